@@ -1,0 +1,78 @@
+"""Time for everything that waits. Nothing else in the project reads the system's clock.
+
+`t_ns` is an integer count of nanoseconds, monotonic within a process. Live clocks are anchored to
+the epoch once, at construction, and then follow the monotonic counter: a step of the system's time
+(NTP, a person) never moves a dead-man or a signal phase.
+"""
+
+import threading
+import time
+from typing import Protocol
+
+NS_PER_S = 1_000_000_000
+NS_PER_MS = 1_000_000
+
+
+def seconds(t_ns: int) -> float:
+    """Return a span of nanoseconds as seconds."""
+    return t_ns / NS_PER_S
+
+
+def nanoseconds(t_s: float) -> int:
+    """Return a span of seconds as whole nanoseconds."""
+    return round(t_s * NS_PER_S)
+
+
+class Clock(Protocol):
+    """What a part's runner needs of time."""
+
+    def now_ns(self) -> int:
+        """Return the present time [ns]."""
+        ...
+
+    def wait_until(self, t_ns: int, wake: threading.Event) -> bool:
+        """Wait until `t_ns` or until `wake` is set; return whether `wake` is set."""
+        ...
+
+
+class WallClock:
+    """The system's time, anchored to the epoch once and monotonic from then on."""
+
+    def __init__(self) -> None:
+        self._offset_ns = time.time_ns() - time.monotonic_ns()
+
+    def now_ns(self) -> int:
+        """Return nanoseconds since the epoch [ns]."""
+        return self._offset_ns + time.monotonic_ns()
+
+    def wait_until(self, t_ns: int, wake: threading.Event) -> bool:
+        """Wait until `t_ns` or until `wake` is set; return whether `wake` is set."""
+        remaining_s = seconds(t_ns - self.now_ns())
+        return wake.wait(remaining_s) if remaining_s > 0.0 else wake.is_set()
+
+
+class StepClock:
+    """A clock that moves only when told to: lockstep runs and tests."""
+
+    def __init__(self, start_ns: int = 0) -> None:
+        self._now_ns = start_ns
+
+    def now_ns(self) -> int:
+        """Return the time it was last set to [ns]."""
+        return self._now_ns
+
+    def set_ns(self, t_ns: int) -> None:
+        """Move to `t_ns`.
+
+        Raises:
+            ValueError: when `t_ns` lies before the present time.
+        """
+        if t_ns < self._now_ns:
+            msg = f"a clock never goes back: now {self._now_ns} ns, asked for {t_ns} ns"
+            raise ValueError(msg)
+        self._now_ns = t_ns
+
+    def wait_until(self, t_ns: int, wake: threading.Event) -> bool:
+        """Move to `t_ns` at once; return whether `wake` is set."""
+        self.set_ns(max(t_ns, self._now_ns))
+        return wake.is_set()

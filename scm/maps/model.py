@@ -1,0 +1,206 @@
+"""The map as data: what a map file says, and what travels to agents that do not have the file.
+
+Frame: the centre of the map's tag is the origin, x right, y up on the floor, lengths in metre, yaw
+counter-clockwise from x in radian. Positions along a lane (`at_m`) count from its start.
+"""
+
+from typing import Literal
+
+import msgspec
+
+Point = tuple[float, float]
+
+
+class Record(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """Base of everything in a map file: unknown keys are refused."""
+
+
+class Floor(Record, kw_only=True, frozen=True):
+    """The ground plate: a rectangle [m]."""
+
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+    colour: str = "#5f6368"
+
+
+class MapTag(Record, kw_only=True, frozen=True):
+    """An AprilTag that lies on the floor and fixes the frame; `size_m` is the black edge."""
+
+    tag_id: int
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+    size_m: float
+
+
+class Segment(Record, kw_only=True, frozen=True):
+    """A piece of a lane's centre line: straight (`length_m`), or an arc.
+
+    Attributes:
+        radius_m: Of the arc, positive.
+        angle_rad: Turned along the arc, + = left.
+    """
+
+    length_m: float | None = None
+    radius_m: float | None = None
+    angle_rad: float | None = None
+
+
+class Lane(Record, kw_only=True, frozen=True):
+    """A way for cars: centre line from a start pose through segments, and what follows it."""
+
+    name: str
+    width_m: float
+    start: tuple[float, float, float]
+    segments: tuple[Segment, ...]
+    next: tuple[str, ...] = ()
+    speed_limit_mps: float
+
+
+class StopLine(Record, kw_only=True, frozen=True):
+    """Where a car waits for a signal group before a junction."""
+
+    name: str
+    lane: str
+    at_m: float
+    junction: str
+    group: str
+
+
+class Conflict(Record, kw_only=True, frozen=True):
+    """The stretch of a lane inside a junction: from `from_m` to `to_m` nobody may stop."""
+
+    lane: str
+    from_m: float
+    to_m: float
+
+
+class Group(Record, kw_only=True, frozen=True):
+    """A signal group and the one movement it releases; `number` is its id in SPATEM."""
+
+    name: str
+    number: int
+    movement: Conflict
+
+
+class Junction(Record, kw_only=True, frozen=True):
+    """Where lanes cross; which groups conflict is derived from the stretches' geometry."""
+
+    name: str
+    number: int
+    groups: tuple[Group, ...]
+    plan: str
+
+
+class Light(Record, kw_only=True, frozen=True):
+    """A three-lamp head on a pole; it shows its group's colour and looks along `yaw_rad`."""
+
+    light_id: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    junction: str
+    group: str
+
+
+class Crosswalk(Record, kw_only=True, frozen=True):
+    """Painted stripes across a lane: centre, direction of the lane there, and size [m]."""
+
+    name: str
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    length_m: float
+    width_m: float
+
+
+class Sign(Record, kw_only=True, frozen=True):
+    """A traffic sign: `left_curve`, `right_curve`, `stop`, `give_way` ..."""
+
+    sign_id: int
+    kind: str
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+class Wall(Record, kw_only=True, frozen=True):
+    """An obstacle along a polyline that nobody can push; `thickness_m` across it."""
+
+    points: tuple[Point, ...]
+    closed: bool = False
+    thickness_m: float = 0.01
+    height_m: float = 0.2
+
+
+class Box(Record, kw_only=True, frozen=True):
+    """A construction box on the floor."""
+
+    name: str
+    x_m: float
+    y_m: float
+    yaw_rad: float = 0.0
+    length_m: float
+    width_m: float
+    height_m: float = 0.2
+
+
+class Spawn(Record, kw_only=True, frozen=True):
+    """A place where a car may be put: on a lane, or anywhere by pose."""
+
+    name: str
+    lane: str | None = None
+    at_m: float | None = None
+    pose: tuple[float, float, float] | None = None
+
+
+class Camera(Record, kw_only=True, frozen=True):
+    """An overhead camera: pinhole with OpenCV's five-term distortion, looking down.
+
+    Attributes:
+        x_m, y_m, z_m: Optical centre in the map frame.
+        yaw_rad: Direction of the image's right edge over the floor (x of the picture).
+        tilt_x_rad, tilt_y_rad: Small rotations about the picture's x and y away from straight down.
+        distortion: k1, k2, p1, p2, k3.
+    """
+
+    name: str
+    x_m: float
+    y_m: float
+    z_m: float
+    yaw_rad: float = 0.0
+    tilt_x_rad: float = 0.0
+    tilt_y_rad: float = 0.0
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    rate_hz: float = 10.0
+    noise_sigma: float = 2.0
+
+
+class CityMap(Record, kw_only=True, frozen=True):
+    """One city. `revision` counts changes of the lanes that cars must know of."""
+
+    map: Literal[1]
+    name: str
+    title: str
+    source: str
+    revision: int = 1
+    floor: Floor
+    tag: MapTag
+    first_vehicle_tag_id: int = 1
+    lanes: tuple[Lane, ...] = ()
+    junctions: tuple[Junction, ...] = ()
+    stop_lines: tuple[StopLine, ...] = ()
+    lights: tuple[Light, ...] = ()
+    crosswalks: tuple[Crosswalk, ...] = ()
+    signs: tuple[Sign, ...] = ()
+    walls: tuple[Wall, ...] = ()
+    boxes: tuple[Box, ...] = ()
+    spawns: tuple[Spawn, ...] = ()
+    cameras: tuple[Camera, ...] = ()
+    radio_range_m: float = 20.0

@@ -1,0 +1,1 @@
+"""Lanes as polylines and routes along them."""

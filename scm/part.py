@@ -1,0 +1,59 @@
+"""The contract of a part of the city: a steppable object without thread, clock or bus.
+
+A part says what it hears and what it serves; a runner (`scm.live` or `scm.lockstep`) ties it to a
+bus and a clock. Because a part only ever sees `now_ns` and its inbox, the same object runs live in
+a process of its own, and deterministically beside all the others on a stepped clock.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.message import Message, Request
+
+
+@dataclass(frozen=True, slots=True)
+class Hears:
+    """A wish to receive: a message class, and values for the variable parts of its key.
+
+    A key part left out of `where` matches everything: `Hears(VehicleState)` hears every vehicle,
+    `Hears(VehicleState, {"vehicle": "n7"})` hears one.
+    """
+
+    kind: type[Message]
+    where: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Serves:
+    """An offer to answer requests of a class whose key parts match `where`."""
+
+    kind: type[Request]
+    where: dict[str, str] = field(default_factory=dict)
+
+
+class Part(Protocol):
+    """A steppable part of the city.
+
+    Attributes:
+        name: The station's name on the bus: `world`, `traffic`, `eye`, `n7`.
+        role: The first chunk of its presence key: `part`, or `v` for a vehicle.
+        period_ns: How often `step` is due [ns].
+        hears: What the runner subscribes to for it, from the start.
+        serves: Which requests the runner brings to it.
+    """
+
+    name: str
+    role: str
+    period_ns: int
+    hears: Sequence[Hears]
+    serves: Sequence[Serves]
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Advance to `now_ns`, having received `inbox` in order of arrival; return what to send."""
+        ...
+
+    def finish(self, now_ns: int) -> list[Outgoing]:
+        """Say last words before the runner closes the bus; called once."""
+        ...

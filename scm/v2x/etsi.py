@@ -1,0 +1,83 @@
+"""ETSI facility messages, CAM and SPATEM, as JSON records in the units of the standards.
+
+A 1:14 car is far below the resolution and the trigger thresholds of the standards (1e-7 degree is
+15 cm of the full-scale city, and a 4 m step is longer than the map). So the V2X layer speaks of the
+enlarged city: lengths, speeds and accelerations times `SCALE`, time unchanged, positions as
+degrees from a reference point. Every field then means what the standard says.
+
+Field sets and units: EN 302 637-2 v1.4.1 (CAM), TS 103 301 with SAE J2735 phase states (SPATEM).
+"""
+
+import msgspec
+
+SCALE = 14.0
+REFERENCE_LATITUDE_DEG = 0.0
+REFERENCE_LONGITUDE_DEG = 0.0
+
+CAM_ID = 2
+SPATEM_ID = 4
+TIME_MARK_UNKNOWN = 36001
+
+
+class CamBody(msgspec.Struct, kw_only=True, frozen=True):
+    """Basic and high-frequency containers of a CAM.
+
+    Attributes:
+        generation_delta_time: Milliseconds modulo 65536.
+        latitude, longitude: 1e-7 degree of the enlarged city, at the middle of the front
+            bumper.
+        heading: 0.1 degree clockwise from north (map +y), 3601 unknown.
+        speed: 0.01 m/s, 16383 unknown.      yaw_rate: 0.01 degree/s, + = left.
+        vehicle_length, vehicle_width: 0.1 m.      longitudinal_acceleration: 0.1 m/s^2.
+        curvature: 1e-4 1/m, + = left, 1023 unknown.      drive_direction: 0 forward, 1 backward.
+    """
+
+    protocol_version: int = 2
+    message_id: int = CAM_ID
+    station_id: int
+    station_type: int = 5
+    generation_delta_time: int
+    latitude: int
+    longitude: int
+    heading: int
+    speed: int
+    drive_direction: int = 0
+    vehicle_length: int
+    vehicle_width: int
+    longitudinal_acceleration: int = 161
+    curvature: int = 1023
+    yaw_rate: int = 32767
+
+
+class MovementState(msgspec.Struct, kw_only=True, frozen=True):
+    """One signal group of a SPATEM.
+
+    Attributes:
+        event_state: SAE J2735 MovementPhaseState by name, e.g. `protected-Movement-Allowed`.
+        min_end_time, max_end_time: 0.1 s within the hour; 36001 is unknown.
+    """
+
+    signal_group: int
+    event_state: str
+    min_end_time: int
+    max_end_time: int = TIME_MARK_UNKNOWN
+
+
+class SpatemBody(msgspec.Struct, kw_only=True, frozen=True):
+    """One intersection of a SPATEM.
+
+    Attributes:
+        revision: Must equal that of the map the receiver holds.
+        status: Names of the set bits: `fixedTimeOperation`, `failureFlash` ...
+        moy: Minute of the year.      time_stamp: Milliseconds within the minute.
+    """
+
+    protocol_version: int = 2
+    message_id: int = SPATEM_ID
+    station_id: int
+    intersection: int
+    revision: int
+    status: tuple[str, ...] = ()
+    moy: int
+    time_stamp: int
+    states: tuple[MovementState, ...]

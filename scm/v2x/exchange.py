@@ -1,0 +1,39 @@
+"""What passes between a part and its bus: things that come in, calls, and answers."""
+
+from dataclasses import dataclass
+
+from scm.v2x.message import Message, Request
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Call:
+    """Ask a request of whoever serves it; the reply comes to a later inbox with `call` set."""
+
+    request: Request
+    timeout_s: float = 2.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Incoming:
+    """One thing that reached a part: a message, a request to answer, or the reply to a call.
+
+    Attributes:
+        message: What arrived. For a reply: the reply, or a `Refused` when the call failed.
+        t_ns: When it reached this process, on this process's own clock [ns].
+        call: The `Call` this answers; None for messages and requests.
+    """
+
+    message: Message
+    t_ns: int
+    call: Call | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """The reply to a request that came in."""
+
+    to: Incoming
+    reply: Message
+
+
+Outgoing = Message | Call | Answer

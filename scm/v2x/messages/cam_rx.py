@@ -1,0 +1,27 @@
+"""Off the air, as heard by one station: a car tells where it is and how it moves."""
+
+from typing import ClassVar
+
+from scm.v2x.etsi import CamBody
+from scm.v2x.message import Message
+
+
+class CamRx(Message, kw_only=True, frozen=True):
+    """A CAM reaches a station.
+
+    Attributes:
+        receiver: Who hears it.
+        station: Who sent it.
+        t_ns: When it was sent.
+    """
+
+    KEY: ClassVar[str] = "v2x/rx/{receiver}/{station}/cam"
+    RATE_HZ: ClassVar[float | None] = 10.0
+
+    receiver: str
+    station: str
+    t_ns: int
+    body: CamBody
+
+
+MESSAGE = CamRx

@@ -1,0 +1,30 @@
+"""The world tells a remote car that it was hit: what the contact did to its motion."""
+
+from typing import ClassVar
+
+from scm.v2x.message import Delivery, Message
+
+
+class Contact(Message, kw_only=True, frozen=True):
+    """What contacts did to the centre of gravity since the last one sent, map frame.
+
+    Attributes:
+        dx_m: Position correction out of the overlap; likewise `dy_m`, `dyaw_rad`.
+        against: What it touched: names of cars, or `wall`.
+    """
+
+    KEY: ClassVar[str] = "v/{vehicle}/contact"
+    DELIVERY: ClassVar[Delivery] = Delivery.COMMAND
+
+    vehicle: str
+    t_ns: int
+    dvx_mps: float
+    dvy_mps: float
+    dyaw_rate_radps: float
+    dx_m: float = 0.0
+    dy_m: float = 0.0
+    dyaw_rad: float = 0.0
+    against: tuple[str, ...] = ()
+
+
+MESSAGE = Contact

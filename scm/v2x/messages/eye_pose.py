@@ -1,0 +1,32 @@
+"""Where an overhead camera sees a car."""
+
+from typing import ClassVar
+
+from scm.v2x.message import Message
+
+
+class EyePose(Message, kw_only=True, frozen=True):
+    """Pose of the rear axle's centre in the map frame, with doubt.
+
+    Attributes:
+        vehicle: The car whose tag it is; `tag-<id>` for a tag that belongs to nobody.
+        t_ns: When the frame was exposed.
+        covariance: Row by row, 3 x 3 over x [m], y [m], yaw [rad].
+        map_tag_age_ms: Since the camera last saw the map's tag: its frame may have moved since.
+    """
+
+    KEY: ClassVar[str] = "eye/{camera}/pose/{vehicle}"
+    RATE_HZ: ClassVar[float | None] = 10.0
+
+    camera: str
+    vehicle: str
+    tag_id: int
+    t_ns: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    covariance: tuple[float, float, float, float, float, float, float, float, float]
+    map_tag_age_ms: float = 0.0
+
+
+MESSAGE = EyePose

@@ -1,0 +1,20 @@
+"""Clear a latched monitor fault: by a person, with a reason."""
+
+from typing import ClassVar
+
+from scm.v2x.message import Message, Request
+from scm.v2x.messages.monitor_status import MonitorStatus
+
+
+class MonitorReset(Request, kw_only=True, frozen=True):
+    """Ask the monitor of a junction to forget its fault."""
+
+    KEY: ClassVar[str] = "tl/{junction}/mon/reset"
+    REPLY: ClassVar[type[Message]] = MonitorStatus
+
+    junction: str
+    by: str
+    reason: str
+
+
+MESSAGE = MonitorReset

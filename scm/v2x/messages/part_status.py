@@ -1,0 +1,28 @@
+"""How a part of the city is doing: its own heartbeat, sent by the loop that does its work."""
+
+from typing import ClassVar
+
+from scm.v2x.message import Message
+
+
+class PartStatus(Message, kw_only=True, frozen=True):
+    """Vital signs of one part.
+
+    Attributes:
+        detail: One line for a person: `6 cars`, `plan calm`, `7 tags`.
+        late_steps: Steps that began later than one period after they were due.
+        dropped: Messages its mailboxes had to drop.
+    """
+
+    KEY: ClassVar[str] = "part/{station}/status"
+    RATE_HZ: ClassVar[float | None] = 1.0
+
+    station: str
+    t_ns: int
+    detail: str = ""
+    step_ms: float = 0.0
+    late_steps: int = 0
+    dropped: int = 0
+
+
+MESSAGE = PartStatus

@@ -1,0 +1,26 @@
+"""Take a car off the map: a hosted one by anybody, a remote one by its own agent as it leaves."""
+
+from typing import ClassVar
+
+from scm.v2x.message import Message, Request
+
+
+class RemoveReply(Message, kw_only=True, frozen=True):
+    """It is gone."""
+
+    KEY: ClassVar[str] = "world/remove/reply"
+
+    vehicle: str
+
+
+class RemoveRequest(Request, kw_only=True, frozen=True):
+    """Remove a car, with a reason for the event log."""
+
+    KEY: ClassVar[str] = "world/remove"
+    REPLY: ClassVar[type[Message]] = RemoveReply
+
+    vehicle: str
+    reason: str = ""
+
+
+MESSAGE = RemoveRequest

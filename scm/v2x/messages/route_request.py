@@ -1,0 +1,41 @@
+"""Send a car along lanes: answered by whoever drives it (the world, or its agent)."""
+
+from typing import ClassVar
+
+from scm.v2x.message import Message, Request
+
+
+class RouteReply(Message, kw_only=True, frozen=True):
+    """The trip has begun.
+
+    Attributes:
+        route: The lanes the car will follow, those between the given ones filled in.
+    """
+
+    KEY: ClassVar[str] = "v/{vehicle}/cmd/route/reply"
+
+    vehicle: str
+    trip_id: str
+    route: tuple[str, ...]
+    length_m: float | None
+
+
+class RouteRequest(Request, kw_only=True, frozen=True):
+    """Drive through these lanes, from where the car is.
+
+    Attributes:
+        via: Lane names to pass in this order; empty: circulate for ever.
+        laps: How often to pass `via`.
+        speed_mps: Wished speed on free road; None: the lanes' limits.
+    """
+
+    KEY: ClassVar[str] = "v/{vehicle}/cmd/route"
+    REPLY: ClassVar[type[Message]] = RouteReply
+
+    vehicle: str
+    via: tuple[str, ...] = ()
+    laps: int = 1
+    speed_mps: float | None = None
+
+
+MESSAGE = RouteRequest

@@ -1,0 +1,37 @@
+"""Put a car that the world itself simulates onto the map."""
+
+from typing import ClassVar
+
+from scm.v2x.message import Message, Request
+
+
+class SpawnReply(Message, kw_only=True, frozen=True):
+    """The car stands there; pose of its rear axle in the map frame."""
+
+    KEY: ClassVar[str] = "world/spawn/reply"
+
+    vehicle: str
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    tag_id: int
+
+
+class SpawnRequest(Request, kw_only=True, frozen=True):
+    """Spawn a hosted car at a named place, or at any free one.
+
+    Attributes:
+        vehicle: Its name; empty: the world chooses one.
+        car: Car file's name.
+        spawn: Name of a spawn place of the map; empty: the first free one.
+    """
+
+    KEY: ClassVar[str] = "world/spawn"
+    REPLY: ClassVar[type[Message]] = SpawnReply
+
+    vehicle: str = ""
+    car: str = "nigel"
+    spawn: str = ""
+
+
+MESSAGE = SpawnRequest

@@ -1,0 +1,44 @@
+"""What a car knows of itself: the native state report of every vehicle."""
+
+from typing import ClassVar
+
+from scm.v2x.message import Message
+
+
+class VehicleState(Message, kw_only=True, frozen=True):
+    """A car's own estimate of its motion; pose of the rear axle's centre on the floor, map frame.
+
+    Attributes:
+        t_ns: When it was true, on the sender's clock.
+        source: Where the pose comes from: `simulated`, `eye`, `odometry`.
+        steering_rad: Mean road-wheel angle, + = left.
+        throttle: Applied command after the guard, -1 to 1.
+        epoch: Of the lease the car obeys now.
+        mode: `drive`, `hold` (commands late), `stop` (commands lost or city stopped), `idle`.
+        lights: Names of those that are on: `head_low head_high left right tail brake reverse`.
+        car: Its car file's name.
+    """
+
+    KEY: ClassVar[str] = "v/{vehicle}/state"
+    RATE_HZ: ClassVar[float | None] = 50.0
+
+    vehicle: str
+    t_ns: int
+    seq: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    speed_mps: float
+    lateral_speed_mps: float = 0.0
+    yaw_rate_radps: float
+    accel_mps2: float = 0.0
+    steering_rad: float
+    throttle: float
+    source: str
+    epoch: int = 0
+    mode: str = "drive"
+    lights: tuple[str, ...] = ()
+    car: str = "nigel"
+
+
+MESSAGE = VehicleState

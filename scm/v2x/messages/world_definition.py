@@ -1,0 +1,20 @@
+"""What the city is: its map, for everybody who joins without having the file."""
+
+from typing import ClassVar
+
+from scm.maps.model import CityMap
+from scm.v2x.message import Delivery, Message
+
+
+class WorldDefinition(Message, kw_only=True, frozen=True):
+    """The map and the scale of the city; sent at the start, late joiners get it."""
+
+    KEY: ClassVar[str] = "world/def"
+    DELIVERY: ClassVar[Delivery] = Delivery.EVENT
+
+    t_ns: int
+    seed: int
+    map: CityMap
+
+
+MESSAGE = WorldDefinition

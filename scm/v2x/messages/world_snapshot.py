@@ -1,0 +1,60 @@
+"""All cars of the city at one instant: for judging, drawing and the emulated overhead camera.
+
+This is the truth of the simulation. It is never sent to agents.
+"""
+
+from typing import ClassVar
+
+import msgspec
+
+from scm.v2x.message import Message
+
+
+class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True):
+    """One car; pose of the rear axle's centre, map frame.
+
+    Attributes:
+        kind: `hosted`, `remote` or `real`.
+        owner: Who holds its lease.
+        age_ms: How old its newest state is: 0 for hosted cars.
+        alive: False from the moment its agent is known to be gone until it is taken off the map.
+    """
+
+    vehicle: str
+    kind: str
+    car: str
+    tag_id: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    speed_mps: float
+    steering_rad: float
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    owner: str = "world"
+    epoch: int = 0
+    mode: str = "drive"
+    age_ms: float = 0.0
+    alive: bool = True
+    lights: tuple[str, ...] = ()
+
+
+class WorldSnapshot(Message, kw_only=True, frozen=True):
+    """The city at `t_ns`.
+
+    Attributes:
+        real_time_factor: Simulated over elapsed time, over the last second.
+        late_ticks: Ticks that ended after the next was due, since the start.
+    """
+
+    KEY: ClassVar[str] = "world/snapshot"
+    RATE_HZ: ClassVar[float | None] = 20.0
+
+    t_ns: int
+    tick: int
+    vehicles: tuple[SnapshotVehicle, ...]
+    real_time_factor: float = 1.0
+    late_ticks: int = 0
+
+
+MESSAGE = WorldSnapshot
