@@ -5,6 +5,9 @@ A 1:14 car is far below the resolution and the trigger thresholds of the standar
 enlarged city: lengths, speeds and accelerations times `SCALE`, time unchanged, positions as
 degrees from a reference point. Every field then means what the standard says.
 
+In JSON the names are those of the records, in snake case as in the open JSON schemas of Orange's
+its-client; the names of phase states and status bits are the standard's own.
+
 Field sets and units: EN 302 637-2 v1.4.1 (CAM), TS 103 301 with SAE J2735 phase states (SPATEM).
 """
 

@@ -1,0 +1,231 @@
+"""Between our own messages and ETSI's records: CAM from a car's state, SPATEM from signal phases.
+
+    enlarged = SCALE * metric        lengths, speeds, accelerations; time and angles as they are
+    heading  = 90 deg - yaw          clockwise from north, north = map +y
+    mark     = 0.1 s within the hour of UTC; 36000 is beyond it, 36001 is unknown
+
+Promises are rounded to the honest side: a minimum end down, a maximum end up. What does not fit a
+field is written as the field's largest value, what is not known as its own unknown value.
+Field sets and values: EN 302 637-2 v1.4.1 with TS 102 894-2, TS 103 301 with SAE J2735.
+"""
+
+import hashlib
+import math
+from datetime import UTC, datetime
+from typing import NamedTuple
+
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.geometry import wrap_angle
+from scm.maps.model import Junction
+from scm.v2x.etsi import (
+    REFERENCE_LATITUDE_DEG,
+    REFERENCE_LONGITUDE_DEG,
+    SCALE,
+    TIME_MARK_UNKNOWN,
+    CamBody,
+    MovementState,
+    SpatemBody,
+)
+from scm.v2x.messages.spat import Colour, SignalGroup, Spat
+from scm.v2x.messages.vehicle_state import VehicleState
+
+TIME_MARK_FAR = 36000
+HEADING_UNKNOWN = 3601
+SPEED_MAX, SPEED_UNKNOWN = 16382, 16383
+LENGTH_MAX, WIDTH_MAX = 1022, 61
+ACCEL_MAX = 160
+CURVATURE_MAX, CURVATURE_UNKNOWN = 1022, 1023
+YAW_RATE_MAX, YAW_RATE_UNKNOWN = 32766, 32767
+REVISIONS = 128
+
+_ITS_EPOCH_MS = 1_072_915_200_000
+_LEAP_MS = 5_000  # leap seconds from 2004 to now: the ITS time scale does not skip them
+_DELTA_TIMES = 65_536
+_MARK_NS = NS_PER_S // 10
+_MARKS_PER_HOUR = 36_000
+_HOUR_NS = 3_600 * NS_PER_S
+_MARK_PAST_MS = 300_000
+_STANDSTILL_MPS = 0.02
+
+# WGS 84: metres per degree at the reference point.
+_A_M, _E2 = 6_378_137.0, 6.694_379_990_141e-3
+_PHI = math.radians(REFERENCE_LATITUDE_DEG)
+_W2 = 1.0 - _E2 * math.sin(_PHI) ** 2
+_NORTH_M = math.radians(1.0) * _A_M * (1.0 - _E2) / _W2**1.5
+_EAST_M = math.radians(1.0) * _A_M * math.cos(_PHI) / math.sqrt(_W2)
+
+_STATE_OF: dict[Colour, str] = {
+    "red": "stop-And-Remain",
+    "green": "protected-Movement-Allowed",
+    "yellow": "protected-clearance",
+    "flashing_red": "stop-Then-Proceed",
+    "dark": "dark",
+}
+_COLOUR_OF: dict[str, Colour] = {state: colour for colour, state in _STATE_OF.items()}
+_STATUS_OF = {
+    "plan": ("fixedTimeOperation",),
+    "start": ("standbyOperation",),
+    "flash": ("failureFlash",),
+}
+
+
+class CamView(NamedTuple):
+    """A CAM in metric units of the table: position of the front bumper's middle, map frame.
+
+    `speed_mps` is negative in reverse; None is unknown.
+    """
+
+    station_id: int
+    x_m: float
+    y_m: float
+    yaw_rad: float | None
+    speed_mps: float | None
+    yaw_rate_radps: float | None
+    length_m: float
+    width_m: float
+
+
+class Told(NamedTuple):
+    """What a SPATEM says of one group; seconds count from the body's own time stamp."""
+
+    colour: Colour
+    min_end_s: float | None
+    max_end_s: float | None
+
+
+def station_id(name: str) -> int:
+    """Return the same 32-bit number for the same station name, on every machine."""
+    return int.from_bytes(hashlib.blake2s(name.encode(), digest_size=4).digest(), "big")
+
+
+def roadside_station(junction: str) -> str:
+    """Return the station name of a junction's roadside unit, the one that sends its SPATEM."""
+    return f"rsu-{junction}"
+
+
+def _clamp(value: float, low: int, high: int) -> int:
+    return max(low, min(high, round(value)))
+
+
+def delta_time(t_ns: int) -> int:
+    """Return generationDeltaTime: ITS milliseconds (since 2004, leap seconds counted) mod 65536."""
+    return (t_ns // NS_PER_MS - _ITS_EPOCH_MS + _LEAP_MS) % _DELTA_TIMES
+
+
+def generated_ns(body: CamBody, near_ns: int) -> int:
+    """Return when a CAM was generated [ns], to the ms, if that is within 32 s of `near_ns`."""
+    half = _DELTA_TIMES // 2
+    ahead = (body.generation_delta_time - delta_time(near_ns) + half) % _DELTA_TIMES - half
+    return (near_ns // NS_PER_MS + ahead) * NS_PER_MS
+
+
+def _heading(yaw: float) -> int:
+    return round((90.0 - math.degrees(yaw)) * 10.0) % 3600
+
+
+def _curvature(state: VehicleState) -> int:
+    if abs(state.speed_mps) < _STANDSTILL_MPS:
+        return CURVATURE_UNKNOWN
+    curvature = state.yaw_rate_radps / state.speed_mps / SCALE
+    return _clamp(curvature * 1e4, -CURVATURE_MAX, CURVATURE_MAX)
+
+
+def cam_of(state: VehicleState, *, length_m: float, width_m: float, front_m: float) -> CamBody:
+    """Return the CAM of a car; `front_m` reaches from its rear axle to its front bumper."""
+    x_m = state.x_m + front_m * math.cos(state.yaw_rad)
+    y_m = state.y_m + front_m * math.sin(state.yaw_rad)
+    return CamBody(
+        station_id=station_id(state.vehicle),
+        generation_delta_time=delta_time(state.t_ns),
+        latitude=round((REFERENCE_LATITUDE_DEG + y_m * SCALE / _NORTH_M) * 1e7),
+        longitude=round((REFERENCE_LONGITUDE_DEG + x_m * SCALE / _EAST_M) * 1e7),
+        heading=_heading(state.yaw_rad),
+        speed=_clamp(abs(state.speed_mps) * SCALE * 100.0, 0, SPEED_MAX),
+        drive_direction=int(state.speed_mps < -_STANDSTILL_MPS),
+        vehicle_length=_clamp(length_m * SCALE * 10.0, 1, LENGTH_MAX),
+        vehicle_width=_clamp(width_m * SCALE * 10.0, 1, WIDTH_MAX),
+        longitudinal_acceleration=_clamp(state.accel_mps2 * SCALE * 10.0, -ACCEL_MAX, ACCEL_MAX),
+        curvature=_curvature(state),
+        yaw_rate=_clamp(math.degrees(state.yaw_rate_radps) * 100.0, -YAW_RATE_MAX, YAW_RATE_MAX),
+    )
+
+
+def _if_known(value: int, unknown: int, unit: float) -> float | None:
+    return None if value == unknown else value * unit
+
+
+def read_cam(body: CamBody) -> CamView:
+    """Return a CAM in metres of the table; resolution 0.8 mm, 0.1 degree, 0.7 mm/s."""
+    backward = -1.0 if body.drive_direction == 1 else 1.0
+    heading = _if_known(body.heading, HEADING_UNKNOWN, 0.1)
+    return CamView(
+        station_id=body.station_id,
+        x_m=(body.longitude * 1e-7 - REFERENCE_LONGITUDE_DEG) * _EAST_M / SCALE,
+        y_m=(body.latitude * 1e-7 - REFERENCE_LATITUDE_DEG) * _NORTH_M / SCALE,
+        yaw_rad=None if heading is None else wrap_angle(math.radians(90.0 - heading)),
+        speed_mps=_if_known(body.speed, SPEED_UNKNOWN, backward * 0.01 / SCALE),
+        yaw_rate_radps=_if_known(body.yaw_rate, YAW_RATE_UNKNOWN, math.radians(0.01)),
+        length_m=body.vehicle_length * 0.1 / SCALE,
+        width_m=body.vehicle_width * 0.1 / SCALE,
+    )
+
+
+def _mark(end_ns: int | None, now_ns: int, *, up: bool) -> int:
+    if end_ns is None:
+        return TIME_MARK_UNKNOWN
+    if end_ns - now_ns >= _HOUR_NS - _MARK_PAST_MS * NS_PER_MS:
+        return TIME_MARK_FAR
+    tenths = -(-end_ns // _MARK_NS) if up else end_ns // _MARK_NS
+    return tenths % _MARKS_PER_HOUR
+
+
+def _movement(group: SignalGroup, number: int, spat: Spat) -> MovementState:
+    promised = spat.mode != "flash" and group.colour in ("red", "green", "yellow")
+    return MovementState(
+        signal_group=number,
+        event_state=_STATE_OF[group.colour],
+        min_end_time=_mark(group.min_end_ns if promised else None, spat.t_ns, up=False),
+        max_end_time=_mark(group.max_end_ns if promised else None, spat.t_ns, up=True),
+    )
+
+
+def spatem_of(spat: Spat, junction: Junction) -> SpatemBody:
+    """Return the SPATEM of a junction, sent by its roadside station.
+
+    Raises:
+        KeyError: when the Spat names a group that the junction does not have.
+    """
+    numbers = {group.name: group.number for group in junction.groups}
+    now = datetime.fromtimestamp(spat.t_ns // NS_PER_S, UTC)
+    return SpatemBody(
+        station_id=station_id(roadside_station(spat.junction)),
+        intersection=junction.number,
+        revision=spat.revision % REVISIONS,
+        status=_STATUS_OF.get(spat.mode, ()),
+        moy=(now.timetuple().tm_yday - 1) * 1440 + now.hour * 60 + now.minute,
+        time_stamp=now.second * 1000 + spat.t_ns % NS_PER_S // NS_PER_MS,
+        states=tuple(_movement(group, numbers[group.group], spat) for group in spat.groups),
+    )
+
+
+def _until_s(mark: int, body: SpatemBody) -> float | None:
+    if mark >= _MARKS_PER_HOUR:
+        return None
+    now_ms = body.moy % 60 * 60_000 + body.time_stamp
+    ahead_ms = (mark * 100 - now_ms + _MARK_PAST_MS) % 3_600_000 - _MARK_PAST_MS
+    return max(0.0, ahead_ms / 1000.0)
+
+
+def colours_of(body: SpatemBody) -> dict[int, Told]:
+    """Return what a SPATEM says of each group number: colour, and seconds to its ends.
+
+    Only a protected movement is green. Every state that we do not know counts as dark.
+    """
+    return {
+        state.signal_group: Told(
+            _COLOUR_OF.get(state.event_state, "dark"),
+            _until_s(state.min_end_time, body),
+            _until_s(state.max_end_time, body),
+        )
+        for state in body.states
+    }
