@@ -1,0 +1,139 @@
+"""The guard between every command and every body: fencing, dead-man, limits, city stop.
+
+Whatever commands a car, a driver beside it or a person far away, its wishes pass here last. The
+guard knows no bus, no clock and no physics: it is told what arrived and when, on the receiver's
+own clock, and says what the body may do now.
+
+    age of the newest accepted command    mode     what the body does
+    below 150 ms                          drive    the command
+    150 ms                                hold     steering held, zero throttle
+    300 ms                                stop     controlled stop
+    1000 ms                               lost     brake, hazard lights, the lease is dropped
+
+A lost car does not drive again on its old epoch, however healthy its commander looks by then.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from scm.clock import NS_PER_MS
+from scm.v2x.messages.drive_command import DriveCommand
+
+HOLD_NS = 150 * NS_PER_MS
+STOP_NS = 300 * NS_PER_MS
+LOST_NS = 1000 * NS_PER_MS
+
+Mode = Literal["drive", "hold", "stop", "lost"]
+
+
+@dataclass(frozen=True, slots=True)
+class Guarded:
+    """What the body may do now.
+
+    Attributes:
+        throttle: -1 to 1, + forward; zero in every mode but `drive`.
+        steering: -1 to 1, + = left; the last commanded one when there is no newer.
+        hazard: Whether the hazard lights must flash.
+    """
+
+    throttle: float
+    steering: float
+    mode: Mode
+    hazard: bool
+
+    @property
+    def brake(self) -> bool:
+        """Whether a body that has a brake of its own must use it."""
+        return self.mode in ("stop", "lost")
+
+
+class Guard:
+    """The last word on one car's throttle and steering.
+
+    A new guard stops until its first command. `epoch` is the lowest one it will obey.
+    """
+
+    def __init__(self, epoch: int = 0) -> None:
+        self._epoch = epoch
+        self._seq: int | None = None
+        self._throttle = 0.0
+        self._steering = 0.0
+        self._heard_ns: int | None = None
+        self._now_ns: int | None = None
+        self._lost = False
+        self._stopped = False
+        self.refused = 0
+
+    @property
+    def epoch(self) -> int:
+        """The highest epoch seen: what is older is refused for ever."""
+        return self._epoch
+
+    @property
+    def lost(self) -> bool:
+        """Whether the lease was dropped: only a newer epoch drives this car again."""
+        return self._lost
+
+    def set_epoch(self, epoch: int, now_ns: int) -> bool:
+        """Learn that the city granted a newer lease; return whether it was newer.
+
+        From now on older commands are refused, and the new holder has as long to speak up as
+        between two commands. Until then the car holds its steering without throttle.
+        """
+        self._advance(now_ns)
+        if epoch <= self._epoch:
+            return False
+        self._epoch, self._seq = epoch, None
+        self._throttle, self._heard_ns = 0.0, self._now_ns
+        self._lost = False
+        return True
+
+    def take(self, command: DriveCommand, now_ns: int) -> bool:
+        """Accept a command that arrived at `now_ns`, or refuse (and count) it; return which."""
+        self._advance(now_ns)
+        if not self._acceptable(command):
+            self.refused += 1
+            return False
+        self._epoch, self._seq = command.epoch, command.seq
+        self._throttle = _limited(command.throttle)
+        self._steering = _limited(command.steering)
+        self._heard_ns = self._now_ns
+        self._lost = False
+        return True
+
+    def stop(self, engaged: bool) -> None:
+        """Engage or release the city-wide stop: while engaged the car stops for everybody."""
+        self._stopped = engaged
+
+    def output(self, now_ns: int) -> Guarded:
+        """Return what the body may do at `now_ns`."""
+        age_ns = self._advance(now_ns)
+        if self._lost:
+            return Guarded(0.0, self._steering, "lost", hazard=True)
+        if self._stopped or age_ns is None or age_ns >= STOP_NS:
+            return Guarded(0.0, self._steering, "stop", hazard=False)
+        if self._seq is None or age_ns >= HOLD_NS:
+            return Guarded(0.0, self._steering, "hold", hazard=False)
+        return Guarded(self._throttle, self._steering, "drive", hazard=False)
+
+    def _advance(self, now_ns: int) -> int | None:
+        """Move to `now_ns`, never backwards; return the newest command's age and note a loss."""
+        self._now_ns = now_ns if self._now_ns is None else max(self._now_ns, now_ns)
+        if self._heard_ns is None:
+            return None
+        age_ns = self._now_ns - self._heard_ns
+        if age_ns >= LOST_NS:
+            self._lost = True
+        return age_ns
+
+    def _acceptable(self, command: DriveCommand) -> bool:
+        if not (math.isfinite(command.throttle) and math.isfinite(command.steering)):
+            return False
+        if command.epoch != self._epoch:
+            return command.epoch > self._epoch
+        return not self._lost and (self._seq is None or command.seq > self._seq)
+
+
+def _limited(value: float) -> float:
+    return min(1.0, max(-1.0, value))
