@@ -1,6 +1,6 @@
 """Send a car along lanes: answered by whoever drives it (the world, or its agent)."""
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from scm.v2x.message import Message, Request
 
@@ -27,6 +27,7 @@ class RouteRequest(Request, kw_only=True, frozen=True):
         via: Lane names to pass in this order; empty: circulate for ever.
         laps: How often to pass `via`.
         speed_mps: Wished speed on free road; None: the lanes' limits.
+        then: What to do on arrival: `stop` there, or `circulate` so as not to block the lane.
     """
 
     KEY: ClassVar[str] = "v/{vehicle}/cmd/route"
@@ -36,6 +37,7 @@ class RouteRequest(Request, kw_only=True, frozen=True):
     via: tuple[str, ...] = ()
     laps: int = 1
     speed_mps: float | None = None
+    then: Literal["stop", "circulate"] = "stop"
 
 
 MESSAGE = RouteRequest

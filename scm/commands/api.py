@@ -1,0 +1,51 @@
+"""`scm api`: REST, event stream and dashboard."""
+
+import argparse
+import threading
+
+from scm.command import Command, part_arguments, stop_on_signals
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    part_arguments(parser)
+    parser.add_argument("--host", default="127.0.0.1", help="address to bind (%(default)s)")
+    parser.add_argument("--port", type=int, default=8000, help="port to bind (%(default)s)")
+    parser.add_argument("--api-key", help="needed to bind any address but this machine's own")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.api.app import check_bind, create_app
+    from scm.api.server import serve
+    from scm.api.view import CityView
+    from scm.clock import WallClock
+    from scm.live import run
+    from scm.maps.load import load_map
+    from scm.v2x.ask import ask
+    from scm.v2x.bus_zenoh import ZenohBus
+
+    check_bind(arguments.host, arguments.api_key)
+    stop = stop_on_signals()
+    view = CityView()
+    with ZenohBus(arguments.city, view.name, arguments.connect) as bus:
+        app = create_app(
+            view,
+            lambda request, timeout_s: ask(bus, request, timeout_s),
+            load_map(arguments.map),
+            api_key=arguments.api_key,
+        )
+        hearing = threading.Thread(target=run, args=(view, bus, WallClock(), stop), name="view")
+        hearing.start()
+        try:
+            serve(app, arguments.host, arguments.port, stop)
+        finally:
+            stop.set()
+            hearing.join()
+    return 0
+
+
+COMMAND = Command(
+    help="REST, event stream and dashboard.",
+    example="scm api driving_school --port 8000",
+    arguments=_arguments,
+    run=_run,
+)

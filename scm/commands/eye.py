@@ -1,0 +1,26 @@
+"""`scm eye`: one part of the city, on its own."""
+
+import argparse
+
+from scm.command import Command, part_arguments, run_part
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    part_arguments(parser)
+    parser.add_argument("--camera", help="which camera of the map; default: its first")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.eye.part import EyePart
+    from scm.maps.load import load_map
+
+    part = EyePart(load_map(arguments.map), arguments.camera, arguments.seed)
+    return run_part(part, arguments)
+
+
+COMMAND = Command(
+    help="AutoDRIVE Eye: poses of tags in the overhead camera's frames.",
+    example="scm eye driving_school --connect tcp/127.0.0.1:7447",
+    arguments=_arguments,
+    run=_run,
+)

@@ -1,0 +1,29 @@
+"""`scm recover`: mend a recording whose writer was killed."""
+
+import argparse
+from pathlib import Path
+
+from scm.command import Command
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("recording", type=Path, metavar="FILE", help="the .mcap that was cut off")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="default: <name>.recovered.mcap")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.recorder.recover import recover
+
+    result = recover(arguments.recording, arguments.out)
+    state = "was whole" if result.whole else "was cut off"
+    print(f"{arguments.recording} {state}: {result.messages} messages over {result.span_s:.1f} s")
+    print(f"written to {result.path}")
+    return 0
+
+
+COMMAND = Command(
+    help="Mend a recording whose writer was killed.",
+    example="scm recover runs/today.mcap",
+    arguments=_arguments,
+    run=_run,
+)

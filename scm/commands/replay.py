@@ -1,0 +1,84 @@
+"""`scm replay`: a recording driven again by the simulator, and how far it strays."""
+
+import argparse
+import csv
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scm.command import Command
+
+if TYPE_CHECKING:
+    from scm.replay import FreeRun
+
+HORIZONS_S = (0.5, 1.0, 3.0)
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "recording", nargs="+", type=Path, help="description files, or their folders"
+    )
+    parser.add_argument("--car", metavar="FILE", help="car file or name; default: the recording's")
+    parser.add_argument(
+        "--data", type=Path, metavar="DIR", help="where the tables are; default: beside"
+    )
+    parser.add_argument(
+        "--horizon-s", type=float, default=3.0, help="length of a window (%(default)s)"
+    )
+    parser.add_argument("--save", type=Path, metavar="CSV", help="write every window's poses here")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.recording.read import read_recordings
+    from scm.replay import free_run
+    from scm.vehicles.car import load_car
+
+    runs = []
+    for path in arguments.recording:
+        for recording in read_recordings(path, arguments.data):
+            car = load_car(arguments.car or recording.vehicle)
+            run = free_run(recording, car, arguments.horizon_s)
+            print(
+                f"{path}  car {car.name}: {len(run.start_s)} windows of {arguments.horizon_s:g} s,"
+            )
+            print("free run from the measured state, median and 90th percentile of the error")
+            print(_table(run, arguments.horizon_s) + "\n")
+            runs.append(run)
+    if arguments.save:
+        _save(arguments.save, runs)
+        print(f"windows written to {arguments.save}")
+    return 0
+
+
+def _table(run: "FreeRun", horizon_s: float) -> str:
+    """Return the error table as aligned text."""
+    from scm.replay import error_table
+
+    horizons = tuple(h for h in HORIZONS_S if h <= horizon_s) or (horizon_s,)
+    lines = [" " * 14 + "".join(f"{f'{h:g} s':>20}" for h in horizons)]
+    for label, values in error_table(run, horizons):
+        cells = "".join(f"{median:>11.4f}{p90:>9.4f}" for median, p90 in values)
+        lines.append(f"{label:<14}{cells}")
+    return "\n".join(lines)
+
+
+def _save(path: Path, runs: "list[FreeRun]") -> None:
+    """Write simulated and measured poses of every window."""
+    window = 0
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["window", "t", "x", "y", "yaw", "x_meas", "y_meas", "yaw_meas"])
+        for run in runs:
+            columns = (run.x, run.y, run.yaw, run.x_measured, run.y_measured, run.yaw_measured)
+            for row, start in enumerate(run.start_s):
+                for k, t in enumerate(run.t_s):
+                    cells = [f"{start + t:.3f}", *(f"{column[row, k]:.6f}" for column in columns)]
+                    writer.writerow([window, *cells])
+                window += 1
+
+
+COMMAND = Command(
+    help="Drive a recording again by free run from the measured state and print the errors.",
+    example="scm replay recordings/dart/free_driving_10_02_28.yaml --data ../recordings/dart",
+    arguments=_arguments,
+    run=_run,
+)

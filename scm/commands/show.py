@@ -1,0 +1,94 @@
+"""`scm show`: a map, a car, the physical effects or the messages, for people."""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+from scm.command import Command
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", choices=("map", "car", "terms", "messages"))
+    parser.add_argument("name", nargs="?", help="which map or car; without: the names there are")
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE", help="map: where to put the SVG picture"
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    show: dict[str, Callable[[argparse.Namespace], str]] = {
+        "map": _map,
+        "car": _car,
+        "terms": _terms,
+        "messages": _messages,
+    }
+    print(show[arguments.what](arguments))
+    return 0
+
+
+def _map(arguments: argparse.Namespace) -> str:
+    from scm.maps.draw import draw_svg
+    from scm.maps.load import load_map, map_names
+
+    if arguments.name is None:
+        return "\n".join(map_names())
+    city_map = load_map(arguments.name)
+    out: Path = arguments.out or Path(f"{city_map.name}.svg")
+    out.write_text(draw_svg(city_map), encoding="utf-8")
+    counts = ", ".join(
+        f"{len(getattr(city_map, kind))} {kind}"
+        for kind in (
+            "lanes",
+            "junctions",
+            "lights",
+            "signs",
+            "crosswalks",
+            "walls",
+            "spawns",
+            "cameras",
+        )
+    )
+    return f"{city_map.title}: {counts}\ndrawn in {out}"
+
+
+def _car(arguments: argparse.Namespace) -> str:
+    from scm.vehicles.car import car_names, load_car
+    from scm.vehicles.describe import describe_car
+
+    return (
+        "\n".join(car_names()) if arguments.name is None else describe_car(load_car(arguments.name))
+    )
+
+
+def _terms(arguments: argparse.Namespace) -> str:
+    from scm.vehicles.describe import describe_terms
+
+    del arguments
+    return describe_terms()
+
+
+def _messages(arguments: argparse.Namespace) -> str:
+    from scm.registry import load, names
+    from scm.v2x.message import Request
+
+    del arguments
+    kinds = [load("scm.v2x.messages", name, "MESSAGE", type) for name in names("scm.v2x.messages")]
+    rows = []
+    for kind in kinds:
+        reply = f" -> {kind.REPLY.__name__}" if issubclass(kind, Request) else ""
+        rate = f"{kind.RATE_HZ:g} Hz" if kind.RATE_HZ else ""
+        about = (kind.__doc__ or "").partition("\n")[0]
+        rows.append((kind.__name__ + reply, kind.KEY, kind.DELIVERY.value, rate, about))
+    widths = [max(len(row[i]) for row in rows) for i in range(4)]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, [*widths, 0], strict=True)).rstrip()
+        for row in rows
+    )
+
+
+COMMAND = Command(
+    help="Show a map, a car, the physical effects or the messages.",
+    example="scm show car nigel",
+    arguments=_arguments,
+    run=_run,
+)

@@ -1,0 +1,34 @@
+"""`scm world`: one part of the city, on its own."""
+
+import argparse
+
+from scm.command import Command, part_arguments, run_part
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    part_arguments(parser)
+    parser.add_argument(
+        "--hosted",
+        type=int,
+        default=0,
+        metavar="N",
+        help="cars to spawn at the start (%(default)s)",
+    )
+    parser.add_argument("--car", default="nigel", help="their car file (%(default)s)")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.maps.load import load_map
+    from scm.world.part import WorldPart
+
+    hosted = tuple((f"n{i + 1}", arguments.car) for i in range(arguments.hosted))
+    part = WorldPart(load_map(arguments.map), arguments.seed, hosted)
+    return run_part(part, arguments)
+
+
+COMMAND = Command(
+    help="The shared world: cars, walls, contacts, sensors, radio, leases.",
+    example="scm world driving_school --connect tcp/127.0.0.1:7447",
+    arguments=_arguments,
+    run=_run,
+)

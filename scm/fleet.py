@@ -1,0 +1,273 @@
+"""Fleet scripts: spawn cars, send them on routes, switch signal plans, collect travel times.
+
+    with open_city("driving_school") as city:                                   # in lockstep
+    with open_city("driving_school", connect="tcp/127.0.0.1:7447") as city:     # live, over the bus
+
+The script is the same: in lockstep waiting moves a stepped clock and takes no longer than the
+computation; live it waits for the real city.
+"""
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Protocol, TypeVar
+
+from scm.clock import WallClock, seconds
+from scm.errors import RunError, ScmError
+from scm.lockstep import Lockstep
+from scm.maps.load import load_map
+from scm.part import Hears
+from scm.traffic.monitor_part import MonitorPart
+from scm.traffic.part import TrafficPart
+from scm.v2x.ask import ask
+from scm.v2x.bus import Mailbox
+from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.message import Message, Refused, Request
+from scm.v2x.messages.plan_request import PlanReply, PlanRequest
+from scm.v2x.messages.remove_request import RemoveRequest
+from scm.v2x.messages.route_request import RouteReply, RouteRequest
+from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
+from scm.v2x.messages.trip import Trip
+from scm.world.part import WorldPart
+
+R = TypeVar("R", bound=Message)
+
+
+class Link(Protocol):
+    """How a script reaches a city: live or in lockstep."""
+
+    @property
+    def now_ns(self) -> int:
+        """The city's time [ns]."""
+        ...
+
+    def ask(self, request: Request) -> Message:
+        """Return the reply to a request, or a `Refused`."""
+        ...
+
+    def hear(self, hears: Hears) -> Mailbox:
+        """Return a mailbox that fills from now on."""
+        ...
+
+    def run_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
+        """Let the city go on until `done()`; return whether that came in time."""
+        ...
+
+
+class LockstepLink:
+    """The city in this process, on a stepped clock."""
+
+    def __init__(self, lockstep: Lockstep) -> None:
+        self._lockstep = lockstep
+
+    @property
+    def now_ns(self) -> int:
+        """The stepped clock's time [ns]."""
+        return self._lockstep.now_ns
+
+    def ask(self, request: Request) -> Message:
+        """Step the city until the reply is there."""
+        return self._lockstep.call(request)
+
+    def hear(self, hears: Hears) -> Mailbox:
+        """Return a mailbox on the in-memory bus."""
+        return self._lockstep.hear(hears)
+
+    def run_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
+        """Step the city until `done()`."""
+        try:
+            self._lockstep.run_until(done, timeout_s)
+        except RunError:
+            return False
+        return True
+
+
+class LiveLink:
+    """A running city, over Zenoh."""
+
+    def __init__(self, bus: ZenohBus) -> None:
+        self._bus = bus
+        self._clock = WallClock()
+        self._wake = threading.Event()
+
+    @property
+    def now_ns(self) -> int:
+        """This process's time [ns]."""
+        return self._clock.now_ns()
+
+    def ask(self, request: Request) -> Message:
+        """Wait for the reply."""
+        return ask(self._bus, request)
+
+    def hear(self, hears: Hears) -> Mailbox:
+        """Return a mailbox subscribed on the bus."""
+        mailbox = Mailbox(1000, self._wake)
+        self._bus.subscribe(hears.kind, hears.where, mailbox)
+        return mailbox
+
+    def run_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
+        """Wait, looking again whenever something is heard."""
+        deadline = self.now_ns + round(timeout_s * 1e9)
+        while not done():
+            if self.now_ns >= deadline:
+                return False
+            self._clock.wait_until(min(deadline, self.now_ns + 100_000_000), self._wake)
+            self._wake.clear()
+        return True
+
+
+@dataclass(eq=False)
+class Journey:
+    """One trip of one car.
+
+    Attributes:
+        route: The lanes it follows.
+        length_m: Of the route.
+        travel_time_s: From start to arrival; None while under way.
+    """
+
+    vehicle: str
+    trip_id: str
+    route: tuple[str, ...]
+    length_m: float | None
+    travel_time_s: float | None = None
+
+
+@dataclass(eq=False)
+class FleetCar:
+    """A car that the script has spawned."""
+
+    name: str
+    city: "City" = field(repr=False)
+
+    def drive(
+        self, *via: str, laps: int = 1, speed_mps: float | None = None, then: str = "circulate"
+    ) -> Journey:
+        """Send the car through lanes, from where it is; it drives on afterwards unless told to stop."""
+        request = RouteRequest(
+            vehicle=self.name,
+            via=via,
+            laps=laps,
+            speed_mps=speed_mps,
+            then="stop" if then == "stop" else "circulate",
+        )
+        reply = self.city.request(request, RouteReply)
+        journey = Journey(self.name, reply.trip_id, reply.route, reply.length_m)
+        self.city.journeys.append(journey)
+        return journey
+
+    def remove(self) -> None:
+        """Take the car off the map."""
+        self.city.request(RemoveRequest(vehicle=self.name, reason="script"), Message)
+        self.city.cars.remove(self)
+
+
+class City:
+    """A script's hold on a city; what the script spawned leaves with it."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._trips = link.hear(Hears(Trip))
+        self.cars: list[FleetCar] = []
+        self.journeys: list[Journey] = []
+
+    @property
+    def time_s(self) -> float:
+        """The city's time [s]."""
+        return seconds(self._link.now_ns)
+
+    def spawn(self, car: str = "nigel", *, at: str = "", name: str = "") -> FleetCar:
+        """Put a car onto a spawn place of the map: `at`, or the first free one."""
+        reply = self.request(SpawnRequest(vehicle=name, car=car, spawn=at), SpawnReply)
+        spawned = FleetCar(reply.vehicle, self)
+        self.cars.append(spawned)
+        return spawned
+
+    def use_plan(
+        self, plan: str, *, junction: str = "crossing", reason: str = "script"
+    ) -> PlanReply:
+        """Ask for a signal plan; the kernel takes it at the next safe moment."""
+        request = PlanRequest(junction=junction, plan=plan, by="script", reason=reason)
+        return self.request(request, PlanReply)
+
+    def run_for(self, duration_s: float) -> None:
+        """Let the city go on for a while."""
+        end = self._link.now_ns + round(duration_s * 1e9)
+        self._link.run_until(lambda: self._link.now_ns >= end, duration_s + 1.0)
+
+    def wait(self, journeys: Sequence[Journey], timeout_s: float = 120.0) -> None:
+        """Let the city go on until all journeys have arrived.
+
+        Raises:
+            RunError: naming those that had not when the time was over.
+        """
+        if self._link.run_until(lambda: self._arrived(journeys), timeout_s):
+            return
+        late = [journey.vehicle for journey in journeys if journey.travel_time_s is None]
+        msg = f"after {timeout_s:g} s these cars had not arrived: {', '.join(late)}"
+        raise RunError(msg)
+
+    def request(self, request: Request, kind: type[R]) -> R:
+        """Ask and return the reply.
+
+        Raises:
+            ScmError: with the sentence of whoever refused.
+        """
+        reply = self._link.ask(request)
+        if isinstance(reply, Refused):
+            msg = f"{type(request).__name__}: {reply.detail}"
+            raise ScmError(msg)
+        if not isinstance(reply, kind):
+            msg = f"{type(request).__name__}: got {type(reply).__name__}, expected {kind.__name__}"
+            raise ScmError(msg)
+        return reply
+
+    def leave(self) -> None:
+        """Remove every car that this script spawned."""
+        for car in list(self.cars):
+            car.remove()
+
+    def _arrived(self, journeys: Sequence[Journey]) -> bool:
+        known = {(journey.vehicle, journey.trip_id): journey for journey in self.journeys}
+        for item in self._trips.drain():
+            trip = item.message
+            if not isinstance(trip, Trip) or trip.arrived_ns is None:
+                continue
+            journey = known.get((trip.vehicle, trip.trip_id))
+            if journey is not None:
+                journey.travel_time_s = seconds(trip.arrived_ns - trip.started_ns)
+        return all(journey.travel_time_s is not None for journey in journeys)
+
+
+@contextmanager
+def open_city(
+    map_name: str = "driving_school",
+    *,
+    connect: str | None = None,
+    city: str = "city",
+    seed: int = 0,
+) -> Iterator[City]:
+    """Open a city for a script.
+
+    Args:
+        map_name: Which map to build in lockstep; ignored live, where the city has its own.
+        connect: Router of a running city; None: a city of its own, in lockstep.
+        city: Whose keys to use.
+        seed: Of all randomness in lockstep.
+    """
+    if connect is None:
+        yield City(LockstepLink(_lockstep_city(map_name, city, seed)))
+        return
+    with ZenohBus(city, "script", connect) as bus:
+        live = City(LiveLink(bus))
+        try:
+            yield live
+        finally:
+            live.leave()
+
+
+def _lockstep_city(map_name: str, city: str, seed: int) -> Lockstep:
+    city_map = load_map(map_name)
+    parts = [WorldPart(city_map, seed), TrafficPart(city_map), MonitorPart(city_map)]
+    return Lockstep(parts, city)

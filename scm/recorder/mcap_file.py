@@ -1,0 +1,143 @@
+"""A run as an MCAP file: one channel a key, JSON messages, one schema a message class.
+
+The raw key is the channel's topic, so that a replay can publish again. A bulk message becomes JSON
+too, its payload in base64, so that any MCAP tool can read the whole file.
+"""
+
+import base64
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple
+
+import msgspec
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from mcap.writer import Writer
+
+from scm import __version__
+from scm.errors import RecordingError
+from scm.registry import load, names
+from scm.v2x.exchange import RawSample
+from scm.v2x.key import matches, prefix, variables
+from scm.v2x.message import Message, Request
+
+MESSAGES = "scm.v2x.messages"
+
+
+class RunFile:
+    """Writes one run; a context manager that always ends the file properly."""
+
+    def __init__(self, path: Path, city: str) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.path = path
+        self.messages = 0
+        self._stream = path.open("wb", buffering=0)
+        self._writer = Writer(self._stream)
+        self._writer.start(profile="scm", library=f"scm {__version__}")
+        self._writer.add_metadata("scm", {"version": __version__, "city": city})
+        self._schemas = SchemaTable(city)
+        self._schema_ids: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self.flush()
+
+    def write(self, sample: RawSample) -> None:
+        """Add one message as it came from the bus."""
+        body = (
+            sample.body if sample.attachment is None else _as_json(sample.body, sample.attachment)
+        )
+        self._writer.add_message(
+            channel_id=self._channel(sample.key),
+            log_time=sample.t_ns,
+            publish_time=sample.t_ns,
+            sequence=self.messages & 0xFFFFFFFF,
+            data=body,
+        )
+        self.messages += 1
+
+    def flush(self) -> None:
+        """Hand everything written so far to the operating system: a kill can no longer lose it."""
+        self._writer.flush()
+
+    def close(self) -> None:
+        """End the file with its index; safe to call twice."""
+        if not self._stream.closed:
+            self._writer.finish()
+            self._stream.close()
+
+    def __enter__(self) -> "RunFile":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _channel(self, key: str) -> int:
+        if key not in self._channels:
+            self._channels[key] = self._writer.register_channel(
+                topic=key, message_encoding="json", schema_id=self._schema(key)
+            )
+        return self._channels[key]
+
+    def _schema(self, key: str) -> int:
+        """Return the schema of the message class a key belongs to; 0 (none) for a foreign key."""
+        kind = self._schemas.kind_of(key)
+        if kind is None:
+            return 0
+        name = f"scm.{kind.__name__}"
+        if name not in self._schema_ids:
+            data = msgspec.json.encode(msgspec.json.schema(kind))
+            self._schema_ids[name] = self._writer.register_schema(name, "jsonschema", data)
+        return self._schema_ids[name]
+
+
+class SchemaTable:
+    """Which message class travels on which key."""
+
+    def __init__(self, city: str) -> None:
+        kinds = [load(MESSAGES, name, "MESSAGE", type) for name in names(MESSAGES)]
+        self._expressions = [
+            (prefix(city) + kind.KEY.format(**dict.fromkeys(variables(kind), "*")), kind)
+            for kind in kinds
+            if issubclass(kind, Message) and not issubclass(kind, Request)
+        ]
+
+    def kind_of(self, key: str) -> type[Message] | None:
+        """Return the message class of a concrete key, None for a key that is nobody's."""
+        return next(
+            (kind for expression, kind in self._expressions if matches(expression, key)), None
+        )
+
+
+def _as_json(payload: bytes, attachment: bytes) -> bytes:
+    """Return a bulk message as one JSON object."""
+    fields = msgspec.json.decode(attachment)
+    fields["payload"] = base64.b64encode(payload).decode("ascii")
+    return msgspec.json.encode(fields)
+
+
+class Recorded(NamedTuple):
+    """One message of a run: when it was heard [ns], its key, and its JSON."""
+
+    t_ns: int
+    key: str
+    body: bytes
+
+
+def read_run(path: Path) -> Iterator[Recorded]:
+    """Yield the messages of a complete run in the order of their times.
+
+    Raises:
+        RecordingError: when the file is not a complete MCAP file.
+    """
+    try:
+        with path.open("rb") as stream:
+            for _, channel, message in make_reader(stream).iter_messages():
+                yield Recorded(message.log_time, channel.topic, message.data)
+    except (McapError, OSError, ValueError) as cause:
+        msg = f"{path}: not a complete recording ({cause}): try `scm recover {path}`"
+        raise RecordingError(msg) from cause

@@ -1,0 +1,124 @@
+"""Mend a recording whose writer was killed: copy every whole message into a file with an index."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap.exceptions import McapError
+from mcap.records import Channel, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader
+from mcap.writer import Writer
+
+from scm.errors import RecordingError
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """What a recovery brought back.
+
+    Attributes:
+        messages: How many were copied.
+        span_s: From the first to the last of them [s].
+        whole: Whether the file was complete to begin with.
+    """
+
+    path: Path
+    messages: int
+    span_s: float
+    whole: bool
+
+
+def recover(broken: Path, mended: Path | None = None) -> Recovered:
+    """Copy what can be read of a cut-off recording.
+
+    Args:
+        broken: The recording; it is not changed.
+        mended: Where to write; None: beside it, as `<name>.recovered.mcap`.
+
+    Raises:
+        RecordingError: when nothing at all can be read, or the target is the source.
+    """
+    target = mended or broken.with_suffix(".recovered.mcap")
+    if target.resolve() == broken.resolve():
+        msg = f"{broken}: cannot be recovered onto itself"
+        raise RecordingError(msg)
+    copy = _Copy(target)
+    whole = True
+    try:
+        with broken.open("rb") as stream:
+            for record in _records(stream):
+                copy.add(record)
+    except OSError as cause:
+        msg = f"{broken}: cannot be read: {cause}"
+        raise RecordingError(msg) from cause
+    except _CutOff:
+        whole = False
+    finally:
+        copy.close()
+    if copy.messages == 0:
+        target.unlink()
+        msg = f"{broken}: holds no whole message"
+        raise RecordingError(msg)
+    return Recovered(target, copy.messages, (copy.last_ns - copy.first_ns) * 1e-9, whole)
+
+
+class _CutOff(Exception):  # noqa: N818  it is not an error: it is where the file ends
+    """The file ends before its end record."""
+
+
+def _records(stream: object) -> Iterator[McapRecord]:
+    """Yield records until the end; raise `_CutOff` where the file stops making sense."""
+    try:
+        yield from StreamReader(stream).records  # type: ignore[arg-type]
+    except (McapError, EOFError, ValueError, KeyError) as cause:
+        raise _CutOff from cause
+    except Exception as cause:  # struct and zstandard raise their own kinds on a torn record
+        if type(cause).__module__.partition(".")[0] not in ("struct", "zstandard", "zstd"):
+            raise
+        raise _CutOff from cause
+
+
+class _Copy:
+    """Writes records into a new file, with ids of its own."""
+
+    def __init__(self, path: Path) -> None:
+        self._stream = path.open("wb")
+        self._writer = Writer(self._stream)
+        self._writer.start(profile="scm", library="scm recover")
+        self._schemas: dict[int, int] = {0: 0}
+        self._channels: dict[int, int] = {}
+        self.messages = 0
+        self.first_ns = self.last_ns = 0
+
+    def add(self, record: McapRecord) -> None:
+        """Copy a schema, channel, message or metadata record; others belong to the old index."""
+        match record:
+            case Schema() if record.id not in self._schemas:
+                self._schemas[record.id] = self._writer.register_schema(
+                    record.name, record.encoding, record.data
+                )
+            case Channel() if record.id not in self._channels:
+                self._channels[record.id] = self._writer.register_channel(
+                    record.topic, record.message_encoding, self._schemas[record.schema_id]
+                )
+            case Message():
+                self._message(record)
+            case Metadata():
+                self._writer.add_metadata(record.name, record.metadata)
+
+    def _message(self, record: Message) -> None:
+        self._writer.add_message(
+            channel_id=self._channels[record.channel_id],
+            log_time=record.log_time,
+            publish_time=record.publish_time,
+            sequence=record.sequence,
+            data=record.data,
+        )
+        self.first_ns = record.log_time if self.messages == 0 else self.first_ns
+        self.last_ns = max(self.last_ns, record.log_time)
+        self.messages += 1
+
+    def close(self) -> None:
+        """End the new file with its index."""
+        self._writer.finish()
+        self._stream.close()

@@ -1,0 +1,127 @@
+"""The file `recording.yaml` as data, checked while it is read."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import yaml
+
+from scm.errors import RecordingError
+
+FILE_NAME = "recording.yaml"
+
+
+class TimeColumn(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """Which column holds the time of a row, on that table's own clock."""
+
+    column: str
+    unit: str = "s"
+
+
+class ChannelColumn(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """Where a channel's values stand.
+
+    Attributes:
+        column: Its column; or `expression` over columns, names with spaces in backquotes.
+        std: Standard deviation of its noise, in the same unit; None: to be estimated.
+        scale, offset, sign: `value = sign * (scale * raw + offset)`, before the unit is converted.
+        point: For poses: where on the body the point is, from the rear axle's centre [m].
+    """
+
+    column: str | None = None
+    expression: str | None = None
+    unit: str = "1"
+    std: float | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+    sign: Literal[1, -1] = 1
+    point: tuple[float, float] | None = None
+
+
+class Table(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """One file of rows with one clock.
+
+    Attributes:
+        file: Relative to the description, or to the folder given when reading.
+        where: Keep only rows for which this expression over columns is true.
+    """
+
+    file: str
+    time: TimeColumn
+    channels: dict[str, ChannelColumn]
+    where: str | None = None
+    vehicle: str | None = None
+
+
+class Description(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """A recording: which car, and where its channels stand.
+
+    Attributes:
+        vehicle: Name or path of the car file; each table may name its own.
+        frame: What the poses are given in; `world` is a right-handed floor frame.
+    """
+
+    recording: Literal[1]
+    tables: tuple[Table, ...]
+    vehicle: str | None = None
+    frame: str = "world"
+    source: str = ""
+    note: str = ""
+
+
+def find_description(path: Path) -> Path:
+    """Return the description file for a path: itself, or `recording.yaml` in that folder.
+
+    Raises:
+        RecordingError: when there is none.
+    """
+    found = path / FILE_NAME if path.is_dir() else path
+    if not found.is_file():
+        msg = f"{path}: no recording here: expected a .yaml file or a folder holding {FILE_NAME}"
+        raise RecordingError(msg)
+    return found
+
+
+def read_description(path: Path) -> Description:
+    """Read and check a description.
+
+    Raises:
+        RecordingError: naming the file, the key, what was expected and what was got.
+    """
+    try:
+        raw = yaml.safe_load(path.read_text(encoding="utf-8"))
+        description = msgspec.convert(raw, Description)
+    except yaml.YAMLError as cause:
+        msg = f"{path}: not YAML: {cause}"
+        raise RecordingError(msg) from cause
+    except msgspec.ValidationError as cause:
+        msg = f"{path}: {cause}"
+        raise RecordingError(msg) from cause
+    problems = _problems(description)
+    if problems:
+        raise RecordingError("\n".join(f"{path}: {problem}" for problem in problems))
+    return description
+
+
+def _problems(description: Description) -> list[str]:
+    """Return what is wrong between the keys of a description, in words."""
+    problems = [] if description.tables else ["tables: expected at least one, got none"]
+    for table in description.tables:
+        where = f"table {table.file}"
+        if description.vehicle is None and table.vehicle is None:
+            problems.append(f"{where}: no vehicle, neither here nor at the top")
+        if not table.channels:
+            problems.append(f"{where}: no channels")
+        problems += _channel_problems(where, table.channels)
+    return problems
+
+
+def _channel_problems(where: str, channels: Mapping[str, ChannelColumn]) -> list[str]:
+    problems = []
+    for name, channel in channels.items():
+        if (channel.column is None) == (channel.expression is None):
+            problems.append(f"{where}: {name}: expected either column or expression")
+        if channel.std is not None and channel.std <= 0.0:
+            problems.append(f"{where}: {name}: std: expected more than 0, got {channel.std}")
+    return problems

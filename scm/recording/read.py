@@ -1,0 +1,142 @@
+"""A recording as channels in SI, each with its own times."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scm.arrays import Bools, Floats
+from scm.errors import RecordingError
+from scm.recording.description import (
+    ChannelColumn,
+    Description,
+    Table,
+    find_description,
+    read_description,
+)
+from scm.recording.expression import evaluate
+from scm.recording.table import read_table
+from scm.recording.units import UNITS, dimensions_of, factor
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One measured or commanded quantity of one car, in SI.
+
+    Attributes:
+        t: Times on its table's clock, shape `(n,)` [s]; may jump at a gap or a reset.
+        values: Shape `(n,)`, finite.
+        std: Standard deviation of the noise; None where the description gives none.
+        point: For poses, where on the body the measured point is, from the rear axle [m].
+        dimension: What it measures: a steering command may be a ratio or an angle.
+    """
+
+    t: Floats
+    values: Floats
+    std: float | None
+    point: tuple[float, float]
+    dimension: str
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What was recorded of one car.
+
+    Attributes:
+        path: Of its description.
+        vehicle: Name or path of its car file.
+        channels: By name, as in the recordings contract.
+    """
+
+    path: Path
+    vehicle: str
+    channels: dict[str, Channel]
+
+    def channel(self, name: str) -> Channel:
+        """Return a channel.
+
+        Raises:
+            RecordingError: when the recording has none of that name.
+        """
+        if name not in self.channels:
+            msg = f"{self.path}: no channel {name!r}; it has {', '.join(sorted(self.channels))}"
+            raise RecordingError(msg)
+        return self.channels[name]
+
+
+def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Recording]:
+    """Read a recording of one or several cars.
+
+    Args:
+        path: A description file, or a folder holding `recording.yaml`.
+        data: Folder that the tables' files are relative to; None: the description's own.
+
+    Returns:
+        One `Recording` a vehicle, in the order in which the description names them.
+
+    Raises:
+        RecordingError: naming file, table, column, line and reason.
+    """
+    found = find_description(Path(path))
+    description = read_description(found)
+    folder = found.parent if data is None else Path(data)
+    by_vehicle: dict[str, dict[str, Channel]] = {}
+    loaded: dict[str, dict[str, Floats]] = {}
+    for table in description.tables:
+        if table.file not in loaded:
+            loaded[table.file] = read_table(folder / table.file)
+        vehicle = _vehicle(description, table)
+        channels = by_vehicle.setdefault(vehicle, {})
+        for name, channel in _channels(table, loaded[table.file], found).items():
+            if name in channels:
+                msg = f"{found}: table {table.file}: channel {name!r} of {vehicle} is given twice"
+                raise RecordingError(msg)
+            channels[name] = channel
+    return [Recording(found, vehicle, channels) for vehicle, channels in by_vehicle.items()]
+
+
+def _vehicle(description: Description, table: Table) -> str:
+    vehicle = table.vehicle or description.vehicle
+    if vehicle is None:  # refused when the description was read
+        msg = f"table {table.file}: no vehicle"
+        raise RecordingError(msg)
+    return vehicle
+
+
+def _channels(table: Table, columns: dict[str, Floats], path: Path) -> dict[str, Channel]:
+    """Return the channels of one table in SI."""
+    where = f"{path}: table {table.file}"
+    if table.where is not None:
+        keep = evaluate(table.where, columns, f"{where}: where") > 0.0
+        columns = {name: values[keep] for name, values in columns.items()}
+    t = evaluate(f"`{table.time.column}`", columns, f"{where}: time")
+    t = t * factor(table.time.unit, ("time",), f"{where}: time")
+    _refuse_no_rows(t, where)
+    return {
+        name: _channel(name, channel, t, columns, where) for name, channel in table.channels.items()
+    }
+
+
+def _channel(
+    name: str, channel: ChannelColumn, t: Floats, columns: dict[str, Floats], where: str
+) -> Channel:
+    at = f"{where}: {name}"
+    to_si = factor(channel.unit, dimensions_of(name, where), at)
+    text = channel.expression if channel.expression is not None else f"`{channel.column}`"
+    raw = evaluate(text, columns, at)
+    values = channel.sign * (channel.scale * raw + channel.offset) * to_si
+    valid: Bools = np.isfinite(values) & np.isfinite(t)
+    _refuse_no_rows(t[valid], at)
+    return Channel(
+        t=t[valid],
+        values=values[valid],
+        std=None if channel.std is None else channel.std * to_si,
+        point=channel.point or (0.0, 0.0),
+        dimension=UNITS[channel.unit][0],
+    )
+
+
+def _refuse_no_rows(t: Floats, where: str) -> None:
+    if len(t) == 0:
+        msg = f"{where}: no row is left"
+        raise RecordingError(msg)
