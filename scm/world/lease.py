@@ -1,0 +1,125 @@
+"""Leases: who may drive a car. Pure rules over frozen records; the caller brings the time.
+
+A car has one owner. The epoch grows with every change of owner and never falls, so a command that
+carries an older epoch can be told from a fresh one (a fencing token). A lease ends by release, by
+theft (with a reason), or when it was not renewed in time on the receiver's own clock.
+"""
+
+from dataclasses import dataclass, replace
+
+from scm.clock import NS_PER_MS
+from scm.errors import LeaseError
+
+SHORTEST_TTL_MS = 100
+LONGEST_TTL_MS = 60_000
+
+
+@dataclass(frozen=True, slots=True)
+class Lease:
+    """One car's lease.
+
+    Attributes:
+        home: Who owns the car when nobody else does: `world`, or the car's own agent.
+        owner: Who owns it now.
+        epoch: Of this ownership; only ever grows.
+        ttl_ms: How long it lives without renewal.
+        expires_ns: When it ends; None: it never does (the home owner's).
+    """
+
+    home: str
+    owner: str
+    epoch: int = 1
+    ttl_ms: int = 1000
+    expires_ns: int | None = None
+
+    @property
+    def is_at_home(self) -> bool:
+        """Whether nobody but the home owner holds it."""
+        return self.owner == self.home
+
+
+def grant(home: str, epoch: int = 1) -> Lease:
+    """Return the lease of a car that nobody but its home owner has asked for."""
+    return Lease(home, home, epoch)
+
+
+def acquire(lease: Lease, owner: str, ttl_ms: int, now_ns: int) -> Lease:
+    """Take a free car; asking again for one's own lease only renews it.
+
+    Raises:
+        LeaseError: when somebody else holds it.
+    """
+    if owner == lease.owner and not lease.is_at_home:
+        return _extended(lease, ttl_ms, now_ns)
+    if not lease.is_at_home:
+        msg = f"the car is leased to {lease.owner!r} (epoch {lease.epoch}); wait, or steal it"
+        raise LeaseError(msg)
+    return _handed_over(lease, owner, ttl_ms, now_ns)
+
+
+def renew(lease: Lease, owner: str, epoch: int, ttl_ms: int, now_ns: int) -> Lease:
+    """Extend one's own lease.
+
+    Raises:
+        LeaseError: when the asker does not hold it under this epoch.
+    """
+    _check_holder(lease, owner, epoch)
+    return _extended(lease, ttl_ms, now_ns)
+
+
+def release(lease: Lease, owner: str, epoch: int) -> Lease:
+    """Give one's lease back: the car goes home under a new epoch.
+
+    Raises:
+        LeaseError: when the asker does not hold it under this epoch.
+    """
+    _check_holder(lease, owner, epoch)
+    return sent_home(lease)
+
+
+def steal(lease: Lease, owner: str, ttl_ms: int, reason: str, now_ns: int) -> Lease:
+    """Take a car from whoever holds it.
+
+    Raises:
+        LeaseError: when no reason is given.
+    """
+    if not reason.strip():
+        msg = f"stealing from {lease.owner!r} needs a reason: it is put into the event log"
+        raise LeaseError(msg)
+    return _handed_over(lease, owner, ttl_ms, now_ns)
+
+
+def is_expired(lease: Lease, now_ns: int) -> bool:
+    """Return whether it was not renewed in time."""
+    return lease.expires_ns is not None and now_ns >= lease.expires_ns
+
+
+def sent_home(lease: Lease) -> Lease:
+    """Return the home owner's lease that follows this one."""
+    return grant(lease.home, lease.epoch + 1)
+
+
+def _check_holder(lease: Lease, owner: str, epoch: int) -> None:
+    if (owner, epoch) != (lease.owner, lease.epoch):
+        msg = (
+            f"{owner!r} does not hold the lease under epoch {epoch}: "
+            f"{lease.owner!r} holds it under epoch {lease.epoch}"
+        )
+        raise LeaseError(msg)
+
+
+def _extended(lease: Lease, ttl_ms: int, now_ns: int) -> Lease:
+    if lease.is_at_home:
+        return lease
+    ttl_ms = _bounded(ttl_ms)
+    return replace(lease, ttl_ms=ttl_ms, expires_ns=now_ns + ttl_ms * NS_PER_MS)
+
+
+def _handed_over(lease: Lease, owner: str, ttl_ms: int, now_ns: int) -> Lease:
+    if owner == lease.home:
+        return sent_home(lease)
+    return _extended(replace(lease, owner=owner, epoch=lease.epoch + 1), ttl_ms, now_ns)
+
+
+def _bounded(ttl_ms: int) -> int:
+    return max(SHORTEST_TTL_MS, min(ttl_ms, LONGEST_TTL_MS))
