@@ -2,42 +2,20 @@
 
 Two buses keep it: `ZenohBus` between processes and machines, `MemoryBus` inside one. The same
 contract test runs over both. Nothing here calls back into a part: what arrives waits in a bounded
-`Mailbox` until its owner drains it, the oldest dropped (and counted) when it is full.
+`Mailbox` until its owner drains it, the oldest dropped (and counted) when it is full. Whoever
+subscribes to what it publishes itself receives it too.
 """
 
-import threading
-from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Protocol
+from types import TracebackType
+from typing import Protocol, Self
 
+from scm.errors import MessageError
 from scm.v2x.exchange import Answer, Call, Incoming
-from scm.v2x.message import Message, Request
+from scm.v2x.mailbox import Mailbox, RawMailbox
+from scm.v2x.message import Message, Refused, Request
 
-
-class Mailbox:
-    """A bounded queue between the bus and its one reader: drop oldest, count drops."""
-
-    def __init__(self, depth: int, wake: threading.Event | None = None) -> None:
-        self._items: deque[Incoming] = deque(maxlen=depth)
-        self._lock = threading.Lock()
-        self._wake = wake
-        self.dropped = 0
-
-    def put(self, item: Incoming) -> None:
-        """Add an item; called by the bus, from any thread."""
-        with self._lock:
-            if len(self._items) == self._items.maxlen:
-                self.dropped += 1
-            self._items.append(item)
-        if self._wake is not None:
-            self._wake.set()
-
-    def drain(self) -> list[Incoming]:
-        """Return and forget everything that waits, oldest first."""
-        with self._lock:
-            items = list(self._items)
-            self._items.clear()
-        return items
+__all__ = ["Bus", "Mailbox", "RawMailbox"]
 
 
 class Bus(Protocol):
@@ -46,17 +24,38 @@ class Bus(Protocol):
     Attributes:
         city: Whose keys are used.
         station: The name this connection is known by.
+        session: Which run of the station this is: no two connections ever share it.
+        rejected: How many arrivals were dropped because they could not be read.
     """
 
     city: str
     station: str
+    session: str
+
+    @property
+    def connected(self) -> bool:
+        """Whether the city can be reached now; what is published meanwhile is dropped."""
+        ...
+
+    @property
+    def rejected(self) -> int:
+        """How many arrivals were dropped because they could not be read."""
+        ...
 
     def publish(self, message: Message) -> None:
         """Send a message on its own key; never blocks for a slow receiver."""
         ...
 
     def subscribe(self, kind: type[Message], where: Mapping[str, str], mailbox: Mailbox) -> None:
-        """Bring messages of a class into a mailbox until the bus is closed."""
+        """Bring messages of a class into a mailbox until the bus is closed.
+
+        Of an EVENT the last ones of each sender that is still there come first. `Presence` tells
+        of everybody who is there already, then who comes and goes.
+        """
+        ...
+
+    def subscribe_raw(self, mailbox: RawMailbox) -> None:
+        """Bring everything that is published in the city into a mailbox, unread."""
         ...
 
     def serve(self, kind: type[Request], where: Mapping[str, str], mailbox: Mailbox) -> None:
@@ -70,7 +69,8 @@ class Bus(Protocol):
     def call(self, call: Call, on_reply: Callable[[Incoming], None]) -> None:
         """Ask, and hand the reply (or a `Refused`) to `on_reply` later; never blocks.
 
-        `on_reply` runs on a thread of the bus: it may only fill a mailbox or set an event.
+        Of several servers the first that does not refuse is heard. `on_reply` runs once, perhaps
+        on a thread of the bus: it may only fill a mailbox or set an event.
         """
         ...
 
@@ -82,6 +82,40 @@ class Bus(Protocol):
         """Leave; safe to call twice."""
         ...
 
-    def __enter__(self) -> "Bus": ...
+    def __enter__(self) -> Self: ...
 
-    def __exit__(self, *exc: object) -> None: ...
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None: ...
+
+
+def check_reply(answer: Answer) -> None:
+    """Refuse to send a reply of a class that the request does not promise.
+
+    Raises:
+        MessageError: naming both.
+    """
+    request, reply = answer.to.message, answer.reply
+    if not isinstance(request, Request):
+        msg = f"{type(request).__name__} is no request: it cannot be answered"
+        raise MessageError(msg)
+    if not isinstance(reply, (request.REPLY, Refused)):
+        msg = (
+            f"{type(request).__name__}: got the reply {type(reply).__name__}, "
+            f"expected {request.REPLY.__name__} or Refused"
+        )
+        raise MessageError(msg)
+
+
+def no_server(request: Request, key: str) -> Refused:
+    """Return the refusal of a request that nobody serves."""
+    return Refused(code="offline", detail=f"{type(request).__name__}: nobody serves {key}")
+
+
+def no_answer(call: Call, key: str) -> Refused:
+    """Return the refusal of a call that was not answered in time."""
+    kind = type(call.request).__name__
+    return Refused(code="timeout", detail=f"{kind}: no answer on {key} within {call.timeout_s} s")

@@ -28,6 +28,23 @@ class Incoming:
     call: Call | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class RawSample:
+    """One message as it travelled, unread: for whoever records or relays everything.
+
+    Attributes:
+        key: The whole key it was sent on.
+        body: JSON, or the raw payload of a bulk message.
+        attachment: The JSON header of a bulk message; else None.
+        t_ns: When it reached this process, on this process's own clock [ns].
+    """
+
+    key: str
+    body: bytes
+    attachment: bytes | None
+    t_ns: int
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
     """The reply to a request that came in."""

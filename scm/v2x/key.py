@@ -5,6 +5,7 @@ The verbatim chunk `@v1` is the major version of the key space: `**` does not cr
 
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 from string import Formatter
 
 from scm.errors import MessageError
@@ -31,21 +32,41 @@ def variables(kind: type[Message]) -> list[str]:
     return [name for _, name, _, _ in Formatter().parse(kind.KEY) if name]
 
 
+@lru_cache(maxsize=256)
+def _places(kind: type[Message]) -> tuple[tuple[int, str], ...]:
+    chunks = kind.KEY.split("/")
+    return tuple((i, c[1:-1]) for i, c in enumerate(chunks) if c.startswith("{"))
+
+
 def prefix(city: str) -> str:
     """Return the part of the key that all messages of a city share, with the closing slash."""
     return f"scm/{VERSION}/{check_name(city, 'city')}/"
 
 
 def key_of(city: str, message: Message) -> str:
-    """Return the concrete key a message is sent on."""
-    chunks = {name: str(getattr(message, name)) for name in variables(type(message))}
+    """Return the concrete key a message is sent on.
+
+    Raises:
+        MessageError: when a field that stands in the key is not a valid name.
+    """
+    kind = type(message)
+    return _key(city, kind, tuple(str(getattr(message, name)) for _, name in _places(kind)))
+
+
+@lru_cache(maxsize=4096)
+def _key(city: str, kind: type[Message], values: tuple[str, ...]) -> str:
+    chunks = {name: value for (_, name), value in zip(_places(kind), values, strict=True)}
     for name, value in chunks.items():
-        check_name(value, f"{type(message).__name__}.{name}")
-    return prefix(city) + message.KEY.format(**chunks)
+        check_name(value, f"{kind.__name__}.{name}")
+    return prefix(city) + kind.KEY.format(**chunks)
 
 
 def selector(city: str, kind: type[Message], where: Mapping[str, str]) -> str:
-    """Return the key expression that matches a class of messages, `*` where `where` is silent."""
+    """Return the key expression that matches a class of messages, `*` where `where` is silent.
+
+    Raises:
+        MessageError: when `where` names what is no part of the key, or holds no valid name.
+    """
     known = variables(kind)
     unknown = sorted(set(where) - set(known))
     if unknown:
@@ -53,7 +74,33 @@ def selector(city: str, kind: type[Message], where: Mapping[str, str]) -> str:
             f"{kind.__name__}: its key {kind.KEY!r} has no part named {unknown[0]!r}, only {known}"
         )
         raise MessageError(msg)
+    for name, value in where.items():
+        check_name(value, f"{kind.__name__}.{name}")
     return prefix(city) + kind.KEY.format(**{name: where.get(name, "*") for name in known})
+
+
+def everything(city: str) -> str:
+    """Return the key expression that matches every message of a city."""
+    return prefix(city) + "**"
+
+
+def parse(city: str, kind: type[Message], key: str) -> dict[str, str]:
+    """Return the variable chunks of a key by name.
+
+    Raises:
+        MessageError: when the key is not one of this class in this city.
+    """
+    if not matches(selector(city, kind, {}), key):
+        msg = f"{kind.__name__}: got key {key!r}, expected {prefix(city)}{kind.KEY}"
+        raise MessageError(msg)
+    chunks = key.removeprefix(prefix(city)).split("/")
+    return {name: chunks[i] for i, name in _places(kind)}
+
+
+def agrees(key: str, message: Message) -> bool:
+    """Return whether a message says the same names inside as the key it came on."""
+    chunks = key.split("/", 3)[-1].split("/")
+    return all(chunks[i] == getattr(message, name) for i, name in _places(type(message)))
 
 
 def matches(expression: str, key: str) -> bool:

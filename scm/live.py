@@ -1,0 +1,118 @@
+"""Run one part on a real bus and clock: one process, one loop, steps on absolute deadlines.
+
+The loop decides nothing. A step that is due while the last one still runs is not made up for: the
+part simply sees more time pass, and the lateness is counted and told.
+"""
+
+import logging
+import signal
+import threading
+from types import FrameType
+
+import msgspec
+
+from scm.clock import NS_PER_MS, NS_PER_S, Clock
+from scm.errors import LinkError
+from scm.log import event
+from scm.part import Part
+from scm.station import Station
+from scm.v2x.bus import Bus
+from scm.v2x.exchange import Outgoing
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.part_status import PartStatus
+
+_log = logging.getLogger(__name__)
+
+
+def run(part: Part, bus: Bus, clock: Clock, stop: threading.Event) -> None:
+    """Step a part until `stop` is set, then let it say its last words and close the bus.
+
+    Its vital signs (`PartStatus`) go out once a second, filled into its own ones when it sends
+    such. An exception of the part is logged, told to the city and raised: the process should die.
+    """
+    with bus:
+        loop = _Loop(part, Station(part, bus), clock)
+        try:
+            while not clock.wait_until(loop.due_ns, stop):
+                loop.step()
+            loop.finish()
+        except Exception as cause:
+            _log.exception("part_failed part=%s", part.name)
+            _tell_failure(part, bus, clock, cause)
+            raise
+
+
+def stop_on_signal() -> threading.Event:
+    """Return an event that SIGINT and SIGTERM set; a second signal ends the process at once.
+
+    Call it from the main thread.
+    """
+    stop = threading.Event()
+
+    def on_signal(number: int, _frame: FrameType | None) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        # The main thread may hold the event's lock just now: let another one set it.
+        threading.Thread(target=stop.set, daemon=True).start()
+
+    signal.signal(signal.SIGINT, on_signal)
+    signal.signal(signal.SIGTERM, on_signal)
+    return stop
+
+
+class _Loop:
+    """The steps of one part, when the next is due, and how it has been doing."""
+
+    def __init__(self, part: Part, station: Station, clock: Clock) -> None:
+        self._part = part
+        self._station = station
+        self._clock = clock
+        self.due_ns = clock.now_ns()
+        self._status_due_ns = self.due_ns + NS_PER_S
+        self._late_steps = 0
+        self._slowest_ns = 0
+
+    def step(self) -> None:
+        """Make the step that is due, and skip those that are overdue as well."""
+        began_ns = self._clock.now_ns()
+        outbox = self._part.step(began_ns, self._station.inbox())
+        ended_ns = self._clock.now_ns()
+        self._slowest_ns = max(self._slowest_ns, ended_ns - began_ns)
+        self._station.send(self._with_vital_signs(outbox, ended_ns))
+        overdue = (began_ns - self.due_ns) // self._part.period_ns
+        self._late_steps += overdue
+        self.due_ns += (overdue + 1) * self._part.period_ns
+
+    def finish(self) -> None:
+        """Send the part's last words."""
+        self._station.send(self._part.finish(self._clock.now_ns()))
+
+    def _with_vital_signs(self, outbox: list[Outgoing], now_ns: int) -> list[Outgoing]:
+        own = [item for item in outbox if isinstance(item, PartStatus)]
+        if not own and now_ns < self._status_due_ns:
+            return outbox
+        status = own[-1] if own else PartStatus(station=self._part.name, t_ns=now_ns)
+        status = msgspec.structs.replace(
+            status,
+            step_ms=self._slowest_ns / NS_PER_MS,
+            late_steps=self._late_steps,
+            dropped=self._station.dropped,
+        )
+        self._slowest_ns = 0
+        self._status_due_ns = now_ns + NS_PER_S
+        return [item for item in outbox if not isinstance(item, PartStatus)] + [status]
+
+
+def _tell_failure(part: Part, bus: Bus, clock: Clock, cause: Exception) -> None:
+    text = f"{part.name} stopped: {type(cause).__name__}: {cause}"
+    try:
+        bus.publish(
+            CityEvent(
+                severity="error",
+                source=part.name,
+                t_ns=clock.now_ns(),
+                name="part_failed",
+                text=text,
+            )
+        )
+    except LinkError as closed:
+        event(_log, "failure_not_told", level=logging.WARNING, part=part.name, reason=closed)

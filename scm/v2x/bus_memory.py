@@ -1,0 +1,295 @@
+"""The bus inside one process: the same contract without a network, in a fixed order.
+
+Every message is written to bytes and read back, as on a wire: nobody can change what another one
+holds, and what would not survive the wire does not survive here. With a stepped clock everything
+that happens is a function of the order of calls, so a run can be repeated bit for bit.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import islice
+from types import TracebackType
+from typing import Self
+
+from scm.clock import Clock, nanoseconds
+from scm.errors import LinkError
+from scm.v2x.bus import check_reply, no_answer, no_server
+from scm.v2x.exchange import Answer, Call, Incoming, RawSample
+from scm.v2x.key import check_name, everything, key_of, matches, selector
+from scm.v2x.mailbox import Mailbox, RawMailbox
+from scm.v2x.message import Delivery, Message, Refused, Request, decode, encode
+from scm.v2x.messages.presence import Presence
+from scm.v2x.reader import Reader
+
+OnReply = Callable[[Incoming], None]
+
+
+@dataclass(eq=False)
+class _Wish:
+    """Who wants what: `deliver` puts one arrival into the wisher's mailbox."""
+
+    owner: "MemoryBus"
+    expression: str
+    deliver: Callable[[RawSample], None]
+    keeps: bool = False
+
+
+@dataclass(eq=False)
+class _Offer:
+    owner: "MemoryBus"
+    expression: str
+    deliver: Callable[["_Asked", RawSample], None]
+
+
+@dataclass(eq=False)
+class _Asked:
+    """A call under way: settled by the first real reply, the last refusal, or time."""
+
+    by: "MemoryBus"
+    call: Call
+    on_reply: OnReply
+    key: str
+    due_ns: int
+    open: set["MemoryBus"] = field(default_factory=set)
+    settled: bool = False
+
+    def settle(self, reply: Message, t_ns: int) -> None:
+        if not self.settled:
+            self.settled = True
+            self.on_reply(Incoming(reply, t_ns, self.call))
+
+    def heard(self, server: "MemoryBus", reply: Message, t_ns: int) -> None:
+        self.open.discard(server)
+        if not isinstance(reply, Refused) or not self.open:
+            self.settle(reply, t_ns)
+
+
+class MemoryNetwork:
+    """What connects the memory buses of one process."""
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self.lock = threading.RLock()
+        self.buses: list[MemoryBus] = []
+        self.wishes: list[_Wish] = []
+        self.offers: list[_Offer] = []
+        self.asked: list[_Asked] = []
+        self._routes: dict[str, list[_Wish]] = {}
+        self._opened = 0
+
+    def bus(self, city: str, station: str) -> "MemoryBus":
+        """Return a new connection for a station."""
+        with self.lock:
+            self._opened += 1
+            bus = MemoryBus(self, city, station, f"m{self._opened}")
+            self.buses.append(bus)
+        return bus
+
+    def expire(self) -> None:
+        """Refuse every call that has waited for longer than it wanted to, by the clock now."""
+        if not self.asked:
+            return
+        with self.lock:
+            now_ns = self.clock.now_ns()
+            late = [asked for asked in self.asked if asked.due_ns <= now_ns]
+            self.asked = [a for a in self.asked if a.due_ns > now_ns and not a.settled]
+            for asked in late:
+                asked.settle(no_answer(asked.call, asked.key), now_ns)
+
+    def route(self, sample: RawSample) -> None:
+        """Deliver a sample to everybody who wishes it, in the order they wished."""
+        with self.lock:
+            wishes = self._routes.get(sample.key)
+            if wishes is None:
+                wishes = [w for w in self.wishes if matches(w.expression, sample.key)]
+                self._routes[sample.key] = wishes
+            for wish in wishes:
+                wish.deliver(sample)
+
+    def add_wish(self, wish: _Wish) -> None:
+        """Remember a wish, and deliver what others kept for late joiners."""
+        with self.lock:
+            self.wishes.append(wish)
+            self._routes.clear()
+            if wish.keeps:
+                kept = [s for bus in self.buses for s in bus.kept(wish.expression)]
+                now_ns = self.clock.now_ns()
+                for _, sample in sorted(kept, key=lambda item: item[0]):
+                    wish.deliver(replace(sample, t_ns=now_ns))
+
+    def leave(self, bus: "MemoryBus") -> None:
+        """Forget a bus and everything it wished, offered, kept and asked."""
+        with self.lock:
+            self.buses.remove(bus)
+            self.wishes = [w for w in self.wishes if w.owner is not bus]
+            self.offers = [o for o in self.offers if o.owner is not bus]
+            self._routes.clear()
+            left_alone = [a for a in self.asked if bus in a.open]
+            self.asked = [a for a in self.asked if a.by is not bus]
+            for asked in left_alone:
+                asked.heard(bus, no_server(asked.call.request, asked.key), self.clock.now_ns())
+
+
+class MemoryBus:
+    """One station's connection inside this process; see `scm.v2x.bus.Bus`."""
+
+    def __init__(self, network: MemoryNetwork, city: str, station: str, session: str) -> None:
+        self.city = check_name(city, "city")
+        self.station = check_name(station, "station")
+        self.session = session
+        self._network = network
+        self._reader = Reader(network.clock)
+        self._kept: dict[str, deque[tuple[int, RawSample]]] = {}
+        self._kept_count = 0
+        self._to_answer: dict[Incoming, _Asked] = {}
+        self._presence: list[Presence] = []
+        self._closed = False
+
+    @property
+    def connected(self) -> bool:
+        """Whether it is still open."""
+        return not self._closed
+
+    @property
+    def rejected(self) -> int:
+        """How many arrivals were dropped because they could not be read."""
+        return self._reader.rejected
+
+    def publish(self, message: Message) -> None:
+        """Send a message on its own key."""
+        self._check_open()
+        self._network.expire()
+        self._send(message, keep=message.KEEP if message.DELIVERY is Delivery.EVENT else 0)
+
+    def _send(self, message: Message, keep: int) -> None:
+        body, attachment = encode(message)
+        key = key_of(self.city, message)
+        sample = RawSample(key, body, attachment, self._network.clock.now_ns())
+        with self._network.lock:
+            if keep:
+                kept = self._kept.setdefault(key, deque(maxlen=keep))
+                kept.append((self._order(), sample))
+            self._network.route(sample)
+
+    def _order(self) -> int:
+        self._kept_count += 1
+        return self._kept_count
+
+    def kept(self, expression: str) -> list[tuple[tuple[int, int], RawSample]]:
+        """Return what this station keeps for late joiners: ((time, order), sample)."""
+        return [
+            ((sample.t_ns, order), sample)
+            for key, samples in self._kept.items()
+            if matches(expression, key)
+            for order, sample in samples
+        ]
+
+    def subscribe(self, kind: type[Message], where: Mapping[str, str], mailbox: Mailbox) -> None:
+        """Bring messages of a class into a mailbox until the bus is closed."""
+        self._check_open()
+
+        def deliver(sample: RawSample) -> None:
+            facts = (sample.key, sample.body, sample.attachment, sample.t_ns)
+            mailbox.put_later(partial(self._reader.read, kind, *facts))
+
+        keeps = kind.DELIVERY in (Delivery.EVENT, Delivery.PRESENCE)
+        self._network.add_wish(_Wish(self, selector(self.city, kind, where), deliver, keeps))
+
+    def subscribe_raw(self, mailbox: RawMailbox) -> None:
+        """Bring everything that is published in the city into a mailbox, unread."""
+        self._check_open()
+
+        def deliver(sample: RawSample) -> None:
+            if not _is_presence(sample.key):
+                mailbox.put(sample)
+
+        self._network.add_wish(_Wish(self, everything(self.city), deliver, keeps=True))
+
+    def serve(self, kind: type[Request], where: Mapping[str, str], mailbox: Mailbox) -> None:
+        """Bring requests of a class into a mailbox; each waits there for its `answer`."""
+        self._check_open()
+
+        def deliver(asked: _Asked, sample: RawSample) -> None:
+            def make() -> Incoming | None:
+                read = self._reader.read
+                incoming = read(kind, sample.key, sample.body, sample.attachment, sample.t_ns)
+                if incoming is not None and not asked.settled:
+                    self._to_answer[incoming] = asked
+                return incoming
+
+            mailbox.put_later(make)
+
+        offer = _Offer(self, selector(self.city, kind, where), deliver)
+        with self._network.lock:
+            self._network.offers.append(offer)
+
+    def answer(self, answer: Answer) -> None:
+        """Reply to a request that came from `serve`; a second answer to the same is ignored."""
+        self._check_open()
+        check_reply(answer)
+        asked = self._to_answer.pop(answer.to, None)
+        if asked is not None:
+            reply = decode(type(answer.reply), *encode(answer.reply))
+            with self._network.lock:
+                asked.heard(self, reply, self._network.clock.now_ns())
+
+    def call(self, call: Call, on_reply: OnReply) -> None:
+        """Ask, and hand the reply (or a `Refused`) to `on_reply` later; never blocks."""
+        self._check_open()
+        self._network.expire()
+        key = key_of(self.city, call.request)
+        body, attachment = encode(call.request)
+        now_ns = self._network.clock.now_ns()
+        asked = _Asked(self, call, on_reply, key, now_ns + nanoseconds(call.timeout_s))
+        sample = RawSample(key, body, attachment, now_ns)
+        with self._network.lock:
+            offers = [o for o in self._network.offers if matches(o.expression, key)]
+            asked.open.update(o.owner for o in offers)
+            self._network.asked.append(asked)
+            for offer in offers:
+                offer.deliver(asked, sample)
+        if not offers:
+            asked.settle(no_server(call.request, key), now_ns)
+
+    def announce(self, role: str) -> None:
+        """Declare this station present until the bus closes."""
+        self._check_open()
+        here = Presence(role=role, station=self.station, session=self.session, alive=True)
+        self._presence.append(here)
+        self._send(here, keep=1)
+
+    def close(self) -> None:
+        """Leave; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._network.leave(self)
+        for here in self._presence:
+            gone = Presence(role=here.role, station=here.station, session=here.session, alive=False)
+            self._send(gone, keep=0)
+        self._kept.clear()
+        self._to_answer.clear()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _check_open(self) -> None:
+        if self._closed:
+            msg = f"the bus of {self.station!r} is closed"
+            raise LinkError(msg)
+
+
+def _is_presence(key: str) -> bool:
+    chunks = islice(reversed(key.split("/")), 1, 2)
+    return next(chunks, "") == "alive"

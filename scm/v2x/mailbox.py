@@ -1,0 +1,72 @@
+"""Bounded queues between the bus and their one reader: drop oldest, count drops.
+
+What is costly to make of the arriving bytes is made only when the reader takes it, on the
+reader's thread; what was dropped by then is never made at all.
+"""
+
+import itertools
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable
+from typing import Generic, TypeVar
+
+from scm.v2x.exchange import Incoming, RawSample
+
+T = TypeVar("T")
+
+_arrivals = itertools.count()
+
+
+class Queue(Generic[T]):
+    """A bounded queue; `put` from any thread, `drain` from one.
+
+    Attributes:
+        dropped: How many items had to make room for newer ones.
+    """
+
+    def __init__(self, depth: int, wake: threading.Event | None = None) -> None:
+        self._items: deque[tuple[int, Callable[[], T | None]]] = deque(maxlen=depth)
+        self._lock = threading.Lock()
+        self._wake = wake
+        self.dropped = 0
+
+    def put(self, item: T) -> None:
+        """Add an item."""
+        self.put_later(lambda: item)
+
+    def put_later(self, make: Callable[[], T | None]) -> None:
+        """Add an item to be made when it is taken; None then counts as nothing."""
+        with self._lock:
+            if len(self._items) == self._items.maxlen:
+                self.dropped += 1
+            self._items.append((next(_arrivals), make))
+        if self._wake is not None:
+            self._wake.set()
+
+    def take(self) -> list[tuple[int, Callable[[], T | None]]]:
+        """Return and forget everything that waits, unmade, each with its order of arrival."""
+        with self._lock:
+            items = list(self._items)
+            self._items.clear()
+        return items
+
+    def drain(self) -> list[T]:
+        """Return and forget everything that waits, oldest first."""
+        return [item for _, make in self.take() if (item := make()) is not None]
+
+
+class Mailbox(Queue[Incoming]):
+    """A queue of messages, requests and replies."""
+
+
+class RawMailbox(Queue[RawSample]):
+    """A queue of unread samples."""
+
+
+def drain_all(boxes: Iterable[Mailbox | RawMailbox]) -> list[Incoming | RawSample]:
+    """Empty several queues of one reader into one list, in order of arrival."""
+    waiting: list[tuple[int, Callable[[], Incoming | RawSample | None]]] = []
+    for box in boxes:
+        waiting.extend(box.take())
+    waiting.sort(key=lambda item: item[0])
+    return [item for _, make in waiting if (item := make()) is not None]

@@ -1,0 +1,57 @@
+"""Turn arriving bytes into messages; what cannot be read is dropped, counted and logged.
+
+The log says so at most once a second, however much rubbish arrives.
+"""
+
+import logging
+
+from scm.clock import NS_PER_S, Clock
+from scm.errors import MessageError
+from scm.log import event
+from scm.v2x.exchange import Incoming
+from scm.v2x.key import agrees
+from scm.v2x.message import Message, decode
+
+_log = logging.getLogger(__name__)
+
+
+class Reader:
+    """Reads what arrives at one bus.
+
+    Attributes:
+        rejected: How many arrivals could not be read, or came on a key that is not theirs.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._quiet_until_ns: int | None = None
+        self.rejected = 0
+
+    def read(
+        self, kind: type[Message], key: str, body: bytes, attachment: bytes | None, t_ns: int
+    ) -> Incoming | None:
+        """Return what arrived, or None when it had to be dropped."""
+        try:
+            message = decode(kind, body, attachment)
+        except MessageError as cause:
+            self.reject(key, str(cause))
+            return None
+        if not agrees(key, message):
+            self.reject(key, "the names inside are not those of its key")
+            return None
+        return Incoming(message, t_ns)
+
+    def reject(self, key: str, reason: str) -> None:
+        """Count something that could not be read."""
+        self.rejected += 1
+        now_ns = self._clock.now_ns()
+        if self._quiet_until_ns is None or now_ns >= self._quiet_until_ns:
+            self._quiet_until_ns = now_ns + NS_PER_S
+            event(
+                _log,
+                "message_rejected",
+                level=logging.WARNING,
+                key=key,
+                reason=reason,
+                rejected=self.rejected,
+            )
