@@ -144,7 +144,7 @@ class FleetCar:
     def drive(
         self, *via: str, laps: int = 1, speed_mps: float | None = None, then: str = "circulate"
     ) -> Journey:
-        """Send the car through lanes, from where it is; it drives on afterwards unless told to stop."""
+        """Send the car through lanes from where it is; on arrival it circulates or stops."""
         request = RouteRequest(
             vehicle=self.name,
             via=via,

@@ -32,7 +32,7 @@ class RunFile:
         path.parent.mkdir(parents=True, exist_ok=True)
         self.path = path
         self.messages = 0
-        self._stream = path.open("wb", buffering=0)
+        self._stream = path.open("wb")
         self._writer = Writer(self._stream)
         self._writer.start(profile="scm", library=f"scm {__version__}")
         self._writer.add_metadata("scm", {"version": __version__, "city": city})

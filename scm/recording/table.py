@@ -51,13 +51,13 @@ def _read_csv(text: str, path: Path) -> dict[str, Floats]:
     if len(set(names)) != len(names):
         msg = f"{path}: line 1: a column name stands twice: {names}"
         raise RecordingError(msg)
+    if not text.partition("\n")[2].strip():
+        msg = f"{path}: no rows below the header"
+        raise RecordingError(msg)
     try:
         cells = np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1, ndmin=2)
     except ValueError:
         cells = _read_cells(text, names, path)
-    if cells.size == 0:
-        msg = f"{path}: no rows below the header"
-        raise RecordingError(msg)
     if cells.shape[1] != len(names):
         msg = f"{path}: {cells.shape[1]} values a line, expected {len(names)} as in the header"
         raise RecordingError(msg)

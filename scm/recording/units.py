@@ -98,6 +98,6 @@ def factor(unit: str, dimensions: tuple[str, ...], where: str) -> float:
     dimension, value = UNITS[unit]
     if dimension not in dimensions:
         fitting = [name for name, (measures, _) in UNITS.items() if measures in dimensions]
-        msg = f"{where}: unit {unit!r} is a {dimension}, expected one of {fitting}"
+        msg = f"{where}: unit {unit!r} measures {dimension}, expected one of {fitting}"
         raise RecordingError(msg)
     return value

@@ -1,0 +1,29 @@
+"""What all tests share: where other people's data lies, and marks that come from the folder."""
+
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+SHARED = ROOT.parent / "shared"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark every test of `tests/e2e` as such."""
+    for item in items:
+        if "e2e" in item.path.parts:
+            item.add_marker(pytest.mark.e2e)
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The project's own folder."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """Other people's recordings and maps, which are not part of the project."""
+    if not SHARED.is_dir():
+        pytest.skip("../shared is not here: it holds other people's data")
+    return SHARED

@@ -1,0 +1,65 @@
+"""Velocities from poses are those of the rear axle, and gaps are told, not bridged."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from scm.errors import RecordingError
+from scm.recording.motion import Poses
+from scm.recording.read import Channel, Recording
+
+RADIUS_M, SPEED_MPS = 0.5, 0.25
+POINT = (0.115, 0.01)
+
+
+def circle(t: np.ndarray, point: tuple[float, float] = POINT) -> Recording:
+    """A car on a circle to the left, its rear axle at constant speed; the pose is of `point`."""
+    angle = SPEED_MPS / RADIUS_M * t
+    yaw = angle + np.pi / 2
+    x = RADIUS_M * np.cos(angle) + np.cos(yaw) * point[0] - np.sin(yaw) * point[1]
+    y = RADIUS_M * np.sin(angle) + np.sin(yaw) * point[0] + np.cos(yaw) * point[1]
+    wrapped = np.arctan2(np.sin(yaw), np.cos(yaw))
+    values = {"pose.x": x, "pose.y": y, "pose.yaw": wrapped}
+    channels = {name: Channel(t, value, None, point, "length") for name, value in values.items()}
+    return Recording(Path("circle"), "nigel", channels)
+
+
+def test_a_circle_gives_its_speed_and_yaw_rate_at_the_rear_axle() -> None:
+    motion = Poses(circle(np.arange(0.0, 20.0, 0.01))).motion(np.array([5.0, 10.0, 15.0]))
+    # the quadratic fit over 0.2 s leaves (omega * 0.1)^2 / 10 of the speed: 2.5e-4
+    assert_allclose(motion.speed, SPEED_MPS, rtol=3e-4)
+    assert_allclose(motion.lateral_speed, 0.0, atol=3e-4)
+    assert_allclose(motion.yaw_rate, SPEED_MPS / RADIUS_M, rtol=1e-6)
+    assert_allclose(np.hypot(motion.x, motion.y), RADIUS_M, rtol=1e-4)
+
+
+def test_slow_poses_are_still_differentiated() -> None:
+    motion = Poses(circle(np.arange(0.0, 20.0, 0.1))).motion(np.array([5.03]))
+    assert motion.valid.all()
+    assert_allclose(motion.speed, SPEED_MPS, rtol=3e-3)
+
+
+def test_a_gap_is_not_bridged() -> None:
+    t = np.arange(0.0, 20.0, 0.01)
+    poses = Poses(circle(t[(t < 8.0) | (t > 8.5)]))
+    assert not poses.motion(np.array([8.25])).valid.any()
+    assert not poses.unbroken(7.0, 9.0)
+    assert poses.unbroken(9.0, 12.0)
+
+
+def test_a_jump_of_the_tracker_breaks_the_window() -> None:
+    t = np.arange(0.0, 20.0, 0.01)
+    recording = circle(t)
+    recording.channel("pose.x").values[1000] += 2.0
+    poses = Poses(recording)
+    assert not poses.unbroken(9.0, 11.0)
+    assert poses.unbroken(1.0, 9.0)
+
+
+def test_times_that_jump_back_are_refused() -> None:
+    t = np.arange(0.0, 20.0, 0.01)
+    t[1000:] -= 5.0
+    with pytest.raises(RecordingError, match="jump back"):
+        Poses(circle(t))
