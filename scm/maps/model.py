@@ -1,7 +1,8 @@
 """The map as data: what a map file says, and what travels to agents that do not have the file.
 
-Frame: the centre of the map's tag is the origin, x right, y up on the floor, lengths in metre, yaw
-counter-clockwise from x in radian. Positions along a lane (`at_m`) count from its start.
+Frame: x right, y up on the floor, lengths in metre, yaw counter-clockwise from x in radian. The
+map's tag fixes it: its centre is the origin unless the file puts the tag elsewhere. Positions along
+a lane (`at_m`) count from its start.
 """
 
 from typing import Literal
@@ -58,7 +59,7 @@ class Lane(Record, kw_only=True, frozen=True):
 
 
 class StopLine(Record, kw_only=True, frozen=True):
-    """Where a car waits for a signal group before a junction."""
+    """Where a car's front waits for a signal group before a junction."""
 
     name: str
     lane: str
@@ -68,7 +69,12 @@ class StopLine(Record, kw_only=True, frozen=True):
 
 
 class Conflict(Record, kw_only=True, frozen=True):
-    """The stretch of a lane inside a junction: from `from_m` to `to_m` nobody may stop."""
+    """The stretch of a lane inside a junction where nobody may stop.
+
+    Attributes:
+        from_m: Behind the stop line.
+        to_m: Where the rear axle of a car is when its tail has cleared every crossing lane.
+    """
 
     lane: str
     from_m: float
@@ -93,7 +99,11 @@ class Junction(Record, kw_only=True, frozen=True):
 
 
 class Light(Record, kw_only=True, frozen=True):
-    """A three-lamp head on a pole; it shows its group's colour and looks along `yaw_rad`."""
+    """A three-lamp head on a pole; it shows its group's colour.
+
+    Attributes:
+        yaw_rad: Where the lamps look: towards the cars they are meant for.
+    """
 
     light_id: int
     x_m: float
@@ -114,8 +124,20 @@ class Crosswalk(Record, kw_only=True, frozen=True):
     width_m: float
 
 
+class Area(Record, kw_only=True, frozen=True):
+    """Paved ground beside the lanes, a polygon: the open middle of a junction, a parking place."""
+
+    name: str
+    points: tuple[Point, ...]
+
+
 class Sign(Record, kw_only=True, frozen=True):
-    """A traffic sign: `left_curve`, `right_curve`, `stop`, `give_way` ..."""
+    """A traffic sign on a pole.
+
+    Attributes:
+        kind: `left_curve`, `right_curve`, `stop` or `give_way`.
+        yaw_rad: Where its face looks: towards the cars it is meant for.
+    """
 
     sign_id: int
     kind: str
@@ -125,7 +147,13 @@ class Sign(Record, kw_only=True, frozen=True):
 
 
 class Wall(Record, kw_only=True, frozen=True):
-    """An obstacle along a polyline that nobody can push; `thickness_m` across it."""
+    """An obstacle along a polyline that nobody can push.
+
+    Attributes:
+        points: Its centre line.
+        closed: The last point is joined to the first.
+        thickness_m: Across it; 0: the line itself is the face, as traced from a scan.
+    """
 
     points: tuple[Point, ...]
     closed: bool = False
@@ -194,6 +222,7 @@ class CityMap(Record, kw_only=True, frozen=True):
     tag: MapTag
     first_vehicle_tag_id: int = 1
     lanes: tuple[Lane, ...] = ()
+    areas: tuple[Area, ...] = ()
     junctions: tuple[Junction, ...] = ()
     stop_lines: tuple[StopLine, ...] = ()
     lights: tuple[Light, ...] = ()

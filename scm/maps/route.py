@@ -1,1 +1,294 @@
-"""Lanes as polylines and routes along them."""
+"""Lanes as polylines, the graph they form, and routes as one long path along them."""
+
+import heapq
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from scm.errors import MapError, nearest
+from scm.geometry import Pose2, wrap_angle
+from scm.maps.model import CityMap, Lane, Spawn, StopLine
+from scm.maps.polyline import Polyline, join, sample
+
+SAME_WAY_RAD = math.radians(60.0)
+
+
+class LanePath(Polyline):
+    """A lane's centre line, from its start to its end.
+
+    Attributes:
+        name: The lane's.
+        width_m: Across the lane.
+        speed_limit_mps: The lane's.
+    """
+
+    def __init__(self, lane: Lane) -> None:
+        line = sample(Pose2(*lane.start), lane.segments)
+        super().__init__(line.points, line.s, line.yaw, line.curvature)
+        self.name = lane.name
+        self.width_m = lane.width_m
+        self.speed_limit_mps = lane.speed_limit_mps
+
+
+class OnLane(NamedTuple):
+    """A place on a lane: distance from its start and to the left of its centre line [m]."""
+
+    lane: str
+    s: float
+    lateral: float
+
+
+class Roads:
+    """The lanes of a map as a graph.
+
+    Attributes:
+        city_map: The map they come from.
+        lanes: By name, in the order of the file.
+    """
+
+    def __init__(self, city_map: CityMap) -> None:
+        self.city_map = city_map
+        self.lanes = {lane.name: LanePath(lane) for lane in city_map.lanes}
+        self._next = {lane.name: lane.next for lane in city_map.lanes}
+        self._spawns = {spawn.name: spawn for spawn in city_map.spawns}
+
+    def lane(self, name: str) -> LanePath:
+        """Return a lane; MapError names the nearest one if there is none of that name."""
+        found = self.lanes.get(name)
+        if found is None:
+            raise MapError(
+                f"map {self.city_map.name}: no lane {name!r}{nearest(name, list(self.lanes))}"
+            )
+        return found
+
+    def successors(self, lane: str) -> tuple[str, ...]:
+        """Return the lanes that begin where this one ends."""
+        self.lane(lane)
+        return self._next[lane]
+
+    def nearest(self, pose: Pose2) -> OnLane | None:
+        """Return the closest lane that runs within 60 degrees of the pose's direction.
+
+        None if the map has no lane of such a direction, or the pose is over 0.5 m off all of them.
+        """
+        best: tuple[float, OnLane] | None = None
+        for lane in self.lanes.values():
+            s, lateral = lane.project(pose.x, pose.y)
+            foot = lane.at(s)
+            if abs(wrap_angle(foot.yaw - pose.yaw)) > SAME_WAY_RAD:
+                continue
+            away = math.hypot(pose.x - foot.x, pose.y - foot.y)
+            if away <= 0.5 and (best is None or away < best[0] - 1e-9):
+                best = away, OnLane(lane.name, s, lateral)
+        return best[1] if best else None
+
+    def stop_lines_on(self, lane: str) -> tuple[StopLine, ...]:
+        """Return the stop lines of a lane in driving order."""
+        on_lane = (line for line in self.city_map.stop_lines if line.lane == lane)
+        return tuple(sorted(on_lane, key=lambda line: line.at_m))
+
+    def spawn_pose(self, name: str) -> Pose2:
+        """Return the pose of a spawn place (rear axle of the car put there)."""
+        spawn = self._spawns.get(name)
+        if spawn is None:
+            known = nearest(name, list(self._spawns))
+            raise MapError(f"map {self.city_map.name}: no spawn {name!r}{known}")
+        return self._pose_of(spawn)
+
+    def free_spawns(self, occupied: Sequence[Pose2], clearance_m: float = 0.45) -> list[str]:
+        """Return the spawn places whose pose is at least `clearance_m` from all given poses.
+
+        The distance counts between rear axles: a Nigel is 0.30 m long, so 0.45 m leaves a gap of
+        half a car. Best first: in the order of the file.
+        """
+        free = []
+        for name in self._spawns:
+            pose = self.spawn_pose(name)
+            if all(math.hypot(pose.x - o.x, pose.y - o.y) >= clearance_m for o in occupied):
+                free.append(name)
+        return free
+
+    def route(self, start_lane: str, via: tuple[str, ...] = (), laps: int = 1) -> tuple[str, ...]:
+        """Return the lanes of the shortest way from a lane through others, in driving order.
+
+        Args:
+            start_lane: First lane of the route.
+            via: Lanes to pass in this order; the last one ends the route. The start lane counts
+                as passed if it is the first. Empty: the loop that the start lane lies on.
+            laps: How often to pass `via`, or the loop.
+
+        Raises:
+            MapError: A lane is unknown or cannot be reached.
+        """
+        if laps < 1:
+            raise MapError(f"laps: expected at least 1, got {laps}")
+        if not via:
+            return self.loop(start_lane) * laps
+        lanes = [self.lane(start_lane).name]
+        wanted = list(via) * laps
+        if wanted[0] == start_lane:
+            del wanted[0]
+        for name in wanted:
+            lanes += self._way(lanes[-1], self.lane(name).name)
+        return tuple(lanes)
+
+    def circulate(self, start_lane: str) -> Iterator[str]:
+        """Yield lanes for ever, at each end the first lane that follows; stops at a dead end."""
+        lane = self.lane(start_lane).name
+        while True:
+            yield lane
+            following = self._next[lane]
+            if not following:
+                return
+            lane = following[0]
+
+    def loop(self, start_lane: str) -> tuple[str, ...]:
+        """Return one round of `circulate`; MapError if it does not come back to its start."""
+        lanes: list[str] = []
+        for lane in self.circulate(start_lane):
+            if lanes and lane == start_lane:
+                return tuple(lanes)
+            if lane in lanes:
+                break
+            lanes.append(lane)
+        raise MapError(
+            f"map {self.city_map.name}: no way round from lane {start_lane!r} back to it "
+            f"(the first followers lead {' -> '.join(lanes)})"
+        )
+
+    def _way(self, start: str, goal: str) -> list[str]:
+        """Return the shortest way after `start` up to `goal`, which may be the same lane again."""
+        queue: list[tuple[float, list[str]]] = [(0.0, [start])]
+        done: set[str] = set()
+        while queue:
+            length, lanes = heapq.heappop(queue)
+            if lanes[-1] == goal and len(lanes) > 1:
+                return lanes[1:]
+            for following in self._next[lanes[-1]]:
+                if following not in done:
+                    done.add(following)
+                    way = length + self.lanes[following].length_m
+                    heapq.heappush(queue, (way, [*lanes, following]))
+        raise MapError(f"map {self.city_map.name}: no way from lane {start!r} to {goal!r}")
+
+    def _pose_of(self, spawn: Spawn) -> Pose2:
+        """Return the pose that a spawn's lane and distance, or its own pose, stands for."""
+        if spawn.pose is not None:
+            return Pose2(*spawn.pose)
+        if spawn.lane is None or spawn.at_m is None:
+            raise MapError(f"spawn {spawn.name!r}: expected lane and at_m, or pose; got neither")
+        return self.lane(spawn.lane).at(spawn.at_m)
+
+
+class Path:
+    """The lanes of a route as one polyline; all distances count from the route's start.
+
+    Attributes:
+        lanes: The route.
+        closed: The route goes round for ever: every distance may exceed `length_m` or be negative,
+            and `project` near a hint counts on through the laps.
+        length_m: Of the route, or of one round.
+        stop_lines: With their distances, in driving order, of one round.
+        conflicts: Stretches (from, to, junction) where nobody may stop, of one round.
+    """
+
+    def __init__(self, roads: Roads, lanes: Sequence[str], *, closed: bool = False) -> None:
+        if not lanes:
+            raise MapError("route: expected at least one lane, got none")
+        self.lanes = tuple(lanes)
+        self.closed = closed
+        self._check_follows(roads)
+        pieces = [roads.lane(name) for name in lanes]
+        self._line = join(pieces, closed=closed)
+        self.length_m = self._line.length_m
+        self._starts = [0.0]
+        for piece in pieces:
+            self._starts.append(self._starts[-1] + piece.length_m)
+        self._limits = [piece.speed_limit_mps for piece in pieces]
+        self.stop_lines = [
+            (start + line.at_m, line)
+            for start, name in zip(self._starts, lanes, strict=False)
+            for line in roads.stop_lines_on(name)
+        ]
+        self.conflicts = sorted(
+            (start + group.movement.from_m, start + group.movement.to_m, junction.name)
+            for start, name in zip(self._starts, lanes, strict=False)
+            for junction in roads.city_map.junctions
+            for group in junction.groups
+            if group.movement.lane == name
+        )
+
+    @classmethod
+    def circulation(cls, roads: Roads, start_lane: str) -> "Path":
+        """Return the closed path of the loop that a lane lies on."""
+        return cls(roads, roads.loop(start_lane), closed=True)
+
+    def at(self, s: float) -> Pose2:
+        """Return the pose on the centre line; beyond an open end it stays at the end."""
+        return self._line.at(s)
+
+    def curvature(self, s: float) -> float:
+        """Return the curvature [1/m], + = turns left."""
+        return self._line.curvature_at(s)
+
+    def project(self, x: float, y: float, near_s: float | None = None) -> tuple[float, float]:
+        """Return distance along the path and beside it [m], + = left; see `Polyline.project`.
+
+        A route may pass the same place twice: give `near_s`, the last known distance.
+        """
+        return self._line.project(x, y, near_s)
+
+    def lane_at(self, s: float) -> str:
+        """Return the name of the lane at a distance."""
+        return self.lanes[self._lane_index(s)]
+
+    def place_at(self, s: float) -> tuple[str, float]:
+        """Return the lane at a distance, and the distance from that lane's start [m]."""
+        index = self._lane_index(s)
+        return self.lanes[index], self._inside(s) - self._starts[index]
+
+    def speed_limit_mps(self, s: float) -> float:
+        """Return the limit of the lane at a distance."""
+        return self._limits[self._lane_index(s)]
+
+    def next_stop_line(self, s: float) -> tuple[float, StopLine] | None:
+        """Return the first stop line at or after a distance; of a closed path, round for ever."""
+        base = s - self._inside(s) if self.closed else 0.0
+        rounds = (base, base + self.length_m) if self.closed else (0.0,)
+        for offset in rounds:
+            for at, line in self.stop_lines:
+                if at + offset >= s:
+                    return at + offset, line
+        return None
+
+    def conflict_at(self, s: float) -> tuple[float, float, str] | None:
+        """Return the conflict stretch (from, to, junction) that holds a distance, or None."""
+        inside = self._inside(s)
+        for start, end, junction in self.conflicts:
+            if start <= inside <= end:
+                return start + s - inside, end + s - inside, junction
+        return None
+
+    def _lane_index(self, s: float) -> int:
+        """Return which lane of the route holds a distance."""
+        inside = self._inside(s)
+        for index in range(len(self.lanes) - 1, 0, -1):
+            if inside >= self._starts[index]:
+                return index
+        return 0
+
+    def _inside(self, s: float) -> float:
+        """Return the same place as a distance from 0 to the length."""
+        return s % self.length_m if self.closed else min(max(s, 0.0), self.length_m)
+
+    def _check_follows(self, roads: Roads) -> None:
+        """Refuse a route with a lane that does not follow the one before it."""
+        pairs = list(zip(self.lanes, self.lanes[1:], strict=False))
+        if self.closed:
+            pairs.append((self.lanes[-1], self.lanes[0]))
+        for before, after in pairs:
+            if after not in roads.successors(before):
+                raise MapError(
+                    f"route: lane {after!r} does not follow {before!r}; expected one of "
+                    f"{', '.join(roads.successors(before)) or 'none: it is a dead end'}"
+                )

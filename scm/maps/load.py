@@ -1,0 +1,113 @@
+"""Reads a map file and doubts it: a bad map is refused with file, key, expected and got."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import msgspec
+
+import scm
+from scm.errors import MapError, nearest
+from scm.maps.check import problems_of
+from scm.maps.model import CityMap
+from scm.maps.occupancy import map_from_occupancy
+
+MAPS_DIR = Path(scm.__file__).parent.parent / "maps"
+
+_PATH = re.compile(r" - at `\$\.?(?P<path>.*)`$")
+_PLAIN = (
+    (re.compile(r"^Expected `([^`]+)`, got `([^`]+)`$"), r"expected \1, got \2"),
+    (re.compile(r"^Object missing required field `([^`]+)`$"), r"key \1 is missing"),
+    (re.compile(r"^Object contains unknown field `([^`]+)`$"), r"key \1 is not known here"),
+    (re.compile(r"^Invalid enum value (.+)$"), r"value \1 is not allowed"),
+    (re.compile(r"^Expected `array` of length (\d+), got (\d+)$"), r"expected \1 values, got \2"),
+)
+_TYPES = {
+    "str": "text in quotes",
+    "float": "a number",
+    "int": "a whole number",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "a table",
+    "null": "nothing",
+}
+
+
+def map_names() -> list[str]:
+    """Return the names of the maps that come with the project."""
+    return sorted(path.stem for path in MAPS_DIR.glob("*.toml"))
+
+
+def load_map(name_or_path: str | Path) -> CityMap:
+    """Return a map by its name, or by the path of a map file or a scanned grid's `.yaml`.
+
+    Raises:
+        MapError: There is no such map; or it is wrong, with every reason that could be found.
+    """
+    path = _find(name_or_path)
+    if path.suffix in {".yaml", ".yml"}:
+        return map_from_occupancy(path)
+    city_map = _read(path)
+    problems = problems_of(city_map)
+    if problems:
+        listed = "".join(f"\n  {problem}" for problem in problems)
+        raise MapError(f"{path}: {len(problems)} problem(s){listed}")
+    return city_map
+
+
+def _find(name_or_path: str | Path) -> Path:
+    """Return the file that is meant: an existing path first, then a name in the maps folder."""
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    known = MAPS_DIR / f"{name_or_path}.toml"
+    if known.is_file():
+        return known
+    if path.suffix in {".toml", ".yaml", ".yml"}:
+        raise MapError(f"{path}: there is no such map file")
+    names = map_names()
+    raise MapError(
+        f"no map {str(name_or_path)!r}{nearest(str(name_or_path), names)}: "
+        f"expected a file, or one of {', '.join(names)}"
+    )
+
+
+def _read(path: Path) -> CityMap:
+    """Return the file as a map whose keys and types are right."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise MapError(f"{path}: cannot be read as TOML: {error}") from error
+    try:
+        return msgspec.convert(data, CityMap)
+    except msgspec.ValidationError as error:
+        raise MapError(f"{path}: {_in_plain_words(str(error), data)}") from error
+
+
+def _in_plain_words(message: str, data: object) -> str:
+    """Return msgspec's sentence as `key: expected .., got ..` with the record's name."""
+    found = _PATH.search(message)
+    path = found["path"] if found else ""
+    text = message[: found.start()] if found else message
+    for pattern, plain in _PLAIN:
+        if pattern.match(text):
+            text = pattern.sub(plain, text)
+            break
+    for python, word in _TYPES.items():
+        text = re.sub(rf"\b(expected|got|\|) {python}\b", rf"\1 {word}", text)
+    where = f"{path}{_name_at(path, data)}"
+    return f"{where}: {text.replace(' | ', ' or ')}" if where else text
+
+
+def _name_at(path: str, data: object) -> str:
+    """Return ` (name)` of the innermost record on the way to a key that has a name or an id."""
+    name = ""
+    for step in re.findall(r"[^.\[\]]+", path):
+        if isinstance(data, list) and step.isdigit() and int(step) < len(data):
+            data = data[int(step)]
+        elif isinstance(data, dict):
+            data = data.get(step)
+        if isinstance(data, dict):
+            named = data.get("name", data.get("light_id", data.get("sign_id", "")))
+            name = f" ({named})" if named != "" else name
+    return name
