@@ -1,0 +1,101 @@
+"""The web application of one city: routes by noun, the live stream, the dashboard's files."""
+
+import asyncio
+import uuid
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from pathlib import Path
+
+from fastapi import APIRouter, FastAPI
+from fastapi.responses import FileResponse
+from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from scm.api import problem
+from scm.api.city import Ask, City
+from scm.api.gate import Gate, content_policy
+from scm.api.routes import cars, events, eye, health, live, map, signals, stations, stop  # noqa: A004  named for its noun
+from scm.api.stream import Stream
+from scm.api.view import CityView
+from scm.maps.model import CityMap
+
+STATIC_DIR = Path(__file__).parent / "static"
+_REVALIDATE = {"Cache-Control": "no-cache"}
+
+
+class _Files(StaticFiles):
+    """Static files with an ETag that the browser asks about each time: no stale page, no reload."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers.update(_REVALIDATE)
+        return response
+
+
+def create_app(
+    view: CityView,
+    ask: Ask,
+    city_map: CityMap,
+    *,
+    api_key: str | None = None,
+    plans: Mapping[str, Sequence[str]] | None = None,
+) -> FastAPI:
+    """Build the application.
+
+    Args:
+        view: What is shown; stepped by its runner on another thread.
+        ask: Sends a request on the bus and waits for the reply, at most so many seconds.
+        city_map: Of the city that `view` hears.
+        api_key: When given, every change needs it as a bearer token; without it only this machine
+            may call.
+        plans: Names of the signal plans each junction offers, beyond those that were seen.
+    """
+    city = City(view, ask, city_map, plans or {})
+    stream = Stream(city, uuid.uuid4().hex[:8])
+    app = FastAPI(
+        title=f"scm {city_map.name}",
+        version="1",
+        docs_url=None,  # its page loads from a CDN: ours is static/docs.html
+        redoc_url=None,
+        openapi_url="/api/v1/openapi.json",
+        lifespan=_lifespan_of(stream),
+    )
+    app.state.stream = stream
+    app.state.api_key = api_key
+    problem.install(app)
+    policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
+    app.add_middleware(Gate, api_key=api_key, policy=policy)
+    api = APIRouter(prefix="/api/v1")
+    for noun in (cars, signals, stations, events, map, eye, stop):
+        api.include_router(noun.router(city))
+    api.include_router(live.router(stream))
+    app.include_router(api)
+    app.include_router(health.router(city))
+    _add_pages(app)
+    return app
+
+
+def _lifespan_of(
+    stream: Stream,
+) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        task = asyncio.create_task(stream.run())
+        yield
+        stream.close()
+        await task
+
+    return lifespan
+
+
+def _add_pages(app: FastAPI) -> None:
+    @app.get("/", include_in_schema=False)
+    def dashboard() -> FileResponse:
+        return FileResponse(STATIC_DIR / "index.html", headers=_REVALIDATE)
+
+    @app.get("/docs", include_in_schema=False)
+    def docs() -> FileResponse:
+        return FileResponse(STATIC_DIR / "docs.html", headers=_REVALIDATE)
+
+    app.mount("/static", _Files(directory=STATIC_DIR), name="static")

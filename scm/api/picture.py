@@ -1,0 +1,69 @@
+"""What the city looked like at one moment: a copy that the web may read without a lock."""
+
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from scm.api.residual import Residual
+from scm.api.stations import StationRow
+from scm.clock import seconds
+from scm.v2x.message import Message
+from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.eye_frame import EyeFrame
+from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.eye_tags import EyeTags
+from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.v2x.messages.world_definition import WorldDefinition
+from scm.v2x.messages.world_snapshot import WorldSnapshot
+
+M = TypeVar("M", bound=Message)
+
+
+@dataclass(frozen=True, slots=True)
+class Held(Generic[M]):
+    """A message and when it reached this process [ns]."""
+
+    message: M
+    arrived_ns: int
+
+    def age_s(self, now_ns: int) -> float:
+        """Return how long ago it arrived [s]."""
+        return seconds(now_ns - self.arrived_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class SeenPose:
+    """A pose the Eye measured, and how far it lay from the truth; None: no truth of that time."""
+
+    held: Held[EyePose]
+    residual: Residual | None
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """The newest of everything heard, as of `now_ns`, the time of the view's last step.
+
+    Attributes:
+        spats, monitors: By junction.
+        trips, states: By vehicle.
+        frames, tags: By camera, the last few, oldest first.
+        poses: By (camera, vehicle).
+        stations: Everybody who is there, and who was lost lately.
+        event_seq: Number of the newest event in the log; 0: none yet.
+    """
+
+    now_ns: int = 0
+    snapshot: Held[WorldSnapshot] | None = None
+    definition: WorldDefinition | None = None
+    stop: CityStop | None = None
+    spats: dict[str, Held[Spat]] = field(default_factory=dict)
+    monitors: dict[str, Held[MonitorStatus]] = field(default_factory=dict)
+    trips: dict[str, Held[Trip]] = field(default_factory=dict)
+    states: dict[str, Held[VehicleState]] = field(default_factory=dict)
+    frames: dict[str, tuple[Held[EyeFrame], ...]] = field(default_factory=dict)
+    tags: dict[str, tuple[Held[EyeTags], ...]] = field(default_factory=dict)
+    poses: dict[tuple[str, str], SeenPose] = field(default_factory=dict)
+    stations: tuple[StationRow, ...] = ()
+    event_seq: int = 0

@@ -1,0 +1,113 @@
+"""Errors of the web interface in one shape: RFC 9457 `application/problem+json`.
+
+On top of the RFC's members every problem has a `code`, a short machine word.
+"""
+
+from http import HTTPStatus
+
+import msgspec
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+
+from scm.v2x.message import Refused
+
+STATUS_OF_CODE = {
+    "not_found": 404,
+    "owned": 409,
+    "invalid": 422,
+    "offline": 503,
+    "timeout": 504,
+}
+"""HTTP status for the code of a `Refused`; any other code is a conflict with the city's state."""
+
+_CODE_OF_STATUS = {
+    401: "unauthorised",
+    403: "forbidden",
+    404: "not_found",
+    405: "method_not_allowed",
+    422: "invalid",
+    500: "internal",
+}
+
+
+class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
+    """The body of an error; `errors` lists each wrong field with where it stands."""
+
+    type: str
+    title: str
+    status: int
+    code: str
+    detail: str = ""
+    instance: str = ""
+    errors: tuple[dict[str, str], ...] = ()
+
+
+class RefusedError(Exception):
+    """The city answered a request with `Refused`; becomes a problem at the edge."""
+
+    def __init__(self, refused: Refused) -> None:
+        super().__init__(refused.detail)
+        self.refused = refused
+
+
+def problem(
+    status: int,
+    code: str,
+    detail: str,
+    *,
+    instance: str = "",
+    errors: tuple[dict[str, str], ...] = (),
+) -> Response:
+    """Return the response for an error."""
+    body = Problem(
+        type="about:blank",
+        title=HTTPStatus(status).phrase,
+        status=status,
+        code=code,
+        detail=detail,
+        instance=instance,
+        errors=errors,
+    )
+    headers = {"Cache-Control": "no-store"}
+    if status == HTTPStatus.UNAUTHORIZED:
+        headers["WWW-Authenticate"] = "Bearer"
+    return Response(
+        msgspec.json.encode(body), status, headers, media_type="application/problem+json"
+    )
+
+
+def install(app: FastAPI) -> None:
+    """Make every error of the application a problem."""
+    app.add_exception_handler(RefusedError, _on_refused)
+    app.add_exception_handler(RequestValidationError, _on_invalid)
+    app.add_exception_handler(HTTPException, _on_http)
+    app.add_exception_handler(Exception, _on_bug)
+
+
+async def _on_refused(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RefusedError)  # noqa: S101  the type it was registered for
+    code = error.refused.code
+    status = STATUS_OF_CODE.get(code, 409)
+    return problem(status, code, error.refused.detail, instance=request.url.path)
+
+
+async def _on_invalid(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)  # noqa: S101  the type it was registered for
+    errors = tuple(
+        {"where": ".".join(str(step) for step in found["loc"]), "expected": str(found["msg"])}
+        for found in error.errors()
+    )
+    detail = "; ".join(f"{item['where']}: {item['expected']}" for item in errors)
+    return problem(422, "invalid", detail, instance=request.url.path, errors=errors)
+
+
+async def _on_http(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)  # noqa: S101  the type it was registered for
+    code = _CODE_OF_STATUS.get(error.status_code, "http")
+    return problem(error.status_code, code, str(error.detail), instance=request.url.path)
+
+
+async def _on_bug(request: Request, _error: Exception) -> Response:
+    detail = "the server failed on this request; its log says why"
+    return problem(500, "internal", detail, instance=request.url.path)

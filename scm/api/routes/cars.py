@@ -1,0 +1,77 @@
+"""Cars: list, look at one, put one on the map, send it on a route, take it off."""
+
+from fastapi import APIRouter, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from scm.api.car_rows import CarRow, cars_topic
+from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
+from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
+from scm.v2x.messages.route_request import RouteReply, RouteRequest
+from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
+
+_NAME_OR_EMPTY = r"^[a-z0-9_-]{0,32}$"
+
+
+class SpawnBody(BaseModel):
+    """A hosted car to put on the map; everything may be left to the world."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    vehicle: str = Field("", pattern=_NAME_OR_EMPTY)
+    car: str = Field("nigel", pattern=_NAME_OR_EMPTY)
+    spawn: str = Field("", max_length=64)
+
+
+class RouteBody(BaseModel):
+    """Where to go; `via` empty: circulate for ever."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    via: list[str] = Field(default_factory=list, max_length=200)
+    laps: int = Field(1, ge=1, le=10_000)
+    speed_mps: float | None = Field(None, gt=0.0, le=10.0)
+
+
+def router(city: City) -> APIRouter:
+    """Return the routes."""
+    routes = APIRouter(prefix="/cars", tags=["cars"])
+
+    @routes.get("", summary="All cars on the map")
+    def all_cars() -> Response:
+        return json_response(cars_topic(city.view.picture()))
+
+    @routes.post("", summary="Spawn a hosted car", status_code=201)
+    def spawn(body: SpawnBody, key: IdempotencyKey = "") -> Response:
+        request = SpawnRequest(request_id=key, vehicle=body.vehicle, car=body.car, spawn=body.spawn)
+        reply = city.ask(request, SpawnReply)
+        return json_response(reply, 201, {"Location": f"/api/v1/cars/{reply.vehicle}"})
+
+    @routes.get("/{name}", summary="One car")
+    def one_car(name: Name) -> Response:
+        return json_response(_find(city, name))
+
+    @routes.delete("/{name}", summary="Take a car off the map")
+    def remove(name: Name, reason: str = "", key: IdempotencyKey = "") -> Response:
+        request = RemoveRequest(request_id=key, vehicle=name, reason=reason)
+        return json_response(city.ask(request, RemoveReply))
+
+    @routes.post("/{name}/route", summary="Send a car on a route")
+    def route(name: Name, body: RouteBody, key: IdempotencyKey = "") -> Response:
+        request = RouteRequest(
+            request_id=key,
+            vehicle=name,
+            via=tuple(body.via),
+            laps=body.laps,
+            speed_mps=body.speed_mps,
+        )
+        return json_response(city.ask(request, RouteReply))
+
+    return routes
+
+
+def _find(city: City, name: str) -> CarRow:
+    rows = cars_topic(city.view.picture()).cars
+    found = next((row for row in rows if row.vehicle == name), None)
+    if found is None:
+        raise not_found("car", name)
+    return found

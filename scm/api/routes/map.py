@@ -1,0 +1,34 @@
+"""The map: as data, and drawn."""
+
+import hashlib
+
+import msgspec
+from fastapi import APIRouter, Request, Response
+
+from scm.api.city import City
+from scm.maps.draw import draw_svg
+
+
+def router(city: City) -> APIRouter:
+    """Return the routes; both forms are made once, a map does not change while the city runs."""
+    routes = APIRouter(tags=["map"])
+    as_json = msgspec.json.encode(city.city_map)
+    as_svg = draw_svg(city.city_map).encode()
+
+    @routes.get("/map", summary="The map as JSON")
+    def map_json(request: Request) -> Response:
+        return _tagged(request, as_json, "application/json")
+
+    @routes.get("/map.svg", summary="The map drawn")
+    def map_svg(request: Request) -> Response:
+        return _tagged(request, as_svg, "image/svg+xml")
+
+    return routes
+
+
+def _tagged(request: Request, body: bytes, media_type: str) -> Response:
+    etag = f'"{hashlib.sha256(body).hexdigest()[:16]}"'
+    headers = {"ETag": etag, "Cache-Control": "no-cache"}
+    if request.headers.get("if-none-match") == etag:
+        return Response(status_code=304, headers=headers)
+    return Response(body, headers=headers, media_type=media_type)

@@ -1,0 +1,95 @@
+"""Run the web application until told to stop; the caller keeps the signals (Ctrl-C)."""
+
+import asyncio
+import contextlib
+import socket
+import threading
+from collections.abc import Callable, Iterator
+
+import uvicorn
+from fastapi import FastAPI
+
+from scm.api.gate import check_bind
+from scm.errors import RunError
+
+_POLL_S = 0.05
+
+
+class _Server(uvicorn.Server):
+    """Uvicorn without its signal handlers."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+def serve(
+    app: FastAPI,
+    host: str,
+    port: int,
+    stop_event: threading.Event,
+    *,
+    on_ready: Callable[[str], None] | None = None,
+) -> None:
+    """Serve until `stop_event` is set, then end all streams and return within a second.
+
+    Args:
+        app: From `create_app`.
+        host: Loopback, unless the application has an API key.
+        port: 0 takes a free one.
+        stop_event: Set by anybody, from any thread.
+        on_ready: Called once with the address (`http://127.0.0.1:8000`) when pages are served.
+
+    Raises:
+        RunError: when the host may not be bound, or the address is taken.
+    """
+    check_bind(host, app.state.api_key)
+    listener = _bind(host, port)
+    config = uvicorn.Config(
+        app,
+        ws="none",
+        log_config=None,
+        access_log=False,
+        lifespan="on",
+        timeout_graceful_shutdown=1,
+        server_header=False,
+    )
+    asyncio.run(_serve(_Server(config), app, listener, stop_event, on_ready))
+
+
+async def _serve(
+    server: uvicorn.Server,
+    app: FastAPI,
+    listener: socket.socket,
+    stop_event: threading.Event,
+    on_ready: Callable[[str], None] | None,
+) -> None:
+    serving = asyncio.create_task(server.serve([listener]))
+    told = False
+    while not (stop_event.is_set() or serving.done()):  # a thread's event: it has to be polled
+        if server.started and not told:
+            told = True
+            if on_ready is not None:
+                on_ready(_address(listener))
+        await asyncio.sleep(_POLL_S)
+    app.state.stream.close()
+    server.should_exit = True
+    await serving
+
+
+def _bind(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+    except OSError as cause:
+        listener.close()
+        msg = f"api address {host}:{port}: {cause.strerror}; expected a free port of this machine"
+        raise RunError(msg) from cause
+    return listener
+
+
+def _address(listener: socket.socket) -> str:
+    host, port = listener.getsockname()[:2]
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"

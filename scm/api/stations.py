@@ -1,0 +1,90 @@
+"""The table of stations: who is there, who was lost lately, and how each one says it does."""
+
+import msgspec
+
+from scm.clock import NS_PER_S, seconds
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.presence import Presence
+
+LOST_SHOWN_NS = 60 * NS_PER_S
+_Key = tuple[str, str, str]
+
+
+class StationRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One run of one station.
+
+    Attributes:
+        since_ns: When it was first seen here.
+        lost_ns: When it left or died; None while it is there.
+        age_s: Since its last status; None: it never sent one.
+    """
+
+    role: str
+    name: str
+    session: str
+    alive: bool
+    since_ns: int
+    lost_ns: int | None = None
+    age_s: float | None = None
+    detail: str = ""
+    step_ms: float = 0.0
+    late_steps: int = 0
+    dropped: int = 0
+
+
+class StationTable:
+    """Stations by role, name and session; a lost one stays listed for 60 s."""
+
+    def __init__(self) -> None:
+        self._rows: dict[_Key, StationRow] = {}
+        self._status: dict[str, tuple[PartStatus, int]] = {}
+
+    def presence(self, seen: Presence, now_ns: int) -> None:
+        """Note that a station came, or went."""
+        key = (seen.role, seen.station, seen.session)
+        known = self._rows.get(key)
+        if seen.alive:
+            since_ns = known.since_ns if known is not None and known.alive else now_ns
+            self._rows[key] = StationRow(
+                role=seen.role,
+                name=seen.station,
+                session=seen.session,
+                alive=True,
+                since_ns=since_ns,
+            )
+        elif known is not None and known.alive:
+            self._rows[key] = msgspec.structs.replace(known, alive=False, lost_ns=now_ns)
+
+    def status(self, status: PartStatus, now_ns: int) -> None:
+        """Note what a station says of itself."""
+        self._status[status.station] = (status, now_ns)
+
+    def forget(self, now_ns: int) -> None:
+        """Drop those lost for more than 60 s, and what was last heard from them."""
+        for key, row in list(self._rows.items()):
+            if row.lost_ns is not None and now_ns - row.lost_ns > LOST_SHOWN_NS:
+                del self._rows[key]
+        names = {row.name for row in self._rows.values()}
+        for name, (_, arrived_ns) in list(self._status.items()):
+            if name not in names and now_ns - arrived_ns > LOST_SHOWN_NS:
+                del self._status[name]
+
+    def rows(self, now_ns: int) -> tuple[StationRow, ...]:
+        """Return the table: parts first, then vehicles, then clients, by name."""
+        order = {"part": 0, "v": 1}
+        rows = [self._with_status(row, now_ns) for row in self._rows.values()]
+        rows.sort(key=lambda row: (order.get(row.role, 2), row.name, row.since_ns, row.session))
+        return tuple(rows)
+
+    def _with_status(self, row: StationRow, now_ns: int) -> StationRow:
+        if row.name not in self._status:
+            return row
+        status, arrived_ns = self._status[row.name]
+        return msgspec.structs.replace(
+            row,
+            age_s=round(seconds(now_ns - arrived_ns), 1),
+            detail=status.detail,
+            step_ms=round(status.step_ms, 2),
+            late_steps=status.late_steps,
+            dropped=status.dropped,
+        )

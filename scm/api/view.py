@@ -1,0 +1,154 @@
+"""The view: a part that only hears, and keeps the newest of everything a person wants to see.
+
+`step` runs on the runner's thread, `picture` and `events_after` are called by the web's threads.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from scm.api.event_log import EventLog, LoggedEvent
+from scm.api.picture import Held, Picture, SeenPose
+from scm.api.residual import residual_of, truth_at
+from scm.api.stations import StationTable
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.geometry import Pose2
+from scm.part import Hears, Serves
+from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.message import Message
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.eye_frame import EyeFrame
+from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.eye_tags import EyeTags
+from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.presence import Presence
+from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.v2x.messages.world_definition import WorldDefinition
+from scm.v2x.messages.world_snapshot import WorldSnapshot
+
+TRUTH_DEPTH = 80  # snapshots: 4 s, longer than any camera's latency
+FRAME_DEPTH = 4
+TAGS_DEPTH = 8
+FORGET_NS = 60 * NS_PER_S
+
+
+class CityView:
+    """What the city looks like from outside; hears all, says nothing."""
+
+    def __init__(self) -> None:
+        self.name = "api"
+        self.role = "part"
+        self.period_ns = 50 * NS_PER_MS
+        self.serves: Sequence[Serves] = ()
+        self._lock = threading.Lock()
+        self._now_ns = 0
+        self._next_forget_ns = 0
+        self._snapshot: Held[WorldSnapshot] | None = None
+        self._definition: WorldDefinition | None = None
+        self._stop: CityStop | None = None
+        self._truth: deque[WorldSnapshot] = deque(maxlen=TRUTH_DEPTH)
+        self._spats: dict[str, Held[Spat]] = {}
+        self._monitors: dict[str, Held[MonitorStatus]] = {}
+        self._trips: dict[str, Held[Trip]] = {}
+        self._states: dict[str, Held[VehicleState]] = {}
+        self._frames: dict[str, deque[Held[EyeFrame]]] = {}
+        self._tags: dict[str, deque[Held[EyeTags]]] = {}
+        self._poses: dict[tuple[str, str], SeenPose] = {}
+        self._stations = StationTable()
+        self._log = EventLog()
+        self._takers: dict[type[Message], Callable[[Any, int], None]] = {
+            WorldSnapshot: self._take_snapshot,
+            WorldDefinition: self._take_definition,
+            Spat: lambda m, t: self._spats.update({m.junction: Held(m, t)}),
+            MonitorStatus: lambda m, t: self._monitors.update({m.junction: Held(m, t)}),
+            EyeFrame: self._take_frame,
+            EyeTags: self._take_tags,
+            EyePose: self._take_pose,
+            Presence: self._stations.presence,
+            PartStatus: self._stations.status,
+            CityEvent: lambda m, _: self._log.add(m),
+            Trip: lambda m, t: self._trips.update({m.vehicle: Held(m, t)}),
+            CityStop: self._take_stop,
+            VehicleState: lambda m, t: self._states.update({m.vehicle: Held(m, t)}),
+        }
+        self.hears: Sequence[Hears] = tuple(Hears(kind) for kind in self._takers)
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Keep what came in; never answers."""
+        with self._lock:
+            self._now_ns = now_ns
+            for incoming in inbox:
+                taker = self._takers.get(type(incoming.message))
+                if taker is not None:
+                    taker(incoming.message, incoming.t_ns)
+            if now_ns >= self._next_forget_ns:
+                self._next_forget_ns = now_ns + NS_PER_S
+                self._forget(now_ns)
+        return []
+
+    def finish(self, now_ns: int) -> list[Outgoing]:
+        """Leave without a word."""
+        self._now_ns = now_ns
+        return []
+
+    def picture(self) -> Picture:
+        """Return a copy of the present state; safe from any thread."""
+        with self._lock:
+            return Picture(
+                now_ns=self._now_ns,
+                snapshot=self._snapshot,
+                definition=self._definition,
+                stop=self._stop,
+                spats=dict(self._spats),
+                monitors=dict(self._monitors),
+                trips=dict(self._trips),
+                states=dict(self._states),
+                frames={camera: tuple(frames) for camera, frames in self._frames.items()},
+                tags={camera: tuple(tags) for camera, tags in self._tags.items()},
+                poses=dict(self._poses),
+                stations=self._stations.rows(self._now_ns),
+                event_seq=self._log.newest_seq,
+            )
+
+    def events_after(self, seq: int, limit: int) -> tuple[LoggedEvent, ...]:
+        """Return up to `limit` events numbered above `seq`, oldest first; safe from any thread."""
+        with self._lock:
+            return self._log.after(seq, limit)
+
+    def _take_snapshot(self, snapshot: WorldSnapshot, t_ns: int) -> None:
+        self._snapshot = Held(snapshot, t_ns)
+        if self._truth and snapshot.t_ns < self._truth[-1].t_ns:
+            self._truth.clear()  # the world was restarted: its time went back
+        self._truth.append(snapshot)
+
+    def _take_definition(self, definition: WorldDefinition, _t_ns: int) -> None:
+        self._definition = definition
+
+    def _take_stop(self, stop: CityStop, _t_ns: int) -> None:
+        self._stop = stop
+
+    def _take_frame(self, frame: EyeFrame, t_ns: int) -> None:
+        self._frames.setdefault(frame.camera, deque(maxlen=FRAME_DEPTH)).append(Held(frame, t_ns))
+
+    def _take_tags(self, tags: EyeTags, t_ns: int) -> None:
+        self._tags.setdefault(tags.camera, deque(maxlen=TAGS_DEPTH)).append(Held(tags, t_ns))
+
+    def _take_pose(self, pose: EyePose, t_ns: int) -> None:
+        truth = truth_at(self._truth, pose.vehicle, pose.t_ns)
+        measured = Pose2(pose.x_m, pose.y_m, pose.yaw_rad)
+        residual = residual_of(measured, truth) if truth is not None else None
+        self._poses[pose.camera, pose.vehicle] = SeenPose(Held(pose, t_ns), residual)
+
+    def _forget(self, now_ns: int) -> None:
+        self._stations.forget(now_ns)
+        oldest_ns = now_ns - FORGET_NS
+        for held in (self._trips, self._states):
+            for name in [name for name, item in held.items() if item.arrived_ns < oldest_ns]:
+                del held[name]
+        for key in [k for k, seen in self._poses.items() if seen.held.arrived_ns < oldest_ns]:
+            del self._poses[key]
