@@ -1,0 +1,156 @@
+"""The contract of a fixed-time plan, and its timetable for one junction.
+
+A plan is one file of `plans/` with a constant `PLAN`. It is parametric: from a junction's program
+it makes a cycle of stages, each a set of groups that are green together, and for how long. Yellow
+and clearance between two stages are not the plan's business: the timetable adds what the kernel
+takes, and one step so that a late step of the controller does not push the next stage.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from scm import registry
+from scm.errors import PlanError
+from scm.traffic.kernel import GroupTimes, Program
+from scm.traffic.program import STEP_NS
+
+PACKAGE = "scm.traffic.plans"
+FLASH = "flash"
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """Groups that are green together, and for how long [ns]."""
+
+    groups: tuple[str, ...]
+    green_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A plug-in: what it is for, in one sentence, and how it makes a cycle of stages."""
+
+    about: str
+    cycle: Callable[[Program], tuple[Stage, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """A stage with its place in the cycle: green is wished from `start_ns` to `end_ns`."""
+
+    groups: frozenset[str]
+    start_ns: int
+    end_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Timetable:
+    """One cycle of a plan at one junction; positions count from its start [ns]."""
+
+    plan: str
+    slots: tuple[Slot, ...]
+    length_ns: int
+
+    def wishes(self, position_ns: int) -> frozenset[str]:
+        """Return the groups wished green at a position of the cycle."""
+        for slot in self.slots:
+            if slot.start_ns <= position_ns < slot.end_ns:
+                return slot.groups
+        return frozenset()
+
+    def slot_of(self, group: str, position_ns: int) -> Slot | None:
+        """Return the group's green that is on, or the next one in this cycle."""
+        for slot in self.slots:
+            if group in slot.groups and position_ns < slot.end_ns:
+                return slot
+        return None
+
+    def first_start_ns(self, group: str) -> int:
+        """Return when the group's first green of a cycle begins."""
+        return min(slot.start_ns for slot in self.slots if group in slot.groups)
+
+
+def plan_names() -> list[str]:
+    """Return the names of all plans that can be asked for."""
+    return registry.names(PACKAGE)
+
+
+def times_of(program: Program, group: str) -> GroupTimes:
+    """Return the least times of a group."""
+    return program.times[program.groups.index(group)]
+
+
+def green_ns(program: Program, groups: tuple[str, ...]) -> int:
+    """Return the shortest green that all of these groups may have together [ns]."""
+    return max(times_of(program, group).min_green for group in groups)
+
+
+def stages(program: Program) -> tuple[tuple[str, ...], ...]:
+    """Return sets of groups without conflict that together hold every group once.
+
+    Greedy, in the map's order: each set takes every later group that fits.
+    """
+    left = list(program.groups)
+    found: list[tuple[str, ...]] = []
+    while left:
+        stage: list[str] = []
+        for group in left:
+            if all(frozenset((group, other)) not in program.conflicts for other in stage):
+                stage.append(group)
+        left = [group for group in left if group not in stage]
+        found.append(tuple(stage))
+    return tuple(found)
+
+
+def load_timetable(name: str, program: Program) -> Timetable:
+    """Return the cycle of a plan by name for one junction.
+
+    Raises:
+        PlanError: when there is no such plan, or its cycle is not safe or leaves somebody out.
+    """
+    plan = registry.load(PACKAGE, name, "PLAN", Plan, error=PlanError)
+    return timetable(name, plan.cycle(program), program)
+
+
+def timetable(name: str, cycle: tuple[Stage, ...], program: Program) -> Timetable:
+    """Return the timetable of a cycle of stages.
+
+    Raises:
+        PlanError: naming every problem of the cycle at once.
+    """
+    problems = [problem for stage in cycle for problem in _problems(stage, program)]
+    served = {group for stage in cycle for group in stage.groups}
+    problems += [
+        f"group {group!r} is never green" for group in program.groups if group not in served
+    ]
+    if problems:
+        raise PlanError(f"plan {name!r}: " + "; ".join(problems))
+    slots: list[Slot] = []
+    position_ns = 0
+    for stage in cycle:
+        end_ns = position_ns + stage.green_ns
+        slots.append(Slot(frozenset(stage.groups), position_ns, end_ns))
+        position_ns = end_ns + _between_ns(stage, program)
+    return Timetable(name, tuple(slots), position_ns)
+
+
+def _between_ns(stage: Stage, program: Program) -> int:
+    times = [times_of(program, group) for group in stage.groups]
+    return max(t.yellow + t.clearance for t in times) + STEP_NS
+
+
+def _problems(stage: Stage, program: Program) -> list[str]:
+    unknown = [group for group in stage.groups if group not in program.groups]
+    if unknown or not stage.groups:
+        return [f"stage {stage.groups}: expected groups of {program.groups}"]
+    clashes = [
+        f"{first!r} and {second!r} conflict but share a stage"
+        for first in stage.groups
+        for second in stage.groups
+        if first < second and frozenset((first, second)) in program.conflicts
+    ]
+    least_ns = green_ns(program, stage.groups)
+    if stage.green_ns < least_ns:
+        got_s, least_s = stage.green_ns / 1e9, least_ns / 1e9
+        clashes.append(f"stage {stage.groups}: green {got_s} s, expected at least {least_s} s")
+    return clashes
