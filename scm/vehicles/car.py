@@ -1,0 +1,273 @@
+"""A car as its file says: the effects it uses, and each number with its spread, unit and source.
+
+`types/<name>.toml` holds the cars shipped; any other TOML file is loaded by its path.
+"""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from scm import registry
+from scm.errors import CarError, TermError, nearest
+from scm.vehicles import body14
+from scm.vehicles.assemble import setters_of
+from scm.vehicles.facts import FACTS, Fact
+from scm.vehicles.param import Param
+from scm.vehicles.term import Term
+
+TYPES_DIR = Path(__file__).parent / "types"
+TERMS = "scm.vehicles.terms"
+STANDARD_TERMS = (
+    "suspension_spring", "suspension_damper", "bump_stop", "tyre_contact", "tyre_longitudinal",
+    "tyre_lateral", "motor_dc", "motor_damping", "motor_hold", "stiction", "reflected_inertia",
+    "wheel_damping", "rolling_resistance", "steer_limit", "servo", "ackermann", "viscous_drag",
+    "aero_drag", "yaw_drag",
+)  # fmt: skip
+
+Value = float | tuple[float, ...] | str
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One value of a car file; `std` is None where the file does not say how sure it is."""
+
+    value: Value
+    std: float | None
+    unit: str
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Car:
+    """A car: its name, its effects in the file's order, and every value by `section.key`."""
+
+    name: str
+    scale: str
+    path: Path
+    terms: tuple[Term, ...]
+    values: Mapping[str, Quantity]
+
+    def has(self, key: str) -> bool:
+        """Say whether the file, or an effect's default, gives this key a value."""
+        return key in self.values
+
+    def quantity(self, key: str) -> Quantity:
+        """Return a value with its spread, unit and source.
+
+        Raises:
+            CarError: when the car has no such key.
+        """
+        if key not in self.values:
+            msg = f"{self.path}: {key}: not in this car{nearest(key, sorted(self.values))}"
+            raise CarError(msg)
+        return self.values[key]
+
+    def value(self, key: str) -> float:
+        """Return a number such as `value("body.mass_kg")`, in the unit its key ends in."""
+        value = self.quantity(key).value
+        if not isinstance(value, float):
+            msg = f"{self.path}: {key}: expected one number, got {value!r}"
+            raise CarError(msg)
+        return value
+
+    def vector(self, key: str) -> tuple[float, ...]:
+        """Return several numbers such as `vector("lidar.range_m")`."""
+        value = self.quantity(key).value
+        if not isinstance(value, tuple):
+            msg = f"{self.path}: {key}: expected several numbers, got {value!r}"
+            raise CarError(msg)
+        return value
+
+    def text(self, key: str) -> str:
+        """Return a word such as `text("ips.tag_family")`."""
+        value = self.quantity(key).value
+        if not isinstance(value, str):
+            msg = f"{self.path}: {key}: expected text, got {value!r}"
+            raise CarError(msg)
+        return value
+
+
+def car_names() -> list[str]:
+    """Return the names of the cars shipped, sorted."""
+    return sorted(path.stem for path in TYPES_DIR.glob("*.toml"))
+
+
+@cache
+def all_terms() -> Mapping[str, Term]:
+    """Return every effect known, by name."""
+    return {name: registry.load(TERMS, name, "TERM", Term) for name in registry.names(TERMS)}
+
+
+def load_car(name_or_path: str | Path) -> Car:
+    """Read a car by the name of a shipped one, or by the path of any car file.
+
+    Raises:
+        CarError: naming every problem of the file at once.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        path = TYPES_DIR / f"{name_or_path}.toml"
+    if not path.is_file():
+        hint = nearest(str(name_or_path), car_names())
+        msg = f"{name_or_path}: no such car; there are {', '.join(car_names())}{hint}"
+        raise CarError(msg)
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        msg = f"{path}: not a TOML file: {error}"
+        raise CarError(msg) from error
+    return car_of(data, path)
+
+
+def car_of(data: Mapping[str, Any], path: Path) -> Car:
+    """Make a car of a parsed file; `path` only names it in errors.
+
+    Raises:
+        CarError: naming every problem at once.
+    """
+    problems: list[str] = []
+    terms = _terms(data, problems)
+    values = _defaults(terms) | _values(data, problems)
+    problems += _contradictions(data, values)
+    try:
+        setters_of(terms)
+    except TermError as error:
+        problems.append(f"terms: {error}")
+    if problems:
+        raise CarError("\n".join(f"{path}: {problem}" for problem in problems))
+    if "drive.layout" in values and "drive.rear_driven" not in _flat(data):
+        rear = 0.0 if values["drive.layout"].value == "front" else 1.0
+        values["drive.rear_driven"] = Quantity(rear, None, "1", "drive.layout")
+    name, scale = str(data.get("name", path.stem)), str(data.get("scale", ""))
+    return Car(name, scale, path, terms, values)
+
+
+def _terms(data: Mapping[str, Any], problems: list[str]) -> tuple[Term, ...]:
+    names = data.get("terms", list(STANDARD_TERMS))
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        problems.append(f"terms: expected a list of effect names, got {names!r}")
+        return ()
+    known = all_terms()
+    for i, name in enumerate(names):
+        if name not in known:
+            problems.append(f"terms: no effect {name!r}{nearest(name, list(known))}")
+        elif name in names[:i]:
+            problems.append(f"terms: {name!r} stands twice")
+    return tuple(known[name] for name in dict.fromkeys(names) if name in known)
+
+
+def _defaults(terms: tuple[Term, ...]) -> dict[str, Quantity]:
+    own = [("skeleton", param) for param in body14.PARAMS if not param.required]
+    own += [(term.name, param) for term in terms for param in term.params]
+    return {p.key: Quantity(p.default, None, p.unit, f"default of {owner}") for owner, p in own}
+
+
+def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
+    sections = {name: body for name, body in data.items() if isinstance(body, dict)}
+    return {f"{s}.{key}": entry for s, body in sections.items() for key, entry in body.items()}
+
+
+def _known_keys() -> dict[str, Param | Fact]:
+    params = [*body14.PARAMS, *(p for term in all_terms().values() for p in term.params)]
+    return {**FACTS, **{param.key: param for param in params}}
+
+
+def _values(data: Mapping[str, Any], problems: list[str]) -> dict[str, Quantity]:
+    known = _known_keys()
+    sections = {key.partition(".")[0] for key in known}
+    problems += _top_problems(data, sections)
+    values: dict[str, Quantity] = {}
+    flat = _flat(data)
+    for key, entry in flat.items():
+        if key.partition(".")[0] not in sections:
+            continue
+        if key not in known:
+            problems.append(f"{key}: no such key{nearest(key, list(known))}")
+            continue
+        found = list(_entry_problems(key, entry, known[key]))
+        problems += found
+        if not found:
+            values[key] = _quantity(entry, known[key])
+    for param in body14.PARAMS:
+        if param.required and param.key not in flat:
+            problems.append(f"{param.key}: missing; expected {param.about} [{param.unit}]")
+    return values
+
+
+def _top_problems(data: Mapping[str, Any], sections: set[str]) -> Iterator[str]:
+    for name, body in data.items():
+        if name in {"name", "scale"}:
+            if not isinstance(body, str):
+                yield f"{name}: expected text, got {body!r}"
+        elif name != "terms" and (name not in sections or not isinstance(body, dict)):
+            valid = [*sorted(sections), "name", "scale", "terms"]
+            yield f"[{name}]: no such section{nearest(name, valid)}"
+
+
+def _entry_problems(key: str, entry: Any, kind: Param | Fact) -> Iterator[str]:
+    if not isinstance(entry, dict) or "value" not in entry:
+        yield f"{key}: expected {{ value = ..., source = ... }}, got {entry!r}"
+        return
+    for name in entry.keys() - {"value", "std", "unit", "source"}:
+        yield f"{key}: no such field{nearest(name, ['value', 'std', 'unit', 'source'])}: {name!r}"
+    if not isinstance(entry.get("source", ""), str):
+        yield f"{key}.source: expected text, got {entry['source']!r}"
+    if entry.get("unit", kind.unit) != kind.unit:
+        yield f"{key}.unit: expected {kind.unit!r}, got {entry['unit']!r}"
+    if "std" in entry and not (_is_number(entry["std"]) and entry["std"] >= 0):
+        yield f"{key}.std: expected a number >= 0, got {entry['std']!r}"
+    yield from _value_problems(key, entry["value"], kind)
+
+
+def _value_problems(key: str, value: Any, kind: Param | Fact) -> Iterator[str]:
+    count = kind.count if isinstance(kind, Fact) else 1
+    if isinstance(kind, Fact) and count == 0:
+        if not isinstance(value, str) or (kind.words and value not in kind.words):
+            expected = " or ".join(map(repr, kind.words)) or "text"
+            yield f"{key}: expected {expected}, got {value!r}"
+        return
+    low, high = kind.bounds
+    numbers = value if isinstance(value, list) else [value]
+    if (isinstance(value, list) != (count > 1)) or not all(map(_is_number, numbers)):
+        yield f"{key}: expected {count} number{'s' * (count > 1)} [{kind.unit}], got {value!r}"
+    elif len(numbers) != count:
+        yield f"{key}: expected {count} numbers [{kind.unit}], got {len(numbers)}"
+    elif not all(low <= number <= high for number in numbers):
+        yield f"{key}: expected {low:g} to {high:g} {kind.unit}, got {value!r}"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _quantity(entry: Mapping[str, Any], kind: Param | Fact) -> Quantity:
+    raw = entry["value"]
+    value: Value
+    if isinstance(raw, list):
+        value = tuple(float(number) for number in raw)
+    else:
+        value = raw if isinstance(raw, str) else float(raw)
+    std = float(entry["std"]) if "std" in entry else None
+    return Quantity(value, std, kind.unit, entry.get("source", ""))
+
+
+def _contradictions(data: Mapping[str, Any], values: Mapping[str, Quantity]) -> Iterator[str]:
+    flat = _flat(data)
+
+    def number(key: str) -> float | None:
+        value = values[key].value if key in flat and key in values else None
+        return value if isinstance(value, float) else None
+
+    mass, wheel = number("body.mass_kg"), number("wheel.mass_kg")
+    if mass is not None and wheel is not None and 4.0 * wheel >= mass:
+        yield f"wheel.mass_kg: four wheels of {wheel} kg outweigh body.mass_kg = {mass}"
+    cog, base = number("body.cog_to_rear_axle_m"), number("body.wheelbase_m")
+    if cog is not None and base is not None and cog >= base:
+        yield f"body.cog_to_rear_axle_m: expected less than body.wheelbase_m = {base}, got {cog}"
+    front = number("drive.front_driven")
+    layout = values["drive.layout"].value if "drive.layout" in values else None
+    if front is not None and layout is not None and (front > 0.0) != (layout != "rear"):
+        yield f"drive.front_driven: {front:g} contradicts drive.layout = {layout!r}"

@@ -1,0 +1,40 @@
+"""The only door to numba: laws and kernels are compiled here, and nowhere else.
+
+Fast-math stays off: sums keep their order, so equal inputs give equal bits on every run.
+"""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_ROWS = "(float64[:,::1],float64[:,::1],boolean[::1],int64[::1],int64,int64,int64,float64)"
+
+
+def law(function: Function) -> Function:
+    """Let a scalar function be called from compiled kernels; plain calls work as before."""
+    return cast("Function", numba.njit(nogil=True, error_model="numpy")(function))
+
+
+def fleet_kernel(function: Function) -> Function:
+    """Compile a kernel over fleet rows, without the interpreter lock, cached beside its file."""
+    compiled = numba.njit(_ROWS, nogil=True, error_model="numpy", cache=True)(function)
+    return cast("Function", compiled)
+
+
+def plain(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the Python function behind a compiled one."""
+    original: Callable[..., Any] = getattr(function, "py_func", function)
+    return original
+
+
+def cache_folder() -> Path:
+    """Return where generated kernels live: SCM_CACHE_DIR, else the user's XDG cache."""
+    chosen = os.environ.get("SCM_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "scm" / "kernels"

@@ -1,0 +1,185 @@
+"""The page that a car's kernel is written on: the skeleton's step, with room for the terms.
+
+`assemble.py` fills the four gaps. What comes out is one plain Python file that reads from top to
+bottom: parameters, body effects, wheel effects, one implicit step, results.
+"""
+
+PAGE = '''"""{title}
+
+Generated from the car's list of terms; the file's name holds a hash of every source it calls.
+One row of `block` is one whole car, one row of `parameters` its numbers.
+"""
+
+import math
+
+import numpy as np
+
+from scm.vehicles.body14 import (
+    SCRATCH_SHAPE,
+    add_contact,
+    body_step,
+    contact_velocity,
+    corner_height,
+    eliminate_hop,
+    eliminate_spin,
+    ground_height,
+    start_sums,
+)
+from scm.vehicles.jit import fleet_kernel
+{imports}
+
+GRAVITY = {gravity!r}
+
+
+@fleet_kernel
+def advance(block, parameters, alive, status, first, last, steps, dt):
+    """Advance rows first..last-1 by `steps` substeps; a car that diverges is put back, marked."""
+    scratch = np.empty(SCRATCH_SHAPE)
+    a = scratch[6:]
+    for row in range(first, last):
+        if not alive[row] or status[row] != 0:
+            continue
+        car = block[row]
+{load}
+        accel_x = car[{accel_x}]
+        accel_y = car[{accel_y}]
+        sprung_mass = mass - 4.0 * wheel_mass
+        front_x = wheelbase - cog_to_rear_axle
+        front_share = 0.5 * cog_to_rear_axle / wheelbase
+        rear_share = 0.5 * front_x / wheelbase
+        for _ in range(steps):
+            cos_yaw = math.cos(yaw)
+            sin_yaw = math.sin(yaw)
+            vx = cos_yaw * vx_world + sin_yaw * vy_world
+            vy = cos_yaw * vy_world - sin_yaw * vx_world
+
+            # effects on the body
+            force_x = 0.0
+            force_y = 0.0
+            moment_z = 0.0
+{body_terms}
+
+            # effects on each wheel: front-left, front-right, rear-left, rear-right
+            start_sums(scratch)
+            for w in range(4):
+                front = 1.0 if w < 2 else 0.0
+                side = 1.0 if w % 2 == 0 else -1.0
+                driven = front_driven if w < 2 else rear_driven
+                wheel_x = front_x if w < 2 else -cog_to_rear_axle
+                wheel_y = 0.5 * side * track
+                share = front_share if w < 2 else rear_share
+                rest_spring_force = share * sprung_mass * GRAVITY
+                rest_load = rest_spring_force + wheel_mass * GRAVITY
+                hop = car[{hop} + w]
+                hop_rate = car[{hop_rate} + w]
+                omega = car[{wheel_speed} + w]
+                corner_rate = corner_height(vz, roll_rate, pitch_rate, wheel_x, wheel_y)
+                compression_rate = hop_rate - corner_rate
+                compression = (
+                    hop
+                    - corner_height(z_cog - cog_height, roll, pitch, wheel_x, wheel_y)
+                    + dt * compression_rate
+                )
+                floor = ground_height(
+                    x_cog + cos_yaw * wheel_x - sin_yaw * wheel_y,
+                    y_cog + sin_yaw * wheel_x + cos_yaw * wheel_y,
+                )
+                tyre_deflection_rate = -hop_rate
+                tyre_deflection = floor - hop + dt * tyre_deflection_rate
+                over_x, over_y = contact_velocity(
+                    vx, vy, roll_rate, pitch_rate, yaw_rate, wheel_x, wheel_y, cog_height
+                )
+                suspension_force = 0.0
+                tyre_x = 0.0
+                tyre_y = 0.0
+                wheel_torque = 0.0
+                dry_torque = 0.0
+                extra_inertia = 0.0
+                suspension_force_damping = 0.0
+                load_damping = 0.0
+                tyre_x_damping = 0.0
+                tyre_y_damping = 0.0
+                wheel_torque_damping = 0.0
+{wheel_terms}
+                spin, follow, long, stiff_long = eliminate_spin(
+                    dt, omega, spin_inertia + extra_inertia, wheel_radius, wheel_torque,
+                    wheel_torque_damping, dry_torque, tyre_x, tyre_x_damping
+                )
+                scratch[w, 4] = spin
+                scratch[w, 5] = follow
+                eliminate_hop(
+                    scratch, w, dt, wheel_x, wheel_y, wheel_mass,
+                    suspension_force, suspension_force_damping, load, load_damping
+                )
+                add_contact(
+                    scratch, w, wheel_x, wheel_y, cos_steer, sin_steer,
+                    long, stiff_long, tyre_y, tyre_y_damping
+                )
+                car[{wheel_load} + w] = load
+                car[{wheel_steer} + w] = wheel_steer
+
+            # one implicit step of the whole car
+            body_step(
+                scratch, dt, force_x, force_y, moment_z, mass, sprung_mass,
+                roll_inertia, pitch_inertia, yaw_inertia, cog_height
+            )
+            dvx, dvy, dvz = a[0, 6], a[1, 6], a[2, 6]
+            droll_rate, dpitch_rate, dyaw_rate = a[3, 6], a[4, 6], a[5, 6]
+            for w in range(4):
+                wheel_x = front_x if w < 2 else -cog_to_rear_axle
+                wheel_y = 0.5 * track if w % 2 == 0 else -0.5 * track
+                over_x, over_y = contact_velocity(
+                    dvx, dvy, droll_rate, dpitch_rate, dyaw_rate, wheel_x, wheel_y, cog_height
+                )
+                spin = scratch[w, 4] + scratch[w, 5] * (
+                    scratch[w, 2] * over_x + scratch[w, 3] * over_y
+                )
+                hop_rate = car[{hop_rate} + w] + scratch[w, 0] + scratch[w, 1] * corner_height(
+                    dvz, droll_rate, dpitch_rate, wheel_x, wheel_y
+                )
+                car[{hop_rate} + w] = hop_rate
+                car[{hop} + w] += dt * hop_rate
+                car[{wheel_speed} + w] = spin
+                car[{wheel_angle} + w] += dt * spin
+            accel_x = dvx / dt
+            accel_y = dvy / dt
+            vx_world += cos_yaw * dvx - sin_yaw * dvy
+            vy_world += sin_yaw * dvx + cos_yaw * dvy
+            vz += dvz
+            roll_rate += droll_rate
+            pitch_rate += dpitch_rate
+            yaw_rate += dyaw_rate
+            x_cog += dt * vx_world
+            y_cog += dt * vy_world
+            z_cog += dt * vz
+            roll += dt * roll_rate
+            pitch += dt * pitch_rate
+            yaw += dt * yaw_rate
+
+        if not (
+            abs(vx_world) + abs(vy_world) + abs(vz) < 1e3
+            and abs(roll_rate) + abs(pitch_rate) + abs(yaw_rate) < 1e4
+            and abs(roll) + abs(pitch) < 1.5
+        ):
+            status[row] = 1
+            for i in range({vx_world}, {yaw_rate} + 1):
+                car[i] = 0.0
+            for i in range({hop_rate}, {hop_rate} + 8):
+                car[i] = 0.0
+            car[{speed}] = 0.0
+            car[{lateral_speed}] = 0.0
+            continue
+        yaw -= 2.0 * math.pi * math.ceil((yaw - math.pi) / (2.0 * math.pi))
+        cos_yaw = math.cos(yaw)
+        sin_yaw = math.sin(yaw)
+{store}
+        car[{x}] = x_cog - cos_yaw * cog_to_rear_axle
+        car[{y}] = y_cog - sin_yaw * cog_to_rear_axle
+        car[{z}] = z_cog - cog_height + pitch * cog_to_rear_axle
+        car[{speed}] = cos_yaw * vx_world + sin_yaw * vy_world
+        car[{lateral_speed}] = (
+            cos_yaw * vy_world - sin_yaw * vx_world - cog_to_rear_axle * yaw_rate
+        )
+        car[{accel_x}] = accel_x
+        car[{accel_y}] = accel_y
+'''

@@ -1,0 +1,96 @@
+"""The contract of a physical effect: a pure scalar law, and its facts as data.
+
+The law's argument names are its wiring: each is a signal of `signals.py`, a parameter of the term,
+or a parameter of the 14-degree-of-freedom skeleton. A law knows no arrays and no configuration.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from scm.errors import TermError
+from scm.vehicles.jit import plain
+from scm.vehicles.param import Param
+from scm.vehicles.signals import Per
+
+__all__ = ["Law", "Per", "Term", "reads"]
+
+Law = Callable[..., float]
+
+
+def reads(law: Law) -> tuple[str, ...]:
+    """Return the argument names of a law, in order."""
+    return tuple(inspect.signature(plain(law)).parameters)
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One physical effect.
+
+    Attributes:
+        law: Pure function of floats, named like its file.
+        per: Once a body or once a wheel.
+        adds: The sum that the law's value is added to; exactly one of `adds` and `sets` is given.
+        sets: The signal whose value the law gives; a car has one setter for a signal.
+        damping: How fast the law's value falls with its own rate (`signals.DAMPED_BY`), >= 0, named
+            `<law>_damping`. The skeleton is implicit in it, so stiff effects hold still at 1 ms.
+        keeps: The law reads the last value of the signal it sets: a state, this its start value.
+        params: Numbers the law reads; a car file fills them.
+        passive: The effect never gives energy to the car.
+        neutral: Parameter values at which the effect does nothing, bit for bit.
+        shows_in: Manoeuvres that make the effect visible.
+    """
+
+    law: Law
+    per: Per
+    adds: str | None = None
+    sets: str | None = None
+    damping: Law | None = None
+    keeps: float | None = None
+    params: tuple[Param, ...] = ()
+    passive: bool = False
+    neutral: Mapping[str, float] = field(default_factory=dict)
+    shows_in: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if (self.adds is None) == (self.sets is None):
+            msg = f"{self.name}: a term either adds to a sum or sets a signal, exactly one of both"
+            raise TermError(msg)
+        if self.damping is not None and self.damping.__name__ != f"{self.name}_damping":
+            msg = f"{self.name}: expected a damping law named {self.name}_damping, "
+            raise TermError(msg + f"got {self.damping.__name__}")
+
+    @property
+    def name(self) -> str:
+        """The law's name, which is its file's."""
+        return self.law.__name__
+
+    @property
+    def target(self) -> str:
+        """The sum or signal that the law gives a value."""
+        return self.adds or self.sets or ""
+
+    @property
+    def module(self) -> str:
+        """Where the law is written."""
+        return self.law.__module__
+
+    def doc_line(self, heading: str) -> str:
+        """Return what the file says after `Holds:`, `Shows in:`, `Source:`; empty when nothing."""
+        text = inspect.getdoc(inspect.getmodule(plain(self.law))) or ""
+        after = text.partition(f"{heading}:")[2]
+        for stop in ("Holds:", "Shows in:", "Source:"):
+            after = after.partition(stop)[0]
+        return " ".join(after.split())
+
+    @property
+    def about(self) -> str:
+        """The first line of the file: what the effect is."""
+        text = inspect.getdoc(inspect.getmodule(plain(self.law))) or ""
+        return text.partition("\n")[0]
+
+    @property
+    def equation(self) -> str:
+        """The indented lines of the file's docstring, joined."""
+        text = inspect.getdoc(inspect.getmodule(plain(self.law))) or ""
+        return "; ".join(line.strip() for line in text.splitlines() if line.startswith("    "))

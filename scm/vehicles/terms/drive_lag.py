@@ -1,0 +1,32 @@
+"""Throttle lag: the motor's force follows the command through a first-order lag.
+
+    throttle += (throttle_received - throttle) * dt / (time_constant + dt)
+
+Holds: one dominant time constant.   Shows in: throttle steps.
+Source: Lorenzo-Lyons/DART, vehicle model (throttle time constant).
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def drive_lag(throttle_received: float, throttle: float, time_constant: float, dt: float) -> float:
+    """Throttle at the substep's end, + forward; exactly the command without lag."""
+    share = dt / (time_constant + dt)
+    return share * throttle_received + (1.0 - share) * throttle
+
+
+TERM = Term(
+    drive_lag,
+    per=Per.BODY,
+    sets="throttle",
+    keeps=0.0,
+    neutral={"time_constant": 0.0},
+    shows_in=("throttle_step",),
+    params=(
+        Param("time_constant", 0.0, "s", "drive.lag_s", (0.0, 2.0),
+              "63 % of a step", LogNormal(0.05, 0.8)),
+    ),
+)  # fmt: skip

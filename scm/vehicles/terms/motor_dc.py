@@ -1,0 +1,44 @@
+"""DC motor at a driven wheel: torque falls with speed, and with the battery.
+
+    wheel_torque += driven * stall_torque * (throttle * battery / nominal - omega / no_load_speed)
+
+Holds: brushed motor on a stiff supply, current loop faster than a millisecond.
+Shows in: throttle steps, top speed.   Source: AutoDRIVE paper, actuators; values see the car file.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def motor_dc(
+    throttle: float, battery: float, omega: float, driven: float,
+    stall_torque: float, no_load_speed: float, battery_nominal: float,
+) -> float:  # fmt: skip
+    """Torque on the wheel, + forward [N*m]."""
+    return driven * stall_torque * (throttle * battery / battery_nominal - omega / no_load_speed)
+
+
+@law
+def motor_dc_damping(driven: float, stall_torque: float, no_load_speed: float) -> float:
+    """Back EMF: torque lost per wheel speed [N*m*s]."""
+    return driven * stall_torque / no_load_speed
+
+
+TERM = Term(
+    motor_dc,
+    per=Per.WHEEL,
+    adds="wheel_torque",
+    damping=motor_dc_damping,
+    neutral={"stall_torque": 0.0},
+    shows_in=("throttle_step", "top_speed"),
+    params=(
+        Param("stall_torque", 0.3, "N*m", "drive.stall_torque_nm", (0.0, 20.0),
+              "at the wheel, full throttle, at rest", LogNormal(0.3, 0.3)),
+        Param("no_load_speed", 9.1807, "rad/s", "drive.no_load_speed_rad_s", (0.5, 1000.0),
+              "of the wheel, full throttle", LogNormal(9.18, 0.2)),
+        Param("battery_nominal", 11.1, "V", "drive.battery_nominal_v", (1.0, 60.0),
+              "voltage at which the torque is given", fit=False),
+    ),
+)  # fmt: skip

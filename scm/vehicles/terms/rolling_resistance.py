@@ -1,0 +1,33 @@
+"""Rolling resistance: the tyre's hysteresis turns rolling into heat and holds a wheel at rest.
+
+    dry_torque += c_rr * load * wheel_radius    [N*m]
+
+Holds: hard floor, below 15 m/s.   Shows in: coast-down that stops too late.
+Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), 4.2.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def rolling_resistance(load: float, wheel_radius: float, coefficient: float) -> float:
+    """Torque that dry friction can hold, never negative [N*m]."""
+    return coefficient * load * wheel_radius
+
+
+TERM = Term(
+    rolling_resistance,
+    per=Per.WHEEL,
+    adds="dry_torque",
+    passive=True,
+    neutral={"coefficient": 0.0},
+    shows_in=("coast_down",),
+    params=(
+        Param(
+            "coefficient", 0.0, "1", "wheel.rolling_resistance", (0.0, 0.2),
+            "resisting force over load", LogNormal(0.015, 0.7),
+        ),
+    ),
+)  # fmt: skip

@@ -1,0 +1,32 @@
+"""Steering lag: the wheels' angle follows its demand through a first-order lag.
+
+    steer_target += (steer_demand - steer_target) * dt / (time_constant + dt)    [rad]
+
+Holds: one dominant time constant.   Shows in: steering steps.
+Source: Lorenzo-Lyons/DART, vehicle model (steering time constant).
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def steer_lag(steer_demand: float, steer_target: float, time_constant: float, dt: float) -> float:
+    """Angle that the servo is asked for at the substep's end, + left [rad]."""
+    share = dt / (time_constant + dt)
+    return share * steer_demand + (1.0 - share) * steer_target
+
+
+TERM = Term(
+    steer_lag,
+    per=Per.BODY,
+    sets="steer_target",
+    keeps=0.0,
+    neutral={"time_constant": 0.0},
+    shows_in=("steering_step",),
+    params=(
+        Param("time_constant", 0.0, "s", "steering.lag_s", (0.0, 2.0),
+              "63 % of a step", LogNormal(0.05, 0.8)),
+    ),
+)  # fmt: skip

@@ -1,0 +1,30 @@
+"""Linear drag on the body, against its forward motion.
+
+    force_x += -coefficient * vx    [N]
+
+Holds: slow air, cables, grease.   Shows in: coast-down.   Source: AutoDRIVE paper, rigid body drag.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def viscous_drag(vx: float, coefficient: float) -> float:
+    """Force against the motion [N]."""
+    return -coefficient * vx
+
+
+TERM = Term(
+    viscous_drag,
+    per=Per.BODY,
+    adds="force_x",
+    passive=True,
+    neutral={"coefficient": 0.0},
+    shows_in=("coast_down",),
+    params=(
+        Param("coefficient", 0.0, "N*s/m", "body.drag_linear_ns_m", (0.0, 20.0),
+              "force over speed", LogNormal(0.05, 1.0)),
+    ),
+)  # fmt: skip
