@@ -122,8 +122,9 @@ def _outlines(city_map: CityMap) -> Iterator[str]:
         if low >= high:
             yield f"floor.{key}: expected [low, high], got [{low}, {high}]"
     for index, wall in enumerate(city_map.walls):
-        if len(wall.points) < 2:
-            yield f"walls[{index}].points: expected at least 2, got {len(wall.points)}"
+        count = len(set(wall.points))
+        if count < 2:
+            yield f"walls[{index}].points: expected at least 2 different ones, got {count}"
     for index, area in enumerate(city_map.areas):
         count = len(area.points)
         if count < 3:
