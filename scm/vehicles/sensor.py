@@ -1,0 +1,155 @@
+"""The contract of a sensor: what it measures exactly, how often, and how its readings are spoilt.
+
+A sensor module says two things: how to `measure` the exact values of many cars at once, and the
+facts of its device, read from the car file. A `Sampler` then makes one car's readings of them: at
+the device's rate, with noise from a generator of its own, late, and sometimes lost. Without noise,
+latency and drop-out the readings are the truth. To add one, copy `sensors/encoders.py`.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from scm.arrays import Floats, Ints
+from scm.clock import NS_PER_S
+from scm.vehicles.car import Car
+
+
+class Truth(Protocol):
+    """What sensors may see of the cars of one file; `Fleet` has it. Arrays over the fleet's rows.
+
+    `x y yaw` is the rear axle's pose; accelerations are those of the centre of gravity without
+    gravity, in the level frame that turns with yaw. Angles and rates are right-handed.
+    """
+
+    @property
+    def x(self) -> Floats: ...  # noqa: D102
+    @property
+    def y(self) -> Floats: ...  # noqa: D102
+    @property
+    def yaw(self) -> Floats: ...  # noqa: D102
+    @property
+    def roll(self) -> Floats: ...  # noqa: D102
+    @property
+    def pitch(self) -> Floats: ...  # noqa: D102
+    @property
+    def roll_rate(self) -> Floats: ...  # noqa: D102
+    @property
+    def pitch_rate(self) -> Floats: ...  # noqa: D102
+    @property
+    def yaw_rate(self) -> Floats: ...  # noqa: D102
+    @property
+    def yaw_accel(self) -> Floats: ...  # noqa: D102
+    @property
+    def accel_x(self) -> Floats: ...  # noqa: D102
+    @property
+    def accel_y(self) -> Floats: ...  # noqa: D102
+    @property
+    def wheel_angle(self) -> Floats: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """What stands around the cars, as vertical faces.
+
+    Attributes:
+        edges: (m, 4) x0, y0, x1, y1 in the map frame [m].
+        owners: (m,) who each face belongs to; -1 for walls.
+        own: (k,) who each measured car is: its own faces are not seen.
+    """
+
+    edges: Floats
+    owners: Ints
+    own: Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a device is like.
+
+    Attributes:
+        noise: Standard deviation of each value, or one for all.
+        latency_s: From the instant of the reading to when it can be had.
+        drop_out: Share of the readings that never come.
+        quantum: Readings are whole multiples of it, rounded towards minus infinity; 0: any value.
+    """
+
+    rate_hz: float
+    noise: tuple[float, ...] = (0.0,)
+    latency_s: float = 0.0
+    drop_out: float = 0.0
+    quantum: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """One kind of sensor.
+
+    Attributes:
+        values: Names of the values in order, with units; one name when all are of a kind.
+        facts: The device as a car file describes it.
+        measure: (car, truth, rows, around) to exact values, (k, number of values).
+    """
+
+    name: str
+    values: tuple[str, ...]
+    facts: Callable[[Car], Facts]
+    measure: Callable[[Car, Truth, Ints, Around | None], Floats]
+
+
+class Reading(NamedTuple):
+    """Values that were true at `t_ns`, as the device gives them."""
+
+    t_ns: int
+    values: Floats
+
+
+class Sampler:
+    """One car's device of a kind: takes exact values when due, gives readings when they are out.
+
+    Args:
+        facts: Of the device.
+        rng: Its own, spawned from the run's seed: the noise of one car depends on no other.
+        offset: Share of a period that the first reading waits, so that not all cars scan at once.
+    """
+
+    def __init__(self, facts: Facts, rng: np.random.Generator, offset: float = 0.0) -> None:
+        self.facts = facts
+        self._rng = rng
+        self._noise = np.array(facts.noise)
+        self._period_ns = round(NS_PER_S / facts.rate_hz)
+        self._offset_ns = round(offset * self._period_ns)
+        self._next_ns: int | None = None
+        self._under_way: deque[Reading] = deque()
+
+    def is_due(self, now_ns: int) -> bool:
+        """Return whether the device reads now; true once a period, a missed one is not made up."""
+        if self._next_ns is None:
+            self._next_ns = now_ns + self._offset_ns
+        if now_ns < self._next_ns:
+            return False
+        self._next_ns += ((now_ns - self._next_ns) // self._period_ns + 1) * self._period_ns
+        return True
+
+    def take(self, now_ns: int, exact: Floats) -> None:
+        """Read: spoil the exact values of `now_ns` and set them on their way."""
+        facts = self.facts
+        values = np.array(exact, dtype=float)
+        if self._noise.any():
+            values = values + self._noise * self._rng.standard_normal(len(values))
+        if facts.quantum:
+            values = np.floor(values / facts.quantum) * facts.quantum
+        if facts.drop_out and self._rng.random() < facts.drop_out:
+            return
+        self._under_way.append(Reading(now_ns, values))
+
+    def ready(self, now_ns: int) -> list[Reading]:
+        """Return, once each, the readings that have come out by now, oldest first."""
+        out = []
+        latency_ns = round(self.facts.latency_s * NS_PER_S)
+        while self._under_way and self._under_way[0].t_ns + latency_ns <= now_ns:
+            out.append(self._under_way.popleft())
+        return out

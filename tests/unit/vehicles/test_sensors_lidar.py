@@ -1,0 +1,99 @@
+"""LIDAR ranges are exact where geometry says so, and equal brute force everywhere."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from scm.vehicles.car import load_car
+from scm.vehicles.sensor import Around
+from scm.vehicles.sensors.lidar import scan
+
+NIGEL = load_car("nigel")
+NEAREST, FARTHEST = NIGEL.vector("lidar.range_m")
+
+
+def around(edges, owners=None, own=(0,)):
+    edges = np.array(edges, float).reshape(-1, 4)
+    owners = np.full(len(edges), -1) if owners is None else np.array(owners)
+    return Around(edges, owners, np.array(own))
+
+
+def room(half):
+    corners = np.array([(half, -half), (half, half), (-half, half), (-half, -half)])
+    return np.column_stack((corners, np.roll(corners, -1, axis=0)))
+
+
+def brute_force(scanners, edges, beams=360):
+    """Every ray against every face, by solving the two-by-two system."""
+    out = np.full((len(scanners), beams), np.inf)
+    for k, (x, y, yaw) in enumerate(scanners):
+        for i in range(beams):
+            angle = yaw + i * 2 * np.pi / beams
+            u = np.array([np.cos(angle), np.sin(angle)])
+            for x0, y0, x1, y1 in edges:
+                matrix = np.column_stack((u, [x0 - x1, y0 - y1]))
+                if abs(np.linalg.det(matrix)) < 1e-12:
+                    continue
+                distance, share = np.linalg.solve(matrix, [x0 - x, y0 - y])
+                if distance > 0 and -1e-12 <= share <= 1 + 1e-12:
+                    out[k, i] = min(out[k, i], distance)
+    out[(out < NEAREST) | (out > FARTHEST)] = np.inf
+    return out
+
+
+def test_a_square_room_gives_its_exact_ranges():
+    angle = np.arange(360) * np.pi / 180
+    expected = 2.0 / np.maximum(np.abs(np.cos(angle)), np.abs(np.sin(angle)))
+    ranges = scan(NIGEL, np.array([[0.0, 0.0, 0.0]]), around(room(2.0)))
+    assert_allclose(ranges[0], expected, rtol=1e-12)
+
+
+def test_beams_count_counter_clockwise_from_straight_ahead():
+    left_wall = [[-1.0, 1.0, 3.0, 1.0]]
+    ranges = scan(NIGEL, np.array([[0.0, 0.0, 0.0]]), around(left_wall))
+    assert ranges[0, 90] == pytest.approx(1.0)
+    assert np.isinf(ranges[0, [0, 270]]).all()
+
+
+def test_turning_the_car_left_turns_the_world_right():
+    pose = np.array([[0.3, -0.2, 0.0]])
+    turned = pose + np.radians([0.0, 0.0, 30.0])
+    before, after = (scan(NIGEL, p, around(room(2.0))) for p in (pose, turned))
+    assert_allclose(after, np.roll(before, -30, axis=1), rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ranges_equal_brute_force(seed):
+    rng = np.random.default_rng(seed)
+    starts = rng.uniform(-4, 4, (30, 2))
+    edges = np.column_stack((starts, starts + rng.normal(0, 1.0, (30, 2))))
+    scanners = np.column_stack((rng.uniform(-3, 3, (3, 2)), rng.uniform(-4, 4, 3)))
+    ranges = scan(NIGEL, scanners, around(edges, own=(0, 1, 2)))
+    assert_allclose(ranges, brute_force(scanners, edges), rtol=1e-9)
+
+
+def test_a_scanner_does_not_see_its_own_car_but_others_do():
+    edges = [[1.0, -1.0, 1.0, 1.0]]
+    pose = np.zeros((2, 3))
+    ranges = scan(NIGEL, pose, around(edges, owners=[5], own=(5, 6)))
+    assert np.isinf(ranges[0]).all()
+    assert ranges[1, 0] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("distance", [NEAREST - 0.01, FARTHEST + 0.01])
+def test_too_near_and_too_far_are_misses(distance):
+    edges = [[distance, -20.0, distance, 20.0]]
+    assert np.isinf(scan(NIGEL, np.zeros((1, 3)), around(edges))[0, 0])
+
+
+def test_no_beam_slips_through_where_two_walls_meet():
+    rng = np.random.default_rng(5)
+    angles = np.sort(rng.uniform(0, 2 * np.pi, 500))
+    points = 3.0 * np.column_stack((np.cos(angles), np.sin(angles)))
+    edges = np.column_stack((points, np.roll(points, -1, axis=0)))
+    scanners = np.column_stack((rng.uniform(-1, 1, (50, 2)), rng.uniform(-4, 4, 50)))
+    assert np.isfinite(scan(NIGEL, scanners, around(edges, own=np.arange(50)))).all()
+
+
+def test_an_empty_city_is_all_misses():
+    assert_array_equal(scan(NIGEL, np.zeros((1, 3)), None), np.full((1, 360), np.inf))
