@@ -60,6 +60,7 @@ class CarLimits:
             empty: not known, the driver finds the throttle by feedback.
         accel: Comfortable acceleration [m/s^2]; likewise `decel`, positive.
         lateral_accel: Comfortable limit in curves [m/s^2].
+        brake_throttle: Lowest throttle to slow down with; 0 where zero throttle already brakes.
     """
 
     wheelbase: float
@@ -72,6 +73,7 @@ class CarLimits:
     accel: float = 0.5
     decel: float = 0.5
     lateral_accel: float = 1.0
+    brake_throttle: float = 0.0
 
     @property
     def length(self) -> float:

@@ -10,6 +10,7 @@ from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Colour
 
 FRESH_NS = NS_PER_S
+RESOLUTION_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +68,7 @@ class SignalView:
             return None
         told = heard.colours[number]
         age_s = seconds(now_ns - heard.arrived_ns)
-        lapsed = told.min_end_s is not None and age_s > told.min_end_s
+        lapsed = told.min_end_s is not None and age_s > told.min_end_s + RESOLUTION_S
         return "yellow" if told.colour == "green" and lapsed else told.colour
 
     def may_go(self, junction: str, group: str, now_ns: int) -> bool:

@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.geometry import Pose2, wrap_angle
 from scm.maps.route import Path
 
 STEP = 0.02
@@ -39,6 +38,10 @@ class Track:
         """Return a position along the way as one on the path, [0, length]."""
         return s % self.length if self.closed else min(max(s, 0.0), self.length)
 
+    def cell(self, s: float) -> int:
+        """Return the index of the last sample at or before a position."""
+        return min(int(self.local(s) / self._step), len(self._yaw) - 2)
+
     def heading(self, s: float) -> float:
         """Return the path's yaw at s without jumps, laps included [rad]."""
         laps, at = divmod(s, self.length) if self.closed else (0.0, self.local(s))
@@ -48,18 +51,6 @@ class Track:
         yaw = self._yaw[low] + part * (self._yaw[low + 1] - self._yaw[low])
         return float(yaw + laps * self._turn)
 
-    def mean_curvature(self, start: float, end: float) -> float:
-        """Return the heading turned between two positions over their distance [1/m], + = left."""
-        return (self.heading(end) - self.heading(start)) / (end - start)
-
-    def project(self, pose: Pose2, near: float | None) -> tuple[float, float, float]:
-        """Return (s, lateral, yaw against the path) of a pose; s counts on from `near`.
-
-        Lateral is + to the left [m].
-        """
-        s, lateral = self.path.project(pose.x, pose.y, near)
-        return s, lateral, wrap_angle(pose.yaw - self.heading(s))
-
     def samples(self, start: float, end: float) -> tuple[Floats, Ints]:
         """Return positions from start to end, one a sample, and the samples' indices."""
         last = len(self.x) - 1
@@ -67,4 +58,5 @@ class Track:
         index = np.arange(first, max(first, int(end / self._step) + 1), dtype=np.int64)
         if not self.closed:
             index = index[(index >= 0) & (index <= last)]
-        return index * self._step, index % last if self.closed else index
+        s = np.asarray(index * self._step, dtype=np.float64)
+        return s, index % last if self.closed else index
