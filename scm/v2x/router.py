@@ -1,0 +1,59 @@
+"""The city's switchboard: a Zenoh router inside this process.
+
+It routes without Python's help, but shares its process only with what is idle: a busy loop beside
+it delays everybody.
+"""
+
+import socket
+from types import TracebackType
+from typing import Self
+
+import zenoh
+
+from scm.errors import RunError
+from scm.v2x import zenoh_config
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+class Router:
+    """A router that listens from `with` on until its end.
+
+    Attributes:
+        listen: The endpoint, also the one that stations connect to.
+    """
+
+    def __init__(self, listen: str = DEFAULT_ENDPOINT) -> None:
+        self.listen = listen
+        self._session: zenoh.Session | None = None
+
+    def __enter__(self) -> Self:
+        """Start to listen.
+
+        Raises:
+            RunError: when the endpoint cannot be listened at.
+        """
+        try:
+            config = zenoh.Config.from_json5(zenoh_config.router(self.listen))
+            self._session = zenoh.open(config)
+        except zenoh.ZError as cause:
+            msg = f"cannot listen at {self.listen!r}: does another city run there? ({cause})"
+            raise RunError(msg) from cause
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._session is not None:
+            self._session.close()  # type: ignore[no-untyped-call]
+            self._session = None
+
+
+def free_endpoint() -> str:
+    """Return an endpoint of this machine at which nobody listens now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

@@ -1,0 +1,48 @@
+"""How Zenoh is set up here, as JSON text: for a station of a city, and for the city's router.
+
+Nothing is ever searched for on the network: a station knows its router's endpoint. Shared memory
+is off (its start races under load), and a silent neighbour is given up after one second, not ten.
+"""
+
+import json
+
+LEASE_MS = 1000
+RETRY_FIRST_MS = 100
+RETRY_MOST_MS = 500
+
+
+def client(endpoint: str, connect_timeout_s: float) -> str:
+    """Return the configuration of a station that reaches its city through one endpoint."""
+    return json.dumps(
+        _both()
+        | {
+            "mode": "client",
+            "connect": {
+                "endpoints": [endpoint],
+                "timeout_ms": round(connect_timeout_s * 1000),
+                "exit_on_failure": True,
+                "retry": {
+                    "period_init_ms": RETRY_FIRST_MS,
+                    "period_max_ms": RETRY_MOST_MS,
+                    "period_increase_factor": 2,
+                },
+            },
+        }
+    )
+
+
+def router(listen: str) -> str:
+    """Return the configuration of the router of a city that listens at one endpoint."""
+    return json.dumps(_both() | {"mode": "router", "listen": {"endpoints": [listen]}})
+
+
+def _both() -> dict[str, object]:
+    off = {"enabled": False}
+    return {
+        "scouting": {"delay": 0, "multicast": off, "gossip": off},
+        "transport": {
+            "shared_memory": off,
+            "link": {"tx": {"lease": LEASE_MS}},
+        },
+        "timestamping": {"enabled": True},
+    }
