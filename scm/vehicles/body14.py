@@ -61,7 +61,7 @@ OUTPUTS = (
     ("x", 1), ("y", 1), ("z", 1), ("speed", 1), ("lateral_speed", 1),
     ("accel_x", 1), ("accel_y", 1), ("steer_angle", 1), ("wheel_steer", 4), ("wheel_load", 4),
 )  # fmt: skip
-SCRATCH_SHAPE = (12, 10)  # rows 0-3 wheels, 4 hop sums, 5 contact sums, 6-11 the equations
+SCRATCH_SHAPE = (6, 10)  # rows 0-3: one wheel each; 4: sums over hops; 5: over contact points
 
 
 @law
@@ -166,50 +166,80 @@ def add_contact(
     scratch[5, 8] += wheel_x * turn_y - wheel_y * turn_x
 
 
+Six = tuple[float, float, float, float, float, float]
+
+
 @law
 def body_step(
     scratch: Floats, dt: float, force_x: float, force_y: float, moment_z: float, mass: float,
     sprung_mass: float, roll_inertia: float, pitch_inertia: float, yaw_inertia: float,
     cog_height: float,
-) -> None:  # fmt: skip
-    """Change of the body's six velocities (vx, vy, vz, roll, pitch, yaw rate) into column 6."""
+) -> Six:  # fmt: skip
+    """Change of the body's six velocities: vx, vy, vz, roll rate, pitch rate, yaw rate.
+
+    Heave couples only with roll and pitch, so it is eliminated first; five equations are left.
+    """
     hop, touch, h = scratch[4], scratch[5], cog_height
-    a = scratch[6:]
-    for i in range(6):
-        for j in range(6):
-            a[i, j] = 0.0
-    a[0, 0] = mass + dt * touch[3]
-    a[1, 0], a[1, 1] = dt * touch[4], mass + dt * touch[5]
-    a[2, 2] = sprung_mass + dt * hop[3]
-    a[3, 0], a[3, 1], a[3, 2] = dt * h * touch[4], dt * h * touch[5], dt * hop[4]
-    a[3, 3] = roll_inertia + dt * (h * h * touch[5] + hop[6])
-    a[4, 0], a[4, 1], a[4, 2] = -dt * h * touch[3], -dt * h * touch[4], dt * hop[5]
-    a[4, 3] = dt * (hop[7] - h * h * touch[4])
-    a[4, 4] = pitch_inertia + dt * (h * h * touch[3] + hop[8])
-    a[5, 0], a[5, 1] = dt * touch[6], dt * touch[7]
-    a[5, 3], a[5, 4] = dt * h * touch[7], -dt * h * touch[6]
-    a[5, 5] = yaw_inertia + dt * touch[8]
-    a[0, 6] = dt * (touch[0] + force_x)
-    a[1, 6] = dt * (touch[1] + force_y)
-    a[2, 6] = dt * (hop[0] - sprung_mass * GRAVITY)
-    a[3, 6] = dt * (hop[1] + h * touch[1])
-    a[4, 6] = dt * (hop[2] - h * touch[0])
-    a[5, 6] = dt * (touch[2] + moment_z)
-    solve_symmetric(a)
+    heave = 1.0 / (sprung_mass + dt * hop[3])
+    heave_roll, heave_pitch = dt * hop[4], dt * hop[5]
+    lift = dt * (hop[0] - sprung_mass * GRAVITY)
+    hx, hy = dt * h * touch[3], dt * h * touch[5]
+    cross = dt * h * touch[4]
+    roll = roll_inertia + h * hy + dt * hop[6] - heave * heave_roll * heave_roll
+    pitch = pitch_inertia + h * hx + dt * hop[8] - heave * heave_pitch * heave_pitch
+    both = dt * hop[7] - h * cross - heave * heave_roll * heave_pitch
+    dvx, dvy, droll, dpitch, dyaw = solve_five(
+        mass + dt * touch[3],
+        dt * touch[4], mass + dt * touch[5],
+        cross, hy, roll,
+        -hx, -cross, both, pitch,
+        dt * touch[6], dt * touch[7], dt * h * touch[7], -dt * h * touch[6],
+        yaw_inertia + dt * touch[8],
+        dt * (touch[0] + force_x),
+        dt * (touch[1] + force_y),
+        dt * (hop[1] + h * touch[1]) - heave * heave_roll * lift,
+        dt * (hop[2] - h * touch[0]) - heave * heave_pitch * lift,
+        dt * (touch[2] + moment_z),
+    )  # fmt: skip
+    dvz = heave * (lift - heave_roll * droll - heave_pitch * dpitch)
+    return dvx, dvy, dvz, droll, dpitch, dyaw
 
 
 @law
-def solve_symmetric(a: Floats) -> None:
-    """Solve six equations in place; lower triangle in, right-hand side and answer in column 6."""
-    for j in range(6):
-        inverse = 1.0 / a[j, j]
-        for i in range(j + 1, 6):
-            factor = a[i, j] * inverse
-            for k in range(i, 6):
-                a[k, i] -= factor * a[k, j]
-            a[i, 6] -= factor * a[j, 6]
-    for j in range(5, -1, -1):
-        answer = a[j, 6]
-        for k in range(j + 1, 6):
-            answer -= a[k, j] * a[k, 6]
-        a[j, 6] = answer / a[j, j]
+def solve_five(
+    a00: float,
+    a10: float, a11: float,
+    a20: float, a21: float, a22: float,
+    a30: float, a31: float, a32: float, a33: float,
+    a40: float, a41: float, a42: float, a43: float, a44: float,
+    b0: float, b1: float, b2: float, b3: float, b4: float,
+) -> tuple[float, float, float, float, float]:  # fmt: skip
+    """Solve five symmetric positive equations given by their lower triangle and right-hand side.
+
+    Gauss without a loop: written out, the compiler keeps all of it in registers.
+    """
+    i0 = 1.0 / a00
+    l1, l2, l3, l4 = a10 * i0, a20 * i0, a30 * i0, a40 * i0
+    a11, a21, a31, a41 = a11 - l1 * a10, a21 - l2 * a10, a31 - l3 * a10, a41 - l4 * a10
+    a22, a32, a42 = a22 - l2 * a20, a32 - l3 * a20, a42 - l4 * a20
+    a33, a43, a44 = a33 - l3 * a30, a43 - l4 * a30, a44 - l4 * a40
+    b1, b2, b3, b4 = b1 - l1 * b0, b2 - l2 * b0, b3 - l3 * b0, b4 - l4 * b0
+    i1 = 1.0 / a11
+    l2, l3, l4 = a21 * i1, a31 * i1, a41 * i1
+    a22, a32, a42 = a22 - l2 * a21, a32 - l3 * a21, a42 - l4 * a21
+    a33, a43, a44 = a33 - l3 * a31, a43 - l4 * a31, a44 - l4 * a41
+    b2, b3, b4 = b2 - l2 * b1, b3 - l3 * b1, b4 - l4 * b1
+    i2 = 1.0 / a22
+    l3, l4 = a32 * i2, a42 * i2
+    a33, a43, a44 = a33 - l3 * a32, a43 - l4 * a32, a44 - l4 * a42
+    b3, b4 = b3 - l3 * b2, b4 - l4 * b2
+    i3 = 1.0 / a33
+    l4 = a43 * i3
+    a44 -= l4 * a43
+    b4 -= l4 * b3
+    x4 = b4 / a44
+    x3 = (b3 - a43 * x4) * i3
+    x2 = (b2 - a32 * x3 - a42 * x4) * i2
+    x1 = (b1 - a21 * x2 - a31 * x3 - a41 * x4) * i1
+    x0 = (b0 - a10 * x1 - a20 * x2 - a30 * x3 - a40 * x4) * i0
+    return x0, x1, x2, x3, x4

@@ -126,11 +126,12 @@ class Fleet:
         lateral_speed: float = 0.0,
         yaw_rate: float = 0.0,
         steer_angle: float | None = None,
+        throttle: float = 0.0,
     ) -> None:
-        """Restart a row from a measured state of its rear axle; None keeps wheels straight.
+        """Restart a row from a measured state of its rear axle; no angle means wheels straight.
 
-        Throttle and battery start at rest and nominal; lags start from where they would have
-        settled for the steering angle given.
+        Lags start settled at `steer_angle` [rad] and `throttle`; the commands themselves start at
+        zero and the battery at its nominal voltage, so write commands after placing.
         """
         car, param = self._block[row], self._parameter
         car[:] = 0.0
@@ -144,10 +145,10 @@ class Fleet:
         self._set(row, "vy_world", s * speed + c * across)
         self._set(row, "yaw_rate", yaw_rate)
         self._set(row, "battery", self._nominal_battery(row))
+        settled = {"steer_target": steer_angle, "steer_angle": steer_angle, "throttle": throttle}
         for term in self.car.terms:
             if term.keeps is not None:
-                start = term.keeps if term.target != "steer_target" else (steer_angle or 0.0)
-                self._set(row, term.target, start)
+                self._set(row, term.target, settled.get(term.target) or term.keeps)
         self._set(row, "steer_angle", steer_angle or 0.0)
         offset = self._slots["wheel_speed"][0]
         half = 0.5 * param(row, "track") * yaw_rate

@@ -35,7 +35,6 @@ GRAVITY = {gravity!r}
 def advance(block, parameters, alive, status, first, last, steps, dt):
     """Advance rows first..last-1 by `steps` substeps; a car that diverges is put back, marked."""
     scratch = np.empty(SCRATCH_SHAPE)
-    a = scratch[6:]
     for row in range(first, last):
         if not alive[row] or status[row] != 0:
             continue
@@ -119,12 +118,10 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
                 car[{wheel_steer} + w] = wheel_steer
 
             # one implicit step of the whole car
-            body_step(
+            dvx, dvy, dvz, droll_rate, dpitch_rate, dyaw_rate = body_step(
                 scratch, dt, force_x, force_y, moment_z, mass, sprung_mass,
                 roll_inertia, pitch_inertia, yaw_inertia, cog_height
             )
-            dvx, dvy, dvz = a[0, 6], a[1, 6], a[2, 6]
-            droll_rate, dpitch_rate, dyaw_rate = a[3, 6], a[4, 6], a[5, 6]
             for w in range(4):
                 wheel_x = front_x if w < 2 else -cog_to_rear_axle
                 wheel_y = 0.5 * track if w % 2 == 0 else -0.5 * track

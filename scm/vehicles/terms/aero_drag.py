@@ -3,7 +3,7 @@
     force_x += -coefficient * vx * |vx|    [N]
 
 Holds: above walking pace.   Shows in: fast coast-down.
-Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), 4.1; coefficient is rho c_d A / 2.
+Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 4; coefficient is rho c_d A / 2.
 """
 
 from scm.vehicles.jit import law

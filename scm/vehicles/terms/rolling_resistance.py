@@ -3,7 +3,7 @@
     dry_torque += c_rr * load * wheel_radius    [N*m]
 
 Holds: hard floor, below 15 m/s.   Shows in: coast-down that stops too late.
-Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), 4.2.
+Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 4.
 """
 
 from scm.vehicles.jit import law

@@ -5,7 +5,7 @@
 A spring rather than a constraint: the wheel may leave the floor and land, and the skeleton is
 implicit in it, so even 45 g on 20 kN/m is calm at 1 ms.
 Holds: small deflections.   Shows in: bumps, wheel lift.
-Source: Jazar, Vehicle Dynamics (3rd ed.), 13.1; stiffness ours.
+Source: quarter-car model, any textbook (Jazar, Vehicle Dynamics); stiffness ours.
 """
 
 from scm.vehicles.jit import law
