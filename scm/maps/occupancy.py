@@ -13,8 +13,8 @@ from scm.maps.model import CityMap, Floor, MapTag, Point, Spawn, Wall
 
 Corner = tuple[int, int]
 
-# A straight wall that runs a little aslant makes steps of one cell; a corner is off by more.
-STRAIGHTEN_CELLS = 0.75
+# Steps of a wall that runs aslant vanish; the corners of a single cell, half its diagonal away, stay.
+STRAIGHTEN_CELLS = 0.7
 TAG_SIZE_M = 0.0762
 START_CLEARANCE_M = 0.25
 
@@ -51,8 +51,8 @@ def map_from_occupancy(yaml_path: str | Path) -> CityMap:
 def walls_of(grid: OccupancyGrid) -> tuple[Wall, ...]:
     """Return the walls of the largest connected free room, as faces without thickness.
 
-    A face follows the edges between free and occupied cells and is straightened within most of a cell.
-    Where the scan ends in unknown cells there is no wall.
+    A face follows the edges between free and occupied cells and is straightened within most of
+    a cell. Where the scan ends in unknown cells there is no wall.
     """
     walls = []
     for chain in _chains(_faces(_room(grid), grid.occupied)):
@@ -82,7 +82,7 @@ def _start(grid: OccupancyGrid) -> tuple[Spawn, ...]:
     clear = np.logical_and.reduce([np.roll(clear, offset, axis=(0, 1)) for offset in disc])
     middles = [
         grid.origin.apply((c - reach + 0.5) * step, (r - reach + 0.5) * step)
-        for r, c in np.argwhere(clear)
+        for r, c in np.argwhere(clear).tolist()
     ]
     if not middles:
         return ()
