@@ -54,7 +54,9 @@ class Pace:
 
     def throttle(self, wished: float, speed: float, now_ns: int) -> float:
         """Return the throttle that brings the car to a speed [m/s] without haste, -1 to 1."""
-        passed = 0.0 if self._last_ns is None else min(0.1, seconds(now_ns - self._last_ns))
+        if self._last_ns is None:
+            self._last_ns, self._wished = now_ns, speed
+        passed = min(0.1, seconds(now_ns - self._last_ns))
         self._last_ns = now_ns
         if wished < (START_SPEED if speed < STANDSTILL else STANDSTILL):
             self._wished = self._sum = 0.0

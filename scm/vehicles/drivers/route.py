@@ -24,7 +24,7 @@ class _Limit(NamedTuple):
 
 
 class RouteDriver:
-    """Drives one car along one path.
+    """Drives one car along a path.
 
     Attributes:
         path: The way.
@@ -41,28 +41,41 @@ class RouteDriver:
         *,
         speed: float | None = None,
         trip_m: float | None = None,
+        near: float | None = None,
     ) -> None:
-        """Prepare to drive.
+        self.limits = limits
+        self.cross_track = 0.0
+        self.waiting_for: str | None = None
+        self._pace = Pace(limits)
+        self._steering = Steering(limits)
+        self.follow(path, speed=speed, trip_m=trip_m, near=near)
+
+    def follow(
+        self,
+        path: Path,
+        *,
+        speed: float | None = None,
+        trip_m: float | None = None,
+        near: float | None = None,
+    ) -> None:
+        """Take another path from now on, without a jerk.
 
         Args:
             path: An open path ends the drive with the rear axle at its end, a closed one never.
-            limits: Of the car.
             speed: Wished on free road [m/s]; None: what lanes and curves allow.
             trip_m: How far the trip goes, from where the car begins; None: to the end of the path.
+            near: Where along the path the car is, roughly [m]; None: at the place closest to it.
         """
         self.path = path
-        self.limits = limits
-        self.s: float | None = None
-        self.cross_track = 0.0
-        self.waiting_for: str | None = None
         self.trip_m = trip_m
+        self.s: float | None = None
         self._started = 0.0
+        self._near = near
         self._speed = speed
         self._track = Track(path)
-        self._free = free_speeds(self._track, limits)
-        self._lines = StopLines(self._track, limits)
-        self._pace = Pace(limits)
-        self._steering = Steering(self._track, limits)
+        self._free = free_speeds(self._track, self.limits)
+        self._lines = StopLines(self._track, self.limits)
+        self._steering.follow(self._track)
 
     @property
     def done_m(self) -> float:
@@ -76,7 +89,8 @@ class RouteDriver:
 
     def decide(self, view: RouteView) -> tuple[float, float]:
         """Return (throttle, steering), both -1 to 1: + forward, + left."""
-        s, lateral = self.path.project(view.pose.x, view.pose.y, self.s)
+        near = self._near if self.s is None else self.s
+        s, lateral = self.path.project(view.pose.x, view.pose.y, near)
         if self.s is None:
             self._begin(s)
         self.s, self.cross_track = s, lateral

@@ -28,17 +28,21 @@ LATERAL_LIMIT = 0.05
 
 
 class Steering:
-    """Steers one car along one way."""
+    """Steers one car along the way it was told to `follow`."""
 
-    def __init__(self, track: Track, limits: CarLimits) -> None:
-        self._track = track
+    def __init__(self, limits: CarLimits) -> None:
         self._limits = limits
-        angle = np.arctan(limits.wheelbase * np.diff(track.yaw) / np.diff(track.s))
-        jumps = np.abs(angle - np.roll(angle, 2))
-        self._swing_s = float(jumps.max() if track.closed else jumps[2:].max(initial=0.0))
-        self._swing_s /= limits.steer_rate
-        self._angle = self._wished = 0.0
+        self._track: Track
+        self._angle = self._wished = self._swing_s = 0.0
         self._last_ns: int | None = None
+
+    def follow(self, track: Track) -> None:
+        """Steer along another way from now on."""
+        self._track = track
+        angle = np.arctan(self._limits.wheelbase * np.diff(track.yaw) / np.diff(track.s))
+        jumps = np.abs(angle - np.roll(angle, 2))
+        largest = float(jumps.max() if track.closed else jumps[2:].max(initial=0.0))
+        self._swing_s = largest / self._limits.steer_rate
 
     def command(self, s: float, lateral: float, pose: Pose2, speed: float, now_ns: int) -> float:
         """Return the steering command, -1 to 1, + = left.

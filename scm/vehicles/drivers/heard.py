@@ -1,0 +1,50 @@
+"""The cars around, as their CAMs tell: remembered for a while and moved on at their last speed."""
+
+import math
+
+from scm.clock import NS_PER_S, seconds
+from scm.v2x.etsi import CamBody
+from scm.v2x.etsi_convert import CamView, read_cam
+from scm.vehicles.driver import Other
+
+REMEMBER_NS = 3 * NS_PER_S
+LONGEST_GUESS_S = 1.0
+
+
+class HeardCars:
+    """What one car knows of the others; a silent one is forgotten after three seconds."""
+
+    def __init__(self) -> None:
+        self._heard: dict[int, tuple[CamView, int]] = {}
+
+    def hear(self, body: CamBody, arrived_ns: int) -> None:
+        """Take a CAM that arrived at `arrived_ns`, on the receiver's own clock."""
+        self._heard[body.station_id] = (read_cam(body), arrived_ns)
+
+    def others(self, now_ns: int) -> tuple[Other, ...]:
+        """Return where the others are believed to be now, in the order of their station ids."""
+        fresh = {
+            station: heard
+            for station, heard in self._heard.items()
+            if now_ns - heard[1] <= REMEMBER_NS
+        }
+        self._heard = fresh
+        return tuple(
+            other_of(view, seconds(now_ns - arrived_ns))
+            for _, (view, arrived_ns) in sorted(fresh.items())
+        )
+
+
+def other_of(view: CamView, age_s: float) -> Other:
+    """Return a car moved on from its CAM; an unknown heading or speed is taken as zero."""
+    yaw, speed = view.yaw_rad or 0.0, view.speed_mps or 0.0
+    ahead = speed * min(age_s, LONGEST_GUESS_S) - 0.5 * view.length_m
+    turned = (view.yaw_rate_radps or 0.0) * min(age_s, LONGEST_GUESS_S)
+    return Other(
+        x=view.x_m + ahead * math.cos(yaw + 0.5 * turned),
+        y=view.y_m + ahead * math.sin(yaw + 0.5 * turned),
+        yaw=yaw + turned,
+        speed=speed,
+        length=view.length_m,
+        width=view.width_m,
+    )
