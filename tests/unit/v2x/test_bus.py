@@ -1,0 +1,95 @@
+"""Mailboxes: bounded, ordered among each other, lazy; and the reader behind them."""
+
+import logging
+import threading
+
+from scm.clock import NS_PER_S, StepClock
+from scm.v2x.bus import Mailbox, RawMailbox
+from scm.v2x.exchange import Incoming, RawSample
+from scm.v2x.mailbox import drain_all
+from scm.v2x.message import Refused, encode
+from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.reader import Reader
+
+KEY = "scm/@v1/city/part/world/status"
+
+
+def item(n):
+    return Incoming(Refused(code=str(n), detail=""), n)
+
+
+def test_a_mailbox_gives_back_in_order_and_forgets():
+    box = Mailbox(10)
+    items = [item(n) for n in range(3)]
+    for i in items:
+        box.put(i)
+    assert box.drain() == items
+    assert box.drain() == []
+
+
+def test_a_full_mailbox_keeps_the_newest_and_counts_the_rest():
+    box = Mailbox(2)
+    for n in range(5):
+        box.put(item(n))
+    assert [i.t_ns for i in box.drain()] == [3, 4]
+    assert box.dropped == 3
+
+
+def test_several_mailboxes_are_drained_in_order_of_arrival():
+    a, b, raw = Mailbox(10), Mailbox(10), RawMailbox(10)
+    first, second, fourth = item(1), item(2), item(4)
+    third = RawSample("k", b"", None, 3)
+    b.put(first)
+    a.put(second)
+    raw.put(third)
+    b.put(fourth)
+    assert drain_all([a, b, raw]) == [first, second, third, fourth]
+
+
+def test_what_is_dropped_is_never_made():
+    made = []
+
+    def make(n):
+        return lambda: made.append(n) or item(n)
+
+    box = Mailbox(1)
+    for n in range(3):
+        box.put_later(make(n))
+    assert [i.t_ns for i in box.drain()] == [2]
+    assert made == [2]
+
+
+def test_what_is_made_to_nothing_is_left_out():
+    box = Mailbox(2)
+    box.put_later(lambda: None)
+    box.put(item(1))
+    assert [i.t_ns for i in box.drain()] == [1]
+
+
+def test_a_mailbox_wakes_its_reader():
+    wake = threading.Event()
+    Mailbox(1, wake).put(item(1))
+    assert wake.is_set()
+
+
+def test_rubbish_is_dropped_counted_and_logged_once_a_second(caplog):
+    clock = StepClock()
+    reader = Reader(clock)
+    with caplog.at_level(logging.WARNING):
+        for _ in range(100):
+            assert reader.read(CityStop, "k", b"rubbish", None, 0) is None
+        assert len(caplog.records) == 1
+        clock.set_ns(NS_PER_S)
+        reader.read(CityStop, "k", b"rubbish", None, 0)
+    assert reader.rejected == 101
+    assert len(caplog.records) == 2
+    assert "rejected=101" in caplog.text
+
+
+def test_a_message_that_claims_to_be_from_somebody_else_is_dropped():
+    reader = Reader(StepClock())
+    honest, forged = (encode(PartStatus(station=s, t_ns=0))[0] for s in ("world", "eye"))
+    assert reader.read(PartStatus, KEY, honest, None, 5).t_ns == 5
+    assert reader.read(PartStatus, KEY, forged, None, 5) is None
+    assert reader.rejected == 1
