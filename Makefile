@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 .PHONY: run test bench clean
 
 run: $(STAMP)
-	$(VENV)/bin/scm up $(MAP)
+	$(VENV)/bin/scm up $(MAP) $(UP_ARGS)
 
 test: $(STAMP)
 	$(VENV)/bin/python -m pytest $(PYTEST_ARGS)

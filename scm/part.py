@@ -44,11 +44,20 @@ class Part(Protocol):
         serves: Which requests the runner brings to it.
     """
 
-    name: str
-    role: str
-    period_ns: int
-    hears: Sequence[Hears]
-    serves: Sequence[Serves]
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def role(self) -> str: ...
+
+    @property
+    def period_ns(self) -> int: ...
+
+    @property
+    def hears(self) -> Sequence[Hears]: ...
+
+    @property
+    def serves(self) -> Sequence[Serves]: ...
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Advance to `now_ns`, having received `inbox` in order of arrival; return what to send."""

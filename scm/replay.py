@@ -65,8 +65,8 @@ class Commands:
     def __init__(self, recording: Recording, car: Car) -> None:
         self._throttle = recording.channel("command.throttle")
         self._steering = recording.channel("command.steering")
-        limit = car.value("steering.limit_rad")
-        self._per_unit = 1.0 / limit if self._steering.dimension == "angle" else 1.0
+        angles = self._steering.dimension == "angle"
+        self._per_unit = 1.0 / car.value("steering.limit_rad") if angles else 1.0
 
     def at(self, t: Floats) -> tuple[Floats, Floats]:
         """Return throttle and steering at times `t`; before the first row they are zero."""
@@ -98,22 +98,24 @@ def free_run(
     fleet = Fleet(car, len(starts))
     _run_in(fleet, commands, starts, initial)
     every = round(save_every_s / STEP_S)
-    t_s = np.arange(round(horizon_s / save_every_s) + 1) * save_every_s
-    simulated = np.empty((4, len(starts), len(t_s)))
-    for k in range(len(t_s)):
-        simulated[:, :, k] = fleet.x, fleet.y, fleet.yaw, fleet.speed
+    t_s: Floats = np.arange(round(horizon_s / save_every_s) + 1, dtype=np.float64) * save_every_s
+    x, y, yaw, speed = (np.empty((len(starts), len(t_s))) for _ in range(4))
+    for k, t in enumerate(t_s):
+        x[:, k], y[:, k], yaw[:, k], speed[:, k] = fleet.x, fleet.y, fleet.yaw, fleet.speed
         if k < len(t_s) - 1:
-            _advance(fleet, commands, starts + t_s[k], every)
+            _advance(fleet, commands, starts + t, every)
     measured = poses.motion((starts[:, None] + t_s).ravel())
-    shape = (len(starts), len(t_s))
     return FreeRun(
-        starts,
-        t_s,
-        *simulated,
-        measured.x.reshape(shape),
-        measured.y.reshape(shape),
-        measured.yaw.reshape(shape),
-        measured.speed.reshape(shape),
+        start_s=starts,
+        t_s=t_s,
+        x=x,
+        y=y,
+        yaw=yaw,
+        speed=speed,
+        x_measured=measured.x.reshape(x.shape),
+        y_measured=measured.y.reshape(x.shape),
+        yaw_measured=measured.yaw.reshape(x.shape),
+        speed_measured=measured.speed.reshape(x.shape),
     )
 
 
@@ -140,6 +142,7 @@ def _run_in(fleet: Fleet, commands: Commands, starts: Floats, initial: Motion) -
     for pose, speed in zip(poses, initial.speed, strict=True):
         fleet.add(pose, float(speed))
     _advance(fleet, commands, starts - RUN_IN_S, round(RUN_IN_S / STEP_S))
+    angles, (throttle, _) = fleet.steer_angle.copy(), commands.at(starts)
     for row, pose in enumerate(poses):
         fleet.place(
             row,
@@ -147,6 +150,8 @@ def _run_in(fleet: Fleet, commands: Commands, starts: Floats, initial: Motion) -
             float(initial.speed[row]),
             float(initial.lateral_speed[row]),
             float(initial.yaw_rate[row]),
+            float(angles[row]),
+            float(throttle[row]),
         )
 
 

@@ -69,10 +69,11 @@ def _terms(arguments: argparse.Namespace) -> str:
 
 def _messages(arguments: argparse.Namespace) -> str:
     from scm.registry import load, names
-    from scm.v2x.message import Request
+    from scm.v2x.message import Message, Request
 
     del arguments
-    kinds = [load("scm.v2x.messages", name, "MESSAGE", type) for name in names("scm.v2x.messages")]
+    modules = names("scm.v2x.messages")
+    kinds: list[type[Message]] = [load("scm.v2x.messages", n, "MESSAGE", type) for n in modules]
     rows = []
     for kind in kinds:
         reply = f" -> {kind.REPLY.__name__}" if issubclass(kind, Request) else ""

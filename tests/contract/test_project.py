@@ -18,7 +18,12 @@ def check(root: Path, *command: str) -> None:
     bin_dir = Path(sys.executable).parent
     path = os.pathsep.join((str(bin_dir), os.environ["PATH"]))
     done = subprocess.run(
-        command, cwd=root, capture_output=True, text=True, check=False, env={**os.environ, "PATH": path}
+        command,
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PATH": path},
     )
     assert done.returncode == 0, f"{' '.join(command)}\n{done.stdout}\n{done.stderr}"
 

@@ -44,7 +44,9 @@ def test_a_run_is_read_back_as_it_was_heard(tmp_path: Path) -> None:
 
 
 def test_bulk_is_readable_as_json(tmp_path: Path) -> None:
-    scan = LidarScan(vehicle="n1", t_ns=5, beams=1, range_min_m=0.1, range_max_m=12.0, payload=b"\x01\x02")
+    scan = LidarScan(
+        vehicle="n1", t_ns=5, beams=1, range_min_m=0.1, range_max_m=12.0, payload=b"\x01\x02"
+    )
     with RunFile(tmp_path / "run.mcap", "city") as file:
         file.write(RawSample(key_of("city", scan), *encode(scan), t_ns=5))
     (message,) = read_run(tmp_path / "run.mcap")

@@ -66,7 +66,9 @@ def test_an_expression_over_columns_is_a_channel(tmp_path: Path) -> None:
 
 def test_scale_offset_and_sign_apply_before_the_unit(tmp_path: Path) -> None:
     table = POSE_TABLE.replace("unit: mm, std: 2", "unit: mm, scale: 2, offset: 10, sign: -1")
-    assert_allclose(read_one(write(tmp_path, table)).channel("pose.x").values, [-0.21, -0.41, -0.61])
+    assert_allclose(
+        read_one(write(tmp_path, table)).channel("pose.x").values, [-0.21, -0.41, -0.61]
+    )
 
 
 def test_gzipped_csv_and_npz_are_read(tmp_path: Path) -> None:
@@ -105,10 +107,18 @@ def test_data_may_lie_elsewhere(tmp_path: Path) -> None:
     [
         (POSE_TABLE, POSE_CSV.replace("200", "two"), "line 3, column 'x': got 'two'"),
         (POSE_TABLE, POSE_CSV.replace("50,200", "50"), "line 3: 4 values, expected 5"),
-        (POSE_TABLE.replace("unit: mm", "unit: deg"), POSE_CSV, "pose.x: unit 'deg' measures angle"),
+        (
+            POSE_TABLE.replace("unit: mm", "unit: deg"),
+            POSE_CSV,
+            "pose.x: unit 'deg' measures angle",
+        ),
         (POSE_TABLE.replace("unit: mm", "unit: mn"), POSE_CSV, "unknown unit 'mn' (did you mean"),
         (POSE_TABLE.replace("pose.x", "pose.ex"), POSE_CSV, "no channel named 'pose.ex' (did you"),
-        (POSE_TABLE.replace("column: x", "column: xx"), POSE_CSV, "no column 'xx' (did you mean 'x'"),
+        (
+            POSE_TABLE.replace("column: x", "column: xx"),
+            POSE_CSV,
+            "no column 'xx' (did you mean 'x'",
+        ),
         (POSE_TABLE.replace("std: 2", "std: 0"), POSE_CSV, "std: expected more than 0, got 0"),
         (POSE_TABLE.replace("column: x", "colum: x"), POSE_CSV, "unknown field `colum`"),
         (POSE_TABLE.replace("pose.csv", "pose.txt"), POSE_CSV, "no such file"),
@@ -125,7 +135,9 @@ def test_a_bad_recording_is_refused_with_place_and_reason(
     assert str(tmp_path) in str(error.value)
 
 
-@pytest.mark.parametrize("text", ["__import__('os')", "x.real", "[x]", "x if x else 1", "x @ x", "'a'"])
+@pytest.mark.parametrize(
+    "text", ["__import__('os')", "x.real", "[x]", "x if x else 1", "x @ x", "'a'"]
+)
 def test_an_expression_can_do_nothing_but_arithmetic(tmp_path: Path, text: str) -> None:
     table = POSE_TABLE.replace("column: x, unit: mm", f'expression: "{text}", unit: mm')
     with pytest.raises(RecordingError, match="is not arithmetic"):
@@ -138,6 +150,7 @@ def test_real_recordings_described_in_the_project_are_read(root: Path, shared: P
     )
     assert len(dart[0].channel("pose.x").t) == 9825
     tinytown = read_recordings(
-        root / "recordings/autodrive_sim_tinytown.yaml", shared / "recordings/autodrive_sim_tinytown"
+        root / "recordings/autodrive_sim_tinytown.yaml",
+        shared / "recordings/autodrive_sim_tinytown",
     )
     assert tinytown[0].channel("command.steering").dimension == "angle"
