@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, TypeVar
 
-import msgspec
 from fastapi import Header, Path, Response
 
+from scm.api.encoding import encode
 from scm.api.problem import RefusedError
 from scm.api.view import CityView
 from scm.maps.model import CityMap
@@ -61,7 +61,7 @@ def json_response(
 ) -> Response:
     """Return `body` as JSON that no cache keeps."""
     return Response(
-        msgspec.json.encode(body),
+        encode(body),
         status,
         {"Cache-Control": "no-store", **(headers or {})},
         media_type="application/json",

@@ -9,6 +9,7 @@ after that one; after a restart of the server the run differs, and it gets the l
 """
 
 import asyncio
+import logging
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from typing import NamedTuple
@@ -17,10 +18,13 @@ import msgspec
 
 from scm.api.car_rows import cars_topic
 from scm.api.city import City
+from scm.api.encoding import encode
 from scm.api.eye_rows import camera_rows
 from scm.api.picture import Picture
 from scm.api.routes.stop import stop_of
 from scm.api.signal_rows import junction_rows
+
+_LOGGER = logging.getLogger(__name__)
 
 PERIOD_S = 0.05
 BEAT_FRAMES = 20
@@ -78,6 +82,7 @@ class Stream:
         self._sent: dict[str, bytes] = {}
         self._frame = 0
         self._silent_frames = 0
+        self._failed_frame = -BEAT_FRAMES
         self._event_seq = 0
         self._closed = False
         self._topics = {
@@ -98,7 +103,10 @@ class Stream:
     async def run(self) -> None:
         """Send a frame every 50 ms until `close`."""
         while not self._closed:
-            self.send_frame()
+            try:
+                self.send_frame()
+            except Exception as failure:  # noqa: BLE001  one bad frame must not silence all pages
+                self._log_failure(failure)
             await asyncio.sleep(PERIOD_S)
 
     def close(self) -> None:
@@ -140,18 +148,23 @@ class Stream:
         finally:
             self._listeners.discard(listener)
 
+    def _log_failure(self, failure: Exception) -> None:
+        if self._frame - self._failed_frame >= BEAT_FRAMES:
+            self._failed_frame = self._frame
+            _LOGGER.error("stream_frame_failed frame=%d", self._frame, exc_info=failure)
+
     def _changed(self, picture: Picture) -> dict[str, msgspec.Raw]:
         changed: dict[str, msgspec.Raw] = {}
         for name, topic in self._topics.items():
             if self._frame % topic.every == 0:
-                body = msgspec.json.encode(topic.make(picture))
+                body = encode(topic.make(picture))
                 if self._sent.get(name) != body:
                     self._sent[name] = body
                     changed[name] = msgspec.Raw(body)
         events = self._city.view.events_after(self._event_seq, EVENTS_SHOWN)
         if events:
             self._event_seq = events[-1].seq
-            changed["events"] = msgspec.Raw(msgspec.json.encode(events))
+            changed["events"] = msgspec.Raw(encode(events))
         return changed
 
     def _snapshot(self, after_seq: int | None) -> bytes:
@@ -160,16 +173,15 @@ class Stream:
             after_seq = max(0, picture.event_seq - EVENTS_SHOWN)
         events = self._city.view.events_after(after_seq, EVENTS_SHOWN)
         body = {
-            name: msgspec.Raw(msgspec.json.encode(topic.make(picture)))
-            for name, topic in self._topics.items()
+            name: msgspec.Raw(encode(topic.make(picture))) for name, topic in self._topics.items()
         }
-        body["events"] = msgspec.Raw(msgspec.json.encode(events))
-        body["run"] = msgspec.Raw(msgspec.json.encode(self._run_id))
+        body["events"] = msgspec.Raw(encode(events))
+        body["run"] = msgspec.Raw(encode(self._run_id))
         return self._event("snapshot", body, events[-1].seq if events else after_seq)
 
     def _event(self, name: str, body: dict[str, msgspec.Raw], event_seq: int) -> bytes:
         head = f"id: {self._run_id}-{self._frame}-{event_seq}\nevent: {name}\ndata: "
-        return head.encode() + msgspec.json.encode(body) + b"\n\n"
+        return head.encode() + encode(body) + b"\n\n"
 
     def _resume_seq(self, last_event_id: str) -> int | None:
         run_id, _, rest = last_event_id.partition("-")

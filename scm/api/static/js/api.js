@@ -1,0 +1,61 @@
+/** Changes go through here: REST with an idempotency key, problems as sentences, the API key kept for the tab. */
+import { signal } from "@preact/signals";
+
+const KEY = "scm-api-key";
+
+/** Resolver of the open question for an API key; null while nobody asks. */
+export const keyWanted = signal(null);
+
+/** Messages for the person at the desk: `{id, kind, text}`. */
+export const notices = signal([]);
+
+let nextNotice = 1;
+
+/** @param {"info" | "error"} kind */
+export function notify(kind, text) {
+  const id = nextNotice++;
+  notices.value = [...notices.value, { id, kind, text }];
+  setTimeout(() => dismiss(id), kind === "error" ? 9000 : 4000);
+}
+
+export function dismiss(id) {
+  notices.value = notices.value.filter((notice) => notice.id !== id);
+}
+
+/**
+ * Ask the city for a change and tell the person how it went.
+ * @returns the reply, or null when it was refused.
+ */
+export async function change(method, path, body, done) {
+  try {
+    const reply = await send(method, path, body, crypto.randomUUID?.() ?? String(Math.random()));
+    if (done) notify("info", done(reply));
+    return reply;
+  } catch (error) {
+    notify("error", error.message);
+    return null;
+  }
+}
+
+async function send(method, path, body, requestId) {
+  const headers = { "Idempotency-Key": requestId };
+  const key = sessionStorage.getItem(KEY);
+  if (key) headers.Authorization = `Bearer ${key}`;
+  if (body !== undefined) headers["Content-Type"] = "application/json";
+  const response = await fetch(`/api/v1${path}`, {
+    method,
+    headers,
+    body: body === undefined ? undefined : JSON.stringify(body),
+  });
+  const reply = await response.json().catch(() => ({}));
+  if (response.ok) return reply;
+  if (response.status === 401 && (await askForKey())) return send(method, path, body, requestId);
+  throw new Error(reply.detail || reply.title || `${method} ${path}: ${response.status}`);
+}
+
+async function askForKey() {
+  const key = await new Promise((resolve) => (keyWanted.value = resolve));
+  keyWanted.value = null;
+  if (key) sessionStorage.setItem(KEY, key);
+  return Boolean(key);
+}

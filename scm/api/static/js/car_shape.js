@@ -1,0 +1,144 @@
+/** A car seen from above, drawn in metres with the rear axle's centre as origin, x forward, y left. */
+
+/** Outlines by car file [m]: rear and front end, half width, wheelbase; unknown ones look like a Nigel. */
+const OUTLINES = {
+  nigel: { rear: -0.07, front: 0.23, half: 0.0875, wheelbase: 0.14154 },
+  f1tenth: { rear: -0.09, front: 0.44, half: 0.15, wheelbase: 0.33 },
+  dart: { rear: -0.04, front: 0.24, half: 0.08, wheelbase: 0.175 },
+};
+const PAINT = {
+  hosted: ["#4c8df0", "#2c65bd"],
+  remote: ["#a97bf2", "#7647c2"],
+  real: ["#f0a13c", "#b9711a"],
+  lost: ["#8a929c", "#5c636c"],
+};
+const BLINK_MS = 400;
+
+export function footprint(car) {
+  const { rear, front, half, wheelbase } = OUTLINES[car] ?? OUTLINES.nigel;
+  return { rear, front, half, wheelbase, middle: (rear + front) / 2 };
+}
+
+export function drawCar(paper, view, car, chosen) {
+  const shape = footprint(car.car);
+  const paint = car.alive ? (PAINT[car.kind] ?? PAINT.hosted) : PAINT.lost;
+  paper.save();
+  paper.translate(view.x(car.x_m), view.y(car.y_m));
+  paper.rotate(-car.yaw_rad);
+  paper.scale(view.scale, -view.scale);
+  if (chosen) halo(paper, shape);
+  wheels(paper, shape, car.steering_rad);
+  body(paper, shape, paint);
+  lamps(paper, shape, new Set(car.alive ? car.lights : []));
+  if (!car.alive) cross(paper, shape);
+  paper.restore();
+  label(paper, view, car, shape, paint, chosen);
+}
+
+function halo(paper, { rear, front, half }) {
+  paper.beginPath();
+  paper.roundRect(rear - 0.03, -half - 0.03, front - rear + 0.06, 2 * half + 0.06, 0.06);
+  paper.lineWidth = 0.009;
+  paper.strokeStyle = "#ffffff";
+  paper.stroke();
+}
+
+function wheels(paper, { half, wheelbase }, steering) {
+  paper.fillStyle = "#0c0f13";
+  for (const [x, angle] of [[0, 0], [wheelbase, steering]]) {
+    for (const y of [-half + 0.012, half - 0.012]) {
+      paper.save();
+      paper.translate(x, y);
+      paper.rotate(angle);
+      paper.beginPath();
+      paper.roundRect(-0.0325, -0.0145, 0.065, 0.029, 0.008);
+      paper.fill();
+      paper.restore();
+    }
+  }
+}
+
+function body(paper, { rear, front, half }, [light, dark]) {
+  const wide = half - 0.019;
+  paper.beginPath();
+  paper.roundRect(rear, -wide, front - rear, 2 * wide, [0.03, 0.03, 0.05, 0.05].reverse());
+  const shade = paper.createLinearGradient(0, wide, 0, -wide);
+  shade.addColorStop(0, light);
+  shade.addColorStop(1, dark);
+  paper.fillStyle = shade;
+  paper.fill();
+  paper.lineWidth = 0.004;
+  paper.strokeStyle = "rgba(8, 12, 18, 0.75)";
+  paper.stroke();
+  const length = front - rear;
+  paper.fillStyle = "rgba(10, 16, 24, 0.72)";
+  pane(paper, rear + 0.62 * length, rear + 0.76 * length, 0.62 * wide, 0.82 * wide);
+  pane(paper, rear + 0.24 * length, rear + 0.15 * length, 0.62 * wide, 0.76 * wide);
+}
+
+/** A windscreen: a trapezium from x0 (narrow) to x1 (wide). */
+function pane(paper, x0, x1, half0, half1) {
+  paper.beginPath();
+  paper.moveTo(x0, -half0);
+  paper.lineTo(x1, -half1);
+  paper.lineTo(x1, half1);
+  paper.lineTo(x0, half0);
+  paper.closePath();
+  paper.fill();
+}
+
+function lamps(paper, { rear, front, half }, on) {
+  const side = half - 0.034;
+  const head = on.has("head_low") || on.has("head_high");
+  const pair = (x, colour, size) => {
+    paper.fillStyle = colour;
+    for (const y of [-side, side]) dot(paper, x, y, size);
+  };
+  pair(front - 0.012, head ? "#fff6cf" : "rgba(255, 255, 255, 0.4)", 0.011);
+  pair(rear + 0.011, on.has("brake") ? "#ff3b30" : on.has("tail") ? "#b3312b" : "#64201f", 0.011);
+  if (on.has("reverse")) dot(paper, rear + 0.01, 0, 0.009, "#ffffff");
+  if (Math.floor(performance.now() / BLINK_MS) % 2) return;
+  for (const [name, y] of [["left", half - 0.016], ["right", 0.016 - half]]) {
+    if (!on.has(name)) continue;
+    for (const x of [rear + 0.02, front - 0.03]) dot(paper, x, y, 0.011, "#ffb02e");
+  }
+}
+
+function dot(paper, x, y, radius, colour) {
+  if (colour) paper.fillStyle = colour;
+  paper.beginPath();
+  paper.arc(x, y, radius, 0, 2 * Math.PI);
+  paper.fill();
+}
+
+function cross(paper, { rear, front, half }) {
+  paper.beginPath();
+  paper.moveTo(rear, -half);
+  paper.lineTo(front, half);
+  paper.moveTo(rear, half);
+  paper.lineTo(front, -half);
+  paper.lineWidth = 0.014;
+  paper.lineCap = "round";
+  paper.strokeStyle = "#ff5a55";
+  paper.stroke();
+}
+
+/** The name beside the car, outside its outline whatever its heading. */
+function label(paper, view, car, { middle, front, rear, half }, [colour], chosen) {
+  const [c, s] = [Math.cos(car.yaw_rad), Math.sin(car.yaw_rad)];
+  const x = view.x(car.x_m + middle * c);
+  const reach = (Math.abs(s) * (front - rear)) / 2 + Math.abs(c) * half;
+  const y = view.y(car.y_m + middle * s) - reach * view.scale - 12;
+  paper.font = "600 12px system-ui, sans-serif";
+  paper.textAlign = "left";
+  paper.textBaseline = "middle";
+  const text = car.alive ? car.vehicle : `${car.vehicle} lost`;
+  const width = paper.measureText(text).width + 24;
+  paper.beginPath();
+  paper.roundRect(x - width / 2, y - 9, width, 18, 9);
+  paper.fillStyle = chosen ? "#ffffff" : "rgba(13, 18, 24, 0.88)";
+  paper.fill();
+  dot(paper, x - width / 2 + 10, y, 3.5, colour);
+  paper.fillStyle = chosen ? "#10151b" : "#f1f4f8";
+  paper.fillText(text, x - width / 2 + 17, y + 0.5);
+}

@@ -1,0 +1,71 @@
+/** The cars as a table: who, whose, how fast, how fresh, how far, and what holds them. */
+import { html } from "./html.js";
+import { change } from "./api.js";
+import { age, fixed, UNKNOWN } from "./format.js";
+import { selected } from "./selection.js";
+import { world } from "./store.js";
+
+const STALE_MS = 500;
+
+export function CarsTable() {
+  const cars = world.value.cars;
+  const spawn = () => change("POST", "/cars", {}, (reply) => `${reply.vehicle} is on the map.`);
+  return html`
+    <section class="panel cars" aria-label="Cars">
+      <div class="panel-head">
+        <h2>Cars <small>${cars.length}</small></h2>
+        <button class="small" onClick=${spawn}>Add a car</button>
+      </div>
+      <div class="scroll" tabindex="0" role="region" aria-label="Table of cars">
+        <table>
+          <thead>
+            <tr>
+              <th>Name</th><th>Kind</th><th class="owner">Owner</th><th>Mode</th>
+              <th class="number">Speed</th><th class="number">Age</th>
+              <th>Trip</th><th>Waits for</th><th><span class="hidden">Remove</span></th>
+            </tr>
+          </thead>
+          <tbody>${cars.map((car) => html`<${Car} key=${car.vehicle} car=${car} />`)}</tbody>
+        </table>
+        ${!cars.length && html`<p class="empty">No car is on the map.</p>`}
+      </div>
+    </section>
+  `;
+}
+
+function Car({ car }) {
+  const chosen = selected.value === car.vehicle;
+  const choose = () => (selected.value = chosen ? null : car.vehicle);
+  const remove = () =>
+    change("DELETE", `/cars/${car.vehicle}?reason=dashboard`, undefined, () => `${car.vehicle} is gone.`);
+  const mode = car.alive ? car.mode : "lost";
+  return html`
+    <tr data-car=${car.vehicle} data-alive=${car.alive} class=${chosen ? "chosen" : ""}>
+      <td>
+        <button class="name" aria-pressed=${chosen} onClick=${choose}>${car.vehicle}</button>
+      </td>
+      <td><span class="kind" data-kind=${car.kind}>${car.kind}</span></td>
+      <td class="owner">${car.owner}</td>
+      <td><span class="mode" data-mode=${mode}>${mode}</span></td>
+      <td class="number">${fixed(car.speed_mps, 2)} <small>m/s</small></td>
+      <td class="number ${car.age_ms > STALE_MS ? "warn" : ""}">${age(car.age_ms)}</td>
+      <td><${Trip} trip=${car.trip} /></td>
+      <td>${car.trip?.waiting_for ?? ""}</td>
+      <td>
+        <button class="plain" title="Take ${car.vehicle} off the map" aria-label="Take ${car.vehicle} off the map" onClick=${remove}>✕</button>
+      </td>
+    </tr>
+  `;
+}
+
+function Trip({ trip }) {
+  if (!trip) return UNKNOWN;
+  if (trip.arrived) return html`<span class="arrived">arrived</span>`;
+  if (trip.length_m === null) return html`<span class="trip">${fixed(trip.done_m, 1)} m</span>`;
+  return html`
+    <span class="trip">
+      <progress value=${trip.done_m} max=${trip.length_m} aria-label="Trip progress"></progress>
+      ${fixed(trip.done_m, 1)} / ${fixed(trip.length_m, 1)} m
+    </span>
+  `;
+}

@@ -1,0 +1,22 @@
+/** A modal question over the page: Escape and a click beside it mean no. */
+import { useEffect, useRef } from "preact/hooks";
+import { html } from "./html.js";
+
+export function Dialog({ title, onClose, children }) {
+  const dialog = useRef(null);
+  useEffect(() => {
+    dialog.current.showModal();
+  }, []);
+  const onClick = (event) => {
+    if (event.target === dialog.current) onClose();
+  };
+  const onCancel = (event) => {
+    event.preventDefault();
+    onClose();
+  };
+  return html`
+    <dialog ref=${dialog} aria-label=${title} onClick=${onClick} onCancel=${onCancel}>
+      <div class="question"><h2>${title}</h2>${children}</div>
+    </dialog>
+  `;
+}

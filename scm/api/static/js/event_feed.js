@@ -1,0 +1,25 @@
+/** The log of the city, newest first. */
+import { html } from "./html.js";
+import { clock } from "./format.js";
+import { events } from "./store.js";
+
+export function EventFeed() {
+  return html`
+    <section class="panel events" aria-label="Events">
+      <div class="panel-head"><h2>Events</h2></div>
+      <div class="scroll" tabindex="0" role="log" aria-label="Log of events, newest first">
+        <ol>
+          ${events.value.map(
+            (event) => html`
+              <li key=${event.seq} data-severity=${event.severity}>
+                <time>${clock(event.t_ns)}</time>
+                <span><b>${event.source}</b> ${event.text}</span>
+              </li>
+            `,
+          )}
+        </ol>
+        ${!events.value.length && html`<p class="empty">Nothing has happened yet.</p>`}
+      </div>
+    </section>
+  `;
+}

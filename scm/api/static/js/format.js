@@ -1,0 +1,30 @@
+/** Numbers and times as people read them; "—" stands for what is not known. */
+
+export const UNKNOWN = "—";
+
+/** @param {number | null | undefined} value */
+export function fixed(value, digits, unit = "") {
+  return value === null || value === undefined ? UNKNOWN : value.toFixed(digits) + unit;
+}
+
+/** An age or a span in seconds, short. */
+export function span(seconds) {
+  if (seconds === null || seconds === undefined) return UNKNOWN;
+  if (seconds < 10) return `${seconds.toFixed(1)} s`;
+  if (seconds < 120) return `${Math.round(seconds)} s`;
+  return `${Math.round(seconds / 60)} min`;
+}
+
+/** A car's age in milliseconds. */
+export function age(ms) {
+  return ms < 1000 ? `${Math.round(ms)} ms` : span(ms / 1000);
+}
+
+/** Wall time of a stamp; of a run on a stepped clock, the time since its start. */
+export function clock(t_ns) {
+  const ms = t_ns / 1e6;
+  if (ms > 1e12) return new Date(ms).toTimeString().slice(0, 8);
+  const s = ms / 1000;
+  const two = (n) => String(Math.floor(n)).padStart(2, "0");
+  return `${two(s / 3600)}:${two((s / 60) % 60)}:${two(s % 60)}`;
+}
