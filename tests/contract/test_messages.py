@@ -1,0 +1,209 @@
+"""Every message of `scm/v2x/messages`: what each of them must keep to, whoever adds one."""
+
+import importlib
+from string import ascii_lowercase, digits
+from types import NoneType, UnionType
+from typing import Literal, Union, get_args, get_origin
+
+import msgspec
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from scm.registry import names
+from scm.v2x.key import agrees, key_of, matches, parse, selector, variables
+from scm.v2x.message import Delivery, Message, Request, decode, encode, is_bulk
+
+PACKAGE = "scm.v2x.messages"
+
+PLAIN_NUMBERS = {
+    "seq": "a count",
+    "epoch": "a count",
+    "tick": "a count",
+    "late_ticks": "a count",
+    "late_steps": "a count",
+    "dropped": "a count",
+    "beams": "a count",
+    "laps": "a count",
+    "revision": "a count",
+    "number": "an identity",
+    "seed": "a seed",
+    "encoder_left": "counts of the encoder",
+    "encoder_right": "counts of the encoder",
+    "throttle": "a share of the greatest",
+    "steering": "a share of the greatest",
+    "margin": "of the tag detector, in its own measure",
+    "covariance": "mixed, see the docstring",
+    "real_time_factor": "a ratio",
+    "start": "a pose of the map, see its docstring",
+}
+UNITS = tuple(
+    f"_{unit}"
+    for unit in (
+        *("ns", "ms", "s", "m", "px", "rad", "deg", "hz"),
+        *("mps", "mps2", "radps", "n", "nm", "kg", "v", "a", "w", "j", "c"),
+        *("id", "number"),
+    )
+)
+ETSI = ("scm.v2x.etsi",)
+
+
+def message_classes():
+    classes = []
+    for name in names(PACKAGE):
+        module = importlib.import_module(f"{PACKAGE}.{name}")
+        for thing in vars(module).values():
+            is_class = isinstance(thing, type) and thing.__module__ == module.__name__
+            if is_class and issubclass(thing, Message):
+                classes.append(thing)
+    return list(dict.fromkeys(classes))
+
+
+CLASSES = message_classes()
+SENT = [importlib.import_module(f"{PACKAGE}.{name}").MESSAGE for name in names(PACKAGE)]
+every_class = pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__name__)
+every_sent = pytest.mark.parametrize("kind", SENT, ids=lambda kind: kind.__name__)
+
+NAME = st.text(ascii_lowercase + digits + "_-", min_size=1, max_size=32)
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+WORDS = st.text(st.characters(codec="utf-8"), max_size=8)
+OF_TYPE = {
+    int: st.integers(-(2**63), 2**63 - 1),
+    float: FINITE,
+    bool: st.booleans(),
+    str: WORDS,
+    bytes: st.binary(max_size=64),
+    NoneType: st.none(),
+}
+
+
+def values(of):
+    """Return a strategy for values of a field's type."""
+    if isinstance(of, type) and issubclass(of, msgspec.Struct):
+        return structs(of)
+    origin, inner = get_origin(of), get_args(of)
+    if origin in (Union, UnionType):
+        return st.one_of(*(values(t) for t in inner))
+    if origin is Literal:
+        return st.sampled_from(inner)
+    if origin is tuple and inner[-1] is Ellipsis:
+        return st.lists(values(inner[0]), max_size=3).map(tuple)
+    if origin is tuple:
+        return st.tuples(*(values(t) for t in inner))
+    return OF_TYPE[of]
+
+
+def structs(kind):
+    in_key = variables(kind) if issubclass(kind, Message) else []
+    fields = {}
+    for field in msgspec.structs.fields(kind):
+        is_name = field.name in in_key and field.type is str
+        fields[field.name] = NAME if is_name else values(field.type)
+    return st.builds(kind, **fields)
+
+
+@every_class
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(data=st.data())
+def test_what_is_written_is_read_back_equal(kind, data):
+    message = data.draw(structs(kind))
+    assert decode(kind, *encode(message)) == message
+
+
+@every_sent
+@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(data=st.data())
+def test_its_key_is_built_parsed_and_selected(kind, data):
+    message = data.draw(structs(kind))
+    key = key_of("city", message)
+    assert parse("city", kind, key) == {n: str(getattr(message, n)) for n in variables(kind)}
+    assert matches(selector("city", kind, {}), key)
+    assert agrees(key, message)
+
+
+@every_class
+@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(data=st.data())
+def test_bytes_from_before_a_field_was_added_still_decode(kind, data):
+    message = data.draw(structs(kind))
+    body, attachment = encode(message)
+    old = msgspec.json.decode(attachment if is_bulk(kind) else body)
+    for field in msgspec.structs.fields(kind):
+        if not field.required:
+            old.pop(field.name, None)
+    bytes_of_old = msgspec.json.encode(old)
+    read = decode(kind, body, bytes_of_old) if is_bulk(kind) else decode(kind, bytes_of_old)
+    for field in msgspec.structs.fields(kind):
+        expected = getattr(message, field.name) if field.required else field.default
+        assert getattr(read, field.name) == expected
+
+
+@every_class
+@settings(max_examples=3, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(data=st.data())
+def test_bytes_with_a_field_from_the_future_decode(kind, data):
+    message = data.draw(structs(kind))
+    body, attachment = encode(message)
+    new = msgspec.json.encode({**msgspec.json.decode(attachment or body), "from_the_future": 1})
+    assert (decode(kind, body, new) if is_bulk(kind) else decode(kind, new)) == message
+
+
+@pytest.mark.parametrize("name", names(PACKAGE))
+def test_the_file_is_named_after_its_class(name):
+    kind = importlib.import_module(f"{PACKAGE}.{name}").MESSAGE
+    assert kind.__name__ == "".join(word.capitalize() for word in name.split("_"))
+
+
+def numeric_fields(kind):
+    """Yield (path, name) of every field that holds numbers, those of inner structs included."""
+    for field in msgspec.structs.fields(kind):
+        yield from _numeric(f"{kind.__name__}.{field.name}", field.name, field.type)
+
+
+def _numeric(path, name, of):
+    if isinstance(of, type) and issubclass(of, msgspec.Struct):
+        if of.__module__ not in ETSI and of.__module__ != "scm.maps.model":
+            yield from numeric_fields(of)
+    elif of in (int, float):
+        yield path, name
+    else:
+        for inner in get_args(of):
+            if isinstance(inner, type) or get_args(inner):
+                yield from _numeric(path, name, inner)
+
+
+@every_class
+def test_every_number_says_its_unit_in_its_name(kind):
+    bare = {
+        path
+        for path, name in numeric_fields(kind)
+        if not name.endswith(UNITS) and name not in PLAIN_NUMBERS
+    }
+    assert not bare, f"no unit in the name, and not in the list of plain numbers: {sorted(bare)}"
+
+
+@every_sent
+def test_its_rate_and_delivery_fit_together(kind):
+    if issubclass(kind, Request):
+        assert kind.DELIVERY is Delivery.RPC
+        assert kind.RATE_HZ is None
+        assert issubclass(kind.REPLY, Message)
+        assert kind.REPLY is not Message
+    if kind.DELIVERY is Delivery.STREAM:
+        assert kind.RATE_HZ is not None
+        assert 0.1 <= kind.RATE_HZ <= 100.0
+    assert kind.KEEP >= 1
+
+
+@every_sent
+def test_messages_that_are_not_asked_for_say_when_they_were_true(kind):
+    if not issubclass(kind, Request) and kind.DELIVERY is not Delivery.PRESENCE:
+        assert "t_ns" in kind.__struct_fields__
+
+
+def test_no_two_messages_share_a_key():
+    patterns = {}
+    for kind in SENT:
+        pattern = selector("city", kind, {})
+        assert pattern not in patterns, f"{kind.__name__} and {patterns.get(pattern)}: {pattern}"
+        patterns[pattern] = kind.__name__
