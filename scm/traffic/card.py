@@ -4,12 +4,12 @@ It is derived from the map a second time and by other code than the controller's
 purpose: a mistake in one of the two shows as a difference, not as a common blind spot. Where the
 controller adds and rounds up, the card asks for the bare minimum of a car that
 
-    brakes at 0.5 m/s^2 from 0.267 m/s after 0.3 s    before the yellow may end
-    drives 0.30 m of itself out of the junction at 0.217 m/s, or the lane's limit if that is less
-    as the first of a queue gets over the line        before the green may end
+    brakes at 0.5 m/s^2 from 0.267 m/s after 0.3 s                     before a yellow may end,
+    drives itself, 0.30 m, out of the conflict at 0.217 m/s            before others may start,
+    starts at the line after 0.3 s and is over it with all its length  before a green may end
 
-(Nigel's figures, see its car file). The card's hash is published: two people can compare it with
-the one they agreed on.
+(Nigel's figures, see its car file; a lane's speed limit counts if it is less). The card's hash is
+published: two people can compare it with the one they agreed on.
 """
 
 import hashlib
@@ -74,7 +74,7 @@ def _group(group: Group, lanes: dict[str, Lane], lines: list[StopLine]) -> CardG
         default=group.movement.to_m - group.movement.from_m,
     )
     braking_s = NIGEL_TOP_MPS / NIGEL_BRAKES_MPS2
-    starting_s = slow_mps / NIGEL_STARTS_MPS2
+    starting_s = slow_mps / (2.0 * NIGEL_STARTS_MPS2) + NIGEL_LENGTH_M / slow_mps
     return CardGroup(
         name=group.name,
         green_ns=int((REACTS_IN_S + starting_s) * 1e9),

@@ -16,6 +16,7 @@ ignore 200 ms and must act at 450 ms because relays bounce; messages do not.
 """
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from scm.clock import NS_PER_MS
@@ -172,7 +173,7 @@ class Monitor:
             group.going_ns = stamp_ns
 
     def _wrong_change(
-        self, name: str, before: _Group, shown: dict[str, Colour], stamp_ns: int
+        self, name: str, before: _Group, shown: Mapping[str, Colour], stamp_ns: int
     ) -> list[tuple[str, str]]:
         """Return the faults of a group's change to what it shows now."""
         colour, card = shown[name], self._card[name]
@@ -191,7 +192,7 @@ class Monitor:
         return [("sequence", f"{colour} after {before.colour}")]
 
     def _short_clearances(
-        self, name: str, shown: dict[str, Colour], stamp_ns: int
+        self, name: str, shown: Mapping[str, Colour], stamp_ns: int
     ) -> list[tuple[str, str]]:
         wrong = []
         for pair in self.card.conflicts:

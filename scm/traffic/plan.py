@@ -3,7 +3,8 @@
 A plan is one file of `plans/` with a constant `PLAN`. It is parametric: from a junction's program
 it makes a cycle of stages, each a set of groups that are green together, and for how long. Yellow
 and clearance between two stages are not the plan's business: the timetable adds what the kernel
-takes, and one step so that a late step of the controller does not push the next stage.
+takes, and a step for each of the three changes between two greens, so that steps that come late
+never push the next stage: SPaT's promises hang on that.
 """
 
 from collections.abc import Callable
@@ -136,7 +137,7 @@ def timetable(name: str, cycle: tuple[Stage, ...], program: Program) -> Timetabl
 
 def _between_ns(stage: Stage, program: Program) -> int:
     times = [times_of(program, group) for group in stage.groups]
-    return max(t.yellow + t.clearance for t in times) + STEP_NS
+    return max(t.yellow + t.clearance for t in times) + 3 * STEP_NS
 
 
 def _problems(stage: Stage, program: Program) -> list[str]:
