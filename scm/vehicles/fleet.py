@@ -43,7 +43,9 @@ class Fleet:
         battery: Battery voltage [V], shape (capacity,); write here.
         alive: Rows in use, shape (capacity,).
         status: `VehicleStatus` of each row, shape (capacity,).
-        x, y, z, roll, pitch, yaw: Rear-axle pose in the world [m, rad]; yaw in (-pi, pi].
+        x, y, z, roll, pitch, yaw: Rear-axle pose in the world [m, rad]; yaw in (-pi, pi]. The
+            point is fixed to the leaning body at floor height: a stopped car that still rocks on
+            its springs has stopped.
         speed, lateral_speed: Velocity of the rear axle along and across the body [m/s].
         yaw_rate: [rad/s].
         accel_x, accel_y: Acceleration of the centre of gravity, body frame, no gravity [m/s^2].

@@ -60,6 +60,8 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
 
             # effects on each wheel: front-left, front-right, rear-left, rear-right
             start_sums(scratch)
+            axle_front = 0.5 * (car[{wheel_speed}] + car[{wheel_speed} + 1])
+            axle_rear = 0.5 * (car[{wheel_speed} + 2] + car[{wheel_speed} + 3])
             for w in range(4):
                 front = 1.0 if w < 2 else 0.0
                 side = 1.0 if w % 2 == 0 else -1.0
@@ -72,6 +74,7 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
                 hop = car[{hop} + w]
                 hop_rate = car[{hop_rate} + w]
                 omega = car[{wheel_speed} + w]
+                axle_omega = axle_front if w < 2 else axle_rear
                 corner_rate = corner_height(vz, roll_rate, pitch_rate, wheel_x, wheel_y)
                 compression_rate = hop_rate - corner_rate
                 compression = (
@@ -170,13 +173,17 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
         cos_yaw = math.cos(yaw)
         sin_yaw = math.sin(yaw)
 {store}
-        car[{x}] = x_cog - cos_yaw * cog_to_rear_axle
-        car[{y}] = y_cog - sin_yaw * cog_to_rear_axle
-        car[{z}] = z_cog - cog_height + pitch * cog_to_rear_axle
-        car[{speed}] = cos_yaw * vx_world + sin_yaw * vy_world
-        car[{lateral_speed}] = (
-            cos_yaw * vy_world - sin_yaw * vx_world - cog_to_rear_axle * yaw_rate
+        back = cog_to_rear_axle + cog_height * pitch
+        left = cog_height * roll
+        over_x, over_y = contact_velocity(
+            cos_yaw * vx_world + sin_yaw * vy_world, cos_yaw * vy_world - sin_yaw * vx_world,
+            roll_rate, pitch_rate, yaw_rate, -cog_to_rear_axle, 0.0, cog_height
         )
+        car[{x}] = x_cog - cos_yaw * back - sin_yaw * left
+        car[{y}] = y_cog - sin_yaw * back + cos_yaw * left
+        car[{z}] = z_cog - cog_height + pitch * cog_to_rear_axle
+        car[{speed}] = over_x
+        car[{lateral_speed}] = over_y
         car[{accel_x}] = accel_x
         car[{accel_y}] = accel_y
 '''

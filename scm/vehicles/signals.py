@@ -118,6 +118,7 @@ _ALL = (
     _wheel("side", "1", Role.GIVEN, "+1 left, -1 right", span=(-1.0, 1.0)),
     _wheel("driven", "1", Role.GIVEN, "1 where a motor turns the wheel, else 0", span=(0.0, 1.0)),
     _wheel("omega", "rad/s", Role.GIVEN, "wheel spin, + rolling forward", span=(-90.0, 90.0)),
+    _wheel("axle_omega", "rad/s", Role.GIVEN, "mean spin of this wheel's axle", span=(-90.0, 90.0)),
     _wheel(
         "v_long",
         "m/s",
