@@ -1,0 +1,169 @@
+"""The lens of an overhead camera: map points to pixels, and pixels back to rays.
+
+    p_camera = camera_R_map (p_map - position)          a, b = p_x / p_z, p_y / p_z
+    pixel = K distort(a, b)         distort: radial k1 k2 k3, tangential p1 p2 (OpenCV's five)
+
+Camera axes: x to the picture's right, y to its bottom, z out of the lens, so down to the floor. At
+zero yaw and tilt the picture's right is the map's x and its top the map's y. Pixels: the centre of
+the first pixel is (0, 0), as OpenCV has it.
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from scm.arrays import Floats
+from scm.errors import EyeError
+from scm.maps.model import Camera
+
+LARGEST_TILT_RAD = math.radians(45.0)
+_UNDISTORT_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-12)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraModel:
+    """A calibrated camera.
+
+    Attributes:
+        camera: What the map file says.
+        matrix: K, (3, 3) [px].
+        distortion: k1, k2, p1, p2, k3; (5,).
+        position: Optical centre in the map frame, (3,) [m].
+        camera_R_map: Turns map directions into camera directions, (3, 3).
+    """
+
+    camera: Camera
+    matrix: Floats
+    distortion: Floats
+    position: Floats
+    camera_R_map: Floats  # noqa: N815  a_R_b: the frame on the right turned into the one on the left
+
+    @property
+    def camera_T_map(self) -> Floats:  # noqa: N802
+        """The extrinsics as one matrix, (4, 4): map points to camera points."""
+        transform = np.eye(4)
+        transform[:3, :3] = self.camera_R_map
+        transform[:3, 3] = -self.camera_R_map @ self.position
+        return transform
+
+    @property
+    def extrinsics(self) -> Floats:
+        """x, y, z [m], yaw, tilt x, tilt y [rad]: what `moved_to` takes, (6,)."""
+        camera = self.camera
+        tilts = camera.tilt_x_rad, camera.tilt_y_rad
+        return np.array([camera.x_m, camera.y_m, camera.z_m, camera.yaw_rad, *tilts])
+
+    def moved_to(self, extrinsics: Floats) -> "CameraModel":
+        """Return the same lens at another place: x, y, z [m], yaw, tilt x, tilt y [rad]."""
+        names = ("x_m", "y_m", "z_m", "yaw_rad", "tilt_x_rad", "tilt_y_rad")
+        placed = {name: float(value) for name, value in zip(names, extrinsics, strict=True)}
+        camera = Camera(**{f: getattr(self.camera, f) for f in Camera.__struct_fields__} | placed)
+        position = np.array(extrinsics[:3], dtype=np.float64)
+        return CameraModel(camera, self.matrix, self.distortion, position, _rotation(camera))
+
+    def project(self, points: Floats) -> Floats:
+        """Return the pixels of map points: (..., 3) [m] to (..., 2) [px], inside the frame or not.
+
+        Points must lie in front of the lens and near its field of view: far outside it the
+        distortion polynomial folds back.
+        """
+        seen = (points - self.position) @ self.camera_R_map.T
+        a, b = seen[..., 0] / seen[..., 2], seen[..., 1] / seen[..., 2]
+        k1, k2, p1, p2, k3 = self.distortion
+        r2 = a * a + b * b
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        x = a * radial + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a)
+        y = b * radial + 2.0 * p2 * a * b + p1 * (r2 + 2.0 * b * b)
+        camera = self.camera
+        return np.stack((camera.fx_px * x + camera.cx_px, camera.fy_px * y + camera.cy_px), axis=-1)
+
+    def undistort(self, pixels: Floats) -> Floats:
+        """Return where a perfect pinhole of focal length 1 would see them: (..., 2) to (..., 2)."""
+        flat = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
+        ideal = cv2.undistortPoints(
+            flat, self.matrix, self.distortion, None, None, None, _UNDISTORT_UNTIL
+        )
+        return np.asarray(ideal, dtype=np.float64).reshape(pixels.shape)
+
+    def on_plane(self, ideal: Floats, height: float) -> Floats:
+        """Return where undistorted points meet the plane z = height: (..., 2) to (..., 2) [m]."""
+        ahead = np.ones((*ideal.shape[:-1], 1))
+        rays: Floats = np.concatenate((ideal, ahead), axis=-1) @ self.camera_R_map
+        reach = (height - self.position[2]) / rays[..., 2:]
+        met: Floats = self.position[:2] + reach * rays[..., :2]
+        return met
+
+    def sees(self, pixel: Floats, margin: float = 0.0) -> bool:
+        """Return whether a pixel is in the frame, at least `margin` [px] from its edges."""
+        x, y = float(pixel[0]), float(pixel[1])
+        camera = self.camera
+        across = margin - 0.5 <= x <= camera.width_px - 0.5 - margin
+        return across and margin - 0.5 <= y <= camera.height_px - 0.5 - margin
+
+
+def camera_model(camera: Camera) -> CameraModel:
+    """Build the model of a map file's camera.
+
+    Raises:
+        EyeError: naming every key that cannot be a camera's, with what was expected.
+    """
+    faults = _faults(camera)
+    if faults:
+        raise EyeError(f"camera {camera.name!r}: " + "; ".join(faults))
+    matrix = np.array(
+        [[camera.fx_px, 0.0, camera.cx_px], [0.0, camera.fy_px, camera.cy_px], [0.0, 0.0, 1.0]]
+    )
+    position = np.array([camera.x_m, camera.y_m, camera.z_m])
+    model = CameraModel(camera, matrix, np.array(camera.distortion), position, _rotation(camera))
+    _refuse_folding(model)
+    return model
+
+
+def _rotation(camera: Camera) -> Floats:
+    c, s = math.cos(camera.yaw_rad), math.sin(camera.yaw_rad)
+    level = np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
+    cx, sx = math.cos(camera.tilt_x_rad), math.sin(camera.tilt_x_rad)
+    cy, sy = math.cos(camera.tilt_y_rad), math.sin(camera.tilt_y_rad)
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
+    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
+    turned: Floats = (about_x @ about_y).T @ level
+    return turned
+
+
+def _faults(camera: Camera) -> list[str]:
+    checks = {
+        "width_px": (camera.width_px, camera.width_px >= 16, "at least 16"),
+        "height_px": (camera.height_px, camera.height_px >= 16, "at least 16"),
+        "fx_px": (camera.fx_px, camera.fx_px > 0.0, "above 0"),
+        "fy_px": (camera.fy_px, camera.fy_px > 0.0, "above 0"),
+        "cx_px": (camera.cx_px, 0 <= camera.cx_px < camera.width_px, "inside the frame"),
+        "cy_px": (camera.cy_px, 0 <= camera.cy_px < camera.height_px, "inside the frame"),
+        "z_m": (camera.z_m, camera.z_m > 0.0, "above the floor"),
+        "rate_hz": (camera.rate_hz, camera.rate_hz > 0.0, "above 0"),
+        "noise_sigma": (camera.noise_sigma, camera.noise_sigma >= 0.0, "at least 0"),
+    }
+    for name in ("tilt_x_rad", "tilt_y_rad"):
+        tilt = getattr(camera, name)
+        checks[name] = (tilt, abs(tilt) < LARGEST_TILT_RAD, "a camera that looks down (below 0.78)")
+    return [
+        f"{k}: expected {want}, got {got}" for k, (got, good, want) in checks.items() if not good
+    ]
+
+
+def _refuse_folding(model: CameraModel) -> None:
+    camera = model.camera
+    far_x = max(camera.cx_px, camera.width_px - camera.cx_px) / camera.fx_px
+    far_y = max(camera.cy_px, camera.height_px - camera.cy_px) / camera.fy_px
+    corner = math.hypot(far_x, far_y)
+    k1, k2, _, _, k3 = model.distortion
+    r = np.linspace(0.0, 1.5 * corner, 200)
+    image = r * (1.0 + r**2 * (k1 + r**2 * (k2 + r**2 * k3)))
+    shrinks = np.diff(image) <= 0.0
+    still = int(np.argmax(shrinks)) if shrinks.any() else len(r) - 1
+    if image[still] < corner:
+        raise EyeError(
+            f"camera {camera.name!r}: distortion: expected a picture that grows outwards up to its "
+            f"corner at {corner:.3f} focal lengths, got one that ends at {image[still]:.3f}"
+        )

@@ -1,0 +1,65 @@
+"""The emulated overhead camera: renders what a real one would see of a snapshot of the world.
+
+Cars have height, so they shift outwards as in a real picture; tags go through the true lens; edges
+are averaged over each pixel's area; the sensor adds Gaussian noise. The noise is cut at a random
+place from a sheet that is drawn once: fresh noise would cost more than the whole picture.
+"""
+
+import math
+
+import cv2
+import numpy as np
+
+from scm.arrays import Image
+from scm.eye.camera import CameraModel
+from scm.eye.render.car import draw_car
+from scm.eye.render.floor import draw_scenery
+from scm.eye.source import Frame
+from scm.maps.model import CityMap
+from scm.v2x.messages.world_snapshot import WorldSnapshot
+
+NOISE_SHEETS = 2
+
+
+class SyntheticSource:
+    """Frames of the world as `model` sees it; the model is the true camera, not a guess of it."""
+
+    def __init__(self, city_map: CityMap, model: CameraModel, rng: np.random.Generator) -> None:
+        self._model = model
+        self._rng = rng
+        self._scenery = draw_scenery(city_map, model, rng)
+        self._frame: Image = self._scenery.picture.copy()
+        self._brighter, self._darker = self._noise()
+        self._taken_ns: int | None = None
+
+    def take(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
+        """Return the picture at the snapshot's time, None if it was taken already."""
+        del now_ns
+        if light is None or light.t_ns == self._taken_ns:
+            return None
+        self._taken_ns = light.t_ns
+        return Frame(light.t_ns, self.render(light))
+
+    def render(self, light: WorldSnapshot) -> Image:
+        """Return the picture of a snapshot, (height, width, 3); it is valid until the next one."""
+        np.copyto(self._frame, self._scenery.picture)
+        x, y, _ = self._model.position
+        for car in sorted(light.vehicles, key=lambda car: -math.hypot(car.x_m - x, car.y_m - y)):
+            draw_car(self._frame, self._model, self._scenery, car)
+        self._add_noise()
+        return self._frame
+
+    def _noise(self) -> tuple[Image, Image]:
+        camera = self._model.camera
+        count = NOISE_SHEETS * camera.width_px * camera.height_px
+        noise = self._rng.standard_normal(count, dtype=np.float32) * np.float32(camera.noise_sigma)
+        grey = np.rint(noise)
+        both = [np.repeat(np.clip(part, 0, 255).astype(np.uint8), 3) for part in (grey, -grey)]
+        return both[0], both[1]
+
+    def _add_noise(self) -> None:
+        size = self._frame.size
+        start = 3 * int(self._rng.integers(0, (len(self._brighter) - size) // 3 + 1))
+        shape = self._frame.shape
+        cv2.add(self._frame, self._brighter[start : start + size].reshape(shape), self._frame)
+        cv2.subtract(self._frame, self._darker[start : start + size].reshape(shape), self._frame)
