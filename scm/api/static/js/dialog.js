@@ -1,4 +1,4 @@
-/** A modal question over the page: Escape and a click beside it mean no. */
+/** A modal question over the page: Escape and a click beside it mean no. What has `data-first` gets the focus. */
 import { useEffect, useRef } from "preact/hooks";
 import { html } from "./html.js";
 
@@ -6,6 +6,7 @@ export function Dialog({ title, onClose, children }) {
   const dialog = useRef(null);
   useEffect(() => {
     dialog.current.showModal();
+    dialog.current.querySelector("[data-first]")?.focus();
   }, []);
   const onClick = (event) => {
     if (event.target === dialog.current) onClose();

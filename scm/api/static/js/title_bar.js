@@ -65,6 +65,7 @@ function StopDialog({ engaged }) {
       reply.engaged ? "All cars are told to stop." : "The stop is released.",
     );
   };
+  // Enter must stop the city: the button has the focus, not the reason.
   const verb = engaged ? "Let all cars drive again" : "Stop all cars";
   return html`
     <${Dialog} title=${engaged ? "Release the city stop?" : "Stop the whole city?"} onClose=${close}>
@@ -77,16 +78,11 @@ function StopDialog({ engaged }) {
         <input name="reason" maxlength="200" placeholder="Reason (optional)" aria-label="Reason" />
         <div class="actions">
           <button type="button" onClick=${close}>Cancel</button>
-          <button class=${engaged ? "primary" : "danger"} ref=${focus}>${verb}</button>
+          <button class=${engaged ? "primary" : "danger"} data-first>${verb}</button>
         </div>
       </form>
     <//>
   `;
-}
-
-/** Enter must stop the city: the button has the focus, not the reason. */
-function focus(button) {
-  if (button) setTimeout(() => button.focus());
 }
 
 export function Banners() {
