@@ -13,7 +13,7 @@ from scm.maps.model import CityMap, Floor, MapTag, Point, Spawn, Wall
 
 Corner = tuple[int, int]
 
-# Steps of a wall that runs aslant vanish; the corners of a single cell, half its diagonal away, stay.
+# Steps of an aslant wall vanish; the corners of a single cell, half its diagonal away, stay.
 STRAIGHTEN_CELLS = 0.7
 TAG_SIZE_M = 0.0762
 START_CLEARANCE_M = 0.25

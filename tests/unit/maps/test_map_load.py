@@ -1,0 +1,105 @@
+import pytest
+
+from scm.errors import MapError
+from scm.maps.load import MAPS_DIR, load_map, map_names
+
+GOOD = (MAPS_DIR / "driving_school.toml").read_text(encoding="utf-8")
+
+
+def refused(tmp_path, *changes):
+    """Return the message about the driving school after some changes of its text."""
+    text = GOOD
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    path = tmp_path / "bad.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(MapError) as caught:
+        load_map(path)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    return message
+
+
+def test_the_maps_that_come_along_are_listed():
+    assert {"driving_school", "parking_school"} <= set(map_names())
+
+
+def test_an_unknown_map_is_refused_with_the_nearest_name():
+    with pytest.raises(MapError, match="did you mean 'driving_school'"):
+        load_map("drivingschool")
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(MapError, match="no such map file"):
+        load_map(tmp_path / "none.toml")
+
+
+def test_a_map_is_loaded_by_path():
+    assert load_map(MAPS_DIR / "driving_school.toml") == load_map("driving_school")
+
+
+def test_broken_toml_is_refused_with_its_line(tmp_path):
+    path = tmp_path / "broken.toml"
+    path.write_text("map = 1\nname = \n", encoding="utf-8")
+    with pytest.raises(MapError, match=r"broken.toml.*line 2"):
+        load_map(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "words"),
+    [
+        (
+            'name = "east_loop"\nwidth_m = 0.257',
+            'name = "east_loop"\nwidth_m = "wide"',
+            "lanes[1].width_m (east_loop)",
+            "expected a number, got text in quotes",
+        ),
+        ("z_m = 2.8\n", "", "cameras[0] (overhead)", "key z_m is missing"),
+        ("z_m = 2.8", "z_m = 2.8\nzoom = 2", "cameras[0] (overhead)", "key zoom is not known here"),
+        ("map = 1\n", "map = 2\n", "map", "value 2 is not allowed"),
+        ("y_m = [-0.095, 1.405]", "y_m = [1.4]", "floor.y_m", "expected 2 values, got 1"),
+    ],
+)
+def test_a_wrong_key_or_type_is_refused_in_plain_words(tmp_path, old, new, key, words):
+    message = refused(tmp_path, (old, new))
+    assert f": {key}: {words}" in message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('next = ["east_loop"]', 'next = ["east_lop"]', "did you mean 'east_loop'?"),
+        ('next = ["east_loop"]', 'next = ["west_loop"]', "'west_loop' does not connect"),
+        (
+            "start = [1.747806, 0.291194",
+            "start = [1.749806, 0.291194",
+            "(crossing_south_east).next: 'east_loop' does not connect",
+        ),
+        ("at_m = 0.3987", "at_m = 1.5", "(south_east).at_m: expected 0 to 1.3882"),
+        ("light_id = 2", "light_id = 1", "lights[1].light_id: 1 is already that of lights[0]"),
+        ('name = "b"', 'name = "a"', "spawns[1].name: 'a' is already that of spawns[0]"),
+        ("first_vehicle_tag_id = 1", "first_vehicle_tag_id = 0", "more than tag.tag_id = 0, got 0"),
+        ('kind = "left_curve"', 'kind = "left_curv"', "did you mean 'left_curve'?"),
+        ("width_m = 0.257", "width_m = -0.257", "lanes[0].width_m: expected more than 0"),
+        ("z_m = 2.8", "z_m = inf", "cameras[0].z_m: expected a finite number, got inf"),
+        ("{length_m = 1.029}", "{length_m = 1.0, radius_m = 2.0}", "got length_m and radius_m"),
+        ("from_m = 0.41", "from_m = 1.2", "movement.to_m: expected more than from_m = 1.2"),
+        ("x_m = [-0.116, 2.884]", "x_m = [2.884, -0.116]", "floor.x_m: expected [low, high]"),
+        ('group = "south_east"', 'group = "south"', "no group of crossing 'south'"),
+        ("at_m = 0.54\n", "pose = [0.0, 0.0, 0.0]\n", "expected lane and at_m, or pose alone"),
+    ],
+)
+def test_a_wrong_meaning_is_refused_with_its_key(tmp_path, old, new, words):
+    assert words in refused(tmp_path, (old, new))
+
+
+def test_all_problems_are_told_at_once(tmp_path):
+    message = refused(
+        tmp_path,
+        ('next = ["east_loop"]', 'next = ["nowhere"]'),
+        ("light_id = 2", "light_id = 1"),
+        ("radius_m = 0.5145", "radius_m = 0.0"),
+    )
+    assert "3 problem(s)" in message
+    assert message.count("\n") == 3
