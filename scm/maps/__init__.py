@@ -1,7 +1,7 @@
 """A city is one file: `maps/<name>.toml` holds lanes, lights, signs, walls, tags and cameras.
 
-`model.py` is the map as data, `load.py` reads and doubts a file, `route.py` finds ways along lanes,
-`occupancy.py` turns scanned grids into walls, `draw.py` makes the picture. May import errors and
-geometry.
-To add a map: write one file in `maps/`.
+`model.py` is the map as data; `load.py` reads a file and `check.py` doubts it; `polyline.py` and
+`route.py` are ways along lanes, `conflicts.py` what may not be green together; `grid.py` and
+`occupancy.py` turn a scan into walls, `segments.py` walls into edges; `draw.py` makes the picture.
+May import errors, arrays and geometry. To add a map: write one file in `maps/`.
 """
