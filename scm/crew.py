@@ -1,0 +1,191 @@
+"""Processes that should be there: started, watched by their presence on the bus, restarted.
+
+A member is up when its presence appears. What dies is started again, later each time, until it has
+died too often; what ends by itself without complaint (exit code 0) or says that its input is bad
+(exit code 2) is left alone. Nothing here prints: what a person should know goes through `say`.
+"""
+
+import os
+import signal
+import subprocess
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from scm.clock import NS_PER_MS, NS_PER_S, Clock, seconds
+from scm.parent_watch import with_parent
+from scm.v2x.messages.presence import Presence
+
+RESTARTS_A_MINUTE = 5
+FIRST_PAUSE_NS = 250 * NS_PER_MS
+STOP_NS = 1500 * NS_PER_MS
+LAST_STOP_NS = 1000 * NS_PER_MS
+SLOW_NS = 4 * NS_PER_S
+BAD_INPUT = 2
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A process to keep alive.
+
+    Attributes:
+        name: Its station on the bus; `role` its role there.
+        what: What it does, in a few words for a person.
+        command: Returns program and arguments, anew for each start.
+        after: Start only when the member of this name is up; empty: at once.
+        last: Stop it after all others, so that it sees them go.
+    """
+
+    name: str
+    role: str
+    what: str
+    command: Callable[[], Sequence[str]]
+    after: str = ""
+    last: bool = False
+
+
+@dataclass
+class Member:
+    """A job and the process that does it now."""
+
+    job: Job
+    process: subprocess.Popen[bytes] | None = None
+    sessions: set[str] = field(default_factory=set)
+    started_ns: int = 0
+    due_ns: int | None = 0
+    died_ns: deque[int] = field(default_factory=lambda: deque(maxlen=RESTARTS_A_MINUTE + 1))
+    was_up: bool = False
+    told_slow: bool = False
+
+    @property
+    def is_up(self) -> bool:
+        """Whether its process runs and is present on the bus."""
+        return self.process is not None and bool(self.sessions)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it is neither running nor going to be."""
+        return self.process is None and self.due_ns is None
+
+
+class Crew:
+    """All processes of a city. Use it from one thread that lives as long as the process."""
+
+    def __init__(self, jobs: Sequence[Job], clock: Clock, say: Say) -> None:
+        self.members = {job.name: Member(job) for job in jobs}
+        self._clock = clock
+        self._say = say
+
+    @property
+    def settled(self) -> bool:
+        """Whether everybody is up, or given up."""
+        return all(m.is_up or m.is_done for m in self.members.values())
+
+    def heard(self, presence: Presence) -> None:
+        """Note that a station came or went."""
+        member = self.members.get(presence.station)
+        if member is None or member.job.role != presence.role:
+            return
+        before = member.is_up
+        if presence.alive:
+            member.sessions.add(presence.session)
+        else:
+            member.sessions.discard(presence.session)
+        if member.process is not None and member.is_up != before:
+            self._tell_presence(member)
+
+    def _tell_presence(self, member: Member) -> None:
+        job, process = member.job, member.process
+        if process is None or process.poll() is not None:
+            return
+        if not member.is_up:
+            self._say(f"  {job.name:<9} is silent: no sign of life on the bus, pid {process.pid}")
+        elif member.was_up:
+            self._say(f"  {job.name:<9} is back, pid {process.pid}")
+        else:
+            member.was_up = True
+            self._say(f"  {job.name:<9} {job.what:<52} pid {process.pid}")
+
+    def look(self) -> None:
+        """Start what is due, and see who died."""
+        now_ns = self._clock.now_ns()
+        for member in self.members.values():
+            if member.process is not None:
+                code = member.process.poll()
+                if code is not None:
+                    self._ended(member, code, now_ns)
+                elif not member.was_up and now_ns > member.started_ns + SLOW_NS:
+                    self._tell_slow(member)
+            elif member.due_ns is not None and now_ns >= member.due_ns and self._may_start(member):
+                self._start(member, now_ns)
+
+    def _may_start(self, member: Member) -> bool:
+        before = self.members.get(member.job.after)
+        return before is None or before.is_up
+
+    def _start(self, member: Member, now_ns: int) -> None:
+        member.process = subprocess.Popen(
+            with_parent(member.job.command()),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        member.started_ns = now_ns
+        member.due_ns = None
+
+    def _tell_slow(self, member: Member) -> None:
+        if not member.told_slow:
+            member.told_slow = True
+            self._say(f"  {member.job.name:<9} is still starting (the first time it compiles)")
+
+    def _ended(self, member: Member, code: int, now_ns: int) -> None:
+        name = member.job.name
+        member.process = None
+        member.sessions.clear()
+        if code == 0:
+            self._say(f"  {name:<9} left")
+            return
+        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+        member.died_ns.append(now_ns)
+        recent = sum(now_ns - t < 60 * NS_PER_S for t in member.died_ns)
+        if code == BAD_INPUT or recent > RESTARTS_A_MINUTE:
+            why = "its input is bad" if code == BAD_INPUT else f"{recent} times within a minute"
+            self._say(f"  {name:<9} died {how}: {why}; it is not started again")
+            return
+        pause_ns = FIRST_PAUSE_NS * 2 ** (recent - 1)
+        member.due_ns = now_ns + pause_ns
+        self._say(f"  {name:<9} died {how}: starts again in {seconds(pause_ns):g} s")
+
+    def stop(self) -> None:
+        """Ask everybody to stop, the last ones last, and end what is left after 1.5 s."""
+        began_ns = self._clock.now_ns()
+        for member in self.members.values():
+            member.due_ns = None
+        for last, until_ns in ((False, began_ns + LAST_STOP_NS), (True, began_ns + STOP_NS)):
+            wave = [m.process for m in self.members.values() if m.process and m.job.last == last]
+            for process in wave:
+                _send(process, signal.SIGTERM)
+            self._wait_for(wave, until_ns)
+        for member in self.members.values():
+            if member.process is not None and member.process.poll() is None:
+                self._say(f"  {member.job.name:<9} did not stop: killed")
+            if member.process is not None:
+                _send(member.process, signal.SIGKILL)
+                member.process.wait()
+                member.process = None
+
+    def _wait_for(self, processes: Sequence[subprocess.Popen[bytes]], until_ns: int) -> None:
+        never = threading.Event()
+        while any(p.poll() is None for p in processes) and self._clock.now_ns() < until_ns:
+            self._clock.wait_until(self._clock.now_ns() + 10 * NS_PER_MS, never)
+
+
+def _send(process: subprocess.Popen[bytes], number: signal.Signals) -> None:
+    """Send a signal to a process and everything it started itself."""
+    try:
+        os.killpg(process.pid, number)
+    except ProcessLookupError:
+        return

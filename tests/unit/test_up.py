@@ -1,0 +1,40 @@
+"""`scm up` refuses what cannot work before it starts anything."""
+
+import socket
+
+import pytest
+
+from scm.errors import MapError, RunError
+from scm.up import run_city
+from scm.v2x.router import Router, free_endpoint
+
+
+@pytest.fixture
+def start(tmp_path):
+    said = []
+
+    def start(map_name="driving_school", **facts):
+        facts = {"port": 0, "listen": "tcp/127.0.0.1:0", **facts}
+        try:
+            run_city(map_name, record_dir=tmp_path / "runs", say=said.append, **facts)
+        finally:
+            assert said == []
+
+    return start
+
+
+def test_an_unknown_map_is_refused_with_the_nearest_name(start):
+    with pytest.raises(MapError, match="driving_school"):
+        start("driving_shool")
+
+
+def test_a_taken_dashboard_port_is_refused_with_its_number(start):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(RunError, match=f"dashboard port {port}: .*expected a free one"):
+            start(port=port)
+
+
+def test_a_taken_endpoint_is_refused(start):
+    with Router(free_endpoint()) as other, pytest.raises(RunError, match="another city"):
+        start(listen=other.listen)
