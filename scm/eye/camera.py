@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass
 
 import cv2
+import msgspec
 import numpy as np
 
 from scm.arrays import Floats
@@ -59,7 +60,7 @@ class CameraModel:
         """Return the same lens at another place: x, y, z [m], yaw, tilt x, tilt y [rad]."""
         names = ("x_m", "y_m", "z_m", "yaw_rad", "tilt_x_rad", "tilt_y_rad")
         placed = {name: float(value) for name, value in zip(names, extrinsics, strict=True)}
-        camera = Camera(**{f: getattr(self.camera, f) for f in Camera.__struct_fields__} | placed)
+        camera = msgspec.structs.replace(self.camera, **placed)
         position = np.array(extrinsics[:3], dtype=np.float64)
         return CameraModel(camera, self.matrix, self.distortion, position, _rotation(camera))
 

@@ -23,6 +23,8 @@ TABLE: Colour = (44, 58, 74)
 ASPHALT: Colour = (62, 58, 56)
 PAINT: Colour = (222, 226, 228)
 EDGE_LINE_M = 0.009
+LOW_M = 0.1
+"""What is lower than this hides no roof."""
 INK, PAPER = 26, 236
 """Grey of a print's black and white."""
 
@@ -65,7 +67,8 @@ def draw_scenery(city_map: CityMap, model: CameraModel, rng: np.random.Generator
     lit = np.clip(picture * light[..., None], 0.0, 255.0).astype(np.uint8)
     draw_map_tag(lit, model, city_map.tag)
     far_first = sorted(_standing(city_map), key=lambda one: -_distance(one, model))
-    return Scenery(lit, light, tuple(_draw_obstacle(lit, model, solid) for solid in far_first))
+    drawn = [(_draw_obstacle(lit, model, solid), solid.top[0, 2]) for solid in far_first]
+    return Scenery(lit, light, tuple(one for one, height in drawn if height > LOW_M))
 
 
 def draw_map_tag(frame: Image, model: CameraModel, tag: MapTag) -> None:
