@@ -1,14 +1,11 @@
 """The contract of a command of the command line, and what all commands that run a part share."""
 
 import argparse
-import signal
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from scm.part import Part
-
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+from scm.v2x.router import DEFAULT_ENDPOINT
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,21 +37,13 @@ def part_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="of all randomness (%(default)s)")
 
 
-def stop_on_signals() -> threading.Event:
-    """Return an event that Ctrl-C and SIGTERM set."""
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
-    return stop
-
-
 def run_part(part: Part, arguments: argparse.Namespace) -> int:
     """Run one part on the real bus and clock until Ctrl-C or SIGTERM."""
     from scm.clock import WallClock
-    from scm.live import run
+    from scm.live import run, stop_on_signal
     from scm.v2x.bus_zenoh import ZenohBus
 
-    stop = stop_on_signals()
+    stop = stop_on_signal()
     with ZenohBus(arguments.city, part.name, arguments.connect) as bus:
         run(part, bus, WallClock(), stop)
     return 0

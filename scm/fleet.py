@@ -17,7 +17,7 @@ from scm.clock import WallClock, seconds
 from scm.errors import RunError, ScmError
 from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.part import Hears, Part
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.ask import ask
@@ -269,5 +269,5 @@ def open_city(
 
 def _lockstep_city(map_name: str, city: str, seed: int) -> Lockstep:
     city_map = load_map(map_name)
-    parts = [WorldPart(city_map, seed), TrafficPart(city_map), MonitorPart(city_map)]
+    parts: list[Part] = [WorldPart(city_map, seed), TrafficPart(city_map), MonitorPart(city_map)]
     return Lockstep(parts, city)

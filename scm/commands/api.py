@@ -3,7 +3,7 @@
 import argparse
 import threading
 
-from scm.command import Command, part_arguments, stop_on_signals
+from scm.command import Command, part_arguments
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,24 +14,27 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from scm.api.app import check_bind, create_app
+    from scm.api.app import create_app
+    from scm.api.gate import check_bind
     from scm.api.server import serve
     from scm.api.view import CityView
     from scm.clock import WallClock
-    from scm.live import run
+    from scm.live import run, stop_on_signal
     from scm.maps.load import load_map
+    from scm.registry import names
     from scm.v2x.ask import ask
     from scm.v2x.bus_zenoh import ZenohBus
 
     check_bind(arguments.host, arguments.api_key)
-    stop = stop_on_signals()
-    view = CityView()
+    stop = stop_on_signal()
+    view, city_map = CityView(), load_map(arguments.map)
     with ZenohBus(arguments.city, view.name, arguments.connect) as bus:
         app = create_app(
             view,
             lambda request, timeout_s: ask(bus, request, timeout_s),
-            load_map(arguments.map),
+            city_map,
             api_key=arguments.api_key,
+            plans={junction.name: names("scm.traffic.plans") for junction in city_map.junctions},
         )
         hearing = threading.Thread(target=run, args=(view, bus, WallClock(), stop), name="view")
         hearing.start()
