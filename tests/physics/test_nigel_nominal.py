@@ -72,7 +72,7 @@ def test_zero_throttle_stops_the_car_and_never_reverses_it(nigel):
         path.append(float(fleet.x[0]))
         slowest_wheel = min(slowest_wheel, float(fleet.wheel_speed[0, 2:].min()))
     assert slowest_wheel == 0.0
-    assert max(path) - path[-1] < 1e-5  # the springs unload through the tyres' creep: microns
+    assert max(path) - path[-1] < 2e-5  # the springs unload through the tyres' creep: microns
     assert abs(fleet.speed[0]) < 1e-4
     assert path[-1] < 0.02
 

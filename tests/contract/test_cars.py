@@ -1,0 +1,68 @@
+"""Every car shipped keeps its contract: it loads, its numbers are the shared ones, it can drive."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scm.geometry import Pose2
+from scm.vehicles.assemble import write_page
+from scm.vehicles.car import STANDARD_TERMS, TYPES_DIR, car_names, load_car
+from scm.vehicles.describe import describe_car
+from scm.vehicles.fleet import Fleet
+
+SHARED = Path(__file__).parents[3] / "shared" / "cars"
+
+
+@pytest.mark.parametrize("name", car_names())
+def test_a_car_is_named_like_its_file(name):
+    assert load_car(name).name == name
+
+
+@pytest.mark.parametrize("name", ["nigel", "f1tenth"])
+def test_the_numbers_are_the_shared_ones(name):
+    shared = SHARED / f"{name}.toml"
+    if not shared.is_file():
+        pytest.skip(f"{shared} is not here: the shared car files are not part of this repository")
+    theirs = tomllib.loads(shared.read_text(encoding="utf-8"))
+    ours = tomllib.loads((TYPES_DIR / f"{name}.toml").read_text(encoding="utf-8"))
+    assert tuple(ours.pop("terms")) == STANDARD_TERMS
+    assert ours == theirs
+
+
+@pytest.mark.parametrize("name", car_names())
+def test_every_number_of_a_car_has_a_source(name):
+    for key, quantity in load_car(name).values.items():
+        assert quantity.source, key
+
+
+@pytest.mark.parametrize("name", car_names())
+def test_a_car_drives_forward_turns_left_and_stays_on_its_wheels(name):
+    fleet = Fleet(load_car(name), 1)
+    fleet.add(Pose2(0.0, 0.0, 0.0))
+    fleet.throttle[0], fleet.steering[0] = 0.5, 0.5
+    fleet.advance(1.0)
+    assert fleet.x[0] > 0.1
+    assert fleet.yaw[0] > 0.05
+    assert fleet.status[0] == 0
+    assert np.all(fleet.wheel_load > 0.0)
+
+
+@pytest.mark.parametrize("name", car_names())
+def test_the_text_of_a_car_names_every_effect_and_parameter(name):
+    car = load_car(name)
+    text = describe_car(car)
+    for term in car.terms:
+        assert f"\n{term.name}  " in text
+        for param in term.params:
+            assert param.name in text
+
+
+@pytest.mark.parametrize("name", car_names())
+def test_the_kernel_page_calls_every_law_once(name):
+    car = load_car(name)
+    page = write_page(car.name, car.terms)
+    compile(page, name, "exec")
+    for term in car.terms:
+        assert page.count(f" {term.name}(") == 1, term.name

@@ -1,0 +1,150 @@
+"""Every physical effect keeps its contract: wiring, documents, finite, passive, neutral."""
+
+import inspect
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scm.vehicles import body14
+from scm.vehicles.car import all_terms
+from scm.vehicles.jit import plain
+from scm.vehicles.layout import columns_of
+from scm.vehicles.signals import SIGNALS
+from scm.vehicles.term import reads
+
+TERMS = all_terms()
+RATES = {"vx", "vy", "yaw_rate", "omega", "v_long", "v_lat", "compression_rate", "wheel_radius"}
+DRAWS = settings(max_examples=100, deadline=None, derandomize=True)
+
+# Power that a term's value gives the car, by what it adds to; never positive of a passive one.
+POWER = {
+    "force_x": lambda value, s: value * s["vx"],
+    "force_y": lambda value, s: value * s["vy"],
+    "moment_z": lambda value, s: value * s["yaw_rate"],
+    "wheel_torque": lambda value, s: value * s["omega"],
+    "tyre_x": lambda value, s: value * (s["v_long"] - s["wheel_radius"] * s["omega"]),
+    "tyre_y": lambda value, s: value * s["v_lat"],
+    "suspension_force": lambda value, s: -value * s["compression_rate"],
+    "dry_torque": lambda value, s: -value,
+    "extra_inertia": lambda value, s: -value,
+}
+
+
+def between(low, high):
+    return st.floats(low, high, allow_nan=False, allow_subnormal=False)
+
+
+@st.composite
+def situations(draw, term):
+    """Draw every signal in its physical span and every parameter inside its bounds."""
+    needed = {n for law in (term.law, term.damping) if law for n in reads(law)} | RATES
+    if term.sets:
+        needed.add(SIGNALS[term.target].otherwise or term.target)
+    spans = {name: signal.span for name, signal in SIGNALS.items()}
+    spans |= {param.name: param.bounds for param in (*body14.PARAMS, *term.params)}
+    return {name: draw(between(*spans[name])) for name in sorted(needed)}
+
+
+def call(law, values):
+    return plain(law)(**{name: values[name] for name in reads(law)})
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_the_law_is_named_like_its_file(name):
+    assert TERMS[name].name == name
+    assert TERMS[name].module == f"scm.vehicles.terms.{name}"
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_the_file_states_equation_range_manoeuvre_and_source(name):
+    term = TERMS[name]
+    assert term.about.endswith(".")
+    assert "=" in term.equation
+    assert term.target in term.equation or "tan(" in term.equation
+    for heading in ("Holds", "Shows in", "Source"):
+        assert len(term.doc_line(heading)) > 5, heading
+    assert term.shows_in
+    file = Path(inspect.getfile(plain(term.law)))
+    assert len(file.read_text(encoding="utf-8").splitlines()) <= 60
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_parameters_have_unit_meaning_and_a_default_inside_their_bounds(name):
+    for param in TERMS[name].params:
+        low, high = param.bounds
+        assert low <= param.default <= high
+        assert param.unit
+        assert len(param.about) >= 5
+        section, _, key = param.key.partition(".")
+        assert section.isidentifier()
+        assert key.isidentifier()
+
+
+def test_a_key_means_the_same_in_every_term():
+    seen = {}
+    for term in TERMS.values():
+        for param in term.params:
+            first = seen.setdefault(param.key, param)
+            assert (param.name, param.unit, param.bounds) == (first.name, first.unit, first.bounds)
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_every_parameter_is_read_by_its_law(name):
+    term = TERMS[name]
+    names = {n for law in (term.law, term.damping) if law for n in reads(law)}
+    assert {param.name for param in term.params} <= names
+
+
+@pytest.mark.parametrize("name", TERMS)
+@DRAWS
+@given(data=st.data())
+def test_laws_are_finite_and_never_negatively_damped(name, data):
+    term = TERMS[name]
+    values = data.draw(situations(term))
+    assert math.isfinite(call(term.law, values))
+    if term.damping is not None:
+        damping = call(term.damping, values)
+        assert math.isfinite(damping)
+        assert damping >= 0.0
+
+
+@pytest.mark.parametrize("name", [name for name, term in TERMS.items() if term.passive])
+@DRAWS
+@given(data=st.data())
+def test_passive_terms_never_give_energy(name, data):
+    term = TERMS[name]
+    values = data.draw(situations(term))
+    assert POWER[term.target](call(term.law, values), values) <= 1e-12
+
+
+@pytest.mark.parametrize("name", [name for name, term in TERMS.items() if term.neutral])
+@DRAWS
+@given(data=st.data())
+def test_a_neutral_term_does_nothing(name, data):
+    term = TERMS[name]
+    values = data.draw(situations(term)) | dict(term.neutral)
+    value = call(term.law, values)
+    if term.adds:
+        assert value == 0.0
+        assert term.damping is None or call(term.damping, values) == 0.0
+    else:
+        assert value == values[SIGNALS[term.target].otherwise]
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_neutral_values_lie_inside_the_bounds(name):
+    term = TERMS[name]
+    bounds = {param.name: param.bounds for param in term.params}
+    for param, value in term.neutral.items():
+        low, high = bounds[param]
+        assert low <= value <= high
+
+
+def test_all_terms_together_have_one_column_for_each_key():
+    columns = columns_of(list(TERMS.values()))
+    assert len({column.name for column in columns}) == len(columns)
+    assert len({column.variable for column in columns}) == len(columns)
+    assert not {column.variable for column in columns} & set(SIGNALS)

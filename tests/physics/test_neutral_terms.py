@@ -1,0 +1,50 @@
+"""Effects at their neutral values leave the trajectory as it was, bit for bit."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from scm.geometry import Pose2
+from scm.vehicles.car import Quantity, all_terms, load_car
+from scm.vehicles.fleet import Fleet
+
+FEW = (
+    "suspension_spring", "tyre_contact", "tyre_longitudinal", "tyre_lateral", "motor_dc",
+    "steer_limit", "ackermann",
+)  # fmt: skip
+
+
+def car_with(names, neutral):
+    """Nigel with these effects, those of `neutral` at their neutral values."""
+    terms = tuple(all_terms()[name] for name in names)
+    nigel = load_car("nigel")
+    values = dict(nigel.values)
+    for term in terms:
+        for param in term.params:
+            number = param.default
+            if term.name in neutral:
+                number = term.neutral.get(param.name, number)
+            if param.key not in values or term.name in neutral:
+                values[param.key] = Quantity(number, None, param.unit, "test")
+    return replace(nigel, name="few", terms=terms, values=values)
+
+
+def drive(car):
+    fleet = Fleet(car, 3)
+    for row in range(3):
+        fleet.add(Pose2(0.0, float(row), 0.4 * row), speed=0.1 * row)
+        fleet.throttle[row], fleet.steering[row] = 0.9 - 0.4 * row, 0.5 - 0.7 * row
+    fleet.advance(1.0)
+    fleet.steering[:] *= -1.0
+    fleet.throttle[1] = 0.0
+    fleet.advance(1.0)
+    return fleet
+
+
+def test_every_neutral_effect_at_once_leaves_the_trajectory_bit_for_bit():
+    neutral = [name for name, term in all_terms().items() if term.neutral and name not in FEW]
+    assert len(neutral) >= 12
+    few, many = drive(car_with(FEW, [])), drive(car_with([*FEW, *neutral], neutral))
+    for name in ("x", "y", "z", "roll", "pitch", "yaw", "speed", "wheel_speed", "wheel_load"):
+        assert np.array_equal(getattr(few, name), getattr(many, name)), name
+    assert few.x[0] > 0.1

@@ -1,0 +1,146 @@
+import os
+import subprocess
+import sys
+
+import pytest
+
+from scm.errors import TermError
+from scm.vehicles.assemble import setters_of, write_page
+from scm.vehicles.car import STANDARD_TERMS, all_terms
+from scm.vehicles.kernel_file import compile_kernel
+from scm.vehicles.param import Param
+from scm.vehicles.signals import Per
+from scm.vehicles.term import Term
+
+STANDARD = [all_terms()[name] for name in STANDARD_TERMS]
+
+
+def of(law, **facts):
+    return Term(law, per=facts.pop("per", Per.BODY), **facts)
+
+
+def test_an_unknown_name_is_refused_with_the_nearest_one():
+    def wind(yaw_rat: float) -> float:
+        return yaw_rat
+
+    with pytest.raises(TermError, match=r"wind reads 'yaw_rat', .* mean 'yaw_rate'"):
+        setters_of([*STANDARD, of(wind, adds="force_y")])
+
+
+def test_two_setters_of_a_signal_are_refused_by_name():
+    def other_servo(steer_target: float) -> float:
+        return steer_target
+
+    with pytest.raises(TermError, match="servo and other_servo both set steer_angle"):
+        setters_of([*STANDARD, of(other_servo, sets="steer_angle")])
+
+
+def test_a_signal_that_nobody_sets_is_refused():
+    with pytest.raises(TermError, match="no term sets load"):
+        setters_of([term for term in STANDARD if term.name != "tyre_contact"])
+
+
+def test_an_effect_of_the_body_cannot_read_a_wheel():
+    def lean(load: float) -> float:
+        return load
+
+    with pytest.raises(TermError, match="lean is once a body and cannot read load"):
+        setters_of([*STANDARD, of(lean, adds="force_y")])
+
+
+def test_a_sum_that_does_not_exist_is_refused_with_what_there_is():
+    def lift(vx: float) -> float:
+        return vx
+
+    with pytest.raises(TermError, match=r"lift: 'force_up' .* one of force_x, force_y, moment_z"):
+        setters_of([*STANDARD, of(lift, adds="force_up")])
+
+
+def test_damping_is_refused_where_the_skeleton_is_not_implicit():
+    def air(vx: float) -> float:
+        return vx
+
+    def air_damping(vx: float) -> float:
+        return vx
+
+    with pytest.raises(TermError, match="air: nothing damps force_x"):
+        setters_of([*STANDARD, of(air, adds="force_x", damping=air_damping)])
+
+
+def test_effects_that_wait_for_each_other_are_named():
+    def compliance(steer_angle: float) -> float:
+        return steer_angle
+
+    with pytest.raises(TermError, match=r"wait for each other: .*steer_target.*"):
+        write_page("loop", [*STANDARD, of(compliance, sets="steer_target")])
+
+
+def test_an_unset_signal_passes_on_the_one_before():
+    page = write_page("nigel", STANDARD)
+    assert "throttle = throttle_received" in page
+    assert page.index("throttle = throttle_received") < page.index("motor_dc(")
+
+
+def test_a_term_left_out_leaves_no_trace():
+    page = write_page("nigel", [term for term in STANDARD if term.name != "yaw_drag"])
+    assert "yaw_drag" not in page
+
+
+def test_the_order_of_the_list_does_not_change_the_order_of_sums():
+    def calls(terms):
+        lines = write_page("nigel", terms).splitlines()
+        return [line.split("(")[0] for line in lines if "+=" in line and "_damping" not in line]
+
+    assert calls(STANDARD) == calls(STANDARD[::-1])
+
+
+def test_terms_that_share_a_bare_parameter_name_keep_their_own_numbers():
+    page = write_page("nigel", STANDARD)
+    assert "tyre_lateral_slip_extremum = parameters" in page
+    assert "tyre_longitudinal_slip_extremum = parameters" in page
+    assert page.count(" low_speed = parameters") == 1
+
+
+def test_a_term_of_somebody_else_joins_by_its_argument_names(tmp_path, monkeypatch):
+    (tmp_path / "side_wind.py").write_text(
+        "from scm.vehicles.jit import law\n\n\n"
+        "@law\ndef side_wind(strength: float) -> float:\n    return strength\n",
+        encoding="utf-8",
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    import side_wind
+
+    strength = Param("strength", 0.0, "N", "body.wind_n", (-5.0, 5.0), "from the right")
+    term = of(side_wind.side_wind, adds="force_y", params=(strength,))
+    page = write_page("windy", [*STANDARD, term])
+    assert "from side_wind import side_wind" in page
+    assert "force_y += side_wind(strength)" in page
+
+
+def test_the_same_terms_give_the_same_kernel_object():
+    assert compile_kernel("nigel", STANDARD) is compile_kernel("nigel", STANDARD)
+
+
+@pytest.mark.slow
+def test_processes_that_compile_at_the_same_time_all_get_a_kernel(tmp_path):
+    script = (
+        "from scm.vehicles.car import load_car\n"
+        "from scm.vehicles.fleet import Fleet\n"
+        "from scm.geometry import Pose2\n"
+        "fleet = Fleet(load_car('nigel'), 1)\n"
+        "fleet.throttle[fleet.add(Pose2(0.0, 0.0, 0.0))] = 1.0\n"
+        "fleet.advance(1.0)\n"
+        "print(fleet.x[0].hex())\n"
+    )
+    environment = {**os.environ, "SCM_CACHE_DIR": str(tmp_path)}
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-c", script], env=environment, stdout=subprocess.PIPE, text=True
+        )
+        for _ in range(3)
+    ]
+    answers = {process.communicate(timeout=120)[0] for process in processes}
+    assert [process.returncode for process in processes] == [0, 0, 0]
+    assert len(answers) == 1
+    assert len(list(tmp_path.glob("*.py"))) == 1
+    assert not list(tmp_path.glob("*.tmp"))

@@ -1,0 +1,141 @@
+import pytest
+
+from scm.errors import CarError
+from scm.vehicles.car import STANDARD_TERMS, TYPES_DIR, load_car
+
+NIGEL = (TYPES_DIR / "nigel.toml").read_text(encoding="utf-8")
+
+
+def changed(tmp_path, *changes):
+    """Write Nigel's file with some of its text replaced; return its path."""
+    text = NIGEL
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refusal(path):
+    with pytest.raises(CarError) as error:
+        load_car(path)
+    return str(error.value)
+
+
+def test_values_come_with_spread_unit_and_source():
+    mass = load_car("nigel").quantity("body.mass_kg")
+    assert (mass.value, mass.std, mass.unit, mass.source) == (2.4, 0.15, "kg", "ours")
+
+
+def test_sensor_sections_stay_readable():
+    car = load_car("nigel")
+    assert car.vector("lidar.range_m") == (0.15, 12.0)
+    assert car.value("encoder.counts_per_revolution") == 1920.0
+    assert car.text("ips.tag_family") == "tag36h11"
+    assert len(car.vector("drive.throttle_speed_m_s")) == 10
+
+
+def test_a_reader_that_asks_for_the_wrong_kind_is_told(tmp_path):
+    car = load_car("nigel")
+    with pytest.raises(CarError, match=r"lidar\.range_m: expected one number"):
+        car.value("lidar.range_m")
+    with pytest.raises(CarError, match=r"lidar\.rate: not in this car .*lidar\.rate_hz"):
+        car.value("lidar.rate")
+
+
+def test_a_car_given_by_path_is_the_car_given_by_name():
+    by_name, by_path = load_car("nigel"), load_car(TYPES_DIR / "nigel.toml")
+    assert by_path == by_name
+
+
+def test_a_file_without_terms_gets_the_standard_ones(tmp_path):
+    start, end = NIGEL.index("terms = ["), NIGEL.index("[body]")
+    path = tmp_path / "plain.toml"
+    path.write_text(NIGEL[:start] + NIGEL[end:], encoding="utf-8")
+    assert tuple(term.name for term in load_car(path).terms) == STANDARD_TERMS
+
+
+def test_an_unknown_car_is_refused_with_the_nearest_name():
+    with pytest.raises(CarError, match=r"nigle: no such car; .* mean 'nigel'"):
+        load_car("nigle")
+
+
+def test_a_misspelt_key_is_refused_with_file_key_and_nearest_name(tmp_path):
+    said = refusal(changed(tmp_path, ("wheelbase_m ", "wheelbse_m ")))
+    assert "mine.toml: body.wheelbse_m: no such key (did you mean 'body.wheelbase_m'?)" in said
+    assert "body.wheelbase_m: missing; expected front axle to rear axle [m]" in said
+
+
+def test_all_problems_are_told_at_once(tmp_path):
+    said = refusal(
+        changed(
+            tmp_path,
+            ("value = 2.40,", "value = -1,"),
+            ('value = "rear"', 'value = "both"'),
+            ("[lidar]", "[lidra]"),
+            ('"servo", ', '"srevo", '),
+            ("value = [0.15, 12.0]", "value = [0.15]"),
+            ("value = 7.0,", 'value = "fast",'),
+        )
+    ).splitlines()
+    assert any("body.mass_kg: expected 0.2 to 60 kg, got -1" in line for line in said)
+    assert any("drive.layout: expected 'rear' or 'front' or 'all', got 'both'" in x for x in said)
+    assert any("[lidra]: no such section (did you mean 'lidar'?)" in line for line in said)
+    assert any("terms: no effect 'srevo' (did you mean 'servo'?)" in line for line in said)
+    assert all("mine.toml: " in line for line in said)
+
+
+def test_a_vector_of_the_wrong_length_is_refused(tmp_path):
+    said = refusal(changed(tmp_path, ("value = [0.15, 12.0]", "value = [0.15]")))
+    assert "lidar.range_m: expected 2 numbers [m], got 1" in said
+
+
+@pytest.mark.parametrize("bad", ['"fast"', "true", "[1.0]", "nan"])
+def test_a_wrong_type_is_refused(tmp_path, bad):
+    said = refusal(changed(tmp_path, ("value = 7.0,", f"value = {bad},")))
+    assert "lidar.rate_hz: expected" in said
+
+
+def test_a_bare_number_is_refused_with_the_form_expected(tmp_path):
+    bare = 'mass_kg               = { value = 2.40,    std = 0.15,  source = "ours" }'
+    said = refusal(changed(tmp_path, (bare, "mass_kg = 2.4")))
+    assert "body.mass_kg: expected { value = ..., source = ... }, got 2.4" in said
+
+
+def test_a_wrong_unit_is_refused(tmp_path):
+    said = refusal(changed(tmp_path, ("value = 2.40, ", 'value = 2.40, unit = "g", ')))
+    assert "body.mass_kg.unit: expected 'kg', got 'g'" in said
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("value = 0.07077", "value = 0.2"), "cog_to_rear_axle_m: expected less than"),
+        (("value = 0.045, ", "value = 0.7, "), "outweigh body.mass_kg = 2.4"),
+        (("front_driven              = { value = 0", "front_driven = { value = 1"), "contradicts"),
+        (('"servo", ', '"servo", "servo", '), "terms: 'servo' stands twice"),
+        (("terms = [", "terms = [3,"), "terms: expected a list of effect names"),
+        (('"tyre_contact", ', ""), "no term sets load"),
+        (("std = 0.15, ", 'std = "much", '), "body.mass_kg.std: expected a number"),
+        (("std = 0.15, ", "sigma = 0.15, "), "body.mass_kg: no such field"),
+    ],
+)
+def test_contradictions_are_refused(tmp_path, change, said):
+    assert said in refusal(changed(tmp_path, change))
+
+
+def test_a_file_that_is_not_toml_is_refused(tmp_path):
+    path = tmp_path / "broken.toml"
+    path.write_text("name = [", encoding="utf-8")
+    assert "broken.toml: not a TOML file" in refusal(path)
+
+
+def test_front_wheel_drive_follows_from_the_layout(tmp_path):
+    path = changed(
+        tmp_path,
+        ('value = "rear"', 'value = "front"'),
+        ("front_driven              = { value = 0", "front_driven = { value = 1"),
+    )
+    car = load_car(path)
+    assert (car.value("drive.front_driven"), car.value("drive.rear_driven")) == (1.0, 0.0)

@@ -1,0 +1,110 @@
+import math
+
+import numpy as np
+import pytest
+
+from scm.errors import RunError, TermError
+from scm.geometry import Pose2
+from scm.vehicles.car import load_car
+from scm.vehicles.fleet import Fleet, VehicleStatus
+
+
+@pytest.fixture
+def fleet():
+    return Fleet(load_car("nigel"), 3)
+
+
+def test_a_car_stands_with_its_rear_axle_where_it_was_put(fleet):
+    row = fleet.add(Pose2(1.0, -2.0, 2.0))
+    assert fleet.pose(row) == pytest.approx((1.0, -2.0, 2.0))
+    x, y, yaw, vx, vy, rate = fleet.planar_cog(row)
+    cog = fleet.car.value("body.cog_to_rear_axle_m")
+    assert (x, y) == pytest.approx((1.0 + cog * math.cos(2.0), -2.0 + cog * math.sin(2.0)))
+    assert (yaw, vx, vy, rate) == (2.0, 0.0, 0.0, 0.0)
+
+
+def test_a_car_put_down_rolling_keeps_rolling(fleet):
+    row = fleet.add(Pose2(0.0, 0.0, 1.0), speed=0.2)
+    assert fleet.speed[row] == pytest.approx(0.2)
+    np.testing.assert_allclose(fleet.wheel_speed[row], 0.2 / 0.0325)
+    fleet.throttle[row] = 0.727  # about the throttle of 0.2 m/s
+    fleet.advance(0.1)
+    assert fleet.speed[row] == pytest.approx(0.2, rel=0.01)
+
+
+def test_a_row_restarts_from_a_measured_state(fleet):
+    row = fleet.add(Pose2(9.0, 9.0, 0.0))
+    fleet.place(row, Pose2(0.5, 0.2, -1.0), 0.25, 0.01, 0.4, steer_angle=0.2)
+    assert fleet.pose(row) == pytest.approx((0.5, 0.2, -1.0))
+    assert fleet.speed[row] == pytest.approx(0.25)
+    assert fleet.lateral_speed[row] == pytest.approx(0.01)
+    assert fleet.yaw_rate[row] == 0.4
+    assert fleet.steer_angle[row] == 0.2
+
+
+def test_lags_restart_settled():
+    fleet = Fleet(load_car("dart"), 1)
+    fleet.add(Pose2(0.0, 0.0, 0.0))
+    fleet.place(0, Pose2(0.0, 0.0, 0.0), 1.0, steer_angle=0.2, throttle=0.5)
+    fleet.throttle[0] = 0.5
+    fleet.advance(1e-3)
+    assert fleet.steer_angle[0] == pytest.approx(0.2, abs=0.003)
+    assert fleet.accel_x[0] > 0.0
+
+
+def test_rows_are_used_again_and_a_full_fleet_says_so(fleet):
+    rows = [fleet.add(Pose2(float(i), 0.0, 0.0)) for i in range(3)]
+    with pytest.raises(RunError, match="all 3 rows are in use"):
+        fleet.add(Pose2(0.0, 0.0, 0.0))
+    fleet.remove(rows[1])
+    assert list(fleet.alive) == [True, False, True]
+    assert fleet.add(Pose2(7.0, 0.0, 0.0)) == rows[1]
+    assert fleet.x[rows[1]] == pytest.approx(7.0)
+
+
+def test_a_new_car_does_not_inherit_the_numbers_of_the_last_one(fleet):
+    row = fleet.add(Pose2(0.0, 0.0, 0.0))
+    fleet.set_parameter(row, "mass", 5.0)
+    fleet.remove(row)
+    assert fleet.add(Pose2(0.0, 0.0, 0.0)) == row
+    assert fleet.parameters[row, fleet.parameter_names.index("mass")] == 2.4
+
+
+def test_each_row_may_have_its_own_parameters(fleet):
+    for row in range(2):
+        fleet.throttle[fleet.add(Pose2(0.0, float(row), 0.0))] = 1.0
+    fleet.set_parameter(0, "stall_torque", 0.2)
+    fleet.set_parameter(1, "drive.stall_torque_nm", 0.4)
+    fleet.advance(1.0)
+    assert fleet.speed[0] < fleet.speed[1]
+
+
+def test_an_unknown_parameter_is_refused_with_the_nearest_name(fleet):
+    with pytest.raises(TermError, match=r"no parameter 'stal_torque' .* mean 'stall_torque'"):
+        fleet.set_parameter(0, "stal_torque", 1.0)
+
+
+def test_results_cannot_be_written_and_commands_can(fleet):
+    fleet.throttle[0] = 0.5
+    with pytest.raises(ValueError, match="read-only"):
+        fleet.x[0] = 1.0
+
+
+def test_yaw_stays_wrapped_while_the_car_circles(fleet):
+    row = fleet.add(Pose2(0.0, 0.0, 3.0))
+    fleet.throttle[row], fleet.steering[row] = 1.0, 1.0
+    for _ in range(40):
+        fleet.advance(0.5)
+        assert -math.pi < fleet.yaw[row] <= math.pi
+
+
+def test_a_weak_battery_slows_the_car(fleet):
+    for row in range(2):
+        fleet.throttle[fleet.add(Pose2(0.0, float(row), 0.0))] = 1.0
+    fleet.battery[1] = 0.8 * fleet.battery[0]
+    fleet.advance(2.0)
+    assert fleet.speed[1] < 0.9 * fleet.speed[0]
+
+
+def test_every_status_has_a_sentence():
+    assert all(status.sentence.endswith(".") for status in VehicleStatus)
