@@ -1,0 +1,7 @@
+"""The program of one car: its own process, its own dynamics or a real car, joined over the bus.
+
+agent      the part: hears, decides, acts, reports        link    joining, the lease, lost links
+stay       one stay in the city: body, guard, driver      lights  which lamps are on
+body       the contract of a body; `bodies/` has one file a kind, found by name
+May import v2x, vehicles and what is below; never the city's parts. Only `bodies/` open the physics.
+"""

@@ -59,7 +59,7 @@ class SignalView:
         that it goes on: a car that can stop then does.
         """
         heard = self._heard.get(junction)
-        if heard is None or not 0 <= now_ns - heard.arrived_ns <= FRESH_NS:
+        if heard is None or abs(now_ns - heard.arrived_ns) > FRESH_NS:
             return None
         if heard.flashing or junction in self._faults:
             return "flashing_red"

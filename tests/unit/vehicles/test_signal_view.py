@@ -78,8 +78,13 @@ def test_a_green_is_believed_for_one_second_from_its_arrival(view, body, age_ms,
 
 
 def test_a_message_from_the_future_is_not_believed(view, body):
-    view.hear_spatem(body(), NOW_NS + 1)
+    view.hear_spatem(body(), NOW_NS + 2 * NS_PER_S)
     assert view.colour(*AT, NOW_NS) is None
+
+
+def test_a_message_that_arrives_while_a_step_runs_is_believed(view, body):
+    view.hear_spatem(body(), NOW_NS + NS_PER_MS)
+    assert view.may_go(*AT, NOW_NS)
 
 
 def test_failure_flash_overrides_every_colour(view, body):

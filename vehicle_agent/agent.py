@@ -1,0 +1,232 @@
+"""The agent of one car as a part: what it hears goes to its link, its senses, its guard.
+
+The car's own driver is the one who commands it, until somebody with a newer lease does. Whoever
+commands, the guard has the last word.
+"""
+
+import logging
+from collections.abc import Callable, Sequence
+
+from scm import registry
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import MapError, RunError
+from scm.log import event
+from scm.maps.model import CityMap
+from scm.part import Hears, Serves
+from scm.v2x.exchange import Answer, Incoming, Outgoing
+from scm.v2x.key import check_name
+from scm.v2x.message import Message, Refused
+from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.presence import Presence
+from scm.v2x.messages.route_request import RouteRequest
+from scm.v2x.messages.spatem_rx import SpatemRx
+from scm.v2x.messages.world_definition import WorldDefinition
+from vehicle_agent.body import BodyKind
+from vehicle_agent.link import Link
+from vehicle_agent.stay import Stay
+
+BODIES = "vehicle_agent.bodies"
+
+_log = logging.getLogger(__name__)
+
+
+class AgentPart:
+    """One car and its program."""
+
+    role = "v"
+    period_ns = 20 * NS_PER_MS
+
+    def __init__(
+        self,
+        name: str,
+        car: str = "nigel",
+        spawn: str = "",
+        session: str = "",
+        seed: int = 0,
+        body: str = "simulated",
+    ) -> None:
+        """Prepare to join.
+
+        Args:
+            name: Of the vehicle.
+            car: Car file's name.
+            spawn: Wished spawn place; empty: any free one.
+            session: Of the agent's bus; empty: learned from its own presence on the bus.
+            seed: Of the sensors' noise.
+            body: Kind of body: a file of `vehicle_agent/bodies`.
+        """
+        self.name = check_name(name, "vehicle")
+        kind = registry.load(BODIES, body, "BODY", BodyKind, RunError)
+        self._body = kind.open(car, seed)
+        self._link = Link(name, car, kind.kind, spawn, session)
+        self._car = car
+        self._map: CityMap | None = None
+        self._defined_ns: int | None = None
+        self._stay: Stay | None = None
+        self._stopped = False
+        self._faults: dict[str, MonitorStatus] = {}
+        self._status_ns: int | None = None
+        here, own = {"receiver": name}, {"vehicle": name}
+        self._on: dict[type[Message], Callable[[Incoming], list[Outgoing]]] = {
+            WorldDefinition: self._on_definition,
+            Presence: self._on_presence,
+            SpatemRx: self._on_spatem,
+            CamRx: self._on_cam,
+            MonitorStatus: self._on_monitor,
+            CityStop: self._on_stop,
+            Contact: self._on_contact,
+            DriveCommand: self._on_command,
+            RouteRequest: self._on_route,
+        }
+        self.hears: Sequence[Hears] = (
+            Hears(WorldDefinition),
+            Hears(Presence, {"role": self.role, "station": name}),
+            Hears(SpatemRx, here),
+            Hears(CamRx, here),
+            Hears(MonitorStatus),
+            Hears(CityStop),
+            Hears(Contact, own),
+            Hears(DriveCommand, own),
+        )
+        self.serves: Sequence[Serves] = (Serves(RouteRequest, own),)
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Hear, drive, report."""
+        outbox: list[Outgoing] = []
+        for item in inbox:
+            if item.call is not None:
+                self._on_reply(item, now_ns)
+            elif type(item.message) in self._on:
+                outbox += self._on[type(item.message)](item)
+        self._check_losses(now_ns)
+        if self._map is not None:
+            outbox += self._link.due(now_ns)
+        if self._stay is not None:
+            own = self._link.epoch if self._link.standing == "own" else None
+            outbox += self._stay.step(now_ns, own)
+        return outbox + self._status(now_ns)
+
+    def finish(self, now_ns: int) -> list[Outgoing]:
+        """Leave the city."""
+        return [*self._link.goodbye()]
+
+    def _check_losses(self, now_ns: int) -> None:
+        if self._stay is None:
+            return
+        if not self._link.is_inside:
+            self._body.command(0.0, 0.0)
+            self._stay = None
+        elif self._link.standing == "own" and (
+            self._stay.guard.lost or not self._link.is_alive(now_ns)
+        ):
+            self._link.regain()
+
+    def _on_reply(self, item: Incoming, now_ns: int) -> None:
+        came_in = self._link.take(item)
+        if came_in and self._map is not None:
+            self._body.place(self._link.start, now_ns)
+            self._begin_stay(self._map, now_ns)
+        elif self._stay is not None and self._link.standing == "own":
+            self._stay.guard.set_epoch(self._link.epoch, now_ns)
+
+    def _begin_stay(self, city_map: CityMap, now_ns: int) -> None:
+        try:
+            stay = Stay(self.name, self._car, self._body, city_map, self._link.epoch, now_ns)
+        except MapError as error:
+            event(_log, "cannot_drive", level=logging.ERROR, reason=error)
+            raise
+        stay.guard.stop(self._stopped)
+        for status in self._faults.values():
+            stay.signals.hear_monitor(status)
+        self._stay = stay
+
+    def _on_definition(self, item: Incoming) -> list[Outgoing]:
+        message = item.message
+        if isinstance(message, WorldDefinition) and message.t_ns != self._defined_ns:
+            self._defined_ns, self._map = message.t_ns, message.map
+            if self._link.is_inside:
+                self._link.leave("the world began anew")
+        return []
+
+    def _on_presence(self, item: Incoming) -> list[Outgoing]:
+        message = item.message
+        if isinstance(message, Presence) and message.alive and not self._link.session:
+            self._link.session = message.session
+        return []
+
+    def _on_spatem(self, item: Incoming) -> list[Outgoing]:
+        if isinstance(item.message, SpatemRx) and self._stay is not None:
+            self._stay.signals.hear_spatem(item.message.body, item.t_ns)
+        return []
+
+    def _on_cam(self, item: Incoming) -> list[Outgoing]:
+        message = item.message
+        if isinstance(message, CamRx) and self._stay is not None and message.station != self.name:
+            self._stay.cars.hear(message.body, item.t_ns)
+        return []
+
+    def _on_monitor(self, item: Incoming) -> list[Outgoing]:
+        if isinstance(item.message, MonitorStatus):
+            self._faults[item.message.junction] = item.message
+            if self._stay is not None:
+                self._stay.signals.hear_monitor(item.message)
+        return []
+
+    def _on_stop(self, item: Incoming) -> list[Outgoing]:
+        if isinstance(item.message, CityStop):
+            self._stopped = item.message.engaged
+            if self._stay is not None:
+                self._stay.guard.stop(self._stopped)
+        return []
+
+    def _on_contact(self, item: Incoming) -> list[Outgoing]:
+        if isinstance(item.message, Contact) and self._stay is not None:
+            self._body.push(item.message)
+        return []
+
+    def _on_command(self, item: Incoming) -> list[Outgoing]:
+        message = item.message
+        if isinstance(message, DriveCommand) and self._stay is not None:
+            newer = message.epoch > self._link.epoch
+            if newer and self._stay.guard.take(message, item.t_ns):
+                self._link.give_way()
+        return []
+
+    def _on_route(self, item: Incoming) -> list[Outgoing]:
+        request = item.message
+        if not isinstance(request, RouteRequest):
+            return []
+        return [Answer(item, self._route(request, item.t_ns))]
+
+    def _route(self, request: RouteRequest, now_ns: int) -> Message:
+        if self._stay is None:
+            return Refused(code="offline", detail=f"{self.name} is not in the city")
+        if self._link.standing == "foreign":
+            if self._stay.guard.output(now_ns).mode in ("drive", "hold"):
+                return Refused(code="owned", detail=f"{self.name} is driven by somebody else")
+            self._link.regain()
+        try:
+            return self._stay.begin(request, now_ns)
+        except MapError as error:
+            return Refused(code="invalid", detail=str(error))
+
+    def _status(self, now_ns: int) -> list[Outgoing]:
+        if self._status_ns is not None and now_ns - self._status_ns < NS_PER_S:
+            return []
+        self._status_ns = now_ns
+        return [PartStatus(station=self.name, t_ns=now_ns, detail=self._detail())]
+
+    def _detail(self) -> str:
+        if self._stay is None:
+            return f"outside: {self._link.reason}" if self._map else "waits for the world"
+        if self._link.standing == "foreign":
+            return "driven by somebody else"
+        if self._link.standing == "regaining":
+            return "asks for its lease"
+        waiting = self._stay.trips.driver.waiting_for
+        return f"waits for {waiting}" if waiting else "drives"

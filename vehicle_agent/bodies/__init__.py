@@ -1,0 +1,1 @@
+"""Bodies: what an agent drives. One file a kind, each with `BODY`."""

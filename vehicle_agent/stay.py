@@ -1,0 +1,117 @@
+"""One stay in the city: from joining to leaving, twenty milliseconds at a time.
+
+hear -> move the body up to now -> decide -> guard -> command the body -> report
+"""
+
+from scm.maps.model import CityMap
+from scm.maps.route import Roads
+from scm.v2x.cam_trigger import CamTrigger
+from scm.v2x.etsi_convert import cam_of
+from scm.v2x.exchange import Outgoing
+from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.route_request import RouteReply, RouteRequest
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.vehicles.driver import RouteView
+from scm.vehicles.drivers.heard import HeardCars
+from scm.vehicles.drivers.trips import Trips
+from scm.vehicles.guard import Guard, Guarded
+from scm.vehicles.signal_view import SignalView
+from vehicle_agent.body import Body
+from vehicle_agent.lights import lights
+
+
+class Stay:
+    """A car in the city.
+
+    Attributes:
+        signals: What it believes of the signals.
+        cars: What it knows of the others.
+        guard: Between every commander and the body.
+        trips: Where it is sent.
+    """
+
+    def __init__(
+        self, vehicle: str, car: str, body: Body, city_map: CityMap, epoch: int, now_ns: int
+    ) -> None:
+        """Begin with the body where the city wants it.
+
+        Raises:
+            MapError: when it stands where no lane leads anywhere.
+        """
+        self._vehicle, self._car, self._body = vehicle, car, body
+        self.signals = SignalView(city_map)
+        self.cars = HeardCars()
+        self.guard = Guard(epoch)
+        self.trips = Trips(vehicle, Roads(city_map), body.limits, body.motion().pose, now_ns)
+        self._cam = CamTrigger()
+        self._seq = 0
+
+    def begin(self, request: RouteRequest, now_ns: int) -> RouteReply:
+        """Send the car on a trip; MapError when the lanes do not allow it."""
+        return self.trips.begin(request, self._body.motion().pose, now_ns)
+
+    def step(self, now_ns: int, epoch: int | None) -> list[Outgoing]:
+        """Drive and report.
+
+        Args:
+            now_ns: The present time [ns].
+            epoch: Under which the car's own driver commands; None: it must not.
+        """
+        self._body.advance(now_ns)
+        if epoch is not None:
+            self.guard.take(self._own_command(now_ns, epoch), now_ns)
+        guarded = self.guard.output(now_ns)
+        self._body.command(guarded.throttle, guarded.steering)
+        return self._reports(guarded, now_ns)
+
+    def _own_command(self, now_ns: int, epoch: int) -> DriveCommand:
+        motion = self._body.motion()
+        view = RouteView(
+            now_ns=now_ns,
+            pose=motion.pose,
+            speed=motion.speed,
+            signals=self.signals,
+            others=self.cars.others(now_ns),
+        )
+        throttle, steering = self.trips.decide(view)
+        return DriveCommand(
+            vehicle=self._vehicle,
+            t_ns=now_ns,
+            epoch=epoch,
+            seq=self._seq,
+            throttle=throttle,
+            steering=steering,
+        )
+
+    def _reports(self, guarded: Guarded, now_ns: int) -> list[Outgoing]:
+        state = self._state(guarded, now_ns)
+        outbox: list[Outgoing] = [state, *self._body.sensors(self._vehicle, now_ns)]
+        if self._cam.due(state, now_ns):
+            limits = self._body.limits
+            body = cam_of(state, length_m=limits.length, width_m=limits.width, front_m=limits.front)
+            outbox.append(CamTx(station=self._vehicle, t_ns=now_ns, body=body))
+        return [*outbox, *self.trips.reports(now_ns)]
+
+    def _state(self, guarded: Guarded, now_ns: int) -> VehicleState:
+        motion = self._body.motion()
+        self._seq += 1
+        return VehicleState(
+            vehicle=self._vehicle,
+            t_ns=now_ns,
+            seq=self._seq,
+            x_m=motion.pose.x,
+            y_m=motion.pose.y,
+            yaw_rad=motion.pose.yaw,
+            speed_mps=motion.speed,
+            lateral_speed_mps=motion.lateral_speed,
+            yaw_rate_radps=motion.yaw_rate,
+            accel_mps2=motion.accel,
+            steering_rad=motion.steering,
+            throttle=guarded.throttle,
+            source=motion.source,
+            epoch=self.guard.epoch,
+            mode="stop" if guarded.mode == "lost" else guarded.mode,
+            lights=lights(guarded, motion.speed, now_ns),
+            car=self._car,
+        )
