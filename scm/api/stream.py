@@ -169,8 +169,7 @@ class Stream:
 
     def _snapshot(self, after_seq: int | None) -> bytes:
         picture = self._city.view.picture()
-        if after_seq is None:
-            after_seq = max(0, picture.event_seq - EVENTS_SHOWN)
+        after_seq = max(after_seq or 0, picture.event_seq - EVENTS_SHOWN)
         events = self._city.view.events_after(after_seq, EVENTS_SHOWN)
         body = {
             name: msgspec.Raw(encode(topic.make(picture))) for name, topic in self._topics.items()
@@ -184,6 +183,5 @@ class Stream:
         return head.encode() + encode(body) + b"\n\n"
 
     def _resume_seq(self, last_event_id: str) -> int | None:
-        run_id, _, rest = last_event_id.partition("-")
-        seq = rest.rpartition("-")[2]
+        run_id, _, seq = (last_event_id.split("-") + ["", ""])[:3]
         return int(seq) if run_id == self._run_id and seq.isascii() and seq.isdigit() else None

@@ -1,0 +1,140 @@
+"""A view that has heard a little, a city that answers from a list, and a client without sockets."""
+
+import asyncio
+
+import httpx
+import pytest
+
+from scm.api.app import create_app
+from scm.api.view import CityView
+from scm.clock import NS_PER_S
+from scm.maps.load import load_map
+from scm.v2x.exchange import Incoming
+from scm.v2x.message import Refused
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
+
+HERE = "http://127.0.0.1:8000"
+
+
+class FakeCity:
+    """Answers by the class of the request, and remembers what it was asked."""
+
+    def __init__(self):
+        self.asked = []
+        self.answers = {}
+
+    def ask(self, request, timeout_s):
+        assert timeout_s > 0.0
+        self.asked.append(request)
+        return self.answers.get(type(request), Refused(code="offline", detail="nobody answers"))
+
+
+class Client:
+    """Calls an application directly; every call runs its own event loop."""
+
+    def __init__(self, app, base_url=HERE):
+        self.app = app
+        self.base_url = base_url
+
+    def __call__(self, method, path, **options):
+        async def call():
+            transport = httpx.ASGITransport(self.app, raise_app_exceptions=False)
+            async with httpx.AsyncClient(transport=transport, base_url=self.base_url) as client:
+                return await client.request(method, path, **options)
+
+        return asyncio.run(call())
+
+
+@pytest.fixture(scope="session")
+def city_map():
+    return load_map("driving_school")
+
+
+@pytest.fixture
+def view():
+    return CityView()
+
+
+@pytest.fixture
+def hear(view):
+    """Step the view at a time [s] with messages that arrive then."""
+
+    def step(at_s, *messages):
+        now_ns = round(at_s * NS_PER_S)
+        return view.step(now_ns, [Incoming(message, now_ns) for message in messages])
+
+    return step
+
+
+@pytest.fixture
+def fake_city():
+    return FakeCity()
+
+
+@pytest.fixture
+def app(view, fake_city, city_map):
+    return create_app(view, fake_city.ask, city_map, plans={"crossing": ("calm", "busy")})
+
+
+@pytest.fixture
+def client(app):
+    return Client(app)
+
+
+@pytest.fixture
+def client_of():
+    return Client
+
+
+@pytest.fixture
+def snapshot():
+    """Build a snapshot at a time [s] of cars given as keyword: name=(x_m, y_m, yaw_rad)."""
+
+    def build(at_s=1.0, tick=1, alive=True, **cars):
+        vehicles = tuple(
+            SnapshotVehicle(
+                vehicle=name,
+                kind="hosted",
+                car="nigel",
+                tag_id=number + 1,
+                x_m=pose[0],
+                y_m=pose[1],
+                yaw_rad=pose[2],
+                speed_mps=0.2,
+                steering_rad=0.1,
+                alive=alive,
+            )
+            for number, (name, pose) in enumerate(cars.items())
+        )
+        return WorldSnapshot(t_ns=round(at_s * NS_PER_S), tick=tick, vehicles=vehicles)
+
+    return build
+
+
+@pytest.fixture
+def spat():
+    """Build the crossing's SPaT at a time [s] on the controller's clock: green for 4 to 6 s."""
+
+    def build(at_s=100.0, colour="green", plan="calm", mode="plan"):
+        t_ns = round(at_s * NS_PER_S)
+        group = SignalGroup(
+            group="south_east",
+            colour=colour,
+            since_ns=t_ns,
+            min_end_ns=t_ns + 4 * NS_PER_S,
+            max_end_ns=t_ns + 6 * NS_PER_S,
+            next_colour="yellow",
+        )
+        return Spat(junction="crossing", t_ns=t_ns, seq=1, mode=mode, plan=plan, groups=(group,))
+
+    return build
+
+
+@pytest.fixture
+def event():
+    def build(text, severity="info"):
+        return CityEvent(severity=severity, source="world", t_ns=1, name="told", text=text)
+
+    return build

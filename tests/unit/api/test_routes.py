@@ -1,0 +1,264 @@
+import msgspec
+import pytest
+
+from scm.maps.model import CityMap
+from scm.v2x.message import Refused
+from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.eye_frame import EyeFrame
+from scm.v2x.messages.eye_tags import EyeTags
+from scm.v2x.messages.monitor_reset import MonitorReset
+from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.plan_request import PlanReply, PlanRequest
+from scm.v2x.messages.presence import Presence
+from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
+from scm.v2x.messages.route_request import RouteReply, RouteRequest
+from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
+from scm.v2x.messages.stop_request import StopRequest
+
+API = "/api/v1"
+
+
+def is_problem(response, status, code):
+    assert response.status_code == status, response.text
+    assert response.headers["content-type"] == "application/problem+json"
+    body = response.json()
+    assert (body["status"], body["code"]) == (status, code)
+    assert body["title"]
+    return body
+
+
+class TestCars:
+    def test_all_cars_are_listed(self, client, hear, snapshot):
+        hear(1.0, snapshot(n1=(0.1, 0.2, 0.3), n2=(0.0, 0.0, 0.0)))
+        body = client("GET", f"{API}/cars").json()
+        assert [car["vehicle"] for car in body["cars"]] == ["n1", "n2"]
+        assert body["cars"][0]["yaw_rad"] == 0.3
+
+    def test_one_car_is_found_by_name(self, client, hear, snapshot):
+        hear(1.0, snapshot(n1=(0.1, 0.2, 0.3)))
+        assert client("GET", f"{API}/cars/n1").json()["x_m"] == 0.1
+
+    def test_a_car_that_is_not_there_is_not_found(self, client):
+        body = is_problem(client("GET", f"{API}/cars/n1"), 404, "not_found")
+        assert "n1" in body["detail"]
+        assert body["instance"] == f"{API}/cars/n1"
+
+    def test_a_name_that_no_key_could_carry_is_invalid(self, client):
+        is_problem(client("GET", f"{API}/cars/N 1"), 422, "invalid")
+
+    def test_spawning_asks_the_world_and_says_where_to_look(self, client, fake_city):
+        reply = SpawnReply(vehicle="n5", x_m=1.0, y_m=2.0, yaw_rad=0.0, tag_id=5)
+        fake_city.answers[SpawnRequest] = reply
+        response = client(
+            "POST", f"{API}/cars", json={"car": "dart"}, headers={"Idempotency-Key": "k1"}
+        )
+        assert response.status_code == 201
+        assert response.headers["location"] == f"{API}/cars/n5"
+        assert response.json()["tag_id"] == 5
+        assert fake_city.asked == [SpawnRequest(request_id="k1", car="dart")]
+
+    def test_removing_passes_the_reason_on(self, client, fake_city):
+        fake_city.answers[RemoveRequest] = RemoveReply(vehicle="n5")
+        response = client("DELETE", f"{API}/cars/n5?reason=tidy")
+        assert response.json() == {"vehicle": "n5"}
+        assert fake_city.asked == [RemoveRequest(vehicle="n5", reason="tidy")]
+
+    def test_a_route_is_passed_on_as_given(self, client, fake_city):
+        fake_city.answers[RouteRequest] = RouteReply(
+            vehicle="n5", trip_id="t1", route=("a", "b"), length_m=3.0
+        )
+        body = {"via": ["a", "b"], "laps": 2, "speed_mps": 0.2}
+        response = client("POST", f"{API}/cars/n5/route", json=body)
+        assert response.json()["route"] == ["a", "b"]
+        assert fake_city.asked == [
+            RouteRequest(vehicle="n5", via=("a", "b"), laps=2, speed_mps=0.2)
+        ]
+
+    @pytest.mark.parametrize(
+        "body", [{"laps": 0}, {"speed_mps": -1}, {"via": "a"}, {"vias": ["a"]}, {"laps": "two"}]
+    )
+    def test_a_wrong_route_is_refused_before_anybody_is_asked(self, client, fake_city, body):
+        problem = is_problem(client("POST", f"{API}/cars/n5/route", json=body), 422, "invalid")
+        (field,) = body
+        assert problem["errors"][0]["where"] == f"body.{field}"
+        assert problem["errors"][0]["expected"]
+        assert fake_city.asked == []
+
+    def test_what_is_not_json_is_a_problem_too(self, client):
+        headers = {"Content-Type": "application/json"}
+        response = client("POST", f"{API}/cars", content=b"{", headers=headers)
+        is_problem(response, 422, "invalid")
+
+
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("code", "status"),
+        [
+            ("not_found", 404),
+            ("owned", 409),
+            ("invalid", 422),
+            ("offline", 503),
+            ("timeout", 504),
+            ("full", 409),
+        ],
+    )
+    def test_the_city_s_no_becomes_a_problem(self, client, fake_city, code, status):
+        fake_city.answers[RemoveRequest] = Refused(code=code, detail="because")
+        body = is_problem(client("DELETE", f"{API}/cars/n5"), status, code)
+        assert body["detail"] == "because"
+
+    def test_a_reply_of_the_wrong_kind_is_a_problem(self, client, fake_city):
+        fake_city.answers[RemoveRequest] = CityStop(t_ns=0, engaged=False)
+        is_problem(client("DELETE", f"{API}/cars/n5"), 409, "invalid_reply")
+
+    def test_a_path_that_does_not_exist_is_a_problem(self, client):
+        is_problem(client("GET", f"{API}/nothing"), 404, "not_found")
+
+    def test_a_method_that_is_not_offered_is_a_problem(self, client):
+        is_problem(client("PATCH", f"{API}/cars"), 405, "method_not_allowed")
+
+    def test_our_own_failure_is_a_problem_that_tells_no_secrets(self, client, fake_city):
+        fake_city.answers = None  # asking it is a bug of ours now
+        body = is_problem(client("DELETE", f"{API}/cars/n5"), 500, "internal")
+        assert "NoneType" not in body["detail"]
+
+
+class TestSignals:
+    def test_all_junctions_are_listed(self, client, hear, spat):
+        hear(1.0, spat())
+        (row,) = client("GET", f"{API}/signals").json()["signals"]
+        assert row["junction"] == "crossing"
+        assert row["groups"][0]["colour"] == "green"
+        assert row["plans"] == ["busy", "calm", "flash"]
+
+    def test_one_junction_is_found_by_name(self, client):
+        assert client("GET", f"{API}/signals/crossing").json()["fresh"] is False
+
+    @pytest.mark.parametrize(
+        ("method", "path", "body"),
+        [
+            ("GET", "", None),
+            ("PUT", "/plan", {"plan": "calm"}),
+            ("POST", "/monitor/reset", {"reason": "seen"}),
+        ],
+    )
+    def test_an_unknown_junction_is_not_found(self, client, fake_city, method, path, body):
+        is_problem(client(method, f"{API}/signals/moon{path}", json=body), 404, "not_found")
+        assert fake_city.asked == []
+
+    def test_a_plan_is_wished_for_with_who_and_why(self, client, fake_city):
+        fake_city.answers[PlanRequest] = PlanReply(junction="crossing", plan="calm", pending="busy")
+        body = {"plan": "busy", "by": "me", "reason": "rush hour"}
+        response = client("PUT", f"{API}/signals/crossing/plan", json=body)
+        assert response.json()["pending"] == "busy"
+        assert fake_city.asked == [
+            PlanRequest(junction="crossing", plan="busy", by="me", reason="rush hour")
+        ]
+
+    def test_a_fault_is_cleared_only_with_a_reason(self, client, fake_city):
+        path = f"{API}/signals/crossing/monitor/reset"
+        is_problem(client("POST", path, json={"reason": ""}), 422, "invalid")
+        fake_city.answers[MonitorReset] = MonitorStatus(
+            junction="crossing", t_ns=1, fault=None, since_ns=1
+        )
+        response = client("POST", path, json={"by": "me", "reason": "bulb replaced"})
+        assert response.json()["fault"] is None
+        assert fake_city.asked == [
+            MonitorReset(junction="crossing", by="me", reason="bulb replaced")
+        ]
+
+
+class TestStop:
+    def test_before_the_world_speaks_the_stop_is_released(self, client):
+        assert client("GET", f"{API}/stop").json()["engaged"] is False
+
+    def test_the_stop_the_world_told_is_shown(self, client, hear):
+        hear(1.0, CityStop(t_ns=1, engaged=True, by="me", reason="smoke"))
+        body = client("GET", f"{API}/stop").json()
+        assert (body["engaged"], body["by"], body["reason"]) == (True, "me", "smoke")
+
+    @pytest.mark.parametrize("engaged", [True, False])
+    def test_the_stop_is_set_to_what_is_wished(self, client, fake_city, engaged):
+        fake_city.answers[StopRequest] = CityStop(t_ns=1, engaged=engaged)
+        body = {"engaged": engaged, "by": "me"}
+        assert client("PUT", f"{API}/stop", json=body).json()["engaged"] is engaged
+        assert fake_city.asked == [StopRequest(engaged=engaged, by="me")]
+
+
+class TestEvents:
+    def test_pages_follow_each_other_without_gap_or_repeat(self, client, hear, event):
+        hear(1.0, *(event(str(number)) for number in range(1, 8)))
+        seen, path = [], f"{API}/events?limit=3"
+        while path:
+            response = client("GET", path)
+            seen += [item["seq"] for item in response.json()["events"]]
+            path = response.links.get("next", {}).get("url")
+        assert seen == [1, 2, 3, 4, 5, 6, 7]
+
+    def test_a_page_at_the_end_says_where_to_go_on_later(self, client, hear, event):
+        hear(1.0, event("one"))
+        body = client("GET", f"{API}/events?after=1").json()
+        assert body == {"events": [], "next_after": 1, "more": False}
+
+    @pytest.mark.parametrize("query", ["limit=0", "limit=501", "after=-1", "after=x"])
+    def test_a_wrong_page_is_refused(self, client, query):
+        is_problem(client("GET", f"{API}/events?{query}"), 422, "invalid")
+
+
+class TestMap:
+    def test_the_map_as_json_reads_back_as_the_map(self, client, city_map):
+        body = client("GET", f"{API}/map").content
+        assert msgspec.json.decode(body, type=CityMap) == city_map
+
+    def test_the_map_is_drawn_in_metres(self, client):
+        response = client("GET", f"{API}/map.svg")
+        assert response.headers["content-type"] == "image/svg+xml"
+        assert response.text.startswith("<svg")
+        assert "viewBox" in response.text
+
+    def test_a_map_already_known_is_not_sent_again(self, client):
+        etag = client("GET", f"{API}/map").headers["etag"]
+        again = client("GET", f"{API}/map", headers={"If-None-Match": etag})
+        assert (again.status_code, again.content) == (304, b"")
+
+
+class TestEye:
+    def test_a_frame_is_the_jpeg_that_came(self, client, hear):
+        hear(1.0, EyeFrame(camera="overhead", t_ns=7, width_px=4, height_px=3, payload=b"jpeg"))
+        response = client("GET", f"{API}/eye/overhead/frame.jpg")
+        assert response.content == b"jpeg"
+        assert response.headers["content-type"] == "image/jpeg"
+        assert response.headers["x-time-ns"] == "7"
+        (camera,) = client("GET", f"{API}/eye").json()["cameras"]
+        assert camera["frame_t_ns"] == "7"
+
+    def test_tags_are_those_that_came(self, client, hear):
+        hear(1.0, EyeTags(camera="overhead", t_ns=7, tags=(), latency_ms=20.0))
+        assert client("GET", f"{API}/eye/overhead/tags").json()["latency_ms"] == 20.0
+
+    @pytest.mark.parametrize("what", ["frame.jpg", "tags"])
+    def test_a_camera_never_heard_is_not_found(self, client, what):
+        is_problem(client("GET", f"{API}/eye/overhead/{what}"), 404, "not_found")
+
+
+class TestRest:
+    def test_stations_are_listed(self, client, hear):
+        hear(1.0, Presence(role="part", station="world", session="s", alive=True))
+        (row,) = client("GET", f"{API}/stations").json()["stations"]
+        assert (row["name"], row["alive"], row["lost_ns"]) == ("world", True, None)
+
+    def test_the_server_is_healthy_at_once_and_ready_with_a_fresh_snapshot(
+        self, client, hear, snapshot
+    ):
+        assert client("GET", "/healthz").status_code == 200
+        is_problem(client("GET", "/readyz"), 503, "not_ready")
+        hear(1.0, snapshot())
+        assert client("GET", "/readyz").status_code == 200
+        hear(3.5)
+        is_problem(client("GET", "/readyz"), 503, "not_ready")
+
+    def test_every_route_is_described(self, client):
+        paths = client("GET", f"{API}/openapi.json").json()["paths"]
+        assert {"/api/v1/cars", "/api/v1/stop", "/api/v1/stream", "/readyz"} <= set(paths)
+        for methods in paths.values():
+            assert all(route["summary"] for route in methods.values())

@@ -1,0 +1,97 @@
+import json
+import socket
+import threading
+from contextlib import contextmanager
+
+import httpx
+import pytest
+
+from scm.api.app import create_app
+from scm.api.server import serve
+from scm.clock import NS_PER_S, WallClock
+from scm.errors import RunError
+
+
+@contextmanager
+def served(app):
+    ready, stop, urls = threading.Event(), threading.Event(), []
+
+    def note(url):
+        urls.append(url)
+        ready.set()
+
+    thread = threading.Thread(
+        target=serve,
+        args=(
+            app,
+            "127.0.0.1",
+            0,
+            stop,
+        ),
+        kwargs={"on_ready": note},
+    )
+    thread.start()
+    try:
+        assert ready.wait(10.0)
+        yield urls[0], stop, thread
+    finally:
+        stop.set()
+        thread.join(10.0)
+
+
+def events_of(response):
+    fields = {}
+    for line in response.iter_lines():
+        if line:
+            name, _, value = line.partition(": ")
+            fields[name] = value
+        elif "event" in fields:
+            yield fields["event"], json.loads(fields["data"])
+            fields = {}
+
+
+def test_a_page_over_a_real_socket_gets_a_snapshot_and_then_deltas(app, hear, snapshot):
+    with served(app) as (url, _, _), httpx.stream("GET", f"{url}/api/v1/stream") as response:
+        assert response.headers["content-type"].startswith("text/event-stream")
+        events = events_of(response)
+        assert next(events)[0] == "snapshot"
+        hear(1.0, snapshot(n1=(0.5, 0.0, 0.0)))
+        for name, body in events:
+            assert name == "delta"
+            if "cars" in body and body["cars"]["cars"]:
+                break
+        assert body["cars"]["cars"][0]["x_m"] == 0.5
+
+
+def test_it_stops_within_a_second_even_while_a_page_listens(app):
+    clock = WallClock()
+    with (
+        served(app) as (url, stop, thread),
+        httpx.stream("GET", f"{url}/api/v1/stream") as response,
+    ):
+        next(response.iter_raw())
+        began_ns = clock.now_ns()
+        stop.set()
+        thread.join(5.0)
+        assert not thread.is_alive()
+        assert clock.now_ns() - began_ns < NS_PER_S
+
+
+def test_a_taken_address_is_said_so(app):
+    with socket.socket() as holder:
+        holder.bind(("127.0.0.1", 0))
+        holder.listen()
+        port = holder.getsockname()[1]
+        with pytest.raises(RunError, match=f"127.0.0.1:{port}"):
+            serve(app, "127.0.0.1", port, threading.Event())
+
+
+def test_a_public_address_is_not_bound_without_a_key(app):
+    with pytest.raises(RunError, match="API key"):
+        serve(app, "0.0.0.0", 0, threading.Event())
+
+
+def test_a_server_told_to_stop_before_it_began_returns(view, fake_city, city_map):
+    stop = threading.Event()
+    stop.set()
+    serve(create_app(view, fake_city.ask, city_map), "127.0.0.1", 0, stop)
