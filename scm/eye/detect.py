@@ -21,9 +21,9 @@ from scm.v2x.messages.eye_tags import TagSeen
 PIXEL_ORIGIN_PX = 0.5
 """The library puts the first pixel's centre at (0.5, 0.5); we, as OpenCV, at (0, 0)."""
 
-CORNER_STD_PX = 0.04
+CORNER_STD_PX = 0.037
 """Standard deviation of each corner coordinate, measured on rendered tags of 30 to 33 px at 2 grey
-levels of sensor noise; a little is added for corners that share an edge."""
+levels of sensor noise."""
 CUT_MARGIN = 0.4
 """Of a cut-out around a tag, in parts of the tag's larger side."""
 
