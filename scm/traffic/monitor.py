@@ -97,7 +97,7 @@ class Monitor:
         if self._is_new and self.fault == "stale":
             self.fault, self.detail, self.since_ns = None, "", arrived_ns
         self._is_new = False
-        if self.fault is not None or spat.t_ns == self._stamp_ns:
+        if spat.t_ns == self._stamp_ns:
             return
         self._judge_clock(spat.t_ns, arrived_ns)
         self._judge_sample(spat, arrived_ns)

@@ -119,6 +119,14 @@ def test_a_frozen_controller_goes_on_later_with_every_time_kept():
 def test_a_green_that_started_late_keeps_its_least_time():
     controller = Controller("x", CROSSING, "brisk")
     list(run(controller, 47))
-    controller.step(49 * S + S // 2)
-    spat = controller.spat(49 * S + S // 2)
-    assert spat.groups[0].min_end_ns - spat.t_ns >= 29 * S
+    controller.step(49 * S)
+    assert controller.late_steps == 0
+    assert controller.spat(49 * S).groups[0].min_end_ns == (49 + 29) * S
+
+
+def test_a_red_promise_narrows_when_the_next_cycle_has_begun():
+    controller = Controller("x", CROSSING, "brisk")
+    spats = list(run(controller, 60))
+    wide, narrow = spats[0].groups[1], spats[50].groups[1]
+    assert wide.min_end_ns == narrow.min_end_ns
+    assert wide.max_end_ns > narrow.max_end_ns == narrow.min_end_ns + 2 * S

@@ -1,5 +1,6 @@
 """Every fault is injected into a stream of signal phases, and found; a healthy stream is not."""
 
+import msgspec
 import pytest
 
 from scm.clock import NS_PER_MS
@@ -34,8 +35,8 @@ def stream(a, b):
             yield None
 
 
-def watch(samples, offset_ms=0):
-    monitor = Monitor(CARD, offset_ms * MS)
+def watch(samples, offset_ms=0, card=CARD):
+    monitor = Monitor(card, offset_ms * MS)
     for k, sample in enumerate(samples):
         now_ns = (100 * k + offset_ms) * MS
         if sample is not None:
@@ -99,6 +100,25 @@ def test_the_other_group_is_watched_as_well():
     assert watch(stream(b, a)).fault == "short_clearance"
 
 
+def test_a_group_that_joins_one_that_goes_is_a_conflict():
+    assert watch(stream("rgggggg", "rrrrrgg")).fault == "conflict"
+    assert watch(stream("rrrrrgg", "rgggggg")).fault == "conflict"
+
+
+def test_a_time_that_is_just_long_enough_is_no_fault():
+    assert watch(stream("r" + "g" * 9 + "y", "r" * 11)).fault is None
+    assert watch(stream("r" + "g" * 8 + "y", "r" * 10)).fault == "short_green"
+
+
+def test_clearance_is_that_of_the_group_that_went_before():
+    slow, quick = CARD.groups[0], msgspec.structs.replace(CARD.groups[1], clearance_ns=500 * MS)
+    card = msgspec.structs.replace(CARD, groups=(slow, quick))
+    after_quick = stream(shown(("r", 24), ("g", 1)), shown(("g", 12), ("y", 6), ("r", 7)))
+    after_slow = stream(shown(("g", 12), ("y", 6), ("r", 7)), shown(("r", 24), ("g", 1)))
+    assert watch(after_quick, card=card).fault is None
+    assert watch(after_slow, card=card).fault == "short_clearance"
+
+
 def test_flash_needs_no_yellow_but_green_after_flash_needs_all_red_first():
     a = shown(("r", 2), ("g", 12), ("f", 10), ("r", 30), ("g", 1))
     b = shown(("r", 14), ("f", 10), ("r", 31))
@@ -121,9 +141,9 @@ def test_a_suspicion_is_forgotten_after_666_ms_without():
 
 
 def test_two_colours_for_one_group_are_dual_and_a_missing_group_is_dark():
-    dual = [spat(100 * k, ("a", "r"), ("a", "g"), ("b", "r")) for k in range(2)]
+    dual = [spat(100 * k, ("a", "r"), ("a", "y"), ("b", "r")) for k in range(1, 3)]
     missing = [spat(100 * k, ("a", "r")) for k in range(2)]
-    assert watch(dual).fault == "dual"
+    assert watch([spat(0, ("a", "r"), ("b", "r")), *dual]).fault == "dual"
     assert watch(missing).fault == "dark"
 
 
@@ -163,8 +183,9 @@ def test_time_stamps_that_run_ahead_are_a_clock_jump_and_late_arrival_is_not():
     ahead = [*stream("rrr", "rrr"), spat(900, ("a", "r"), ("b", "r"))]
     assert watch(ahead).fault == "clock_jump"
     monitor = watch(stream("rrr", "rrr"), offset_ms=10_000)
-    for k in range(3, 8):
-        monitor.see(spat(100 * k, ("a", "r"), ("b", "r")), (10_800 + k) * MS)
+    for k in range(3, 12):
+        monitor.see(spat(100 * k, ("a", "r"), ("b", "r")), (11_200 + k) * MS)
+    monitor.see(spat(1300, ("a", "r"), ("b", "r")), 11_300 * MS)
     assert monitor.fault is None
 
 
@@ -178,7 +199,8 @@ def test_a_fault_stays_with_its_first_name_until_reset_and_is_found_again():
     bad = list(stream("rrgg", "rrgg"))
     monitor = watch([*bad, *stream("rrrrrrrr", "rrrrrrrr")][:10])
     assert (monitor.fault, monitor.since_ns) == ("conflict", 300 * MS)
-    monitor.tick(60_000 * MS)
+    for t_ms in (60_000, 60_050):
+        monitor.tick(t_ms * MS)
     assert monitor.fault == "conflict"
     monitor.reset(2000 * MS)
     assert (monitor.fault, monitor.detail, monitor.since_ns) == (None, "", 2000 * MS)
