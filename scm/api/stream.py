@@ -183,5 +183,5 @@ class Stream:
         return head.encode() + encode(body) + b"\n\n"
 
     def _resume_seq(self, last_event_id: str) -> int | None:
-        run_id, _, seq = (last_event_id.split("-") + ["", ""])[:3]
+        run_id, _, seq = [*last_event_id.split("-"), "", ""][:3]
         return int(seq) if run_id == self._run_id and seq.isascii() and seq.isdigit() else None

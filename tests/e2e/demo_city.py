@@ -57,6 +57,7 @@ class DemoCity:
         self.stopped = None
         self.plan = "calm"
         self.fault = None
+        self.ask_refuses = ""
         self.tick = 0
         self.clock = WallClock()
         self._lock = threading.Lock()
@@ -94,6 +95,8 @@ class DemoCity:
 
     def ask(self, request, timeout_s):
         now_ns = self.clock.now_ns()
+        if self.ask_refuses:
+            return Refused(code="owned", detail=self.ask_refuses)
         if isinstance(request, StopRequest):
             self.stopped = request if request.engaged else None
             text = f"city stop {'engaged' if request.engaged else 'released'} by {request.by}"

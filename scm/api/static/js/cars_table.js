@@ -1,11 +1,16 @@
 /** The cars as a table: who, whose, how fast, how fresh, how far, and what holds them. */
+import { signal } from "@preact/signals";
 import { html } from "./html.js";
 import { change } from "./api.js";
+import { Dialog } from "./dialog.js";
 import { age, fixed, UNKNOWN } from "./format.js";
 import { selected } from "./selection.js";
 import { world } from "./store.js";
 
 const STALE_MS = 500;
+
+/** Name of the car that somebody may want to take away; null: none. */
+const removing = signal(null);
 
 export function CarsTable() {
   const cars = world.value.cars;
@@ -29,6 +34,7 @@ export function CarsTable() {
         </table>
         ${!cars.length && html`<p class="empty">No car is on the map.</p>`}
       </div>
+      ${removing.value && html`<${RemoveDialog} name=${removing.value} />`}
     </section>
   `;
 }
@@ -36,8 +42,6 @@ export function CarsTable() {
 function Car({ car }) {
   const chosen = selected.value === car.vehicle;
   const choose = () => (selected.value = chosen ? null : car.vehicle);
-  const remove = () =>
-    change("DELETE", `/cars/${car.vehicle}?reason=dashboard`, undefined, () => `${car.vehicle} is gone.`);
   const mode = car.alive ? car.mode : "lost";
   return html`
     <tr data-car=${car.vehicle} data-alive=${car.alive} class=${chosen ? "chosen" : ""}>
@@ -52,9 +56,25 @@ function Car({ car }) {
       <td><${Trip} trip=${car.trip} /></td>
       <td>${car.trip?.waiting_for ?? ""}</td>
       <td>
-        <button class="plain" title="Take ${car.vehicle} off the map" aria-label="Take ${car.vehicle} off the map" onClick=${remove}>✕</button>
+        <button class="plain" title="Take ${car.vehicle} off the map" aria-label="Take ${car.vehicle} off the map" onClick=${() => (removing.value = car.vehicle)}>✕</button>
       </td>
     </tr>
+  `;
+}
+
+function RemoveDialog({ name }) {
+  const close = () => (removing.value = null);
+  const remove = () => {
+    close();
+    change("DELETE", `/cars/${name}?reason=dashboard`, undefined, () => `${name} is off the map.`);
+  };
+  return html`
+    <${Dialog} title="Take ${name} off the map?" onClose=${close}>
+      <div class="actions">
+        <button onClick=${close}>Cancel</button>
+        <button class="danger" data-first onClick=${remove}>Take it off</button>
+      </div>
+    <//>
   `;
 }
 

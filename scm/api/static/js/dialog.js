@@ -1,10 +1,10 @@
 /** A modal question over the page: Escape and a click beside it mean no. What has `data-first` gets the focus. */
-import { useEffect, useRef } from "preact/hooks";
+import { useLayoutEffect, useRef } from "preact/hooks";
 import { html } from "./html.js";
 
 export function Dialog({ title, onClose, children }) {
   const dialog = useRef(null);
-  useEffect(() => {
+  useLayoutEffect(() => {
     dialog.current.showModal();
     dialog.current.querySelector("[data-first]")?.focus();
   }, []);
