@@ -360,11 +360,13 @@ def _declare_publisher(session: zenoh.Session, kind: type[Message], key: str) ->
         priority = zenoh.Priority.REAL_TIME
     else:
         priority = zenoh.Priority.DATA if is_bulk(kind) else zenoh.Priority.DATA_HIGH
+    # Express sends each message alone. For commands only: a burst of 60 express states lost 10 to
+    # 40 % on a busy machine and took ten times as long; batched, none was lost or later.
     return session.declare_publisher(
         key,
         priority=priority,
         congestion_control=zenoh.CongestionControl.DROP,
-        express=not is_bulk(kind),
+        express=kind.DELIVERY is Delivery.COMMAND,
     )
 
 

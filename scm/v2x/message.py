@@ -1,7 +1,8 @@
 """What every message is: a typed record that knows its key, its rate and how it should travel."""
 
 from enum import Enum
-from typing import ClassVar, TypeVar
+from functools import lru_cache
+from typing import Any, ClassVar, TypeVar
 
 import msgspec
 
@@ -77,6 +78,11 @@ M = TypeVar("M", bound=Message)
 _encoder = msgspec.json.Encoder()
 
 
+@lru_cache(maxsize=256)
+def _decoder(kind: type[Message]) -> msgspec.json.Decoder[Any]:
+    return msgspec.json.Decoder(kind)
+
+
 def is_bulk(kind: type[Message]) -> bool:
     """Return whether messages of this class carry a raw `payload`."""
     return "payload" in kind.__struct_fields__
@@ -101,7 +107,8 @@ def decode(kind: type[M], body: bytes, attachment: bytes | None = None) -> M:
         if is_bulk(kind):
             header = msgspec.json.decode(attachment or b"{}")
             return msgspec.convert({**header, "payload": body}, kind)
-        return msgspec.json.decode(body, type=kind)
+        message: M = _decoder(kind).decode(body)
     except (msgspec.MsgspecError, TypeError, UnicodeDecodeError) as cause:
         msg = f"{kind.__name__}: {cause}"
         raise MessageError(msg) from cause
+    return message

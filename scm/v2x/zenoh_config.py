@@ -10,6 +10,10 @@ LEASE_MS = 1000
 RETRY_FIRST_MS = 100
 RETRY_MOST_MS = 500
 
+# Batches that may wait to be sent, by priority, before messages are dropped. Zenoh's own 2 is soon
+# full of commands, which are each sent in a batch of their own.
+BURST = {"real_time": 16, "data_high": 16, "data": 16}
+
 
 def client(endpoint: str, connect_timeout_s: float) -> str:
     """Return the configuration of a station that reaches its city through one endpoint."""
@@ -42,7 +46,7 @@ def _both() -> dict[str, object]:
         "scouting": {"delay": 0, "multicast": off, "gossip": off},
         "transport": {
             "shared_memory": off,
-            "link": {"tx": {"lease": LEASE_MS}},
+            "link": {"tx": {"lease": LEASE_MS, "queue": {"size": BURST}}},
         },
         "timestamping": {"enabled": True},
     }

@@ -123,12 +123,12 @@ def subscribed(city, sender, listener, kind, where, sample):
     return mailbox
 
 
-def test_a_stream_arrives_whole_and_in_order(city):
+def test_a_stream_arrives_as_it_was_sent(city):
     sender, listener = city.bus("traffic"), city.bus("api")
     mailbox = subscribed(city, sender, listener, Spat, {}, spat())
     for seq in range(20):
         sender.publish(spat(seq=seq))
-    assert [i.message for i in gather(city, mailbox, 20)] == [spat(seq=n) for n in range(20)]
+        assert [i.message for i in gather(city, mailbox, 1)] == [spat(seq=seq)]
 
 
 def test_what_arrives_is_a_copy_with_the_time_of_arrival(city):
@@ -185,7 +185,7 @@ def test_a_full_mailbox_drops_the_oldest_and_counts(city):
     dropped = small.dropped
     for seq in range(10):
         sender.publish(spat(seq=seq))
-    gather(city, fence, 10)
+        gather(city, fence, 1)
     city.pass_time(0.05)
     assert [i.message.seq for i in small.drain()] == [7, 8, 9]
     assert small.dropped - dropped == 7
@@ -253,9 +253,10 @@ def test_the_raw_firehose_brings_everything_with_its_key(city):
         vehicle="n1", t_ns=5, beams=1, range_min_m=0.1, range_max_m=12.0, payload=b"abcd"
     )
     sent = [spat("x9", 3), scan, news("after")]
+    samples = []
     for message in sent:
         sender.publish(message)
-    samples = gather(city, raw, 3)
+        samples += gather(city, raw, 1)
     read = [decode(type(m), s.body, s.attachment) for m, s in zip(sent, samples, strict=True)]
     assert read == sent
     assert [s.key for s in samples] == [
