@@ -64,12 +64,12 @@ def _join(arguments: argparse.Namespace) -> int:
 
     check_name(arguments.name, "--name")
     check_name(arguments.city, "--city")
-    stop = stop_on_signal()
-    with ZenohBus(arguments.city, arguments.name, arguments.connect) as bus:
+    stop, clock = stop_on_signal(), WallClock()
+    with ZenohBus(arguments.city, arguments.name, arguments.connect, clock=clock) as bus:
         part = AgentPart(
             arguments.name, arguments.car, arguments.spawn, bus.session, arguments.seed
         )
-        run(part, bus, WallClock(), stop)
+        run(part, bus, clock, stop)
     return 0
 
 

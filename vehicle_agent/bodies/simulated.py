@@ -104,11 +104,14 @@ class _Device:
     def __init__(self, name: str, fleet: Fleet, generator: np.random.Generator) -> None:
         self._sensor = registry.load(SENSORS, name, "SENSOR", Sensor)
         self._fleet = fleet
-        self._sampler = Sampler(self._sensor.facts(fleet.car), generator)
+        fitted = self._sensor.is_fitted(fleet.car)
+        self._sampler = Sampler(self._sensor.facts(fleet.car), generator) if fitted else None
         self.newest: tuple[float, ...] = ()
 
     def read(self, now_ns: int) -> bool:
         """Take a reading if one is due; return whether there is a new one."""
+        if self._sampler is None:
+            return False
         if self._sampler.is_due(now_ns):
             rows = np.flatnonzero(self._fleet.alive)
             exact = self._sensor.measure(self._fleet.car, self._fleet, rows, None)

@@ -1,0 +1,71 @@
+"""The cars around, as their CAMs tell."""
+
+import math
+
+import pytest
+
+from scm.clock import NS_PER_S
+from scm.v2x.etsi_convert import cam_of
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.vehicles.drivers.heard import HeardCars
+
+
+def cam(name="n1", x_m=1.0, y_m=2.0, yaw_rad=math.pi / 2, speed_mps=0.2, yaw_rate_radps=0.0):
+    state = VehicleState(
+        vehicle=name,
+        t_ns=0,
+        seq=1,
+        x_m=x_m,
+        y_m=y_m,
+        yaw_rad=yaw_rad,
+        speed_mps=speed_mps,
+        yaw_rate_radps=yaw_rate_radps,
+        steering_rad=0.0,
+        throttle=0.0,
+        source="simulated",
+    )
+    return cam_of(state, length_m=0.30, width_m=0.175, front_m=0.23)
+
+
+def test_a_car_is_where_its_middle_is():
+    cars = HeardCars()
+    cars.hear(cam(), 0)
+    (other,) = cars.others(0)
+    assert (other.x, other.y) == (pytest.approx(1.0, abs=2e-3), pytest.approx(2.08, abs=2e-3))
+    assert other.yaw == pytest.approx(math.pi / 2, abs=2e-3)
+
+
+def test_it_is_moved_on_at_its_last_speed_for_a_second_at_most():
+    cars = HeardCars()
+    cars.hear(cam(), 0)
+    assert cars.others(NS_PER_S // 2)[0].y == pytest.approx(2.18, abs=3e-3)
+    assert cars.others(2 * NS_PER_S)[0].y == pytest.approx(2.28, abs=3e-3)
+
+
+def test_it_is_turned_on_at_its_last_yaw_rate():
+    cars = HeardCars()
+    cars.hear(cam(yaw_rate_radps=0.4), 0)
+    assert cars.others(NS_PER_S // 2)[0].yaw == pytest.approx(math.pi / 2 + 0.2, abs=3e-3)
+
+
+def test_a_newer_cam_replaces_the_older():
+    cars = HeardCars()
+    cars.hear(cam(), 0)
+    cars.hear(cam(x_m=3.0), 10)
+    (other,) = cars.others(10)
+    assert other.x == pytest.approx(3.0, abs=2e-3)
+
+
+def test_a_silent_car_is_forgotten_after_three_seconds():
+    cars = HeardCars()
+    cars.hear(cam(), 0)
+    assert len(cars.others(3 * NS_PER_S)) == 1
+    assert cars.others(3 * NS_PER_S + 1) == ()
+
+
+def test_the_order_does_not_depend_on_who_spoke_first():
+    first, second = HeardCars(), HeardCars()
+    for cars, names in ((first, ("n1", "n2")), (second, ("n2", "n1"))):
+        for name in names:
+            cars.hear(cam(name), 0)
+    assert first.others(0) == second.others(0)

@@ -1,0 +1,110 @@
+"""Errands of a car: route requests in, progress out."""
+
+import pytest
+
+from scm.clock import NS_PER_MS
+from scm.errors import MapError
+from scm.geometry import Pose2
+from scm.maps.load import load_map
+from scm.maps.route import Roads
+from scm.v2x.messages.route_request import RouteRequest
+from scm.vehicles.driver import CarLimits, RouteView
+from scm.vehicles.drivers.trips import Trips
+from scm.vehicles.signal_view import SignalView
+
+LIMITS = CarLimits(0.14154, 0.5236, 0.42, 0.23, 0.07, 0.175, speeds=(0.13, 0.27))
+
+
+@pytest.fixture(scope="module")
+def city_map():
+    return load_map("driving_school")
+
+
+@pytest.fixture(scope="module")
+def roads(city_map):
+    return Roads(city_map)
+
+
+@pytest.fixture
+def start(roads):
+    return roads.lane("east_loop").at(0.5)
+
+
+@pytest.fixture
+def trips(roads, start):
+    return Trips("n7", roads, LIMITS, start, 0)
+
+
+@pytest.fixture
+def view(city_map):
+    signals = SignalView(city_map)
+
+    def make(pose, now_ms=20):
+        return RouteView(now_ms * NS_PER_MS, pose, 0.0, signals)
+
+    return make
+
+
+def test_a_car_circulates_without_end_at_first(trips, view, start):
+    trips.decide(view(start))
+    (trip,) = trips.reports(20 * NS_PER_MS)
+    assert trip.route[0] == "east_loop"
+    assert trip.length_m is None
+    assert trip.arrived_ns is None
+
+
+def test_reports_come_twice_a_second(trips, view, start):
+    trips.decide(view(start))
+    times = [t for t in range(0, 2000, 20) if trips.reports(t * NS_PER_MS)]
+    assert times == [0, 500, 1000, 1500]
+
+
+def test_a_request_is_answered_with_the_lanes_between_filled_in(trips, start):
+    request = RouteRequest(vehicle="n7", via=("west_loop",), request_id="r1")
+    reply = trips.begin(request, start, 0)
+    assert reply.route == ("east_loop", "crossing_south_west", "west_loop")
+    assert reply.trip_id == "r1"
+
+
+def test_the_length_of_a_trip_counts_from_where_the_car_is(trips, roads, start):
+    reply = trips.begin(RouteRequest(vehicle="n7", via=("east_loop",)), start, 0)
+    assert reply.length_m == pytest.approx(roads.lane("east_loop").length_m - 0.5, abs=0.01)
+
+
+def test_a_trip_without_lanes_has_no_end(trips, start):
+    assert trips.begin(RouteRequest(vehicle="n7"), start, 0).length_m is None
+
+
+def test_two_trips_have_two_ids(trips, start):
+    ids = {trips.begin(RouteRequest(vehicle="n7"), start, 0).trip_id for _ in range(3)}
+    assert len(ids) == 3
+
+
+def test_an_impossible_trip_is_refused_and_changes_nothing(trips, start):
+    driver_path = trips.driver.path
+    with pytest.raises(MapError, match="nowhere"):
+        trips.begin(RouteRequest(vehicle="n7", via=("nowhere",)), start, 0)
+    assert trips.driver.path is driver_path
+
+
+def test_a_car_beside_all_lanes_cannot_begin(roads):
+    with pytest.raises(MapError, match="n7"):
+        Trips("n7", roads, LIMITS, Pose2(50.0, 50.0, 0.0), 0)
+
+
+@pytest.mark.parametrize("then", ["stop", "circulate"])
+def test_the_arrival_is_told_once_at_once(trips, view, roads, start, then):
+    request = RouteRequest(vehicle="n7", via=("east_loop",), request_id="r1", then=then)
+    trips.begin(request, start, 0)
+    trips.decide(view(start))
+    trips.reports(0)
+    lane = roads.lane("east_loop")
+    for s in (1.5, 2.0, lane.length_m - 0.005, lane.length_m - 0.001):
+        trips.decide(view(lane.at(s), 40))
+    told = trips.reports(40 * NS_PER_MS)
+    ends = [trip for trip in told if trip.arrived_ns is not None]
+    assert [trip.trip_id for trip in ends] == ["r1"]
+    assert ends[0].done_m == pytest.approx(lane.length_m - 0.5, abs=0.02)
+    assert [trip.trip_id for trip in told if trip.arrived_ns is None] == (
+        ["n7-3"] if then == "circulate" else []
+    )
