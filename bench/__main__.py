@@ -1,0 +1,18 @@
+"""`make bench`: every benchmark, each number beside a peer or a limit measured in the same run."""
+
+import importlib
+import sys
+
+BENCHMARKS = ("kernel", "world", "bus", "eye")
+
+
+def main(names: list[str]) -> None:
+    """Run the named benchmarks, or all of them."""
+    for name in names or BENCHMARKS:
+        module = importlib.import_module(f"bench.{name}")
+        print(f"\n## {name}: {(module.__doc__ or '').partition(chr(10))[0]}\n", flush=True)
+        module.main()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

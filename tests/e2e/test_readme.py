@@ -1,0 +1,122 @@
+"""Every command in README is run here, against a city on free ports; a new one fails until it is."""
+
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from scm.recorder.mcap_file import RunFile
+from scm.v2x.exchange import RawSample
+from tests.e2e.city_process import CityProcess, city, wait_for
+
+README = Path(__file__).parents[2] / "README.md"
+BIN = Path(sys.executable).parent
+LONG = {  # commands that run until they are stopped, or run this very test: checked by other means
+    "make run": "make -n run",
+    "make test": "make -n test",
+    "make bench": "make -n bench",
+}
+
+
+def commands() -> list[str]:
+    """Return the shell lines of README's fenced blocks, comments taken off."""
+    blocks = re.findall(r"```sh\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    lines = [line.partition("  #")[0].strip() for block in blocks for line in block.splitlines()]
+    return [line for line in lines if line]
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
+    """One city that the README's commands talk to."""
+    with city(tmp_path_factory.mktemp("runs"), "--agents", "0", "--hosted", "1") as process:
+        yield process
+
+
+@pytest.fixture
+def workplace(tmp_path: Path, root: Path) -> Path:
+    """A folder that looks like the project's, so that commands leave nothing behind in it."""
+    for name in ("examples", "recordings", "maps", "Makefile", "pyproject.toml"):
+        (tmp_path / name).symlink_to(root / name)
+    (tmp_path / ".venv").mkdir()
+    (tmp_path / ".venv/bin").symlink_to(BIN)
+    (tmp_path / "runs").mkdir()
+    with RunFile(tmp_path / "runs/today.mcap", "city") as run:
+        run.write(RawSample("scm/@v1/city/part/eye/status", b"{}", None, 1))
+    return tmp_path
+
+
+def here(command: str, running: CityProcess, root: Path) -> str:
+    """Return a README command that talks to the test's city and the real data's folder."""
+    command = command.replace("tcp/127.0.0.1:7447", running.endpoint)
+    command = command.replace("http://127.0.0.1:8000", running.url)
+    command = command.replace("../shared", str(root.parent / "shared"))
+    return f"{command} --connect {running.endpoint}" if command.endswith("--live") else command
+
+
+@pytest.mark.parametrize("command", commands())
+def test_readme_command_works(
+    command: str, running: CityProcess, workplace: Path, root: Path
+) -> None:
+    if "../shared" in command and not (root.parent / "shared").is_dir():
+        pytest.skip("../shared is not here: it holds other people's data")
+    if command in LONG:
+        assert run(LONG[command], root).returncode == 0
+        return
+    check: Callable[[str, CityProcess, Path], None] = joins if " join " in command else ends_well
+    check(here(command, running, root), running, workplace)
+
+
+def ends_well(command: str, running: CityProcess, workplace: Path) -> None:
+    """The command ends by itself, with success and something to read."""
+    del running
+    done = run(command, workplace)
+    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+    assert done.stdout.strip(), command
+    assert '"status":4' not in done.stdout.replace(" ", ""), done.stdout
+
+
+def joins(command: str, running: CityProcess, workplace: Path) -> None:
+    """The agent's car appears on the map while the command runs."""
+    agent = subprocess.Popen(command, shell=True, cwd=workplace, start_new_session=True)
+    try:
+        name = command.partition("--name ")[2].split()[0]
+
+        def there() -> bool:
+            return name in {row["vehicle"] for row in running.get("/cars")["cars"]}
+
+        wait_for(there, 40.0, f"{name} is on the map")
+    finally:
+        subprocess.run(["pkill", "-INT", "-g", str(agent.pid)], check=False)
+        agent.wait(timeout=5.0)
+
+
+def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a shell line in a folder."""
+    return subprocess.run(
+        command, shell=True, cwd=folder, capture_output=True, text=True, timeout=280.0, check=False
+    )
+
+
+def test_every_example_is_in_the_readme(root: Path) -> None:
+    text = README.read_text(encoding="utf-8")
+    assert all(path.name in text for path in (root / "examples").glob("*.py"))
+
+
+def test_the_readme_is_short_and_its_links_lead_somewhere(root: Path) -> None:
+    text = README.read_text(encoding="utf-8")
+    assert text.count("\n") < 200
+    for target in re.findall(r"\]\(([^)#]+)\)", text):
+        assert target.startswith("http") or (root / target).exists(), target
+
+
+def test_the_lockstep_example_is_faster_than_real_time(workplace: Path) -> None:
+    began = time.monotonic()
+    done = run(".venv/bin/python examples/travel_times.py", workplace)
+    elapsed = time.monotonic() - began
+    found = re.search(r"(\d+) s of city", done.stdout)
+    assert found, done.stdout + done.stderr
+    assert float(found.group(1)) > elapsed
