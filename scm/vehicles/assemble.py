@@ -15,8 +15,8 @@ from scm.vehicles.term import Law, Term, reads
 
 _FRAME = "wheel frame"  # the skeleton's own node: needs wheel_steer, gives v_long and v_lat
 _FRAME_LINES = (
-    "cos_steer = math.cos(wheel_steer)",
-    "sin_steer = math.sin(wheel_steer)",
+    "cos_steer = math.cos(wheel_steer) if wheel_steer != 0.0 else 1.0",
+    "sin_steer = math.sin(wheel_steer) if wheel_steer != 0.0 else 0.0",
     "v_long = cos_steer * over_x + sin_steer * over_y",
     "v_lat = cos_steer * over_y - sin_steer * over_x",
 )

@@ -47,7 +47,7 @@ class Fleet:
             point is fixed to the leaning body at floor height: a stopped car that still rocks on
             its springs has stopped.
         speed, lateral_speed: Velocity of the rear axle along and across the body [m/s].
-        yaw_rate: [rad/s].
+        roll_rate, pitch_rate, yaw_rate: [rad/s]; yaw_accel [rad/s^2].
         accel_x, accel_y: Acceleration of the centre of gravity, body frame, no gravity [m/s^2].
         steer_angle: Mean road-wheel angle, + left [rad].
         wheel_speed, wheel_angle, wheel_steer: Of each wheel, (capacity, 4) [rad/s, rad, rad].
@@ -73,7 +73,7 @@ class Fleet:
         self.battery = self._view("battery")
         for name in (
             "x", "y", "z", "roll", "pitch", "yaw", "speed", "lateral_speed", "yaw_rate",
-            "accel_x", "accel_y", "steer_angle",
+            "roll_rate", "pitch_rate", "accel_x", "accel_y", "yaw_accel", "steer_angle",
             "wheel_speed", "wheel_angle", "wheel_steer", "wheel_load",
         ):  # fmt: skip
             view = self._view(name)
@@ -90,8 +90,11 @@ class Fleet:
     speed: Floats
     lateral_speed: Floats
     yaw_rate: Floats
+    roll_rate: Floats
+    pitch_rate: Floats
     accel_x: Floats
     accel_y: Floats
+    yaw_accel: Floats
     steer_angle: Floats
     wheel_speed: Floats
     wheel_angle: Floats
@@ -183,6 +186,12 @@ class Fleet:
         names = ("x_cog", "y_cog", "yaw", "vx_world", "vy_world", "yaw_rate")
         x, y, yaw, vx, vy, rate = (float(self._block[row, self._slots[n][0]]) for n in names)
         return x, y, yaw, vx, vy, rate
+
+    def planar_cogs(self, rows: Ints) -> Floats:
+        """Return `planar_cog` of many rows at once, shape (n, 6)."""
+        names = ("x_cog", "y_cog", "yaw", "vx_world", "vy_world", "yaw_rate")
+        columns = [self._slots[name][0] for name in names]
+        return self._block[rows[:, None], columns]
 
     def push(
         self,

@@ -42,6 +42,7 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
 {load}
         accel_x = car[{accel_x}]
         accel_y = car[{accel_y}]
+        yaw_accel = car[{yaw_accel}]
         sprung_mass = mass - 4.0 * wheel_mass
         front_x = wheelbase - cog_to_rear_axle
         front_share = 0.5 * cog_to_rear_axle / wheelbase
@@ -143,6 +144,7 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
                 car[{wheel_angle} + w] += dt * spin
             accel_x = dvx / dt
             accel_y = dvy / dt
+            yaw_accel = dyaw_rate / dt
             vx_world += cos_yaw * dvx - sin_yaw * dvy
             vy_world += sin_yaw * dvx + cos_yaw * dvy
             vz += dvz
@@ -186,4 +188,5 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
         car[{lateral_speed}] = over_y
         car[{accel_x}] = accel_x
         car[{accel_y}] = accel_y
+        car[{yaw_accel}] = yaw_accel
 '''

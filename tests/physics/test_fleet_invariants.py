@@ -179,3 +179,16 @@ def test_a_diverged_car_freezes_and_the_others_go_on():
     assert np.isfinite(frozen).all()
     assert fleet.speed[0] == 0.0
     assert fleet.x[1] > 0.1
+
+
+def test_a_very_stiff_suspension_is_still_calm_at_one_millisecond():
+    fleet = Fleet(load_car("nigel"), 1)
+    fleet.add(Pose2(0.0, 0.0, 0.0))
+    for name, value in (("spring", 1e5), ("damper", 2000.0), ("stiffness", 4e5)):
+        fleet.set_parameter(0, name, value)
+    fleet.throttle[0], fleet.steering[0] = 1.0, 0.5
+    fleet.advance(2.0)
+    assert fleet.status[0] == 0
+    assert np.abs(np.diff([fleet.roll[0], 0.0])) < 1e-3
+    assert fleet.wheel_load[0].min() > 4.0
+    assert fleet.speed[0] == pytest.approx(0.26, rel=0.03)

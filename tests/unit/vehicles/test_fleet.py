@@ -108,3 +108,20 @@ def test_a_weak_battery_slows_the_car(fleet):
 
 def test_every_status_has_a_sentence():
     assert all(status.sentence.endswith(".") for status in VehicleStatus)
+
+
+def test_many_centres_of_gravity_are_read_at_once(fleet):
+    for row in range(3):
+        fleet.add(Pose2(float(row), 2.0, 0.3 * row), speed=0.1)
+    together = fleet.planar_cogs(np.array([2, 0]))
+    np.testing.assert_array_equal(together, [fleet.planar_cog(2), fleet.planar_cog(0)])
+
+
+def test_yaw_acceleration_is_the_change_of_yaw_rate(fleet):
+    row = fleet.add(Pose2(0.0, 0.0, 0.0), speed=0.2)
+    fleet.steering[row] = 1.0
+    fleet.advance(0.1)
+    before = float(fleet.yaw_rate[row])
+    fleet.advance(1e-3)
+    assert fleet.yaw_accel[row] == pytest.approx((fleet.yaw_rate[row] - before) / 1e-3, rel=1e-9)
+    assert fleet.yaw_accel[row] > 0.0
