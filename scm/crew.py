@@ -22,6 +22,7 @@ FIRST_PAUSE_NS = 250 * NS_PER_MS
 STOP_NS = 1500 * NS_PER_MS
 LAST_STOP_NS = 1000 * NS_PER_MS
 SLOW_NS = 4 * NS_PER_S
+SILENT_NS = 500 * NS_PER_MS
 BAD_INPUT = 2
 
 Say = Callable[[str], None]
@@ -57,6 +58,7 @@ class Member:
     started_ns: int = 0
     due_ns: int | None = 0
     died_ns: deque[int] = field(default_factory=lambda: deque(maxlen=RESTARTS_A_MINUTE + 1))
+    silent_ns: int | None = None
     was_up: bool = False
     told_slow: bool = False
 
@@ -94,20 +96,19 @@ class Crew:
             member.sessions.add(presence.session)
         else:
             member.sessions.discard(presence.session)
-        if member.process is not None and member.is_up != before:
-            self._tell_presence(member)
+        if member.is_up and not before:
+            self._tell_up(member)
+        elif before and not member.is_up:
+            member.silent_ns = self._clock.now_ns()
 
-    def _tell_presence(self, member: Member) -> None:
-        job, process = member.job, member.process
-        if process is None or process.poll() is not None:
-            return
-        if not member.is_up:
-            self._say(f"  {job.name:<9} is silent: no sign of life on the bus, pid {process.pid}")
-        elif member.was_up:
-            self._say(f"  {job.name:<9} is back, pid {process.pid}")
+    def _tell_up(self, member: Member) -> None:
+        job, pid = member.job, member.process.pid if member.process else 0
+        member.silent_ns = None
+        if member.was_up:
+            self._say(f"  {job.name:<9} is back, pid {pid}")
         else:
             member.was_up = True
-            self._say(f"  {job.name:<9} {job.what:<52} pid {process.pid}")
+            self._say(f"  {job.name:<9} {job.what:<52} pid {pid}")
 
     def look(self) -> None:
         """Start what is due, and see who died."""
@@ -117,8 +118,8 @@ class Crew:
                 code = member.process.poll()
                 if code is not None:
                     self._ended(member, code, now_ns)
-                elif not member.was_up and now_ns > member.started_ns + SLOW_NS:
-                    self._tell_slow(member)
+                else:
+                    self._tell_trouble(member, now_ns)
             elif member.due_ns is not None and now_ns >= member.due_ns and self._may_start(member):
                 self._start(member, now_ns)
 
@@ -136,14 +137,19 @@ class Crew:
         member.started_ns = now_ns
         member.due_ns = None
 
-    def _tell_slow(self, member: Member) -> None:
-        if not member.told_slow:
+    def _tell_trouble(self, member: Member, now_ns: int) -> None:
+        name = member.job.name
+        if member.silent_ns is not None and now_ns > member.silent_ns + SILENT_NS:
+            member.silent_ns = None
+            self._say(f"  {name:<9} is silent: it runs, but gives no sign of life on the bus")
+        if not (member.was_up or member.told_slow) and now_ns > member.started_ns + SLOW_NS:
             member.told_slow = True
-            self._say(f"  {member.job.name:<9} is still starting (the first time it compiles)")
+            self._say(f"  {name:<9} is still starting (the first time it compiles)")
 
     def _ended(self, member: Member, code: int, now_ns: int) -> None:
         name = member.job.name
         member.process = None
+        member.silent_ns = None
         member.sessions.clear()
         if code == 0:
             self._say(f"  {name:<9} left")

@@ -197,6 +197,18 @@ def test_a_crew_restarts_what_dies_and_says_so(supervise):
     toys.until(lambda: any("is back" in line for line in toys.said))
     assert toys.pids() != [first]
     assert any("died by SIGKILL: starts again in 0.25 s" in line for line in toys.said)
+    assert not any("is silent" in line for line in toys.said)
+
+
+def test_a_crew_says_who_is_frozen_and_who_goes_on(supervise):
+    toys = supervise(a="run")
+    toys.until(lambda: toys.crew.settled)
+    (pid,) = toys.pids()
+    os.kill(pid, signal.SIGSTOP)
+    toys.until(lambda: any("is silent: it runs" in line for line in toys.said))
+    os.kill(pid, signal.SIGCONT)
+    toys.until(lambda: any("is back" in line for line in toys.said))
+    assert toys.pids() == [pid]
 
 
 def test_a_crew_gives_up_on_bad_input_at_once(supervise):
