@@ -90,14 +90,20 @@ class Sensor:
 
     Attributes:
         values: Names of the values in order, with units; one name when all are of a kind.
+        needs: Keys of the car file that describe the device.
         facts: The device as a car file describes it.
         measure: (car, truth, rows, around) to exact values, (k, number of values).
     """
 
     name: str
     values: tuple[str, ...]
+    needs: tuple[str, ...]
     facts: Callable[[Car], Facts]
     measure: Callable[[Car, Truth, Ints, Around | None], Floats]
+
+    def is_fitted(self, car: Car) -> bool:
+        """Return whether a car has such a device: its file describes it."""
+        return all(car.has(key) for key in self.needs)
 
 
 class Reading(NamedTuple):

@@ -27,4 +27,10 @@ def measure(car: Car, truth: Truth, rows: Ints, around: Around | None) -> Floats
     return truth.wheel_angle[rows][:, REAR] * (counts / (2.0 * math.pi))
 
 
-SENSOR = Sensor("encoders", ("left_counts", "right_counts"), facts, measure)
+SENSOR = Sensor(
+    "encoders",
+    ("left_counts", "right_counts"),
+    ("encoder.counts_per_revolution",),
+    facts,
+    measure,
+)

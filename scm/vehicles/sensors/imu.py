@@ -53,6 +53,7 @@ SENSOR = Sensor(
     "imu",
     ("accel_x_mps2", "accel_y_mps2", "accel_z_mps2",
      "gyro_x_radps", "gyro_y_radps", "gyro_z_radps"),
+    ("imu.position_m", "imu.rate_hz", "imu.accel_noise_m_s2", "imu.gyro_noise_rad_s"),
     facts,
     measure,
 )  # fmt: skip

@@ -16,7 +16,7 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
-from scm.vehicles.jit import law
+from scm.vehicles.jit import array_kernel
 from scm.vehicles.sensor import Around, Facts, Sensor, Truth
 
 EDGE = 1e-9
@@ -50,7 +50,7 @@ def scan(car: Car, scanners: Floats, around: Around | None) -> Floats:
     return ranges
 
 
-@law
+@array_kernel
 def cast(
     ranges: Floats,
     ux: Floats,
@@ -100,4 +100,10 @@ def cast(
                         ranges[k, beam] = distance
 
 
-SENSOR = Sensor("lidar", ("range_m",), facts, measure)
+SENSOR = Sensor(
+    "lidar",
+    ("range_m",),
+    ("lidar.position_m", "lidar.rate_hz", "lidar.beams", "lidar.range_m", "lidar.noise_m"),
+    facts,
+    measure,
+)

@@ -1,0 +1,78 @@
+"""The hosted cars' dynamics: one fleet a car file, so that one kernel call moves all its cars."""
+
+import numpy as np
+
+from scm.arrays import Floats, Ints
+from scm.geometry import Pose2
+from scm.vehicles.car import Car, load_car
+from scm.vehicles.fleet import Fleet
+
+_NOBODY: Ints = np.empty(0, np.int64)
+
+
+class Garage:
+    """Fleets by the name of their car file.
+
+    Attributes:
+        fleets: Those in use; a row's slot is the number its car has in the whole world.
+    """
+
+    def __init__(self, capacity: int) -> None:
+        self._capacity = capacity
+        self._cars: dict[str, Car] = {}
+        self.fleets: dict[str, Fleet] = {}
+        self._rows: dict[str, Ints] = {}
+        self._slots: dict[str, Ints] = {}
+
+    def car(self, name: str) -> Car:
+        """Return a car file, read once.
+
+        Raises:
+            CarError: when there is none of that name, or it is wrong.
+        """
+        if name not in self._cars:
+            self._cars[name] = load_car(name)
+        return self._cars[name]
+
+    def park(self, name: str, pose: Pose2, slot: int) -> tuple[Fleet, int]:
+        """Put a car of a file on the floor; return its fleet and row.
+
+        Raises:
+            CarError: when there is no such car file.
+            RunError: when the fleet is full.
+        """
+        if name not in self.fleets:
+            self.fleets[name] = Fleet(self.car(name), self._capacity)
+        fleet = self.fleets[name]
+        row = fleet.add(pose)
+        self._rows[name] = np.append(self.rows(name), row)
+        self._slots[name] = np.append(self.slots(name), slot)
+        return fleet, row
+
+    def scrap(self, name: str, row: int) -> None:
+        """Take a car off the floor."""
+        self.fleets[name].remove(row)
+        kept = self._rows[name] != row
+        self._rows[name], self._slots[name] = self._rows[name][kept], self._slots[name][kept]
+
+    def rows(self, name: str) -> Ints:
+        """Return the rows in use of a fleet, in the order its cars came."""
+        return self._rows.get(name, _NOBODY)
+
+    def slots(self, name: str) -> Ints:
+        """Return the world's numbers of the cars in `rows`."""
+        return self._slots.get(name, _NOBODY)
+
+    def advance(self, duration: float) -> None:
+        """Let all cars move for a time [s]."""
+        for fleet in self.fleets.values():
+            fleet.advance(duration)
+
+    def poses(self, name: str) -> Floats:
+        """Return the rear-axle poses of the cars in `rows`, (n, 3)."""
+        fleet, rows = self.fleets[name], self.rows(name)
+        return np.column_stack((fleet.x[rows], fleet.y[rows], fleet.yaw[rows]))
+
+    def motion(self, name: str) -> Floats:
+        """Return the motion of the centres of gravity of the cars in `rows`, (n, 6)."""
+        return self.fleets[name].planar_cogs(self.rows(name))

@@ -1,0 +1,84 @@
+"""The first stage of a tick: everything that arrived, each kind where it belongs.
+
+What comes from outside never stops the city: what fits nothing is counted in `World.ignored`.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from scm.part import Hears
+from scm.v2x.exchange import Answer, Incoming
+from scm.v2x.message import Message, Request
+from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.presence import Presence
+from scm.v2x.messages.spatem_tx import SpatemTx
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.world.air import transmit
+from scm.world.requests import reply_to
+from scm.world.watch import lose
+from scm.world.world import World
+
+VEHICLE_ROLE = "v"
+
+
+def hear(world: World, now_ns: int, inbox: Sequence[Incoming]) -> None:
+    """Take in what arrived, in order; answers go to the outbox."""
+    for item in inbox:
+        message = item.message
+        if isinstance(message, Request):
+            reply = reply_to(world, message, now_ns)
+            if reply is not None:
+                world.outbox.append(Answer(item, reply))
+        elif (handler := _HANDLERS.get(type(message))) is not None:
+            handler(world, message, now_ns)
+
+
+def _state(world: World, state: VehicleState, now_ns: int) -> None:
+    car = world.remote.get(state.vehicle)
+    if car is None:
+        world.ignored += state.vehicle not in world.hosted
+        return
+    was_alive = car.alive
+    if car.follow(state, now_ns) and not was_alive:
+        world.say("info", "vehicle_back", f"{car.name} reports again", now_ns, car.name)
+
+
+def _command(world: World, command: DriveCommand, now_ns: int) -> None:
+    car = world.hosted.get(command.vehicle)
+    if car is None:
+        return  # for an agent
+    if car.lease.is_at_home or command.epoch != car.lease.epoch:
+        world.ignored += 1
+        return
+    car.guard.take(command, now_ns)
+
+
+def _frame(world: World, frame: CamTx | SpatemTx, now_ns: int) -> None:
+    if frame.station not in world.hosted:  # the bus brings our own cars' frames back
+        transmit(world, [frame], now_ns)
+
+
+def _verdict(world: World, status: MonitorStatus, now_ns: int) -> None:
+    world.verdicts[status.junction] = status
+    for car in world.hosted.values():
+        car.signals.hear_monitor(status)
+
+
+def _presence(world: World, presence: Presence, now_ns: int) -> None:
+    car = world.remote.get(presence.station)
+    if car is not None and not presence.alive and presence.session == car.session:
+        lose(world, car, f"the session of {car.name} ended", now_ns, dead=True)
+
+
+_HANDLERS: dict[type[Message], Callable[[World, Any, int], None]] = {
+    VehicleState: _state,
+    DriveCommand: _command,
+    CamTx: _frame,
+    SpatemTx: _frame,
+    MonitorStatus: _verdict,
+    Presence: _presence,
+}
+
+HEARS = tuple(Hears(kind, {"role": VEHICLE_ROLE} if kind is Presence else {}) for kind in _HANDLERS)

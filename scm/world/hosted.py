@@ -1,0 +1,98 @@
+"""A car that the world itself simulates: its row of a fleet, its owner, and what it knows.
+
+Its dynamics live in the `Garage`; who may drive it is its lease; what it believes of signals and of
+other cars comes over the radio like everybody's.
+"""
+
+from dataclasses import dataclass, field
+
+from scm.geometry import Pose2
+from scm.v2x.cam_trigger import CamTrigger
+from scm.v2x.messages.trip import Trip
+from scm.vehicles.car import Car
+from scm.vehicles.drivers.route import RouteDriver
+from scm.vehicles.fleet import Fleet, VehicleStatus
+from scm.vehicles.guard import Guard
+from scm.vehicles.sensor import Reading, Sampler
+from scm.vehicles.signal_view import SignalView
+from scm.world.ears import Ears
+from scm.world.lease import Lease
+
+
+@dataclass(slots=True)
+class Errand:
+    """A trip under way: where to, who steers, since when."""
+
+    trip_id: str
+    driver: RouteDriver
+    started_ns: int
+    arrived_ns: int | None = None
+
+    def report(self, vehicle: str, now_ns: int) -> Trip:
+        """Return how far it is."""
+        return Trip(
+            vehicle=vehicle,
+            trip_id=self.trip_id,
+            t_ns=now_ns,
+            route=self.driver.path.lanes,
+            done_m=self.driver.done_m,
+            length_m=self.driver.trip_m,
+            started_ns=self.started_ns,
+            arrived_ns=self.arrived_ns,
+            waiting_for=self.driver.waiting_for,
+        )
+
+
+@dataclass(slots=True)
+class HostedCar:
+    """One hosted car.
+
+    Attributes:
+        slot: Its number in the contact space.
+        errand: What the world's own driver does with it; None: it stands until told.
+        mode: As in `VehicleState`.
+        hazard: Whether its hazard lights flash: its commander was lost.
+        last_trip_ns: When its trip was last reported.
+    """
+
+    name: str
+    car: Car
+    car_file: str
+    tag_id: int
+    slot: int
+    fleet: Fleet
+    row: int
+    lease: Lease
+    signals: SignalView
+    guard: Guard
+    ears: Ears = field(default_factory=Ears)
+    errand: Errand | None = None
+    mode: str = "idle"
+    hazard: bool = False
+    seq: int = 0
+    diverged: bool = False
+    cam_trigger: CamTrigger = field(default_factory=CamTrigger)
+    samplers: dict[str, Sampler] = field(default_factory=dict)
+    readings: dict[str, Reading] = field(default_factory=dict)
+
+    kind = "hosted"
+
+    @property
+    def pose(self) -> Pose2:
+        """Of the rear axle, map frame."""
+        return self.fleet.pose(self.row)
+
+    @property
+    def speed(self) -> float:
+        """Along the body [m/s]."""
+        return float(self.fleet.speed[self.row])
+
+    @property
+    def has_diverged(self) -> bool:
+        """Whether its numbers left every physical range: it is frozen."""
+        return bool(self.fleet.status[self.row] != VehicleStatus.OK)
+
+    def command(self, throttle: float, steering: float) -> None:
+        """Tell motor and servo, both -1 to 1."""
+        self.fleet.throttle[self.row] = throttle
+        self.fleet.steering[self.row] = steering

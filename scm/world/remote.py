@@ -1,0 +1,120 @@
+"""A car with dynamics of its own, as the world keeps it: a body that follows its agent's reports.
+
+Between reports the body goes on as reported. A contact changes the body at once and is told to the
+agent; until the agent's reports can reflect it (`ECHO_NS`) the change is kept on top of them, so
+that one hit is not told twice.
+"""
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.clock import NS_PER_MS, NS_PER_S, seconds
+from scm.geometry import Pose2
+from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.vehicles.car import Car
+from scm.world.hull import cog_motion
+from scm.world.lease import Lease
+
+STALE_NS = NS_PER_S
+ECHO_NS = 45 * NS_PER_MS
+GONE_NS = 3 * NS_PER_S
+
+
+@dataclass(slots=True)
+class RemoteCar:
+    """One remote or real car.
+
+    Attributes:
+        session: Of its agent; when this session ends, the car is lost.
+        slot: Its number in the contact space.
+        pose: Of the rear axle, from the newest report, or where it was told to start.
+        heard_ns: When that came, on the world's clock.
+        lost_ns: Since when its agent is known to be gone or silent; None while it is there.
+        dead: Whether the session ended: it can only join again, not come back.
+    """
+
+    name: str
+    kind: str
+    session: str
+    car: Car
+    car_file: str
+    tag_id: int
+    slot: int
+    lease: Lease
+    pose: Pose2
+    heard_ns: int
+    state: VehicleState | None = None
+    lost_ns: int | None = None
+    dead: bool = False
+    _echo: deque[tuple[int, Floats, Floats]] = field(default_factory=deque)
+    _dv: Floats = field(default_factory=lambda: np.zeros(3))
+    _shift: Floats = field(default_factory=lambda: np.zeros(2))
+    _against: set[str] = field(default_factory=set)
+
+    @property
+    def alive(self) -> bool:
+        """Whether its agent is there."""
+        return self.lost_ns is None
+
+    @property
+    def speed(self) -> float:
+        """As reported [m/s]; 0 before the first report."""
+        return self.state.speed_mps if self.state is not None else 0.0
+
+    def age_ns(self, now_ns: int) -> int:
+        """Return how old its newest report is, on the world's clock."""
+        return max(0, now_ns - self.heard_ns)
+
+    def follow(self, state: VehicleState, now_ns: int) -> bool:
+        """Take a report; return whether it was newer than the last one."""
+        if self.dead or (self.state is not None and state.seq <= self.state.seq):
+            return False
+        self.state, self.heard_ns, self.lost_ns = state, now_ns, None
+        self.pose = Pose2(state.x_m, state.y_m, state.yaw_rad)
+        return True
+
+    def motion(self, now_ns: int) -> Floats:
+        """Return x, y, yaw, vx, vy, yaw rate of the centre of gravity, (6,), map frame."""
+        state = self.state
+        speeds = (0.0, 0.0, 0.0)
+        if state is not None and self.alive:
+            speeds = (state.speed_mps, state.lateral_speed_mps, state.yaw_rate_radps)
+        row: Floats = cog_motion(self.car, np.array([[*self.pose, *speeds]]))[0]
+        age = seconds(min(self.age_ns(now_ns), STALE_NS))
+        row[:3] += row[3:] * age
+        while self._echo and now_ns - self._echo[0][0] > ECHO_NS:
+            self._echo.popleft()
+        for hit_ns, dv, shift in self._echo:
+            row[3:] += dv
+            row[:3] += dv * seconds(max(0, now_ns - hit_ns))
+            row[:2] += shift
+        return row
+
+    def hit(self, dv: Floats, shift: Floats, against: set[str], now_ns: int) -> None:
+        """Note what one contact step did to it."""
+        self._echo.append((now_ns, dv, shift))
+        self._dv += dv
+        self._shift += shift
+        self._against |= against
+
+    def contact(self, now_ns: int) -> Contact | None:
+        """Return what is to be told to its agent since the last time, if anything."""
+        if not (self._dv.any() or self._shift.any()):
+            return None
+        (dvx, dvy, rate), (dx, dy) = self._dv.tolist(), self._shift.tolist()
+        told = Contact(
+            vehicle=self.name,
+            t_ns=now_ns,
+            dvx_mps=dvx,
+            dvy_mps=dvy,
+            dyaw_rate_radps=rate,
+            dx_m=dx,
+            dy_m=dy,
+            against=tuple(sorted(self._against)),
+        )
+        self._dv, self._shift, self._against = np.zeros(3), np.zeros(2), set()
+        return told

@@ -1,0 +1,210 @@
+"""What the world is asked to do, one function a request; what cannot be done is refused in words.
+
+To add a request: write its message, a function here, and its line in `_ANSWERS`.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from scm.errors import LeaseError, RunError, ScmError, nearest
+from scm.geometry import Pose2
+from scm.part import Serves
+from scm.v2x.key import check_name
+from scm.v2x.message import Message, Refused, Request
+from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.join_request import JoinReply, JoinRequest
+from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
+from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
+from scm.v2x.messages.route_request import RouteReply, RouteRequest
+from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
+from scm.v2x.messages.stop_request import StopRequest
+from scm.vehicles.car import car_names
+from scm.world import lease as rules
+from scm.world.driving import driver_for, take_over
+from scm.world.hosted import Errand, HostedCar
+from scm.world.remote import RemoteCar
+from scm.world.world import AnyCar, World
+
+KINDS = ("remote", "real")
+
+
+class _RefusedError(ScmError):
+    """A request that cannot be done, with the machine's word for why."""
+
+    def __init__(self, code: str, detail: str) -> None:
+        super().__init__(detail)
+        self.code = code
+
+
+def reply_to(world: World, request: Request, now_ns: int) -> Message | None:
+    """Do what is asked; None leaves the answer to somebody else."""
+    try:
+        return _ANSWERS[type(request)](world, request, now_ns)
+    except _RefusedError as refusal:
+        return Refused(code=refusal.code, detail=str(refusal))
+    except LeaseError as refusal:
+        return Refused(code="owned", detail=f"{request.vehicle}: {refusal}")  # type: ignore[attr-defined]
+    except RunError as refusal:
+        return Refused(code="full", detail=str(refusal))
+    except ScmError as refusal:
+        return Refused(code="invalid", detail=str(refusal))
+
+
+def _spawn(world: World, request: SpawnRequest, now_ns: int) -> SpawnReply:
+    name = request.vehicle or world.free_name()
+    _check_new(world, name, request.car)
+    car = world.host(name, request.car, _place(world, request.spawn), now_ns)
+    world.say(
+        "info", "vehicle_spawned", f"{name}, a {request.car}, stands on the map", now_ns, name
+    )
+    x, y, yaw = car.pose
+    return SpawnReply(vehicle=name, x_m=x, y_m=y, yaw_rad=yaw, tag_id=car.tag_id)
+
+
+def _join(world: World, request: JoinRequest, now_ns: int) -> JoinReply:
+    name, before = request.vehicle, world.remote.get(request.vehicle)
+    if request.kind not in KINDS:
+        raise _RefusedError("invalid", f"kind: got {request.kind!r}, expected remote or real")
+    if before is not None and before.session == request.session and before.alive:
+        return _welcome(before, now_ns)
+    if before is not None and not before.alive:
+        world.remove(name)
+    _check_new(world, name, request.car)
+    pose = _place(world, request.spawn)
+    car = world.admit(name, request.kind, request.session, request.car, pose, now_ns)
+    world.say("info", "vehicle_joined", f"{name}, a {request.car}, joined the city", now_ns, name)
+    return _welcome(car, now_ns)
+
+
+def _welcome(car: RemoteCar, now_ns: int) -> JoinReply:
+    x, y, yaw = car.pose
+    return JoinReply(
+        vehicle=car.name,
+        x_m=x,
+        y_m=y,
+        yaw_rad=yaw,
+        tag_id=car.tag_id,
+        epoch=car.lease.epoch,
+        t_ns=now_ns,
+    )
+
+
+def _remove(world: World, request: RemoveRequest, now_ns: int) -> RemoveReply:
+    car = _known(world, request.vehicle)
+    world.remove(car.name)
+    name = "vehicle_removed" if isinstance(car, HostedCar) else "vehicle_left"
+    reason = f": {request.reason}" if request.reason else ""
+    world.say("info", name, f"{car.name} left the city{reason}", now_ns, car.name)
+    return RemoveReply(vehicle=car.name)
+
+
+def _route(world: World, request: RouteRequest, now_ns: int) -> RouteReply | None:
+    car = world.hosted.get(request.vehicle)
+    if car is None:
+        return None  # its agent answers, if there is one
+    if not car.lease.is_at_home:
+        detail = f"{car.name} is leased to {car.lease.owner!r}: release the lease, or steal it"
+        raise _RefusedError("owned", detail)
+    return send(world, car, request, now_ns)
+
+
+def send(world: World, car: HostedCar, request: RouteRequest, now_ns: int) -> RouteReply:
+    """Send a hosted car along a route, from the lane it stands on.
+
+    Raises:
+        ScmError: when the lanes do not allow the route, or the car stands on none.
+    """
+    if request.speed_mps is not None and not request.speed_mps > 0.0:
+        raise _RefusedError("invalid", f"speed_mps: got {request.speed_mps}, expected above 0")
+    here = world.roads.nearest(car.pose)
+    if here is None:
+        x, y, _ = car.pose
+        detail = f"{car.name} stands on no lane: nearest to ({x:.2f}, {y:.2f}) m there is none"
+        raise _RefusedError("invalid", detail)
+    driver = driver_for(
+        world.roads, car.car, here.lane, request.via, request.laps, request.speed_mps
+    )
+    world.trips += 1
+    trip_id = request.request_id or f"{car.name}-{world.trips}"
+    car.errand = Errand(trip_id, driver, now_ns)
+    car.hazard = False
+    path = driver.path
+    length = None if path.closed else path.length_m - here.s
+    return RouteReply(vehicle=car.name, trip_id=trip_id, route=path.lanes, length_m=length)
+
+
+def _lease(world: World, request: LeaseRequest, now_ns: int) -> LeaseReply:
+    car = _known(world, request.vehicle)
+    before, owner, ttl_ms = car.lease, request.owner, request.ttl_ms
+    if not owner:
+        raise _RefusedError("invalid", "owner: got nothing, expected who asks")
+    if request.verb == "acquire":
+        lease = rules.acquire(before, owner, ttl_ms, now_ns)
+    elif request.verb == "renew":
+        lease = rules.renew(before, owner, request.epoch, ttl_ms, now_ns)
+    elif request.verb == "release":
+        lease = rules.release(before, owner, request.epoch)
+    else:
+        lease = rules.steal(before, owner, ttl_ms, request.reason, now_ns)
+        text = f"{owner} took {car.name} from {before.owner}: {request.reason}"
+        world.say("warning", "lease_stolen", text, now_ns, car.name)
+    if isinstance(car, HostedCar) and lease.epoch != before.epoch:
+        take_over(car, lease, now_ns)
+    car.lease = lease
+    return LeaseReply(vehicle=car.name, owner=lease.owner, epoch=lease.epoch, ttl_ms=lease.ttl_ms)
+
+
+def _stop(world: World, request: StopRequest, now_ns: int) -> CityStop:
+    world.stop = CityStop(
+        t_ns=now_ns, engaged=request.engaged, by=request.by, reason=request.reason
+    )
+    verb = "stopped the city" if request.engaged else "let the city drive again"
+    reason = f": {request.reason}" if request.reason else ""
+    world.say("warning", "city_stop", f"{request.by} {verb}{reason}", now_ns)
+    world.outbox.append(world.stop)
+    return world.stop
+
+
+def _known(world: World, name: str) -> AnyCar:
+    car = world.car(name)
+    if car is None:
+        names = [car.name for car in world.cars()]
+        raise _RefusedError("not_found", f"no car named {name!r}{nearest(name, names)}")
+    return car
+
+
+def _check_new(world: World, name: str, car_file: str) -> None:
+    check_name(name, "vehicle")
+    if world.car(name) is not None or name in world.roadside:
+        raise _RefusedError("owned", f"vehicle: there is already a station named {name!r}")
+    if car_file not in car_names():  # no paths: whoever asks may be far away
+        known = ", ".join(car_names())
+        detail = f"car: got {car_file!r}, expected one of {known}{nearest(car_file, car_names())}"
+        raise _RefusedError("invalid", detail)
+
+
+def _place(world: World, spawn: str) -> Pose2:
+    """Return a free place to stand: the wished one, or the first."""
+    free = world.roads.free_spawns([car.pose for car in world.cars()])
+    if spawn:
+        pose = world.roads.spawn_pose(spawn)
+        if spawn not in free:
+            raise _RefusedError("occupied", f"spawn: a car stands at {spawn!r}")
+        return pose
+    if not free:
+        raise _RefusedError("full", f"no spawn place of map {world.city_map.name} is free")
+    return world.roads.spawn_pose(free[0])
+
+
+_ANSWERS: dict[type[Message], Callable[[World, Any, int], Message | None]] = {
+    SpawnRequest: _spawn,
+    JoinRequest: _join,
+    RemoveRequest: _remove,
+    RouteRequest: _route,
+    LeaseRequest: _lease,
+    StopRequest: _stop,
+}
+
+SERVES = tuple(Serves(kind) for kind in (
+    SpawnRequest, JoinRequest, RemoveRequest, RouteRequest, LeaseRequest, StopRequest,
+))  # fmt: skip

@@ -1,0 +1,47 @@
+"""Watching over cars: agents that vanish, leases that run out, dynamics that leave all ranges."""
+
+from scm.clock import NS_PER_S, seconds
+from scm.vehicles.fleet import VehicleStatus
+from scm.world import lease as rules
+from scm.world.remote import GONE_NS, STALE_NS, RemoteCar
+from scm.world.world import World
+
+FIRST_REPORT_NS = 10 * NS_PER_S
+
+
+def watch(world: World, now_ns: int) -> None:
+    """Mark who is gone, take off the map who has been gone for long, tell who is frozen."""
+    for car in list(world.remote.values()):
+        _watch_agent(world, car, now_ns)
+        _watch_lease(world, car, now_ns)
+    for hosted in world.hosted.values():
+        if hosted.has_diverged and not hosted.diverged:
+            hosted.diverged = True
+            sentence = VehicleStatus.DIVERGED.sentence
+            world.say("error", "vehicle_diverged", sentence, now_ns, hosted.name)
+
+
+def lose(world: World, car: RemoteCar, why: str, now_ns: int, *, dead: bool) -> None:
+    """Mark a remote car as lost, once; it leaves the map a while later."""
+    car.dead = car.dead or dead
+    if car.alive:
+        car.lost_ns = now_ns
+        world.say("warning", "vehicle_lost", why, now_ns, car.name)
+
+
+def _watch_agent(world: World, car: RemoteCar, now_ns: int) -> None:
+    patience_ns = STALE_NS if car.state is not None else FIRST_REPORT_NS
+    if car.alive and car.age_ns(now_ns) > patience_ns:
+        why = f"{car.name} has been silent for {seconds(car.age_ns(now_ns)):.1f} s"
+        lose(world, car, why, now_ns, dead=False)
+    if car.lost_ns is not None and now_ns - car.lost_ns >= GONE_NS:
+        world.remove(car.name)
+        text = f"{car.name} was taken off the map: nobody drives it any more"
+        world.say("info", "vehicle_removed", text, now_ns, car.name)
+
+
+def _watch_lease(world: World, car: RemoteCar, now_ns: int) -> None:
+    if rules.is_expired(car.lease, now_ns):
+        text = f"{car.lease.owner} did not renew the lease of {car.name}: it is its agent's again"
+        car.lease = rules.sent_home(car.lease)
+        world.say("warning", "lease_lost", text, now_ns, car.name)

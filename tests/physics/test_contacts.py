@@ -1,0 +1,178 @@
+"""Collisions of whole cars in the world: momentum, bounce, walls, and nobody else disturbed.
+
+Where momentum is judged the tyres' force is set to zero: on ice the floor takes nothing, and what
+is left is what the contact impulses say.
+"""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from scm.geometry import Pose2
+from scm.maps.model import CityMap, Floor, MapTag, Wall
+from scm.v2x.exchange import Incoming
+from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.lease_request import LeaseRequest
+from scm.v2x.messages.vehicle_sensors import VehicleSensors
+from scm.vehicles.car import load_car
+from scm.vehicles.fleet import Fleet
+from scm.world.requests import reply_to
+from scm.world.step import tick
+from scm.world.world import PERIOD_NS, World
+
+TICK_S = 0.02
+NIGEL = load_car("nigel")
+MASS, INERTIA = NIGEL.value("body.mass_kg"), NIGEL.value("body.yaw_inertia_kgm2")
+RESTITUTION = NIGEL.value("body.bounce_restitution")
+
+
+def world_with(*walls):
+    return World(
+        CityMap(
+            map=1, name="plain", title="", source="", floor=Floor(x_m=(-9.0, 9.0), y_m=(-9.0, 9.0)),
+            tag=MapTag(tag_id=0, size_m=0.1), walls=walls,
+        ),
+        capacity=8,
+    )  # fmt: skip
+
+
+def put(world, name, pose, speed=0.0, car="nigel", ice=False):
+    hosted = world.host(name, car, Pose2(*pose), 0)
+    hosted.fleet.place(hosted.row, Pose2(*pose), speed)
+    if ice:
+        for parameter in ("force_extremum", "force_asymptote"):
+            hosted.fleet.set_parameter(hosted.row, f"tyre.{parameter}", 0.0)
+            hosted.fleet.set_parameter(hosted.row, f"tyre.lateral_{parameter}", 0.0)
+    return hosted
+
+
+def run(world, seconds):
+    """Step the world on; return the motions of the cars after each tick, (ticks, cars, 6)."""
+    history = []
+    start = world.tick
+    for i in range(round(seconds / TICK_S) + 1):
+        tick(world, (start + i) * PERIOD_NS, [])
+        cars = world.hosted.values()
+        history.append([car.fleet.planar_cog(car.row) for car in cars])
+    return np.array(history)
+
+
+def command(world, name, throttle, seconds):
+    """Lease a car and command it for a while."""
+    ask = LeaseRequest(vehicle=name, owner="test", verb="acquire", ttl_ms=60_000)
+    lease = reply_to(world, ask, world.tick * PERIOD_NS)
+    for seq in range(round(seconds / TICK_S)):
+        now = world.tick * PERIOD_NS
+        told = DriveCommand(
+            vehicle=name, t_ns=now, epoch=lease.epoch, seq=seq, throttle=throttle, steering=0.0
+        )
+        tick(world, now, [Incoming(told, now)])
+
+
+def head_on(ice=True, speed=0.25, offset=0.0):
+    world = world_with()
+    put(world, "a", (0.0, 0.0, 0.0), speed, ice=ice)
+    put(world, "b", (0.6, offset, np.pi), speed, ice=ice)
+    return world
+
+
+def hit_tick(history):
+    """Return the first tick at which anybody's speed jumped."""
+    jumps = np.abs(np.diff(history[:, :, 3], axis=0)).max(axis=1)
+    return int(np.argmax(jumps > 0.05)) + 1
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.06])
+def test_cars_on_ice_keep_their_momentum_through_a_collision(offset):
+    history = run(head_on(offset=offset), 1.5)
+    assert hit_tick(history) > 1
+    momentum = MASS * history[:, :, 3:5].sum(axis=1)
+    assert_allclose(momentum, np.broadcast_to(momentum[0], momentum.shape), atol=1e-9)
+
+
+def test_equal_cars_on_ice_part_with_the_restitution_of_their_file():
+    history = run(head_on(), 1.5)
+    assert history[-1, 1, 3] - history[-1, 0, 3] == pytest.approx(0.5 * RESTITUTION, rel=1e-4)
+
+
+def test_a_collision_on_ice_never_adds_energy():
+    history = run(head_on(offset=0.1), 1.5)
+    energy = 0.5 * (
+        MASS * (history[:, :, 3:5] ** 2).sum(axis=(1, 2)) + INERTIA * (history[:, :, 5] ** 2).sum(1)
+    )
+    assert (np.diff(energy) <= 1e-9).all()
+
+
+def test_on_the_road_the_floor_takes_at_most_what_its_friction_allows():
+    history = run(head_on(ice=False), 1.5)
+    i = hit_tick(history)
+    momentum = MASS * history[:, :, 3].sum(axis=1)
+    # Tyres carry at most their peak coefficient, 1, times weight; one tick lasts 20 ms.
+    assert abs(momentum[i] - momentum[i - 1]) <= 2 * MASS * 9.81 * TICK_S
+
+
+def test_a_car_on_ice_bounces_off_a_wall_with_the_restitution_of_its_file():
+    world = world_with(Wall(points=((0.5, -2.0), (0.5, 2.0))))
+    put(world, "a", (0.0, 0.0, 0.0), 0.25, ice=True)
+    history = run(world, 2.0)
+    assert history[-1, 0, 3] == pytest.approx(-0.25 * RESTITUTION, rel=1e-3)
+
+
+def test_a_car_that_pushes_against_a_wall_stays_in_front_of_it():
+    world = world_with(Wall(points=((0.5, -2.0), (0.5, 2.0)), thickness_m=0.01))
+    car = put(world, "a", (0.0, 0.0, 0.0))
+    command(world, "a", throttle=1.0, seconds=5.0)
+    nose = car.pose.x + NIGEL.vector("body.footprint_x_m")[1]
+    assert nose == pytest.approx(0.495, abs=2e-3)
+
+
+@pytest.mark.parametrize(("model", "speed"), [("nigel", 0.267), ("f1tenth", 7.0)])
+@pytest.mark.parametrize("yaw", [0.0, 0.6])
+def test_no_car_gets_through_a_thin_wall_at_its_top_speed(model, speed, yaw):
+    world = world_with(Wall(points=((1.0, -4.0), (1.0, 4.0)), thickness_m=0.005))
+    put(world, "a", (0.3, 0.0, yaw), speed, car=model)
+    history = run(world, 1.0 if speed > 1.0 else 4.0)
+    assert history[:, 0, 0].max() < 1.0
+
+
+def test_cars_that_touch_nothing_move_as_if_they_were_alone_bit_for_bit():
+    world = world_with(Wall(points=((3.0, -4.0), (3.0, 4.0))))
+    crowd = put(world, "a", (0.0, 0.0, 0.3))
+    put(world, "b", (1.0, 1.0, 2.0), 0.2)
+    put(world, "c", (1.5, 1.0, -1.1), 0.2)
+    alone = Fleet(NIGEL, 1)
+    row = alone.add(Pose2(0.0, 0.0, 0.3))
+    run(world, 3.0)
+    for _ in range(4 * 150):
+        alone.advance(0.005)
+    for name in ("x", "y", "z", "yaw", "roll", "pitch", "speed", "wheel_angle", "wheel_load"):
+        assert_array_equal(getattr(crowd.fleet, name)[crowd.row], getattr(alone, name)[row], name)
+
+
+def sensed(world, name):
+    found = [m for m in world.outbox if isinstance(m, VehicleSensors) and m.vehicle == name]
+    return found[-1]
+
+
+def test_encoders_count_the_distance_driven():
+    world = world_with()
+    car = put(world, "a", (0.0, 0.0, 0.0))
+    command(world, "a", throttle=0.5, seconds=4.0)
+    counts = sensed(world, "a")
+    expected = car.pose.x / (2 * np.pi * NIGEL.value("wheel.radius_m")) * 1920
+    # The driven wheels slip a little, and the counts are whole ones.
+    assert counts.encoder_left == counts.encoder_right == pytest.approx(expected, rel=0.01)
+
+
+def test_at_rest_the_imu_reads_gravity_and_its_own_noise():
+    world = world_with()
+    put(world, "a", (0.0, 0.0, 0.0))
+    readings = []
+    for i in range(500):
+        tick(world, i * PERIOD_NS, [])
+        readings.append((*sensed(world, "a").accel_mps2, *sensed(world, "a").gyro_radps))
+    accel, gyro = NIGEL.value("imu.accel_noise_m_s2"), NIGEL.value("imu.gyro_noise_rad_s")
+    spread = np.array([accel] * 3 + [gyro] * 3)
+    # 500 readings: mean within 4.5 sigma / sqrt(500), spread within 15 %.
+    assert_allclose(np.mean(readings, 0), [0, 0, 9.80665, 0, 0, 0], atol=0.2 * accel)
+    assert_allclose(np.std(readings, 0), spread, rtol=0.15)
