@@ -59,7 +59,8 @@ STATES = (
 INPUTS = (("throttle_command", 1), ("steering_command", 1), ("battery", 1))
 OUTPUTS = (
     ("x", 1), ("y", 1), ("z", 1), ("speed", 1), ("lateral_speed", 1),
-    ("accel_x", 1), ("accel_y", 1), ("yaw_accel", 1), ("steer_angle", 1),
+    ("accel_x", 1), ("accel_y", 1), ("accel_z", 1), ("yaw_accel", 1),
+    ("steer_angle", 1),
     ("wheel_steer", 4), ("wheel_load", 4),
 )  # fmt: skip
 SCRATCH_SHAPE = (6, 10)  # rows 0-3: one wheel each; 4: sums over hops; 5: over contact points

@@ -48,7 +48,8 @@ class Fleet:
             its springs has stopped.
         speed, lateral_speed: Velocity of the rear axle along and across the body [m/s].
         roll_rate, pitch_rate, yaw_rate: [rad/s]; yaw_accel [rad/s^2].
-        accel_x, accel_y: Acceleration of the centre of gravity, body frame, no gravity [m/s^2].
+        accel_x, accel_y, accel_z: Acceleration of the centre of gravity over the last substep, in
+            the level body frame, without gravity [m/s^2].
         steer_angle: Mean road-wheel angle, + left [rad].
         wheel_speed, wheel_angle, wheel_steer: Of each wheel, (capacity, 4) [rad/s, rad, rad].
         wheel_load: Floor on tyre, (capacity, 4) [N].
@@ -73,7 +74,7 @@ class Fleet:
         self.battery = self._view("battery")
         for name in (
             "x", "y", "z", "roll", "pitch", "yaw", "speed", "lateral_speed", "yaw_rate",
-            "roll_rate", "pitch_rate", "accel_x", "accel_y", "yaw_accel", "steer_angle",
+            "roll_rate", "pitch_rate", "accel_x", "accel_y", "accel_z", "yaw_accel", "steer_angle",
             "wheel_speed", "wheel_angle", "wheel_steer", "wheel_load",
         ):  # fmt: skip
             view = self._view(name)
@@ -94,6 +95,7 @@ class Fleet:
     pitch_rate: Floats
     accel_x: Floats
     accel_y: Floats
+    accel_z: Floats
     yaw_accel: Floats
     steer_angle: Floats
     wheel_speed: Floats

@@ -20,6 +20,11 @@ def law(function: Function) -> Function:
     return cast("Function", numba.njit(nogil=True, error_model="numpy")(function))
 
 
+def array_kernel(function: Function) -> Function:
+    """Compile a function over arrays at its first call, without the interpreter lock, cached."""
+    return cast("Function", numba.njit(nogil=True, error_model="numpy", cache=True)(function))
+
+
 def fleet_kernel(function: Function) -> Function:
     """Compile a kernel over fleet rows, without the interpreter lock, cached beside its file."""
     compiled = numba.njit(_ROWS, nogil=True, error_model="numpy", cache=True)(function)

@@ -42,6 +42,7 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
 {load}
         accel_x = car[{accel_x}]
         accel_y = car[{accel_y}]
+        accel_z = car[{accel_z}]
         yaw_accel = car[{yaw_accel}]
         sprung_mass = mass - 4.0 * wheel_mass
         front_x = wheelbase - cog_to_rear_axle
@@ -144,6 +145,7 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
                 car[{wheel_angle} + w] += dt * spin
             accel_x = dvx / dt
             accel_y = dvy / dt
+            accel_z = dvz / dt
             yaw_accel = dyaw_rate / dt
             vx_world += cos_yaw * dvx - sin_yaw * dvy
             vy_world += sin_yaw * dvx + cos_yaw * dvy
@@ -188,5 +190,6 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
         car[{lateral_speed}] = over_y
         car[{accel_x}] = accel_x
         car[{accel_y}] = accel_y
+        car[{accel_z}] = accel_z
         car[{yaw_accel}] = yaw_accel
 '''

@@ -1,4 +1,4 @@
-"""The skeleton's implicit step against its equations of motion, integrated by SciPy's own solver."""
+"""The skeleton's implicit step against its equations of motion, integrated by SciPy."""
 
 import math
 

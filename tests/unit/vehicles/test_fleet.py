@@ -119,8 +119,8 @@ def test_many_centres_of_gravity_are_read_at_once(fleet):
 
 def test_yaw_acceleration_is_the_change_of_yaw_rate(fleet):
     row = fleet.add(Pose2(0.0, 0.0, 0.0), speed=0.2)
-    fleet.steering[row] = 1.0
-    fleet.advance(0.1)
+    fleet.throttle[row], fleet.steering[row] = 0.7, 1.0
+    fleet.advance(0.3)
     before = float(fleet.yaw_rate[row])
     fleet.advance(1e-3)
     assert fleet.yaw_accel[row] == pytest.approx((fleet.yaw_rate[row] - before) / 1e-3, rel=1e-9)
