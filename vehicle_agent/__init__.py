@@ -2,6 +2,6 @@
 
 agent      the part: hears, decides, acts, reports        link    joining, the lease, lost links
 stay       one stay in the city: body, guard, driver      lights  which lamps are on
-body       the contract of a body; `bodies/` has one file a kind, found by name
+body       the contract of a body, one file a kind       leaving goodbye before the process ends
 May import v2x, vehicles and what is below; never the city's parts. Only `bodies/` open the physics.
 """

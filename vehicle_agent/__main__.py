@@ -1,8 +1,10 @@
 """The command line of the agent: `vehicle-agent join --name n7 --connect tcp/HOST:PORT`."""
 
 import argparse
+import gc
 import logging
 import sys
+import threading
 from collections.abc import Sequence
 
 from scm import __version__
@@ -61,15 +63,17 @@ def _join(arguments: argparse.Namespace) -> int:
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name
     from vehicle_agent.agent import AgentPart
+    from vehicle_agent.leaving import Leaving
 
     check_name(arguments.name, "--name")
     check_name(arguments.city, "--city")
-    stop, clock = stop_on_signal(), WallClock()
+    wish, done, clock = stop_on_signal(), threading.Event(), WallClock()
     with ZenohBus(arguments.city, arguments.name, arguments.connect, clock=clock) as bus:
         part = AgentPart(
             arguments.name, arguments.car, arguments.spawn, bus.session, arguments.seed
         )
-        run(part, bus, clock, stop)
+        run(Leaving(part, wish, done), bus, clock, done)
+    gc.freeze()  # taking the compiler's objects apart one by one would take a quarter of a second
     return 0
 
 

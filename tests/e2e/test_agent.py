@@ -101,7 +101,7 @@ def test_a_signal_makes_it_leave_within_a_second(stage, driving, number):
     driving.send_signal(number)
     assert driving.wait(timeout=5.0) == 0
     assert time.monotonic() - began < 1.0
-    wait_for(lambda: "n7" not in stage.vehicles(), 0.5, "the map is empty at once")
+    wait_for(lambda: "n7" not in stage.vehicles(), 1.5, "the map is empty at once")
 
 
 def test_a_killed_agent_is_off_the_map_in_the_end(stage, driving):
