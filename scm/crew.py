@@ -170,11 +170,13 @@ class Crew:
         began_ns = self._clock.now_ns()
         for member in self.members.values():
             member.due_ns = None
+        stopping: list[subprocess.Popen[bytes]] = []
         for last, until_ns in ((False, began_ns + LAST_STOP_NS), (True, began_ns + STOP_NS)):
             wave = [m.process for m in self.members.values() if m.process and m.job.last == last]
             for process in wave:
                 _send(process, signal.SIGTERM)
-            self._wait_for(wave, until_ns)
+            stopping += wave
+            self._wait_for(stopping, until_ns)
         for member in self.members.values():
             if member.process is not None and member.process.poll() is None:
                 self._say(f"  {member.job.name:<9} did not stop: killed")
