@@ -73,12 +73,9 @@ def _order(terms: Sequence[Term], per: Per, setters: dict[str, Term]) -> list[st
         graph[name] = {source} if source in chain or name in setters else set()
     for term in (t for t in terms if t.per is per):
         names = {name for law in (term.law, term.damping) if law for name in reads(law)}
-        if term.keeps is not None:
-            names.discard(term.target)
-        graph[term.name] = {_FRAME if n in {"v_long", "v_lat"} else n for n in names} & {
-            *chain,
-            _FRAME,
-        }
+        names -= {term.target} if term.keeps is not None else set()
+        waits = {_FRAME if n in {"v_long", "v_lat"} else n for n in names}
+        graph[term.name] = waits & {*chain, _FRAME}
     if per is Per.WHEEL:
         graph[_FRAME] = {"wheel_steer"}
     sorter = TopologicalSorter(graph)
@@ -97,7 +94,7 @@ def _order(terms: Sequence[Term], per: Per, setters: dict[str, Term]) -> list[st
 
 def _stage(terms: Sequence[Term], per: Per, setters: dict[str, Term]) -> Iterator[str]:
     slots, by_name = slots_of(terms), {term.name: term for term in terms}
-    own = {(c.param.key): c.variable for c in columns_of(terms)}
+    own = {c.param.key: c.variable for c in columns_of(terms)}
 
     def call(term: Term, law: Law) -> str:
         names = {param.name: own[param.key] for param in term.params}

@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from scm.errors import TermError
+from scm.errors import RunError, TermError
 from scm.vehicles import body14, jit, tyre_curve
 from scm.vehicles.assemble import write_page
 from scm.vehicles.term import Term
@@ -43,11 +43,19 @@ def compile_kernel(car_name: str, terms: Sequence[Term]) -> Advance:
 
 def _keep(path: Path, text: str) -> Path:
     """Write the file unless it is there; several processes may do so at once."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if not path.exists():
-        with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".tmp", delete=False) as file:
-            file.write(text)
-        # numba asks the file for its time: the same one for every writer keeps the cache good
-        os.utime(file.name, (0, 0))
-        Path(file.name).replace(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists():
+            _write(path, text)
+    except OSError as error:
+        msg = f"{path.parent}: compiled cars cannot be kept here ({error.strerror}); "
+        raise RunError(msg + "set SCM_CACHE_DIR to a folder that can be written") from error
     return path
+
+
+def _write(path: Path, text: str) -> None:
+    with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".tmp", delete=False) as file:
+        file.write(text)
+    # numba asks the file for its time: the same one for every writer keeps the cache good
+    os.utime(file.name, (0, 0))
+    Path(file.name).replace(path)

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from scm.errors import TermError
+from scm.errors import RunError, TermError
 from scm.vehicles.assemble import setters_of, write_page
 from scm.vehicles.car import STANDARD_TERMS, all_terms
 from scm.vehicles.kernel_file import compile_kernel
@@ -144,3 +144,12 @@ def test_processes_that_compile_at_the_same_time_all_get_a_kernel(tmp_path):
     assert len(answers) == 1
     assert len(list(tmp_path.glob("*.py"))) == 1
     assert not list(tmp_path.glob("*.tmp"))
+
+
+def test_a_cache_folder_that_cannot_be_written_is_refused_with_the_way_out(tmp_path, monkeypatch):
+    blocked = tmp_path / "file"
+    blocked.write_text("", encoding="utf-8")
+    monkeypatch.setenv("SCM_CACHE_DIR", str(blocked / "cache"))
+    few = [term for term in STANDARD if term.name not in {"aero_drag", "viscous_drag", "yaw_drag"}]
+    with pytest.raises(RunError, match="set SCM_CACHE_DIR"):
+        compile_kernel("nigel", few)
