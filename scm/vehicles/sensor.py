@@ -48,6 +48,8 @@ class Truth(Protocol):
     @property
     def accel_y(self) -> Floats: ...  # noqa: D102
     @property
+    def accel_z(self) -> Floats: ...  # noqa: D102
+    @property
     def wheel_angle(self) -> Floats: ...  # noqa: D102
 
 

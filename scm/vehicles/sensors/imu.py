@@ -4,7 +4,7 @@
     gyro = omega                                                     roll, pitch, yaw rate
 
 r reaches from the centre of gravity to the IMU, R tilts the level frame by pitch, then roll.
-Holds: rigid mounting, small roll and pitch rates; heave, roll and pitch acceleration are left out.
+Holds: rigid mounting, small roll and pitch; of alpha only the part about z is counted.
 Source: rigid-body kinematics; noise of the MPU-9250's class, from the car file.
 """
 
@@ -25,14 +25,22 @@ def facts(car: Car) -> Facts:
 
 def measure(car: Car, truth: Truth, rows: Ints, around: Around | None) -> Floats:
     """Return specific force [m/s^2] and turn rate [rad/s], (k, 6)."""
-    level = np.column_stack((truth.accel_x[rows], truth.accel_y[rows], np.full(len(rows), GRAVITY)))
+    level = np.column_stack(
+        (truth.accel_x[rows], truth.accel_y[rows], truth.accel_z[rows] + GRAVITY)
+    )
     force = tilted(level, truth.roll[rows], truth.pitch[rows])
     omega = np.column_stack((truth.roll_rate[rows], truth.pitch_rate[rows], truth.yaw_rate[rows]))
     alpha = np.zeros_like(omega)
     alpha[:, 2] = truth.yaw_accel[rows]
     arm = np.broadcast_to(lever_arm(car), omega.shape)
-    force += np.cross(alpha, arm) + np.cross(omega, np.cross(omega, arm))
+    force += cross(alpha, arm) + cross(omega, cross(omega, arm))
     return np.column_stack((force, omega))
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """Return the vector products of rows (k, 3); for a few rows much quicker than numpy's own."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.column_stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
 
 
 def lever_arm(car: Car) -> Floats:

@@ -11,7 +11,17 @@ from scm.vehicles.car import load_car
 from scm.vehicles.sensors.imu import SENSOR, lever_arm
 
 NIGEL = load_car("nigel")
-NAMES = ["roll", "pitch", "roll_rate", "pitch_rate", "yaw_rate", "yaw_accel", "accel_x", "accel_y"]
+NAMES = [
+    "roll",
+    "pitch",
+    "roll_rate",
+    "pitch_rate",
+    "yaw_rate",
+    "yaw_accel",
+    "accel_x",
+    "accel_y",
+    "accel_z",
+]
 
 
 def felt(**motion):
