@@ -11,7 +11,7 @@ measurement: Gauss-Newton on
 lets the tag correct exactly what it can see better than the calibrator did. The tag lies still, so
 its corners are averaged over the last frames, which calms the poses; the doubt stays that of one
 frame, because a still tag's corners are off by nearly the same in every frame. A camera that was
-knocked shows as a misfit far outside the tolerance: then the tag is believed instead.
+knocked shows the tag far outside the tolerance: then the tolerance is widened and the tag believed.
 """
 
 import logging
@@ -31,7 +31,7 @@ from scm.maps.model import MapTag
 LOGGER = logging.getLogger(__name__)
 AVERAGED_FRAMES = 20
 MOVED_PX = 1.0
-MISFIT_LIMIT = 60.0
+KNOCKED_SIGMAS = 5.0
 KNOCKED_TOLERANCE = 30.0
 ITERATIONS = 3
 STEPS = np.array([1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5])
@@ -104,30 +104,33 @@ class Anchor:
         self._corners = self._corners + (corners - self._corners) / self._averaged
 
     def _solve(self) -> None:
-        model, covariance, misfit = self._fit(1.0)
-        knocked = misfit > MISFIT_LIMIT
+        at = self.calibrated.extrinsics
+        jacobian, tolerated = self._jacobian(at), self.tolerance.deviations() ** 2
+        surprise = self._surprise(jacobian, tolerated)
+        knocked = surprise > KNOCKED_SIGMAS
         if knocked:
-            model, covariance, _ = self._fit(KNOCKED_TOLERANCE)
+            tolerated = tolerated * KNOCKED_TOLERANCE**2
         if knocked and not self._knocked:
-            event(LOGGER, "eye_camera_moved", camera=model.camera.name, misfit=round(misfit))
+            facts = {"camera": self.model.camera.name, "surprise_sigmas": round(surprise, 1)}
+            event(LOGGER, "eye_camera_moved", level=logging.WARNING, **facts)
         self._knocked = knocked
-        self.model, self.covariance = model, covariance
-        self.probes = _probes(model)
-
-    def _fit(self, widened: float) -> tuple[CameraModel, Floats, float]:
-        """Return the camera, its covariance, and how badly calibration and tag disagree."""
-        calibrated = self.calibrated.extrinsics
-        prior = np.diag((self.tolerance.deviations() * widened) ** -2)
-        weight = self.corner_std_px**-2
-        at = calibrated.copy()
-        jacobian = self._jacobian(at)
+        prior, weight = np.diag(1.0 / tolerated), self.corner_std_px**-2
         covariance = np.linalg.inv(prior + weight * jacobian.T @ jacobian).astype(np.float64)
         for _ in range(ITERATIONS):
-            downhill = weight * jacobian.T @ self._residual(at) - prior @ (at - calibrated)
-            at = at + covariance @ downhill
-        left, off = self._residual(at), at - calibrated
-        misfit = float(weight * left @ left + off @ prior @ off)
-        return self.calibrated.moved_to(at), covariance, misfit
+            downhill = weight * jacobian.T @ self._residual(at)
+            at = at + covariance @ (downhill - prior @ (at - self.calibrated.extrinsics))
+        self.model, self.covariance = self.calibrated.moved_to(at), covariance
+        self.probes = _probes(self.model)
+
+    def _surprise(self, jacobian: Floats, tolerated: Floats) -> float:
+        """Return how far the tag's middle is from where calibration puts it, in deviations.
+
+        The middle, because it hardly depends on how well this camera's corners are found.
+        """
+        off = self._residual(self.calibrated.extrinsics).reshape(4, 2).mean(axis=0)
+        by_camera = jacobian.reshape(4, 2, 6).mean(axis=0)
+        doubt = (by_camera * tolerated) @ by_camera.T + self.corner_std_px**2 * np.eye(2)
+        return float(np.sqrt(off @ np.linalg.solve(doubt, off)))
 
     def _residual(self, extrinsics: Floats) -> Floats:
         pose = Pose2(self.tag.x_m, self.tag.y_m, self.tag.yaw_rad)

@@ -166,5 +166,5 @@ def _refuse_folding(model: CameraModel) -> None:
     if image[still] < corner:
         raise EyeError(
             f"camera {camera.name!r}: distortion: expected a picture that grows outwards up to its "
-            f"corner at {corner:.3f} focal lengths, got one that ends at {image[still]:.3f}"
+            f"corner at {corner:.3f} focal lengths, got one that folds back at {image[still]:.3f}"
         )

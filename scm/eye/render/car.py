@@ -84,9 +84,9 @@ def draw_car(frame: Image, model: CameraModel, scenery: Scenery, car: SnapshotVe
     draw_shape(canvas, shape, solid, gain)
     canvas.picture(_roof_print(car.tag_id, gain), tag)
     canvas.put_back()
-    away = math.hypot(car.x_m - model.position[0], car.y_m - model.position[1])
+    outline = (_shadow(body) @ rotation.T + origin)[:, :2]
     for obstacle in scenery.obstacles:
-        if obstacle.nearest < away:
+        if obstacle.is_before(outline, model.position[:2]):
             _hide_behind(canvas, obstacle, scenery.picture)
 
 

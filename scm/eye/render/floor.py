@@ -34,14 +34,29 @@ class Obstacle:
     """Something that stands on the floor and may hide a car behind it.
 
     Attributes:
-        nearest: Least distance of its foot from the point below the camera [m].
+        foot: Its outline on the floor, counter-clockwise, (n, 2) [m].
         corner: First column and row of its window in the frame.
         mask: Which pixels of the window it covers.
     """
 
-    nearest: float
+    foot: Floats
     corner: tuple[int, int]
     mask: Bools
+
+    def is_before(self, points: Floats, eye: Floats) -> bool:
+        """Return whether a line over the floor from `eye` (2,) to one of `points` (n, 2) meets it.
+
+        That is: seen from a camera above `eye`, whether it stands before something there.
+        """
+        edge = np.roll(self.foot, -1, axis=0) - self.foot
+        line = (points - eye)[:, None]
+        across = _cross(line, edge)
+        safe = np.where(across == 0.0, np.inf, across)
+        from_eye = self.foot - eye
+        along_line = _cross(from_eye, edge) / safe
+        along_edge = _cross(from_eye, line) / safe
+        met = (along_line >= 0.0) & (along_line <= 1.0) & (along_edge >= 0.0) & (along_edge <= 1.0)
+        return bool((met & (across != 0.0)).any())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +72,11 @@ class Scenery:
     picture: Image
     light: Floats
     obstacles: tuple[Obstacle, ...]
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    found: Floats = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return found
 
 
 def draw_scenery(city_map: CityMap, model: CameraModel, rng: np.random.Generator) -> Scenery:
@@ -237,12 +257,12 @@ def _draw_obstacle(frame: Image, model: CameraModel, solid: Solid) -> Obstacle:
     pixels = model.project(shape.points)
     canvas = Canvas(frame, pixels)
     corner = int(canvas.corner[0]), int(canvas.corner[1])
-    nearest = _distance(solid, model)
+    foot = solid.bottom[:, :2]
     if canvas.is_empty:
-        return Obstacle(nearest, corner, np.zeros((0, 0), dtype=np.bool_))
+        return Obstacle(foot, corner, np.zeros((0, 0), dtype=np.bool_))
     draw_shape(canvas, shape, pixels)
     canvas.put_back()
     mask = np.zeros(canvas.window.shape[:2], dtype=np.uint8)
     hull = cv2.convexHull((pixels - canvas.corner).astype(np.float32))
     cv2.fillConvexPoly(mask, np.rint(hull * 16.0).astype(np.int32), 255, cv2.LINE_8, 4)
-    return Obstacle(nearest, corner, mask > 0)
+    return Obstacle(foot, corner, mask > 0)

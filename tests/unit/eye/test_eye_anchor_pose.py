@@ -1,0 +1,111 @@
+"""Where the camera is, and where cars are, from exact and from shifted corners."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scm.eye.anchor import Anchor, Tolerance
+from scm.eye.bodies import NIGEL
+from scm.eye.camera import camera_model
+from scm.eye.pose import car_pose
+from scm.eye.render.car import tag_on_roof
+from scm.eye.tags import tag_corners
+from scm.maps.load import load_map
+from scm.v2x.messages.world_snapshot import SnapshotVehicle
+
+CITY = load_map("driving_school")
+TRUE = camera_model(CITY.cameras[0])
+FLOOR_TAG = np.column_stack((tag_corners(CITY.tag.size_m), np.zeros(4)))
+
+
+def car(x, y, yaw, **more):
+    return SnapshotVehicle(
+        vehicle="n1", kind="hosted", car="nigel", tag_id=1, x_m=x, y_m=y, yaw_rad=yaw,
+        speed_mps=0.0, steering_rad=0.0, **more,
+    )  # fmt: skip
+
+
+@given(st.floats(0.0, 2.7), st.floats(0.0, 1.3), st.floats(-math.pi, math.pi))
+def test_exact_corners_give_the_exact_pose(x, y, yaw):
+    corners = TRUE.project(tag_on_roof(car(x, y, yaw)))
+    pose = car_pose(Anchor(TRUE, CITY.tag), NIGEL, corners).pose
+    assert (pose.x, pose.y) == pytest.approx((x, y), abs=1e-7)
+    assert math.remainder(pose.yaw - yaw, math.tau) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_covariance_is_symmetric_and_positive():
+    corners = TRUE.project(tag_on_roof(car(0.4, 1.0, 2.0)))
+    covariance = car_pose(Anchor(TRUE, CITY.tag), NIGEL, corners).covariance
+    np.testing.assert_array_equal(covariance, covariance.T)
+    assert np.linalg.eigvalsh(covariance).min() > 0.0
+
+
+def test_a_map_tag_makes_the_camera_less_doubtful():
+    anchor = Anchor(TRUE, CITY.tag)
+    before = anchor.covariance.copy()
+    anchor.see(TRUE.project(FLOOR_TAG), 0)
+    assert np.linalg.eigvalsh(before - anchor.covariance).min() > -1e-15
+    assert anchor.covariance[0, 0] < 0.5 * before[0, 0]
+
+
+def test_exact_corners_of_the_map_tag_leave_a_right_calibration_alone():
+    anchor = Anchor(TRUE, CITY.tag)
+    anchor.see(TRUE.project(FLOOR_TAG), 0)
+    np.testing.assert_allclose(anchor.model.extrinsics, TRUE.extrinsics, atol=1e-9)
+
+
+def test_a_shifted_calibration_is_put_right_at_the_map_tag():
+    off = np.array([0.006, -0.005, 0.0, 0.0, 0.0, 0.0])
+    anchor = Anchor(TRUE.moved_to(TRUE.extrinsics + off), CITY.tag)
+    anchor.see(TRUE.project(FLOOR_TAG), 0)
+    misfit = np.abs(anchor.model.project(FLOOR_TAG) - TRUE.project(FLOOR_TAG)).max()
+    assert misfit < 0.1
+
+
+def test_a_lost_map_tag_keeps_the_last_correction_and_grows_old():
+    anchor = Anchor(TRUE.moved_to(TRUE.extrinsics + np.array([0.005, 0, 0, 0, 0, 0])), CITY.tag)
+    anchor.see(TRUE.project(FLOOR_TAG), 1_000_000)
+    corrected = anchor.model
+    anchor.see(None, 251_000_000)
+    assert anchor.model is corrected
+    assert anchor.age_ms(251_000_000) == 250.0
+
+
+def test_a_map_tag_never_seen_ages_from_the_first_frame():
+    anchor = Anchor(TRUE, CITY.tag)
+    anchor.see(None, 1_000_000_000)
+    anchor.see(None, 3_000_000_000)
+    assert anchor.age_ms(3_000_000_000) == 2000.0
+
+
+def test_a_knocked_camera_is_believed_and_logged(caplog):
+    knocked = TRUE.moved_to(TRUE.extrinsics + np.array([0.05, -0.04, 0.0, 0.01, 0.0, 0.0]))
+    anchor = Anchor(TRUE, CITY.tag)
+    for tick in range(3):
+        anchor.see(TRUE.project(FLOOR_TAG), tick)
+    with caplog.at_level("INFO"):
+        anchor.see(knocked.project(FLOOR_TAG), 3)
+    assert np.hypot(*(anchor.model.position - knocked.position)[:2]) < 0.03
+    assert anchor.covariance[0, 0] > Tolerance().position_m ** 2
+    assert "eye_camera_moved" in caplog.text
+
+
+def test_badly_found_corners_are_not_taken_for_a_knock(caplog):
+    anchor = Anchor(TRUE, CITY.tag)
+    blurred = 0.5 * np.random.default_rng(1).standard_normal((4, 2))
+    with caplog.at_level("INFO"):
+        anchor.see(TRUE.project(FLOOR_TAG) + blurred, 0)
+    assert caplog.text == ""
+
+
+def test_noise_of_a_still_tag_is_averaged_away():
+    rng = np.random.default_rng(0)
+    anchor = Anchor(TRUE, CITY.tag)
+    places = []
+    for tick in range(60):
+        anchor.see(TRUE.project(FLOOR_TAG) + 0.05 * rng.standard_normal((4, 2)), tick)
+        places.append(anchor.model.position[:2])
+    assert np.std(places[40:], axis=0).max() < 0.5 * np.std(places[:5], axis=0).max()
