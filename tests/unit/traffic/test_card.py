@@ -25,7 +25,10 @@ def test_the_card_knows_the_crossing_as_the_only_conflict():
     assert CARD.conflicts == (("south_east", "south_west"),)
 
 
-def test_movements_that_stay_a_lane_apart_do_not_conflict():
+@pytest.mark.parametrize(
+    ("apart_m", "conflicts"), [(0.26, ()), (0.25, (("south_east", "south_west"),))]
+)
+def test_movements_conflict_when_they_come_closer_than_a_lane_is_wide(apart_m, conflicts):
     lanes = [
         Lane(
             name=name,
@@ -34,10 +37,10 @@ def test_movements_that_stay_a_lane_apart_do_not_conflict():
             segments=(Segment(length_m=2.0),),
             speed_limit_mps=0.25,
         )
-        for name, y_m in (("crossing_south_east", 0.0), ("crossing_south_west", 0.26))
+        for name, y_m in (("crossing_south_east", 0.0), ("crossing_south_west", apart_m))
     ]
     city_map = msgspec.structs.replace(MAP, lanes=tuple(lanes))
-    assert card_of(city_map, MAP.junctions[0]).conflicts == ()
+    assert card_of(city_map, MAP.junctions[0]).conflicts == conflicts
 
 
 def test_a_stop_line_on_another_lane_or_none_still_gives_a_clearance():

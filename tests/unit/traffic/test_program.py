@@ -51,3 +51,28 @@ def test_a_stop_line_that_does_not_lead_to_its_movement_is_refused():
     line = msgspec.structs.replace(MAP.stop_lines[0], lane="crossing_south_west")
     with pytest.raises(PlanError, match="does not lead to 'crossing_south_east'"):
         program_of(*changed(stop_lines=(line, *MAP.stop_lines[1:])))
+
+
+def slower(name, limit_mps):
+    return tuple(
+        msgspec.structs.replace(lane, speed_limit_mps=limit_mps) if lane.name == name else lane
+        for lane in MAP.lanes
+    )
+
+
+def test_the_farthest_of_several_stop_lines_counts():
+    far = msgspec.structs.replace(MAP.stop_lines[0], name="far", at_m=0.1)
+    for lines in ((far, *MAP.stop_lines), (*MAP.stop_lines, far)):
+        junction, roads = changed(stop_lines=lines)
+        way_m = junction.groups[0].movement.to_m - 0.1
+        clearance = program_of(junction, roads).times[0].clearance
+        assert clearance == whole_steps_ns((way_m + 0.3) / 0.217)
+
+
+@pytest.mark.parametrize("slow", ["west_loop", "crossing_south_east"])
+def test_the_lowest_speed_limit_on_the_way_counts(slow):
+    before = msgspec.structs.replace(MAP.stop_lines[0], name="before", lane="west_loop", at_m=2.0)
+    lines = (before, *MAP.stop_lines)
+    junction, roads = changed(stop_lines=lines, lanes=slower(slow, 0.1))
+    way_m = roads.lane("west_loop").length_m - 2.0 + junction.groups[0].movement.to_m
+    assert program_of(junction, roads).times[0].clearance == whole_steps_ns((way_m + 0.3) / 0.1)

@@ -69,3 +69,12 @@ def test_the_pace_of_motion_is_kept_for_three_cams_and_then_falls_back():
         return a_state(x_m=1.0 if t_ms >= 200 else 0.0)
 
     assert sends(jump_at_200_ms, 2900) == [0, 200, 400, 600, 800, 1800, 2800]
+
+
+def test_motion_starts_the_count_of_three_again():
+    jumps = (200, 800)
+
+    def jumping(t_ms):
+        return a_state(x_m=float(sum(t_ms >= jump for jump in jumps)))
+
+    assert sends(jumping, 1900) == [0, 200, 400, 600, 800, 1000, 1200, 1400]

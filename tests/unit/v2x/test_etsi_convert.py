@@ -191,13 +191,14 @@ def test_a_spatem_read_back_is_the_spat_also_across_the_hour(t_s, t_ms, to_min_m
     assert most <= told.max_end_s < most + 0.1
 
 
-def test_an_end_beyond_the_hour_is_far_and_read_as_unknown():
-    body = ec.spatem_of(a_spat(max_end_ns=NOW + 7200 * NS_PER_S), JUNCTION)
+@pytest.mark.parametrize("ahead_s", [56 * 60, 7200])
+def test_an_end_of_an_hour_or_so_ahead_is_far_and_read_as_unknown(ahead_s):
+    body = ec.spatem_of(a_spat(max_end_ns=NOW + ahead_s * NS_PER_S), JUNCTION)
     assert body.states[0].max_end_time == 36000
     assert ec.colours_of(body)[1].max_end_s is None
 
 
-@pytest.mark.parametrize("colour", ["flashing_red", "dark"])
+@pytest.mark.parametrize("colour", ["flashing_red", "dark", "red"])
 def test_flash_promises_nothing_and_says_failure(colour):
     body = ec.spatem_of(a_spat(mode="flash", colour=colour, max_end_ns=NOW), JUNCTION)
     assert body.status == ("failureFlash",)
