@@ -261,14 +261,6 @@ def test_a_trip_arrives_and_the_car_goes_on(city, watch):
     assert watch.all(Trip)[-1].trip_id != "t-1"
 
 
-def test_a_route_that_does_not_exist_is_refused_in_words(city, watch):
-    city.add(AgentPart("n1"))
-    city.run_until(lambda: watch.state("n1") is not None, 3.0)
-    refused = city.call(RouteRequest(vehicle="n1", via=("nowhere",)))
-    assert isinstance(refused, Refused)
-    assert "nowhere" in refused.detail
-
-
 def command(vehicle, epoch, seq, throttle=0.0, steering=0.0):
     return DriveCommand(
         vehicle=vehicle, t_ns=0, epoch=epoch, seq=seq, throttle=throttle, steering=steering
