@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 
 from scm.geometry import Pose2
 from scm.v2x.cam_trigger import CamTrigger
-from scm.v2x.messages.trip import Trip
 from scm.vehicles.car import Car
-from scm.vehicles.drivers.route import RouteDriver
+from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.guard import Guard
 from scm.vehicles.sensor import Reading, Sampler
@@ -20,39 +19,15 @@ from scm.world.lease import Lease
 
 
 @dataclass(slots=True)
-class Errand:
-    """A trip under way: where to, who steers, since when."""
-
-    trip_id: str
-    driver: RouteDriver
-    started_ns: int
-    arrived_ns: int | None = None
-
-    def report(self, vehicle: str, now_ns: int) -> Trip:
-        """Return how far it is."""
-        return Trip(
-            vehicle=vehicle,
-            trip_id=self.trip_id,
-            t_ns=now_ns,
-            route=self.driver.path.lanes,
-            done_m=self.driver.done_m,
-            length_m=self.driver.trip_m,
-            started_ns=self.started_ns,
-            arrived_ns=self.arrived_ns,
-            waiting_for=self.driver.waiting_for,
-        )
-
-
-@dataclass(slots=True)
 class HostedCar:
     """One hosted car.
 
     Attributes:
         slot: Its number in the contact space.
-        errand: What the world's own driver does with it; None: it stands until told.
+        trips: Where it was sent, and the driver that takes it there; None before the first trip.
+        is_sent: Whether its own driver drives it; else it stands until it is sent or leased.
         mode: As in `VehicleState`.
         hazard: Whether its hazard lights flash: its commander was lost.
-        last_trip_ns: When its trip was last reported.
     """
 
     name: str
@@ -66,7 +41,8 @@ class HostedCar:
     signals: SignalView
     guard: Guard
     ears: Ears = field(default_factory=Ears)
-    errand: Errand | None = None
+    trips: Trips | None = None
+    is_sent: bool = False
     mode: str = "idle"
     hazard: bool = False
     seq: int = 0

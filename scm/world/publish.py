@@ -138,13 +138,9 @@ def cams_due(world: World, states: list[VehicleState], now_ns: int) -> list[CamT
 
 
 def _trips(world: World, now_ns: int) -> None:
-    is_due = world.every["trip"].is_due(now_ns)
     for car in world.hosted.values():
-        errand = car.errand
-        if errand is not None and (
-            errand.arrived_ns == now_ns or (is_due and errand.arrived_ns is None)
-        ):
-            world.outbox.append(errand.report(car.name, now_ns))
+        if car.trips is not None and car.is_sent:
+            world.outbox += car.trips.reports(now_ns)
 
 
 def _each_second(world: World, now_ns: int) -> list[Message]:

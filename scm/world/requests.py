@@ -19,9 +19,11 @@ from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.vehicles.car import car_names
+from scm.vehicles.drivers.limits import limits_of
+from scm.vehicles.drivers.trips import Trips
 from scm.world import lease as rules
-from scm.world.driving import driver_for, take_over
-from scm.world.hosted import Errand, HostedCar
+from scm.world.driving import take_over
+from scm.world.hosted import HostedCar
 from scm.world.remote import RemoteCar
 from scm.world.world import AnyCar, World
 
@@ -116,21 +118,12 @@ def send(world: World, car: HostedCar, request: RouteRequest, now_ns: int) -> Ro
     """
     if request.speed_mps is not None and not request.speed_mps > 0.0:
         raise _RefusedError("invalid", f"speed_mps: got {request.speed_mps}, expected above 0")
-    here = world.roads.nearest(car.pose)
-    if here is None:
-        x, y, _ = car.pose
-        detail = f"{car.name} stands on no lane: nearest to ({x:.2f}, {y:.2f}) m there is none"
-        raise _RefusedError("invalid", detail)
-    driver = driver_for(
-        world.roads, car.car, here.lane, request.via, request.laps, request.speed_mps
-    )
-    world.trips += 1
-    trip_id = request.request_id or f"{car.name}-{world.trips}"
-    car.errand = Errand(trip_id, driver, now_ns)
+    if car.trips is None:
+        car.trips = Trips(car.name, world.roads, limits_of(car.car), car.pose, now_ns)
+    reply = car.trips.begin(request, car.pose, now_ns)
+    car.is_sent = True
     car.hazard = False
-    path = driver.path
-    length = None if path.closed else path.length_m - here.s
-    return RouteReply(vehicle=car.name, trip_id=trip_id, route=path.lanes, length_m=length)
+    return reply
 
 
 def _lease(world: World, request: LeaseRequest, now_ns: int) -> LeaseReply:

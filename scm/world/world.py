@@ -49,7 +49,6 @@ class World:
         scanners: One LIDAR a remote car, by its name: only the world can see for it.
         stop: The red button as it stands.
         outbox: What the tick under way sends.
-        trips: How many trips were begun.
         ignored: Messages that fitted nothing: unknown cars, commands without the lease.
         last_hit_ns: When a car's contact was last told.
         verdicts: The monitors' newest, by junction.
@@ -73,11 +72,10 @@ class World:
         self.remote: dict[str, RemoteCar] = {}
         self.scanners: dict[str, Sampler] = {}
         self.pace = Pace(PERIOD_NS)
-        self.every = {"snapshot": Every(20.0), "trip": Every(2.0), "second": Every(1.0)}
+        self.every = {"snapshot": Every(20.0), "second": Every(1.0)}
         self.stop = CityStop(t_ns=0, engaged=False)
         self.outbox: list[Outgoing] = []
         self.tick = 0
-        self.trips = 0
         self.ignored = 0
         self.last_hit_ns: dict[str, int] = {}
         self.verdicts: dict[str, MonitorStatus] = {}
