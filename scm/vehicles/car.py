@@ -3,6 +3,7 @@
 `types/<name>.toml` holds the cars shipped; any other TOML file is loaded by its path.
 """
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -202,6 +203,8 @@ def _top_problems(data: Mapping[str, Any], sections: set[str]) -> Iterator[str]:
         if name in {"name", "scale"}:
             if not isinstance(body, str):
                 yield f"{name}: expected text, got {body!r}"
+            elif name == "name" and not re.fullmatch(r"[A-Za-z0-9_-]{1,40}", body):
+                yield f"name: expected up to 40 letters, digits, - and _, got {body!r}"
         elif name != "terms" and (name not in sections or not isinstance(body, dict)):
             valid = [*sorted(sections), "name", "scale", "terms"]
             yield f"[{name}]: no such section{nearest(name, valid)}"

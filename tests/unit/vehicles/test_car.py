@@ -117,6 +117,8 @@ def test_a_wrong_unit_is_refused(tmp_path):
         (('"servo", ', '"servo", "servo", '), "terms: 'servo' stands twice"),
         (("terms = [", "terms = [3,"), "terms: expected a list of effect names"),
         (('"tyre_contact", ', ""), "no term sets load"),
+        (('name = "nigel"', 'name = "my car"'), "name: expected up to 40 letters, digits"),
+        (('scale = "1:14"', "scale = 14"), "scale: expected text, got 14"),
         (("std = 0.15, ", 'std = "much", '), "body.mass_kg.std: expected a number"),
         (("std = 0.15, ", "sigma = 0.15, "), "body.mass_kg: no such field"),
     ],
