@@ -144,7 +144,7 @@ class Crew:
             self._say(f"  {name:<9} is silent: it runs, but gives no sign of life on the bus")
         if not (member.was_up or member.told_slow) and now_ns > member.started_ns + SLOW_NS:
             member.told_slow = True
-            self._say(f"  {name:<9} is still starting (the first time it compiles)")
+            self._say(f"  {name:<9} is still starting (a first start compiles and takes longer)")
 
     def _ended(self, member: Member, code: int, now_ns: int) -> None:
         name = member.job.name
