@@ -1,7 +1,8 @@
 """What one frame of the eye costs and how exact it is, beside OpenCV's own tag detector.
 
-Run: `python -m bench.eye`. Both detectors see the same rendered 720p frames of the driving school with 6 cars; poses come from
-the same estimator with the camera's place known, so only the corners differ. CPU milliseconds of one thread, median over the frames.
+Both detectors see the same rendered 720p frames of the driving school with 6 cars. Poses come from
+the same estimator with the camera's place known, so only the corners differ. CPU milliseconds of
+one thread, median over the frames. Run: `python -m bench.eye`.
 """
 
 import math
@@ -125,9 +126,8 @@ def main() -> None:
         costs.append(spent)
         shots.append((cars, Frame(tick, image).grey().copy()))
     _, jpeg = timed(cv2.imencode, ".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 80])
-    print(
-        f"{FRAMES} frames 1280 x 720, {CARS} cars: render {np.median(costs):.1f} ms, jpeg {jpeg:.1f} ms"
-    )
+    drawn = f"render {np.median(costs):.1f} ms, jpeg {jpeg:.1f} ms"
+    print(f"{FRAMES} frames 1280 x 720, {CARS} cars: {drawn}")
     rows = {
         "scm, sought at 1/2": judge(ours(Settings()), shots),
         "scm, 1/2, blurred": judge(ours(Settings(quad_sigma=0.8)), shots),

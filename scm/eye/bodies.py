@@ -1,12 +1,10 @@
 """What the eye knows of a kind of car: where its tag sits, and its outline for the picture."""
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any
-
-from scm.errors import CarError
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +15,7 @@ class CarBody:
         tag_position: Centre of the roof's tag.
         tag_size: Edge of its black square.
         x_span, y_span: The outline from above: rear to front, right to left.
+        has_tag: Whether the car file has a section `ips`; without it the roof is bare.
     """
 
     tag_position: tuple[float, float, float] = (0.035125, 0.0, 0.129165)
@@ -27,41 +26,38 @@ class CarBody:
     track: float = 0.153
     wheel_radius: float = 0.0325
     wheel_width: float = 0.025
+    has_tag: bool = True
 
 
 NIGEL = CarBody()
+KEYS = {
+    "tag_position": "ips.position_m",
+    "tag_size": "ips.tag_size_m",
+    "x_span": "body.footprint_x_m",
+    "y_span": "body.footprint_y_m",
+    "wheelbase": "body.wheelbase_m",
+    "track": "body.track_m",
+    "wheel_radius": "wheel.radius_m",
+    "wheel_width": "wheel.width_m",
+}
 
 
 @lru_cache(maxsize=64)
 def car_body(car: str) -> CarBody:
     """Return the body of a car file of that name; a car that is not among ours is a Nigel to us.
 
-    Raises:
-        CarError: The file lacks one of the measures.
+    Every measure that a file leaves out is a Nigel's.
     """
     path = files("scm.vehicles") / "types" / f"{car}.toml"
     if not car.replace("-", "_").isidentifier() or not path.is_file():
         return NIGEL
     values = tomllib.loads(path.read_text())
-    return CarBody(
-        tag_position=_span(car, values, "ips.position_m"),
-        tag_size=_value(car, values, "ips.tag_size_m"),
-        x_span=_span(car, values, "body.footprint_x_m"),
-        y_span=_span(car, values, "body.footprint_y_m"),
-        wheelbase=_value(car, values, "body.wheelbase_m"),
-        track=_value(car, values, "body.track_m"),
-        wheel_radius=_value(car, values, "wheel.radius_m"),
-        wheel_width=_value(car, values, "wheel.width_m"),
-    )
+    given = {field: _value(values, key) for field, key in KEYS.items()}
+    known = {field: value for field, value in given.items() if value is not None}
+    return replace(NIGEL, **known, has_tag="ips" in values)
 
 
-def _value(car: str, values: dict[str, Any], key: str) -> Any:
+def _value(values: dict[str, Any], key: str) -> Any:
     section, name = key.split(".")
-    try:
-        return values[section][name]["value"]
-    except (KeyError, TypeError) as cause:
-        raise CarError(f"car {car!r}: {key}: expected {{ value = ... }} for the eye") from cause
-
-
-def _span(car: str, values: dict[str, Any], key: str) -> Any:
-    return tuple(float(value) for value in _value(car, values, key))
+    value = values.get(section, {}).get(name, {}).get("value")
+    return tuple(value) if isinstance(value, list) else value

@@ -82,12 +82,12 @@ def draw_car(frame: Image, model: CameraModel, scenery: Scenery, car: SnapshotVe
     if canvas.is_empty:
         return
     draw_shape(canvas, shape, solid, gain)
-    canvas.picture(_roof_print(car.tag_id, gain), tag)
+    if body.has_tag:
+        canvas.picture(_roof_print(car.tag_id, gain), tag)
     canvas.put_back()
     outline = (_shadow(body) @ rotation.T + origin)[:, :2]
     for obstacle in scenery.obstacles:
-        if obstacle.is_before(outline, model.position[:2]):
-            _hide_behind(canvas, obstacle, scenery.picture)
+        _hide_behind(canvas, obstacle, scenery.picture, outline, model)
 
 
 @lru_cache(maxsize=256)
@@ -112,14 +112,17 @@ def _cast(canvas: Canvas, outline: Floats) -> None:
     canvas.window[:] = cv2.multiply(canvas.window, three, scale=1.0 / 255.0)
 
 
-def _hide_behind(canvas: Canvas, obstacle: Obstacle, picture: Image) -> None:
+def _hide_behind(
+    canvas: Canvas, obstacle: Obstacle, picture: Image, outline: Floats, model: CameraModel
+) -> None:
+    """Put an obstacle back over a car of that outline (n, 2), if it stands before it."""
     height, width = canvas.window.shape[:2]
     x0, y0 = (int(value) for value in canvas.corner)
     ox, oy = obstacle.corner
     left, top = max(x0, ox), max(y0, oy)
     right = min(x0 + width, ox + obstacle.mask.shape[1])
     bottom = min(y0 + height, oy + obstacle.mask.shape[0])
-    if right <= left or bottom <= top:
+    if right <= left or bottom <= top or not obstacle.is_before(outline, model.position[:2]):
         return
     mask = obstacle.mask[top - oy : bottom - oy, left - ox : right - ox]
     window = canvas.window[top - y0 : bottom - y0, left - x0 : right - x0]
@@ -160,6 +163,7 @@ def _shell(body: CarBody, colour: Colour) -> tuple[Solid, ...]:
     tag_x, _, roof = body.tag_position
     plate = body.tag_size * PRINT_SCALE
     inner = 0.78 * half
+    nose = front - 0.016
     dark: Colour = (colour[0] * 2 // 3, colour[1] * 2 // 3, colour[2] * 2 // 3)
     deck = 0.62 * roof
     puck_x = min(front - 0.05, tag_x + plate / 2 + 0.062)
@@ -172,15 +176,13 @@ def _shell(body: CarBody, colour: Colour) -> tuple[Solid, ...]:
         prism(rectangle(rear + 0.008, 0.0, 0.016, 1.7 * half), 0.02, 0.05, BLACK),
         prism(_rounded(rear, front - 0.006, -inner, inner, 0.022), 0.02, deck, colour, taper=0.04),
         prism(
-            rectangle((puck_x + front) / 2, 0.0, front - puck_x, 0.5 * inner),
+            rectangle((puck_x + nose) / 2, 0.0, nose - puck_x, 0.5 * inner),
             deck,
             deck + 0.002,
             dark,
         ),
         *(
-            prism(
-                rectangle(front - 0.022, s * 0.68 * inner, 0.014, 0.024), deck, deck + 0.001, LAMP
-            )
+            prism(rectangle(nose - 0.012, s * 0.68 * inner, 0.014, 0.024), deck, deck + 0.001, LAMP)
             for s in (1.0, -1.0)
         ),
         *(

@@ -132,6 +132,11 @@ def test_other_car_files_have_their_own_roof():
     assert car_body("f1tenth").tag_position[2] == 0.18
 
 
+def test_a_car_file_without_a_tag_makes_a_car_with_a_bare_roof(still):
+    assert not car_body("dart").has_tag
+    assert ids(still.render(light(msgspec.structs.replace(CAR, car="dart")))) == [0]
+
+
 @pytest.mark.parametrize("name", ["home-made", "../types/f1tenth", "", "a/b"])
 def test_a_car_without_a_file_of_ours_is_taken_for_a_nigel(name):
     assert car_body(name) == NIGEL
