@@ -85,7 +85,7 @@ class Guard:
         if epoch <= self._epoch:
             return False
         self._epoch, self._seq = epoch, None
-        self._throttle, self._heard_ns = 0.0, self._now_ns
+        self._heard_ns = self._now_ns
         self._lost = False
         return True
 

@@ -145,6 +145,11 @@ def test_a_granted_epoch_fences_before_its_first_command(guard):
     assert guard.output(at(30)).mode == "drive"
 
 
+def test_the_new_holders_time_counts_from_the_grant(guard):
+    guard.set_epoch(2, at(500))
+    assert guard.output(at(700)).mode == "hold"
+
+
 @pytest.mark.parametrize("epoch", [0, 1])
 def test_an_epoch_that_is_not_newer_changes_nothing(guard, epoch):
     assert not guard.set_epoch(epoch, at(10))
