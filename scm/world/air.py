@@ -2,13 +2,10 @@
 
 from collections.abc import Sequence
 
-from scm.v2x.etsi_convert import read_cam
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.spatem_rx import SpatemRx
 from scm.v2x.messages.spatem_tx import SpatemTx
-from scm.world.ears import heard
-from scm.world.hosted import HostedCar
 from scm.world.world import World
 
 Frame = CamTx | SpatemTx
@@ -22,19 +19,12 @@ def transmit(world: World, frames: Sequence[Frame], now_ns: int) -> None:
     for frame in frames:
         receivers = world.radio.receivers(frame.station, places)
         hosted = [world.hosted[name] for name in receivers if name in world.hosted]
-        if isinstance(frame, CamTx):
-            _hear_cam(hosted, frame, now_ns)
-        else:
-            for car in hosted:
+        for car in hosted:
+            if isinstance(frame, CamTx):
+                car.others.hear(frame.body, now_ns)
+            else:
                 car.signals.hear_spatem(frame.body, now_ns)
         world.outbox += [_received(n, frame) for n in receivers if n not in world.hosted]
-
-
-def _hear_cam(cars: list[HostedCar], frame: CamTx, now_ns: int) -> None:
-    told = heard(read_cam(frame.body), now_ns)
-    if told is not None:
-        for car in cars:
-            car.ears.hear(frame.station, told)
 
 
 def _received(receiver: str, frame: Frame) -> CamRx | SpatemRx:

@@ -62,7 +62,7 @@ def _follow(car: HostedCar, trips: Trips, now_ns: int, *, stop: bool) -> None:
         pose=car.pose,
         speed=car.speed,
         signals=car.signals,
-        others=car.ears.others(now_ns),
+        others=car.others.others(now_ns),
         stop=stop,
     )
     car.command(*trips.decide(view))

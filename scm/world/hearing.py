@@ -28,9 +28,7 @@ def hear(world: World, now_ns: int, inbox: Sequence[Incoming]) -> None:
     for item in inbox:
         message = item.message
         if isinstance(message, Request):
-            reply = reply_to(world, message, now_ns)
-            if reply is not None:
-                world.outbox.append(Answer(item, reply))
+            world.outbox.append(Answer(item, reply_to(world, message, now_ns)))
         elif (handler := _HANDLERS.get(type(message))) is not None:
             handler(world, message, now_ns)
 

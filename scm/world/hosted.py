@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from scm.geometry import Pose2
 from scm.v2x.cam_trigger import CamTrigger
 from scm.vehicles.car import Car
+from scm.vehicles.drivers.heard import HeardCars
 from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.guard import Guard
 from scm.vehicles.sensor import Reading, Sampler
 from scm.vehicles.signal_view import SignalView
-from scm.world.ears import Ears
 from scm.world.lease import Lease
 
 
@@ -24,6 +24,7 @@ class HostedCar:
 
     Attributes:
         slot: Its number in the contact space.
+        others: The cars it has heard of.
         trips: Where it was sent, and the driver that takes it there; None before the first trip.
         is_sent: Whether its own driver drives it; else it stands until it is sent or leased.
         mode: As in `VehicleState`.
@@ -40,7 +41,7 @@ class HostedCar:
     lease: Lease
     signals: SignalView
     guard: Guard
-    ears: Ears = field(default_factory=Ears)
+    others: HeardCars = field(default_factory=HeardCars)
     trips: Trips | None = None
     is_sent: bool = False
     mode: str = "idle"

@@ -44,7 +44,9 @@ def grant(home: str, epoch: int = 1) -> Lease:
 
 
 def acquire(lease: Lease, owner: str, ttl_ms: int, now_ns: int) -> Lease:
-    """Take a free car; asking again for one's own lease only renews it.
+    """Take a car that is at home; asking again for one's own lease only renews it.
+
+    The home owner that asks gets a newer epoch: what it commanded before is void.
 
     Raises:
         LeaseError: when somebody else holds it.

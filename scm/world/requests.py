@@ -38,8 +38,8 @@ class _RefusedError(ScmError):
         self.code = code
 
 
-def reply_to(world: World, request: Request, now_ns: int) -> Message | None:
-    """Do what is asked; None leaves the answer to somebody else."""
+def reply_to(world: World, request: Request, now_ns: int) -> Message:
+    """Do what is asked, or refuse it in words."""
     try:
         return _ANSWERS[type(request)](world, request, now_ns)
     except _RefusedError as refusal:
@@ -100,10 +100,10 @@ def _remove(world: World, request: RemoveRequest, now_ns: int) -> RemoveReply:
     return RemoveReply(vehicle=car.name)
 
 
-def _route(world: World, request: RouteRequest, now_ns: int) -> RouteReply | None:
-    car = world.hosted.get(request.vehicle)
-    if car is None:
-        return None  # its agent answers, if there is one
+def _route(world: World, request: RouteRequest, now_ns: int) -> RouteReply:
+    car = _known(world, request.vehicle)
+    if isinstance(car, RemoteCar):  # of several answers the bus takes the one that is no refusal
+        raise _RefusedError("not_found", f"{car.name} is not hosted: its own agent answers for it")
     if not car.lease.is_at_home:
         detail = f"{car.name} is leased to {car.lease.owner!r}: release the lease, or steal it"
         raise _RefusedError("owned", detail)
@@ -189,7 +189,7 @@ def _place(world: World, spawn: str) -> Pose2:
     return world.roads.spawn_pose(free[0])
 
 
-_ANSWERS: dict[type[Message], Callable[[World, Any, int], Message | None]] = {
+_ANSWERS: dict[type[Message], Callable[[World, Any, int], Message]] = {
     SpawnRequest: _spawn,
     JoinRequest: _join,
     RemoveRequest: _remove,

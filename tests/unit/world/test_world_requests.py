@@ -149,7 +149,7 @@ def test_a_full_city_says_so(city):
 
 def test_a_route_for_a_car_that_is_not_hosted_is_left_to_its_agent(city):
     joined(city)
-    assert city.ask(RouteRequest(vehicle="n7")) is None
+    assert city.ask(RouteRequest(vehicle="n7")).code == "not_found"
 
 
 def test_a_sent_car_drives_and_reports_its_trip(city):
