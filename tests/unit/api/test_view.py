@@ -1,8 +1,10 @@
+import sys
 import threading
 
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
@@ -127,9 +129,15 @@ def test_pictures_may_be_taken_while_another_thread_steps(view, hear, snapshot, 
             failures.append(failure)
 
     reader = threading.Thread(target=read)
-    reader.start()
-    for number in range(300):
-        hear(1.0 + number, snapshot(n1=(0.0, 0.0, 0.0)), spat(), trip_of(f"n{number}"))
-    done.set()
-    reader.join()
+    usual_s = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        reader.start()
+        for number in range(300):
+            came = Presence(role="v", station=f"n{number}", session="s", alive=True)
+            hear(1.0 + number, snapshot(n1=(0.0, 0.0, 0.0)), spat(), trip_of(f"n{number}"), came)
+    finally:
+        sys.setswitchinterval(usual_s)
+        done.set()
+        reader.join()
     assert failures == []
