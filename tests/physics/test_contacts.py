@@ -11,9 +11,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scm.geometry import Pose2
 from scm.maps.model import CityMap, Floor, MapTag, Wall
 from scm.v2x.exchange import Incoming
+from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
+from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.world.requests import reply_to
@@ -176,3 +178,69 @@ def test_at_rest_the_imu_reads_gravity_and_its_own_noise():
     # 500 readings: mean within 4.5 sigma / sqrt(500), spread within 15 %.
     assert_allclose(np.mean(readings, 0), [0, 0, 9.80665, 0, 0, 0], atol=0.2 * accel)
     assert_allclose(np.std(readings, 0), spread, rtol=0.15)
+
+
+class Agent:
+    """A remote car with a fleet of its own, whose reports and pushes take a tick each way."""
+
+    def __init__(self, world, name, pose, speed, ice=False):
+        self.world, self.name, self.seq = world, name, 0
+        self.car = world.admit(name, "remote", "s", "nigel", Pose2(*pose), 0)
+        self.fleet = Fleet(NIGEL, 1)
+        self.fleet.add(Pose2(*pose), speed)
+        self.told = []
+        if ice:
+            for key in ("force_extremum", "force_asymptote"):
+                self.fleet.set_parameter(0, f"tyre.{key}", 0.0)
+                self.fleet.set_parameter(0, f"tyre.lateral_{key}", 0.0)
+
+    def step(self, now):
+        """Move a tick, having heard the last tick's contacts; report."""
+        for contact in (m for m in self.world.outbox if isinstance(m, Contact)):
+            self.told.append(contact)
+            self.fleet.push(0, contact.dvx_mps, contact.dvy_mps, contact.dyaw_rate_radps,
+                            contact.dx_m, contact.dy_m)  # fmt: skip
+        self.fleet.advance(TICK_S)
+        self.seq += 1
+        x, y, yaw = self.fleet.pose(0)
+        state = VehicleState(
+            vehicle=self.name, t_ns=now, seq=self.seq, x_m=x, y_m=y, yaw_rad=yaw,
+            speed_mps=float(self.fleet.speed[0]),
+            lateral_speed_mps=float(self.fleet.lateral_speed[0]),
+            yaw_rate_radps=float(self.fleet.yaw_rate[0]),
+            steering_rad=0.0, throttle=0.0, source="simulated",
+        )  # fmt: skip
+        return Incoming(state, now)
+
+
+def rear_end(seconds, ice, throttle=0.0):
+    """Let a remote car run into a standing hosted one; return both and their gaps."""
+    world = world_with()
+    hosted = put(world, "a", (0.5, 0.0, 0.0), ice=ice)
+    agent = Agent(world, "n7", (0.0, 0.0, 0.0), 0.25, ice=ice)
+    gaps = []
+    for i in range(round(seconds / TICK_S)):
+        agent.fleet.throttle[0] = throttle
+        tick(world, i * PERIOD_NS, [agent.step(i * PERIOD_NS)])
+        gaps.append(hosted.pose.x - agent.fleet.x[0] - 0.30)
+    return hosted, agent, gaps
+
+
+def test_what_a_remote_car_is_told_is_what_the_hosted_car_gained():
+    hosted, agent, _ = rear_end(3.0, ice=True)
+    gained = hosted.fleet.planar_cog(hosted.row)[3]
+    assert sum(contact.dvx_mps for contact in agent.told) == pytest.approx(-gained, abs=1e-9)
+    assert agent.told[0].against == ("a",)
+
+
+def test_one_hit_by_a_remote_car_is_told_once():
+    hosted, _, _ = rear_end(3.0, ice=True)
+    # Equal cars on ice: the hit one leaves with (1 + e) / 2 of the speed; told twice it were more.
+    gained = hosted.fleet.planar_cog(hosted.row)[3]
+    assert gained == pytest.approx(0.25 * (1 + RESTITUTION) / 2, rel=0.02)
+
+
+def test_a_remote_car_that_keeps_pushing_does_not_creep_into_the_hosted_one():
+    _, agent, gaps = rear_end(4.0, ice=False, throttle=0.8)
+    assert len(agent.told) > 10
+    assert min(gaps) > -0.01
