@@ -142,7 +142,6 @@ def _run_in(fleet: Fleet, commands: Commands, starts: Floats, initial: Motion) -
     for pose, speed in zip(poses, initial.speed, strict=True):
         fleet.add(pose, float(speed))
     _advance(fleet, commands, starts - RUN_IN_S, round(RUN_IN_S / STEP_S))
-    angles, (throttle, _) = fleet.steer_angle.copy(), commands.at(starts)
     for row, pose in enumerate(poses):
         fleet.place(
             row,
@@ -150,8 +149,7 @@ def _run_in(fleet: Fleet, commands: Commands, starts: Floats, initial: Motion) -
             float(initial.speed[row]),
             float(initial.lateral_speed[row]),
             float(initial.yaw_rate[row]),
-            float(angles[row]),
-            float(throttle[row]),
+            keep_actuators=True,
         )
 
 

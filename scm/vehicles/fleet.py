@@ -134,13 +134,18 @@ class Fleet:
         yaw_rate: float = 0.0,
         steer_angle: float | None = None,
         throttle: float = 0.0,
+        *,
+        keep_actuators: bool = False,
     ) -> None:
         """Restart a row from a measured state of its rear axle; no angle means wheels straight.
 
         Lags start settled at `steer_angle` [rad] and `throttle`; the commands themselves start at
-        zero and the battery at its nominal voltage, so write commands after placing.
+        zero and the battery at its nominal voltage, so write commands after placing. With
+        `keep_actuators` lags and servo stay as they are, whatever angle and throttle are given.
         """
         car, param = self._block[row], self._parameter
+        lags = [term.target for term in self.car.terms if term.keeps is not None]
+        kept = {name: self._view(name)[row].copy() for name in {*lags, "steer_angle"}}
         car[:] = 0.0
         cog, c, s = param(row, "cog_to_rear_axle"), math.cos(pose.yaw), math.sin(pose.yaw)
         across = lateral_speed + cog * yaw_rate
@@ -157,6 +162,8 @@ class Fleet:
             if term.keeps is not None:
                 self._set(row, term.target, settled.get(term.target) or term.keeps)
         self._set(row, "steer_angle", steer_angle or 0.0)
+        for name in kept if keep_actuators else ():
+            self._set(row, name, kept[name])
         offset = self._slots["wheel_speed"][0]
         half = 0.5 * param(row, "track") * yaw_rate
         rolling = np.array([speed - half, speed + half, speed - half, speed + half])
@@ -236,7 +243,7 @@ class Fleet:
         offset, width = self._slots[name]
         return self._block[:, offset] if width == 1 else self._block[:, offset : offset + width]
 
-    def _set(self, row: int, name: str, value: float) -> None:
+    def _set(self, row: int, name: str, value: float | Floats) -> None:
         offset, width = self._slots[name]
         self._block[row, offset : offset + width] = value
 

@@ -29,7 +29,7 @@ def cars_of(running: CityProcess) -> dict[str, Any]:
 
 
 def alive_stations(running: CityProcess) -> set[str]:
-    return {row["station"] for row in running.get("/stations")["stations"] if row["alive"]}
+    return {row["name"] for row in running.get("/stations")["stations"] if row["alive"]}
 
 
 def test_every_part_and_six_cars_come_up(running: CityProcess) -> None:
@@ -118,7 +118,7 @@ def test_a_killed_car_is_noticed_within_one_and_a_half_seconds(running: CityProc
 def test_a_part_that_dies_is_started_again(running: CityProcess) -> None:
     def session_of_eye() -> str | None:
         rows = running.get("/stations")["stations"]
-        return next((r["session"] for r in rows if r["station"] == "eye" and r["alive"]), None)
+        return next((r["session"] for r in rows if r["name"] == "eye" and r["alive"]), None)
 
     before = wait_for(session_of_eye, 20.0, "the eye is there")
     (line,) = [row for row in running.lines if row.split()[:1] == ["eye"]][:1]

@@ -125,3 +125,19 @@ def test_yaw_acceleration_is_the_change_of_yaw_rate(fleet):
     fleet.advance(1e-3)
     assert fleet.yaw_accel[row] == pytest.approx((fleet.yaw_rate[row] - before) / 1e-3, rel=1e-9)
     assert fleet.yaw_accel[row] > 0.0
+
+
+def test_a_row_restarts_elsewhere_with_its_actuators_as_they_were():
+    fleet = Fleet(load_car("dart"), 2)
+    rows = [fleet.add(Pose2(0.0, 0.0, 0.0), 1.0) for _ in range(2)]
+    fleet.throttle[:], fleet.steering[:] = 0.4, 0.8
+    fleet.advance(0.05)
+    turned = fleet.steer_angle[0]
+    assert turned > 0.05
+    fleet.place(rows[0], Pose2(3.0, 1.0, 0.5), 1.0, keep_actuators=True)
+    fleet.place(rows[1], Pose2(3.0, 1.0, 0.5), 1.0)
+    assert fleet.steer_angle[0] == turned
+    assert fleet.steer_angle[1] == 0.0
+    fleet.throttle[:] = 0.4
+    fleet.advance(0.002)
+    assert fleet.speed[0] > fleet.speed[1]  # its throttle lag was already filled
