@@ -11,9 +11,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    import cv2
+
     from scm.eye.part import EyePart
     from scm.maps.load import load_map
 
+    cv2.setNumThreads(1)  # the city needs the other cores, and one frame at a time is fast enough
     part = EyePart(load_map(arguments.map), arguments.camera, arguments.seed)
     return run_part(part, arguments)
 
