@@ -8,6 +8,7 @@ import { carsNow } from "./motion.js";
 import { selected } from "./selection.js";
 import { city, link, live, signals } from "./store.js";
 
+const FRAME_MS = 30;
 const ROADS = "/api/v1/map.svg";
 
 export function MapPanel() {
@@ -78,7 +79,7 @@ function pick(event, box) {
   selected.value = best;
 }
 
-/** Draw at the screen's own pace; returns what ends it. */
+/** Draw at most 30 times a second, which is smooth for a table city; returns what ends it. */
 function animate(canvas, box) {
   const paper = canvas.getContext("2d");
   const groups = new Map();
@@ -91,17 +92,20 @@ function animate(canvas, box) {
     }
   });
   let request = 0;
-  const frame = () => {
+  let drawn = -Infinity;
+  const frame = (time) => {
     request = requestAnimationFrame(frame);
+    if (time - drawn < FRAME_MS) return;
+    drawn = time;
     const view = prepare(canvas, paper, box);
     const colours = link.value === "live" ? groups : new Map();
+    for (const car of carsNow()) drawCar(paper, view, car, car.vehicle === selected.value);
+    // Lights last: no car's name may hide a colour.
     for (const light of city.value?.lights ?? []) {
       drawLight(paper, view, light, colours.get(`${light.junction}/${light.group}`));
     }
-    const cars = carsNow();
-    for (const car of cars) drawCar(paper, view, car, car.vehicle === selected.value);
   };
-  frame();
+  request = requestAnimationFrame(frame);
   return () => {
     cancelAnimationFrame(request);
     forget();

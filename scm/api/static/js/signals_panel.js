@@ -15,6 +15,9 @@ const WORDS = {
   dark: "dark",
 };
 
+/** A promise this narrow is shown as one time: the later one, so that nobody starts early. */
+const NARROW_S = 0.5;
+
 const resetting = signal(null);
 
 export function SignalsPanel() {
@@ -88,13 +91,15 @@ function Light({ id, group }) {
   `;
 }
 
-/** A promise is shown as given: exactly, as a range, or as "not before". */
+/** A promise is shown as given: as one time, as a range, or as "not before". */
 function timeLeft({ min_s, max_s }) {
   if (min_s === null) return UNKNOWN;
   const passed = (now.value - signalsAt.value) / 1000;
   const left = (seconds) => Math.max(0, seconds - Math.max(0, passed)).toFixed(1);
   if (max_s === null) return `≥ ${left(min_s)} s`;
-  return max_s - min_s < 0.15 ? `${left(max_s)} s` : `${left(min_s)}–${left(max_s)} s`;
+  if (max_s - min_s <= NARROW_S) return `${left(max_s)} s`;
+  const whole = (text) => (Number(text) < 10 ? text : Math.round(text));
+  return `${whole(left(min_s))}–${whole(left(max_s))} s`;
 }
 
 function Monitor({ junction }) {

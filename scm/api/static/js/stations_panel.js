@@ -35,7 +35,7 @@ function Station({ row }) {
     <li data-station=${row.name} data-state=${state} title="session ${row.session}">
       <i aria-hidden="true"></i>
       <b>${row.name}</b>
-      <span class="detail">${row.alive ? row.detail || ROLES[row.role] || row.role : "lost"}</span>
+      <span class="detail" title=${row.detail}>${row.alive ? row.detail || ROLES[row.role] || row.role : "lost"}</span>
       <span class="late">${notes.join(", ")}</span>
       <span class="age">${row.age_s === null ? "" : span(row.age_s)}</span>
     </li>
