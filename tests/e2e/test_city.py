@@ -1,6 +1,7 @@
 """The whole city as a user starts it: all parts up, cars moving, deaths noticed, a clean end."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -121,8 +122,8 @@ def test_a_part_that_dies_is_started_again(running: CityProcess) -> None:
         return next((r["session"] for r in rows if r["name"] == "eye" and r["alive"]), None)
 
     before = wait_for(session_of_eye, 20.0, "the eye is there")
-    (line,) = [row for row in running.lines if row.split()[:1] == ["eye"]][:1]
-    pid = int(next(word for word in reversed(line.replace(",", " ").split()) if word.isdigit()))
+    found = (re.fullmatch(r" *eye .* pid (\d+)", line) for line in running.lines)
+    pid = next(int(match.group(1)) for match in found if match)
     os.kill(pid, signal.SIGKILL)
     wait_for(lambda: session_of_eye() not in (None, before), 20.0, "another eye is there")
 
