@@ -1,5 +1,8 @@
 """The agent as a part: one message at a time."""
 
+import subprocess
+import sys
+
 import pytest
 
 from scm.clock import NS_PER_MS, NS_PER_S
@@ -270,3 +273,8 @@ def test_what_it_is_made_of_must_exist(options, error):
 def test_its_name_must_fit_into_a_key():
     with pytest.raises(MessageError):
         AgentPart("N 7")
+
+
+def test_the_agent_itself_loads_without_the_physics_compiler():
+    code = "import sys, vehicle_agent.agent; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], timeout=30.0, check=False).returncode == 0
