@@ -153,7 +153,6 @@ class Contacts:
             batch.get_space_bodies(self._space, _MOTION, self._motion_out)
             after = np.frombuffer(self._motion_out.float_buf()).reshape(-1, 6)
             dv[row_of_body] = after[: len(row_of_body), 3:] - motion[row_of_body, 3:]
-            dv[~touched] = 0.0
         return dv
 
     def _shifts(

@@ -181,22 +181,25 @@ def test_at_rest_the_imu_reads_gravity_and_its_own_noise():
 
 
 class Agent:
-    """A remote car with a fleet of its own, whose reports and pushes take a tick each way."""
+    """A remote car with a fleet of its own, whose reports take a tick and whose pushes take two."""
 
     def __init__(self, world, name, pose, speed, ice=False):
         self.world, self.name, self.seq = world, name, 0
         self.car = world.admit(name, "remote", "s", "nigel", Pose2(*pose), 0)
         self.fleet = Fleet(NIGEL, 1)
         self.fleet.add(Pose2(*pose), speed)
-        self.told = []
+        self.told, self._under_way = [], []
         if ice:
             for key in ("force_extremum", "force_asymptote"):
                 self.fleet.set_parameter(0, f"tyre.{key}", 0.0)
                 self.fleet.set_parameter(0, f"tyre.lateral_{key}", 0.0)
 
     def step(self, now):
-        """Move a tick, having heard the last tick's contacts; report."""
-        for contact in (m for m in self.world.outbox if isinstance(m, Contact)):
+        """Move a tick, having heard the contacts of the tick before last; report."""
+        arrived, self._under_way = self._under_way, [
+            m for m in self.world.outbox if isinstance(m, Contact)
+        ]
+        for contact in arrived:
             self.told.append(contact)
             self.fleet.push(0, contact.dvx_mps, contact.dvy_mps, contact.dyaw_rate_radps,
                             contact.dx_m, contact.dy_m)  # fmt: skip
@@ -213,11 +216,11 @@ class Agent:
         return Incoming(state, now)
 
 
-def rear_end(seconds, ice, throttle=0.0):
+def rear_end(seconds, ice, throttle=0.0, start=0.0):
     """Let a remote car run into a standing hosted one; return both and their gaps."""
     world = world_with()
     hosted = put(world, "a", (0.5, 0.0, 0.0), ice=ice)
-    agent = Agent(world, "n7", (0.0, 0.0, 0.0), 0.25, ice=ice)
+    agent = Agent(world, "n7", (start, 0.0, 0.0), 0.25, ice=ice)
     gaps = []
     for i in range(round(seconds / TICK_S)):
         agent.fleet.throttle[0] = throttle
@@ -233,8 +236,9 @@ def test_what_a_remote_car_is_told_is_what_the_hosted_car_gained():
     assert agent.told[0].against == ("a",)
 
 
-def test_one_hit_by_a_remote_car_is_told_once():
-    hosted, _, _ = rear_end(3.0, ice=True)
+@pytest.mark.parametrize("start", [0.0, 0.001, 0.002, 0.003, 0.004])
+def test_one_hit_by_a_remote_car_is_told_once(start):
+    hosted, _, _ = rear_end(3.0, ice=True, start=start)
     # Equal cars on ice: the hit one leaves with (1 + e) / 2 of the speed; told twice it were more.
     gained = hosted.fleet.planar_cog(hosted.row)[3]
     assert gained == pytest.approx(0.25 * (1 + RESTITUTION) / 2, rel=0.02)

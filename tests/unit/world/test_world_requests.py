@@ -2,10 +2,9 @@
 
 import pytest
 
-from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
 from scm.maps.load import load_map
-from scm.v2x.exchange import Answer, Incoming
+from scm.v2x.exchange import Answer
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
@@ -19,76 +18,9 @@ from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.trip import Trip
-from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
-from scm.v2x.messages.world_snapshot import WorldSnapshot
-from scm.world.part import WorldPart
 
 MAP = load_map("driving_school")
-TICK = 20 * NS_PER_MS
-
-
-class City:
-    """A world without a bus: what it is told goes into the next step, what it says is kept."""
-
-    def __init__(self, **given):
-        self.part = WorldPart(MAP, **given)
-        self.world = self.part.world
-        self.now = 0
-        self.said = []
-        self.run(1)
-
-    def run(self, ticks, *messages):
-        for i in range(ticks):
-            inbox = [Incoming(m, self.now) for m in messages] if i == 0 else []
-            self.said += self.part.step(self.now, inbox)
-            self.now += TICK
-
-    def run_for(self, seconds, *messages):
-        self.run(round(seconds * 50), *messages)
-
-    def ask(self, request):
-        before = len(self.said)
-        self.run(1, request)
-        answers = [out.reply for out in self.said[before:] if isinstance(out, Answer)]
-        return answers[0] if answers else None
-
-    def heard(self, kind):
-        return [out for out in self.said if isinstance(out, kind)]
-
-    def events(self):
-        return [event.name for event in self.heard(CityEvent)]
-
-    def shown(self, name):
-        vehicles = self.heard(WorldSnapshot)[-1].vehicles
-        return next((v for v in vehicles if v.vehicle == name), None)
-
-    def report(self, name="n7", seq=1, x=1.0, y=0.6, **more):
-        rest = {"yaw_rad": 0.0, "speed_mps": 0.0, "yaw_rate_radps": 0.0, **more}
-        return VehicleState(
-            vehicle=name, t_ns=self.now, seq=seq, x_m=x, y_m=y, steering_rad=0.0, throttle=0.0,
-            source="simulated", **rest,
-        )  # fmt: skip
-
-
-def command(lease, seq, throttle=0.5, steering=0.0):
-    return DriveCommand(
-        vehicle=lease.vehicle, t_ns=0, epoch=lease.epoch, seq=seq, throttle=throttle,
-        steering=steering,
-    )  # fmt: skip
-
-
-@pytest.fixture
-def city():
-    return City()
-
-
-def lease_of(city, name="n1", **more):
-    return city.ask(LeaseRequest(vehicle=name, owner="ann", verb="acquire", **more))
-
-
-def joined(city, name="n7", session="s1"):
-    return city.ask(JoinRequest(vehicle=name, session=session))
 
 
 def test_the_first_step_tells_what_the_city_is(city):
@@ -148,7 +80,7 @@ def test_a_full_city_says_so(city):
 
 
 def test_a_route_for_a_car_that_is_not_hosted_is_left_to_its_agent(city):
-    joined(city)
+    city.join()
     assert city.ask(RouteRequest(vehicle="n7")).code == "not_found"
 
 
@@ -163,8 +95,8 @@ def test_a_sent_car_drives_and_reports_its_trip(city):
     assert abs(city.shown("n1").speed_mps) < 0.01
 
 
-def test_hosted_cars_of_the_start_circulate_and_stop_before_a_signal_nobody_sends():
-    city = City(hosted=(("n1", "nigel"),))
+def test_hosted_cars_of_the_start_circulate_and_stop_before_a_signal_nobody_sends(make_city):
+    city = make_city(hosted=(("n1", "nigel"),))
     city.run_for(20.0)
     assert city.shown("n1").speed_mps == pytest.approx(0.0, abs=1e-3)
     assert city.heard(Trip)[-1].waiting_for == "signal"
@@ -172,16 +104,16 @@ def test_hosted_cars_of_the_start_circulate_and_stop_before_a_signal_nobody_send
 
 def test_a_leased_car_obeys_its_leaseholder(city):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
-    lease = lease_of(city)
+    lease = city.lease()
     for seq in range(25):
-        city.run(1, command(lease, seq))
+        city.run(1, city.command(lease, seq))
     assert city.shown("n1").speed_mps > 0.1
     assert city.shown("n1").owner == "ann"
 
 
 def test_a_command_under_another_epoch_moves_nothing(city):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
-    lease = lease_of(city)
+    lease = city.lease()
     for step in (-1, 1):
         for seq in range(10):
             wrong = DriveCommand(
@@ -193,9 +125,9 @@ def test_a_command_under_another_epoch_moves_nothing(city):
 
 def test_silence_stops_a_leased_car_and_drops_the_lease_after_a_second(city):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
-    lease = lease_of(city, ttl_ms=60_000)
+    lease = city.lease(ttl_ms=60_000)
     for seq in range(25):
-        city.run(1, command(lease, seq))
+        city.run(1, city.command(lease, seq))
     city.run_for(1.1)
     shown = city.shown("n1")
     assert (shown.owner, shown.mode) == ("world", "stop")
@@ -206,17 +138,17 @@ def test_silence_stops_a_leased_car_and_drops_the_lease_after_a_second(city):
 
 def test_after_a_lost_lease_the_old_holders_commands_move_nothing(city):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
-    lease = lease_of(city)
+    lease = city.lease()
     city.run_for(1.2)
     for seq in range(100, 125):
-        city.run(1, command(lease, seq))
+        city.run(1, city.command(lease, seq))
     assert city.shown("n1").speed_mps == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_car_given_back_stands_until_it_is_sent_again(city):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
     city.ask(RouteRequest(vehicle="n1"))
-    lease = lease_of(city)
+    lease = city.lease()
     city.ask(LeaseRequest(vehicle="n1", owner="ann", verb="release", epoch=lease.epoch))
     city.run_for(2.0)
     stood = city.shown("n1").speed_mps
@@ -228,13 +160,13 @@ def test_a_car_given_back_stands_until_it_is_sent_again(city):
 
 def test_a_leased_car_cannot_be_sent_by_somebody_else(city):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
-    lease_of(city)
+    city.lease()
     assert city.ask(RouteRequest(vehicle="n1")).code == "owned"
 
 
 def test_a_theft_is_told_with_its_reason(city):
     city.ask(SpawnRequest(vehicle="n1"))
-    lease_of(city)
+    city.lease()
     request = LeaseRequest(vehicle="n1", owner="bob", verb="steal", reason="ann left the room")
     assert city.ask(request).owner == "bob"
     told = next(e for e in city.heard(CityEvent) if e.name == "lease_stolen")
@@ -243,7 +175,7 @@ def test_a_theft_is_told_with_its_reason(city):
 
 def test_a_retried_acquisition_keeps_its_epoch(city):
     city.ask(SpawnRequest(vehicle="n1"))
-    assert lease_of(city).epoch == lease_of(city).epoch
+    assert city.lease().epoch == city.lease().epoch
 
 
 def test_the_red_button_stops_cars_and_releasing_it_lets_them_drive(city):
@@ -267,24 +199,24 @@ def test_the_red_button_is_repeated_every_second_while_engaged(city):
 
 
 def test_a_joined_car_is_shown_where_its_agent_says(city):
-    joined(city)
+    city.join()
     city.run(3, city.report(x=0.7, y=0.9, speed_mps=0.2))
     shown = city.shown("n7")
     assert (shown.kind, shown.owner, shown.x_m, shown.alive) == ("remote", "n7", 0.7, True)
 
 
 def test_joining_twice_in_one_session_gets_the_same_welcome(city):
-    assert joined(city).epoch == joined(city).epoch
+    assert city.join().epoch == city.join().epoch
     assert city.events().count("vehicle_joined") == 1
 
 
 def test_a_name_in_use_by_another_session_is_refused(city):
-    joined(city)
-    assert joined(city, session="s2").code == "owned"
+    city.join()
+    assert city.join(session="s2").code == "owned"
 
 
 def test_a_lost_session_is_shown_at_once_and_leaves_the_map_after_three_seconds(city):
-    joined(city)
+    city.join()
     city.run(3, city.report())
     city.run(3, Presence(role="v", station="n7", session="s1", alive=False))
     assert city.shown("n7").alive is False
@@ -294,21 +226,21 @@ def test_a_lost_session_is_shown_at_once_and_leaves_the_map_after_three_seconds(
 
 
 def test_the_end_of_another_session_changes_nothing(city):
-    joined(city)
+    city.join()
     city.run(3, city.report())
     city.run(3, Presence(role="v", station="n7", session="s0", alive=False))
     assert city.shown("n7").alive is True
 
 
 def test_a_silent_agent_is_shown_as_lost_within_one_and_a_half_seconds(city):
-    joined(city)
+    city.join()
     city.run(1, city.report())
     city.run_for(1.2)
     assert city.shown("n7").alive is False
 
 
 def test_a_car_that_reports_again_in_time_is_back(city):
-    joined(city)
+    city.join()
     city.run(1, city.report())
     city.run_for(1.2)
     city.run(5, city.report(seq=2))
@@ -317,7 +249,7 @@ def test_a_car_that_reports_again_in_time_is_back(city):
 
 
 def test_a_car_whose_session_ended_does_not_come_back_by_a_late_report(city):
-    joined(city)
+    city.join()
     city.run(1, city.report())
     city.run(1, Presence(role="v", station="n7", session="s1", alive=False))
     city.run(3, city.report(seq=2))
@@ -325,14 +257,14 @@ def test_a_car_whose_session_ended_does_not_come_back_by_a_late_report(city):
 
 
 def test_a_new_session_takes_over_the_name_of_a_lost_car(city):
-    first = joined(city)
+    first = city.join()
     city.run(1, Presence(role="v", station="n7", session="s1", alive=False))
-    again = joined(city, session="s2")
+    again = city.join(session="s2")
     assert again.epoch > first.epoch
 
 
 def test_a_clean_leave_takes_the_car_off_at_once(city):
-    joined(city)
+    city.join()
     city.ask(RemoveRequest(vehicle="n7", reason="done"))
     city.run(3)
     assert city.shown("n7") is None
@@ -341,7 +273,7 @@ def test_a_clean_leave_takes_the_car_off_at_once(city):
 
 def test_a_remote_car_that_drives_into_a_standing_one_is_told_of_the_contact(city):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
-    joined(city)
+    city.join()
     behind = city.world.hosted["n1"].pose @ Pose2(-0.295, 0.0, 0.0)
     ahead = city.report(x=behind.x, y=behind.y, yaw_rad=behind.yaw, speed_mps=0.2)
     city.run(2, ahead)
@@ -352,18 +284,18 @@ def test_a_remote_car_that_drives_into_a_standing_one_is_told_of_the_contact(cit
     assert "contact" in city.events()
 
 
-def test_the_same_seed_gives_the_same_run_bit_for_bit():
+def test_the_same_seed_gives_the_same_run_bit_for_bit(make_city):
     def run():
-        city = City(seed=4, hosted=(("n1", "nigel"), ("n2", "nigel")))
+        city = make_city(seed=4, hosted=(("n1", "nigel"), ("n2", "nigel")))
         city.run_for(3.0)
         return [out for out in city.said if not isinstance(out, Answer)]
 
     assert run() == run()
 
 
-def test_another_seed_gives_other_noise():
+def test_another_seed_gives_other_noise(make_city):
     def scans(seed):
-        city = City(seed=seed, hosted=(("n1", "nigel"),))
+        city = make_city(seed=seed, hosted=(("n1", "nigel"),))
         city.run_for(0.5)
         return [out for out in city.said if type(out).__name__ == "LidarScan"]
 
