@@ -20,7 +20,7 @@ from scm.world.hull import cog_motion
 from scm.world.lease import Lease
 
 STALE_NS = NS_PER_S
-ECHO_NS = 80 * NS_PER_MS
+ECHO_NS = 60 * NS_PER_MS
 GONE_NS = 3 * NS_PER_S
 
 

@@ -247,4 +247,6 @@ def test_one_hit_by_a_remote_car_is_told_once(start):
 def test_a_remote_car_that_keeps_pushing_does_not_creep_into_the_hosted_one():
     _, agent, gaps = rear_end(4.0, ice=False, throttle=0.8)
     assert len(agent.told) > 10
-    assert min(gaps) > -0.01
+    # The overlap stays below what the car drives until its reports can show the push, 60 ms.
+    assert min(gaps) > -0.06 * 0.25
+    assert gaps[-1] > gaps[-50] - 0.001
