@@ -14,7 +14,6 @@ from scm.v2x.exchange import RawSample
 from tests.e2e.city_process import CityProcess, city, wait_for
 
 README = Path(__file__).parents[2] / "README.md"
-BIN = Path(sys.executable).parent
 LONG = {  # commands that run until they are stopped, or run this very test: checked by other means
     "make run": "make -n run",
     "make test": "make -n test",
@@ -41,8 +40,7 @@ def workplace(tmp_path: Path, root: Path) -> Path:
     """A folder that looks like the project's, so that commands leave nothing behind in it."""
     for name in ("examples", "recordings", "maps", "Makefile", "pyproject.toml"):
         (tmp_path / name).symlink_to(root / name)
-    (tmp_path / ".venv").mkdir()
-    (tmp_path / ".venv/bin").symlink_to(BIN)
+    (tmp_path / ".venv").symlink_to(sys.prefix)
     (tmp_path / "runs").mkdir()
     with RunFile(tmp_path / "runs/today.mcap", "city") as run:
         run.write(RawSample("scm/@v1/city/part/eye/status", b"{}", None, 1))
