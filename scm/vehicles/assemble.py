@@ -132,6 +132,7 @@ def write_page(car_name: str, terms: Sequence[Term]) -> str:
     laws = sorted({(t.module, law.__name__) for t in terms for law in (t.law, t.damping) if law})
     load = [f"{c.variable} = parameters[row, {i}]" for i, c in enumerate(columns_of(terms))]
     load += [f"{n} = car[{slots[n][0]}]" for n in [*held, *(n for n, _ in body14.INPUTS)]]
+    load += [f"{n} = min(max({n}, -1.0), 1.0)" for n in ("throttle_command", "steering_command")]
     return page.PAGE.format(
         title=f"Kernel of the car {car_name!r}: {len(terms)} effects on 14 degrees of freedom.",
         imports="\n".join(f"from {module} import {law}" for module, law in laws),

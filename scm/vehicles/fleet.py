@@ -31,15 +31,19 @@ class VehicleStatus(IntEnum):
         """Say it in words."""
         if self is VehicleStatus.OK:
             return "The car drives."
-        return "The car's motion left every physical range: it is frozen where it last made sense."
+        return (
+            "The car rolled over, its motion left every physical range, or a command was no number:"
+            " it is frozen where it last made sense."
+        )
 
 
 class Fleet:
     """All cars of one car file.
 
     Attributes:
-        throttle: Commands in [-1, 1], + forward, shape (capacity,); write here.
-        steering: Commands in [-1, 1], + left, shape (capacity,); write here.
+        throttle: Commands in [-1, 1], + forward, shape (capacity,); write here. Beyond counts as
+            full, and a command that is no number freezes the car, marked DIVERGED.
+        steering: Likewise, + left.
         battery: Battery voltage [V], shape (capacity,); write here.
         alive: Rows in use, shape (capacity,).
         status: `VehicleStatus` of each row, shape (capacity,).

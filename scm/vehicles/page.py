@@ -35,10 +35,13 @@ GRAVITY = {gravity!r}
 def advance(block, parameters, alive, status, first, last, steps, dt):
     """Advance rows first..last-1 by `steps` substeps; a car that diverges is put back, marked."""
     scratch = np.empty(SCRATCH_SHAPE)
+    before = np.empty(block.shape[1])
     for row in range(first, last):
         if not alive[row] or status[row] != 0:
             continue
         car = block[row]
+        for i in range(block.shape[1]):
+            before[i] = car[i]
 {load}
         accel_x = car[{accel_x}]
         accel_y = car[{accel_y}]
@@ -164,14 +167,17 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
             abs(vx_world) + abs(vy_world) + abs(vz) < 1e3
             and abs(roll_rate) + abs(pitch_rate) + abs(yaw_rate) < 1e4
             and abs(roll) + abs(pitch) < 1.5
+            and not math.isnan(throttle_command + steering_command)
         ):
             status[row] = 1
+            for i in range(block.shape[1]):
+                car[i] = before[i]
             for i in range({vx_world}, {yaw_rate} + 1):
                 car[i] = 0.0
             for i in range({hop_rate}, {hop_rate} + 8):
                 car[i] = 0.0
-            car[{speed}] = 0.0
-            car[{lateral_speed}] = 0.0
+            for i in range({speed}, {yaw_accel} + 1):
+                car[i] = 0.0
             continue
         yaw -= 2.0 * math.pi * math.ceil((yaw - math.pi) / (2.0 * math.pi))
         cos_yaw = math.cos(yaw)

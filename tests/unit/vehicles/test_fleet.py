@@ -106,6 +106,33 @@ def test_a_weak_battery_slows_the_car(fleet):
     assert fleet.speed[1] < 0.9 * fleet.speed[0]
 
 
+@pytest.mark.parametrize("wild", [(5.0, 3.0), (-5.0, -3.0), (math.inf, -math.inf)])
+def test_commands_beyond_full_count_as_full(fleet, wild):
+    full = np.clip(wild, -1.0, 1.0)
+    for command in (wild, full):
+        row = fleet.add(Pose2(0.0, 0.0, 0.0))
+        fleet.throttle[row], fleet.steering[row] = command
+    fleet.advance(2.0)
+    assert fleet.pose(0) == fleet.pose(1)
+    assert list(fleet.status[:2]) == [0, 0]
+
+
+@pytest.mark.parametrize("command", [(math.nan, 0.0), (0.5, math.nan)])
+def test_a_command_that_is_no_number_freezes_the_car_with_every_output_as_it_was(fleet, command):
+    row = fleet.add(Pose2(0.0, 0.0, 0.0), speed=0.1)
+    fleet.throttle[row], fleet.steering[row] = 0.5, 0.3
+    fleet.advance(0.2)
+    kept = ("x", "y", "yaw", "roll", "steer_angle", "wheel_angle", "wheel_steer", "wheel_load")
+    before = {name: getattr(fleet, name)[row].copy() for name in kept}
+    fleet.throttle[row], fleet.steering[row] = command
+    fleet.advance(0.2)
+    assert fleet.status[row] == VehicleStatus.DIVERGED
+    for name, value in before.items():
+        assert np.array_equal(getattr(fleet, name)[row], value), name
+    for name in ("speed", "yaw_rate", "wheel_speed", "accel_x", "accel_y", "accel_z", "yaw_accel"):
+        assert not np.any(getattr(fleet, name)[row]), name
+
+
 def test_every_status_has_a_sentence():
     assert all(status.sentence.endswith(".") for status in VehicleStatus)
 
