@@ -34,6 +34,16 @@ class Garage:
             self._cars[name] = load_car(name)
         return self._cars[name]
 
+    def prepare(self, name: str) -> Fleet:
+        """Return the fleet of a car file; the first call compiles or loads its kernel, for seconds.
+
+        Raises:
+            CarError: when there is no such car file.
+        """
+        if name not in self.fleets:
+            self.fleets[name] = Fleet(self.car(name), self._capacity)
+        return self.fleets[name]
+
     def park(self, name: str, pose: Pose2, slot: int) -> tuple[Fleet, int]:
         """Put a car of a file on the floor; return its fleet and row.
 
@@ -41,9 +51,7 @@ class Garage:
             CarError: when there is no such car file.
             RunError: when the fleet is full.
         """
-        if name not in self.fleets:
-            self.fleets[name] = Fleet(self.car(name), self._capacity)
-        fleet = self.fleets[name]
+        fleet = self.prepare(name)
         row = fleet.add(pose)
         self._rows[name] = np.append(self.rows(name), row)
         self._slots[name] = np.append(self.slots(name), slot)

@@ -13,7 +13,7 @@ from scm.v2x.messages.world_definition import WorldDefinition
 from scm.world.hearing import HEARS
 from scm.world.requests import SERVES, reply_to, send
 from scm.world.step import tick
-from scm.world.world import NAME, PERIOD_NS, World
+from scm.world.world import DEFAULT_CAR, NAME, PERIOD_NS, World
 
 
 class WorldPart:
@@ -34,7 +34,8 @@ class WorldPart:
     def __init__(
         self, city_map: CityMap, seed: int = 0, hosted: tuple[tuple[str, str], ...] = ()
     ) -> None:
-        self.world = World(city_map, seed, capacity=max(256, 2 * len(hosted)))
+        cars = {DEFAULT_CAR, *(car for _, car in hosted)}
+        self.world = World(city_map, seed, capacity=max(256, 2 * len(hosted)), prepare=sorted(cars))
         self._to_spawn = hosted
         self._is_open = False
 

@@ -4,8 +4,10 @@
 to be sent waits in `outbox`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal
+
+import numpy as np
 
 from scm import registry
 from scm.clock import NS_PER_MS
@@ -19,7 +21,8 @@ from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.vehicles.car import Car
 from scm.vehicles.guard import Guard
-from scm.vehicles.sensor import Sampler, Sensor
+from scm.vehicles.sensor import Around, Sampler, Sensor
+from scm.vehicles.sensors.lidar import scan
 from scm.vehicles.signal_view import SignalView
 from scm.world import lease as rules
 from scm.world.contacts import Contacts, Hull
@@ -35,12 +38,20 @@ NAME = "world"
 PERIOD_NS = 20 * NS_PER_MS
 SENSORS = "scm.vehicles.sensors"
 SCANNER = "lidar"
+DEFAULT_CAR = "nigel"
 
 AnyCar = HostedCar | RemoteCar
 
 
 class World:
     """The shared state of one city.
+
+    Args:
+        city_map: The city.
+        seed: Of all noise and of lost radio frames.
+        capacity: Most hosted cars of one car file.
+        loss: Share of radio frames that get lost.
+        prepare: Car files whose kernels are compiled now and not when their first car comes.
 
     Attributes:
         hosted: Cars simulated here, by name, in the order they came; likewise `remote`.
@@ -55,7 +66,12 @@ class World:
     """
 
     def __init__(
-        self, city_map: CityMap, seed: int = 0, capacity: int = 256, loss: float = 0.0
+        self,
+        city_map: CityMap,
+        seed: int = 0,
+        capacity: int = 256,
+        loss: float = 0.0,
+        prepare: Iterable[str] = (DEFAULT_CAR,),
     ) -> None:
         self.city_map = city_map
         self.seed = seed
@@ -80,6 +96,9 @@ class World:
         self.last_hit_ns: dict[str, int] = {}
         self.verdicts: dict[str, MonitorStatus] = {}
         self._came = 0
+        for name in prepare:
+            self.garage.prepare(name)
+        self._warm_scanner()
         self._slots: set[int] = set()
 
     def cars(self) -> Iterator[AnyCar]:
@@ -195,6 +214,11 @@ class World:
         """Return a name for a car that has none."""
         taken = {car.name for car in self.cars()}
         return next(f"n{i}" for i in range(1, len(taken) + 2) if f"n{i}" not in taken)
+
+    def _warm_scanner(self) -> None:
+        """Scan once for nobody, so that the kernel is compiled before the first car scans."""
+        nowhere = Around(np.zeros((1, 4)), np.zeros(1, np.int64), np.zeros(1, np.int64))
+        scan(self.garage.car(DEFAULT_CAR), np.zeros((1, 3)), nowhere)
 
     def _take_slot(self, slot: int, hull: Hull) -> None:
         self.contacts.add(slot, hull)
