@@ -16,6 +16,7 @@ from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.spatem_tx import SpatemTx
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.air import transmit
+from scm.world.remote import is_plausible
 from scm.world.requests import reply_to
 from scm.world.watch import lose
 from scm.world.world import World
@@ -35,7 +36,7 @@ def hear(world: World, now_ns: int, inbox: Sequence[Incoming]) -> None:
 
 def _state(world: World, state: VehicleState, now_ns: int) -> None:
     car = world.remote.get(state.vehicle)
-    if car is None:
+    if car is None or not is_plausible(state):
         world.ignored += state.vehicle not in world.hosted
         return
     was_alive = car.alive

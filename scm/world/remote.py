@@ -19,9 +19,18 @@ from scm.vehicles.car import Car
 from scm.world.hull import cog_motion
 from scm.world.lease import Lease
 
+FARTHEST_M = 10_000.0
+FASTEST = 100.0
 STALE_NS = NS_PER_S
 ECHO_NS = 60 * NS_PER_MS
 GONE_NS = 3 * NS_PER_S
+
+
+def is_plausible(state: VehicleState) -> bool:
+    """Return whether a report can be of a car: one absurd number would blind the contact solver."""
+    where = (state.x_m, state.y_m)
+    speeds = (state.yaw_rad, state.speed_mps, state.lateral_speed_mps, state.yaw_rate_radps)
+    return all(abs(v) <= FARTHEST_M for v in where) and all(abs(v) <= FASTEST for v in speeds)
 
 
 @dataclass(slots=True)

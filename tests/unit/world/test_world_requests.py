@@ -300,3 +300,12 @@ def test_another_seed_gives_other_noise(make_city):
         return [out for out in city.said if type(out).__name__ == "LidarScan"]
 
     assert scans(1) != scans(2)
+
+
+@pytest.mark.parametrize("absurd", [{"x": 1e300}, {"y": float("nan")}, {"speed_mps": float("inf")}])
+def test_an_absurd_report_is_dropped_and_counted(city, absurd):
+    city.join()
+    city.run(3, city.report(seq=1, x=1.0))
+    city.run(3, city.report(seq=2, **{"x": 2.0, **absurd}))
+    assert city.shown("n7").x_m == 1.0
+    assert city.world.ignored == 1
