@@ -81,14 +81,17 @@ def _scan_for_remote(world: World, faces: _Faces, now_ns: int) -> None:
 
 
 def _readings(car: HostedCar, now_ns: int) -> list[Message]:
+    """Return a car's scans, and a message for each new reading of the encoders."""
     out: list[Message] = []
+    counted = False
     for kind, sampler in car.samplers.items():
         ready = sampler.ready(now_ns)
         if kind == SCANNER:
             out += _scans(car.name, car.car, ready)
         elif ready:
             car.readings[kind] = ready[-1]
-    if ENCODERS in car.readings and IMU in car.readings:
+            counted = counted or kind == ENCODERS
+    if counted and IMU in car.readings:
         out.append(_sensors(car))
     return out
 
@@ -98,7 +101,7 @@ def _sensors(car: HostedCar) -> VehicleSensors:
     ax, ay, az, p, q, r = car.readings[IMU].values.tolist()
     return VehicleSensors(
         vehicle=car.name,
-        t_ns=car.readings[IMU].t_ns,
+        t_ns=car.readings[ENCODERS].t_ns,
         encoder_left=int(left),
         encoder_right=int(right),
         accel_mps2=(ax, ay, az),
