@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core.caching import FunctionCache
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -22,13 +23,34 @@ def law(function: Function) -> Function:
 
 def array_kernel(function: Function) -> Function:
     """Compile a function over arrays at its first call, without the interpreter lock, cached."""
-    return cast("Function", numba.njit(nogil=True, error_model="numpy", cache=True)(function))
+    return cast("Function", _cached(function))
 
 
 def fleet_kernel(function: Function) -> Function:
     """Compile a kernel over fleet rows, without the interpreter lock, cached beside its file."""
-    compiled = numba.njit(_ROWS, nogil=True, error_model="numpy", cache=True)(function)
+    compiled = _cached(function)
+    compiled.compile(_ROWS)
     return cast("Function", compiled)
+
+
+_Cache: Any = FunctionCache
+
+
+class _ForgivingCache(_Cache):  # type: ignore[misc]
+    """Numba's cache; files in it that are damaged are forgotten, so that they are written anew."""
+
+    def load_overload(self, sig: object, target_context: object) -> object:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # noqa: BLE001 a damaged pickle may raise anything
+            self.flush()
+            return None
+
+
+def _cached(function: Callable[..., Any]) -> Any:
+    compiled: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    compiled._cache = _ForgivingCache(function)  # noqa: SLF001 as its own enable_caching does
+    return compiled
 
 
 def plain(function: Callable[..., Any]) -> Callable[..., Any]:
