@@ -196,9 +196,10 @@ class Agent:
 
     def step(self, now):
         """Move a tick, having heard the contacts of the tick before last; report."""
-        arrived, self._under_way = self._under_way, [
-            m for m in self.world.outbox if isinstance(m, Contact)
-        ]
+        arrived, self._under_way = (
+            self._under_way,
+            [m for m in self.world.outbox if isinstance(m, Contact)],
+        )
         for contact in arrived:
             self.told.append(contact)
             self.fleet.push(0, contact.dvx_mps, contact.dvy_mps, contact.dyaw_rate_radps,
