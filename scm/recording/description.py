@@ -1,8 +1,9 @@
 """The file `recording.yaml` as data, checked while it is read."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Hashable, Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 import yaml
@@ -16,7 +17,7 @@ class TimeColumn(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_field
     """Which column holds the time of a row, on that table's own clock."""
 
     column: str
-    unit: str = "s"
+    unit: str | int = "s"
 
 
 class ChannelColumn(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -24,14 +25,15 @@ class ChannelColumn(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
 
     Attributes:
         column: Its column; or `expression` over columns, names with spaces in backquotes.
-        std: Standard deviation of its noise, in the same unit; None: to be estimated.
+        unit: Of the value, and of `offset` and `std`; `1` without quotes is a number to YAML.
+        std: Standard deviation of the value's noise; None: to be estimated.
         scale, offset, sign: `value = sign * (scale * raw + offset)`, before the unit is converted.
         point: For poses: where on the body the point is, from the rear axle's centre [m].
     """
 
     column: str | None = None
     expression: str | None = None
-    unit: str = "1"
+    unit: str | int = "1"
     std: float | None = None
     scale: float = 1.0
     offset: float = 0.0
@@ -90,18 +92,46 @@ def read_description(path: Path) -> Description:
         RecordingError: naming the file, the key, what was expected and what was got.
     """
     try:
-        raw = yaml.safe_load(path.read_text(encoding="utf-8"))
+        raw = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_Loader)
         description = msgspec.convert(raw, Description)
-    except yaml.YAMLError as cause:
-        msg = f"{path}: not YAML: {cause}"
+    except (yaml.YAMLError, OSError, UnicodeDecodeError, RecursionError) as cause:
+        msg = f"{path}: not a YAML file that can be read: {cause}"
         raise RecordingError(msg) from cause
     except msgspec.ValidationError as cause:
-        msg = f"{path}: {cause}"
+        msg = f"{path}: {_guilty_channel(raw)}{cause}"
         raise RecordingError(msg) from cause
     problems = _problems(description)
     if problems:
         raise RecordingError("\n".join(f"{path}: {problem}" for problem in problems))
     return description
+
+
+class _Loader(yaml.SafeLoader):
+    """Plain YAML, but a key that stands twice is refused: the first one would be lost silently."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        """Return a mapping of distinct keys."""
+        keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+        for i, key in enumerate(keys):
+            if key in keys[:i]:
+                line = node.value[i][0].start_mark.line + 1
+                msg = f"line {line}: the key {key!r} stands twice"
+                raise yaml.YAMLError(msg)
+        return super().construct_mapping(node, deep)
+
+
+def _guilty_channel(raw: Any) -> str:
+    """Return "table: channel: " of the first channel that is malformed, or nothing."""
+    try:
+        pairs = [(t["file"], *item) for t in raw["tables"] for item in t["channels"].items()]
+    except (TypeError, KeyError, AttributeError):
+        return ""
+    for file, name, channel in pairs:
+        try:
+            msgspec.convert(channel, ChannelColumn)
+        except msgspec.ValidationError:
+            return f"table {file}: {name}: "
+    return ""
 
 
 def _problems(description: Description) -> list[str]:
@@ -122,6 +152,15 @@ def _channel_problems(where: str, channels: Mapping[str, ChannelColumn]) -> list
     for name, channel in channels.items():
         if (channel.column is None) == (channel.expression is None):
             problems.append(f"{where}: {name}: expected either column or expression")
-        if channel.std is not None and channel.std <= 0.0:
+        if channel.std is not None and not 0.0 < channel.std < math.inf:
             problems.append(f"{where}: {name}: std: expected more than 0, got {channel.std}")
+        numbers = {"scale": channel.scale, "offset": channel.offset}
+        numbers |= {f"point[{i}]": value for i, value in enumerate(channel.point or ())}
+        problems += [
+            f"{where}: {name}: {key}: expected a finite number, got {value}"
+            for key, value in numbers.items()
+            if not math.isfinite(value)
+        ]
+        if channel.scale == 0.0:
+            problems.append(f"{where}: {name}: scale: 0 would lose the values")
     return problems

@@ -11,11 +11,12 @@ from scm.recording.description import (
     ChannelColumn,
     Description,
     Table,
+    TimeColumn,
     find_description,
     read_description,
 )
 from scm.recording.expression import evaluate
-from scm.recording.table import read_table
+from scm.recording.table import Columns, read_table
 from scm.recording.units import UNITS, dimensions_of, factor
 
 
@@ -81,7 +82,7 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
     description = read_description(found)
     folder = found.parent if data is None else Path(data)
     by_vehicle: dict[str, dict[str, Channel]] = {}
-    loaded: dict[str, dict[str, Floats]] = {}
+    loaded: dict[str, Columns] = {}
     for table in description.tables:
         if table.file not in loaded:
             loaded[table.file] = read_table(folder / table.file)
@@ -103,27 +104,35 @@ def _vehicle(description: Description, table: Table) -> str:
     return vehicle
 
 
-def _channels(table: Table, columns: dict[str, Floats], path: Path) -> dict[str, Channel]:
+def _channels(table: Table, columns: Columns, path: Path) -> dict[str, Channel]:
     """Return the channels of one table in SI."""
     where = f"{path}: table {table.file}"
+    keep: Bools = np.ones(columns.rows, dtype=np.bool_)
     if table.where is not None:
-        keep = evaluate(table.where, columns, f"{where}: where") > 0.0
-        columns = {name: values[keep] for name, values in columns.items()}
-    t = evaluate(f"`{table.time.column}`", columns, f"{where}: time")
-    t = t * factor(table.time.unit, ("time",), f"{where}: time")
+        keep = evaluate(table.where, columns, columns.rows, f"{where}: where") > 0.0
+    t = _values(table.time, columns, f"{where}: time")[keep]
+    t = t * factor(str(table.time.unit), ("time",), f"{where}: time")
     _refuse_no_rows(t, where)
     return {
-        name: _channel(name, channel, t, columns, where) for name, channel in table.channels.items()
+        name: _channel(name, channel, t, _values(channel, columns, f"{where}: {name}")[keep], where)
+        for name, channel in table.channels.items()
     }
 
 
-def _channel(
-    name: str, channel: ChannelColumn, t: Floats, columns: dict[str, Floats], where: str
-) -> Channel:
-    at = f"{where}: {name}"
-    to_si = factor(channel.unit, dimensions_of(name, where), at)
-    text = channel.expression if channel.expression is not None else f"`{channel.column}`"
-    raw = evaluate(text, columns, at)
+def _values(source: TimeColumn | ChannelColumn, columns: Columns, at: str) -> Floats:
+    """Return what a column or an expression gives for every row."""
+    if isinstance(source, ChannelColumn) and source.expression is not None:
+        return evaluate(source.expression, columns, columns.rows, at)
+    try:
+        return columns[str(source.column)]
+    except RecordingError as cause:
+        msg = f"{at}: {cause}"
+        raise RecordingError(msg) from cause
+
+
+def _channel(name: str, channel: ChannelColumn, t: Floats, raw: Floats, where: str) -> Channel:
+    at, unit = f"{where}: {name}", str(channel.unit)
+    to_si = factor(unit, dimensions_of(name, where), at)
     values = channel.sign * (channel.scale * raw + channel.offset) * to_si
     valid: Bools = np.isfinite(values) & np.isfinite(t)
     _refuse_no_rows(t[valid], at)
@@ -132,7 +141,7 @@ def _channel(
         values=values[valid],
         std=None if channel.std is None else channel.std * to_si,
         point=channel.point or (0.0, 0.0),
-        dimension=UNITS[channel.unit][0],
+        dimension=UNITS[unit][0],
     )
 
 

@@ -136,6 +136,72 @@ def test_a_bad_recording_is_refused_with_place_and_reason(
 
 
 @pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("std: .nan", "pose.x: std: expected more than 0, got nan"),
+        ("scale: 0", "pose.x: scale: 0 would lose the values"),
+        ("offset: .inf", "pose.x: offset: expected a finite number, got inf"),
+        ("point: [.nan, 0]", "pose.x: point[0]: expected a finite number"),
+        ("sign: 2", "table pose.csv: pose.x: Invalid enum value 2"),
+        ("column: y", "line 7: the key 'column' stands twice"),
+    ],
+)
+def test_a_bad_key_of_a_channel_is_refused_with_its_channel(
+    tmp_path: Path, key: str, said: str
+) -> None:
+    with pytest.raises(RecordingError) as error:
+        read_recordings(write(tmp_path, POSE_TABLE.replace("std: 2", key)))
+    assert said in str(error.value)
+
+
+def test_a_channel_that_stands_twice_in_a_table_is_refused(tmp_path: Path) -> None:
+    table = POSE_TABLE + "      pose.x: {column: y, unit: mm}\n"
+    with pytest.raises(RecordingError, match=r"line 9: the key 'pose\.x' stands twice"):
+        read_recordings(write(tmp_path, table))
+
+
+@pytest.mark.parametrize("text", [b"\xb0 no text", b"[" * 5000, b"[]", b"", b"1: 2", b"a: &a [*a]"])
+def test_a_file_that_is_no_description_is_refused(tmp_path: Path, text: bytes) -> None:
+    (tmp_path / "recording.yaml").write_bytes(text)
+    with pytest.raises(RecordingError, match=r"recording\.yaml"):
+        read_recordings(tmp_path)
+
+
+def test_the_unit_1_needs_no_quotes(tmp_path: Path) -> None:
+    table = POSE_TABLE + "      light.left: {column: ok, unit: 1}\n"
+    assert_allclose(read_one(write(tmp_path, table)).channel("light.left").values, [1, 0, 1])
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("1 / 0 + x * (ok > 0)", None),
+        ("x / ok", [0.1, 0.3]),
+        ("10 ** 10 ** 10 ** 10", None),
+        ("50 < x < 250", [0.001, 0.001, 0.0]),
+        ("+x", [0.1, 0.2, 0.3]),
+        ("True and x", [0.001, 0.001, 0.001]),
+    ],
+)
+def test_arithmetic_without_an_answer_drops_the_row(
+    tmp_path: Path, text: str, values: list[float] | None
+) -> None:
+    folder = write(tmp_path, POSE_TABLE.replace("column: x,", f'expression: "{text}",'))
+    if values is None:
+        with pytest.raises(RecordingError, match=r"pose\.x: no row is left"):
+            read_recordings(folder)
+    else:
+        assert_allclose(read_one(folder).channel("pose.x").values, values)
+
+
+def test_an_endless_expression_is_refused(tmp_path: Path) -> None:
+    text = "-" * 50_000 + "x"
+    table = POSE_TABLE.replace("column: x,", f'expression: "{text}",')
+    with pytest.raises(RecordingError, match="expected at most 1000"):
+        read_recordings(write(tmp_path, table))
+
+
+@pytest.mark.parametrize(
     "text", ["__import__('os')", "x.real", "[x]", "x if x else 1", "x @ x", "'a'"]
 )
 def test_an_expression_can_do_nothing_but_arithmetic(tmp_path: Path, text: str) -> None:
