@@ -22,11 +22,8 @@ with open_city("driving_school", connect=arguments.connect if arguments.live els
         trips = [car.drive("east_loop", "west_loop", laps=1) for car in cars]
         city.wait(trips, timeout_s=300.0)
         for trip in trips:
-            speed_mps = trip.length_m / trip.travel_time_s
-            print(
-                f"{plan:>6} {trip.vehicle:>4} {trip.length_m:6.2f} m in {trip.travel_time_s:5.1f} s, "
-                f"{speed_mps:.3f} m/s on average",
-                flush=True,
-            )
+            time_s, length_m = trip.travel_time_s, trip.length_m
+            told = f"{length_m:.2f} m in {time_s:.1f} s, {length_m / time_s:.3f} m/s on average"
+            print(f"{plan:>6} {trip.vehicle:>4}: {told}", flush=True)
     city_s, elapsed_s = city.time_s - start_s, time.perf_counter() - began
 print(f"{city_s:.0f} s of city in {elapsed_s:.1f} s: {city_s / elapsed_s:.1f} x real time")

@@ -36,28 +36,33 @@ class Serves:
 class Part(Protocol):
     """A steppable part of the city.
 
-    Attributes:
-        name: The station's name on the bus: `world`, `traffic`, `eye`, `n7`.
-        role: The first chunk of its presence key: `part`, or `v` for a vehicle.
-        period_ns: How often `step` is due [ns].
-        hears: What the runner subscribes to for it, from the start.
-        serves: Which requests the runner brings to it.
+    One that also sets `hears_raw = True` gets every message of the city, unread, as `RawSample`.
     """
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The station's name on the bus: `world`, `traffic`, `eye`, `n7`."""
+        ...
 
     @property
-    def role(self) -> str: ...
+    def role(self) -> str:
+        """The first chunk of its presence key: `part`, or `v` for a vehicle."""
+        ...
 
     @property
-    def period_ns(self) -> int: ...
+    def period_ns(self) -> int:
+        """How often `step` is due [ns]."""
+        ...
 
     @property
-    def hears(self) -> Sequence[Hears]: ...
+    def hears(self) -> Sequence[Hears]:
+        """What the runner subscribes to for it, from the start."""
+        ...
 
     @property
-    def serves(self) -> Sequence[Serves]: ...
+    def serves(self) -> Sequence[Serves]:
+        """Which requests the runner brings to it."""
+        ...
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Advance to `now_ns`, having received `inbox` in order of arrival; return what to send."""

@@ -5,10 +5,10 @@ of the sprung mass are kept in the world frame, so a coasting turn neither gains
 
     (M + dt * sum J^T K J) * dv = dt * (sum J^T F + F_body - weight)     [kg*m/s, kg*m^2*rad/s]
 
-F are the forces at the four contact points and four spring seats, J their lever arms, K how fast
-each falls with its own velocity. Every wheel's hop and spin is eliminated by hand first. Being
-implicit in K is what lets a 24 mg*m^2 front wheel, a stiff tyre and a car at rest stay calm at
-1 ms: with K the secant of the tyre curve, a step never overshoots the velocity where F vanishes.
+F are the forces at the four contact points, four spring seats and on the body, J their lever arms,
+K how fast each falls with its own velocity. Every wheel's hop and spin is eliminated by hand first.
+Being implicit in K is what lets a 24 mg*m^2 front wheel, a stiff tyre and a car at rest stay calm
+at 1 ms: with K the secant of the tyre curve, a step never overshoots the velocity where F vanishes.
 """
 
 import math
@@ -173,7 +173,8 @@ Six = tuple[float, float, float, float, float, float]
 
 @law
 def body_step(
-    scratch: Floats, dt: float, force_x: float, force_y: float, moment_z: float, mass: float,
+    scratch: Floats, dt: float, force_x: float, force_y: float, moment_z: float,
+    force_x_damping: float, force_y_damping: float, moment_z_damping: float, mass: float,
     sprung_mass: float, roll_inertia: float, pitch_inertia: float, yaw_inertia: float,
     cog_height: float,
 ) -> Six:  # fmt: skip
@@ -191,12 +192,12 @@ def body_step(
     pitch = pitch_inertia + h * hx + dt * hop[8] - heave * heave_pitch * heave_pitch
     both = dt * hop[7] - h * cross - heave * heave_roll * heave_pitch
     dvx, dvy, droll, dpitch, dyaw = solve_five(
-        mass + dt * touch[3],
-        dt * touch[4], mass + dt * touch[5],
+        mass + dt * (touch[3] + force_x_damping),
+        dt * touch[4], mass + dt * (touch[5] + force_y_damping),
         cross, hy, roll,
         -hx, -cross, both, pitch,
         dt * touch[6], dt * touch[7], dt * h * touch[7], -dt * h * touch[6],
-        yaw_inertia + dt * touch[8],
+        yaw_inertia + dt * (touch[8] + moment_z_damping),
         dt * (touch[0] + force_x),
         dt * (touch[1] + force_y),
         dt * (hop[1] + h * touch[1]) - heave * heave_roll * lift,

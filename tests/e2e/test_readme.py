@@ -1,4 +1,4 @@
-"""Every command in README is run here, against a city on free ports; a new one fails until it is."""
+"""Every command in README is run here, against a city on free ports."""
 
 import re
 import subprocess
