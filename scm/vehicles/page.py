@@ -61,6 +61,9 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
             force_x = 0.0
             force_y = 0.0
             moment_z = 0.0
+            force_x_damping = 0.0
+            force_y_damping = 0.0
+            moment_z_damping = 0.0
 {body_terms}
 
             # effects on each wheel: front-left, front-right, rear-left, rear-right
@@ -127,8 +130,9 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
 
             # one implicit step of the whole car
             dvx, dvy, dvz, droll_rate, dpitch_rate, dyaw_rate = body_step(
-                scratch, dt, force_x, force_y, moment_z, mass, sprung_mass,
-                roll_inertia, pitch_inertia, yaw_inertia, cog_height
+                scratch, dt, force_x, force_y, moment_z, force_x_damping, force_y_damping,
+                moment_z_damping, mass, sprung_mass, roll_inertia, pitch_inertia, yaw_inertia,
+                cog_height
             )
             for w in range(4):
                 wheel_x = front_x if w < 2 else -cog_to_rear_axle

@@ -183,6 +183,9 @@ SIGNALS: dict[str, Signal] = {signal.name: signal for signal in _ALL}
 
 # What a term that `damps` is implicit in: its target falls by the damping times this rate.
 DAMPED_BY: dict[str, str] = {
+    "force_x": "vx",
+    "force_y": "vy",
+    "moment_z": "yaw_rate",
     "suspension_force": "minus the compression rate",
     "load": "minus the tyre's deflection rate",
     "tyre_x": "minus the slip speed r * omega - v_long",

@@ -181,6 +181,30 @@ def test_a_diverged_car_freezes_and_the_others_go_on():
     assert fleet.x[1] > 0.1
 
 
+@pytest.mark.parametrize(
+    ("name", "numbers"),
+    [
+        ("nigel", {"yaw_drag.coefficient": 2.0, "yaw_inertia": 1e-4}),
+        ("dart", {"static": 50.0, "sharpness": 100.0, "quadratic": 5.0}),
+    ],
+)
+def test_the_strongest_drag_slows_a_car_and_never_pushes_it_back(name, numbers):
+    fleet = Fleet(load_car(name), 1)
+    fleet.add(Pose2(0.0, 0.0, 0.0))
+    for parameter, value in numbers.items():
+        fleet.set_parameter(0, parameter, value)
+    fleet.place(0, Pose2(0.0, 0.0, 0.0), speed=1.0, yaw_rate=1.0)
+    speeds, rates = [], []
+    for _ in range(2000):
+        fleet.advance(1e-3)
+        speeds.append(fleet.planar_cog(0)[3])
+        rates.append(float(fleet.yaw_rate[0]))
+    assert fleet.status[0] == 0
+    assert min(speeds) > -1e-2
+    assert max(rates) <= 1.0
+    assert np.ptp(speeds[-100:]) < 1e-5  # no chatter
+
+
 def test_a_very_stiff_suspension_is_still_calm_at_one_millisecond():
     fleet = Fleet(load_car("nigel"), 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))

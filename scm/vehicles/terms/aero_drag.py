@@ -17,10 +17,17 @@ def aero_drag(vx: float, coefficient: float) -> float:
     return -coefficient * vx * abs(vx)
 
 
+@law
+def aero_drag_damping(vx: float, coefficient: float) -> float:
+    """Force lost per speed, the secant [N*s/m]."""
+    return coefficient * abs(vx)
+
+
 TERM = Term(
     aero_drag,
     per=Per.BODY,
     adds="force_x",
+    damping=aero_drag_damping,
     passive=True,
     neutral={"coefficient": 0.0},
     shows_in=("coast_down",),

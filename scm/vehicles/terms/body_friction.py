@@ -23,10 +23,21 @@ def body_friction(
     return -math.copysign(max(0.0, force), vx)
 
 
+@law
+def body_friction_damping(
+    vx: float, static: float, sharpness: float, linear: float, quadratic: float
+) -> float:
+    """Force lost per speed, the secant: it never pushes a car back [N*s/m]."""
+    size = abs(vx)
+    near_rest = sharpness if size < 1e-9 else math.tanh(sharpness * size) / size
+    return max(0.0, static * near_rest + linear + quadratic * size)
+
+
 TERM = Term(
     body_friction,
     per=Per.BODY,
     adds="force_x",
+    damping=body_friction_damping,
     passive=True,
     neutral={"static": 0.0, "linear": 0.0, "quadratic": 0.0},
     shows_in=("coast_down",),

@@ -16,10 +16,17 @@ def viscous_drag(vx: float, coefficient: float) -> float:
     return -coefficient * vx
 
 
+@law
+def viscous_drag_damping(coefficient: float) -> float:
+    """Force lost per speed [N*s/m]."""
+    return coefficient
+
+
 TERM = Term(
     viscous_drag,
     per=Per.BODY,
     adds="force_x",
+    damping=viscous_drag_damping,
     passive=True,
     neutral={"coefficient": 0.0},
     shows_in=("coast_down",),

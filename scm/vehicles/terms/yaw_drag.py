@@ -17,10 +17,17 @@ def yaw_drag(yaw_rate: float, coefficient: float) -> float:
     return -coefficient * yaw_rate
 
 
+@law
+def yaw_drag_damping(coefficient: float) -> float:
+    """Moment lost per yaw rate [N*m*s]."""
+    return coefficient
+
+
 TERM = Term(
     yaw_drag,
     per=Per.BODY,
     adds="moment_z",
+    damping=yaw_drag_damping,
     passive=True,
     neutral={"coefficient": 0.0},
     shows_in=("circle",),

@@ -57,14 +57,16 @@ def test_a_sum_that_does_not_exist_is_refused_with_what_there_is():
 
 
 def test_damping_is_refused_where_the_skeleton_is_not_implicit():
-    def air(vx: float) -> float:
-        return vx
+    def rotor(omega: float) -> float:
+        return omega
 
-    def air_damping(vx: float) -> float:
-        return vx
+    def rotor_damping(omega: float) -> float:
+        return omega
 
-    with pytest.raises(TermError, match="air: nothing damps force_x"):
-        setters_of([*STANDARD, of(air, adds="force_x", damping=air_damping)])
+    with pytest.raises(TermError, match="rotor: nothing damps extra_inertia"):
+        setters_of(
+            [*STANDARD, of(rotor, per=Per.WHEEL, adds="extra_inertia", damping=rotor_damping)]
+        )
 
 
 def test_effects_that_wait_for_each_other_are_named():
