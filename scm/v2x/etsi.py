@@ -11,7 +11,10 @@ its-client; the names of phase states and status bits are the standard's own.
 Field sets and units: EN 302 637-2 v1.4.1 (CAM), TS 103 301 with SAE J2735 phase states (SPATEM).
 """
 
+from typing import Annotated
+
 import msgspec
+from msgspec import Meta
 
 SCALE = 14.0
 REFERENCE_LATITUDE_DEG = 0.0
@@ -20,6 +23,12 @@ REFERENCE_LONGITUDE_DEG = 0.0
 CAM_ID = 2
 SPATEM_ID = 4
 TIME_MARK_UNKNOWN = 36001
+
+# A value beyond the standard's range is refused when read: it comes from the air.
+_Byte = Annotated[int, Meta(ge=0, le=255)]
+_Word = Annotated[int, Meta(ge=0, le=65_535)]
+_Station = Annotated[int, Meta(ge=0, le=2**32 - 1)]
+_TimeMark = Annotated[int, Meta(ge=0, le=36_111)]
 
 
 class CamBody(msgspec.Struct, kw_only=True, frozen=True):
@@ -35,21 +44,21 @@ class CamBody(msgspec.Struct, kw_only=True, frozen=True):
         curvature: 1e-4 1/m, + = left, 1023 unknown.      drive_direction: 0 forward, 1 backward.
     """
 
-    protocol_version: int = 2
-    message_id: int = CAM_ID
-    station_id: int
-    station_type: int = 5
-    generation_delta_time: int
-    latitude: int
-    longitude: int
-    heading: int
-    speed: int
-    drive_direction: int = 0
-    vehicle_length: int
-    vehicle_width: int
-    longitudinal_acceleration: int = 161
-    curvature: int = 1023
-    yaw_rate: int = 32767
+    protocol_version: _Byte = 2
+    message_id: _Byte = CAM_ID
+    station_id: _Station
+    station_type: _Byte = 5
+    generation_delta_time: _Word
+    latitude: Annotated[int, Meta(ge=-900_000_000, le=900_000_001)]
+    longitude: Annotated[int, Meta(ge=-1_800_000_000, le=1_800_000_001)]
+    heading: Annotated[int, Meta(ge=0, le=3601)]
+    speed: Annotated[int, Meta(ge=0, le=16_383)]
+    drive_direction: Annotated[int, Meta(ge=0, le=2)] = 0
+    vehicle_length: Annotated[int, Meta(ge=1, le=1023)]
+    vehicle_width: Annotated[int, Meta(ge=1, le=62)]
+    longitudinal_acceleration: Annotated[int, Meta(ge=-160, le=161)] = 161
+    curvature: Annotated[int, Meta(ge=-1023, le=1023)] = 1023
+    yaw_rate: Annotated[int, Meta(ge=-32_766, le=32_767)] = 32767
 
 
 class MovementState(msgspec.Struct, kw_only=True, frozen=True):
@@ -60,10 +69,10 @@ class MovementState(msgspec.Struct, kw_only=True, frozen=True):
         min_end_time, max_end_time: 0.1 s within the hour; 36001 is unknown.
     """
 
-    signal_group: int
+    signal_group: _Byte
     event_state: str
-    min_end_time: int
-    max_end_time: int = TIME_MARK_UNKNOWN
+    min_end_time: _TimeMark
+    max_end_time: _TimeMark = TIME_MARK_UNKNOWN
 
 
 class SpatemBody(msgspec.Struct, kw_only=True, frozen=True):
@@ -75,12 +84,12 @@ class SpatemBody(msgspec.Struct, kw_only=True, frozen=True):
         moy: Minute of the year.      time_stamp: Milliseconds within the minute.
     """
 
-    protocol_version: int = 2
-    message_id: int = SPATEM_ID
-    station_id: int
-    intersection: int
-    revision: int
+    protocol_version: _Byte = 2
+    message_id: _Byte = SPATEM_ID
+    station_id: _Station
+    intersection: _Word
+    revision: Annotated[int, Meta(ge=0, le=127)]
     status: tuple[str, ...] = ()
-    moy: int
-    time_stamp: int
+    moy: Annotated[int, Meta(ge=0, le=527_040)]
+    time_stamp: _Word
     states: tuple[MovementState, ...]

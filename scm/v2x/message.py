@@ -1,5 +1,6 @@
 """What every message is: a typed record that knows its key, its rate and how it should travel."""
 
+import re
 from enum import Enum
 from functools import lru_cache
 from typing import Any, ClassVar, TypeVar
@@ -75,6 +76,9 @@ class Refused(Message, kw_only=True, frozen=True):
 
 M = TypeVar("M", bound=Message)
 
+_LARGEST = 2**63 - 1
+_MANY_DIGITS = re.compile(rb"\d{20}|9[2-9]\d{17}")
+
 _encoder = msgspec.json.Encoder()
 
 
@@ -106,9 +110,30 @@ def decode(kind: type[M], body: bytes, attachment: bytes | None = None) -> M:
     try:
         if is_bulk(kind):
             header = msgspec.json.decode(attachment or b"{}")
-            return msgspec.convert({**header, "payload": body}, kind)
-        message: M = _decoder(kind).decode(body)
-    except (msgspec.MsgspecError, TypeError, UnicodeDecodeError) as cause:
+            message = msgspec.convert({**header, "payload": body}, kind)
+        else:
+            message = _decoder(kind).decode(body)
+    except (msgspec.MsgspecError, TypeError, UnicodeDecodeError, RecursionError) as cause:
         msg = f"{kind.__name__}: {cause}"
         raise MessageError(msg) from cause
+    _check_integers(message, body if attachment is None else attachment)
     return message
+
+
+def _check_integers(message: Message, text: bytes) -> None:
+    """Refuse integers of more than 64 bits: a float, an array, another language cannot hold them.
+
+    Raises:
+        MessageError: naming the class.
+    """
+    if _MANY_DIGITS.search(text) and not _are_short(msgspec.to_builtins(message)):
+        msg = f"{type(message).__name__}: expected integers of at most 64 bits"
+        raise MessageError(msg)
+
+
+def _are_short(value: object) -> bool:
+    if isinstance(value, dict):
+        return all(map(_are_short, value.values()))
+    if isinstance(value, list | tuple):
+        return all(map(_are_short, value))
+    return not isinstance(value, int) or -_LARGEST - 1 <= value <= _LARGEST

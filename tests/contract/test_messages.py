@@ -3,7 +3,7 @@
 import importlib
 from string import ascii_lowercase, digits
 from types import NoneType, UnionType
-from typing import Literal, Union, get_args, get_origin
+from typing import Annotated, Literal, Union, get_args, get_origin
 
 import msgspec
 import pytest
@@ -86,6 +86,8 @@ def values(of):
         return st.one_of(*(values(t) for t in inner))
     if origin is Literal:
         return st.sampled_from(inner)
+    if origin is Annotated:
+        return st.integers(inner[1].ge, inner[1].le)
     if origin is tuple and inner[-1] is Ellipsis:
         return st.lists(values(inner[0]), max_size=3).map(tuple)
     if origin is tuple:

@@ -5,10 +5,13 @@ import math
 import pytest
 
 from scm.errors import MessageError
+from scm.v2x.etsi_convert import cam_of
 from scm.v2x.message import Refused, decode, encode
+from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.vehicle_state import VehicleState
 
 
 def scan():
@@ -45,6 +48,9 @@ def test_unknown_fields_are_ignored():
         (b"", "CityStop: "),
         (b"\xff\xfe", "CityStop: "),
         (b'{"t_ns":1', "CityStop: "),
+        (b'{"t_ns":1,"engaged":true,"deep":' + b"[" * 100_000, "CityStop: .*recursion"),
+        (b'{"t_ns":9223372036854775808,"engaged":true}', "CityStop: .*64 bits"),
+        (b'{"t_ns":-1' + b"0" * 300 + b',"engaged":true}', "CityStop: .*64 bits"),
     ],
 )
 def test_bytes_that_are_no_such_message_are_refused_with_class_and_field(body, said):
@@ -52,7 +58,12 @@ def test_bytes_that_are_no_such_message_are_refused_with_class_and_field(body, s
         decode(CityStop, body)
 
 
-@pytest.mark.parametrize("attachment", [None, b"{", b"[1]", b'{"vehicle":"n1"}'])
+def test_long_digits_are_fine_where_they_are_no_integers():
+    body = b'{"t_ns":-9223372036854775808,"engaged":true,"reason":"%s"}' % (b"9" * 30)
+    assert decode(CityStop, body).reason == "9" * 30
+
+
+@pytest.mark.parametrize("attachment", [None, b"{", b"[1]", b'{"vehicle":"n1"}', b"[" * 100_000])
 def test_a_bulk_message_with_a_bad_header_is_refused(attachment):
     with pytest.raises(MessageError, match="LidarScan: "):
         decode(LidarScan, b"1234", attachment)
@@ -72,3 +83,28 @@ def test_not_a_number_is_refused_by_the_receiver():
     )
     with pytest.raises(MessageError, match=r"Trip: Expected `float`, got `null`.*done_m"):
         decode(Trip, body)
+
+
+def test_what_no_standard_allows_on_the_air_is_refused_with_its_field():
+    body = cam_of(state(), length_m=0.5, width_m=0.2, front_m=0.4)
+    good, _ = encode(CamTx(station="n1", t_ns=1, body=body))
+    assert decode(CamTx, good).body == body
+    bad = good.replace(b'"heading":900', b'"heading":99999')
+    with pytest.raises(MessageError, match=r"\$\.body\.heading"):
+        decode(CamTx, bad)
+
+
+def state():
+    return VehicleState(
+        vehicle="n1",
+        t_ns=0,
+        seq=1,
+        x_m=0.0,
+        y_m=0.0,
+        yaw_rad=0.0,
+        speed_mps=0.1,
+        yaw_rate_radps=0.0,
+        steering_rad=0.0,
+        throttle=0.0,
+        source="simulated",
+    )
