@@ -59,7 +59,8 @@ STATES = (
 INPUTS = (("throttle_command", 1), ("steering_command", 1), ("battery", 1))
 OUTPUTS = (
     ("x", 1), ("y", 1), ("z", 1), ("speed", 1), ("lateral_speed", 1),
-    ("accel_x", 1), ("accel_y", 1), ("accel_z", 1), ("yaw_accel", 1),
+    ("accel_x", 1), ("accel_y", 1), ("accel_z", 1),
+    ("roll_accel", 1), ("pitch_accel", 1), ("yaw_accel", 1),
     ("steer_angle", 1),
     ("wheel_steer", 4), ("wheel_load", 4),
 )  # fmt: skip

@@ -51,7 +51,7 @@ class Fleet:
             point is fixed to the leaning body at floor height: a stopped car that still rocks on
             its springs has stopped.
         speed, lateral_speed: Velocity of the rear axle along and across the body [m/s].
-        roll_rate, pitch_rate, yaw_rate: [rad/s]; yaw_accel [rad/s^2].
+        roll_rate, pitch_rate, yaw_rate: [rad/s]; roll_accel, pitch_accel, yaw_accel: [rad/s^2].
         accel_x, accel_y, accel_z: Acceleration of the centre of gravity over the last substep, in
             the level body frame, without gravity [m/s^2].
         steer_angle: Mean road-wheel angle, + left [rad].
@@ -78,8 +78,8 @@ class Fleet:
         self.battery = self._view("battery")
         for name in (
             "x", "y", "z", "roll", "pitch", "yaw", "speed", "lateral_speed", "yaw_rate",
-            "roll_rate", "pitch_rate", "accel_x", "accel_y", "accel_z", "yaw_accel", "steer_angle",
-            "wheel_speed", "wheel_angle", "wheel_steer", "wheel_load",
+            "roll_rate", "pitch_rate", "accel_x", "accel_y", "accel_z", "roll_accel", "pitch_accel",
+            "yaw_accel", "steer_angle", "wheel_speed", "wheel_angle", "wheel_steer", "wheel_load",
         ):  # fmt: skip
             view = self._view(name)
             view.flags.writeable = False
@@ -100,6 +100,8 @@ class Fleet:
     accel_x: Floats
     accel_y: Floats
     accel_z: Floats
+    roll_accel: Floats
+    pitch_accel: Floats
     yaw_accel: Floats
     steer_angle: Floats
     wheel_speed: Floats

@@ -46,6 +46,8 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
         accel_x = car[{accel_x}]
         accel_y = car[{accel_y}]
         accel_z = car[{accel_z}]
+        roll_accel = car[{roll_accel}]
+        pitch_accel = car[{pitch_accel}]
         yaw_accel = car[{yaw_accel}]
         sprung_mass = mass - 4.0 * wheel_mass
         front_x = wheelbase - cog_to_rear_axle
@@ -153,6 +155,8 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
             accel_x = dvx / dt
             accel_y = dvy / dt
             accel_z = dvz / dt
+            roll_accel = droll_rate / dt
+            pitch_accel = dpitch_rate / dt
             yaw_accel = dyaw_rate / dt
             vx_world += cos_yaw * dvx - sin_yaw * dvy
             vy_world += sin_yaw * dvx + cos_yaw * dvy
@@ -201,5 +205,7 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
         car[{accel_x}] = accel_x
         car[{accel_y}] = accel_y
         car[{accel_z}] = accel_z
+        car[{roll_accel}] = roll_accel
+        car[{pitch_accel}] = pitch_accel
         car[{yaw_accel}] = yaw_accel
 '''

@@ -42,6 +42,10 @@ class Truth(Protocol):
     @property
     def yaw_rate(self) -> Floats: ...  # noqa: D102
     @property
+    def roll_accel(self) -> Floats: ...  # noqa: D102
+    @property
+    def pitch_accel(self) -> Floats: ...  # noqa: D102
+    @property
     def yaw_accel(self) -> Floats: ...  # noqa: D102
     @property
     def accel_x(self) -> Floats: ...  # noqa: D102

@@ -4,7 +4,7 @@
     gyro = omega                                                     roll, pitch, yaw rate
 
 r reaches from the centre of gravity to the IMU, R tilts the level frame by pitch, then roll.
-Holds: rigid mounting, small roll and pitch; of alpha only the part about z is counted.
+Holds: rigid mounting, small roll and pitch.
 Source: rigid-body kinematics; noise of the MPU-9250's class, from the car file.
 """
 
@@ -30,8 +30,9 @@ def measure(car: Car, truth: Truth, rows: Ints, around: Around | None) -> Floats
     )
     force = tilted(level, truth.roll[rows], truth.pitch[rows])
     omega = np.column_stack((truth.roll_rate[rows], truth.pitch_rate[rows], truth.yaw_rate[rows]))
-    alpha = np.zeros_like(omega)
-    alpha[:, 2] = truth.yaw_accel[rows]
+    alpha = np.column_stack(
+        (truth.roll_accel[rows], truth.pitch_accel[rows], truth.yaw_accel[rows])
+    )
     arm = np.broadcast_to(lever_arm(car), omega.shape)
     force += cross(alpha, arm) + cross(omega, cross(omega, arm))
     return np.column_stack((force, omega))

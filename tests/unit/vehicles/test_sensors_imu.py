@@ -5,9 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
+from scm.geometry import Pose2
 from scm.vehicles.body14 import GRAVITY
 from scm.vehicles.car import load_car
+from scm.vehicles.fleet import Fleet
 from scm.vehicles.sensors.imu import SENSOR, lever_arm
 
 NIGEL = load_car("nigel")
@@ -17,6 +20,8 @@ NAMES = [
     "roll_rate",
     "pitch_rate",
     "yaw_rate",
+    "roll_accel",
+    "pitch_accel",
     "yaw_accel",
     "accel_x",
     "accel_y",
@@ -58,3 +63,26 @@ def test_spinning_up_pushes_across_the_lever_arm():
 
 def test_the_gyro_reads_the_turn_rates_in_order():
     assert_allclose(felt(roll_rate=0.1, pitch_rate=0.2, yaw_rate=0.3)[3:], [0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize("name", ["nigel", "f1tenth"])
+def test_the_force_is_that_of_the_path_which_the_imu_itself_takes(name):
+    car = load_car(name)
+    fleet, dt, path, frames, forces = Fleet(car, 1), 1e-3, [], [], []
+    fleet.add(Pose2(0.0, 0.0, 0.3))
+    fleet.steering[0] = 0.5
+    for i in range(300):
+        fleet.throttle[0] = (1.0, 0.0, -1.0)[i // 100]  # launch, stop, launch backwards
+        fleet.advance(dt)
+        x, y, yaw = fleet.planar_cog(0)[:3]
+        roll, pitch = fleet.roll[0], fleet.pitch[0]
+        z = fleet.z[0] + car.value("body.cog_height_m")
+        z -= pitch * car.value("body.cog_to_rear_axle_m")
+        frames.append(Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix())
+        path.append(np.array([x, y, z]) + frames[-1] @ lever_arm(car))
+        forces.append(SENSOR.measure(car, fleet, np.array([0]), None)[0, :3])
+    accel = np.diff(path, 2, axis=0) / dt**2 + (0.0, 0.0, GRAVITY)
+    expected = np.array([R.T @ a for R, a in zip(frames[1:-1], accel, strict=True)])
+    spread = (expected - (0.0, 0.0, GRAVITY)).std(axis=0)
+    error = np.sqrt(np.mean((np.array(forces[2:]) - expected) ** 2, axis=0))
+    assert (error[[0, 2]] < 0.05 * spread[[0, 2]]).all(), (error, spread)
