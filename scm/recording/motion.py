@@ -1,6 +1,9 @@
 """The measured motion of a car: its rear axle's pose and velocities at any time, from its poses."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import reduce
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +14,7 @@ from scm.recording.read import Channel, Recording
 HALF_WIDTH_S = 0.1
 LONGEST_GAP_S = 0.25
 FASTEST_MPS = 20.0
+LARGEST_STEP_BACK_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,19 +40,23 @@ class Motion:
 class Poses:
     """The pose channels of a recording, moved to the rear axle and made continuous.
 
+    A pose counts where all three channels have a row of the same time.
+
     Raises:
-        RecordingError: when x, y and yaw are not of one table, or time does not go forward.
+        RecordingError: when x, y and yaw share no times, name different points of the body, or
+            time does not go forward.
     """
 
     def __init__(self, recording: Recording) -> None:
-        x, y, yaw = (recording.channel(f"pose.{axis}") for axis in ("x", "y", "yaw"))
-        if not (np.array_equal(x.t, y.t) and np.array_equal(x.t, yaw.t)):
+        channels = {name: forward(recording, name) for name in ("pose.x", "pose.y", "pose.yaw")}
+        common = reduce(np.intersect1d, (channel.t for channel in channels.values()))
+        if len(common) < 0.5 * max(len(channel.t) for channel in channels.values()):
             msg = f"{recording.path}: pose.x, pose.y and pose.yaw must have the same times"
             raise RecordingError(msg)
-        first = _forward(x.t, recording)
-        self.t = x.t[first]
-        self.yaw = np.unwrap(yaw.values[first])
-        self.x, self.y = _at_rear_axle(x, y, first, self.yaw)
+        self.t: Floats = common
+        x, y, yaw = (c.values[np.isin(c.t, common)] for c in channels.values())
+        self.yaw = np.unwrap(yaw)
+        self.x, self.y = _at_rear_axle(x, y, self.yaw, _point(recording.path, channels))
         self._broken = _broken_intervals(self.t, self.x, self.y)
 
     def motion(self, t: Floats) -> Motion:
@@ -91,21 +99,42 @@ class Poses:
         return (*fit[0], *fit[1])
 
 
-def _forward(t: Floats, recording: Recording) -> Bools:
-    """Return which rows to keep so that time strictly increases; refuse a clock that was reset."""
-    newest = np.maximum.accumulate(t)
-    if np.any(newest - t > 1.0):
-        row = int(np.argmax(newest - t > 1.0))
-        msg = f"{recording.path}: pose times jump back by {newest[row] - t[row]:.3f} s at row {row}"
+def forward(recording: Recording, name: str) -> Channel:
+    """Return a channel without the rows that do not move its time forward.
+
+    Raises:
+        RecordingError: when the channel is missing, or its clock was reset in between.
+    """
+    channel = recording.channel(name)
+    newest = np.maximum.accumulate(channel.t)
+    back = newest - channel.t
+    if np.any(back > LARGEST_STEP_BACK_S):
+        row = int(np.argmax(back > LARGEST_STEP_BACK_S))
+        msg = (
+            f"{recording.path}: {name}: time jumps back by {back[row]:.3f} s, from "
+            f"{newest[row]:.3f} s to {channel.t[row]:.3f} s: split the recording there"
+        )
         raise RecordingError(msg)
-    return np.concatenate(([True], newest[1:] > newest[:-1]))
+    keep = np.concatenate(([True], newest[1:] > newest[:-1]))
+    return replace(channel, t=channel.t[keep], values=channel.values[keep])
 
 
-def _at_rear_axle(x: Channel, y: Channel, keep: Bools, yaw: Floats) -> tuple[Floats, Floats]:
+def _point(path: Path, channels: Mapping[str, Channel]) -> tuple[float, float]:
+    """Return the measured point of the body: it may stand on any one of the pose channels."""
+    named = {name: channel.point for name, channel in channels.items() if any(channel.point)}
+    if len(set(named.values())) > 1:
+        msg = f"{path}: point: expected the same on all pose channels, got {named}"
+        raise RecordingError(msg)
+    return next(iter(named.values()), (0.0, 0.0))
+
+
+def _at_rear_axle(
+    x: Floats, y: Floats, yaw: Floats, point: tuple[float, float]
+) -> tuple[Floats, Floats]:
     """Return the rear axle's positions from those of the measured point on the body."""
-    px, py = x.point
+    px, py = point
     c, s = np.cos(yaw), np.sin(yaw)
-    return x.values[keep] - c * px + s * py, y.values[keep] - s * px - c * py
+    return x - c * px + s * py, y - s * px - c * py
 
 
 def _broken_intervals(t: Floats, x: Floats, y: Floats) -> Bools:

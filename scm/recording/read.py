@@ -86,7 +86,7 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
     for table in description.tables:
         if table.file not in loaded:
             loaded[table.file] = read_table(folder / table.file)
-        vehicle = _vehicle(description, table)
+        vehicle = _vehicle(description, table, found.parent)
         channels = by_vehicle.setdefault(vehicle, {})
         for name, channel in _channels(table, loaded[table.file], found).items():
             if name in channels:
@@ -96,12 +96,14 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
     return [Recording(found, vehicle, channels) for vehicle, channels in by_vehicle.items()]
 
 
-def _vehicle(description: Description, table: Table) -> str:
+def _vehicle(description: Description, table: Table, folder: Path) -> str:
+    """Return the name of a table's car, or the path of its file: beside the description first."""
     vehicle = table.vehicle or description.vehicle
     if vehicle is None:  # refused when the description was read
         msg = f"table {table.file}: no vehicle"
         raise RecordingError(msg)
-    return vehicle
+    beside = folder / vehicle
+    return str(beside) if beside.suffix == ".toml" and beside.is_file() else vehicle
 
 
 def _channels(table: Table, columns: Columns, path: Path) -> dict[str, Channel]:

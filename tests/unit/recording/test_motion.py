@@ -1,5 +1,6 @@
 """Velocities from poses are those of the rear axle, and gaps are told, not bridged."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,5 +62,44 @@ def test_a_jump_of_the_tracker_breaks_the_window() -> None:
 def test_times_that_jump_back_are_refused() -> None:
     t = np.arange(0.0, 20.0, 0.01)
     t[1000:] -= 5.0
-    with pytest.raises(RecordingError, match="jump back"):
+    with pytest.raises(
+        RecordingError, match=r"pose\.x: time jumps back by 4\.990 s, from 9\.990 s to 5\.000 s"
+    ):
         Poses(circle(t))
+
+
+def without(channel: Channel, rows: slice) -> Channel:
+    return replace(channel, t=np.delete(channel.t, rows), values=np.delete(channel.values, rows))
+
+
+def test_a_cell_missing_in_one_column_costs_that_pose_only() -> None:
+    recording = circle(np.arange(0.0, 20.0, 0.01))
+    recording.channels["pose.y"] = without(recording.channel("pose.y"), slice(1000, 1001))
+    recording.channels["pose.yaw"] = without(recording.channel("pose.yaw"), slice(1500, 1501))
+    poses = Poses(recording)
+    assert len(poses.t) == 1998
+    assert_allclose(poses.motion(np.array([10.0])).speed, SPEED_MPS, rtol=1e-3)
+
+
+def test_pose_channels_of_different_tables_are_refused() -> None:
+    recording = circle(np.arange(0.0, 20.0, 0.01))
+    y = recording.channel("pose.y")
+    recording.channels["pose.y"] = replace(y, t=y.t + 0.005)
+    with pytest.raises(RecordingError, match="same times"):
+        Poses(recording)
+
+
+@pytest.mark.parametrize("keeps", ["pose.x", "pose.y", "pose.yaw"])
+def test_the_point_may_stand_on_any_pose_channel(keeps: str) -> None:
+    recording = circle(np.arange(0.0, 20.0, 0.01))
+    for name in {"pose.x", "pose.y", "pose.yaw"} - {keeps}:
+        recording.channels[name] = replace(recording.channels[name], point=(0.0, 0.0))
+    motion = Poses(recording).motion(np.array([5.0]))
+    assert_allclose(np.hypot(motion.x, motion.y), RADIUS_M, rtol=1e-4)
+
+
+def test_two_points_for_one_pose_are_refused() -> None:
+    recording = circle(np.arange(0.0, 20.0, 0.01))
+    recording.channels["pose.y"] = replace(recording.channels["pose.y"], point=(0.1, 0.0))
+    with pytest.raises(RecordingError, match="point: expected the same"):
+        Poses(recording)
