@@ -12,7 +12,7 @@ import numpy as np
 from scm.arrays import Floats
 from scm.errors import RecordingError
 from scm.geometry import Pose2
-from scm.recording.motion import Motion, Poses
+from scm.recording.motion import Motion, Poses, forward
 from scm.recording.read import Channel, Recording
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
@@ -20,6 +20,9 @@ from scm.vehicles.fleet import Fleet
 STEP_S = 0.005
 RUN_IN_S = 1.0
 HORIZONS_S = (0.5, 1.0, 3.0)
+SHORTEST_HORIZON_S = 0.05
+NEEDED = ("command.throttle", "command.steering", "pose.x", "pose.y", "pose.yaw")
+LARGEST_COMMAND = 1.5  # some drivers overshoot 1 a little; a percentage is far beyond
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +66,16 @@ class Commands:
     """Recorded throttle and steering, held between their rows, as the car's commands in [-1, 1]."""
 
     def __init__(self, recording: Recording, car: Car) -> None:
-        self._throttle = recording.channel("command.throttle")
-        self._steering = recording.channel("command.steering")
-        angles = self._steering.dimension == "angle"
-        self._per_unit = 1.0 / car.value("steering.limit_rad") if angles else 1.0
+        self._throttle = forward(recording, "command.throttle")
+        self._steering = forward(recording, "command.steering")
+        self._per_unit = 1.0
+        if self._steering.dimension == "angle":
+            self._per_unit = 1.0 / _steering_limit(recording, car)
+        for name, channel in (("throttle", self._throttle), ("steering", self._steering)):
+            largest = float(np.abs(channel.values).max())
+            if channel.dimension == "ratio" and largest > LARGEST_COMMAND:
+                msg = f"{recording.path}: command.{name}: reaches {largest:g}, expected -1 to 1"
+                raise RecordingError(msg)
 
     def at(self, t: Floats) -> tuple[Floats, Floats]:
         """Return throttle and steering at times `t`; before the first row they are zero."""
@@ -77,6 +86,30 @@ class Commands:
         """First and last time at which both commands are known."""
         first = max(self._throttle.t[0], self._steering.t[0])
         return float(first), float(min(self._throttle.t[-1], self._steering.t[-1]))
+
+
+def _steering_limit(recording: Recording, car: Car) -> float:
+    """Return the wheel angle that a steering command of 1 asks for [rad]."""
+    if not car.has("steering.limit_rad"):
+        msg = (
+            f"{recording.path}: command.steering is an angle, but {car.name} has no "
+            f"steering.limit_rad to say which command that is"
+        )
+        raise RecordingError(msg)
+    return car.value("steering.limit_rad")
+
+
+def _refuse_incomplete(recording: Recording) -> None:
+    """Say in one sentence which channels a replay lacks."""
+    missing = [name for name in NEEDED if name not in recording.channels]
+    if missing:
+        speed = "command.speed" in recording.channels and "command.throttle" in missing
+        hint = "; command.speed alone does not say how the car was driven" if speed else ""
+        msg = (
+            f"{recording.path}: a replay needs {', '.join(NEEDED)}; "
+            f"missing: {', '.join(missing)}{hint}"
+        )
+        raise RecordingError(msg)
 
 
 def _held(channel: Channel, t: Floats) -> Floats:
@@ -93,17 +126,21 @@ def free_run(
     Raises:
         RecordingError: when a needed channel is missing or no window is whole.
     """
+    if not SHORTEST_HORIZON_S <= horizon_s < np.inf:
+        msg = f"horizon: got {horizon_s:g} s, expected {SHORTEST_HORIZON_S:g} s or more"
+        raise RecordingError(msg)
+    _refuse_incomplete(recording)
     poses, commands = Poses(recording), Commands(recording, car)
     starts, initial = _windows(recording, poses, commands, horizon_s)
     fleet = Fleet(car, len(starts))
     _run_in(fleet, commands, starts, initial)
-    every = round(save_every_s / STEP_S)
-    t_s: Floats = np.arange(round(horizon_s / save_every_s) + 1, dtype=np.float64) * save_every_s
+    t_s: Floats = np.append(np.arange(0.0, horizon_s - 0.5 * STEP_S, save_every_s), horizon_s)
+    steps = np.diff(np.rint(t_s / STEP_S).astype(np.int64))
     x, y, yaw, speed = (np.empty((len(starts), len(t_s))) for _ in range(4))
     for k, t in enumerate(t_s):
         x[:, k], y[:, k], yaw[:, k], speed[:, k] = fleet.x, fleet.y, fleet.yaw, fleet.speed
-        if k < len(t_s) - 1:
-            _advance(fleet, commands, starts + t, every)
+        if k < len(steps):
+            _advance(fleet, commands, starts + t, int(steps[k]))
     measured = poses.motion((starts[:, None] + t_s).ravel())
     return FreeRun(
         start_s=starts,
@@ -123,14 +160,20 @@ def _windows(
     recording: Recording, poses: Poses, commands: Commands, horizon_s: float
 ) -> tuple[Floats, Motion]:
     """Return the starts of whole windows, end to end, and the measured motion there."""
-    first = max(poses.t[0], commands.span_s[0])
-    last = min(poses.t[-1], commands.span_s[1]) - horizon_s
-    starts = np.array(
-        [t for t in np.arange(first, last, horizon_s) if poses.unbroken(t, t + horizon_s)]
-    )
+    (first_command, last_command), tiny = commands.span_s, 1e-6
+    first = max(poses.t[0], first_command)
+    span = min(poses.t[-1], last_command) - first
+    if span < horizon_s - tiny:
+        msg = (
+            f"{recording.path}: no window of {horizon_s:g} s: poses from {poses.t[0]:.3f} s to "
+            f"{poses.t[-1]:.3f} s, commands from {first_command:.3f} s to {last_command:.3f} s"
+        )
+        raise RecordingError(msg)
+    every: Floats = first + horizon_s * np.arange(int((span + tiny) / horizon_s))
+    starts = np.array([t for t in every if poses.unbroken(t, t + horizon_s - tiny)])
     initial = poses.motion(starts)
     if not initial.valid.any():
-        msg = f"{recording.path}: no window of {horizon_s} s without a gap in the poses"
+        msg = f"{recording.path}: no window of {horizon_s:g} s without a gap in the poses"
         raise RecordingError(msg)
     keep = initial.valid
     return starts[keep], poses.motion(starts[keep])
@@ -169,7 +212,7 @@ def error_table(
     """Return, for each error, its median and 90th percentile at each horizon.
 
     Returns:
-        (label, array of shape `(horizons, 2)`); horizons beyond the run are left out by the caller.
+        (label, array of shape `(horizons, 2)`), each at the saved time nearest to the horizon.
     """
     columns = [int(np.argmin(np.abs(run.t_s - h))) for h in horizons_s]
     rows = (
@@ -178,6 +221,11 @@ def error_table(
         ("speed [m/s]", run.speed_error()),
     )
     return [
-        (label, np.array([np.nanpercentile(error[:, k], (50, 90)) for k in columns]))
-        for label, error in rows
+        (label, np.array([_percentiles(error[:, k]) for k in columns])) for label, error in rows
     ]
+
+
+def _percentiles(errors: Floats) -> Floats:
+    """Return median and 90th percentile of what is known; NaN when nothing is."""
+    known = errors[np.isfinite(errors)]
+    return np.percentile(known, (50, 90)) if len(known) else np.full(2, np.nan)

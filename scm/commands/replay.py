@@ -32,6 +32,8 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.replay import free_run
     from scm.vehicles.car import load_car
 
+    if arguments.save:
+        _refuse_unwritable(arguments.save)
     runs = []
     for path in arguments.recording:
         for recording in read_recordings(path, arguments.data):
@@ -53,12 +55,21 @@ def _table(run: "FreeRun", horizon_s: float) -> str:
     """Return the error table as aligned text."""
     from scm.replay import error_table
 
-    horizons = tuple(h for h in HORIZONS_S if h <= horizon_s) or (horizon_s,)
+    horizons = (*(h for h in HORIZONS_S if h < horizon_s), horizon_s)
     lines = [" " * 14 + "".join(f"{f'{h:g} s':>20}" for h in horizons)]
     for label, values in error_table(run, horizons):
         cells = "".join(f"{median:>11.4f}{p90:>9.4f}" for median, p90 in values)
         lines.append(f"{label:<14}{cells}")
     return "\n".join(lines)
+
+
+def _refuse_unwritable(path: Path) -> None:
+    """Find out before the work that its result could not be saved."""
+    from scm.errors import RecordingError
+
+    if path.is_dir() or not path.absolute().parent.is_dir():
+        msg = f"--save {path}: expected a file in a folder that exists"
+        raise RecordingError(msg)
 
 
 def _save(path: Path, runs: "list[FreeRun]") -> None:

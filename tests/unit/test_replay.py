@@ -1,6 +1,7 @@
 """Free runs start where the car was and measure how far the simulator strays."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -123,3 +124,98 @@ def test_a_shorter_horizon_prints_only_what_it_reaches(
 def test_bad_input_exits_with_2_and_says_where(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", "nowhere.yaml"]) == 2
     assert "nowhere.yaml: no recording here" in capsys.readouterr().err
+
+
+def test_what_a_replay_lacks_is_said_at_once(nigel: Car) -> None:
+    recording = drive(nigel, 4.0)
+    recording.channels["command.speed"] = recording.channels.pop("command.throttle")
+    del recording.channels["pose.yaw"]
+    with pytest.raises(RecordingError) as error:
+        free_run(recording, nigel)
+    assert "missing: command.throttle, pose.yaw" in str(error.value)
+    assert "command.speed alone does not say" in str(error.value)
+
+
+def test_commands_whose_clock_was_reset_are_refused(nigel: Car) -> None:
+    recording = drive(nigel, 8.0)
+    throttle = recording.channels["command.throttle"]
+    t = np.where(throttle.t < 4.0, throttle.t, throttle.t - 4.0)
+    recording.channels["command.throttle"] = replace(throttle, t=t)
+    with pytest.raises(RecordingError, match=r"command\.throttle: time jumps back"):
+        free_run(recording, nigel)
+
+
+def test_clocks_that_never_meet_are_told(nigel: Car) -> None:
+    recording = drive(nigel, 8.0)
+    for name in ("command.throttle", "command.steering"):
+        recording.channels[name] = replace(
+            recording.channels[name], t=recording.channels[name].t + 1.7e9
+        )
+    with pytest.raises(RecordingError, match=r"poses from 0\.000 s to 7\.990 s, commands from 17"):
+        free_run(recording, nigel)
+
+
+def test_a_percentage_taken_for_a_ratio_is_refused(nigel: Car) -> None:
+    recording = drive(nigel, 4.0)
+    recording.channels["command.throttle"].values[:] *= 100.0
+    with pytest.raises(RecordingError, match=r"command\.throttle: reaches 99.*expected -1 to 1"):
+        free_run(recording, nigel)
+
+
+def test_an_angle_needs_a_car_that_says_its_limit(nigel: Car) -> None:
+    recording = drive(nigel, 4.0)
+    steering = recording.channels["command.steering"]
+    recording.channels["command.steering"] = replace(steering, dimension="angle")
+    values = {key: v for key, v in nigel.values.items() if key != "steering.limit_rad"}
+    with pytest.raises(RecordingError, match=r"nigel has no steering\.limit_rad"):
+        free_run(recording, replace(nigel, values=values))
+
+
+@pytest.mark.parametrize("horizon_s", [0.0, -1.0, 0.01, float("nan"), float("inf")])
+def test_a_horizon_without_length_is_refused(nigel: Car, horizon_s: float) -> None:
+    with pytest.raises(RecordingError, match=r"horizon: got .*expected 0\.05 s or more"):
+        free_run(drive(nigel, 1.0), nigel, horizon_s)
+
+
+def test_a_window_may_last_as_long_as_the_recording(nigel: Car) -> None:
+    recording = drive(nigel, 4.01)
+    assert_allclose(free_run(recording, nigel, 4.0).start_s, [0.0])
+    with pytest.raises(
+        RecordingError, match=r"no window of 4\.1 s: poses from 0\.000 s to 4\.000 s"
+    ):
+        free_run(recording, nigel, 4.1)
+
+
+def test_a_horizon_that_is_no_multiple_of_the_saved_step_is_reached(nigel: Car) -> None:
+    run = free_run(drive(nigel, 4.0), nigel, 0.52)
+    assert_allclose(run.t_s[[0, 1, -2, -1]], [0.0, 0.05, 0.5, 0.52])
+    assert np.median(run.position_error()[:, -1]) < 0.004
+
+
+def test_the_horizon_asked_for_is_in_the_table(
+    root: Path, shared: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tinytown = str(root / "recordings/autodrive_sim_tinytown.yaml")
+    data = str(shared / "recordings/autodrive_sim_tinytown")
+    assert main(["replay", tinytown, "--data", data, "--horizon-s", "2"]) == 0
+    assert capsys.readouterr().out.splitlines()[2].split() == ["0.5", "s", "1", "s", "2", "s"]
+
+
+def test_a_car_file_may_lie_beside_the_description(tmp_path: Path, root: Path) -> None:
+    car = (root / "scm/vehicles/types/nigel.toml").read_text()
+    (tmp_path / "mine.toml").write_text(car)
+    (tmp_path / "t.csv").write_text("t,x\n0,1\n")
+    (tmp_path / "recording.yaml").write_text(
+        "recording: 1\nvehicle: mine.toml\ntables:\n  - file: t.csv\n    time: {column: t}\n"
+        "    channels: {pose.x: {column: x, unit: m}}\n"
+    )
+    (recording,) = read_recordings(tmp_path)
+    assert load_car(recording.vehicle).path == tmp_path / "mine.toml"
+
+
+@pytest.mark.parametrize("save", ["", "nowhere/windows.csv"])
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path: Path, save: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", "nowhere.yaml", "--save", str(tmp_path / save)]) == 2
+    assert "--save" in capsys.readouterr().err
