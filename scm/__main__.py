@@ -2,11 +2,14 @@
 
 import argparse
 import logging
+import os
 import sys
 from collections.abc import Sequence
 
 from scm import __version__
 from scm.errors import ScmError
+
+INTERRUPTED = 130  # what a shell reports for a command ended by Ctrl-C
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -17,7 +20,12 @@ def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="scm", description="Smart City Manager for scaled cars.")
     parser.add_argument("--version", action="version", version=f"scm {__version__}")
     parser.add_argument(
-        "--log", default="warning", metavar="LEVEL", help="debug, info, warning, error"
+        "--log",
+        default="warning",
+        type=str.lower,
+        choices=("debug", "info", "warning", "error"),
+        metavar="LEVEL",
+        help="debug, info, warning, error (%(default)s); debug also shows where a failure happened",
     )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in names("scm.commands"):
@@ -35,19 +43,42 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; return 0 done, 2 bad input, 1 our fault."""
+    """Run one command; return 0 done, 2 bad input, 1 our fault, 130 ended by Ctrl-C."""
     arguments = build_parser().parse_args(argv)
     logging.basicConfig(
         level=arguments.log.upper(), format="%(asctime)s %(levelname)s %(name)s %(message)s"
     )
     try:
         code: int = arguments.run(arguments)
-    except ScmError as error:
-        print(f"scm {arguments.command}: {error}", file=sys.stderr)
-        return 2
+        sys.stdout.flush()
     except BrokenPipeError:  # `scm show ... | head`
+        _forget_stdout()
         return 0
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except Exception as error:  # noqa: BLE001  the edge of the process
+        return _said(arguments.command, error)
     return code
+
+
+def _said(command: str, error: Exception) -> int:
+    """Tell what stopped a command in one message; return 2 for bad input, 1 for our fault."""
+    logging.getLogger(__name__).debug("%s failed", command, exc_info=error)
+    place = isinstance(error, OSError) and error.filename is not None
+    if place or isinstance(error, ScmError):
+        print(f"scm {command}: {error}", file=sys.stderr)
+        return 2
+    print(
+        f"scm {command}: unexpected {type(error).__name__}: {error}\n"
+        f"This is a fault of ours: `scm --log debug {command} ...` shows where it happened.",
+        file=sys.stderr,
+    )
+    return 1
+
+
+def _forget_stdout() -> None:
+    """Let the interpreter's own last flush go nowhere: nobody reads any more."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 if __name__ == "__main__":

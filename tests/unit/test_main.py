@@ -1,0 +1,82 @@
+"""The command line ends every command with a sentence and an exit code that means something."""
+
+import logging
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from scm.__main__ import build_parser, main
+from scm.command import Command
+from scm.commands import show
+from scm.errors import MapError
+from scm.registry import load, names
+
+
+@pytest.fixture
+def failing(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    """Let `scm show car` fail with what the test asks for."""
+
+    def fail(_arguments: object) -> str:
+        raise request.param
+
+    monkeypatch.setattr(show, "_car", fail)
+
+
+@pytest.mark.parametrize(
+    ("failing", "code", "said"),
+    [
+        (MapError("m.toml: bad"), 2, "scm show: m.toml: bad"),
+        (PermissionError(13, "Permission denied", "out.csv"), 2, "Permission denied: 'out.csv'"),
+        (KeyError("x"), 1, "unexpected KeyError: 'x'\nThis is a fault of ours"),
+        (OSError(28, "No space left on device"), 1, "unexpected OSError"),
+        (KeyboardInterrupt(), 130, ""),
+    ],
+    indirect=["failing"],
+)
+def test_each_way_to_fail_has_its_code_and_sentence(
+    failing: None, code: int, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["show", "car"]) == code
+    err = capsys.readouterr().err
+    assert said in err
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("failing", [KeyError("x")], indirect=True)
+def test_the_traceback_is_shown_to_who_debugs(
+    failing: None, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.DEBUG)
+    assert main(["--log", "debug", "show", "car"]) == 1
+    (record,) = [record for record in caplog.records if record.exc_info]
+    assert record.levelno == logging.DEBUG
+
+
+def test_a_log_level_that_does_not_exist_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--log", "nonsense", "show", "car"])
+    assert ended.value.code == 2
+    assert "'nonsense'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", names("scm.commands"))
+def test_every_command_shows_an_example_that_it_understands(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    example = load("scm.commands", name, "COMMAND", Command).example
+    assert example.startswith(f"scm {name} ")
+    build_parser().parse_args(example.split()[1:])
+    with pytest.raises(SystemExit):
+        main([name, "--help"])
+    assert f"example: {example}" in capsys.readouterr().out
+
+
+def test_a_reader_that_leaves_early_is_no_error(root: Path) -> None:
+    command = f"{sys.executable} -m scm show terms | head -1"
+    done = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", command], cwd=root, capture_output=True, check=False
+    )
+    assert done.stderr == b""
+    assert done.returncode == 0
