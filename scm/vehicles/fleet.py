@@ -218,10 +218,16 @@ class Fleet:
         dy: float = 0.0,
         dyaw: float = 0.0,
     ) -> None:
-        """Apply a contact's result: change of velocity and pose of the COG, in the world frame."""
+        """Apply a contact's result: change of velocity and pose of the COG, in the world frame.
+
+        A change that is no number is not applied: it freezes the car, marked DIVERGED.
+        """
         if self.status[row] != VehicleStatus.OK:
             return
         changes = (dvx, dvy, dyaw_rate, dx, dy, dyaw)
+        if not all(map(math.isfinite, changes)):
+            self.status[row] = VehicleStatus.DIVERGED
+            return
         names = ("vx_world", "vy_world", "yaw_rate", "x_cog", "y_cog", "yaw")
         for name, change in zip(names, changes, strict=True):
             self._block[row, self._slots[name][0]] += change

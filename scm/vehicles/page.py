@@ -175,6 +175,7 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
             abs(vx_world) + abs(vy_world) + abs(vz) < 1e3
             and abs(roll_rate) + abs(pitch_rate) + abs(yaw_rate) < 1e4
             and abs(roll) + abs(pitch) < 1.5
+            and abs(x_cog) + abs(y_cog) + abs(yaw) < 1e6
             and not math.isnan(throttle_command + steering_command)
         ):
             status[row] = 1

@@ -133,6 +133,22 @@ def test_a_command_that_is_no_number_freezes_the_car_with_every_output_as_it_was
         assert not np.any(getattr(fleet, name)[row]), name
 
 
+@pytest.mark.parametrize("bad", [(0.0, 0.0, 0.0, math.nan), (math.inf,), (0.0, math.nan)])
+def test_a_push_that_is_no_number_freezes_the_car_where_it_is(fleet, bad):
+    row = fleet.add(Pose2(1.0, 2.0, 0.5), speed=0.1)
+    before = fleet.planar_cog(row)
+    fleet.push(row, *bad, *[0.0] * (3 - len(bad)))
+    assert fleet.planar_cog(row) == before
+    assert fleet.status[row] == VehicleStatus.DIVERGED
+    fleet.advance(0.1)
+    assert fleet.pose(row) == pytest.approx((1.0, 2.0, 0.5))
+
+
+def test_a_car_put_where_no_number_is_counts_as_diverged(fleet):
+    row = fleet.add(Pose2(math.nan, 0.0, 0.0))
+    assert fleet.status[row] == VehicleStatus.DIVERGED
+
+
 def test_every_status_has_a_sentence():
     assert all(status.sentence.endswith(".") for status in VehicleStatus)
 
