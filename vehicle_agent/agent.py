@@ -31,8 +31,16 @@ from vehicle_agent.link import Link
 from vehicle_agent.stay import Stay
 
 BODIES = "vehicle_agent.bodies"
+HARDEST = 100.0
 
 _log = logging.getLogger(__name__)
+
+
+def is_possible(contact: Contact) -> bool:
+    """Return whether a car can be hit like that: one absurd number would throw it off all maps."""
+    hit = (contact.dvx_mps, contact.dvy_mps, contact.dyaw_rate_radps)
+    shift = (contact.dx_m, contact.dy_m, contact.dyaw_rad)
+    return all(abs(change) <= HARDEST for change in (*hit, *shift))
 
 
 class AgentPart:
@@ -185,8 +193,9 @@ class AgentPart:
         return []
 
     def _on_contact(self, item: Incoming) -> list[Outgoing]:
-        if isinstance(item.message, Contact) and self._stay is not None:
-            self._body.push(item.message)
+        contact = item.message
+        if isinstance(contact, Contact) and self._stay is not None and is_possible(contact):
+            self._body.push(contact)
         return []
 
     def _on_command(self, item: Incoming) -> list[Outgoing]:
