@@ -11,6 +11,7 @@ from scm.maps.model import CityMap, Lane, Spawn, StopLine
 from scm.maps.polyline import Polyline, join, sample
 
 SAME_WAY_RAD = math.radians(60.0)
+MOST_PASSES = 400
 
 
 class LanePath(Polyline):
@@ -118,10 +119,14 @@ class Roads:
             laps: How often to pass `via`, or the loop.
 
         Raises:
-            MapError: A lane is unknown or cannot be reached.
+            MapError: A lane is unknown or cannot be reached, or there are too many to pass.
         """
         if laps < 1:
             raise MapError(f"laps: expected at least 1, got {laps}")
+        passes = laps * max(1, len(via))
+        if passes > MOST_PASSES:  # its path takes 0.1 ms a lane to lay, while the car's city waits
+            msg = f"laps x via: expected at most {MOST_PASSES} lanes to pass, got {passes}"
+            raise MapError(msg)
         if not via:
             return self.loop(start_lane) * laps
         lanes = [self.lane(start_lane).name]

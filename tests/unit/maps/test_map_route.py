@@ -57,6 +57,12 @@ def test_a_route_that_starts_at_its_first_aim_counts_it_as_passed(roads):
     assert roads.route("east_loop", ("east_loop", "west_loop")) == LAP[1:]
 
 
+@pytest.mark.parametrize(("via", "laps"), [((), 10**30), (("west_loop",) * 21, 20)])
+def test_a_route_that_would_take_long_to_lay_is_refused(roads, via, laps):
+    with pytest.raises(MapError, match="laps x via: expected at most 400"):
+        roads.route("east_loop", via, laps)
+
+
 def test_laps_pass_the_aims_again(roads):
     assert roads.route("east_loop", ("west_loop",), laps=2) == (*LAP[1:], *LAP)
 
