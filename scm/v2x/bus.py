@@ -69,8 +69,9 @@ class Bus(Protocol):
     def call(self, call: Call, on_reply: Callable[[Incoming], None]) -> None:
         """Ask, and hand the reply (or a `Refused`) to `on_reply` later; never blocks.
 
-        Of several servers the first that does not refuse is heard. `on_reply` runs once, perhaps
-        on a thread of the bus: it may only fill a mailbox or set an event.
+        Of several servers the first that does not refuse is heard; if all do, the last one with
+        another reason than `not_found`. `on_reply` runs once, perhaps on a thread of the bus: it
+        may only fill a mailbox or set an event.
         """
         ...
 
@@ -113,6 +114,11 @@ def check_reply(answer: Answer) -> None:
 def no_server(request: Request, key: str) -> Refused:
     """Return the refusal of a request that nobody serves."""
     return Refused(code="offline", detail=f"{type(request).__name__}: nobody serves {key}")
+
+
+def more_telling(before: Refused | None, now: Refused) -> Refused:
+    """Return which of two refusals to tell: whoever knows the thing says more than who does not."""
+    return before if before is not None and now.code == "not_found" else now
 
 
 def no_answer(call: Call, key: str) -> Refused:

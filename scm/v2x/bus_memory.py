@@ -16,7 +16,7 @@ from typing import Self
 
 from scm.clock import Clock, nanoseconds
 from scm.errors import LinkError
-from scm.v2x.bus import check_reply, no_answer, no_server
+from scm.v2x.bus import check_reply, more_telling, no_answer, no_server
 from scm.v2x.exchange import Answer, Call, Incoming, RawSample
 from scm.v2x.key import check_name, everything, key_of, matches, selector
 from scm.v2x.mailbox import Mailbox, RawMailbox
@@ -46,7 +46,7 @@ class _Offer:
 
 @dataclass(eq=False)
 class _Asked:
-    """A call under way: settled by the first real reply, the last refusal, or time."""
+    """A call under way: settled by the first real reply, by a refusal when all refuse, or time."""
 
     by: "MemoryBus"
     call: Call
@@ -55,6 +55,7 @@ class _Asked:
     due_ns: int
     open: set["MemoryBus"] = field(default_factory=set)
     settled: bool = False
+    refused: Refused | None = None
 
     def settle(self, reply: Message, t_ns: int) -> None:
         if not self.settled:
@@ -63,8 +64,12 @@ class _Asked:
 
     def heard(self, server: "MemoryBus", reply: Message, t_ns: int) -> None:
         self.open.discard(server)
-        if not isinstance(reply, Refused) or not self.open:
+        if not isinstance(reply, Refused):
             self.settle(reply, t_ns)
+            return
+        self.refused = more_telling(self.refused, reply)
+        if not self.open:
+            self.settle(self.refused, t_ns)
 
 
 class MemoryNetwork:

@@ -22,7 +22,7 @@ from scm.clock import Clock, WallClock
 from scm.errors import LinkError, MessageError
 from scm.log import event
 from scm.v2x import zenoh_config
-from scm.v2x.bus import check_reply, no_answer, no_server
+from scm.v2x.bus import check_reply, more_telling, no_answer, no_server
 from scm.v2x.exchange import Answer, Call, Incoming, RawSample
 from scm.v2x.key import check_name, everything, key_of, parse, selector
 from scm.v2x.mailbox import Mailbox, RawMailbox
@@ -297,7 +297,7 @@ class ZenohBus:
 
 
 class _Asked:
-    """A call under way: settled by the first real reply, or at its end by the last refusal."""
+    """A call under way: settled by the first real reply, or at its end by a refusal."""
 
     def __init__(
         self, call: Call, on_reply: Callable[[Incoming], None], key: str, clock: Clock
@@ -320,7 +320,7 @@ class _Asked:
     def heard(self, reply: zenoh.Reply) -> None:
         if reply.ok is None:
             body = reply.err.payload.to_bytes() if reply.err is not None else _TIMEOUT
-            self._refused = self._read_refusal(body)
+            self._refused = more_telling(self._refused, self._read_refusal(body))
             return
         attachment = reply.ok.attachment
         try:
@@ -336,7 +336,7 @@ class _Asked:
 
     def _read_refusal(self, body: bytes) -> Refused:
         if body == _TIMEOUT:
-            return self._refused or no_answer(self._call, self._key)
+            return no_answer(self._call, self._key)
         try:
             return decode(Refused, body)
         except MessageError as cause:

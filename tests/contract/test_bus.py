@@ -414,6 +414,24 @@ def test_of_two_servers_the_one_that_does_not_refuse_is_heard(city, asking):
     assert reply.message == PlanReply(junction="x1", plan="calm")
 
 
+@pytest.mark.parametrize("first", ["owned", "not_found"])
+def test_of_two_refusals_the_one_that_knows_the_thing_is_heard(city, asking, first):
+    other, requests = city.bus("other"), Mailbox(10)
+    other.serve(PlanRequest, {}, requests)
+    city.pass_time(0.1)
+    asking.ask()
+    waiting = {
+        "not_found": (other, gather(city, requests, 1)[0]),
+        "owned": (asking.server, gather(city, asking.requests, 1)[0]),
+    }
+    for code in sorted(waiting, key=lambda code: code != first):
+        server, request = waiting[code]
+        server.answer(Answer(request, Refused(code=code, detail="no")))
+        city.pass_time(0.05)
+    (reply,) = gather(city, asking.replies, 1)
+    assert reply.message.code == "owned"
+
+
 def test_after_it_is_closed_a_bus_says_so(city):
     bus = city.bus("api")
     assert bus.connected
