@@ -98,9 +98,15 @@ def parse(city: str, kind: type[Message], key: str) -> dict[str, str]:
 
 
 def agrees(key: str, message: Message) -> bool:
-    """Return whether a message says the same names inside as the key it came on."""
+    """Return whether a message says the same names inside as the key it came on.
+
+    No message agrees with a key of wildcards: a query may come on one.
+    """
     chunks = key.split("/", 3)[-1].split("/")
-    return all(chunks[i] == getattr(message, name) for i, name in _places(type(message)))
+    own = type(message).KEY.split("/")
+    for i, name in _places(type(message)):
+        own[i] = getattr(message, name)
+    return chunks == own
 
 
 def matches(expression: str, key: str) -> bool:

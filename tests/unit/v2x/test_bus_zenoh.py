@@ -10,6 +10,7 @@ from scm.errors import LinkError, RunError
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.exchange import Call
+from scm.v2x.message import encode
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.plan_request import PlanRequest
 from scm.v2x.messages.presence import Presence
@@ -168,6 +169,23 @@ def test_a_request_that_cannot_be_read_is_refused_as_invalid(router):
             lambda: codes.extend(i.message.code for i in replies.drain()) or "invalid" in codes,
             also=ask,
         )
+
+
+@pytest.mark.parametrize("key", ["**", "tl/**", "tl/*/req"])
+def test_a_question_to_everybody_at_once_is_refused_and_stops_nobody(router, key):
+    server = ZenohBus("city", "traffic", router.listen)
+    caller = ZenohBus("city", "api", router.listen)
+    requests, answers = Mailbox(10), []
+    body, _ = encode(PlanRequest(junction="x1", plan="calm", by="me"))
+
+    def ask():
+        get = caller._session.get(f"scm/@v1/city/{key}", payload=body, timeout=0.2)
+        threading.Thread(target=lambda: answers.extend(reply.err for reply in get)).start()
+        assert requests.drain() == []
+
+    with server, caller:
+        server.serve(PlanRequest, {}, requests)
+        until(lambda: any(b"invalid" in e.payload.to_bytes() for e in answers if e), also=ask)
 
 
 def test_closing_under_fire_does_not_hang(router):
