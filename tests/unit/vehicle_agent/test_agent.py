@@ -247,8 +247,9 @@ def test_a_contact_that_no_car_could_have_is_not_felt(inside):
     before = one(inside.step(), VehicleState)
     still = {"dvx_mps": 0.0, "dvy_mps": 0.0, "dyaw_rate_radps": 0.0}
     hit = Contact(vehicle="n7", t_ns=0, **still, dy_m=-1e308)
-    after = one(inside.step(hit), VehicleState)
-    assert (after.x_m, after.y_m) == pytest.approx((before.x_m, before.y_m), abs=5e-3)
+    nudge = Contact(vehicle="n7", t_ns=0, **still, dx_m=0.05)
+    after = one(inside.step(hit, nudge), VehicleState)
+    assert (after.x_m - before.x_m, after.y_m - before.y_m) == pytest.approx((0.05, 0.0), abs=5e-3)
 
 
 def test_a_monitor_fault_heard_outside_is_known_inside(desk):
