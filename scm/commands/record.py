@@ -11,12 +11,21 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, required=True, metavar="FILE", help="the .mcap to write"
     )
+    parser.add_argument(
+        "--frames-hz",
+        type=float,
+        default=1.0,
+        metavar="HZ",
+        help="camera pictures kept of each camera a second, 0: none (%(default)s); "
+        "all else is always kept",
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.recorder.part import RecorderPart
 
-    return run_part(RecorderPart(arguments.out, arguments.city), arguments)
+    part = RecorderPart(arguments.out, arguments.city, arguments.frames_hz)
+    return run_part(part, arguments)
 
 
 COMMAND = Command(

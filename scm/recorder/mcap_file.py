@@ -1,16 +1,19 @@
 """A run as an MCAP file: one channel a key, JSON messages, one schema a message class.
 
 The raw key is the channel's topic, so that a replay can publish again. A bulk message becomes JSON
-too, its payload in base64, so that any MCAP tool can read the whole file.
+too, its payload in base64, so that any MCAP tool can read the whole file; so do bytes that are not
+JSON though they should be.
 """
 
-import base64
+import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
+import zstandard
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.writer import Writer
@@ -23,47 +26,63 @@ from scm.v2x.key import matches, prefix, variables
 from scm.v2x.message import Message, Request
 
 MESSAGES = "scm.v2x.messages"
+UNREADABLE = (  # what a torn or damaged file makes its readers raise
+    McapError, EOFError, ValueError, LookupError, MemoryError, OverflowError, struct.error,
+    zstandard.ZstdError,
+)  # fmt: skip
 
 
 class RunFile:
-    """Writes one run; a context manager that always ends the file properly."""
+    """Writes one run; a context manager that always ends the file properly.
+
+    Raises:
+        RecordingError: when the file is there already, or cannot be written (any more).
+    """
 
     def __init__(self, path: Path, city: str) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
         self.path = path
         self.messages = 0
-        self._stream = path.open("wb")
+        if path.exists():
+            msg = f"{path}: is there already: a recording is never written over"
+            raise RecordingError(msg)
+        with _writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._stream = path.open("xb")
         self._writer = Writer(self._stream)
-        self._writer.start(profile="scm", library=f"scm {__version__}")
-        self._writer.add_metadata("scm", {"version": __version__, "city": city})
         self._schemas = SchemaTable(city)
         self._schema_ids: dict[str, int] = {}
         self._channels: dict[str, int] = {}
-        self.flush()
+        with _writing(path):
+            self._writer.start(profile="scm", library=f"scm {__version__}")
+            self._writer.add_metadata("scm", {"version": __version__, "city": city})
+            self._writer.flush()
 
     def write(self, sample: RawSample) -> None:
         """Add one message as it came from the bus."""
-        body = (
-            sample.body if sample.attachment is None else _as_json(sample.body, sample.attachment)
-        )
-        self._writer.add_message(
-            channel_id=self._channel(sample.key),
-            log_time=sample.t_ns,
-            publish_time=sample.t_ns,
-            sequence=self.messages & 0xFFFFFFFF,
-            data=body,
-        )
+        with _writing(self.path):
+            self._writer.add_message(
+                channel_id=self._channel(sample.key),
+                log_time=sample.t_ns,
+                publish_time=sample.t_ns,
+                sequence=self.messages & 0xFFFFFFFF,
+                data=_as_json(sample.body, sample.attachment),
+            )
         self.messages += 1
+
+    def kind_of(self, key: str) -> type[Message] | None:
+        """Return the message class that travels on a key; None for a foreign key."""
+        return self._schemas.kind_of(key)
 
     def flush(self) -> None:
         """Hand everything written so far to the operating system: a kill can no longer lose it."""
-        self._writer.flush()
+        with _writing(self.path):
+            self._writer.flush()
 
     def close(self) -> None:
         """End the file with its index; safe to call twice."""
         if not self._stream.closed:
-            self._writer.finish()
-            self._stream.close()
+            with _writing(self.path), self._stream:
+                self._writer.finish()
 
     def __enter__(self) -> "RunFile":
         return self
@@ -95,6 +114,15 @@ class RunFile:
         return self._schema_ids[name]
 
 
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as cause:
+        msg = f"{path}: cannot be written: {cause.strerror or cause}"
+        raise RecordingError(msg) from cause
+
+
 class SchemaTable:
     """Which message class travels on which key."""
 
@@ -105,18 +133,28 @@ class SchemaTable:
             for kind in kinds
             if issubclass(kind, Message) and not issubclass(kind, Request)
         ]
+        self._found: dict[str, type[Message] | None] = {}
 
     def kind_of(self, key: str) -> type[Message] | None:
         """Return the message class of a concrete key, None for a key that is nobody's."""
-        return next(
-            (kind for expression, kind in self._expressions if matches(expression, key)), None
-        )
+        if key not in self._found:
+            kinds = (kind for expression, kind in self._expressions if matches(expression, key))
+            self._found[key] = next(kinds, None)
+        return self._found[key]
 
 
-def _as_json(payload: bytes, attachment: bytes) -> bytes:
-    """Return a bulk message as one JSON object."""
-    fields = msgspec.json.decode(attachment)
-    fields["payload"] = base64.b64encode(payload).decode("ascii")
+def _as_json(body: bytes, attachment: bytes | None) -> bytes:
+    """Return a message as JSON: as it came, or as an object that holds its bytes in base64."""
+    try:
+        if attachment is None:
+            msgspec.json.decode(body, type=msgspec.Raw)
+            return body
+        fields = msgspec.json.decode(attachment, type=dict[str, Any])
+    except (msgspec.MsgspecError, RecursionError):
+        if attachment is None:
+            return msgspec.json.encode({"unreadable": body})
+        fields = {"unreadable": attachment}
+    fields["payload"] = body
     return msgspec.json.encode(fields)
 
 
@@ -138,6 +176,6 @@ def read_run(path: Path) -> Iterator[Recorded]:
         with path.open("rb") as stream:
             for _, channel, message in make_reader(stream).iter_messages():
                 yield Recorded(message.log_time, channel.topic, message.data)
-    except (McapError, OSError, ValueError) as cause:
+    except (OSError, *UNREADABLE) as cause:
         msg = f"{path}: not a complete recording ({cause}): try `scm recover {path}`"
         raise RecordingError(msg) from cause

@@ -4,16 +4,23 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import RecordingError
 from scm.part import Hears, Serves
 from scm.recorder.mcap_file import RunFile
 from scm.v2x.exchange import Incoming, Outgoing, RawSample
+from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.part_status import PartStatus
 
 FLUSH_NS = 250 * NS_PER_MS
+FRAMES_HZ = 1.0
 
 
 class RecorderPart:
-    """Writes every message of the city; what is older than half a second survives a kill."""
+    """Writes every message of the city; what is older than half a second survives a kill.
+
+    Camera pictures alone would be nearly all of the file (some 30 MB a minute at 5 Hz), so of each
+    camera at most `frames_hz` a second are kept; 0 keeps none.
+    """
 
     name = "record"
     role = "part"
@@ -22,15 +29,20 @@ class RecorderPart:
     serves: Sequence[Serves] = ()
     hears_raw = True
 
-    def __init__(self, path: Path, city: str = "city") -> None:
+    def __init__(self, path: Path, city: str = "city", frames_hz: float = FRAMES_HZ) -> None:
+        if not 0.0 <= frames_hz < float("inf"):
+            msg = f"frames_hz: got {frames_hz}, expected 0 or more"
+            raise RecordingError(msg)
         self.file = RunFile(path, city)
+        self._frame_period_ns = round(NS_PER_S / frames_hz) if frames_hz else None
+        self._frame_due_ns: dict[str, int] = {}
         self._flush_due_ns = 0
         self._status_due_ns = 0
 
     def step(self, now_ns: int, inbox: Sequence[Incoming | RawSample]) -> list[Outgoing]:
         """Write what came in; flush four times a second."""
         for item in inbox:
-            if isinstance(item, RawSample):
+            if isinstance(item, RawSample) and self._is_kept(item):
                 self.file.write(item)
         if now_ns >= self._flush_due_ns:
             self._flush_due_ns = now_ns + FLUSH_NS
@@ -40,6 +52,18 @@ class RecorderPart:
         self._status_due_ns = now_ns + NS_PER_S
         detail = f"{self.file.messages} messages in {self.file.path.name}"
         return [PartStatus(station=self.name, t_ns=now_ns, detail=detail)]
+
+    def _is_kept(self, sample: RawSample) -> bool:
+        """Say whether a message goes into the file: everything but pictures before their time."""
+        if self.file.kind_of(sample.key) is not EyeFrame:
+            return True
+        due_ns = self._frame_due_ns.get(sample.key, sample.t_ns)
+        if self._frame_period_ns is None or sample.t_ns < due_ns:
+            return False
+        # Counted from when it was due: frames at 5 Hz that jitter still make 1 Hz, not 0.83.
+        late = sample.t_ns - due_ns >= self._frame_period_ns
+        self._frame_due_ns[sample.key] = (sample.t_ns if late else due_ns) + self._frame_period_ns
+        return True
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """End the file with its index."""

@@ -1,15 +1,15 @@
 """Mend a recording whose writer was killed: copy every whole message into a file with an index."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
-from mcap.exceptions import McapError
 from mcap.records import Channel, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from scm.errors import RecordingError
+from scm.recorder.mcap_file import UNREADABLE
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,19 +42,21 @@ def recover(broken: Path, mended: Path | None = None) -> Recovered:
     if target.resolve() == broken.resolve():
         msg = f"{broken}: cannot be recovered onto itself"
         raise RecordingError(msg)
-    copy = _Copy(target)
-    whole = True
     try:
-        with broken.open("rb") as stream:
-            for record in _records(stream):
-                copy.add(record)
+        stream = broken.open("rb")
     except OSError as cause:
-        msg = f"{broken}: cannot be read: {cause}"
+        msg = f"{broken}: cannot be read: {cause.strerror}"
         raise RecordingError(msg) from cause
-    except _CutOff:
-        whole = False
-    finally:
-        copy.close()
+    with stream:
+        try:
+            copy = _Copy(target)
+        except OSError as cause:
+            msg = f"{target}: cannot be written: {cause.strerror}"
+            raise RecordingError(msg) from cause
+        try:
+            whole = _copy_all(stream, copy)
+        finally:
+            copy.close()
     if copy.messages == 0:
         target.unlink()
         msg = f"{broken}: holds no whole message"
@@ -62,20 +64,14 @@ def recover(broken: Path, mended: Path | None = None) -> Recovered:
     return Recovered(target, copy.messages, (copy.last_ns - copy.first_ns) * 1e-9, whole)
 
 
-class _CutOff(Exception):  # noqa: N818  it is not an error: it is where the file ends
-    """The file ends before its end record."""
-
-
-def _records(stream: object) -> Iterator[McapRecord]:
-    """Yield records until the end; raise `_CutOff` where the file stops making sense."""
+def _copy_all(stream: IO[bytes], copy: "_Copy") -> bool:
+    """Copy until the file ends or stops making sense; return whether it has its end record."""
     try:
-        yield from StreamReader(stream).records  # type: ignore[arg-type]
-    except (McapError, EOFError, ValueError, KeyError) as cause:
-        raise _CutOff from cause
-    except Exception as cause:  # struct and zstandard raise their own kinds on a torn record
-        if type(cause).__module__.partition(".")[0] not in ("struct", "zstandard", "zstd"):
-            raise
-        raise _CutOff from cause
+        for record in StreamReader(stream).records:
+            copy.add(record)
+    except UNREADABLE:
+        return False
+    return True
 
 
 class _Copy:
@@ -99,7 +95,9 @@ class _Copy:
                 )
             case Channel() if record.id not in self._channels:
                 self._channels[record.id] = self._writer.register_channel(
-                    record.topic, record.message_encoding, self._schemas[record.schema_id]
+                    record.topic,
+                    record.message_encoding,
+                    self._schemas.get(record.schema_id, 0),
                 )
             case Message():
                 self._message(record)
