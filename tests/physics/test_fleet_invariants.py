@@ -7,6 +7,7 @@ from scm.geometry import Pose2
 from scm.vehicles.body14 import GRAVITY
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
+from scm.vehicles.layout import columns_of
 
 OUTPUTS = (
     "x", "y", "z", "roll", "pitch", "yaw", "speed", "lateral_speed", "yaw_rate", "accel_x",
@@ -203,6 +204,27 @@ def test_the_strongest_drag_slows_a_car_and_never_pushes_it_back(name, numbers):
     assert min(speeds) > -1e-2
     assert max(rates) <= 1.0
     assert np.ptp(speeds[-100:]) < 1e-5  # no chatter
+
+
+def test_no_car_inside_the_bounds_of_its_numbers_stirs_at_rest():
+    rng, rows = np.random.default_rng(3), 1000
+    fleet = Fleet(load_car("nigel"), rows)
+    bounds = {c.name: c.param.bounds for c in columns_of(fleet.car.terms)}
+    at_bound = {name: rng.choice(pair, rows) for name, pair in bounds.items()}
+    at_bound["wheel_mass"] = np.minimum(at_bound["wheel_mass"], 0.24 * at_bound["mass"])
+    at_bound["cog_to_rear_axle"] = np.minimum(
+        at_bound["cog_to_rear_axle"], 0.98 * at_bound["wheelbase"]
+    )
+    for row in range(rows):
+        fleet.add(Pose2(0.0, 0.0, 0.01 * row))
+    for name, values in at_bound.items():
+        fleet.parameters[:, fleet.parameter_names.index(name)] = values
+    for row in range(rows):
+        fleet.place(row, Pose2(0.0, 0.0, 0.01 * row))
+    fleet.steering[:] = rng.choice((-1.0, 1.0), rows)
+    fleet.advance(1.0)
+    assert not fleet.status.any()
+    assert np.abs(np.column_stack((fleet.x, fleet.y, fleet.z, fleet.pitch))).max() < 1e-6
 
 
 def test_a_very_stiff_suspension_is_still_calm_at_one_millisecond():

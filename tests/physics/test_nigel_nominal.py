@@ -25,6 +25,40 @@ def test_steady_speed_is_the_published_one_at_every_throttle(nigel):
     np.testing.assert_allclose(fleet.speed, published, rtol=0.01)
 
 
+def test_backwards_it_reaches_the_same_speeds_and_forward_again_after_a_knock(nigel):
+    published = np.array(nigel.vector("drive.throttle_speed_m_s"))
+    throttle = np.arange(1, 11) / 10
+    fleet = Fleet(nigel, 10)
+    for _ in range(10):
+        fleet.add(Pose2(0.0, 0.0, 0.0))
+    fleet.throttle[:] = -throttle
+    fleet.advance(8.0)
+    np.testing.assert_allclose(-fleet.speed, published, rtol=0.01)
+    assert np.abs(fleet.y).max() < 1e-9
+    fleet.throttle[:] = throttle
+    for row in range(10):
+        fleet.push(row, -0.3, 0.1, 0.5)
+    fleet.advance(8.0)
+    np.testing.assert_allclose(fleet.speed, published, rtol=0.01)
+
+
+def test_backwards_left_wheels_turn_the_tail_left_on_the_same_circle_and_zero_throttle_holds(nigel):
+    fleet = Fleet(nigel, 4)
+    for row, steering in enumerate((1.0, 0.4, -0.4, -1.0)):
+        fleet.add(Pose2(0.0, 0.0, 0.0))
+        fleet.throttle[row], fleet.steering[row] = -0.36, steering
+    fleet.advance(20.0)
+    radius = fleet.speed / fleet.yaw_rate
+    geometry = nigel.value("body.wheelbase_m") / np.tan(fleet.steer_angle)
+    np.testing.assert_allclose(radius, geometry, rtol=0.02)
+    assert np.array_equal(np.sign(fleet.yaw_rate), [-1.0, -1.0, 1.0, 1.0])
+    fleet.throttle[:] = 0.0
+    fleet.advance(2.0)
+    before = [fleet.pose(row) for row in range(4)]
+    fleet.advance(10.0)
+    assert np.abs(np.array([fleet.pose(row) for row in range(4)]) - before).max() < 1e-9
+
+
 @pytest.fixture(scope="module")
 def circles(nigel):
     fleet = Fleet(nigel, len(ANGLES))

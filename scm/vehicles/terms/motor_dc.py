@@ -1,6 +1,7 @@
 """DC motors of a driven axle: torque falls with speed, and with the battery.
 
-    wheel_torque += driven * stall_torque * (throttle * battery / nominal - n / no_load_speed)
+    wheel_torque += driven * stall_torque * (throttle * charge - n / no_load_speed)
+    charge = battery / battery_nominal
     n = axle_omega + axle_lock * (omega - axle_omega)
 
 Both wheels of an axle get the torque of its mean speed, as behind a differential (axle_lock = 0).

@@ -1,6 +1,6 @@
 """Vertical tyre contact: a stiff spring with a little damping that can push but never pull.
 
-    load = max(0, rest_load + stiffness * tyre_deflection + damping * tyre_deflection_rate)    [N]
+    load = max(0, rest_load + stiffness * tyre_deflection + contact_damping * its rate)    [N]
 
 A spring rather than a constraint: the wheel may leave the floor and land, and the skeleton is
 implicit in it, so even 45 g on 20 kN/m is calm at 1 ms.
