@@ -7,6 +7,8 @@ The script is the same: in lockstep waiting moves a stepped clock and takes no l
 computation; live it waits for the real city.
 """
 
+import logging
+import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,8 +16,9 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 from scm.clock import WallClock, seconds
-from scm.errors import RunError, ScmError
+from scm.errors import RunError, ScmError, nearest
 from scm.lockstep import Lockstep
+from scm.log import event
 from scm.maps.load import load_map
 from scm.part import Hears, Part
 from scm.traffic.monitor_part import MonitorPart
@@ -32,6 +35,10 @@ from scm.v2x.messages.trip import Trip
 from scm.world.part import WorldPart
 
 R = TypeVar("R", bound=Message)
+THEN = ("circulate", "stop")
+ASK_S = 15.0  # the first car of a kind may have to be compiled; who is not there is told at once
+
+_log = logging.getLogger(__name__)
 
 
 class Link(Protocol):
@@ -98,7 +105,7 @@ class LiveLink:
 
     def ask(self, request: Request) -> Message:
         """Wait for the reply."""
-        return ask(self._bus, request)
+        return ask(self._bus, request, ASK_S)
 
     def hear(self, hears: Hears) -> Mailbox:
         """Return a mailbox subscribed on the bus."""
@@ -144,7 +151,19 @@ class FleetCar:
     def drive(
         self, *via: str, laps: int = 1, speed_mps: float | None = None, then: str = "circulate"
     ) -> Journey:
-        """Send the car through lanes from where it is; on arrival it circulates or stops."""
+        """Send the car through lanes from where it is; on arrival it circulates or stops.
+
+        Without lanes it circulates at once, and never arrives.
+
+        Raises:
+            ScmError: for a lane, a number of laps, a speed or a `then` that cannot be.
+        """
+        if then not in THEN:
+            msg = f"then: got {then!r}, expected 'circulate' or 'stop'{nearest(then, THEN)}"
+            raise ScmError(msg)
+        if speed_mps is not None and not 0.0 < speed_mps < math.inf:
+            msg = f"speed_mps: got {speed_mps}, expected above 0"
+            raise ScmError(msg)
         request = RouteRequest(
             vehicle=self.name,
             via=via,
@@ -200,8 +219,17 @@ class City:
         """Let the city go on until all journeys have arrived.
 
         Raises:
-            RunError: naming those that had not when the time was over.
+            RunError: naming those that had not when the time was over, or never will: cars that
+                circulate, and cars that the script has removed.
         """
+        here = {car.name for car in self.cars}
+        for journey in journeys:
+            if journey.travel_time_s is None and (
+                journey.length_m is None or journey.vehicle not in here
+            ):
+                why = "it was removed" if journey.vehicle not in here else "it circulates"
+                msg = f"{journey.vehicle} will never arrive: {why}"
+                raise RunError(msg)
         if self._link.run_until(lambda: self._arrived(journeys), timeout_s):
             return
         late = [journey.vehicle for journey in journeys if journey.travel_time_s is None]
@@ -224,9 +252,12 @@ class City:
         return reply
 
     def leave(self) -> None:
-        """Remove every car that this script spawned."""
+        """Remove every car that this script spawned, as far as the city still lets it."""
         for car in list(self.cars):
-            car.remove()
+            try:
+                car.remove()
+            except ScmError as cause:
+                event(_log, "car_left_behind", level=logging.WARNING, car=car.name, reason=cause)
 
     def _arrived(self, journeys: Sequence[Journey]) -> bool:
         known = {(journey.vehicle, journey.trip_id): journey for journey in self.journeys}
@@ -257,7 +288,8 @@ def open_city(
         seed: Of all randomness in lockstep.
     """
     if connect is None:
-        yield City(LockstepLink(_lockstep_city(map_name, city, seed)))
+        with _lockstep_city(map_name, city, seed) as lockstep:
+            yield City(LockstepLink(lockstep))
         return
     with ZenohBus(city, "script", connect) as bus:
         live = City(LiveLink(bus))
