@@ -10,6 +10,7 @@ from pathlib import Path
 from scm.clock import NS_PER_MS, WallClock, seconds
 from scm.crew import Crew, Job, Say
 from scm.errors import RunError
+from scm.latched import HEARD, Latched
 from scm.live import stop_on_signal
 from scm.maps.load import load_map
 from scm.v2x.bus import Mailbox
@@ -59,22 +60,26 @@ def run_city(
         Router(free_endpoint() if listen.endswith(":0") else listen) as router,
         ZenohBus(city, "up", router.listen) as bus,
     ):
+        latched = Latched()
         jobs = [
-            *_parts(map_name, city, router.listen, hosted, port, record_dir, seed, clock),
+            *_parts(map_name, city, router.listen, hosted, port, record_dir, seed, clock, latched),
             *_agents(city, router.listen, hosted, agents),
         ]
         crew = Crew(jobs, clock, say)
-        presence = Mailbox(1000)
+        heard = Mailbox(1000)
         stop = stop_on_signal()
-        bus.subscribe(Presence, {}, presence)
+        for kind in (Presence, *HEARD):
+            bus.subscribe(kind, {}, heard)
         say(f"scm: city {city!r} on map {map_name!r}, bus {router.listen}")
         told = False
         try:
             while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, stop):
                 crew.look()
-                for item in presence.drain():
+                for item in heard.drain():
                     if isinstance(item.message, Presence):
                         crew.heard(item.message)
+                    else:
+                        latched.heard(item.message)
                 if crew.settled and not told:
                     told = True
                     _tell_next(say, city, router.listen, port, hosted + agents + 1, record_dir)
@@ -93,6 +98,7 @@ def _parts(
     record_dir: Path,
     seed: int,
     clock: WallClock,
+    latched: Latched,
 ) -> list[Job]:
     def scm(part: str, *more: str) -> Sequence[str]:
         shared = ("--connect", endpoint, "--city", city, "--seed", str(seed))
@@ -103,14 +109,20 @@ def _parts(
         out = record_dir / f"{city}-{now:%Y%m%d-%H%M%S-%f}.mcap"
         return scm("record", "--out", str(out))
 
+    def monitor() -> Sequence[str]:
+        return scm("monitor", *latched.monitor_arguments())
+
+    def world() -> Sequence[str]:
+        return scm("world", "--hosted", str(hosted), *latched.world_arguments())
+
     def part(name: str, what: str, *more: str) -> Job:
         return Job(name, "part", what, lambda: scm(name, *more))
 
     return [
         Job("record", "part", f"everything on the bus into {record_dir}/", record, last=True),
         part("traffic", "signals: safe kernel, plans"),
-        part("monitor", "second channel: doubts the signals, latches flash"),
-        part("world", f"cars, walls, sensors, radio; {hosted} hosted", "--hosted", str(hosted)),
+        Job("monitor", "part", "second channel: doubts the signals, latches flash", monitor),
+        Job("world", "part", f"cars, walls, sensors, radio; {hosted} hosted", world),
         part("eye", "overhead camera: frames, tags, poses"),
         part("api", "REST, event stream, dashboard", "--host", HOST, "--port", str(port)),
     ]

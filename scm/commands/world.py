@@ -15,6 +15,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="cars to spawn at the start (%(default)s)",
     )
     parser.add_argument("--car", default="nigel", help="their car file (%(default)s)")
+    parser.add_argument(
+        "--stopped-by", metavar="WHO", help="start with the city stop that WHO engaged before"
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -22,7 +25,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.world.part import WorldPart
 
     hosted = tuple((f"n{i + 1}", arguments.car) for i in range(arguments.hosted))
-    part = WorldPart(load_map(arguments.map), arguments.seed, hosted)
+    part = WorldPart(load_map(arguments.map), arguments.seed, hosted, arguments.stopped_by)
     return run_part(part, arguments)
 
 

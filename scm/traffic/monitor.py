@@ -81,6 +81,11 @@ class Monitor:
         self._ticked_ns = now_ns
         self._is_new = True
 
+    def keep(self, fault: str, now_ns: int) -> None:
+        """Keep a fault that was latched before the monitor itself was started again."""
+        self._is_new = False
+        self._latch(fault, "latched before the monitor was started again", now_ns)
+
     def tick(self, now_ns: int) -> None:
         """Look at the time: has the controller fallen silent?"""
         if now_ns - self._ticked_ns > ASLEEP_NS:

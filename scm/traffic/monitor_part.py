@@ -5,7 +5,7 @@ resets it and says why.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from scm.clock import NS_PER_MS
@@ -31,7 +31,8 @@ _log = logging.getLogger(__name__)
 class MonitorPart:
     """Watches all junctions of a map; see `scm.part.Part`."""
 
-    def __init__(self, city_map: CityMap) -> None:
+    def __init__(self, city_map: CityMap, faults: Mapping[str, str] | None = None) -> None:
+        """Take the map, and the faults by junction that a monitor before this one had latched."""
         self.name = "monitor"
         self.role = "part"
         self.period_ns = PERIOD_NS
@@ -39,11 +40,15 @@ class MonitorPart:
         self.serves = (Serves(MonitorReset),)
         self._cards = [card_of(city_map, junction) for junction in city_map.junctions]
         self._watches: dict[str, _Watch] = {}
+        self._faults = dict(faults or {})
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Judge what arrived and what did not, answer resets, tell verdicts."""
         if not self._watches:
-            self._watches = {card.junction: _Watch(card, now_ns) for card in self._cards}
+            self._watches = {
+                card.junction: _Watch(card, now_ns, self._faults.get(card.junction))
+                for card in self._cards
+            }
         outbox: list[Outgoing] = []
         for item in inbox:
             if isinstance(item.message, Spat):
@@ -80,8 +85,10 @@ class MonitorPart:
 class _Watch:
     """One junction's monitor and what was last told of it."""
 
-    def __init__(self, card: Card, now_ns: int) -> None:
+    def __init__(self, card: Card, now_ns: int, fault: str | None) -> None:
         self.monitor = Monitor(card, now_ns)
+        if fault is not None:
+            self.monitor.keep(fault, now_ns)
         self._hash = card_hash(card)
         self._told: str | None = None
         self._told_ns: int | None = None

@@ -9,6 +9,7 @@ from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Refused
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
+from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.world.hearing import HEARS
 from scm.world.requests import SERVES, reply_to, send
@@ -23,6 +24,7 @@ class WorldPart:
         city_map: The city.
         seed: Of all noise and of lost radio frames.
         hosted: (name, car file) of cars to spawn at the start; they circulate.
+        stopped_by: Who engaged the city stop in a run before this one; None: nobody.
     """
 
     name = NAME
@@ -32,11 +34,16 @@ class WorldPart:
     serves: Sequence[Serves] = SERVES
 
     def __init__(
-        self, city_map: CityMap, seed: int = 0, hosted: tuple[tuple[str, str], ...] = ()
+        self,
+        city_map: CityMap,
+        seed: int = 0,
+        hosted: tuple[tuple[str, str], ...] = (),
+        stopped_by: str | None = None,
     ) -> None:
         cars = {DEFAULT_CAR, *(car for _, car in hosted)}
         self.world = World(city_map, seed, capacity=max(256, 2 * len(hosted)), prepare=sorted(cars))
         self._to_spawn = hosted
+        self._stopped_by = stopped_by
         self._is_open = False
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -53,6 +60,10 @@ class WorldPart:
 
     def _open(self, now_ns: int) -> list[Outgoing]:
         world = self.world
+        if self._stopped_by is not None:
+            reason = "still engaged when the world was started again"
+            stop = StopRequest(engaged=True, by=self._stopped_by, reason=reason)
+            reply_to(world, stop, now_ns)
         for name, car_file in self._to_spawn:
             request = SpawnRequest(vehicle=name, car=car_file)
             answer = reply_to(world, request, now_ns)

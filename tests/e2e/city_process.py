@@ -63,6 +63,17 @@ class CityProcess:
         self.process.wait(timeout=10.0)
         return time.monotonic() - began
 
+    def pid(self, name: str) -> int:
+        """Return the process id of a part or agent, as last told."""
+        found = (re.fullmatch(rf" *{name} .* pid (\d+)", line) for line in self.lines)
+        return [int(match.group(1)) for match in found if match][-1]
+
+    def kill(self, name: str) -> None:
+        """Kill a part, and wait until it is back."""
+        before = self.pid(name)
+        os.kill(before, signal.SIGKILL)
+        wait_for(lambda: self.pid(name) != before, 20.0, f"{name} is back")
+
     def descendants(self) -> set[int]:
         """Return the process ids of everything the city started and that still runs."""
         return {pid for pid in _pids() if _is_below(pid, self.process.pid)}

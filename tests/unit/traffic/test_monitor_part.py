@@ -49,6 +49,14 @@ def reset(city, **fields):
     )
 
 
+def test_a_fault_outlives_the_monitor_and_ends_by_reset_alone():
+    with Lockstep([TrafficPart(MAP), MonitorPart(MAP, {"crossing": "stale"})]) as city:
+        statuses = city.hear(Hears(MonitorStatus))
+        city.run_for(3.0)
+        assert {item.message.fault for item in statuses.drain()} == {"stale"}
+        assert reset(city).fault is None
+
+
 @pytest.fixture
 def traffic():
     return Tampered()
