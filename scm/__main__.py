@@ -1,6 +1,7 @@
 """The command line: `scm <command> ...`, one file of `scm/commands` a command."""
 
 import argparse
+import errno
 import logging
 import os
 import sys
@@ -64,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _said(command: str, error: Exception) -> int:
     """Tell what stopped a command in one message; return 2 for bad input, 1 for our fault."""
     logging.getLogger(__name__).debug("%s failed", command, exc_info=error)
-    place = isinstance(error, OSError) and error.filename is not None
+    place = isinstance(error, OSError) and (error.filename or error.errno == errno.ENOSPC)
     if place or isinstance(error, ScmError):
         print(f"scm {command}: {error}", file=sys.stderr)
         return 2

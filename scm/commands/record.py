@@ -22,10 +22,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from scm.errors import LinkError
     from scm.recorder.part import RecorderPart
 
     part = RecorderPart(arguments.out, arguments.city, arguments.frames_hz)
-    return run_part(part, arguments)
+    try:
+        return run_part(part, arguments)
+    except LinkError:
+        part.file.discard()  # no city: the next try may use the same name
+        raise
 
 
 COMMAND = Command(

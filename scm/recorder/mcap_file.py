@@ -84,6 +84,12 @@ class RunFile:
             with _writing(self.path), self._stream:
                 self._writer.finish()
 
+    def discard(self) -> None:
+        """End the file; when it holds no message, take it away as if it had never been there."""
+        self.close()
+        if self.messages == 0:
+            self.path.unlink()
+
     def __enter__(self) -> "RunFile":
         return self
 

@@ -30,7 +30,8 @@ def failing(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> 
         (MapError("m.toml: bad"), 2, "scm show: m.toml: bad"),
         (PermissionError(13, "Permission denied", "out.csv"), 2, "Permission denied: 'out.csv'"),
         (KeyError("x"), 1, "unexpected KeyError: 'x'\nThis is a fault of ours"),
-        (OSError(28, "No space left on device"), 1, "unexpected OSError"),
+        (OSError(28, "No space left on device"), 2, "scm show: [Errno 28] No space left"),
+        (OSError(5, "Input/output error"), 1, "unexpected OSError"),
         (KeyboardInterrupt(), 130, ""),
     ],
     indirect=["failing"],
@@ -71,6 +72,15 @@ def test_every_command_shows_an_example_that_it_understands(
     with pytest.raises(SystemExit):
         main([name, "--help"])
     assert f"example: {example}" in capsys.readouterr().out
+
+
+def test_a_recorder_without_a_city_leaves_no_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run.mcap"
+    assert main(["record", "--out", str(out), "--connect", "nonsense"]) == 2
+    assert "no city at 'nonsense'" in capsys.readouterr().err
+    assert not out.exists()
 
 
 def test_a_reader_that_leaves_early_is_no_error(root: Path) -> None:
