@@ -67,7 +67,11 @@ def _verdict(world: World, status: MonitorStatus, now_ns: int) -> None:
 
 def _presence(world: World, presence: Presence, now_ns: int) -> None:
     car = world.remote.get(presence.station)
-    if car is not None and not presence.alive and presence.session == car.session:
+    if car is None or presence.session != car.session:
+        return
+    if presence.alive:
+        car.dead = False  # its agent, or we, slept for longer than the link waits
+    else:
         lose(world, car, f"the session of {car.name} ended", now_ns, dead=True)
 
 

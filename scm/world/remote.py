@@ -43,7 +43,7 @@ class RemoteCar:
         pose: Of the rear axle, from the newest report, or where it was told to start.
         heard_ns: When that came, on the world's clock.
         lost_ns: Since when its agent is known to be gone or silent; None while it is there.
-        dead: Whether the session ended: it can only join again, not come back.
+        dead: Whether the session ended: its reports count only when it is there again.
     """
 
     name: str

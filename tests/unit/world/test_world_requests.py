@@ -233,6 +233,19 @@ def test_a_lost_session_is_shown_at_once_and_leaves_the_map_after_three_seconds(
     assert city.shown("n7") is None
 
 
+def test_a_session_that_was_only_asleep_is_back_with_its_next_report(city):
+    city.join()
+    city.run(1, city.report(seq=1))
+    city.run(3, Presence(role="v", station="n7", session="s1", alive=False))
+    city.run(3, city.report(seq=2, x=1.1))
+    asleep = city.shown("n7")
+    city.run(3, Presence(role="v", station="n7", session="s1", alive=True))
+    city.run(3, city.report(seq=3, x=1.2))
+    awake = city.shown("n7")
+    assert (asleep.alive, awake.alive) == (False, True)
+    assert awake.x_m == pytest.approx(1.2, abs=0.01)
+
+
 def test_the_end_of_another_session_changes_nothing(city):
     city.join()
     city.run(3, city.report())
