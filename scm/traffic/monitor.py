@@ -89,8 +89,8 @@ class Monitor:
     def tick(self, now_ns: int) -> None:
         """Look at the time: has the controller fallen silent?"""
         if now_ns - self._ticked_ns > ASLEEP_NS:
-            # Who slept cannot call others silent: what they said may still be on its way.
-            self._heard_ns = max(self._heard_ns, now_ns - STALE_NS)
+            # Who slept cannot call others silent: its own link may just be coming back.
+            self._heard_ns = max(self._heard_ns, now_ns)
         self._ticked_ns = now_ns
         silent_ns = now_ns - self._heard_ns
         if silent_ns > (GRACE_NS if self._is_new else STALE_NS):
