@@ -6,12 +6,25 @@ from pathlib import Path
 
 from scm.command import Command
 
+_MAP_KINDS = {
+    "lanes": "lane",
+    "junctions": "junction",
+    "lights": "light",
+    "signs": "sign",
+    "crosswalks": "crosswalk",
+    "walls": "wall",
+    "spawns": "spawn",
+    "cameras": "camera",
+}
+
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("what", choices=("map", "car", "terms", "messages"))
-    parser.add_argument("name", nargs="?", help="which map or car; without: the names there are")
     parser.add_argument(
-        "--out", type=Path, metavar="FILE", help="map: where to put the SVG picture"
+        "name", nargs="?", help="map or car, by name or file; without: the names there are"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE", help="map: the SVG picture to write (NAME.svg)"
     )
 
 
@@ -36,17 +49,9 @@ def _map(arguments: argparse.Namespace) -> str:
     out: Path = arguments.out or Path(f"{city_map.name}.svg")
     out.write_text(draw_svg(city_map), encoding="utf-8")
     counts = ", ".join(
-        f"{len(getattr(city_map, kind))} {kind}"
-        for kind in (
-            "lanes",
-            "junctions",
-            "lights",
-            "signs",
-            "crosswalks",
-            "walls",
-            "spawns",
-            "cameras",
-        )
+        f"{count} {singular if count == 1 else plural}"
+        for plural, singular in _MAP_KINDS.items()
+        if (count := len(getattr(city_map, plural)))
     )
     return f"{city_map.title}: {counts}\ndrawn in {out}"
 

@@ -73,6 +73,6 @@ class WorldPart:
             try:
                 send(world, world.hosted[name], RouteRequest(vehicle=name), now_ns)
             except ScmError as cause:
-                world.say("info", "no_circulation", f"{name} stands: {cause}", now_ns, name)
+                world.say("info", "no_circulation", f"{cause}; it stands", now_ns, name)
         definition = WorldDefinition(t_ns=now_ns, seed=world.seed, map=world.city_map)
         return [definition, *world.outbox]

@@ -3,9 +3,9 @@ import { signal } from "@preact/signals";
 import { html } from "./html.js";
 import { change } from "./api.js";
 import { Dialog } from "./dialog.js";
-import { age, fixed, UNKNOWN } from "./format.js";
+import { age, byName, fixed, UNKNOWN } from "./format.js";
 import { selected } from "./selection.js";
-import { world } from "./store.js";
+import { city, world } from "./store.js";
 
 const STALE_MS = 500;
 
@@ -13,20 +13,19 @@ const STALE_MS = 500;
 const removing = signal(null);
 
 export function CarsTable() {
-  const cars = world.value.cars;
-  const spawn = () => change("POST", "/cars", {}, (reply) => `${reply.vehicle} is on the map.`);
+  const cars = world.value.cars.toSorted((a, b) => byName(a.vehicle, b.vehicle));
   return html`
     <section class="panel cars" aria-label="Cars">
       <div class="panel-head">
         <h2>Cars <small>${cars.length}</small></h2>
-        <button class="small" onClick=${spawn}>Add a car</button>
+        <button class="small" onClick=${add}>Add a car</button>
       </div>
       <div class="scroll" tabindex="0" role="region" aria-label="Table of cars">
         <table>
           <thead>
             <tr>
               <th>Name</th><th>Kind</th><th class="owner">Owner</th><th>Mode</th>
-              <th class="number">Speed</th><th class="number">Age</th>
+              <th class="number">Speed</th><th class="number age">Age</th>
               <th>Trip</th><th>Waits for</th><th><span class="hidden">Remove</span></th>
             </tr>
           </thead>
@@ -37,6 +36,12 @@ export function CarsTable() {
       ${removing.value && html`<${RemoveDialog} name=${removing.value} />`}
     </section>
   `;
+}
+
+/** A car that stood where it was put would block its lane: where there are lanes, it drives. */
+async function add() {
+  const reply = await change("POST", "/cars", {}, ({ vehicle }) => `${vehicle} is on the map.`);
+  if (reply && city.value?.lanes.length) await change("POST", `/cars/${reply.vehicle}/route`, {});
 }
 
 function Car({ car }) {
@@ -52,7 +57,7 @@ function Car({ car }) {
       <td class="owner">${car.owner}</td>
       <td><span class="mode" data-mode=${mode}>${mode}</span></td>
       <td class="number">${fixed(car.speed_mps, 2)} <small>m/s</small></td>
-      <td class="number ${car.age_ms > STALE_MS ? "warn" : ""}">${age(car.age_ms)}</td>
+      <td class="number age ${car.age_ms > STALE_MS ? "warn" : ""}">${age(car.age_ms)}</td>
       <td><${Trip} trip=${car.trip} /></td>
       <td>${car.trip?.waiting_for ?? ""}</td>
       <td>

@@ -13,7 +13,7 @@ export function EventFeed() {
             (event) => html`
               <li key=${event.seq} data-severity=${event.severity}>
                 <time>${clock(event.t_ns)}</time>
-                <span><b>${event.source}</b> ${event.text}</span>
+                <span>${event.text} <small>${event.source}</small></span>
               </li>
             `,
           )}

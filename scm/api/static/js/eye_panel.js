@@ -1,7 +1,7 @@
 /** The Eye: its newest picture with the tags found drawn over it, and how far off each pose is. */
 import { useEffect, useRef } from "preact/hooks";
 import { html } from "./html.js";
-import { fixed, span, UNKNOWN } from "./format.js";
+import { byName, fixed, span, UNKNOWN } from "./format.js";
 import { selected } from "./selection.js";
 import { cameras } from "./store.js";
 
@@ -22,6 +22,7 @@ function Camera({ of: camera }) {
   const canvas = useRef(null);
   const loading = useRef(false);
   const { frame_t_ns, tags } = camera;
+  const seen = camera.seen.toSorted((a, b) => byName(a.vehicle, b.vehicle));
   useEffect(() => {
     if (frame_t_ns === null || loading.current) return;
     loading.current = true;
@@ -51,7 +52,7 @@ function Camera({ of: camera }) {
       data-frame=${frame_t_ns}
     ></canvas>
     <ul class="residuals" aria-label="Pose residual against the world's truth">
-      ${camera.seen.map((seen) => html`<${Seen} key=${seen.vehicle} seen=${seen} />`)}
+      ${seen.map((one) => html`<${Seen} key=${one.vehicle} seen=${one} />`)}
     </ul>
   `;
 }

@@ -7,6 +7,9 @@ export function fixed(value, digits, unit = "") {
   return value === null || value === undefined ? UNKNOWN : value.toFixed(digits) + unit;
 }
 
+/** Names in the order people count: n2 before n17. */
+export const byName = new Intl.Collator("en", { numeric: true }).compare;
+
 /** An age or a span in seconds, short. */
 export function span(seconds) {
   if (seconds === null || seconds === undefined) return UNKNOWN;

@@ -20,6 +20,9 @@ const NARROW_S = 0.5;
 
 const resetting = signal(null);
 
+/** Junction to the plan it was asked for and has not begun: a change waits for a safe moment. */
+const awaited = signal({});
+
 export function SignalsPanel() {
   return html`
     <section class="panel signals" aria-label="Signals">
@@ -55,7 +58,7 @@ function PlanChoice({ junction }) {
   const choose = async (event) => {
     const plan = event.target.value;
     event.target.value = shown;
-    await change(
+    const reply = await change(
       "PUT",
       `/signals/${junction.junction}/plan`,
       { plan, by: "dashboard", reason: "chosen on the dashboard" },
@@ -64,11 +67,14 @@ function PlanChoice({ junction }) {
           ? `Plan ${reply.pending} begins at the next safe moment.`
           : `Plan ${reply.plan} is in force.`,
     );
+    if (reply) awaited.value = { ...awaited.value, [junction.junction]: reply.pending };
   };
+  const next = awaited.value[junction.junction];
+  const waits = next && junction.mode !== "flash" && next !== junction.plan;
   const shown = junction.mode === "flash" ? "flash" : (junction.plan ?? "");
   return html`
     <label class="plan">
-      <span>Plan</span>
+      <span>${waits ? `${next} begins soon` : "Plan"}</span>
       <select value=${shown} onChange=${choose} disabled=${!junction.fresh}>
         ${!shown && html`<option value="">${UNKNOWN}</option>`}
         ${junction.plans.map((plan) => html`<option key=${plan} value=${plan}>${plan}</option>`)}
