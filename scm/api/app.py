@@ -68,10 +68,10 @@ def create_app(
     app.add_middleware(Gate, api_key=api_key, policy=policy)
     api = APIRouter(prefix="/api/v1")
     for noun in (cars, signals, stations, events, map, eye, stop):
-        api.include_router(noun.router(city))
-    api.include_router(live.router(stream))
+        api.include_router(noun.router(city), responses=problem.RESPONSES)
+    api.include_router(live.router(stream), responses=problem.RESPONSES)
     app.include_router(api)
-    app.include_router(health.router(city))
+    app.include_router(health.router(city), responses=problem.RESPONSES)
     _add_pages(app)
     return app
 

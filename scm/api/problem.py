@@ -4,6 +4,7 @@ On top of the RFC's members every problem has a `code`, a short machine word.
 """
 
 from http import HTTPStatus
+from typing import Any
 
 import msgspec
 from fastapi import FastAPI, Request, Response
@@ -31,6 +32,9 @@ _CODE_OF_STATUS = {
 }
 
 
+_STATUSES = (400, 401, 403, 404, 409, 422, 500, 503, 504)
+
+
 class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """The body of an error; `errors` lists each wrong field with where it stands."""
 
@@ -41,6 +45,17 @@ class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     detail: str = ""
     instance: str = ""
     errors: tuple[dict[str, str], ...] = ()
+
+
+_SCHEMA = msgspec.json.schema(Problem)["$defs"]["Problem"]
+RESPONSES: dict[int | str, dict[str, Any]] = {
+    status: {
+        "description": HTTPStatus(status).phrase,
+        "content": {"application/problem+json": {"schema": _SCHEMA}},
+    }
+    for status in _STATUSES
+}
+"""What any route may answer instead, for the description of the interface."""
 
 
 class RefusedError(Exception):

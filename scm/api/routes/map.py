@@ -9,6 +9,12 @@ from scm.api.city import City
 from scm.maps.draw import draw_svg
 
 
+class SvgResponse(Response):
+    """A drawing."""
+
+    media_type = "image/svg+xml"
+
+
 def router(city: City) -> APIRouter:
     """Return the routes; both forms are made once, a map does not change while the city runs."""
     routes = APIRouter(tags=["map"])
@@ -19,7 +25,7 @@ def router(city: City) -> APIRouter:
     def map_json(request: Request) -> Response:
         return _tagged(request, as_json, "application/json")
 
-    @routes.get("/map.svg", summary="The map drawn")
+    @routes.get("/map.svg", summary="The map drawn", response_class=SvgResponse)
     def map_svg(request: Request) -> Response:
         return _tagged(request, as_svg, "image/svg+xml")
 

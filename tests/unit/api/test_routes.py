@@ -257,6 +257,15 @@ class TestRest:
         hear(3.5)
         is_problem(client("GET", "/readyz"), 503, "not_ready")
 
+    def test_every_route_says_that_its_errors_are_problems(self, client):
+        paths = client("GET", f"{API}/openapi.json").json()["paths"]
+        for methods in paths.values():
+            for route in methods.values():
+                for status in ("400", "404", "422", "503"):
+                    assert set(route["responses"][status]["content"]) == {
+                        "application/problem+json"
+                    }
+
     def test_every_route_is_described(self, client):
         paths = client("GET", f"{API}/openapi.json").json()["paths"]
         assert {"/api/v1/cars", "/api/v1/stop", "/api/v1/stream", "/readyz"} <= set(paths)
