@@ -12,7 +12,7 @@ from types import FrameType
 import msgspec
 
 from scm.clock import NS_PER_MS, NS_PER_S, Clock
-from scm.errors import LinkError
+from scm.errors import LinkError, ScmError
 from scm.log import event
 from scm.part import Part
 from scm.station import Station
@@ -37,7 +37,8 @@ def run(part: Part, bus: Bus, clock: Clock, stop: threading.Event) -> None:
                 loop.step()
             loop.finish()
         except Exception as cause:
-            _log.exception("part_failed part=%s", part.name)
+            trace = None if isinstance(cause, ScmError) else cause  # bad input needs no place
+            _log.error("part_failed part=%s reason=%s", part.name, cause, exc_info=trace)
             _tell_failure(part, bus, clock, cause)
             raise
 

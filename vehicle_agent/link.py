@@ -15,6 +15,7 @@ import logging
 from typing import Literal
 
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import RunError
 from scm.geometry import Pose2
 from scm.log import event
 from scm.v2x.exchange import Call, Incoming
@@ -75,7 +76,11 @@ class Link:
         return [Call(self._beat(), timeout_s=1.0)]
 
     def take(self, reply: Incoming) -> bool:
-        """Take a reply of the city; return whether the car has just come in."""
+        """Take a reply of the city; return whether the car has just come in.
+
+        Raises:
+            RunError: when the city will never take the car as it is: no such car, no such place.
+        """
         message = reply.message
         if isinstance(message, Refused):
             self._refused(message, reply)
@@ -153,6 +158,8 @@ class Link:
         self._answered_ns = max(self._answered_ns, reply.t_ns)
         asked = reply.call.request if reply.call is not None else None
         if isinstance(asked, JoinRequest):
+            if refused.code == "invalid":
+                raise RunError(refused.detail)
             self._attempt += 1
             if refused.detail != self.reason:
                 event(_log, "not_joined", level=logging.WARNING, reason=refused.detail)

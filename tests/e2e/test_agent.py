@@ -173,6 +173,14 @@ def test_an_unknown_car_file_ends_with_2_and_names_the_nearest(stage):
     assert b"nigel" in said
 
 
+def test_a_place_that_the_map_does_not_have_ends_with_2_and_no_traceback(stage):
+    child = stage.agent("n9", "--spawn", "zz")
+    _, said = child.communicate(timeout=30.0)
+    assert child.returncode == 2
+    assert b"no spawn 'zz'" in said
+    assert b"Traceback" not in said
+
+
 def test_help_shows_an_example():
     command = [sys.executable, "-m", "vehicle_agent", "join", "--help"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=30.0, check=True)

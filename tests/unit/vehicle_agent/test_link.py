@@ -3,6 +3,7 @@
 import pytest
 
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import RunError
 from scm.v2x.exchange import Call, Incoming
 from scm.v2x.message import Refused
 from scm.v2x.messages.join_request import JoinReply, JoinRequest
@@ -58,6 +59,12 @@ def test_a_refused_joining_is_asked_anew_and_its_reason_kept(link):
     assert link.reason == "no place is free"
     assert not link.is_inside
     assert ask(link, 1000).request_id != first.request_id
+
+
+def test_a_joining_that_can_never_be_is_given_up(link):
+    refused = Refused(code="invalid", detail="map x: no spawn 'zz'")
+    with pytest.raises(RunError, match="no spawn 'zz'"):
+        answer(link, refused, ask(link, 0))
 
 
 def test_an_unanswered_joining_keeps_its_id(link):
