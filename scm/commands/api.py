@@ -36,14 +36,24 @@ def _run(arguments: argparse.Namespace) -> int:
             api_key=arguments.api_key,
             plans={junction.name: names("scm.traffic.plans") for junction in city_map.junctions},
         )
-        hearing = threading.Thread(target=run, args=(view, bus, WallClock(), stop), name="view")
+
+        def hear() -> None:
+            try:
+                run(view, bus, WallClock(), stop)
+            except Exception as failure:  # noqa: BLE001  the edge of a thread; `run` has logged it
+                failures.append(failure)
+            finally:
+                stop.set()  # a server that hears nothing any more would show an old city for ever
+
+        failures: list[Exception] = []
+        hearing = threading.Thread(target=hear, name="view")
         hearing.start()
         try:
             serve(app, arguments.host, arguments.port, stop)
         finally:
             stop.set()
             hearing.join()
-    return 0
+    return 1 if failures else 0
 
 
 COMMAND = Command(
