@@ -19,7 +19,7 @@ with open_city("driving_school", connect=arguments.connect if arguments.live els
     cars = [city.spawn("nigel") for _ in range(2)]
     for plan in ("calm", "brisk"):
         city.use_plan(plan)
-        trips = [car.drive("east_loop", "west_loop", laps=2) for car in cars]
+        trips = [car.drive("east_loop", "west_loop", laps=1) for car in cars]
         city.wait(trips, timeout_s=300.0)
         for trip in trips:
             length_m, time_s = trip.length_m, trip.travel_time_s
