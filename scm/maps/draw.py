@@ -342,7 +342,7 @@ def _scale(city_map: CityMap, x_low: float, x_high: float, y_low: float) -> str:
     long_m = 0.5 if x_high - x_low < 6.0 else 1.0
     y = y_low - MARGIN_M / 2.0 - STRIP_M / 2.0
     left, middle = x_high - long_m, x_high - long_m / 2.0
-    half = element("rect", x=left, y=-y, width=long_m / 2.0, height=0.022, fill="#6b717c")
+    half = element("rect", x=left, y=-y, width=long_m / 2.0, height=0.022, fill="#7f8792")
     bar = element(
         "rect",
         x=left,
@@ -350,10 +350,10 @@ def _scale(city_map: CityMap, x_low: float, x_high: float, y_low: float) -> str:
         width=long_m,
         height=0.022,
         fill="none",
-        stroke="#6b717c",
+        stroke="#7f8792",
         stroke_width=0.006,
     )
-    grey = {"fill": "#6b717c"}
+    grey = {"fill": "#7f8792"}
     return element(
         "g",
         half,

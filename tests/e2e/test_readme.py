@@ -14,11 +14,6 @@ from scm.v2x.exchange import RawSample
 from tests.e2e.city_process import CityProcess, city, wait_for
 
 README = Path(__file__).parents[2] / "README.md"
-LONG = {  # commands that run until they are stopped, or run this very test: checked by other means
-    "make run": "make -n run",
-    "make test": "make -n test",
-    "make bench": "make -n bench",
-}
 
 
 def commands() -> list[str]:
@@ -61,8 +56,8 @@ def test_readme_command_works(
 ) -> None:
     if "../shared" in command and not (root.parent / "shared").is_dir():
         pytest.skip("../shared is not here: it holds other people's data")
-    if command in LONG:
-        assert run(LONG[command], root).returncode == 0
+    if command.startswith("make "):  # a city without an end, or this very test: the recipe is there
+        assert run(command.replace("make", "make -n", 1), root).returncode == 0
         return
     check: Callable[[str, CityProcess, Path], None] = joins if " join " in command else ends_well
     check(here(command, running, root), running, workplace)
