@@ -1,0 +1,122 @@
+"""Whatever reads as a message, no part of the city stops at its numbers.
+
+Every class is sent with the ends of what its fields can hold, into a city whose parts all run.
+"""
+
+import msgspec
+import pytest
+from msgspec import inspect
+
+from scm.api.car_rows import cars_topic
+from scm.api.encoding import encode as to_json
+from scm.api.eye_rows import camera_rows
+from scm.api.signal_rows import junction_rows
+from scm.api.view import CityView
+from scm.errors import MessageError
+from scm.lockstep import Lockstep
+from scm.maps.load import load_map
+from scm.registry import load, names
+from scm.traffic.monitor_part import MonitorPart
+from scm.traffic.part import TrafficPart
+from scm.v2x.exchange import Call
+from scm.v2x.key import key_of
+from scm.v2x.message import Request, decode, encode
+from scm.world.part import WorldPart
+from vehicle_agent.agent import AgentPart
+
+PACKAGE = "scm.v2x.messages"
+MAP = load_map("driving_school")
+INTEGERS = (0, -1, 1, 2**63 - 1, -(2**63))
+FLOATS = (0.0, -0.0, 1e-320, 1e154, 1.7e308, -1.7e308, 0.3)
+# so that a message concerns somebody who is there
+PLACES = {
+    "vehicle": ("n1", "n2"),
+    "receiver": ("n2",),
+    "station": ("n1", "n2", "world"),
+    "source": ("world",),
+    "junction": ("crossing",),
+    "camera": ("overhead",),
+    "owner": ("ann", "n2", "world"),
+    "car": ("nigel",),
+    "kind": ("remote",),
+}
+MADE_BY_THE_BUS_OR_ONCE = {"presence", "world_definition"}
+
+
+SENT = [
+    load(PACKAGE, name, "MESSAGE", type)
+    for name in sorted(set(names(PACKAGE)) - MADE_BY_THE_BUS_OR_ONCE)
+]
+
+
+def extreme(of, name, turn):
+    """Return the `turn`-th value for a field, through all its ends and in another order each."""
+    if name in PLACES:
+        return PLACES[name][turn % len(PLACES[name])]
+    return MAKERS[type(of)](of, turn)
+
+
+def integer(of, turn):
+    value = INTEGERS[turn % len(INTEGERS)]
+    value = value if of.ge is None else max(of.ge, value)
+    return value if of.le is None else min(of.le, value)
+
+
+MAKERS = {
+    inspect.IntType: integer,
+    inspect.FloatType: lambda _, turn: FLOATS[turn % len(FLOATS)],
+    inspect.BoolType: lambda _, turn: turn % 2 == 0,
+    inspect.StrType: lambda _, turn: ("", "x" * 3000, "\u0000")[turn % 3],
+    inspect.BytesType: lambda *_: b"\xff",
+    inspect.NoneType: lambda *_: None,
+    inspect.LiteralType: lambda of, turn: of.values[turn % len(of.values)],
+    inspect.UnionType: lambda of, turn: extreme(of.types[turn % len(of.types)], "", turn),
+    inspect.StructType: lambda of, turn: fields(of.cls, turn),
+    inspect.VarTupleType: lambda of, turn: [
+        extreme(of.item_type, "", turn + i) for i in range(turn % 3)
+    ],
+    inspect.TupleType: lambda of, turn: [
+        extreme(item, "", turn + i) for i, item in enumerate(of.item_types)
+    ],
+}
+
+
+def fields(kind, turn):
+    shape = inspect.type_info(kind)
+    return {f.name: extreme(f.type, f.name, turn + i * 3) for i, f in enumerate(shape.fields)}
+
+
+@pytest.fixture(scope="module")
+def city():
+    view = CityView()
+    parts = [WorldPart(MAP, 0, (("n1", "nigel"),)), TrafficPart(MAP), MonitorPart(MAP), view]
+    with Lockstep([*parts, AgentPart("n2")], start_ns=10**18) as running:
+        running.run_for(1.5)
+        yield running, view
+
+
+@pytest.mark.parametrize("kind", SENT, ids=lambda kind: kind.__name__)
+def test_no_part_stops_at_extreme_numbers(city, kind):
+    running, view = city
+    sent = 0
+    for turn in range(35):
+        try:
+            message = msgspec.convert(fields(kind, turn), kind)
+            key_of("city", message)
+            decode(kind, *encode(message))
+        except (msgspec.ValidationError, MessageError):
+            continue
+        sent += 1
+        if issubclass(kind, Request):
+            running.bus.call(Call(message, 1.0), lambda _reply: None)
+        else:
+            running.publish(message)
+        running.run_for(0.04)
+        picture = view.picture()
+        rows = (
+            cars_topic(picture),
+            junction_rows(picture, MAP.junctions, {}),
+            camera_rows(picture),
+        )
+        assert all(map(to_json, rows))
+    assert sent > 5
