@@ -25,7 +25,7 @@ from scm.world import lease as rules
 from scm.world.driving import take_over
 from scm.world.hosted import HostedCar
 from scm.world.remote import RemoteCar
-from scm.world.world import AnyCar, World
+from scm.world.world import NAME, AnyCar, World
 
 KINDS = ("remote", "real")
 
@@ -168,7 +168,7 @@ def _known(world: World, name: str) -> AnyCar:
 
 def _check_new(world: World, name: str, car_file: str) -> None:
     check_name(name, "vehicle")
-    if world.car(name) is not None or name in world.roadside:
+    if world.car(name) is not None or name in (NAME, *world.roadside):
         raise _RefusedError("owned", f"vehicle: there is already a station named {name!r}")
     if car_file not in car_names():  # no paths: whoever asks may be far away
         known = ", ".join(car_names())

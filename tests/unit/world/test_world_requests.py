@@ -54,6 +54,7 @@ def test_cars_without_a_name_get_one_each(city):
         (SpawnRequest(spawn="zz"), "invalid", "zz"),
         (SpawnRequest(spawn="a"), "occupied", "'a'"),
         (JoinRequest(vehicle="n1", session="s"), "owned", "n1"),
+        (JoinRequest(vehicle="world", session="s"), "owned", "world"),
         (JoinRequest(vehicle="n9", session="s", kind="ghost"), "invalid", "ghost"),
         (RemoveRequest(vehicle="n8"), "not_found", "n8"),
         (RouteRequest(vehicle="n1", via=("nowhere",)), "invalid", "nowhere"),
