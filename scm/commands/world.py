@@ -22,10 +22,13 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
+    from scm.vehicles.car import car_names
     from scm.world.part import WorldPart
 
     hosted = tuple((f"n{i + 1}", arguments.car) for i in range(arguments.hosted))
     part = WorldPart(load_map(arguments.map), arguments.seed, hosted, arguments.stopped_by)
+    for car in car_names():  # compiled when its first car comes, it would stop the city for 2.5 s
+        part.world.garage.prepare(car)
     return run_part(part, arguments)
 
 

@@ -1,0 +1,35 @@
+"""The first car of a file must not stop the city while its kernel is compiled."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from scm.v2x.ask import ask
+from scm.v2x.bus import Mailbox
+from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.presence import Presence
+from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
+from scm.v2x.router import Router, free_endpoint
+from scm.vehicles.car import car_names
+from tests.e2e.city_process import START_S, wait_for
+
+
+def test_every_car_file_is_compiled_before_the_world_opens(tmp_path: Path) -> None:
+    with Router(free_endpoint()) as router, ZenohBus("city", "test", router.listen) as bus:
+        here, statuses = Mailbox(100), Mailbox(1000)
+        bus.subscribe(Presence, {"station": "world"}, here)
+        command = [sys.executable, "-m", "scm", "world", "driving_school"]
+        environment = {**os.environ, "SCM_CACHE_DIR": str(tmp_path)}
+        world = subprocess.Popen([*command, "--connect", router.listen], env=environment)
+        try:
+            wait_for(here.drain, START_S, "the world is up")
+            bus.subscribe(PartStatus, {"station": "world"}, statuses)
+            for car in car_names():
+                assert isinstance(ask(bus, SpawnRequest(car=car)), SpawnReply), car
+            told = wait_for(statuses.drain, 5.0, "the world's status")
+        finally:
+            world.terminate()
+            world.wait(timeout=5.0)
+    assert max(item.message.step_ms for item in told if isinstance(item.message, PartStatus)) < 1000
