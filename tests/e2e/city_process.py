@@ -14,6 +14,8 @@ from typing import Any
 
 import httpx
 
+from scm.parent_watch import with_parent
+
 START_S = 90.0  # a cold start compiles the physics
 
 
@@ -38,7 +40,7 @@ class CityProcess:
         self.folder = folder
         self.lines: list[str] = []
         self.process = subprocess.Popen(
-            command,
+            with_parent(command),
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
