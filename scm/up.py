@@ -3,6 +3,7 @@
 import socket
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -52,104 +53,133 @@ def run_city(
     Raises:
         ScmError: when the map, the port or the endpoint is not to be had.
     """
-    load_map(map_name)
-    clock = WallClock()
+    city_map = load_map(map_name)
     port = _free_port(port)
     record_dir.mkdir(parents=True, exist_ok=True)
     with (
         Router(free_endpoint() if listen.endswith(":0") else listen) as router,
         ZenohBus(city, "up", router.listen) as bus,
     ):
-        latched = Latched()
-        jobs = [
-            *_parts(map_name, city, router.listen, hosted, port, record_dir, seed, clock, latched),
-            *_agents(city, router.listen, hosted, agents),
-        ]
-        crew = Crew(jobs, clock, say)
-        heard = Mailbox(1000)
-        stop = stop_on_signal()
-        for kind in (Presence, *HEARD):
-            bus.subscribe(kind, {}, heard)
+        plan = _Plan(
+            map_name=map_name,
+            city=city,
+            endpoint=router.listen,
+            hosted=hosted,
+            agents=agents,
+            port=port,
+            recording=record_dir / f"{city}-{_stamp()}.mcap",
+            seed=seed,
+            has_camera=bool(city_map.cameras),
+        )
         say(f"scm: city {city!r} on map {map_name!r}, bus {router.listen}")
-        told = False
-        try:
-            while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, stop):
-                crew.look()
-                for item in heard.drain():
-                    if isinstance(item.message, Presence):
-                        crew.heard(item.message)
-                    else:
-                        latched.heard(item.message)
-                if crew.settled and not told:
-                    told = True
-                    _tell_next(say, city, router.listen, port, hosted + agents + 1, record_dir)
-        finally:
-            say("stopping")
-            crew.stop()
+        _watch(plan, bus, say)
+    if plan.recording.exists():
+        say(f"recorded in {plan.recording}")
     return 0
 
 
-def _parts(
-    map_name: str,
-    city: str,
-    endpoint: str,
-    hosted: int,
-    port: int,
-    record_dir: Path,
-    seed: int,
-    clock: WallClock,
-    latched: Latched,
-) -> list[Job]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Plan:
+    """What city is to run."""
+
+    map_name: str
+    city: str
+    endpoint: str
+    hosted: int
+    agents: int
+    port: int
+    recording: Path
+    seed: int
+    has_camera: bool
+
+
+def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
+    """Keep all processes of the city alive until told to stop."""
+    clock, latched, heard = WallClock(), Latched(), Mailbox(1000)
+    crew = Crew([*_parts(plan, latched), *_agents(plan)], clock, say)
+    stop = stop_on_signal()
+    for kind in (Presence, *HEARD):
+        bus.subscribe(kind, {}, heard)
+    told = False
+    try:
+        while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, stop):
+            crew.look()
+            for item in heard.drain():
+                if isinstance(item.message, Presence):
+                    crew.heard(item.message)
+                else:
+                    latched.heard(item.message)
+            if crew.settled and not told:
+                told = True
+                _tell_next(plan, say)
+    finally:
+        say("stopping")
+        crew.stop()
+
+
+def _parts(plan: _Plan, latched: Latched) -> list[Job]:
     def scm(part: str, *more: str) -> Sequence[str]:
-        shared = ("--connect", endpoint, "--city", city, "--seed", str(seed))
-        return [sys.executable, "-m", "scm", part, map_name, *shared, *more]
+        shared = ("--connect", plan.endpoint, "--city", plan.city, "--seed", str(plan.seed))
+        return [sys.executable, "-m", "scm", part, plan.map_name, *shared, *more]
 
     def record() -> Sequence[str]:
-        now = datetime.fromtimestamp(seconds(clock.now_ns()), UTC)
-        out = record_dir / f"{city}-{now:%Y%m%d-%H%M%S-%f}.mcap"
+        """Name another file when a recorder died: a recording is never written over."""
+        first = plan.recording
+        out = first.with_stem(f"{plan.city}-{_stamp()}") if first.exists() else first
         return scm("record", "--out", str(out))
 
     def monitor() -> Sequence[str]:
         return scm("monitor", *latched.monitor_arguments())
 
     def world() -> Sequence[str]:
-        return scm("world", "--hosted", str(hosted), *latched.world_arguments())
+        return scm("world", "--hosted", str(plan.hosted), *latched.world_arguments())
 
     def part(name: str, what: str, *more: str) -> Job:
         return Job(name, "part", what, lambda: scm(name, *more))
 
+    folder = plan.recording.parent
+    cars = f"cars, walls, sensors, radio; {plan.hosted} hosted"
+    eye = [part("eye", "overhead camera: frames, tags, poses")] if plan.has_camera else []
     return [
-        Job("record", "part", f"everything on the bus into {record_dir}/", record, last=True),
+        Job("record", "part", f"everything on the bus into {folder}/", record, last=True),
         part("traffic", "signals: safe kernel, plans"),
         Job("monitor", "part", "second channel: doubts the signals, latches flash", monitor),
-        Job("world", "part", f"cars, walls, sensors, radio; {hosted} hosted", world),
-        part("eye", "overhead camera: frames, tags, poses"),
-        part("api", "REST, event stream, dashboard", "--host", HOST, "--port", str(port)),
+        Job("world", "part", cars, world),
+        *eye,
+        part("api", "REST, event stream, dashboard", "--host", HOST, "--port", str(plan.port)),
     ]
 
 
-def _agents(city: str, endpoint: str, hosted: int, agents: int) -> list[Job]:
+def _agents(plan: _Plan) -> list[Job]:
     def join(name: str) -> Sequence[str]:
-        program = (sys.executable, "-m", "vehicle_agent", "join")
-        return [*program, "--name", name, "--connect", endpoint, "--city", city]
+        program = (sys.executable, "-m", "vehicle_agent", "--log", "warning", "join")
+        return [*program, "--name", name, "--connect", plan.endpoint, "--city", plan.city]
 
     # After the world: it compiles the physics, and they find it compiled.
     return [
         Job(name, "v", "vehicle agent: a car of its own", partial(join, name), after="world")
-        for name in (f"n{hosted + i + 1}" for i in range(agents))
+        for name in (f"n{plan.hosted + i + 1}" for i in range(plan.agents))
     ]
 
 
-def _tell_next(
-    say: Say, city: str, endpoint: str, port: int, next_car: int, record_dir: Path
-) -> None:
-    at = f"--connect {endpoint}" + ("" if city == "city" else f" --city {city}")
-    say(f"dashboard: http://{HOST}:{port}")
-    say("try next:")
-    say(f"  vehicle-agent join --name n{next_car} {at}      another car")
-    say("  ls examples/        scripts that spawn, route and time cars")
-    say(f"  scm recover {record_dir}/<file>.mcap        mend a recording that was cut off")
-    say("Ctrl-C stops the city")
+def _tell_next(plan: _Plan, say: Say) -> None:
+    script = f"--connect {plan.endpoint}"
+    at = script + ("" if plan.city == "city" else f" --city {plan.city}")
+    programs = Path(sys.executable).parent
+    if programs.is_relative_to(Path.cwd()):
+        programs = programs.relative_to(Path.cwd())
+    car = f"n{plan.hosted + plan.agents + 1}"
+    say(f"dashboard: http://{HOST}:{plan.port}")
+    say("try next, in another shell:")
+    say(f"  {programs}/vehicle-agent join --name {car} {at}      another car")
+    say(f"  {programs}/python examples/travel_times.py --live {script}      a fleet script")
+    say("Ctrl-C stops the city and names its recording")
+
+
+def _stamp() -> str:
+    """Return the time of day for a file's name, UTC."""
+    now = datetime.fromtimestamp(seconds(WallClock().now_ns()), UTC)
+    return f"{now:%Y%m%d-%H%M%S-%f}"
 
 
 def _free_port(port: int) -> int:

@@ -21,7 +21,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"scm {__version__}")
     parser.add_argument(
         "--log",
-        default="warning",
+        default="info",
         choices=["debug", "info", "warning", "error"],
         help="how much to log (%(default)s)",
     )

@@ -27,6 +27,7 @@ from scm.v2x.messages.remove_request import RemoveRequest
 JOIN_EVERY_NS = NS_PER_S
 BEAT_EVERY_NS = 200 * NS_PER_MS
 LINK_LOST_NS = NS_PER_S
+NAME_TAKEN_NS = 10 * NS_PER_S  # a car that died leaves its name within a few seconds
 UNREACHABLE = ("timeout", "offline")
 
 Standing = Literal["outside", "own", "foreign", "regaining"]
@@ -55,6 +56,8 @@ class Link:
         self._attempt = 0
         self._asked_ns: int | None = None
         self._answered_ns = 0
+        self._was_inside = False
+        self._taken_ns: int | None = None
 
     @property
     def is_inside(self) -> bool:
@@ -87,7 +90,7 @@ class Link:
             return False
         self._answered_ns = max(self._answered_ns, reply.t_ns)
         if isinstance(message, JoinReply) and not self.is_inside:
-            self.standing, self.epoch = "own", message.epoch
+            self.standing, self.epoch, self._was_inside = "own", message.epoch, True
             self.start = Pose2(message.x_m, message.y_m, message.yaw_rad)
             event(_log, "joined", vehicle=self._vehicle, tag_id=message.tag_id, epoch=self.epoch)
             return True
@@ -158,7 +161,7 @@ class Link:
         self._answered_ns = max(self._answered_ns, reply.t_ns)
         asked = reply.call.request if reply.call is not None else None
         if isinstance(asked, JoinRequest):
-            if refused.code == "invalid":
+            if refused.code == "invalid" or self._is_taken_for_good(refused, reply.t_ns):
                 raise RunError(refused.detail)
             self._attempt += 1
             if refused.detail != self.reason:
@@ -169,3 +172,10 @@ class Link:
                 self.leave("the city does not know the car any more")
             elif asked == self._beat():  # an answer to an older question says nothing new
                 self.give_way()
+
+    def _is_taken_for_good(self, refused: Refused, t_ns: int) -> bool:
+        """Return whether a newcomer's name has been somebody else's for too long to wait on."""
+        if refused.code != "owned" or self._was_inside:
+            return False
+        self._taken_ns = t_ns if self._taken_ns is None else self._taken_ns
+        return t_ns - self._taken_ns >= NAME_TAKEN_NS

@@ -351,9 +351,8 @@ def _open(endpoint: str, connect_timeout_s: float) -> zenoh.Session:
         config = zenoh.Config.from_json5(zenoh_config.client(endpoint, connect_timeout_s))
         return zenoh.open(config)
     except zenoh.ZError as cause:
-        msg = (
-            f"no city at {endpoint!r} within {connect_timeout_s} s: is `scm up` running? ({cause})"
-        )
+        why = zenoh_config.reason(cause)
+        msg = f"no city at {endpoint!r} within {connect_timeout_s} s: is `scm up` running? ({why})"
         raise LinkError(msg) from cause
 
 

@@ -37,7 +37,8 @@ class Router:
             config = zenoh.Config.from_json5(zenoh_config.router(self.listen))
             self._session = zenoh.open(config)
         except zenoh.ZError as cause:
-            msg = f"cannot listen at {self.listen!r}: does another city run there? ({cause})"
+            why = zenoh_config.reason(cause)
+            msg = f"cannot listen at {self.listen!r}: does another city run there? ({why})"
             raise RunError(msg) from cause
         return self
 

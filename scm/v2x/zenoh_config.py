@@ -50,3 +50,8 @@ def _both() -> dict[str, object]:
         },
         "timestamping": {"enabled": True},
     }
+
+
+def reason(cause: Exception) -> str:
+    """Return what Zenoh says went wrong, without where in its own sources that was."""
+    return str(cause).partition(" at /")[0]

@@ -169,7 +169,7 @@ def _known(world: World, name: str) -> AnyCar:
 def _check_new(world: World, name: str, car_file: str) -> None:
     check_name(name, "vehicle")
     if world.car(name) is not None or name in (NAME, *world.roadside):
-        raise _RefusedError("owned", f"vehicle: there is already a station named {name!r}")
+        raise _RefusedError("owned", f"vehicle: there is already one named {name!r}")
     if car_file not in car_names():  # no paths: whoever asks may be far away
         known = ", ".join(car_names())
         detail = f"car: got {car_file!r}, expected one of {known}{nearest(car_file, car_names())}"

@@ -142,13 +142,14 @@ def test_a_world_that_comes_back_is_joined_again(stage, driving):
     wait_for(moves, 20.0, "n7 drives again")
 
 
-def test_a_second_car_of_the_same_name_waits_outside(stage, driving):
+def test_a_second_car_of_the_same_name_waits_outside_and_then_gives_up(stage, driving):
     second = stage.agent("n7")
     with pytest.raises(subprocess.TimeoutExpired):
         second.wait(timeout=4.0)
     assert len(stage.vehicles()) == 1
-    second.send_signal(signal.SIGTERM)
-    assert second.wait(timeout=2.0) == 0
+    _, said = second.communicate(timeout=20.0)
+    assert second.returncode == 2
+    assert b"already one named 'n7'" in said
     assert "n7" in stage.vehicles()
 
 
@@ -164,6 +165,7 @@ def test_bad_input_ends_with_2_and_says_why(arguments, words):
     done = subprocess.run(command, capture_output=True, text=True, timeout=30.0, check=False)
     assert done.returncode == 2
     assert words in done.stderr
+    assert ".rs:" not in done.stderr
 
 
 def test_an_unknown_car_file_ends_with_2_and_names_the_nearest(stage):

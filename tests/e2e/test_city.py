@@ -45,7 +45,7 @@ def test_it_prints_a_line_for_every_part_and_what_to_try_next(running: CityProce
     text = "\n".join(running.lines)
     for name in (*PARTS, "n5", "n6"):
         assert any(name in line.split() for line in running.lines), name
-    for hint in ("vehicle-agent join", "examples/", "scm recover", "Ctrl-C"):
+    for hint in ("vehicle-agent join", "examples/", "Ctrl-C"):
         assert hint in text
 
 

@@ -44,7 +44,7 @@ def test_the_same_script_gives_the_same_times_bit_for_bit() -> None:
         (lambda c: c.use_plan("calm", junction="x"), "no junction 'x', only ['crossing']"),
         (lambda c: c.spawn("nigl"), "did you mean 'nigel'?"),
         (lambda c: c.spawn(at="nowhere"), "no spawn 'nowhere'"),
-        (lambda c: c.spawn(name="first"), "already a station named 'first'"),
+        (lambda c: c.spawn(name="first"), "already one named 'first'"),
         (lambda c: [c.spawn() for _ in range(40)], "no spawn place of map driving_school is free"),
         (lambda c: c.cars[0].drive("nolane"), "no lane 'nolane'"),
         (lambda c: c.cars[0].drive("east_loop", laps=0), "laps: expected at least 1, got 0"),

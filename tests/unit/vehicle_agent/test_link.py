@@ -67,6 +67,22 @@ def test_a_joining_that_can_never_be_is_given_up(link):
         answer(link, refused, ask(link, 0))
 
 
+def test_a_newcomer_gives_up_a_name_that_stays_taken(link):
+    refused = Refused(code="owned", detail="there is already one named 'n7'")
+    for t_ms in range(0, 10_000, 1000):
+        answer(link, refused, ask(link, t_ms), t_ms)
+    with pytest.raises(RunError, match="already one named 'n7'"):
+        answer(link, refused, ask(link, 10_000), 10_000)
+
+
+def test_a_car_that_was_inside_waits_for_its_name_as_long_as_it_takes(inside):
+    inside.leave("the city came back")
+    refused = Refused(code="owned", detail="there is already one named 'n7'")
+    for t_ms in range(20_000, 60_000, 1000):
+        answer(inside, refused, ask(inside, t_ms), t_ms)
+    assert not inside.is_inside
+
+
 def test_an_unanswered_joining_keeps_its_id(link):
     first = ask(link, 0)
     answer(link, Refused(code="timeout", detail="no answer"), first)
