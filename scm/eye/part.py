@@ -77,6 +77,7 @@ class EyePart:
         frame = self._source.take(now_ns, self._light)
         if frame is None:
             return []
+        self._check_size(frame)
         tags = detect_tags(frame.grey(), self._settings)
         latency_ms = (now_ns - frame.t_ns) / NS_PER_MS
         seen = EyeTags(camera=self.camera, t_ns=frame.t_ns, tags=tags, latency_ms=latency_ms)
@@ -86,6 +87,17 @@ class EyePart:
         """Leave without a word."""
         del now_ns
         return []
+
+    def _check_size(self, frame: Frame) -> None:
+        """Refuse pictures that the camera of the map cannot have taken."""
+        camera = self.anchor.model.camera
+        got = (frame.image.shape[1], frame.image.shape[0])
+        if got != (camera.width_px, camera.height_px):
+            wanted = f"{camera.width_px} x {camera.height_px}"
+            msg = (
+                f"camera {camera.name!r}: got a frame of {got[0]} x {got[1]} px, expected {wanted}"
+            )
+            raise EyeError(msg)
 
     def _poses(self, t_ns: int, tags: tuple[TagSeen, ...]) -> list[EyePose]:
         map_tag = self.anchor.tag.tag_id

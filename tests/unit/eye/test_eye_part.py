@@ -7,6 +7,7 @@ import pytest
 
 from scm.errors import EyeError
 from scm.eye.part import EyePart
+from scm.eye.sources.file import FileSource
 from scm.maps.load import load_map
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.eye_frame import EyeFrame
@@ -131,3 +132,18 @@ def test_an_unknown_camera_is_refused_with_the_nearest_name():
 def test_a_map_without_a_camera_has_no_eye():
     with pytest.raises(EyeError, match="cameras"):
         EyePart(msgspec.structs.replace(CITY, cameras=()))
+
+
+def test_a_picture_of_the_cameras_size_is_read_without_any_world(eye, tmp_path):
+    (frame,) = of(EyeFrame, see(EyePart(CITY, seed=3), light(1, CAR)))
+    (tmp_path / "frame.jpg").write_bytes(frame.payload)
+    out = EyePart(CITY, source=FileSource(tmp_path / "frame.jpg")).step(0, [])
+    (pose,) = of(EyePose, out)
+    assert pose.vehicle == "tag-7"  # nobody said whose tag it is
+    assert np.hypot(pose.x_m - CAR.x_m, pose.y_m - CAR.y_m) < 0.003
+
+
+def test_a_picture_of_another_size_is_refused(tmp_path):
+    cv2.imwrite(str(tmp_path / "small.png"), np.zeros((480, 640, 3), np.uint8))
+    with pytest.raises(EyeError, match="640 x 480 px, expected 1280 x 720"):
+        EyePart(CITY, source=FileSource(tmp_path / "small.png")).step(0, [])
