@@ -8,6 +8,7 @@ import msgspec
 
 import scm
 from scm.errors import MapError, nearest
+from scm.maps import model
 from scm.maps.check import problems_of
 from scm.maps.model import CityMap
 from scm.maps.occupancy import map_from_occupancy
@@ -19,9 +20,12 @@ _PLAIN = (
     (re.compile(r"^Expected `([^`]+)`, got `([^`]+)`$"), r"expected \1, got \2"),
     (re.compile(r"^Object missing required field `([^`]+)`$"), r"key \1 is missing"),
     (re.compile(r"^Object contains unknown field `([^`]+)`$"), r"key \1 is not known here"),
-    (re.compile(r"^Invalid enum value (.+)$"), r"value \1 is not allowed"),
+    # The only value that is fixed is the format's number: `map = 1`.
+    (re.compile(r"^Invalid enum value (.+)$"), r"expected 1 (the map format), got \1"),
     (re.compile(r"^Expected `array` of length (\d+), got (\d+)$"), r"expected \1 values, got \2"),
 )
+_UNKNOWN = re.compile(r"^key (?P<key>\S+) is not known here$")
+_KEYS = sorted({key for kind in model.Record.__subclasses__() for key in kind.__struct_fields__})
 _TYPES = {
     "str": "text in quotes",
     "float": "a number",
@@ -93,6 +97,8 @@ def _in_plain_words(message: str, data: object) -> str:
         if pattern.match(text):
             text = pattern.sub(plain, text)
             break
+    if unknown := _UNKNOWN.match(text):
+        text += nearest(unknown["key"], _KEYS)
     for python, word in _TYPES.items():
         text = re.sub(rf"\b(expected|got|\|) {python}\b", rf"\1 {word}", text)
     where = f"{path}{_name_at(path, data)}"

@@ -57,7 +57,13 @@ def test_broken_toml_is_refused_with_its_line(tmp_path):
         ),
         ("z_m = 2.8\n", "", "cameras[0] (overhead)", "key z_m is missing"),
         ("z_m = 2.8", "z_m = 2.8\nzoom = 2", "cameras[0] (overhead)", "key zoom is not known here"),
-        ("map = 1\n", "map = 2\n", "map", "value 2 is not allowed"),
+        (
+            "z_m = 2.8",
+            "z_m = 2.8\nwidht_px = 2",
+            "cameras[0] (overhead)",
+            "key widht_px is not known here (did you mean 'width_px'?)",
+        ),
+        ("map = 1\n", "map = 2\n", "map", "expected 1 (the map format), got 2"),
         ("y_m = [-0.095, 1.405]", "y_m = [1.4]", "floor.y_m", "expected 2 values, got 1"),
     ],
 )
