@@ -1,16 +1,16 @@
 """A tick of the world beside its limit, the 20 ms it may take, and its contact stage beside a peer.
 
-Run with `python bench/world.py [cars ...]`. Cars drive rounds of four in walled blocks, with
-drivers, contacts, LIDAR, encoders, IMU and radio. The peer of the contact stage is pymunk as its
-manual shows it, poses and velocities set and read by attribute. All times are processor times of
-the one thread that a world is.
+Run with `python -m bench world`, or with `python -m bench.world [cars ...]`. Cars drive rounds of
+four in walled blocks, with drivers, contacts, LIDAR, encoders, IMU and radio. The peer of the contact
+stage is pymunk as its manual shows it, poses and velocities set and read by attribute. All times
+are processor times of the one thread that a world is.
 """
 
 import math
 import statistics
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pymunk
 
@@ -25,6 +25,7 @@ from scm.world.world import PERIOD_NS, World
 
 RADIUS, BLOCK, CARS_A_BLOCK = 0.7, 2.0, 4
 WARM_TICKS, TICKS = 60, 100
+SIZES = (6, 100, 1000)
 LIMIT_MS = PERIOD_NS / 1e6
 STAGES = ("hear", "_steer", "_move", "watch", "sense", "publish", "_call_out")
 
@@ -150,8 +151,7 @@ def row_of(cars: int, stages: Stages) -> str:
     )
 
 
-def main() -> None:
-    sizes = [int(word) for word in sys.argv[1:]] or [6, 100, 1000]
+def main(sizes: Sequence[int] = SIZES) -> None:
     stages = Stages()
     print(" cars  tick ms  of limit  JSON ms  contact us  by attribute   stages [ms]")
     for cars in sizes:
@@ -159,4 +159,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main([int(word) for word in sys.argv[1:]] or SIZES)

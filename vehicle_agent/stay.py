@@ -72,7 +72,7 @@ class Stay:
             pose=motion.pose,
             speed=motion.speed,
             signals=self.signals,
-            others=self.cars.others(now_ns),
+            others=self.cars.others(now_ns, motion.pose),
         )
         throttle, steering = self.trips.decide(view)
         return DriveCommand(

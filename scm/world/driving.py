@@ -62,7 +62,7 @@ def _follow(car: HostedCar, trips: Trips, now_ns: int, *, stop: bool) -> None:
         pose=car.pose,
         speed=car.speed,
         signals=car.signals,
-        others=car.others.others(now_ns),
+        others=car.others.others(now_ns, car.pose),
         stop=stop,
     )
     car.command(*trips.decide(view))

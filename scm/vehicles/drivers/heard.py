@@ -3,9 +3,11 @@
 import math
 
 from scm.clock import NS_PER_S, seconds
+from scm.geometry import Pose2
 from scm.v2x.etsi import CamBody
 from scm.v2x.etsi_convert import CamView, read_cam
 from scm.vehicles.driver import Other
+from scm.vehicles.drivers.ahead import REACH
 
 REMEMBER_NS = 3 * NS_PER_S
 LONGEST_GUESS_S = 1.0
@@ -21,8 +23,12 @@ class HeardCars:
         """Take a CAM that arrived at `arrived_ns`, on the receiver's own clock."""
         self._heard[body.station_id] = (read_cam(body), arrived_ns)
 
-    def others(self, now_ns: int) -> tuple[Other, ...]:
-        """Return where the others are believed to be now, in the order of their station ids."""
+    def others(self, now_ns: int, near: Pose2 | None = None) -> tuple[Other, ...]:
+        """Return where the others are believed to be now, in the order of their station ids.
+
+        With `near`, those that cannot be within a driver's reach of it may be left out: in a large
+        city working out where they are would cost more than all the rest of driving.
+        """
         fresh = {
             station: heard
             for station, heard in self._heard.items()
@@ -32,7 +38,14 @@ class HeardCars:
         return tuple(
             other_of(view, seconds(now_ns - arrived_ns))
             for _, (view, arrived_ns) in sorted(fresh.items())
+            if near is None or _may_be_within_reach(view, near)
         )
+
+
+def _may_be_within_reach(view: CamView, near: Pose2) -> bool:
+    farthest = REACH + view.length_m + LONGEST_GUESS_S * abs(view.speed_mps or 0.0)
+    dx, dy = view.x_m - near.x, view.y_m - near.y
+    return dx * dx + dy * dy <= farthest * farthest
 
 
 def other_of(view: CamView, age_s: float) -> Other:

@@ -5,8 +5,10 @@ import math
 import pytest
 
 from scm.clock import NS_PER_S
+from scm.geometry import Pose2
 from scm.v2x.etsi_convert import cam_of
 from scm.v2x.messages.vehicle_state import VehicleState
+from scm.vehicles.drivers.ahead import REACH
 from scm.vehicles.drivers.heard import HeardCars
 
 
@@ -69,3 +71,22 @@ def test_the_order_does_not_depend_on_who_spoke_first():
         for name in names:
             cars.hear(cam(name), 0)
     assert first.others(0) == second.others(0)
+
+
+@pytest.mark.parametrize("speed_mps", [0.0, 0.25, 5.0, -1.0])
+def test_only_cars_that_no_driver_looks_at_are_left_out_for_being_far(speed_mps):
+    here = Pose2(0.0, 0.0, 0.0)
+    for x_m in (-30.0, -2.5, -1.0, 0.0, 1.0, 2.5, 8.0, 30.0):
+        for yaw_rad in (-2.0, 0.0, 1.0, math.pi):
+            cars = HeardCars()
+            cars.hear(cam(x_m=x_m, y_m=0.5, yaw_rad=yaw_rad, speed_mps=speed_mps), 0)
+            for now_ns in (0, NS_PER_S, 3 * NS_PER_S):
+                (other,) = cars.others(now_ns)
+                left_out = cars.others(now_ns, here) == ()
+                assert not (left_out and math.hypot(other.x, other.y) < REACH)
+
+
+def test_cars_at_the_other_end_of_a_large_city_are_left_out():
+    cars = HeardCars()
+    cars.hear(cam(x_m=10.0), 0)
+    assert cars.others(0, Pose2(0.0, 0.0, 0.0)) == ()
