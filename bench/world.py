@@ -1,8 +1,8 @@
 """A tick of the world beside its limit, the 20 ms it may take, and its contact stage beside a peer.
 
 Run with `python -m bench world`, or with `python -m bench.world [cars ...]`. Cars drive rounds of
-four in walled blocks, with drivers, contacts, LIDAR, encoders, IMU and radio. The peer of the contact
-stage is pymunk as its manual shows it, poses and velocities set and read by attribute. All times
+four in walled blocks, with drivers, contacts, LIDAR, encoders, IMU and radio. The contact stage's
+peer is pymunk as its manual shows it, poses and velocities set and read by attribute. All times
 are processor times of the one thread that a world is.
 """
 

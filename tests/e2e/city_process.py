@@ -76,6 +76,15 @@ class CityProcess:
         os.kill(before, signal.SIGKILL)
         wait_for(lambda: self.pid(name) != before, 20.0, f"{name} is back")
 
+    @contextmanager
+    def frozen(self, name: str) -> Iterator[None]:
+        """Keep a part from running."""
+        os.kill(self.pid(name), signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            os.kill(self.pid(name), signal.SIGCONT)
+
     def descendants(self) -> set[int]:
         """Return the process ids of everything the city started and that still runs."""
         return {pid for pid in _pids() if _is_below(pid, self.process.pid)}
