@@ -131,7 +131,7 @@ def car_of(data: Mapping[str, Any], path: Path) -> Car:
     """
     problems: list[str] = []
     terms = _terms(data, problems)
-    values = _defaults(terms) | _values(data, problems)
+    values = _defaults(terms) | _fact_defaults(data) | _values(data, problems)
     problems += _contradictions(data, values)
     try:
         setters_of(terms)
@@ -164,6 +164,14 @@ def _defaults(terms: tuple[Term, ...]) -> dict[str, Quantity]:
     own = [("skeleton", param) for param in body14.PARAMS if not param.required]
     own += [(term.name, param) for term in terms for param in term.params]
     return {p.key: Quantity(p.default, None, p.unit, f"default of {owner}") for owner, p in own}
+
+
+def _fact_defaults(data: Mapping[str, Any]) -> dict[str, Quantity]:
+    return {
+        key: Quantity(fact.default, None, fact.unit, "default")
+        for key, fact in FACTS.items()
+        if fact.default is not None and isinstance(data.get(key.partition(".")[0]), dict)
+    }
 
 
 def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
