@@ -33,6 +33,7 @@ class Param:
         fit: False for numbers of the method, which no recording may move.
         required: A car file without this key is refused.
         about: The meaning in a few words.
+        report: Its public name, with the unit, in reports; empty where that is `name`.
     """
 
     name: str
@@ -44,3 +45,9 @@ class Param:
     prior: Normal | LogNormal | None = None
     fit: bool = True
     required: bool = False
+    report: str = ""
+
+    @property
+    def reported(self) -> str:
+        """The name that reports and results use."""
+        return self.report or self.name

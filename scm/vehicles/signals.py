@@ -21,13 +21,20 @@ class Role(Enum):
 
     INPUT = "input"  # from outside, constant during a call
     GIVEN = "given"  # the 14-degree-of-freedom skeleton
-    CHAIN = "chain"  # one term sets it; without one it passes on the signal `otherwise`
+    CHAIN = "chain"  # one term sets it; without one it passes on `otherwise`
     SUM = "sum"  # starts at 0 each substep, any number of terms add to it
+    SHAPE = "shape"  # a sum over numbers of the car alone, made once a call
 
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """One name of the vocabulary; `span` is the physical range that tests draw from."""
+    """One name of the vocabulary.
+
+    Attributes:
+        span: The physical range that tests draw from.
+        otherwise: What a chain signal is where no term sets it: another signal, or a number.
+        settles: Where a state starts when a car is placed: at its "steer" angle or "throttle".
+    """
 
     name: str
     unit: str
@@ -36,6 +43,7 @@ class Signal:
     about: str
     span: tuple[float, float] = (-10.0, 10.0)
     otherwise: str | None = None
+    settles: str = ""
 
 
 def _body(name: str, unit: str, role: Role, about: str, **more: object) -> Signal:
@@ -51,18 +59,30 @@ _ALL = (
     _body("throttle_command", "1", Role.INPUT, "asked for, + forward", span=(-1.0, 1.0)),
     _body("steering_command", "1", Role.INPUT, "asked for, + left", span=(-1.0, 1.0)),
     _body("battery", "V", Role.INPUT, "battery voltage", span=(6.0, 13.0)),
+    _body("throttle_past", "1", Role.INPUT, "asked for `drive.delay_s` ago", span=(-1.0, 1.0)),
+    _body("steering_past", "1", Role.INPUT, "asked for `steering.delay_s` ago", span=(-1.0, 1.0)),
+    _body("air_x", "m/s", Role.INPUT, "wind velocity, world x", span=(-8.0, 8.0)),
+    _body("air_y", "m/s", Role.INPUT, "wind velocity, world y", span=(-8.0, 8.0)),
     _body("x_cog", "m", Role.GIVEN, "centre of gravity in the world"),
     _body("y_cog", "m", Role.GIVEN, "centre of gravity in the world"),
     _body("z_cog", "m", Role.GIVEN, "centre of gravity above the floor's zero", span=(0.0, 0.2)),
     _body("roll", "rad", Role.GIVEN, "+ left side up", span=(-0.3, 0.3)),
     _body("pitch", "rad", Role.GIVEN, "+ nose down", span=(-0.3, 0.3)),
     _body("yaw", "rad", Role.GIVEN, "counter-clockwise from world x", span=(-3.14, 3.14)),
+    _body("cos_yaw", "1", Role.GIVEN, "of the heading", span=(-1.0, 1.0)),
+    _body("sin_yaw", "1", Role.GIVEN, "of the heading", span=(-1.0, 1.0)),
+    _body("time", "s", Role.GIVEN, "since the car was placed", span=(0.0, 1e4)),
+    _body("accel_x", "m/s^2", Role.GIVEN, "of the last substep, body x", span=(-20.0, 20.0)),
+    _body("accel_y", "m/s^2", Role.GIVEN, "of the last substep, body y", span=(-20.0, 20.0)),
     _body("vx", "m/s", Role.GIVEN, "velocity of the centre of gravity, body x", span=(-5.0, 5.0)),
     _body("vy", "m/s", Role.GIVEN, "velocity of the centre of gravity, body y", span=(-3.0, 3.0)),
     _body("vz", "m/s", Role.GIVEN, "velocity of the centre of gravity, up", span=(-1.0, 1.0)),
     _body("roll_rate", "rad/s", Role.GIVEN, "about body x"),
     _body("pitch_rate", "rad/s", Role.GIVEN, "about body y"),
     _body("yaw_rate", "rad/s", Role.GIVEN, "about z"),
+    _body("yaw_accel", "rad/s^2", Role.GIVEN, "about z, last substep", span=(-50.0, 50.0)),
+    _body("drive_omega", "rad/s", Role.GIVEN, "mean spin of the driven wheels", span=(-90.0, 90.0)),
+    # the throttle's way: command, radio, dead-band, gain, lag
     _body(
         "throttle_received",
         "1",
@@ -72,20 +92,79 @@ _ALL = (
         otherwise="throttle_command",
     ),
     _body(
+        "throttle_live",
+        "1",
+        Role.CHAIN,
+        "command beyond the dead-band",
+        span=(-1.0, 1.0),
+        otherwise="throttle_received",
+    ),
+    _body(
+        "throttle_scaled",
+        "1",
+        Role.CHAIN,
+        "command as strong as the controller takes it",
+        span=(-1.0, 1.0),
+        otherwise="throttle_live",
+    ),
+    _body(
         "throttle",
         "1",
         Role.CHAIN,
         "what the motor controller gives, + forward",
         span=(-1.0, 1.0),
-        otherwise="throttle_received",
+        otherwise="throttle_scaled",
+        settles="throttle",
+    ),
+    # the battery: charge drawn, voltage without and with load, ageing within a drive
+    _body(
+        "charge_drawn",
+        "A*s",
+        Role.CHAIN,
+        "taken from the battery since the car was placed",
+        span=(0.0, 2e4),
+        otherwise="0.0",
     ),
     _body(
-        "steering",
+        "open_circuit_voltage",
+        "V",
+        Role.CHAIN,
+        "of the battery without load",
+        span=(6.0, 13.0),
+        otherwise="battery",
+    ),
+    _body(
+        "terminal_voltage",
+        "V",
+        Role.CHAIN,
+        "of the battery under load",
+        span=(6.0, 13.0),
+        otherwise="open_circuit_voltage",
+    ),
+    _body(
+        "supply_voltage",
+        "V",
+        Role.CHAIN,
+        "what the motors get",
+        span=(6.0, 13.0),
+        otherwise="terminal_voltage",
+    ),
+    # the steering's way: command, radio, end stops, angle, gain, lag, servo, play, trim, give
+    _body(
+        "steering_received",
         "1",
         Role.CHAIN,
         "command after its way to the car, + left",
         span=(-1.0, 1.0),
         otherwise="steering_command",
+    ),
+    _body(
+        "steering",
+        "1",
+        Role.CHAIN,
+        "command within the steering's end stops, + left",
+        span=(-1.0, 1.0),
+        otherwise="steering_received",
     ),
     _body(
         "steer_demand",
@@ -96,12 +175,63 @@ _ALL = (
         otherwise="steering",
     ),
     _body(
+        "steer_scaled",
+        "rad",
+        Role.CHAIN,
+        "angle meant, as the linkage scales it, + left",
+        span=(-0.6, 0.6),
+        otherwise="steer_demand",
+    ),
+    _body(
         "steer_target",
         "rad",
         Role.CHAIN,
         "angle the servo is asked for, + left",
         span=(-0.6, 0.6),
-        otherwise="steer_demand",
+        otherwise="steer_scaled",
+        settles="steer",
+    ),
+    _body(
+        "servo_load_pace",
+        "1",
+        Role.CHAIN,
+        "servo speed that the load on the wheels leaves, over its free speed",
+        span=(0.05, 1.0),
+        otherwise="1.0",
+    ),
+    _body(
+        "servo_pace",
+        "1",
+        Role.CHAIN,
+        "servo speed over the nominal one",
+        span=(0.05, 2.0),
+        otherwise="servo_load_pace",
+    ),
+    _body(
+        "servo_angle",
+        "rad",
+        Role.CHAIN,
+        "road-wheel angle that the servo holds, + left",
+        span=(-0.6, 0.6),
+        otherwise="steer_target",
+        settles="steer",
+    ),
+    _body(
+        "linkage_angle",
+        "rad",
+        Role.CHAIN,
+        "road-wheel angle behind the linkage's play, + left",
+        span=(-0.6, 0.6),
+        otherwise="servo_angle",
+        settles="steer",
+    ),
+    _body(
+        "steer_trimmed",
+        "rad",
+        Role.CHAIN,
+        "road-wheel angle with the linkage's misalignment, + left",
+        span=(-0.6, 0.6),
+        otherwise="linkage_angle",
     ),
     _body(
         "steer_angle",
@@ -109,11 +239,30 @@ _ALL = (
         Role.CHAIN,
         "mean road-wheel angle, + left",
         span=(-0.6, 0.6),
-        otherwise="steer_target",
+        otherwise="steer_trimmed",
+        settles="steer",
     ),
+    _body(
+        "road_angle",
+        "rad",
+        Role.CHAIN,
+        "mean angle at which the front wheels meet the floor, + left",
+        span=(-0.6, 0.6),
+        otherwise="steer_angle",
+    ),
+    _body("added_mass", "kg", Role.SHAPE, "beyond the car file's mass", span=(-1.0, 5.0)),
+    _body("added_cog_x", "m", Role.SHAPE, "centre of gravity, + forward", span=(-0.05, 0.05)),
+    _body("added_cog_z", "m", Role.SHAPE, "centre of gravity, + up", span=(-0.05, 0.05)),
     _body("force_x", "N", Role.SUM, "on the body at the centre of gravity, body x"),
     _body("force_y", "N", Role.SUM, "on the body at the centre of gravity, body y"),
     _body("moment_z", "N*m", Role.SUM, "on the body about z"),
+    _wheel("floor_height", "m", Role.INPUT, "under the wheel", span=(-0.5, 0.5)),
+    _wheel("floor_slope_x", "1", Role.INPUT, "rise of the floor along world x", span=(-0.5, 0.5)),
+    _wheel("floor_slope_y", "1", Role.INPUT, "rise of the floor along world y", span=(-0.5, 0.5)),
+    _wheel("floor_grip", "1", Role.INPUT, "factor on tyre friction, 1 neutral", span=(0.05, 1.5)),
+    _wheel("floor_rolling", "1", Role.INPUT, "added to the rolling coefficient", span=(0.0, 0.2)),
+    _wheel("x_wheel", "m", Role.GIVEN, "contact point in the world"),
+    _wheel("y_wheel", "m", Role.GIVEN, "contact point in the world"),
     _wheel("front", "1", Role.GIVEN, "1 on the front axle, 0 on the rear", span=(0.0, 1.0)),
     _wheel("side", "1", Role.GIVEN, "+1 left, -1 right", span=(-1.0, 1.0)),
     _wheel("driven", "1", Role.GIVEN, "1 where a motor turns the wheel, else 0", span=(0.0, 1.0)),
@@ -158,14 +307,119 @@ _ALL = (
     ),
     _wheel("rest_load", "N", Role.GIVEN, "whole weight on this wheel at rest", span=(0.5, 20.0)),
     _wheel(
+        "motor_throttle",
+        "1",
+        Role.CHAIN,
+        "what this wheel's motor is given, + forward",
+        span=(-1.0, 1.0),
+        otherwise="throttle",
+    ),
+    _wheel(
+        "motor_heat",
+        "K",
+        Role.CHAIN,
+        "this wheel's motor above the air around it",
+        span=(0.0, 150.0),
+        otherwise="0.0",
+    ),
+    _wheel(
+        "winding_strength",
+        "1",
+        Role.CHAIN,
+        "torque that a warm winding leaves, over a cold one's",
+        span=(0.3, 1.0),
+        otherwise="1.0",
+    ),
+    _wheel(
+        "motor_strength",
+        "1",
+        Role.CHAIN,
+        "torque of this wheel's motor over its nominal one",
+        span=(0.0, 1.0),
+        otherwise="winding_strength",
+    ),
+    _wheel(
         "wheel_steer",
         "rad",
         Role.CHAIN,
         "angle of this wheel to the body, + left",
         span=(-0.8, 0.8),
-        otherwise="steer_angle",
+        otherwise="road_angle",
     ),
     _wheel("load", "N", Role.CHAIN, "floor on tyre, + up, never negative", span=(0.0, 40.0)),
+    _wheel(
+        "grip_load",
+        "N",
+        Role.CHAIN,
+        "load that the tyre's friction works with",
+        span=(0.0, 40.0),
+        otherwise="load",
+    ),
+    _wheel(
+        "grip_here",
+        "1",
+        Role.CHAIN,
+        "factor of this spot of floor on the tyre's friction",
+        span=(0.05, 2.0),
+        otherwise="floor_grip",
+    ),
+    _wheel(
+        "grip",
+        "1",
+        Role.CHAIN,
+        "factor of floor and tyre on the tyre's friction",
+        span=(0.05, 2.0),
+        otherwise="grip_here",
+    ),
+    _wheel(
+        "rolling",
+        "1",
+        Role.CHAIN,
+        "what this spot of floor adds to the coefficient of rolling resistance",
+        span=(0.0, 0.2),
+        otherwise="floor_rolling",
+    ),
+    _wheel(
+        "slip_scale",
+        "1",
+        Role.CHAIN,
+        "factor on both slips before the tyre's curve",
+        span=(0.2, 3.0),
+        otherwise="1.0",
+    ),
+    # what a tyre remembers: the slip its contact patch still carries, and how fast it forgets
+    _wheel(
+        "side_lag",
+        "1",
+        Role.CHAIN,
+        "side slip that the contact patch carries, + sliding left",
+        span=(-1.0, 1.0),
+        otherwise="0.0",
+    ),
+    _wheel(
+        "side_lag_speed",
+        "m/s",
+        Role.CHAIN,
+        "relaxation length over the substep: how much of that slip stays",
+        span=(0.0, 1e3),
+        otherwise="0.0",
+    ),
+    _wheel(
+        "spin_lag",
+        "1",
+        Role.CHAIN,
+        "spin slip that the contact patch carries, + driving",
+        span=(-1.0, 1.0),
+        otherwise="0.0",
+    ),
+    _wheel(
+        "spin_lag_speed",
+        "m/s",
+        Role.CHAIN,
+        "relaxation length over the substep: how much of that slip stays",
+        span=(0.0, 1e3),
+        otherwise="0.0",
+    ),
     _wheel("suspension_force", "N", Role.SUM, "spring and damper on the body, + up"),
     _wheel("tyre_x", "N", Role.SUM, "floor on tyre, along the wheel"),
     _wheel("tyre_y", "N", Role.SUM, "floor on tyre, + to the wheel's left"),

@@ -42,10 +42,16 @@ def situations(draw, term):
     """Draw every signal in its physical span and every parameter inside its bounds."""
     needed = {n for law in (term.law, term.damping) if law for n in reads(law)} | RATES
     if term.sets:
-        needed.add(SIGNALS[term.target].otherwise or term.target)
+        needed.add(otherwise_of(term))
     spans = {name: signal.span for name, signal in SIGNALS.items()}
     spans |= {param.name: param.bounds for param in (*body14.PARAMS, *term.params)}
+    spans |= {name: (float(name), float(name)) for name in ("0.0", "1.0")}
     return {name: draw(between(*spans[name])) for name in sorted(needed)}
+
+
+def otherwise_of(term):
+    """What the term's signal would be without it: a signal, else a number, else itself."""
+    return SIGNALS[term.target].otherwise or term.target
 
 
 def call(law, values):
@@ -131,7 +137,7 @@ def test_a_neutral_term_does_nothing(name, data):
         assert value == 0.0
         assert term.damping is None or call(term.damping, values) == 0.0
     else:
-        assert value == values[SIGNALS[term.target].otherwise]
+        assert value == values[otherwise_of(term)]
 
 
 @pytest.mark.parametrize("name", TERMS)

@@ -42,7 +42,9 @@ class Equations:
             "rest_spring_force": self.share[w] * self.sprung * GRAVITY,
             "rest_load": (self.share[w] * self.sprung + self.n["wheel_mass"]) * GRAVITY,
             "dt": 0.0,
-            "battery": self.n["battery_nominal"],
+            "supply_voltage": self.n["battery_nominal"],
+            "motor_throttle": THROTTLE,
+            "motor_strength": 1.0,
             "throttle": THROTTLE,
         }
         known = {**self.n, **wheel, **signals, **numbers}

@@ -1,6 +1,6 @@
 """Throttle lag: the motor's force follows the command through a first-order lag.
 
-    throttle += (throttle_received - throttle) * dt / (time_constant + dt)
+    throttle += (throttle_scaled - throttle) * dt / (time_constant + dt)
 
 Holds: one dominant time constant.   Shows in: throttle steps.
 Source: Lorenzo-Lyons/DART, vehicle model (throttle time constant).
@@ -12,10 +12,10 @@ from scm.vehicles.term import Per, Term
 
 
 @law
-def drive_lag(throttle_received: float, throttle: float, time_constant: float, dt: float) -> float:
+def drive_lag(throttle_scaled: float, throttle: float, time_constant: float, dt: float) -> float:
     """Throttle at the substep's end, + forward; exactly the command without lag."""
     share = dt / (time_constant + dt)
-    return share * throttle_received + (1.0 - share) * throttle
+    return share * throttle_scaled + (1.0 - share) * throttle
 
 
 TERM = Term(
@@ -27,6 +27,6 @@ TERM = Term(
     shows_in=("throttle_step",),
     params=(
         Param("time_constant", 0.0, "s", "drive.lag_s", (0.0, 2.0),
-              "63 % of a step", LogNormal(0.05, 0.8)),
+              "63 % of a step", LogNormal(0.05, 0.8), report="time_constant_s"),
     ),
 )  # fmt: skip

@@ -1,7 +1,7 @@
 """DC motors of a driven axle: torque falls with speed, and with the battery.
 
-    wheel_torque += driven * stall_torque * (throttle * charge - n / no_load_speed)
-    charge = battery / battery_nominal
+    wheel_torque += driven * stall_torque * motor_strength * (u - n / no_load_speed)
+    u = motor_throttle * supply_voltage / battery_nominal
     n = axle_omega + axle_lock * (omega - axle_omega)
 
 Both wheels of an axle get the torque of its mean speed, as behind a differential (axle_lock = 0).
@@ -18,20 +18,23 @@ from scm.vehicles.term import Per, Term
 
 @law
 def motor_dc(
-    throttle: float, battery: float, omega: float, axle_omega: float, driven: float,
-    stall_torque: float, no_load_speed: float, battery_nominal: float, axle_lock: float,
+    motor_throttle: float, supply_voltage: float, motor_strength: float, omega: float,
+    axle_omega: float, driven: float, stall_torque: float, no_load_speed: float,
+    battery_nominal: float, axle_lock: float,
 ) -> float:  # fmt: skip
     """Torque on the wheel, + forward [N*m]."""
     felt = axle_omega + axle_lock * (omega - axle_omega)
-    return driven * stall_torque * (throttle * battery / battery_nominal - felt / no_load_speed)
+    u = motor_throttle * supply_voltage / battery_nominal
+    return driven * stall_torque * motor_strength * (u - felt / no_load_speed)
 
 
 @law
 def motor_dc_damping(
-    driven: float, stall_torque: float, no_load_speed: float, axle_lock: float
-) -> float:
+    motor_strength: float, driven: float, stall_torque: float, no_load_speed: float,
+    axle_lock: float,
+) -> float:  # fmt: skip
     """Back EMF: torque lost per own wheel speed [N*m*s]."""
-    return driven * stall_torque / no_load_speed * 0.5 * (1.0 + axle_lock)
+    return driven * stall_torque * motor_strength / no_load_speed * 0.5 * (1.0 + axle_lock)
 
 
 TERM = Term(

@@ -1,10 +1,12 @@
 """Steering servo: follows its target no faster than its rate.
 
-    steer_angle += clip(steer_target - steer_angle, -rate * dt, rate * dt)    [rad]
+    servo_angle += clip(steer_target - servo_angle, -step, step),  step = rate * servo_pace * dt
 
-Holds: servo that is strong against the tyres.   Shows in: steering steps.
+Holds: one speed; what load leaves of it is servo_pace.   Shows in: steering steps.
 Source: AutoDRIVE paper, steering (rate limit).
 """
+
+import math
 
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
@@ -12,18 +14,19 @@ from scm.vehicles.term import Per, Term
 
 
 @law
-def servo(steer_target: float, steer_angle: float, rate: float, dt: float) -> float:
-    """Mean road-wheel angle at the substep's end, + left [rad]."""
-    step = rate * dt
-    if abs(steer_target - steer_angle) <= step:
-        return steer_target
-    return steer_angle + step if steer_target > steer_angle else steer_angle - step
+def servo(
+    steer_target: float, servo_angle: float, servo_pace: float, rate: float, dt: float
+) -> float:
+    """Road-wheel angle that the servo holds at the substep's end, + left [rad]."""
+    step = rate * servo_pace * dt
+    moved = servo_angle + math.copysign(step, steer_target - servo_angle)
+    return steer_target if abs(steer_target - servo_angle) <= step else moved
 
 
 TERM = Term(
     servo,
     per=Per.BODY,
-    sets="steer_angle",
+    sets="servo_angle",
     keeps=0.0,
     neutral={"rate": 1e6},
     shows_in=("steering_step",),

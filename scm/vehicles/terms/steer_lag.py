@@ -1,6 +1,6 @@
 """Steering lag: the wheels' angle follows its demand through a first-order lag.
 
-    steer_target += (steer_demand - steer_target) * dt / (time_constant + dt)    [rad]
+    steer_target += (steer_scaled - steer_target) * dt / (time_constant + dt)    [rad]
 
 Holds: one dominant time constant.   Shows in: steering steps.
 Source: Lorenzo-Lyons/DART, vehicle model (steering time constant).
@@ -12,10 +12,10 @@ from scm.vehicles.term import Per, Term
 
 
 @law
-def steer_lag(steer_demand: float, steer_target: float, time_constant: float, dt: float) -> float:
+def steer_lag(steer_scaled: float, steer_target: float, time_constant: float, dt: float) -> float:
     """Angle that the servo is asked for at the substep's end, + left [rad]."""
     share = dt / (time_constant + dt)
-    return share * steer_demand + (1.0 - share) * steer_target
+    return share * steer_scaled + (1.0 - share) * steer_target
 
 
 TERM = Term(
@@ -27,6 +27,6 @@ TERM = Term(
     shows_in=("steering_step",),
     params=(
         Param("time_constant", 0.0, "s", "steering.lag_s", (0.0, 2.0),
-              "63 % of a step", LogNormal(0.05, 0.8)),
+              "63 % of a step", LogNormal(0.05, 0.8), report="time_constant_s"),
     ),
 )  # fmt: skip

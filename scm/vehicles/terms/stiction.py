@@ -26,6 +26,6 @@ TERM = Term(
     shows_in=("throttle_ramp", "coast_down"),
     params=(
         Param("torque", 0.0, "N*m", "drive.coulomb_torque_nm", (0.0, 5.0),
-              "per driven wheel", LogNormal(0.01, 1.0)),
+              "per driven wheel", LogNormal(0.01, 1.0), report="torque_nm"),
     ),
 )  # fmt: skip

@@ -31,8 +31,8 @@ def test_two_setters_of_a_signal_are_refused_by_name():
     def other_servo(steer_target: float) -> float:
         return steer_target
 
-    with pytest.raises(TermError, match="servo and other_servo both set steer_angle"):
-        setters_of([*STANDARD, of(other_servo, sets="steer_angle")])
+    with pytest.raises(TermError, match="servo and other_servo both set servo_angle"):
+        setters_of([*STANDARD, of(other_servo, sets="servo_angle")])
 
 
 def test_a_signal_that_nobody_sets_is_refused():
@@ -79,8 +79,8 @@ def test_effects_that_wait_for_each_other_are_named():
 
 def test_an_unset_signal_passes_on_the_one_before():
     page = write_page("nigel", STANDARD)
-    assert "throttle = throttle_received" in page
-    assert page.index("throttle = throttle_received") < page.index("motor_dc(")
+    assert "throttle_live = throttle_received" in page
+    assert page.index("throttle_live = throttle_received") < page.index("motor_dc(")
 
 
 def test_a_term_left_out_leaves_no_trace():
