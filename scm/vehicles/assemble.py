@@ -4,7 +4,7 @@ Terms are sorted by what they read and set, ties by name, so sums keep their ord
 fit together is refused by name: unknown names, two setters, a missing one, a circle.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 
 from scm.errors import TermError, nearest
@@ -118,6 +118,15 @@ def _stage(terms: Sequence[Term], per: Per, setters: dict[str, Term]) -> Iterato
             yield f"{name} = {SIGNALS[name].otherwise}"
 
 
+def _given(terms: Sequence[Term], slots: Mapping[str, tuple[int, int]]) -> Iterator[str]:
+    """Yield what the skeleton gives to those effects only that read it."""
+    asked = {name for term in terms for name in reads(term.law)}
+    if "drive_omega" in asked:
+        spin = [f"car[{slots['wheel_speed'][0]} + {w}]" for w in range(4)]
+        both = f"front_driven * ({spin[0]} + {spin[1]}) + rear_driven * ({spin[2]} + {spin[3]})"
+        yield f"drive_omega = ({both}) / max(2.0 * (front_driven + rear_driven), 1.0)"
+
+
 def write_page(car_name: str, terms: Sequence[Term]) -> str:
     """Return the text of a car's kernel.
 
@@ -131,14 +140,15 @@ def write_page(car_name: str, terms: Sequence[Term]) -> str:
     held += ["steer_angle", *(n for n in sorted(kept) if n != "steer_angle")]
     laws = sorted({(t.module, law.__name__) for t in terms for law in (t.law, t.damping) if law})
     load = [f"{c.variable} = parameters[row, {i}]" for i, c in enumerate(columns_of(terms))]
-    load += [f"{n} = car[{slots[n][0]}]" for n in [*held, *(n for n, _ in body14.INPUTS)]]
+    inputs = [n for n, width in body14.INPUTS if width == 1]
+    load += [f"{n} = car[{slots[n][0]}]" for n in [*held, *inputs]]
     load += [f"{n} = min(max({n}, -1.0), 1.0)" for n in ("throttle_command", "steering_command")]
     return page.PAGE.format(
         title=f"Kernel of the car {car_name!r}: {len(terms)} effects on 14 degrees of freedom.",
         imports="\n".join(f"from {module} import {law}" for module, law in laws),
         gravity=body14.GRAVITY,
         load=_indent(load, 8),
-        body_terms=_indent(_stage(terms, Per.BODY, setters), 12),
+        body_terms=_indent([*_given(terms, slots), *_stage(terms, Per.BODY, setters)], 12),
         wheel_terms=_indent(_stage(terms, Per.WHEEL, setters), 16),
         store=_indent([f"car[{slots[n][0]}] = {n}" for n in held], 8),
         **{name: offset for name, (offset, _) in slots.items()},

@@ -54,23 +54,21 @@ STATES = (
     ("x_cog", 1), ("y_cog", 1), ("z_cog", 1), ("roll", 1), ("pitch", 1), ("yaw", 1),
     ("vx_world", 1), ("vy_world", 1), ("vz", 1),
     ("roll_rate", 1), ("pitch_rate", 1), ("yaw_rate", 1),
-    ("hop", 4), ("hop_rate", 4), ("wheel_speed", 4), ("wheel_angle", 4),
+    ("time", 1), ("hop", 4), ("hop_rate", 4), ("wheel_speed", 4), ("wheel_angle", 4),
 )  # fmt: skip
-INPUTS = (("throttle_command", 1), ("steering_command", 1), ("battery", 1))
+INPUTS = (
+    ("throttle_command", 1), ("steering_command", 1), ("throttle_past", 1), ("steering_past", 1),
+    ("battery", 1), ("air_x", 1), ("air_y", 1), ("floor_height", 4), ("floor_slope_x", 4),
+    ("floor_slope_y", 4), ("floor_grip", 4), ("floor_rolling", 4),
+)  # fmt: skip
 OUTPUTS = (
     ("x", 1), ("y", 1), ("z", 1), ("speed", 1), ("lateral_speed", 1),
     ("accel_x", 1), ("accel_y", 1), ("accel_z", 1),
     ("roll_accel", 1), ("pitch_accel", 1), ("yaw_accel", 1),
     ("steer_angle", 1),
-    ("wheel_steer", 4), ("wheel_load", 4),
+    ("wheel_steer", 4), ("wheel_load", 4), ("wheel_x", 4), ("wheel_y", 4),
 )  # fmt: skip
 SCRATCH_SHAPE = (6, 10)  # rows 0-3: one wheel each; 4: sums over hops; 5: over contact points
-
-
-@law
-def ground_height(x: float, y: float) -> float:
-    """Floor height under a wheel [m]: level; the one place where a height map would enter."""
-    return 0.0 * (x + y)
 
 
 @law

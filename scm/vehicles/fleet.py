@@ -16,6 +16,7 @@ from scm.vehicles.body14 import GRAVITY, STATUS_DIVERGED, STATUS_OK
 from scm.vehicles.car import Car
 from scm.vehicles.kernel_file import compile_kernel
 from scm.vehicles.layout import columns_of, find_column, slots_of
+from scm.vehicles.signals import SIGNALS
 
 SUBSTEP_S = 1e-3
 
@@ -45,6 +46,17 @@ class Fleet:
             full, and a command that is no number freezes the car, marked DIVERGED.
         steering: Likewise, + left.
         battery: Battery voltage [V], shape (capacity,); write here.
+        air_x, air_y: Wind velocity in the world [m/s], shape (capacity,); write here. 0 is still.
+        floor_height, floor_slope_x, floor_slope_y: Floor under each wheel [m] and its rise along
+            world x and y [1], shape (capacity, 4); write here. The kernel carries the height along
+            the slope, so it stays that of the wheel's place until written anew.
+        floor_grip, floor_rolling: Factor on tyre friction, and what the floor adds to the rolling
+            coefficient [1], shape (capacity, 4); write here. Adding or placing a car makes its
+            floor level and of grip 1, its air still.
+        wheel_x, wheel_y: Contact points in the world, (capacity, 4) [m].
+        time: Since the car was placed [s], shape (capacity,); may be written.
+        impact_x, impact_y, impact_yaw: What contacts added to the acceleration over the last tick,
+            level body frame [m/s^2, rad/s^2], shape (capacity,); written by who finds the contacts.
         alive: Rows in use, shape (capacity,).
         status: `VehicleStatus` of each row, shape (capacity,).
         x, y, z, roll, pitch, yaw: Rear-axle pose in the world [m, rad]; yaw in (-pi, pi]. The
@@ -76,10 +88,19 @@ class Fleet:
             self._view("steering_command"),
         )
         self.battery = self._view("battery")
+        self.air_x, self.air_y = self._view("air_x"), self._view("air_y")
+        self.floor_height = self._view("floor_height")
+        self.floor_slope_x = self._view("floor_slope_x")
+        self.floor_slope_y = self._view("floor_slope_y")
+        self.floor_grip = self._view("floor_grip")
+        self.floor_rolling = self._view("floor_rolling")
+        self.time = self._view("time")
+        self.impact_x, self.impact_y, self.impact_yaw = np.zeros((3, capacity))
         for name in (
             "x", "y", "z", "roll", "pitch", "yaw", "speed", "lateral_speed", "yaw_rate",
             "roll_rate", "pitch_rate", "accel_x", "accel_y", "accel_z", "roll_accel", "pitch_accel",
             "yaw_accel", "steer_angle", "wheel_speed", "wheel_angle", "wheel_steer", "wheel_load",
+            "wheel_x", "wheel_y",
         ):  # fmt: skip
             view = self._view(name)
             view.flags.writeable = False
@@ -108,6 +129,8 @@ class Fleet:
     wheel_angle: Floats
     wheel_steer: Floats
     wheel_load: Floats
+    wheel_x: Floats
+    wheel_y: Floats
 
     def add(self, pose: Pose2, speed: float = 0.0) -> int:
         """Put a car on the floor with its rear axle at `pose`, settled and rolling; return its row.
@@ -163,10 +186,13 @@ class Fleet:
         self._set(row, "vy_world", s * speed + c * across)
         self._set(row, "yaw_rate", yaw_rate)
         self._set(row, "battery", self._nominal_battery(row))
-        settled = {"steer_target": steer_angle, "steer_angle": steer_angle, "throttle": throttle}
+        self._set(row, "floor_grip", 1.0)
+        self.impact_x[row] = self.impact_y[row] = self.impact_yaw[row] = 0.0
+        settled = {"steer": steer_angle, "throttle": throttle}
         for term in self.car.terms:
             if term.keeps is not None:
-                self._set(row, term.target, settled.get(term.target) or term.keeps)
+                start = settled.get(SIGNALS[term.target].settles)
+                self._set(row, term.target, start or term.keeps)
         self._set(row, "steer_angle", steer_angle or 0.0)
         for name in kept if keep_actuators else ():
             self._set(row, name, kept[name])

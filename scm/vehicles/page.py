@@ -22,7 +22,6 @@ from scm.vehicles.body14 import (
     corner_height,
     eliminate_hop,
     eliminate_spin,
-    ground_height,
     start_sums,
 )
 from scm.vehicles.jit import fleet_kernel
@@ -92,15 +91,25 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
                     - corner_height(z_cog - cog_height, roll, pitch, wheel_x, wheel_y)
                     + dt * compression_rate
                 )
-                floor = ground_height(
-                    x_cog + cos_yaw * wheel_x - sin_yaw * wheel_y,
-                    y_cog + sin_yaw * wheel_x + cos_yaw * wheel_y,
-                )
-                tyre_deflection_rate = -hop_rate
-                tyre_deflection = floor - hop + dt * tyre_deflection_rate
+                x_wheel = x_cog + cos_yaw * wheel_x - sin_yaw * wheel_y
+                y_wheel = y_cog + sin_yaw * wheel_x + cos_yaw * wheel_y
+                floor_height = car[{floor_height} + w]
+                floor_slope_x = car[{floor_slope_x} + w]
+                floor_slope_y = car[{floor_slope_y} + w]
+                floor_grip = car[{floor_grip} + w]
+                floor_rolling = car[{floor_rolling} + w]
+                floor_height += floor_slope_x * (x_wheel - car[{wheel_x} + w])
+                floor_height += floor_slope_y * (y_wheel - car[{wheel_y} + w])
+                car[{floor_height} + w] = floor_height
+                car[{wheel_x} + w] = x_wheel
+                car[{wheel_y} + w] = y_wheel
+                slope_x = cos_yaw * floor_slope_x + sin_yaw * floor_slope_y
+                slope_y = cos_yaw * floor_slope_y - sin_yaw * floor_slope_x
                 over_x, over_y = contact_velocity(
                     vx, vy, roll_rate, pitch_rate, yaw_rate, wheel_x, wheel_y, cog_height
                 )
+                tyre_deflection_rate = slope_x * over_x + slope_y * over_y - hop_rate
+                tyre_deflection = floor_height - hop + dt * tyre_deflection_rate
                 suspension_force = 0.0
                 tyre_x = 0.0
                 tyre_y = 0.0
@@ -127,6 +136,9 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
                     scratch, w, wheel_x, wheel_y, cos_steer, sin_steer,
                     long, stiff_long, tyre_y, tyre_y_damping
                 )
+                force_x -= load * slope_x
+                force_y -= load * slope_y
+                moment_z -= load * (wheel_x * slope_y - wheel_y * slope_x)
                 car[{wheel_load} + w] = load
                 car[{wheel_steer} + w] = wheel_steer
 
@@ -170,6 +182,7 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
             roll += dt * roll_rate
             pitch += dt * pitch_rate
             yaw += dt * yaw_rate
+            time += dt
 
         if not (
             abs(vx_world) + abs(vy_world) + abs(vz) < 1e3
@@ -198,6 +211,17 @@ def advance(block, parameters, alive, status, first, last, steps, dt):
             cos_yaw * vx_world + sin_yaw * vy_world, cos_yaw * vy_world - sin_yaw * vx_world,
             roll_rate, pitch_rate, yaw_rate, -cog_to_rear_axle, 0.0, cog_height
         )
+        for w in range(4):
+            wheel_x = front_x if w < 2 else -cog_to_rear_axle
+            wheel_y = 0.5 * track if w % 2 == 0 else -0.5 * track
+            x_wheel = x_cog + cos_yaw * wheel_x - sin_yaw * wheel_y
+            y_wheel = y_cog + sin_yaw * wheel_x + cos_yaw * wheel_y
+            if steps > 0:
+                car[{floor_height} + w] += car[{floor_slope_x} + w] * (
+                    x_wheel - car[{wheel_x} + w]
+                ) + car[{floor_slope_y} + w] * (y_wheel - car[{wheel_y} + w])
+            car[{wheel_x} + w] = x_wheel
+            car[{wheel_y} + w] = y_wheel
         car[{x}] = x_cog - cos_yaw * back - sin_yaw * left
         car[{y}] = y_cog - sin_yaw * back + cos_yaw * left
         car[{z}] = z_cog - cog_height + pitch * cog_to_rear_axle
