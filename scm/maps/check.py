@@ -8,6 +8,7 @@ import msgspec
 
 from scm.errors import nearest
 from scm.geometry import wrap_angle
+from scm.maps.floor_check import floor_problems
 from scm.maps.model import CityMap, Segment
 from scm.maps.route import LanePath
 
@@ -17,9 +18,9 @@ SIGN_KINDS = ("left_curve", "right_curve", "stop", "give_way")
 
 _POSITIVE = {
     "width_m", "length_m", "radius_m", "height_m", "size_m", "speed_limit_mps", "radio_range_m",
-    "z_m", "width_px", "height_px", "fx_px", "fy_px", "rate_hz",
+    "z_m", "width_px", "height_px", "fx_px", "fy_px", "rate_hz", "mass_kg", "gust_s", "m_per_grey",
 }  # fmt: skip
-_NOT_NEGATIVE = {"thickness_m", "noise_sigma", "tag_id", "first_vehicle_tag_id"}
+_NOT_NEGATIVE = {"thickness_m", "noise_sigma", "tag_id", "first_vehicle_tag_id", "friction"}
 
 
 def problems_of(city_map: CityMap) -> list[str]:
@@ -28,7 +29,7 @@ def problems_of(city_map: CityMap) -> list[str]:
     Checks that need the lanes' geometry are made only if the numbers and segments are right.
     """
     found = [*_numbers(city_map, ""), *_segments(city_map)]
-    for check in (_unique, _outlines, _references, _spawns, _signs):
+    for check in (_unique, _outlines, floor_problems, _references, _spawns, _signs):
         found += check(city_map)
     if not found:
         paths = {lane.name: LanePath(lane) for lane in city_map.lanes}
@@ -95,6 +96,10 @@ def _unique(city_map: CityMap) -> Iterator[str]:
         ("junctions", "number", junctions),
         ("lights", "light_id", city_map.lights),
         ("signs", "sign_id", city_map.signs),
+    ]
+    named += [
+        (f"floor.{key}", "name", getattr(city_map.floor, key))
+        for key in ("patches", "ramps", "plates")
     ]
     for index, junction in enumerate(junctions):
         for attribute in ("name", "number"):

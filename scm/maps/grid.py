@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from scm.arrays import Bools, Floats
 from scm.errors import MapError
@@ -58,7 +59,7 @@ def load_occupancy(yaml_path: str | Path) -> OccupancyGrid:
     if not isinstance(origin, list) or len(origin) != 3:
         raise MapError(f"{path}: origin: expected [x, y, yaw], got {origin!r}")
     corner = Pose2(*(_number(path, f"origin[{i}]", value) for i, value in enumerate(origin)))
-    grey = _read_pgm(path.parent / str(info["image"])) / 255.0
+    grey = _grey(path.parent / str(info["image"]))
     taken = grey if info.get("negate", 0) else 1.0 - grey
     upward = taken[::-1]
     return OccupancyGrid(
@@ -92,8 +93,18 @@ def _number(path: Path, key: str, value: object) -> float:
     return float(value)
 
 
-def _read_pgm(path: Path) -> Floats:
-    """Return a grey picture, shape (rows, columns) from the top, scaled to 0..255."""
+def _grey(path: Path) -> Floats:
+    """Return a picture's grey, 0 black to 1 white, from the top."""
+    pixels = read_pgm(path)
+    return np.asarray(pixels / np.iinfo(pixels.dtype).max, dtype=np.float64)
+
+
+def read_pgm(path: Path) -> NDArray[Any]:
+    """Return a grey picture, shape (rows, columns) from the top, white at the type's full scale.
+
+    Raises:
+        MapError: The file is missing, or no PGM picture.
+    """
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -102,12 +113,17 @@ def _read_pgm(path: Path) -> Floats:
     if header is None:
         raise MapError(f"{path}: expected a PGM picture (P2 or P5), got {data[:8]!r}")
     width, height, top = (int(header[i]) for i in (2, 3, 4))
-    if not 0 < top < 256:
-        raise MapError(f"{path}: expected a largest grey value of 1 to 255, got {top}")
+    if not 0 < top < 65536:
+        raise MapError(f"{path}: expected a largest grey value of 1 to 65535, got {top}")
     body = data[header.end() :]
+    depth = np.dtype(">u2") if top > 255 else np.dtype("u1")
     if header[1] == b"P2":
-        body = bytes(min(int(word), 255) for word in body.split() if word.isdigit())
-    if len(body) < width * height:
-        raise MapError(f"{path}: expected {width} x {height} pixels, got {len(body)}")
-    pixels = np.frombuffer(body, np.uint8, width * height).reshape(height, width)
-    return np.asarray(pixels * (255.0 / top), dtype=np.float64)
+        words = [min(int(word), top) for word in body.split() if word.isdigit()]
+        body = np.array(words, depth).tobytes()
+    if len(body) < width * height * depth.itemsize:
+        got = len(body) // depth.itemsize
+        raise MapError(f"{path}: expected {width} x {height} pixels, got {got}")
+    pixels: NDArray[Any] = np.frombuffer(body, depth, width * height).reshape(height, width)
+    full = 65535 if top > 255 else 255
+    scaled: NDArray[Any] = np.rint(pixels * (full / top)).astype(depth.newbyteorder("="))
+    return scaled

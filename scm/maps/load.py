@@ -10,6 +10,7 @@ import scm
 from scm.errors import MapError, nearest
 from scm.maps import model
 from scm.maps.check import problems_of
+from scm.maps.grey import read_grey
 from scm.maps.model import CityMap
 from scm.maps.occupancy import map_from_occupancy
 
@@ -51,7 +52,7 @@ def load_map(name_or_path: str | Path) -> CityMap:
     path = _find(name_or_path)
     if path.suffix in {".yaml", ".yml"}:
         return map_from_occupancy(path)
-    city_map = _read(path)
+    city_map = _with_pictures(_read(path), path)
     problems = problems_of(city_map)
     if problems:
         listed = "".join(f"\n  {problem}" for problem in problems)
@@ -86,6 +87,22 @@ def _read(path: Path) -> CityMap:
         return msgspec.convert(data, CityMap)
     except msgspec.ValidationError as error:
         raise MapError(f"{path}: {_in_plain_words(str(error), data)}") from error
+
+
+def _with_pictures(city_map: CityMap, path: Path) -> CityMap:
+    """Return the map with the grey values of the pictures it names: they lie beside its file."""
+    floor = city_map.floor
+    for key in ("friction_map", "height_map"):
+        picture = getattr(floor, key)
+        if picture is None:
+            continue
+        try:
+            samples = read_grey(path.parent / picture.image)
+        except MapError as error:
+            raise MapError(f"{path}: floor.{key}.image: {error}") from error
+        picture = msgspec.structs.replace(picture, samples=samples)
+        floor = msgspec.structs.replace(floor, **{key: picture})
+    return city_map if floor is city_map.floor else msgspec.structs.replace(city_map, floor=floor)
 
 
 def _in_plain_words(message: str, data: object) -> str:

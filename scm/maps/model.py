@@ -16,12 +16,134 @@ class Record(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     """Base of everything in a map file: unknown keys are refused."""
 
 
+class Samples(Record, kw_only=True, frozen=True):
+    """The grey values of a picture that a map names; the loader puts them in, for the map travels.
+
+    Attributes:
+        kind: What a value is: `uint8`, `uint16` or `float32`, little-endian.
+        packed: The values, row by row from the top, deflated.
+    """
+
+    rows: int
+    columns: int
+    kind: Literal["uint8", "uint16", "float32"]
+    packed: bytes
+
+
+class FrictionMap(Record, kw_only=True, frozen=True):
+    """A grey picture of how the floor holds: between black and white it is interpolated.
+
+    Attributes:
+        image: PNG or PGM file beside the map file.
+        x_m: What the whole picture covers; likewise `y_m`. Around it the floor's own values hold.
+        grip: Factor on the tyres' friction where it is black, and where it is white.
+        rolling: Likewise, coefficient of rolling resistance on top of the tyres' own.
+    """
+
+    image: str
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+    grip: tuple[float, float] = (0.0, 1.0)
+    rolling: tuple[float, float] = (0.0, 0.0)
+    samples: Samples | None = None
+
+
+class HeightMap(Record, kw_only=True, frozen=True):
+    """A picture of hills and hollows; outside it the floor goes on as at its rim.
+
+    Attributes:
+        image: PNG, PGM (8 or 16 bit) or NPY file beside the map file.
+        m_per_grey: Height of one grey value, or of a value of 1 in an NPY file.
+        zero_grey: The value at height 0.
+    """
+
+    image: str
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+    m_per_grey: float
+    zero_grey: float = 0.0
+    samples: Samples | None = None
+
+
+class Patch(Record, kw_only=True, frozen=True):
+    """A piece of other floor: circle, rectangle or polygon; a later one lies on an earlier one.
+
+    Attributes:
+        grip: Factor on the tyres' friction.
+        rolling: Coefficient of rolling resistance on top of the tyres' own.
+    """
+
+    name: str
+    grip: float = 1.0
+    rolling: float = 0.0
+    x_m: float | None = None
+    y_m: float | None = None
+    yaw_rad: float = 0.0
+    radius_m: float | None = None
+    length_m: float | None = None
+    width_m: float | None = None
+    points: tuple[Point, ...] = ()
+
+
+class Ramp(Record, kw_only=True, frozen=True):
+    """A plane that rises along `yaw_rad` from one height to another; centre and size [m]."""
+
+    name: str
+    x_m: float
+    y_m: float
+    yaw_rad: float = 0.0
+    length_m: float
+    width_m: float
+    from_m: float = 0.0
+    to_m: float
+
+
+class Plate(Record, kw_only=True, frozen=True):
+    """A level piece of floor with an edge to be driven over: a rectangle or a convex polygon."""
+
+    name: str
+    height_m: float
+    x_m: float | None = None
+    y_m: float | None = None
+    yaw_rad: float = 0.0
+    length_m: float | None = None
+    width_m: float | None = None
+    points: tuple[Point, ...] = ()
+
+
 class Floor(Record, kw_only=True, frozen=True):
-    """The ground plate: a rectangle [m]."""
+    """The ground plate: a rectangle [m], and how it holds, rolls and rises.
+
+    Attributes:
+        grip: Factor on the tyres' friction everywhere that nothing else is said.
+        rolling: Likewise, coefficient of rolling resistance on top of the tyres' own.
+    """
 
     x_m: tuple[float, float]
     y_m: tuple[float, float]
     colour: str = "#5f6368"
+    grip: float = 1.0
+    rolling: float = 0.0
+    friction_map: FrictionMap | None = None
+    height_map: HeightMap | None = None
+    patches: tuple[Patch, ...] = ()
+    ramps: tuple[Ramp, ...] = ()
+    plates: tuple[Plate, ...] = ()
+
+
+class Wind(Record, kw_only=True, frozen=True):
+    """The air over the whole map.
+
+    Attributes:
+        x_mps: Where it blows to, along map x; likewise `y_mps`.
+        gust_mps: Standard deviation of its gusts, along x and along y.
+        gust_s: How long a gust lasts.
+    """
+
+    x_mps: float = 0.0
+    y_mps: float = 0.0
+    gust_mps: float = 0.0
+    gust_s: float = 1.0
 
 
 class MapTag(Record, kw_only=True, frozen=True):
@@ -162,7 +284,12 @@ class Wall(Record, kw_only=True, frozen=True):
 
 
 class Box(Record, kw_only=True, frozen=True):
-    """A construction box on the floor."""
+    """A construction box on the floor.
+
+    Attributes:
+        mass_kg: Of one that cars can push; without it nobody moves the box.
+        friction: Between the box and the floor.
+    """
 
     name: str
     x_m: float
@@ -171,6 +298,8 @@ class Box(Record, kw_only=True, frozen=True):
     length_m: float
     width_m: float
     height_m: float = 0.2
+    mass_kg: float | None = None
+    friction: float = 0.5
 
 
 class Spawn(Record, kw_only=True, frozen=True):
@@ -219,6 +348,7 @@ class CityMap(Record, kw_only=True, frozen=True):
     source: str
     revision: int = 1
     floor: Floor
+    wind: Wind = Wind()
     tag: MapTag
     first_vehicle_tag_id: int = 1
     lanes: tuple[Lane, ...] = ()
