@@ -20,6 +20,7 @@ from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
@@ -90,6 +91,7 @@ class AgentPart:
             Contact: self._on_contact,
             DriveCommand: self._on_command,
             RouteRequest: self._on_route,
+            LightRequest: self._on_lights,
         }
         self.hears: Sequence[Hears] = (
             Hears(WorldDefinition),
@@ -101,7 +103,7 @@ class AgentPart:
             Hears(Contact, own),
             Hears(DriveCommand, own),
         )
-        self.serves: Sequence[Serves] = (Serves(RouteRequest, own),)
+        self.serves: Sequence[Serves] = (Serves(RouteRequest, own), Serves(LightRequest, own))
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Hear, drive, report."""
@@ -203,6 +205,7 @@ class AgentPart:
         if isinstance(message, DriveCommand) and self._stay is not None:
             newer = message.epoch > self._link.epoch
             if newer and self._stay.guard.take(message, item.t_ns):
+                self._stay.told(message.headlights, message.indicators)
                 self._link.give_way()
         return []
 
@@ -223,6 +226,20 @@ class AgentPart:
             return self._stay.begin(request, now_ns)
         except MapError as error:
             return Refused(code="invalid", detail=str(error))
+
+    def _on_lights(self, item: Incoming) -> list[Outgoing]:
+        request = item.message
+        if not isinstance(request, LightRequest):
+            return []
+        return [Answer(item, self._lights(request))]
+
+    def _lights(self, request: LightRequest) -> Message:
+        if self._stay is None:
+            return Refused(code="offline", detail=f"{self.name} is not in the city")
+        if self._link.standing == "foreign":
+            return Refused(code="owned", detail=f"{self.name} is driven by somebody else")
+        told = self._stay.told(request.headlights, request.indicators)
+        return LightReply(vehicle=self.name, headlights=told.headlights, indicators=told.indicators)
 
     def _status(self, now_ns: int) -> list[Outgoing]:
         if self._status_ns is not None and now_ns - self._status_ns < NS_PER_S:

@@ -16,9 +16,9 @@ from scm.vehicles.driver import RouteView
 from scm.vehicles.drivers.heard import HeardCars
 from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.guard import Guard, Guarded
+from scm.vehicles.lights import OFF, Headlights, Indicators, Switches, lamps
 from scm.vehicles.signal_view import SignalView
 from vehicle_agent.body import Body
-from vehicle_agent.lights import lights
 
 
 class Stay:
@@ -29,6 +29,7 @@ class Stay:
         cars: What it knows of the others.
         guard: Between every commander and the body.
         trips: Where it is sent.
+        switches: How its headlights and indicators are switched.
     """
 
     def __init__(
@@ -44,12 +45,18 @@ class Stay:
         self.cars = HeardCars()
         self.guard = Guard(epoch)
         self.trips = Trips(vehicle, Roads(city_map), body.limits, body.motion().pose, now_ns)
+        self.switches = OFF
         self._cam = CamTrigger()
         self._seq = 0
 
     def begin(self, request: RouteRequest, now_ns: int) -> RouteReply:
         """Send the car on a trip; MapError when the lanes do not allow it."""
         return self.trips.begin(request, self._body.motion().pose, now_ns)
+
+    def told(self, headlights: Headlights | None, indicators: Indicators | None) -> Switches:
+        """Switch the lights, None leaves one as it is; return how they stand."""
+        self.switches = self.switches.told(headlights, indicators)
+        return self.switches
 
     def step(self, now_ns: int, epoch: int | None) -> list[Outgoing]:
         """Drive and report.
@@ -112,6 +119,8 @@ class Stay:
             source=motion.source,
             epoch=self.guard.epoch,
             mode="stop" if guarded.mode == "lost" else guarded.mode,
-            lights=lights(guarded, motion.speed, now_ns),
+            lights=lamps(
+                self.switches, guarded.throttle, motion.speed, now_ns, hazard=guarded.hazard
+            ),
             car=self._car,
         )

@@ -51,7 +51,8 @@ def _command(world: World, command: DriveCommand, now_ns: int) -> None:
     if car.lease.is_at_home or command.epoch != car.lease.epoch:
         world.ignored += 1
         return
-    car.guard.take(command, now_ns)
+    if car.guard.take(command, now_ns):
+        car.switches = car.switches.told(command.headlights, command.indicators)
 
 
 def _frame(world: World, frame: CamTx | SpatemTx, now_ns: int) -> None:

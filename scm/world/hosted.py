@@ -13,6 +13,7 @@ from scm.vehicles.drivers.heard import HeardCars
 from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.guard import Guard
+from scm.vehicles.lights import OFF, Switches
 from scm.vehicles.sensor import Reading, Sampler
 from scm.vehicles.signal_view import SignalView
 from scm.world.lease import Lease
@@ -29,6 +30,7 @@ class HostedCar:
         is_sent: Whether its own driver drives it; else it stands until it is sent or leased.
         mode: As in `VehicleState`.
         hazard: Whether its hazard lights flash: its commander was lost.
+        switches: How its headlights and indicators are switched.
     """
 
     name: str
@@ -46,6 +48,7 @@ class HostedCar:
     is_sent: bool = False
     mode: str = "idle"
     hazard: bool = False
+    switches: Switches = OFF
     seq: int = 0
     diverged: bool = False
     cam_trigger: CamTrigger = field(default_factory=CamTrigger)

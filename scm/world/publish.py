@@ -7,12 +7,10 @@ from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
+from scm.vehicles.lights import lamps
 from scm.world.hosted import HostedCar
 from scm.world.remote import RemoteCar
 from scm.world.world import NAME, World
-
-BLINK_NS = 500 * NS_PER_MS
-ROLLING_MPS = 0.01
 
 
 def publish(world: World, now_ns: int) -> None:
@@ -57,13 +55,9 @@ def state_of(car: HostedCar, now_ns: int) -> VehicleState:
 
 
 def lights_of(car: HostedCar, now_ns: int) -> tuple[str, ...]:
-    """Return the lights that are on: brake and reverse as it drives, both indicators in hazard."""
-    throttle, rolling = float(car.fleet.throttle[car.row]), abs(car.speed) > ROLLING_MPS
-    on = ["brake"] if throttle == 0.0 and (rolling or car.mode != "idle") else []
-    on += ["reverse"] if throttle < 0.0 else []
-    if car.hazard and now_ns // BLINK_NS % 2 == 0:
-        on += ["left", "right"]
-    return tuple(on)
+    """Return the names of the lamps that are on."""
+    throttle = float(car.fleet.throttle[car.row])
+    return lamps(car.switches, throttle, car.speed, now_ns, hazard=car.hazard)
 
 
 def snapshot(world: World, now_ns: int) -> WorldSnapshot:

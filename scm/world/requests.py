@@ -14,6 +14,7 @@ from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.join_request import JoinReply, JoinRequest
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
+from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
@@ -101,13 +102,7 @@ def _remove(world: World, request: RemoveRequest, now_ns: int) -> RemoveReply:
 
 
 def _route(world: World, request: RouteRequest, now_ns: int) -> RouteReply:
-    car = _known(world, request.vehicle)
-    if isinstance(car, RemoteCar):  # of several answers the bus takes the one that is no refusal
-        raise _RefusedError("not_found", f"{car.name} is not hosted: its own agent answers for it")
-    if not car.lease.is_at_home:
-        detail = f"{car.name} is leased to {car.lease.owner!r}: release the lease, or steal it"
-        raise _RefusedError("owned", detail)
-    return send(world, car, request, now_ns)
+    return send(world, _at_home(world, request.vehicle), request, now_ns)
 
 
 def send(world: World, car: HostedCar, request: RouteRequest, now_ns: int) -> RouteReply:
@@ -147,6 +142,14 @@ def _lease(world: World, request: LeaseRequest, now_ns: int) -> LeaseReply:
     return LeaseReply(vehicle=car.name, owner=lease.owner, epoch=lease.epoch, ttl_ms=lease.ttl_ms)
 
 
+def _lights(world: World, request: LightRequest, now_ns: int) -> LightReply:
+    del now_ns
+    car = _at_home(world, request.vehicle)
+    car.switches = car.switches.told(request.headlights, request.indicators)
+    told = car.switches
+    return LightReply(vehicle=car.name, headlights=told.headlights, indicators=told.indicators)
+
+
 def _stop(world: World, request: StopRequest, now_ns: int) -> CityStop:
     world.stop = CityStop(
         t_ns=now_ns, engaged=request.engaged, by=request.by, reason=request.reason
@@ -163,6 +166,17 @@ def _known(world: World, name: str) -> AnyCar:
     if car is None:
         names = [car.name for car in world.cars()]
         raise _RefusedError("not_found", f"no car named {name!r}{nearest(name, names)}")
+    return car
+
+
+def _at_home(world: World, name: str) -> HostedCar:
+    """Return a hosted car that nobody has leased."""
+    car = _known(world, name)
+    if isinstance(car, RemoteCar):  # of several answers the bus takes the one that is no refusal
+        raise _RefusedError("not_found", f"{car.name} is not hosted: its own agent answers for it")
+    if not car.lease.is_at_home:
+        detail = f"{car.name} is leased to {car.lease.owner!r}: release the lease, or steal it"
+        raise _RefusedError("owned", detail)
     return car
 
 
@@ -195,9 +209,10 @@ _ANSWERS: dict[type[Message], Callable[[World, Any, int], Message]] = {
     RemoveRequest: _remove,
     RouteRequest: _route,
     LeaseRequest: _lease,
+    LightRequest: _lights,
     StopRequest: _stop,
 }
 
 SERVES = tuple(Serves(kind) for kind in (
-    SpawnRequest, JoinRequest, RemoveRequest, RouteRequest, LeaseRequest, StopRequest,
+    SpawnRequest, JoinRequest, RemoveRequest, RouteRequest, LeaseRequest, LightRequest, StopRequest,
 ))  # fmt: skip

@@ -1,10 +1,13 @@
 """Cars: list, look at one, put one on the map, send it on a route, take it off."""
 
+from typing import Literal
+
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.car_rows import CarRow, cars_topic
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
+from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
@@ -30,6 +33,15 @@ class RouteBody(BaseModel):
     via: list[str] = Field(default_factory=list, max_length=200)
     laps: int = Field(1, ge=1, le=10_000)
     speed_mps: float | None = Field(None, gt=0.0, le=10.0)
+
+
+class LightsBody(BaseModel):
+    """How to switch headlights and indicators; what is left out stays as it is."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    headlights: Literal["off", "low", "high"] | None = None
+    indicators: Literal["off", "left", "right", "hazard"] | None = None
 
 
 def router(city: City) -> APIRouter:
@@ -65,6 +77,13 @@ def router(city: City) -> APIRouter:
             speed_mps=body.speed_mps,
         )
         return json_response(city.ask(request, RouteReply))
+
+    @routes.put("/{name}/lights", summary="Switch a car's headlights and indicators")
+    def lights(name: Name, body: LightsBody, key: IdempotencyKey = "") -> Response:
+        request = LightRequest(
+            request_id=key, vehicle=name, headlights=body.headlights, indicators=body.indicators
+        )
+        return json_response(city.ask(request, LightReply))
 
     return routes
 

@@ -1,6 +1,6 @@
 """What a car is told to do now, by the one who holds its lease."""
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from scm.v2x.message import Delivery, Message
 
@@ -13,6 +13,7 @@ class DriveCommand(Message, kw_only=True, frozen=True):
         seq: Counts up within an epoch; a repeated or older one is ignored.
         throttle: -1 to 1, + forward.
         steering: -1 to 1 of the car's steering limit, + = left.
+        headlights, indicators: How the lights are switched from now on; None: as they were.
     """
 
     KEY: ClassVar[str] = "v/{vehicle}/cmd/drive"
@@ -25,6 +26,8 @@ class DriveCommand(Message, kw_only=True, frozen=True):
     seq: int
     throttle: float
     steering: float
+    headlights: Literal["off", "low", "high"] | None = None
+    indicators: Literal["off", "left", "right", "hazard"] | None = None
 
 
 MESSAGE = DriveCommand

@@ -6,6 +6,7 @@ from scm.v2x.message import Refused
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_tags import EyeTags
+from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.monitor_reset import MonitorReset
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
@@ -82,6 +83,19 @@ class TestCars:
         (field,) = body
         assert problem["errors"][0]["where"] == f"body.{field}"
         assert problem["errors"][0]["expected"]
+        assert fake_city.asked == []
+
+    def test_lights_are_switched_one_or_both(self, client, fake_city):
+        fake_city.answers[LightRequest] = LightReply(
+            vehicle="n5", headlights="low", indicators="off"
+        )
+        response = client("PUT", f"{API}/cars/n5/lights", json={"headlights": "low"})
+        assert response.json()["headlights"] == "low"
+        assert fake_city.asked == [LightRequest(vehicle="n5", headlights="low")]
+
+    def test_a_light_that_does_not_exist_is_refused(self, client, fake_city):
+        response = client("PUT", f"{API}/cars/n5/lights", json={"indicators": "up"})
+        is_problem(response, 422, "invalid")
         assert fake_city.asked == []
 
     def test_what_is_not_json_is_a_problem_too(self, client):

@@ -17,6 +17,7 @@ from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.join_request import JoinReply, JoinRequest
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
+from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
@@ -189,6 +190,12 @@ def test_after_a_lost_link_it_drives_on_under_the_newer_epoch_only(inside):
     inside.step(replies=[(inside.asked[0], lease(EPOCH + 5))])
     state = inside.steps(1.0)
     assert (state.mode, state.epoch) == ("drive", EPOCH + 5)
+
+
+def test_an_agent_switches_the_lights_of_its_car(inside):
+    reply = one(inside.step(LightRequest(vehicle="n7", headlights="low")), Answer).reply
+    assert reply == LightReply(vehicle="n7", headlights="low", indicators="off")
+    assert {"head_low", "tail"} <= set(one(inside.step(), VehicleState).lights)
 
 
 def test_hazard_lights_flash_when_commands_stay_away(inside):

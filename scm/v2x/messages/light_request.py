@@ -1,0 +1,32 @@
+"""Switch a car's headlights and indicators: answered by whoever owns the car."""
+
+from typing import ClassVar, Literal
+
+from scm.v2x.message import Message, Request
+
+
+class LightReply(Message, kw_only=True, frozen=True):
+    """How the switches stand now; tail, brake and reverse lamps follow by themselves."""
+
+    KEY: ClassVar[str] = "v/{vehicle}/cmd/lights/reply"
+
+    vehicle: str
+    headlights: Literal["off", "low", "high"]
+    indicators: Literal["off", "left", "right", "hazard"]
+
+
+class LightRequest(Request, kw_only=True, frozen=True):
+    """Set headlights, indicators or both; None leaves one as it is.
+
+    Whoever drives by `DriveCommand` sets them there: a leased car refuses this.
+    """
+
+    KEY: ClassVar[str] = "v/{vehicle}/cmd/lights"
+    REPLY: ClassVar[type[Message]] = LightReply
+
+    vehicle: str
+    headlights: Literal["off", "low", "high"] | None = None
+    indicators: Literal["off", "left", "right", "hazard"] | None = None
+
+
+MESSAGE = LightRequest
