@@ -5,7 +5,7 @@ bus and a clock. Because a part only ever sees `now_ns` and its inbox, the same 
 a process of its own, and deterministically beside all the others on a stepped clock.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -33,10 +33,25 @@ class Serves:
     where: dict[str, str] = field(default_factory=dict)
 
 
+class IsWanted(Protocol):
+    """Tells a part whether anybody would hear what it could send."""
+
+    def __call__(self, kind: type[Message], where: Mapping[str, str]) -> bool:
+        """Return whether anybody subscribes to messages of a class with these key parts.
+
+        Key parts left out match everything, as in `Hears`.
+        """
+        ...
+
+
 class Part(Protocol):
     """A steppable part of the city.
 
-    One that also sets `hears_raw = True` gets every message of the city, unread, as `RawSample`.
+    One that also sets `hears_raw = True` gets every message of the city, unread, as `RawSample`;
+    `hears_raw_too`, a list of classes, adds those that come only to who names them.
+
+    One that also has `learn_wishes(is_wanted)` is given an `IsWanted` before its first step: what
+    is costly to make need not be made for nobody.
     """
 
     @property
@@ -56,7 +71,7 @@ class Part(Protocol):
 
     @property
     def hears(self) -> Sequence[Hears]:
-        """What the runner subscribes to for it, from the start."""
+        """What the runner subscribes to for it; when it changes, the runner follows."""
         ...
 
     @property

@@ -8,7 +8,7 @@ from collections import OrderedDict
 from collections.abc import Iterable, Sequence
 from typing import TypeVar, cast
 
-from scm.part import Part
+from scm.part import Hears, Part
 from scm.v2x.bus import Bus, Mailbox, RawMailbox
 from scm.v2x.exchange import Answer, Call, Incoming, Outgoing, RawSample
 from scm.v2x.mailbox import drain_all
@@ -36,15 +36,40 @@ class Station:
         self._boxes: list[Mailbox | RawMailbox] = []
         self._replies = self._mailbox(Delivery.RPC)
         self._answers = _Answers()
-        for hears in part.hears:
-            bus.subscribe(hears.kind, hears.where, self._mailbox(hears.kind.DELIVERY))
+        self._heard: Sequence[Hears] = ()
+        self._ears: list[tuple[Hears, Mailbox]] = []
+        self._follow()
         for serves in part.serves:
             bus.serve(serves.kind, serves.where, self._mailbox(Delivery.RPC))
         if getattr(part, "hears_raw", False):
             raw = RawMailbox(RAW_DEPTH)
             self._boxes.append(raw)
             bus.subscribe_raw(raw)
+            for kind in getattr(part, "hears_raw_too", ()):
+                bus.subscribe_raw(raw, kind)
+        learn = getattr(part, "learn_wishes", None)
+        if learn is not None:
+            learn(bus.is_wanted)
         bus.announce(part.role)
+
+    def _follow(self) -> None:
+        """Subscribe to what the part wishes to hear now, and to nothing else any more."""
+        if self._part.hears is self._heard:
+            return
+        self._heard = self._part.hears
+        wished = list(self._heard)
+        for ear in list(self._ears):
+            hears, box = ear
+            if hears in wished:
+                wished.remove(hears)
+            else:
+                self._bus.unsubscribe(box)
+                self._ears.remove(ear)
+                self._boxes.remove(box)
+        for hears in wished:
+            box = self._mailbox(hears.kind.DELIVERY)
+            self._bus.subscribe(hears.kind, hears.where, box)
+            self._ears.append((hears, box))
 
     def _mailbox(self, delivery: Delivery) -> Mailbox:
         box = Mailbox(DEPTH[delivery])
@@ -58,6 +83,7 @@ class Station:
 
     def inbox(self) -> list[Incoming]:
         """Return what arrived since the last time, without requests that are answered already."""
+        self._follow()
         fresh: list[Incoming | RawSample] = []
         for item in drain_all(self._boxes):
             if isinstance(item, Incoming) and _is_request(item):

@@ -54,8 +54,23 @@ class Bus(Protocol):
         """
         ...
 
-    def subscribe_raw(self, mailbox: RawMailbox) -> None:
-        """Bring everything that is published in the city into a mailbox, unread."""
+    def subscribe_raw(self, mailbox: RawMailbox, kind: type[Message] | None = None) -> None:
+        """Bring everything that is published in the city into a mailbox, unread.
+
+        Messages whose key has a verbatim chunk (`@camera`) come only to those who name their
+        class: `kind` asks for one class alone.
+        """
+        ...
+
+    def unsubscribe(self, mailbox: Mailbox) -> None:
+        """Bring nothing more into a mailbox; what waits in it stays."""
+        ...
+
+    def is_wanted(self, kind: type[Message], where: Mapping[str, str]) -> bool:
+        """Return whether anybody subscribes to messages of a class; cheap enough for each step.
+
+        Key parts left out of `where` match everything: it is true if any of them is wanted.
+        """
         ...
 
     def serve(self, kind: type[Request], where: Mapping[str, str], mailbox: Mailbox) -> None:

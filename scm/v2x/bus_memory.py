@@ -18,7 +18,7 @@ from scm.clock import Clock, nanoseconds
 from scm.errors import LinkError
 from scm.v2x.bus import check_reply, more_telling, no_answer, no_server
 from scm.v2x.exchange import Answer, Call, Incoming, RawSample
-from scm.v2x.key import check_name, everything, key_of, matches, selector
+from scm.v2x.key import check_name, everything, intersects, key_of, matches, selector
 from scm.v2x.mailbox import Mailbox, RawMailbox
 from scm.v2x.message import Delivery, Message, Refused, Request, decode, encode
 from scm.v2x.messages.presence import Presence
@@ -34,6 +34,7 @@ class _Wish:
     owner: "MemoryBus"
     expression: str
     deliver: Callable[[RawSample], None]
+    mailbox: Mailbox | RawMailbox
     keeps: bool = False
 
 
@@ -125,6 +126,17 @@ class MemoryNetwork:
                 for _, sample in sorted(kept, key=lambda item: item[0]):
                     wish.deliver(replace(sample, t_ns=now_ns))
 
+    def drop_wishes(self, mailbox: Mailbox) -> None:
+        """Forget what was to come into a mailbox."""
+        with self.lock:
+            self.wishes = [w for w in self.wishes if w.mailbox is not mailbox]
+            self._routes.clear()
+
+    def is_wished(self, expression: str) -> bool:
+        """Return whether anybody wishes something that matches."""
+        with self.lock:
+            return any(intersects(wish.expression, expression) for wish in self.wishes)
+
     def leave(self, bus: "MemoryBus") -> None:
         """Forget a bus and everything it wished, offered, kept and asked."""
         with self.lock:
@@ -201,17 +213,29 @@ class MemoryBus:
             mailbox.put_later(partial(self._reader.read, kind, *facts))
 
         keeps = kind.DELIVERY in (Delivery.EVENT, Delivery.PRESENCE)
-        self._network.add_wish(_Wish(self, selector(self.city, kind, where), deliver, keeps))
+        wish = _Wish(self, selector(self.city, kind, where), deliver, mailbox, keeps)
+        self._network.add_wish(wish)
 
-    def subscribe_raw(self, mailbox: RawMailbox) -> None:
-        """Bring everything that is published in the city into a mailbox, unread."""
+    def subscribe_raw(self, mailbox: RawMailbox, kind: type[Message] | None = None) -> None:
+        """Bring everything that is published, or one class of it, into a mailbox, unread."""
         self._check_open()
 
         def deliver(sample: RawSample) -> None:
             if not _is_presence(sample.key):
                 mailbox.put(sample)
 
-        self._network.add_wish(_Wish(self, everything(self.city), deliver, keeps=True))
+        expression = everything(self.city) if kind is None else selector(self.city, kind, {})
+        self._network.add_wish(_Wish(self, expression, deliver, mailbox, keeps=True))
+
+    def unsubscribe(self, mailbox: Mailbox) -> None:
+        """Bring nothing more into a mailbox; what waits in it stays."""
+        self._check_open()
+        self._network.drop_wishes(mailbox)
+
+    def is_wanted(self, kind: type[Message], where: Mapping[str, str]) -> bool:
+        """Return whether anybody subscribes to messages of a class."""
+        self._check_open()
+        return self._network.is_wished(selector(self.city, kind, where))
 
     def serve(self, kind: type[Request], where: Mapping[str, str], mailbox: Mailbox) -> None:
         """Bring requests of a class into a mailbox; each waits there for its `answer`."""

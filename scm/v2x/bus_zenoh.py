@@ -9,7 +9,7 @@ never wait for a slow receiver. An empty result of a query is a failure, never a
 import logging
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from datetime import timedelta
 from functools import partial
 from types import TracebackType
@@ -70,6 +70,8 @@ class ZenohBus:
         self._closed = False
         self._publishers: dict[str, _Publisher] = {}
         self._declared: list[Any] = []
+        self._subscribers: list[tuple[Mailbox, Any]] = []
+        self._wishes: dict[str, zenoh.Publisher] = {}
         self._to_answer: OrderedDict[Incoming, zenoh.Query] = OrderedDict()
         self._session = _open(endpoint, connect_timeout_s)
         self.session = str(self._session.zid())
@@ -124,11 +126,38 @@ class ZenohBus:
         callback = self._direct(self._noting(on_sample))
         if kind.DELIVERY is Delivery.EVENT:
             again = ASK_AGAIN if kind.RATE_HZ is None else None
-            self._declare(
-                _declare_event_subscriber(self._session, expression, callback, kind.KEEP, again)
+            subscriber = _declare_event_subscriber(
+                self._session, expression, callback, kind.KEEP, again
             )
         else:
-            self._declare(self._session.declare_subscriber(expression, callback))
+            subscriber = self._session.declare_subscriber(expression, callback)
+        with self._lock:
+            self._subscribers.append((mailbox, subscriber))
+
+    def unsubscribe(self, mailbox: Mailbox) -> None:
+        """Bring nothing more into a mailbox; what waits in it stays."""
+        self._check_open()
+        with self._lock:
+            ended = [thing for box, thing in self._subscribers if box is mailbox]
+            self._subscribers = [item for item in self._subscribers if item[0] is not mailbox]
+        _undeclare(ended)
+
+    def is_wanted(self, kind: type[Message], where: Mapping[str, str]) -> bool:
+        """Return whether anybody subscribes to messages of a class.
+
+        Zenoh tells it to whoever has declared to publish there: asking for `*` first keeps the
+        number of declarations small.
+        """
+        self._check_open()
+        expression = selector(self.city, kind, where)
+        with self._lock:
+            asking = self._wishes.get(expression)
+            if asking is None:
+                asking = self._wishes[expression] = self._session.declare_publisher(expression)
+                self._declared.append(asking)
+        # The stubs say bool; it is an object that is always true.
+        status: Any = asking.matching_status
+        return bool(status.matching)
 
     def _watch_presence(self, expression: str, mailbox: Mailbox) -> None:
         def on_sample(sample: zenoh.Sample) -> None:
@@ -137,7 +166,9 @@ class ZenohBus:
             mailbox.put_later(partial(self._read_presence, *facts))
 
         live = self._session.liveliness()
-        self._declare(live.declare_subscriber(expression, self._direct(on_sample), history=True))
+        subscriber = live.declare_subscriber(expression, self._direct(on_sample), history=True)
+        with self._lock:
+            self._subscribers.append((mailbox, subscriber))
 
     def _read_presence(self, key: str, alive: bool, t_ns: int) -> Incoming | None:
         try:
@@ -147,15 +178,19 @@ class ZenohBus:
             return None
         return Incoming(Presence(**names, alive=alive), t_ns)
 
-    def subscribe_raw(self, mailbox: RawMailbox) -> None:
-        """Bring everything that is published in the city into a mailbox, unread."""
+    def subscribe_raw(self, mailbox: RawMailbox, kind: type[Message] | None = None) -> None:
+        """Bring everything that is published, or one class of it, into a mailbox, unread."""
         self._check_open()
 
         def on_sample(key: str, body: bytes, attachment: bytes | None, t_ns: int) -> None:
             mailbox.put(RawSample(key, body, attachment, t_ns))
 
         callback = self._direct(self._noting(on_sample))
-        expression, again = everything(self.city), ASK_AGAIN_FOR_ALL
+        expression = everything(self.city) if kind is None else selector(self.city, kind, {})
+        if kind is not None and kind.DELIVERY is not Delivery.EVENT:
+            self._declare(self._session.declare_subscriber(expression, callback))
+            return
+        again = ASK_AGAIN_FOR_ALL
         self._declare(_declare_event_subscriber(self._session, expression, callback, None, again))
 
     def serve(self, kind: type[Request], where: Mapping[str, str], mailbox: Mailbox) -> None:
@@ -242,12 +277,11 @@ class ZenohBus:
                 return
             self._closed = True
             declared, self._declared = self._declared, []
+            declared += [thing for _, thing in self._subscribers]
+            self._subscribers.clear()
             self._publishers.clear()
-        for thing in reversed(declared):
-            try:
-                thing.undeclare()
-            except zenoh.ZError as cause:
-                event(_log, "undeclare_failed", level=logging.DEBUG, reason=cause)
+            self._wishes.clear()
+        _undeclare(reversed(declared))
         self._to_answer.clear()
         self._session.close()  # type: ignore[no-untyped-call]
 
@@ -344,6 +378,14 @@ class _Asked:
 
     def done(self) -> None:
         self.settle(self._refused or no_server(self._call.request, self._key))
+
+
+def _undeclare(things: Iterable[Any]) -> None:
+    for thing in things:
+        try:
+            thing.undeclare()
+        except zenoh.ZError as cause:
+            event(_log, "undeclare_failed", level=logging.DEBUG, reason=cause)
 
 
 def _open(endpoint: str, connect_timeout_s: float) -> zenoh.Session:

@@ -1,6 +1,8 @@
 """Build and parse key expressions: `scm/@v1/<city>/<KEY of the message>`.
 
-The verbatim chunk `@v1` is the major version of the key space: `**` does not cross it.
+A chunk that begins with `@` is verbatim: no `*` and no `**` stands for it, only itself does. `@v1`
+is the major version of the key space; `v/n1/@camera/front` holds pictures that nobody gets who
+does not ask for them by name, not even a recorder of everything.
 """
 
 import re
@@ -111,8 +113,22 @@ def agrees(key: str, message: Message) -> bool:
 
 def matches(expression: str, key: str) -> bool:
     """Return whether a key matches an expression of literal chunks, `*` and a final `**`."""
-    wanted, got = expression.split("/"), key.split("/")
-    if wanted[-1] == "**":
-        wanted = wanted[:-1]
-        got = got[: len(wanted)]
-    return len(wanted) == len(got) and all(w in ("*", g) for w, g in zip(wanted, got, strict=True))
+    return intersects(expression, key)
+
+
+def intersects(one: str, other: str) -> bool:
+    """Return whether some key matches both expressions."""
+    a, b = one.split("/"), other.split("/")
+    for longer, shorter in ((a, b), (b, a)):
+        if shorter[-1] == "**":
+            rest = longer[len(shorter) - 1 :]
+            if len(longer) < len(shorter) - 1 or any(chunk.startswith("@") for chunk in rest):
+                return False
+            a, b = longer[: len(shorter) - 1], shorter[:-1]
+            break
+    return len(a) == len(b) and all(map(_meet, a, b))
+
+
+def _meet(one: str, other: str) -> bool:
+    """Return whether two chunks can be the same: equal, or one `*` and the other not verbatim."""
+    return one == other or (one == "*" and other[:1] != "@") or (other == "*" and one[:1] != "@")

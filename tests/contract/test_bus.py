@@ -12,6 +12,7 @@ from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.exchange import Answer, Call
 from scm.v2x.message import Refused, decode
+from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.lidar_scan import LidarScan
@@ -445,3 +446,61 @@ def test_after_it_is_closed_a_bus_says_so(city):
 def test_a_station_name_that_may_not_stand_in_a_key_is_refused(city):
     with pytest.raises(MessageError, match="station"):
         city.bus("N 7")
+
+
+def picture(vehicle="n1", camera="front"):
+    return CameraFrame(
+        vehicle=vehicle, camera=camera, t_ns=1, width_px=2, height_px=1, payload=b"\xff\xd8"
+    )
+
+
+def settles(city, condition):
+    """Wait until a condition holds: a subscription takes a moment to be known over Zenoh."""
+    began_ns = city.clock.now_ns()
+    while not condition():
+        assert seconds(city.clock.now_ns() - began_ns) < PATIENCE_S
+        city.pass_time(0.01)
+
+
+def test_what_nobody_subscribes_to_is_not_wanted(city):
+    sender, hearer = city.bus("a"), city.bus("b")
+    assert not sender.is_wanted(CameraFrame, {})
+    mailbox = Mailbox(4)
+    hearer.subscribe(CameraFrame, {"vehicle": "n1", "camera": "front"}, mailbox)
+    settles(city, lambda: sender.is_wanted(CameraFrame, {"vehicle": "n1", "camera": "front"}))
+    assert sender.is_wanted(CameraFrame, {})
+    assert sender.is_wanted(CameraFrame, {"vehicle": "n1"})
+    assert not sender.is_wanted(CameraFrame, {"vehicle": "n2"})
+    assert not sender.is_wanted(CameraFrame, {"vehicle": "n1", "camera": "rear"})
+    hearer.unsubscribe(mailbox)
+    settles(city, lambda: not sender.is_wanted(CameraFrame, {}))
+
+
+def test_everything_is_not_what_must_be_asked_for_by_name(city):
+    sender, recorder = city.bus("a"), city.bus("b")
+    everything, asked = RawMailbox(8), RawMailbox(8)
+    recorder.subscribe_raw(everything)
+    city.pass_time(0.05)
+    assert not sender.is_wanted(CameraFrame, {})
+    recorder.subscribe_raw(asked, CameraFrame)
+    settles(city, lambda: sender.is_wanted(CameraFrame, {"vehicle": "n7", "camera": "rear"}))
+    sender.publish(picture())
+    (sample,) = gather(city, asked, 1)
+    assert sample.key == "scm/@v1/test/v/n1/@camera/front"
+    assert everything.drain() == []
+
+
+def test_after_unsubscribing_nothing_more_arrives(city):
+    sender, hearer = city.bus("a"), city.bus("b")
+    ended, going = Mailbox(8), Mailbox(8)
+    hearer.subscribe(CameraFrame, {}, ended)
+    hearer.subscribe(CameraFrame, {}, going)
+    settles(city, lambda: sender.is_wanted(CameraFrame, {}))
+    sender.publish(picture())
+    gather(city, going, 1)
+    assert len(gather(city, ended, 1)) == 1
+    hearer.unsubscribe(ended)
+    city.pass_time(0.05)
+    sender.publish(picture())
+    gather(city, going, 1)
+    assert ended.drain() == []

@@ -290,3 +290,47 @@ def test_time_never_goes_back_between_steps():
     with Lockstep([talker]) as city:
         city.run_for(0.1)
     assert all(b - a == 7 * NS_PER_MS for a, b in pairwise(talker.steps))
+
+
+class Picky(Talker):
+    """Hears trips only while told to, and knows whether anybody hears the events of `x`."""
+
+    def __init__(self, name):
+        super().__init__(name)
+        self.is_wanted = None
+
+    def learn_wishes(self, is_wanted):
+        self.is_wanted = is_wanted
+
+
+def trip(done_m):
+    return Trip(
+        vehicle="n1", trip_id="t", t_ns=0, route=(), done_m=done_m, length_m=None, started_ns=0
+    )
+
+
+def test_a_part_that_changes_what_it_hears_is_followed():
+    picky = Picky("picky")
+    with Lockstep([picky]) as city:
+        city.publish(trip(1.0))
+        city.run_for(0.04)
+        picky.hears = (Hears(Trip),)
+        city.run_for(0.02)
+        city.publish(trip(2.0))
+        city.run_for(0.02)
+        picky.hears = ()
+        city.run_for(0.02)
+        city.publish(trip(3.0))
+        city.run_for(0.04)
+    done = [said.done_m for _, said in picky.heard if isinstance(said, Trip)]
+    assert done[-1] == 2.0
+    assert 3.0 not in done
+
+
+def test_a_part_may_ask_whether_anybody_would_hear_it():
+    picky = Picky("picky")
+    with Lockstep([picky]) as city:
+        assert not picky.is_wanted(Trip, {})
+        city.add(Talker("hearer", hears=(Hears(Trip, {"vehicle": "n1"}),)))
+        assert picky.is_wanted(Trip, {"vehicle": "n1"})
+        assert not picky.is_wanted(Trip, {"vehicle": "n2"})

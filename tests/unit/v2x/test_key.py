@@ -3,7 +3,7 @@
 import pytest
 
 from scm.errors import MessageError
-from scm.v2x.key import agrees, check_name, everything, key_of, matches, parse, selector
+from scm.v2x.key import agrees, check_name, everything, intersects, key_of, matches, parse, selector
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
@@ -75,6 +75,9 @@ def test_parse_refuses_keys_of_other_classes_cities_and_versions(key):
         ("a/**", "b/c", False),
         ("a/b/**", "a", False),
         ("a/b", "a/b/c", False),
+        ("a/*/c", "a/@b/c", False),
+        ("a/**", "a/b/@c/d", False),
+        ("a/*/@c/*", "a/b/@c/d", True),
     ],
 )
 def test_matching_follows_the_rules_of_key_expressions(expression, key, expected):
@@ -89,3 +92,19 @@ def test_everything_matches_every_key_of_the_city_and_none_of_another():
 def test_a_message_agrees_with_its_own_key_only():
     assert agrees("scm/@v1/city/event/info/world", event("world"))
     assert not agrees("scm/@v1/city/event/info/n7", event("world"))
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "expected"),
+    [
+        ("a/*/c", "a/b/*", True),
+        ("a/*", "b/*", False),
+        ("a/**", "a/b/*", True),
+        ("a/**", "a/b/@c/*", False),
+        ("a/*", "a/*/c", False),
+        ("a/**", "**", True),
+    ],
+)
+def test_two_expressions_meet_if_one_key_matches_both(one, other, expected):
+    assert intersects(one, other) is expected
+    assert intersects(other, one) is expected
