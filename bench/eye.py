@@ -13,7 +13,6 @@ import cv2
 import numpy as np
 
 from scm.eye.anchor import Anchor
-from scm.eye.bodies import NIGEL
 from scm.eye.camera import camera_model
 from scm.eye.detect import Settings, detect_tags
 from scm.eye.pose import car_pose
@@ -22,6 +21,7 @@ from scm.eye.source import Frame
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.maps.load import load_map
 from scm.maps.route import Roads
+from scm.scenery.bodies import NIGEL
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 CARS = 6

@@ -23,10 +23,10 @@ from scm.arrays import Floats
 from scm.clock import NS_PER_MS
 from scm.eye.camera import CameraModel
 from scm.eye.detect import CORNER_STD_PX
-from scm.eye.tags import tag_corners
 from scm.geometry import Pose2
 from scm.log import event
 from scm.maps.model import MapTag
+from scm.scenery.tags import tag_corners
 
 LOGGER = logging.getLogger(__name__)
 AVERAGED_FRAMES = 20

@@ -15,7 +15,6 @@ from scm.arrays import Image
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import EyeError, nearest
 from scm.eye.anchor import Anchor
-from scm.eye.bodies import NIGEL, CarBody, car_body
 from scm.eye.camera import CameraModel, camera_model
 from scm.eye.detect import Settings, detect_tags
 from scm.eye.pose import car_pose
@@ -23,6 +22,7 @@ from scm.eye.source import Frame, Source
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.maps.model import Camera, CityMap
 from scm.part import Hears
+from scm.scenery.bodies import NIGEL, CarBody, car_body
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose

@@ -19,10 +19,10 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.eye.anchor import STEPS, Anchor
-from scm.eye.bodies import CarBody
 from scm.eye.camera import CameraModel
-from scm.eye.tags import tag_corners
 from scm.geometry import Pose2, wrap_angle
+from scm.scenery.bodies import CarBody
+from scm.scenery.tags import tag_corners
 
 LEAN_RAD = 0.003
 """Standard deviation of roll and of pitch that a scaled car is trusted to stay within."""

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from scm.eye.anchor import Anchor, Tolerance
-from scm.eye.bodies import NIGEL
 from scm.eye.camera import CameraModel, camera_model
 from scm.eye.detect import PIXEL_ORIGIN_PX, Settings, detect_tags
 from scm.eye.pose import LEAN_RAD, car_pose
@@ -16,6 +15,7 @@ from scm.eye.source import Frame
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.geometry import Pose2
 from scm.maps.load import load_map
+from scm.scenery.bodies import NIGEL
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 FRAMES = 40

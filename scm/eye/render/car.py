@@ -7,11 +7,12 @@ import cv2
 import numpy as np
 
 from scm.arrays import Floats, Image
-from scm.eye.bodies import CarBody, car_body
 from scm.eye.camera import CameraModel
-from scm.eye.render.canvas import Canvas, Colour, colour_of
-from scm.eye.render.floor import Obstacle, Scenery, printed_tag
-from scm.eye.render.solids import (
+from scm.eye.render.floor import Obstacle, Scenery
+from scm.scenery.bodies import CarBody, car_body
+from scm.scenery.canvas import Canvas, Colour, colour_of
+from scm.scenery.sheet import printed_tag
+from scm.scenery.solids import (
     LIGHT,
     Shape,
     Solid,
@@ -20,7 +21,7 @@ from scm.eye.render.solids import (
     rectangle,
     shape_of,
 )
-from scm.eye.tags import PRINT_SCALE, tag_corners
+from scm.scenery.tags import PRINT_SCALE, tag_corners
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 PALETTE = tuple(

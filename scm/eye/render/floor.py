@@ -1,32 +1,23 @@
 """What lies still under the camera, drawn once: ground, roads, paint, the map's tag, obstacles."""
 
-import math
 from dataclasses import dataclass
-from itertools import pairwise
 
 import cv2
 import numpy as np
 
 from scm.arrays import Bools, Floats, Image
 from scm.eye.camera import CameraModel
-from scm.eye.render.canvas import Canvas, Colour, colour_of, dimmed
-from scm.eye.render.solids import Solid, draw_shape, prism, rectangle, shape_of
-from scm.eye.tags import PRINT_SCALE, tag_corners, tag_picture
 from scm.geometry import Pose2
-from scm.maps.model import CityMap, Crosswalk, MapTag, Wall
-from scm.maps.route import LanePath
+from scm.maps.model import CityMap, MapTag
+from scm.scenery.canvas import Canvas
+from scm.scenery.sheet import FloorSheet, paint_floor, printed_tag, wall_pieces
+from scm.scenery.solids import Solid, draw_shape, prism, rectangle, shape_of
+from scm.scenery.tags import PRINT_SCALE, tag_corners
 
-TEXELS_PER_M = 800.0
 FINER = 2
 GRID_PX = 8
-TABLE: Colour = (44, 58, 74)
-ASPHALT: Colour = (62, 58, 56)
-PAINT: Colour = (222, 226, 228)
-EDGE_LINE_M = 0.009
 LOW_M = 0.1
 """What is lower than this hides no roof."""
-INK, PAPER = 26, 236
-"""Grey of a print's black and white."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,13 +93,6 @@ def draw_map_tag(frame: Image, model: CameraModel, tag: MapTag) -> None:
         canvas.put_back()
 
 
-def printed_tag(tag_id: int, gain: float = 1.0) -> Image:
-    """Return the print of a tag under the city's light, (h, w, 3)."""
-    paper = tag_picture(tag_id).astype(np.float64) / 255.0
-    grey = np.clip((INK + (PAPER - INK) * paper) * gain, 0.0, 255.0).astype(np.uint8)
-    return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
-
-
 def _through_lens(city_map: CityMap, model: CameraModel, rng: np.random.Generator) -> Image:
     width, height = model.camera.width_px, model.camera.height_px
     columns = np.arange(-GRID_PX, width + 2 * GRID_PX, GRID_PX, dtype=np.float64)
@@ -117,13 +101,13 @@ def _through_lens(city_map: CityMap, model: CameraModel, rng: np.random.Generato
     seen = model.on_plane(model.undistort(grid), 0.0)
     corner = seen.reshape(-1, 2).min(axis=0)
     extent = seen.reshape(-1, 2).max(axis=0) - corner
-    sheet = _Sheet(float(corner[0]), float(corner[1] + extent[1]), extent, rng)
-    _paint(sheet, city_map)
+    sheet = FloorSheet(float(corner[0]), float(corner[1] + extent[1]), extent, rng)
+    paint_floor(sheet, city_map)
     over, down = _interpolation(columns, width), _interpolation(rows, height)
-    x = (down @ seen[..., 0] @ over.T - sheet.left) * TEXELS_PER_M - 0.5
-    y = (sheet.upper - down @ seen[..., 1] @ over.T) * TEXELS_PER_M - 0.5
+    x = (down @ seen[..., 0] @ over.T - sheet.left) * sheet.texels_per_m - 0.5
+    y = (sheet.upper - down @ seen[..., 1] @ over.T) * sheet.texels_per_m - 0.5
     fine = cv2.remap(
-        sheet.texture(), x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR,
+        sheet.picture, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_REPLICATE,
     )  # fmt: skip
     small = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
@@ -141,76 +125,6 @@ def _interpolation(knots: Floats, count: int) -> Floats:
     return weights
 
 
-class _Sheet:
-    """A picture of the plane of the floor, `TEXELS_PER_M` fine, y up."""
-
-    def __init__(self, left: float, upper: float, extent: Floats, rng: np.random.Generator) -> None:
-        self.left, self.upper = left, upper
-        width, height = (math.ceil(float(side) * TEXELS_PER_M) + 2 for side in extent)
-        self._picture = np.empty((height, width, 3), dtype=np.uint8)
-        self._picture[:] = TABLE
-        self._rng = rng
-
-    def polygon(self, points: Floats, colour: Colour) -> None:
-        texels = np.column_stack((points[:, 0] - self.left, self.upper - points[:, 1]))
-        fixed = np.rint((texels * TEXELS_PER_M - 0.5) * 16.0).astype(np.int32)
-        cv2.fillPoly(self._picture, [fixed], colour, cv2.LINE_AA, 4)
-
-    def grain(self, strengths: tuple[tuple[int, float], ...]) -> None:
-        """Roughen everything painted so far: pairs of blotch size [texels] and strength."""
-        height, width = self._picture.shape[:2]
-        total = np.zeros((height, width), dtype=np.float32)
-        for size, strength in strengths:
-            shape = height // size + 2, width // size + 2
-            coarse = self._rng.standard_normal(shape, dtype=np.float32)
-            blown = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
-            total += np.float32(strength) * blown
-        rough = self._picture * (1.0 + total)[..., None]
-        self._picture = np.clip(rough, 0.0, 255.0).astype(np.uint8)
-
-    def texture(self) -> Image:
-        return self._picture
-
-
-def _paint(sheet: _Sheet, city_map: CityMap) -> None:
-    floor = city_map.floor
-    (x0, x1), (y0, y1) = floor.x_m, floor.y_m
-    middle = (x0 + x1) / 2, (y0 + y1) / 2
-    sheet.polygon(rectangle(*middle, x1 - x0 + 0.016, y1 - y0 + 0.016), dimmed(TABLE, 0.6))
-    sheet.polygon(rectangle(*middle, x1 - x0, y1 - y0), colour_of(floor.colour))
-    lanes = {lane.name: LanePath(lane) for lane in city_map.lanes}
-    for path in lanes.values():
-        sheet.polygon(_strip(path, path.width_m / 2 + EDGE_LINE_M / 2), PAINT)
-    for path in lanes.values():
-        sheet.polygon(_strip(path, path.width_m / 2 - EDGE_LINE_M / 2), ASPHALT)
-    sheet.grain(((2, 0.022), (6, 0.018), (60, 0.02), (300, 0.03)))
-    for crosswalk in city_map.crosswalks:
-        for stripe in _stripes(crosswalk):
-            sheet.polygon(stripe, PAINT)
-    for line in city_map.stop_lines:
-        path = lanes[line.lane]
-        at = path.at(line.at_m)
-        bar = rectangle(at.x, at.y, 0.018, path.width_m - EDGE_LINE_M, at.yaw)
-        sheet.polygon(bar, PAINT)
-    sheet.grain(((3, 0.012),))
-
-
-def _strip(path: LanePath, half: float) -> Floats:
-    left = np.column_stack((-np.sin(path.yaw), np.cos(path.yaw))) * half
-    return np.concatenate((path.points + left, (path.points - left)[::-1]))
-
-
-def _stripes(crosswalk: Crosswalk) -> list[Floats]:
-    count = max(2, round(crosswalk.width_m / 0.036))
-    pitch = crosswalk.width_m / count
-    middle = Pose2(crosswalk.x_m, crosswalk.y_m, crosswalk.yaw_rad)
-    stripes = []
-    for i in range(count):
-        x, y = middle.apply(0.0, (i + 0.5) * pitch - crosswalk.width_m / 2)
-        stripes.append(rectangle(x, y, crosswalk.length_m, 0.55 * pitch, crosswalk.yaw_rad))
-    return stripes
-
-
 def _light(width: int, height: int) -> Floats:
     """A lamp off the middle and a lens that is darker towards its corners."""
     x = (np.arange(width) - 0.42 * width) / width
@@ -226,21 +140,11 @@ def _standing(city_map: CityMap) -> list[Solid]:
         for b in city_map.boxes
     ]
     for wall in city_map.walls:
-        solids += [prism(piece, 0.0, wall.height_m, brick) for piece in _wall_pieces(wall)]
+        solids += [prism(piece, 0.0, wall.height_m, brick) for piece in wall_pieces(wall)]
     for light in city_map.lights:
         foot = rectangle(light.x_m, light.y_m, 0.03, 0.03, light.yaw_rad)
         solids.append(prism(foot, 0.0, 0.012, (48, 48, 48)))
     return solids
-
-
-def _wall_pieces(wall: Wall) -> list[Floats]:
-    points = [*wall.points, wall.points[0]] if wall.closed else list(wall.points)
-    pieces = []
-    for (x0, y0), (x1, y1) in pairwise(points):
-        length = math.hypot(x1 - x0, y1 - y0) + wall.thickness_m
-        yaw = math.atan2(y1 - y0, x1 - x0)
-        pieces.append(rectangle((x0 + x1) / 2, (y0 + y1) / 2, length, wall.thickness_m, yaw))
-    return pieces
 
 
 def _distance(solid: Solid, model: CameraModel) -> float:

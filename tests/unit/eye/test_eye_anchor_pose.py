@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scm.eye.anchor import Anchor, Tolerance
-from scm.eye.bodies import NIGEL
 from scm.eye.camera import camera_model
 from scm.eye.pose import car_pose
 from scm.eye.render.car import tag_on_roof
-from scm.eye.tags import tag_corners
 from scm.maps.load import load_map
+from scm.scenery.bodies import NIGEL
+from scm.scenery.tags import tag_corners
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 CITY = load_map("driving_school")

@@ -8,7 +8,7 @@ import pytest
 
 from scm.errors import EyeError
 from scm.eye.detect import Settings, detect_tags
-from scm.eye.tags import CELLS, tag_picture
+from scm.scenery.tags import CELLS, tag_picture
 
 PHOTOS = Path(__file__).parents[4] / "shared" / "data" / "april_images"
 

@@ -4,7 +4,6 @@ import msgspec
 import numpy as np
 import pytest
 
-from scm.eye.bodies import NIGEL, car_body
 from scm.eye.camera import camera_model
 from scm.eye.detect import detect_tags
 from scm.eye.render.car import car_rotation, tag_on_roof
@@ -12,6 +11,7 @@ from scm.eye.source import Frame
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.maps.load import load_map
 from scm.maps.model import Box
+from scm.scenery.bodies import NIGEL, car_body
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 CITY = load_map("driving_school")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.eye.render.canvas import Canvas, Colour
+from scm.scenery.canvas import Canvas, Colour
 
 LIGHT = np.array([math.cos(2.2), math.sin(2.2)])
 """Where the lamp hangs, as a direction over the floor."""
