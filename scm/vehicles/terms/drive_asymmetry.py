@@ -1,0 +1,30 @@
+"""Drive asymmetry: one side's motors are stronger, so throttle turns the car.
+
+    motor_strength = drive_strength * (1 + side * difference),  side = +1 left, -1 right
+
+Holds: each driven wheel has its motor.   Shows in: straight drives, forward against reverse.
+Source: geometry of unequal motors; + makes the left side stronger and the car turn right.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import Normal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def drive_asymmetry(drive_strength: float, side: float, difference: float) -> float:
+    """Torque of this side's motor over the nominal one."""
+    return drive_strength * (1.0 + side * difference)
+
+
+TERM = Term(
+    drive_asymmetry,
+    per=Per.WHEEL,
+    sets="motor_strength",
+    neutral={"difference": 0.0},
+    shows_in=("straight", "shuttle"),
+    params=(
+        Param("difference", 0.0, "1", "drive.asymmetry", (-0.6, 0.6),
+              "half the difference left to right, over the mean", Normal(0.0, 0.1)),
+    ),
+)  # fmt: skip

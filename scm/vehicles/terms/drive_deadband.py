@@ -1,0 +1,30 @@
+"""Throttle dead-band: small commands do nothing, larger ones lose as much.
+
+    throttle_live = throttle_received - clip(throttle_received, -threshold, threshold)
+
+Holds: the same both ways.   Shows in: throttle ramps, crawling.
+Source: textbook dead zone; the real Nigel needs about 0.2 throttle to move.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def drive_deadband(throttle_received: float, threshold: float) -> float:
+    """Throttle that is left, + forward."""
+    return throttle_received - min(max(throttle_received, -threshold), threshold)
+
+
+TERM = Term(
+    drive_deadband,
+    per=Per.BODY,
+    sets="throttle_live",
+    neutral={"threshold": 0.0},
+    shows_in=("throttle_ramp", "crawl"),
+    params=(
+        Param("threshold", 0.0, "1", "drive.deadband", (0.0, 0.6),
+              "throttle below which nothing happens", LogNormal(0.05, 0.8)),
+    ),
+)  # fmt: skip

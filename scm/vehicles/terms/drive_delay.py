@@ -1,0 +1,30 @@
+"""Throttle delay: the motor hears a command some time after it was given.
+
+    throttle_received = throttle_command(t - delay)
+
+Holds: constant dead time; the skeleton keeps the commands.   Shows in: throttle steps.
+Source: textbook dead time; radio, bus and controller cycle together.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def drive_delay(throttle_past: float) -> float:
+    """Throttle that arrives now, + forward."""
+    return throttle_past
+
+
+TERM = Term(
+    drive_delay,
+    per=Per.BODY,
+    sets="throttle_received",
+    neutral={"delay": 0.0},
+    shows_in=("throttle_step",),
+    params=(
+        Param("delay", 0.0, "s", "drive.delay_s", (0.0, 0.5),
+              "from command to motor", LogNormal(0.05, 0.8), report="delay_s"),
+    ),
+)  # fmt: skip

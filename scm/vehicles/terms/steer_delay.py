@@ -1,0 +1,30 @@
+"""Steering delay: the servo hears a command some time after it was given.
+
+    steering_received = steering_command(t - delay)
+
+Holds: constant dead time; the skeleton keeps the commands.   Shows in: steering steps.
+Source: textbook dead time; radio, bus and the servo's 20 ms frame together.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def steer_delay(steering_past: float) -> float:
+    """Steering command that arrives now, + left."""
+    return steering_past
+
+
+TERM = Term(
+    steer_delay,
+    per=Per.BODY,
+    sets="steering_received",
+    neutral={"delay": 0.0},
+    shows_in=("steering_step",),
+    params=(
+        Param("delay", 0.0, "s", "steering.delay_s", (0.0, 0.5),
+              "from command to servo", LogNormal(0.05, 0.8), report="delay_s"),
+    ),
+)  # fmt: skip

@@ -1,0 +1,32 @@
+"""Steering saturation: an end stop on either side cuts the command short.
+
+    steering = clip(steering_received, -right, left)
+
+Holds: stops hard against the servo.   Shows in: tightest circles, both ways.
+Source: geometry; both numbers are shares of full command, + both, 1 where nothing is cut.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import Normal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def steer_saturation(steering_received: float, left: float, right: float) -> float:
+    """Command within the stops, + left."""
+    return min(max(steering_received, -right), left)
+
+
+TERM = Term(
+    steer_saturation,
+    per=Per.BODY,
+    sets="steering",
+    neutral={"left": 1.0, "right": 1.0},
+    shows_in=("tight_circle",),
+    params=(
+        Param("left", 1.0, "1", "steering.stop_left", (0.1, 1.0),
+              "largest left command that still acts", Normal(1.0, 0.2)),
+        Param("right", 1.0, "1", "steering.stop_right", (0.1, 1.0),
+              "largest right command that still acts", Normal(1.0, 0.2)),
+    ),
+)  # fmt: skip

@@ -1,0 +1,29 @@
+"""Steering trim: the wheels stand off by an angle, whatever the command.
+
+    steer_trimmed = linkage_angle + offset    [rad]
+
+Holds: bent or badly set rod.   Shows in: straight drives.   Source: geometry; + turns left.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import Normal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def steer_trim(linkage_angle: float, offset: float) -> float:
+    """Mean road-wheel angle, + left [rad]."""
+    return linkage_angle + offset
+
+
+TERM = Term(
+    steer_trim,
+    per=Per.BODY,
+    sets="steer_trimmed",
+    neutral={"offset": 0.0},
+    shows_in=("straight",),
+    params=(
+        Param("offset", 0.0, "rad", "steering.trim_rad", (-0.3, 0.3),
+              "added to the wheels' angle, + left", Normal(0.0, 0.03), report="offset_rad"),
+    ),
+)  # fmt: skip
