@@ -5,8 +5,8 @@
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from scm.vehicles import body14
 from scm.vehicles.assemble import setters_of
 from scm.vehicles.facts import FACTS, Fact
 from scm.vehicles.param import Param
-from scm.vehicles.term import Term
+from scm.vehicles.term import Term, flat
 
 TYPES_DIR = Path(__file__).parent / "types"
 TERMS = "scm.vehicles.terms"
@@ -65,6 +65,31 @@ class Car:
             msg = f"{self.path}: {key}: not in this car{nearest(key, sorted(self.values))}"
             raise CarError(msg)
         return self.values[key]
+
+    def with_terms(self, names: Sequence[str], values: Mapping[str, float] | None = None) -> "Car":
+        """Return this car with further effects, and with other numbers by `section.key`.
+
+        An effect that sets what another one sets takes its place.
+
+        Raises:
+            CarError: naming every unknown effect and key, and every value outside its bounds.
+        """
+        known, problems = all_terms(), list[str]()
+        problems += [f"no effect {n!r}{nearest(n, list(known))}" for n in names if n not in known]
+        new = flat(known[name] for name in names if name in known)
+        taken = {term.sets for term in new if term.sets}
+        kept = [term for term in self.terms if term.sets not in taken and term not in new]
+        numbers = {**_defaults(new), **self.values}
+        for key, number in (values or {}).items():
+            kind = _known_keys().get(key)
+            if kind is None or key not in numbers:
+                problems.append(f"{key}: not in this car{nearest(key, sorted(numbers))}")
+            else:
+                problems += _value_problems(key, number, kind)
+                numbers[key] = Quantity(float(number), None, kind.unit, "given")
+        if problems:
+            raise CarError("\n".join(f"{self.path}: {problem}" for problem in problems))
+        return replace(self, terms=(*kept, *new), values=numbers)
 
     def value(self, key: str) -> float:
         """Return a number such as `value("body.mass_kg")`, in the unit its key ends in."""
@@ -157,7 +182,7 @@ def _terms(data: Mapping[str, Any], problems: list[str]) -> tuple[Term, ...]:
             problems.append(f"terms: no effect {name!r}{nearest(name, list(known))}")
         elif name in names[:i]:
             problems.append(f"terms: {name!r} stands twice")
-    return tuple(known[name] for name in dict.fromkeys(names) if name in known)
+    return flat(known[name] for name in dict.fromkeys(names) if name in known)
 
 
 def _defaults(terms: tuple[Term, ...]) -> dict[str, Quantity]:

@@ -5,7 +5,7 @@ or a parameter of the 14-degree-of-freedom skeleton. A law knows no arrays and n
 """
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from scm.errors import TermError
@@ -13,7 +13,7 @@ from scm.vehicles.jit import plain
 from scm.vehicles.param import Param
 from scm.vehicles.signals import Per
 
-__all__ = ["Law", "Per", "Term", "reads"]
+__all__ = ["Law", "Per", "Term", "flat", "reads"]
 
 Law = Callable[..., float]
 
@@ -39,6 +39,7 @@ class Term:
         passive: The effect never gives energy to the car.
         neutral: Parameter values at which the effect does nothing, bit for bit.
         shows_in: Manoeuvres that make the effect visible.
+        also: Further laws of the same file that come with this one: wind has two directions.
     """
 
     law: Law
@@ -51,12 +52,15 @@ class Term:
     passive: bool = False
     neutral: Mapping[str, float] = field(default_factory=dict)
     shows_in: tuple[str, ...] = ()
+    also: tuple["Term", ...] = ()
 
     def __post_init__(self) -> None:
         if (self.adds is None) == (self.sets is None):
             msg = f"{self.name}: a term either adds to a sum or sets a signal, exactly one of both"
             raise TermError(msg)
-        if self.damping is not None and self.damping.__name__ != f"{self.name}_damping":
+        # further laws of a file may share the first one's: air drag falls alike both ways
+        stem, suffix, _ = (self.damping or self.law).__name__.partition("_damping")
+        if self.damping is not None and not (suffix and self.name.startswith(stem)):
             msg = f"{self.name}: expected a damping law named {self.name}_damping, "
             raise TermError(msg + f"got {self.damping.__name__}")
 
@@ -94,3 +98,8 @@ class Term:
         """The indented lines of the file's docstring, joined."""
         text = inspect.getdoc(inspect.getmodule(plain(self.law))) or ""
         return "; ".join(line.strip() for line in text.splitlines() if line.startswith("    "))
+
+
+def flat(terms: Iterable[Term]) -> tuple[Term, ...]:
+    """Return the effects with every further law of their files behind each, in order, once."""
+    return tuple({part.name: part for term in terms for part in (term, *term.also)}.values())

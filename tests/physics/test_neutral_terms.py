@@ -7,6 +7,8 @@ import numpy as np
 from scm.geometry import Pose2
 from scm.vehicles.car import Quantity, all_terms, load_car
 from scm.vehicles.fleet import Fleet
+from scm.vehicles.signals import SIGNALS, Role
+from scm.vehicles.term import flat
 
 FEW = (
     "suspension_spring", "tyre_contact", "tyre_longitudinal", "tyre_lateral", "motor_dc",
@@ -16,15 +18,15 @@ FEW = (
 
 def car_with(names, neutral):
     """Nigel with these effects, those of `neutral` at their neutral values."""
-    terms = tuple(all_terms()[name] for name in names)
+    terms = flat(all_terms()[name] for name in names)
     nigel = load_car("nigel")
     values = dict(nigel.values)
     for term in terms:
         for param in term.params:
             number = param.default
-            if term.name in neutral:
+            if term.name.startswith(tuple(neutral)):
                 number = term.neutral.get(param.name, number)
-            if param.key not in values or term.name in neutral:
+            if param.key not in values or term.name.startswith(tuple(neutral)):
                 values[param.key] = Quantity(number, None, param.unit, "test")
     return replace(nigel, name="few", terms=terms, values=values)
 
@@ -43,6 +45,7 @@ def drive(car):
 
 def test_every_neutral_effect_at_once_leaves_the_trajectory_bit_for_bit():
     neutral = [name for name, term in all_terms().items() if term.neutral and name not in FEW]
+    neutral = [name for name in neutral if SIGNALS[all_terms()[name].target].role is not Role.SHAPE]
     assert len(neutral) >= 12
     few, many = drive(car_with(FEW, [])), drive(car_with([*FEW, *neutral], neutral))
     for name in ("x", "y", "z", "roll", "pitch", "yaw", "speed", "wheel_speed", "wheel_load"):

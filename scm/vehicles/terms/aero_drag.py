@@ -1,38 +1,58 @@
-"""Air drag on the body, against its forward motion.
+"""Air drag on the body, against its whole motion through the air, wind included.
 
-    force_x += -coefficient * vx * |vx|    [N]
+    u = velocity of the body - velocity of the air, in the body frame
+    force_x += -coefficient * |u| * u_x,  force_y += -coefficient * |u| * u_y    [N]
 
-Holds: above walking pace.   Shows in: fast coast-down.
+Holds: above walking pace, one coefficient for all directions.   Shows in: fast coast-down, wind.
 Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 4; coefficient is rho c_d A / 2.
 """
+
+import math
 
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
+_PARAMS = (
+    Param("coefficient", 0.0, "N*s^2/m^2", "body.drag_quadratic_ns2_m2", (0.0, 5.0),
+          "force over speed squared", LogNormal(0.01, 1.0)),
+)  # fmt: skip
+
 
 @law
-def aero_drag(vx: float, coefficient: float) -> float:
-    """Force against the motion [N]."""
-    return -coefficient * vx * abs(vx)
-
-
-@law
-def aero_drag_damping(vx: float, coefficient: float) -> float:
+def aero_drag_damping(
+    vx: float, vy: float, air_x: float, air_y: float, cos_yaw: float, sin_yaw: float,
+    coefficient: float,
+) -> float:  # fmt: skip
     """Force lost per speed, the secant [N*s/m]."""
-    return coefficient * abs(vx)
+    along = vx - (cos_yaw * air_x + sin_yaw * air_y)
+    across = vy - (cos_yaw * air_y - sin_yaw * air_x)
+    return coefficient * math.sqrt(along * along + across * across)
+
+
+@law
+def aero_drag(
+    vx: float, vy: float, air_x: float, air_y: float, cos_yaw: float, sin_yaw: float,
+    coefficient: float,
+) -> float:  # fmt: skip
+    """Force along the body, + forward [N]."""
+    secant = aero_drag_damping(vx, vy, air_x, air_y, cos_yaw, sin_yaw, coefficient)
+    return -secant * (vx - (cos_yaw * air_x + sin_yaw * air_y))
+
+
+@law
+def aero_drag_across(
+    vx: float, vy: float, air_x: float, air_y: float, cos_yaw: float, sin_yaw: float,
+    coefficient: float,
+) -> float:  # fmt: skip
+    """Force across the body, + to its left [N]."""
+    secant = aero_drag_damping(vx, vy, air_x, air_y, cos_yaw, sin_yaw, coefficient)
+    return -secant * (vy - (cos_yaw * air_y - sin_yaw * air_x))
 
 
 TERM = Term(
-    aero_drag,
-    per=Per.BODY,
-    adds="force_x",
-    damping=aero_drag_damping,
-    passive=True,
-    neutral={"coefficient": 0.0},
-    shows_in=("coast_down",),
-    params=(
-        Param("coefficient", 0.0, "N*s^2/m^2", "body.drag_quadratic_ns2_m2", (0.0, 5.0),
-              "force over speed squared", LogNormal(0.01, 1.0)),
-    ),
+    aero_drag, per=Per.BODY, adds="force_x", damping=aero_drag_damping, passive=True,
+    neutral={"coefficient": 0.0}, params=_PARAMS, shows_in=("coast_down",),
+    also=(Term(aero_drag_across, per=Per.BODY, adds="force_y", damping=aero_drag_damping,
+               passive=True, neutral={"coefficient": 0.0}, params=_PARAMS, shows_in=("wind",)),),
 )  # fmt: skip

@@ -1,6 +1,8 @@
 """Rolling resistance: the tyre's hysteresis turns rolling into heat and holds a wheel at rest.
 
-    dry_torque += c_rr * load * wheel_radius    [N*m]
+    dry_torque += (c_rr + rolling) * load * wheel_radius    [N*m]
+
+rolling is what the floor under the wheel adds.
 
 Holds: hard floor, below 15 m/s.   Shows in: coast-down that stops too late.
 Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 4.
@@ -12,9 +14,11 @@ from scm.vehicles.term import Per, Term
 
 
 @law
-def rolling_resistance(load: float, wheel_radius: float, coefficient: float) -> float:
+def rolling_resistance(
+    load: float, rolling: float, wheel_radius: float, coefficient: float
+) -> float:
     """Torque that dry friction can hold, never negative [N*m]."""
-    return coefficient * load * wheel_radius
+    return (coefficient + rolling) * load * wheel_radius
 
 
 TERM = Term(

@@ -1,6 +1,9 @@
 """Lateral tyre force: grip against side slip, the paper's two cubics times the load.
 
-    tyre_y += -load * F(slip),  slip = v_lat / max(|v_long|, low_speed)
+    tyre_y += -load * grip * F(slip),  slip = slip_scale * v_lat / max(|v_long|, low_speed)    [N]
+
+A tyre with memory (tyre_relaxation) has (v_lat + m side_lag) / max(|v_long| + m, low_speed) as
+its slip, m = side_lag_speed; without, m = 0.
 
 Holds: dry floor; independent of longitudinal slip, as in the paper; no rise of grip per load.
 Shows in: fast circles, lane changes.   Source: AutoDRIVE paper, tyre model (two cubics).
@@ -14,25 +17,29 @@ from scm.vehicles.tyre_curve import curve_over_slip
 
 @law
 def tyre_lateral(
-    v_long: float, v_lat: float, load: float, slip_extremum: float,
-    force_extremum: float, slip_asymptote: float, force_asymptote: float, low_speed: float,
+    v_long: float, v_lat: float, grip_load: float, grip: float, slip_scale: float, side_lag: float,
+    side_lag_speed: float, slip_extremum: float, force_extremum: float, slip_asymptote: float,
+    force_asymptote: float, low_speed: float,
 ) -> float:  # fmt: skip
     """Force across the wheel, + to its left [N]."""
-    slip = v_lat / max(abs(v_long), low_speed)
-    return -load * slip * curve_over_slip(
+    speed = max(abs(v_long) + side_lag_speed, low_speed)
+    slip = slip_scale * (v_lat + side_lag_speed * side_lag) / speed
+    return -grip_load * grip * slip * curve_over_slip(
         slip, slip_extremum, force_extremum, slip_asymptote, force_asymptote
     )  # fmt: skip
 
 
 @law
 def tyre_lateral_damping(
-    v_long: float, v_lat: float, load: float, slip_extremum: float,
-    force_extremum: float, slip_asymptote: float, force_asymptote: float, low_speed: float,
+    v_long: float, v_lat: float, grip_load: float, grip: float, slip_scale: float, side_lag: float,
+    side_lag_speed: float, slip_extremum: float, force_extremum: float, slip_asymptote: float,
+    force_asymptote: float, low_speed: float,
 ) -> float:  # fmt: skip
     """Force per side speed, the secant: beyond the peak it never overshoots zero slip [N*s/m]."""
-    speed = max(abs(v_long), low_speed)
-    return load / speed * curve_over_slip(
-        v_lat / speed, slip_extremum, force_extremum, slip_asymptote, force_asymptote
+    speed = max(abs(v_long) + side_lag_speed, low_speed)
+    slip = slip_scale * (v_lat + side_lag_speed * side_lag) / speed
+    return grip_load * grip * slip_scale / speed * curve_over_slip(
+        slip, slip_extremum, force_extremum, slip_asymptote, force_asymptote
     )  # fmt: skip
 
 

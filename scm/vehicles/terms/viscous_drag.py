@@ -1,6 +1,6 @@
-"""Linear drag on the body, against its forward motion.
+"""Linear drag on the body, against its motion over the floor.
 
-    force_x += -coefficient * vx    [N]
+    force_x += -coefficient * vx,  force_y += -coefficient * vy    [N]
 
 Holds: slow air, cables, grease.   Shows in: coast-down.   Source: AutoDRIVE paper, rigid body drag.
 """
@@ -9,11 +9,22 @@ from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
+_PARAMS = (
+    Param("coefficient", 0.0, "N*s/m", "body.drag_linear_ns_m", (0.0, 20.0),
+          "force over speed", LogNormal(0.05, 1.0)),
+)  # fmt: skip
+
 
 @law
 def viscous_drag(vx: float, coefficient: float) -> float:
-    """Force against the motion [N]."""
+    """Force along the body, + forward [N]."""
     return -coefficient * vx
+
+
+@law
+def viscous_drag_across(vy: float, coefficient: float) -> float:
+    """Force across the body, + to its left [N]."""
+    return -coefficient * vy
 
 
 @law
@@ -23,15 +34,8 @@ def viscous_drag_damping(coefficient: float) -> float:
 
 
 TERM = Term(
-    viscous_drag,
-    per=Per.BODY,
-    adds="force_x",
-    damping=viscous_drag_damping,
-    passive=True,
-    neutral={"coefficient": 0.0},
-    shows_in=("coast_down",),
-    params=(
-        Param("coefficient", 0.0, "N*s/m", "body.drag_linear_ns_m", (0.0, 20.0),
-              "force over speed", LogNormal(0.05, 1.0)),
-    ),
+    viscous_drag, per=Per.BODY, adds="force_x", damping=viscous_drag_damping, passive=True,
+    neutral={"coefficient": 0.0}, params=_PARAMS, shows_in=("coast_down",),
+    also=(Term(viscous_drag_across, per=Per.BODY, adds="force_y", damping=viscous_drag_damping,
+               passive=True, neutral={"coefficient": 0.0}, params=_PARAMS, shows_in=("slide",)),),
 )  # fmt: skip

@@ -29,5 +29,5 @@ def test_a_damping_law_must_carry_the_terms_name():
 def test_documents_are_read_from_the_terms_file():
     term = all_terms()["rolling_resistance"]
     assert term.about.startswith("Rolling resistance")
-    assert term.equation == "dry_torque += c_rr * load * wheel_radius    [N*m]"
+    assert term.equation == "dry_torque += (c_rr + rolling) * load * wheel_radius    [N*m]"
     assert term.doc_line("Shows in") == "coast-down that stops too late."

@@ -1,0 +1,32 @@
+"""Centre of gravity that lies elsewhere along the car than the car file says.
+
+    added_cog_x += shift    [m]
+
+Moves load between the axles and the lever arms of their side forces; yaw inertia stays.
+Holds: while the centre of gravity stays between the axles.
+Shows in: fast circles, steering steps at speed.
+Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 6.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import Normal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def com_shift(shift: float) -> float:
+    """Centre of gravity ahead of where the car file puts it [m]."""
+    return shift
+
+
+TERM = Term(
+    com_shift,
+    per=Per.BODY,
+    adds="added_cog_x",
+    neutral={"shift": 0.0},
+    shows_in=("fast_circle", "steering_step"),
+    params=(
+        Param("shift", 0.0, "m", "com_shift.shift_m", (-0.4, 0.4),
+              "+ forward", Normal(0.0, 0.02), report="shift_m"),
+    ),
+)  # fmt: skip

@@ -1,0 +1,32 @@
+"""Payload: load at the centre of gravity that the car file does not know of.
+
+    added_mass += mass    [kg]
+
+The car stands as high as before, its springs carry the load; moments of inertia stay.
+Holds: load near the centre of gravity. On a level floor it is the twin of a weak motor: only a
+ramp, or a known load added, tells them apart.
+Shows in: throttle steps, ramps.   Source: Newton's second law.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import Normal, Param
+from scm.vehicles.term import Per, Term
+
+
+@law
+def payload(mass: float) -> float:
+    """Mass beyond the car file's [kg]."""
+    return mass
+
+
+TERM = Term(
+    payload,
+    per=Per.BODY,
+    adds="added_mass",
+    neutral={"mass": 0.0},
+    shows_in=("throttle_step", "ramp"),
+    params=(
+        Param("mass", 0.0, "kg", "payload.mass_kg", (-0.1, 20.0),
+              "carried beside the car file's mass", Normal(0.0, 1.0), report="mass_kg"),
+    ),
+)  # fmt: skip

@@ -1,0 +1,52 @@
+"""Tyre that must roll a length before its side force has built up, and holds like a spring at rest.
+
+    length * d(side_lag)/dt + |v_long| * side_lag = v_lat
+    side_lag_speed = length / dt
+
+side_lag is the slip that the contact patch still carries. At rest the left side loses its second
+part: the patch is a spring, so a car on a side slope stands where a quasi-static tyre creeps. A
+patch that slides carries no more than the slip of the slide, at rest that of most grip.
+Holds: lengths above 1 mm at 1 ms substeps.   Shows in: steering steps at speed, standing.
+Source: Pacejka, Tire and Vehicle Dynamics, single contact point transient model.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.term import Per, Term
+
+_LENGTH = Param("length", 0.0, "m", "tyre_relaxation.length_m", (0.0, 2.0),
+                "rolled for 63 % of the side force", LogNormal(0.05, 1.0),
+                report="length_m")  # fmt: skip
+
+
+@law
+def tyre_relaxation(
+    v_long: float, v_lat: float, side_lag: float, dt: float, length: float, slip_extremum: float,
+    low_speed: float,
+) -> float:  # fmt: skip
+    """Side slip that the contact patch carries, + sliding left; 0 without a length."""
+    most = max(slip_extremum, abs(v_lat) / max(abs(v_long), low_speed))
+    speed = max(abs(v_long) + length / dt, low_speed)
+    carried = (v_lat + length / dt * side_lag) / speed
+    return min(max(carried, -most), most) if length > 0.0 else 0.0
+
+
+@law
+def tyre_relaxation_speed(dt: float, length: float) -> float:
+    """How much of the carried slip stays [m/s]."""
+    return length / dt
+
+
+TERM = Term(
+    tyre_relaxation, per=Per.WHEEL, sets="side_lag", keeps=0.0, neutral={"length": 0.0},
+    shows_in=("steering_step", "stand_on_slope"),
+    params=(
+        _LENGTH,
+        Param("slip_extremum", 0.2, "1", "tyre.lateral_slip_extremum", (0.01, 1.0),
+              "slip of most grip", LogNormal(0.2, 0.3)),
+        Param("low_speed", 0.05, "m/s", "tyre.low_speed_m_s", (0.01, 1.0),
+              "floor of the slip's denominator", fit=False),
+    ),
+    also=(Term(tyre_relaxation_speed, per=Per.WHEEL, sets="side_lag_speed", params=(_LENGTH,),
+               neutral={"length": 0.0}, shows_in=("steering_step",)),),
+)  # fmt: skip

@@ -1,0 +1,52 @@
+"""Tyre that winds up before it drives or brakes, and holds the car like a spring at rest.
+
+    length * d(spin_lag)/dt + |v_long| * spin_lag = wheel_radius * omega - v_long
+    spin_lag_speed = length / dt
+
+The same as tyre_relaxation, along the wheel: with both a car whose motors hold stands on any slope
+without creep, where quasi-static tyres let it slip by a fraction of a millimetre a second.
+Holds: lengths above 1 mm at 1 ms substeps.   Shows in: launch, standing on a slope.
+Source: Pacejka, Tire and Vehicle Dynamics, single contact point transient model.
+"""
+
+from scm.vehicles.jit import law
+from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.term import Per, Term
+
+_LENGTH = Param("length", 0.0, "m", "tyre_windup.length_m", (0.0, 2.0),
+                "rolled for 63 % of the force along", LogNormal(0.02, 1.0),
+                report="length_m")  # fmt: skip
+
+
+@law
+def tyre_windup(
+    omega: float, v_long: float, wheel_radius: float, spin_lag: float, dt: float, length: float,
+    slip_extremum: float, low_speed: float,
+) -> float:  # fmt: skip
+    """Spin slip that the contact patch carries, + driving; 0 without a length."""
+    slide = wheel_radius * omega - v_long
+    most = max(slip_extremum, abs(slide) / max(abs(v_long), low_speed))
+    speed = max(abs(v_long) + length / dt, low_speed)
+    carried = (slide + length / dt * spin_lag) / speed
+    return min(max(carried, -most), most) if length > 0.0 else 0.0
+
+
+@law
+def tyre_windup_speed(dt: float, length: float) -> float:
+    """How much of the carried slip stays [m/s]."""
+    return length / dt
+
+
+TERM = Term(
+    tyre_windup, per=Per.WHEEL, sets="spin_lag", keeps=0.0, neutral={"length": 0.0},
+    shows_in=("launch", "stand_on_slope"),
+    params=(
+        _LENGTH,
+        Param("slip_extremum", 0.2, "1", "tyre.slip_extremum", (0.01, 1.0),
+              "slip of most grip", LogNormal(0.2, 0.3)),
+        Param("low_speed", 0.05, "m/s", "tyre.low_speed_m_s", (0.01, 1.0),
+              "floor of the slip's denominator", fit=False),
+    ),
+    also=(Term(tyre_windup_speed, per=Per.WHEEL, sets="spin_lag_speed", params=(_LENGTH,),
+               neutral={"length": 0.0}, shows_in=("launch",)),),
+)  # fmt: skip
