@@ -98,7 +98,7 @@ def _readings(car: HostedCar, now_ns: int) -> list[Message]:
 
 def _sensors(car: HostedCar) -> VehicleSensors:
     left, right = car.readings[ENCODERS].values.tolist()
-    ax, ay, az, p, q, r = car.readings[IMU].values.tolist()
+    ax, ay, az, p, q, r = car.readings[IMU].values[:6].tolist()
     return VehicleSensors(
         vehicle=car.name,
         t_ns=car.readings[ENCODERS].t_ns,

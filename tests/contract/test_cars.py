@@ -28,7 +28,10 @@ def test_the_numbers_are_the_shared_ones(name):
     theirs = tomllib.loads(shared.read_text(encoding="utf-8"))
     ours = tomllib.loads((TYPES_DIR / f"{name}.toml").read_text(encoding="utf-8"))
     assert tuple(ours.pop("terms")) == STANDARD_TERMS
-    assert ours == theirs
+    for section, keys in theirs.items():
+        known = ours[section]
+        of_ours = {key: known[key] for key in keys} if isinstance(keys, dict) else known
+        assert of_ours == keys  # ours may say more of the devices
 
 
 @pytest.mark.parametrize("name", car_names())

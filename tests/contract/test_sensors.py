@@ -7,15 +7,18 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from scm import registry
-from scm.clock import NS_PER_S
 from scm.geometry import Pose2
+from scm.vehicles.bank import Bank
 from scm.vehicles.car import car_names, load_car
 from scm.vehicles.fleet import Fleet
-from scm.vehicles.sensor import Around, Sampler, Sensor
+from scm.vehicles.rays.grid import WallGrid
+from scm.vehicles.rays.scene import Scene
+from scm.vehicles.sensor import Sensor, Sight
 
 PACKAGE = "scm.vehicles.sensors"
 KINDS = registry.names(PACKAGE)
 WALL = np.array([[2.0, -5.0, 2.0, 5.0]])
+SCENE = Scene(WallGrid(WALL), np.zeros((0, 4)), np.zeros(0, np.int64))
 
 
 def sensor(kind):
@@ -32,7 +35,7 @@ def fleet():
 
 
 def measured(kind, fleet, rows):
-    around = Around(WALL, np.array([-1]), np.array(rows))
+    around = Sight(SCENE, np.array(rows))
     return sensor(kind).measure(fleet.car, fleet, np.array(rows), around)
 
 
@@ -66,35 +69,44 @@ def test_a_car_measures_the_same_alone_and_in_company(kind, fleet):
     assert_array_equal(measured(kind, fleet, [0])[0], together[1])
 
 
+def quiet(facts):
+    nothing = (0.0,)
+    return replace(facts, noise=nothing, bias=nothing, walk=nothing, drop_out=0.0, latency_s=0.0)
+
+
+def bank_of(kind, fleet, facts, seed=0):
+    bank = Bank(replace(sensor(kind), facts=lambda car: facts), seed)
+    for row in range(3):
+        bank.fit(row, f"car{row}", fleet.car, fleet, row, 0)
+    return bank
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_without_noise_a_reading_is_the_truth_to_its_quantum(kind, fleet):
-    facts = replace(sensor(kind).facts(fleet.car), noise=(0.0,))
-    exact = measured(kind, fleet, [1])[0]
-    sampler = Sampler(facts, np.random.default_rng(0))
-    sampler.take(0, exact)
-    (reading,) = sampler.ready(0)
-    expected = np.floor(exact) if facts.quantum else exact
-    assert_array_equal(reading.values, expected)
+    facts = quiet(sensor(kind).facts(fleet.car))
+    exact = measured(kind, fleet, [0, 1, 2])
+    (readings,) = bank_of(kind, fleet, facts).step(0, lambda: SCENE)
+    expected = np.floor(exact / facts.quantum) * facts.quantum if facts.quantum else exact.copy()
+    if facts.seen is not None:
+        expected[(exact < facts.seen[0]) | (exact > facts.seen[1])] = np.inf
+    assert_array_equal(readings.values, expected)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_device_keeps_its_rate(kind, fleet):
-    facts = sensor(kind).facts(fleet.car)
-    sampler = Sampler(facts, np.random.default_rng(0))
-    reads = sum(sampler.is_due(t) for t in range(0, 10 * NS_PER_S, NS_PER_S // 500))
-    assert reads == round(10 * facts.rate_hz)
+def test_the_names_of_the_values_fit_what_is_measured(kind, fleet):
+    count = measured(kind, fleet, [0]).shape[1]
+    assert len(sensor(kind).values) in {1, count}
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_seed_one_noise(kind, fleet):
-    facts, exact = sensor(kind).facts(fleet.car), measured(kind, fleet, [1])[0]
+    facts = sensor(kind).facts(fleet.car)
 
     def read(seed):
-        sampler = Sampler(facts, np.random.default_rng(seed))
-        sampler.take(0, exact)
-        return sampler.ready(0)[0].values
+        return bank_of(kind, fleet, facts, seed).step(0, lambda: SCENE)[0].values
 
     assert_array_equal(read(3), read(3))
+    noisy = np.isfinite(read(3)) & np.isfinite(read(4))
     if any(facts.noise):
-        finite = np.isfinite(exact)
-        assert (read(3)[finite] != read(4)[finite]).all()
+        noisy &= np.broadcast_to(np.array(facts.noise) > 0.0, noisy.shape)
+        assert (read(3)[noisy] != read(4)[noisy]).all()

@@ -85,7 +85,7 @@ class SimulatedBody:
         if not self._encoders.read(now_ns) or not self._imu.newest:
             return []
         left, right = self._encoders.newest
-        ax, ay, az, roll_rate, pitch_rate, yaw_rate = self._imu.newest
+        ax, ay, az, roll_rate, pitch_rate, yaw_rate = self._imu.newest[:6]
         return [
             VehicleSensors(
                 vehicle=vehicle,

@@ -1,6 +1,6 @@
 """Encoders of the rear wheels: whole counts of the wheel angle since the car was placed.
 
-    count = floor(angle * counts_per_revolution / (2 pi))        left, right; + = forward
+    count = floor(angle * counts_per_revolution / (2 pi) + noise)    left, right; + = forward
 
 Holds: quadrature counting without missed edges.
 Source: 1920 counts a revolution, AutoDRIVE paper; simulator: 16 pulses through a 120:1 gear.
@@ -10,18 +10,23 @@ import math
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
-from scm.vehicles.sensor import Around, Facts, Sensor, Truth
+from scm.vehicles.sensor import Around, Facts, Sensor, Sight, Truth
 
-RATE_HZ = 50.0
 REAR = (2, 3)
 
 
 def facts(car: Car) -> Facts:
-    """Return the device: noise-free, in whole counts."""
-    return Facts(rate_hz=RATE_HZ, quantum=1.0)
+    """Return the device of a car file: whole counts."""
+    return Facts(
+        rate_hz=car.value("encoder.rate_hz"),
+        noise=(car.value("encoder.noise_counts"),),
+        latency_s=car.value("encoder.latency_s"),
+        drop_out=car.value("encoder.drop_out"),
+        quantum=1.0,
+    )
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Around | None) -> Floats:
+def measure(car: Car, truth: Truth, rows: Ints, around: Sight | Around | None) -> Floats:
     """Return the angles of the rear wheels in counts, not yet rounded, (k, 2)."""
     counts = car.value("encoder.counts_per_revolution")
     return truth.wheel_angle[rows][:, REAR] * (counts / (2.0 * math.pi))

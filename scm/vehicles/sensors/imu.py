@@ -1,41 +1,67 @@
-"""IMU: specific force and turn rate at its place on the body, in the tilted body frame.
+"""IMU: specific force and turn rate at its place on the body, and which way the body looks.
 
-    f = R^T (a_cog + g z) + alpha x r + omega x (omega x r)          x forward, y left, z up
+    f = R^T (a_cog + a_impact + g z) + alpha x r + omega x (omega x r)    x forward, y left, z up
     gyro = omega                                                     roll, pitch, yaw rate
+    orientation = roll, pitch, yaw                                   yaw from the map's x axis
 
-r reaches from the centre of gravity to the IMU, R tilts the level frame by pitch, then roll.
-Holds: rigid mounting, small roll and pitch.
+r reaches from the centre of gravity to the IMU, R tilts the level frame by pitch, then roll. The
+last three are what a nine-axis unit makes of its magnetic field and the rest. Contacts are felt as
+their mean acceleration over the last tick.
+Holds: rigid mounting, small roll and pitch; a magnetic field that turns nowhere.
 Source: rigid-body kinematics; noise of the MPU-9250's class, from the car file.
 """
+
+import math
 
 import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.body14 import GRAVITY
 from scm.vehicles.car import Car
-from scm.vehicles.sensor import Around, Facts, Sensor, Truth
+from scm.vehicles.sensor import Around, Facts, Sensor, Sight, Truth
 
 
 def facts(car: Car) -> Facts:
     """Return the device of a car file."""
-    accel = car.value("imu.accel_noise_m_s2")
-    gyro = car.value("imu.gyro_noise_rad_s")
-    return Facts(rate_hz=car.value("imu.rate_hz"), noise=(accel,) * 3 + (gyro,) * 3)
+    value, vector = car.value, car.vector
+    accel, gyro = value("imu.accel_noise_m_s2"), value("imu.gyro_noise_rad_s")
+    accel_walk, gyro_walk = value("imu.accel_walk_m_s2_sqrt_s"), value("imu.gyro_walk_rad_s_sqrt_s")
+    heading_walk = value("imu.heading_walk_rad_sqrt_s")
+    return Facts(
+        rate_hz=value("imu.rate_hz"),
+        latency_s=value("imu.latency_s"),
+        drop_out=value("imu.drop_out"),
+        noise=(accel,) * 3 + (gyro,) * 3 + (value("imu.orientation_noise_rad"),) * 3,
+        bias=(
+            *vector("imu.accel_bias_m_s2"), *vector("imu.gyro_bias_rad_s"),
+            0.0, 0.0, value("imu.heading_bias_rad"),
+        ),
+        walk=(accel_walk,) * 3 + (gyro_walk,) * 3 + (0.0, 0.0, heading_walk),
+        saturates_at=(
+            *(value("imu.accel_limit_m_s2"),) * 3, *(value("imu.gyro_limit_rad_s"),) * 3,
+            *(math.inf,) * 3,
+        ),
+        angles=(6, 7, 8),
+    )  # fmt: skip
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Around | None) -> Floats:
-    """Return specific force [m/s^2] and turn rate [rad/s], (k, 6)."""
+def measure(car: Car, truth: Truth, rows: Ints, around: Sight | Around | None) -> Floats:
+    """Return specific force [m/s^2], turn rate [rad/s] and orientation [rad], (k, 9)."""
     level = np.column_stack(
-        (truth.accel_x[rows], truth.accel_y[rows], truth.accel_z[rows] + GRAVITY)
+        (
+            truth.accel_x[rows] + truth.impact_x[rows],
+            truth.accel_y[rows] + truth.impact_y[rows],
+            truth.accel_z[rows] + GRAVITY,
+        )
     )
-    force = tilted(level, truth.roll[rows], truth.pitch[rows])
+    roll, pitch = truth.roll[rows], truth.pitch[rows]
+    force = tilted(level, roll, pitch)
     omega = np.column_stack((truth.roll_rate[rows], truth.pitch_rate[rows], truth.yaw_rate[rows]))
-    alpha = np.column_stack(
-        (truth.roll_accel[rows], truth.pitch_accel[rows], truth.yaw_accel[rows])
-    )
+    turning = truth.yaw_accel[rows] + truth.impact_yaw[rows]
+    alpha = np.column_stack((truth.roll_accel[rows], truth.pitch_accel[rows], turning))
     arm = np.broadcast_to(lever_arm(car), omega.shape)
     force += cross(alpha, arm) + cross(omega, cross(omega, arm))
-    return np.column_stack((force, omega))
+    return np.column_stack((force, omega, roll, pitch, truth.yaw[rows]))
 
 
 def cross(a: Floats, b: Floats) -> Floats:
@@ -61,7 +87,7 @@ def tilted(level: Floats, roll: Floats, pitch: Floats) -> Floats:
 SENSOR = Sensor(
     "imu",
     ("accel_x_mps2", "accel_y_mps2", "accel_z_mps2",
-     "gyro_x_radps", "gyro_y_radps", "gyro_z_radps"),
+     "gyro_x_radps", "gyro_y_radps", "gyro_z_radps", "roll_rad", "pitch_rad", "yaw_rad"),
     ("imu.position_m", "imu.rate_hz", "imu.accel_noise_m_s2", "imu.gyro_noise_rad_s"),
     facts,
     measure,

@@ -17,7 +17,7 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
 from scm.vehicles.jit import array_kernel
-from scm.vehicles.sensor import Around, Facts, Sensor, Truth
+from scm.vehicles.sensor import Around, Facts, Sensor, Sight, Truth
 
 EDGE = 1e-9
 SMALL = 1e-12
@@ -25,11 +25,24 @@ SMALL = 1e-12
 
 def facts(car: Car) -> Facts:
     """Return the device of a car file."""
-    return Facts(rate_hz=car.value("lidar.rate_hz"), noise=(car.value("lidar.noise_m"),))
+    nearest, farthest = car.vector("lidar.range_m")
+    return Facts(
+        rate_hz=car.value("lidar.rate_hz"),
+        noise=(car.value("lidar.noise_m"),),
+        latency_s=car.value("lidar.latency_s"),
+        drop_out=car.value("lidar.drop_out"),
+        quantum=car.value("lidar.quantum_m"),
+        seen=(nearest, farthest),
+    )
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Around | None) -> Floats:
+def measure(car: Car, truth: Truth, rows: Ints, around: Sight | Around | None) -> Floats:
     """Return ranges (k, beams) [m]; infinity is a miss."""
+    if isinstance(around, Sight):
+        scene = around.scene
+        edges = np.concatenate((scene.walls.edges, scene.outlines))
+        owners = np.concatenate((np.full(len(scene.walls.edges), -1), np.repeat(scene.owners, 4)))
+        around = Around(edges, owners, around.own)
     x, y, _ = car.vector("lidar.position_m")
     yaw = truth.yaw[rows]
     c, s = np.cos(yaw), np.sin(yaw)

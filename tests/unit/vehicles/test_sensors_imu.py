@@ -26,6 +26,10 @@ NAMES = [
     "accel_x",
     "accel_y",
     "accel_z",
+    "impact_x",
+    "impact_y",
+    "impact_yaw",
+    "yaw",
 ]
 
 
@@ -35,7 +39,7 @@ def felt(**motion):
 
 
 def test_at_rest_it_feels_gravity_upwards_and_no_turn():
-    assert_allclose(felt(), [0, 0, GRAVITY, 0, 0, 0], atol=1e-15)
+    assert_allclose(felt(), [0, 0, GRAVITY, 0, 0, 0, 0, 0, 0], atol=1e-15)
 
 
 def test_nose_down_gravity_pulls_forward_so_the_force_is_backward():
@@ -62,7 +66,17 @@ def test_spinning_up_pushes_across_the_lever_arm():
 
 
 def test_the_gyro_reads_the_turn_rates_in_order():
-    assert_allclose(felt(roll_rate=0.1, pitch_rate=0.2, yaw_rate=0.3)[3:], [0.1, 0.2, 0.3])
+    assert_allclose(felt(roll_rate=0.1, pitch_rate=0.2, yaw_rate=0.3)[3:6], [0.1, 0.2, 0.3])
+
+
+def test_the_orientation_is_roll_pitch_and_yaw():
+    assert_allclose(felt(roll=0.1, pitch=0.2, yaw=0.3)[6:], [0.1, 0.2, 0.3])
+
+
+def test_a_contact_is_felt_through_the_lever_arm():
+    x, y, _ = lever_arm(NIGEL)
+    force = felt(impact_x=-20.0, impact_y=3.0, impact_yaw=50.0)
+    assert_allclose(force[:2], [-20.0 - 50.0 * y, 3.0 + 50.0 * x])
 
 
 @pytest.mark.parametrize("name", ["nigel", "f1tenth"])

@@ -1,0 +1,1 @@
+"""What level scanners see: `scene` stands around them, `grid` sorts it by place, `cast` looks."""
