@@ -14,7 +14,7 @@ MITRE_LIMIT = 4.0
 
 
 def wall_segments(city_map: CityMap) -> Floats:
-    """Return all edges of walls and boxes, shape (m, 4): x0, y0, x1, y1 [m].
+    """Return all edges of walls and boxes that stay, shape (m, 4): x0, y0, x1, y1 [m].
 
     A wall of thickness 0 is its own edge; a thicker one has one edge on each side and, if it is
     open, one at each end.
@@ -24,6 +24,8 @@ def wall_segments(city_map: CityMap) -> Floats:
         for outline in wall_outlines(wall):
             edges += _edges(outline)
     for box in city_map.boxes:
+        if box.mass_kg is not None:
+            continue
         edges += _edges(box_outline(box))
     return np.array(edges, dtype=np.float64).reshape(-1, 4)
 

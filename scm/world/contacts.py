@@ -1,33 +1,37 @@
-"""Contacts between cars, and of cars with walls and boxes: pymunk's impulse solver, in batches.
+"""Contacts between cars, boxes and walls: pymunk's impulse solver, for those who touch.
 
 The cars' own dynamics have already moved them; a contact step only solves impulses at the places
 where footprints overlap, so its own duration is next to nothing (`INSTANT`) and it moves nobody.
 What it returns per car is the change of velocity, and a shift out of the overlap that is shared by
-inverse mass. A car that touches nothing gets exact zeros.
+inverse mass. A car that touches nothing gets exact zeros and never meets pymunk: `near.py` sieves.
+Boxes that can be pushed live here too: between two steps they slide, braked by the floor.
 
-Two shapes a car: one meets other cars, one meets walls. pymunk multiplies the two restitutions of a
-contact; with the root on the first and the car's own value on the second (walls carry 1), a car
-against a wall and two equal cars both bounce with the restitution their car file gives.
+Two shapes a car: one meets other cars, one meets walls and boxes. pymunk multiplies the two
+restitutions of a contact; with the root on the first and the car's own value on the second (walls
+and boxes carry 1), a car against a wall and two equal cars both bounce with the restitution their
+car file gives. Boxes bounce neither off each other nor off walls.
 Read and written through `pymunk.batch`: attributes cost thirty times as much.
 """
 
-import math
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 import pymunk
 from pymunk import batch
 
 from scm.arrays import Bools, Floats, Ints
-from scm.maps.model import Box, CityMap, Wall
+from scm.maps.model import CityMap
+from scm.world.boxes import Boxes
+from scm.world.near import Near, obstacles_of
+from scm.world.solids import Hull, box_body, car_body, obstacle_boxes, outline_of, solids
 
 INSTANT = 1e-9
+STEP_S = 0.005
 OVERLAP_KEPT = 2e-4
 SHARE_CORRECTED = 0.2
 ITERATIONS = 30
-MEETS_CARS, MEETS_WALLS, WALL = 0b001, 0b010, 0b100
+KEPT_STEPS = 40
+WALL, FIRST_BOX = -1, -2
 
 _MOTION = (
     batch.BodyFields.POSITION
@@ -45,19 +49,6 @@ _TOUCH = (
 )
 
 
-class Hull(NamedTuple):
-    """What a car is to others: a box about its centre of gravity, body frame, SI."""
-
-    mass: float
-    yaw_inertia: float
-    rear: float
-    front: float
-    right: float
-    left: float
-    restitution: float
-    friction: float
-
-
 @dataclass(frozen=True, slots=True)
 class Touches:
     """What one contact step did; rows as in the motion that was given, world frame.
@@ -66,7 +57,7 @@ class Touches:
         dv: (n, 3) change of the centre of gravity's velocity x, y and of the yaw rate.
         shift: (n, 2) way out of the overlap [m].
         touched: (n,) whether the car touched anything.
-        pairs: (k, 2) rows that touched each other; -1 stands for a wall.
+        pairs: (k, 2) rows that touched each other; -1 stands for a wall, -2 - i for box i.
     """
 
     dv: Floats
@@ -76,49 +67,37 @@ class Touches:
 
 
 class Contacts:
-    """A pymunk space with the map's obstacles and one body for each slot in use."""
+    """Who can touch whom on a map, by the caller's slots.
+
+    Attributes:
+        boxes: Those that can be pushed.
+    """
 
     def __init__(self, city_map: CityMap) -> None:
-        self._space = pymunk.Space()
-        self._space.iterations = ITERATIONS
-        self._space.collision_slop = 0.0
-        self._space.collision_bias = 1.0  # pymunk moves nobody out of an overlap: we do
-        self._bodies: dict[int, pymunk.Body] = {}
-        self._slot_of_id: dict[int, int] = {}
-        self._order: Ints = np.empty(0, np.int64)
-        self._inverse_mass: Floats = np.empty(0)
-        self._motion_in, self._motion_out, self._touch = (batch.Buffer() for _ in range(3))
-        for wall in city_map.walls:
-            self._space.add(*_wall_shapes(self._space.static_body, wall))
-        for box in city_map.boxes:
-            self._space.add(_box_shape(self._space.static_body, box))
-        self._reorder()
+        self.boxes = Boxes(city_map.boxes)
+        self._near = Near(obstacles_of(obstacle_boxes(city_map)))
+        self._ring = _Ring(city_map, self.boxes)
+        rows = [(0.0, 0.0, a, b, np.hypot(a, b)) for a, b in self.boxes.sizes.tolist()]
+        self._outlines: Floats = np.array(rows, dtype=float).reshape(-1, 5)
 
     def add(self, slot: int, hull: Hull) -> None:
         """Give a car a body under a number of the caller's; its motion comes with every step."""
-        body = pymunk.Body(hull.mass, hull.yaw_inertia)
-        corners = [
-            (hull.rear, hull.right),
-            (hull.front, hull.right),
-            (hull.front, hull.left),
-            (hull.rear, hull.left),
-        ]
-        for category, mask, restitution, friction in (
-            (MEETS_CARS, MEETS_CARS, math.sqrt(hull.restitution), math.sqrt(hull.friction)),
-            (MEETS_WALLS, WALL, hull.restitution, hull.friction),
-        ):
-            shape = pymunk.Poly(body, corners)
-            shape.elasticity, shape.friction = restitution, friction
-            shape.filter = pymunk.ShapeFilter(categories=category, mask=mask)
-            self._space.add(*(() if body.space else (body,)), shape)
-        self._bodies[slot] = body
-        self._reorder()
+        key = slot + len(self.boxes)
+        if key >= len(self._outlines):
+            more = np.zeros((max(64, 2 * key) - len(self._outlines), 5))
+            self._outlines = np.concatenate((self._outlines, more))
+        self._outlines[key] = outline_of(hull)
+        self._ring.known[key] = hull
 
     def remove(self, slot: int) -> None:
         """Take a car's body away."""
-        body = self._bodies.pop(slot)
-        self._space.remove(body, *body.shapes)
-        self._reorder()
+        self._ring.forget(slot + len(self.boxes))
+
+    def warm(self) -> None:
+        """Compile or load now what `step` needs, not when the first cars meet."""
+        outlines = np.full((2, 5), 0.1)
+        near = Near(obstacles_of(np.array([[5.0, 0.0, 1.0, 0.0, 1.0, 0.1]])))
+        near.touching(np.arange(2), np.zeros((2, 6)), outlines, 1)
 
     def step(self, slots: Ints, motion: Floats) -> Touches:
         """Solve the contacts of this instant.
@@ -127,94 +106,152 @@ class Contacts:
             slots: (n,) the caller's numbers of all cars that were added, in any order.
             motion: (n, 6) x, y, yaw, velocity x, y and yaw rate of the centres of gravity.
         """
-        n = len(slots)
-        row_of_slot = np.empty(max(self._bodies, default=-1) + 1, np.int64)
-        row_of_slot[slots] = np.arange(n)
-        row_of_body = row_of_slot[self._order]
-        block = np.zeros((n + 1, 6))  # the last body is the static one
-        block[:n] = motion[row_of_body]
+        n, count = len(slots), len(self.boxes)
+        keys = slots + count
+        if count:
+            self.boxes.slide(STEP_S)
+            keys = np.concatenate((keys, np.arange(count)))
+            motion = np.concatenate((motion, self.boxes.motion))
+        marks = self._near.touching(keys, motion, self._outlines[keys], n)
+        rows = np.flatnonzero(marks)
+        if not len(rows):
+            return _nothing(n)
+        dv, shift, pairs = self._ring.solve(keys, motion, rows)
+        if count:
+            self.boxes.push(dv[n:], shift[n:])
+        touched = np.zeros(n, np.bool_)
+        touched[pairs[(pairs >= 0) & (pairs < n)]] = True
+        pairs = np.where(pairs >= n, FIRST_BOX - (pairs - n), pairs)
+        met = (pairs >= 0).any(axis=1)
+        return Touches(dv[:n], shift[:n], touched, pairs[met])
+
+
+def _nothing(n: int) -> Touches:
+    return Touches(
+        np.zeros((n, 3)), np.zeros((n, 2)), np.zeros(n, np.bool_), np.empty((0, 2), np.int64)
+    )
+
+
+class _Ring:
+    """The pymunk space: everything that stays, and whoever touched something a moment ago.
+
+    Coming in costs a body ten microseconds, so it stays for `KEPT_STEPS` steps that solve.
+
+    Attributes:
+        known: Cars that may come in, by key; boxes have the first keys.
+    """
+
+    def __init__(self, city_map: CityMap, boxes: Boxes) -> None:
+        self._space = pymunk.Space()
+        self._space.iterations = ITERATIONS
+        self._space.collision_slop = 0.0
+        self._space.collision_bias = 1.0  # pymunk moves nobody out of an overlap: we do
+        self._boxes = boxes.boxes
+        self.known: dict[int, Hull] = {}
+        self._bodies: dict[int, pymunk.Body] = {}
+        self._left: dict[int, int] = {}
+        self._order: Ints = np.empty(0, np.int64)
+        self._ids: Ints = np.empty(0, np.int64)
+        self._keys_of_ids: Ints = np.empty(0, np.int64)
+        self._lightness: Floats = np.empty(0)
+        self._motion_in, self._motion_out, self._touch = (batch.Buffer() for _ in range(3))
+        self._space.add(*solids(self._space.static_body, city_map))
+
+    def forget(self, key: int) -> None:
+        """Take a car out for good."""
+        del self.known[key]
+        if key in self._left:
+            self._leave([key])
+        self._bodies.pop(key, None)
+
+    def solve(self, keys: Ints, motion: Floats, rows: Ints) -> tuple[Floats, Floats, Ints]:
+        """Return changes of velocity (n, 3), shifts (n, 2) and pairs (k, 2) of rows; -1: a wall.
+
+        Args:
+            keys: (n,) who is in which row.
+            motion: (n, 6).
+            rows: Those that touch something.
+        """
+        self._let_in(keys[rows].tolist())
+        row_of = np.empty(int(keys.max()) + 1, np.int64)
+        row_of[keys] = np.arange(len(keys))
+        inside = row_of[self._order]
+        block = np.zeros((len(inside) + 1, 6))  # the last body is the static one
+        block[:-1] = motion[inside]
         self._motion_in.set_float_buf(block)
         batch.set_space_bodies(self._space, _MOTION, self._motion_in)
         self._space.step(INSTANT)
-        pairs, normals, depths = self._touching(row_of_slot)
-        touched = np.zeros(n, np.bool_)
-        touched[pairs[pairs >= 0]] = True
-        return Touches(
-            self._velocity_change(motion, row_of_body, touched),
-            self._shifts(n, pairs, normals, depths, row_of_body),
-            touched,
-            pairs,
-        )
+        pairs, normals, depths = self._touching(row_of)
+        dv = np.zeros((len(keys), 3))
+        self._motion_out.clear()
+        batch.get_space_bodies(self._space, _MOTION, self._motion_out)
+        after = np.frombuffer(self._motion_out.float_buf()).reshape(-1, 6)
+        dv[inside] = after[: len(inside), 3:] - block[:-1, 3:]
+        lightness = np.zeros(len(keys) + 1)  # a wall is row -1: the last, immovable one
+        lightness[inside] = self._lightness
+        return dv, _shifts(pairs, normals, depths, lightness), pairs
 
-    def _velocity_change(self, motion: Floats, row_of_body: Ints, touched: Bools) -> Floats:
-        dv = np.zeros((len(motion), 3))
-        if touched.any():
-            self._motion_out.clear()
-            batch.get_space_bodies(self._space, _MOTION, self._motion_out)
-            after = np.frombuffer(self._motion_out.float_buf()).reshape(-1, 6)
-            dv[row_of_body] = after[: len(row_of_body), 3:] - motion[row_of_body, 3:]
-        return dv
-
-    def _shifts(
-        self, n: int, pairs: Ints, normals: Floats, depths: Floats, row_of_body: Ints
-    ) -> Floats:
-        shift = np.zeros((n, 2))
-        if not len(pairs):
-            return shift
-        inverse_mass = np.zeros(n + 1)  # a wall is row -1: the last, immovable one
-        inverse_mass[row_of_body] = self._inverse_mass
-        a, b = pairs.T
-        out = SHARE_CORRECTED * np.maximum(depths - OVERLAP_KEPT, 0.0)
-        out /= inverse_mass[a] + inverse_mass[b]
-        way = np.zeros((n + 1, 2))
-        np.add.at(way, a, -normals * (out * inverse_mass[a])[:, None])
-        np.add.at(way, b, normals * (out * inverse_mass[b])[:, None])
-        shift[:] = way[:n]
-        return shift
-
-    def _touching(self, row_of_slot: Ints) -> tuple[Ints, Floats, Floats]:
+    def _touching(self, row_of: Ints) -> tuple[Ints, Floats, Floats]:
         self._touch.clear()
         batch.get_space_arbiters(self._space, _TOUCH, self._touch)
-        ints = np.frombuffer(self._touch.int_buf(), np.uint64).reshape(-1, 3)
+        ints = np.frombuffer(self._touch.int_buf(), np.int64).reshape(-1, 3)
         floats = np.frombuffer(self._touch.float_buf()).reshape(-1, 4)
         alive = ints[:, 2] > 0  # arbiters of past contacts linger for some steps
         ints, floats = ints[alive], floats[alive]
-        pairs = np.array([[self._row(i, row_of_slot) for i in ids] for ids in ints[:, :2].tolist()])
+        places = np.minimum(np.searchsorted(self._ids, ints[:, :2]), len(self._ids) - 1)
+        is_body = self._ids[places] == ints[:, :2]
+        pairs = np.where(is_body, row_of[self._keys_of_ids[places]], WALL)
         depths = -np.minimum(floats[:, 2], np.where(ints[:, 2] > 1, floats[:, 3], np.inf))
-        return pairs.reshape(-1, 2).astype(np.int64), floats[:, :2], depths
+        return pairs, floats[:, :2], depths
 
-    def _row(self, body_id: int, row_of_slot: Ints) -> int:
-        slot = self._slot_of_id.get(body_id)
-        return -1 if slot is None else int(row_of_slot[slot])
+    def _let_in(self, keys: list[int]) -> None:
+        """Take in who touches something; let go who has not for long."""
+        left = {key: steps - 1 for key, steps in self._left.items()}
+        new = [key for key in keys if key not in left]
+        left.update(dict.fromkeys(keys, KEPT_STEPS))
+        self._left = left
+        for key in new:
+            if key not in self._bodies:
+                self._bodies[key] = self._made(key)
+            body = self._bodies[key]
+            self._space.add(body, *body.shapes, *body.constraints)
+        old = [key for key, steps in left.items() if steps <= 0]
+        if old:
+            self._leave(old)
+        elif new:
+            self._reorder()
+
+    def _made(self, key: int) -> pymunk.Body:
+        if key < len(self._boxes):
+            return box_body(self._boxes[key], self._space.static_body, STEP_S / INSTANT)
+        return car_body(self.known[key])
+
+    def _leave(self, keys: list[int]) -> None:
+        for key in keys:
+            del self._left[key]
+            body = self._bodies[key]
+            self._space.remove(body, *body.shapes, *body.constraints)
+        self._reorder()
 
     def _reorder(self) -> None:
         """Learn in which order the batch calls walk through the bodies."""
-        self._slot_of_id = {body.id: slot for slot, body in self._bodies.items()}
+        key_of = {self._bodies[key].id: key for key in self._left}
         buffer = batch.Buffer()
         batch.get_space_bodies(self._space, batch.BodyFields.BODY_ID, buffer)
-        ids = np.frombuffer(buffer.int_buf(), np.uint64).tolist()
-        self._order = np.array(
-            [self._slot_of_id[i] for i in ids if i in self._slot_of_id], dtype=np.int64
-        )
-        self._inverse_mass = np.array([1.0 / self._bodies[slot].mass for slot in self._order])
+        ids = [i for i in np.frombuffer(buffer.int_buf(), np.int64).tolist() if i in key_of]
+        self._order = np.array([key_of[i] for i in ids], dtype=np.int64)
+        self._ids = np.sort(np.array(ids, dtype=np.int64))
+        self._keys_of_ids = np.array([key_of[i] for i in self._ids.tolist()], dtype=np.int64)
+        self._lightness = np.array([1.0 / self._bodies[key].mass for key in self._order.tolist()])
 
 
-def _wall_shapes(static: pymunk.Body, wall: Wall) -> list[pymunk.Shape]:
-    points = [*wall.points, wall.points[0]] if wall.closed else list(wall.points)
-    ends = pairwise(points)
-    radius = 0.5 * wall.thickness_m
-    return [_solid(pymunk.Segment(static, a, b, radius)) for a, b in ends]
-
-
-def _box_shape(static: pymunk.Body, box: Box) -> pymunk.Shape:
-    c, s = math.cos(box.yaw_rad), math.sin(box.yaw_rad)
-    half = ((1, 1), (-1, 1), (-1, -1), (1, -1))
-    sizes = [(0.5 * i * box.length_m, 0.5 * j * box.width_m) for i, j in half]
-    corners = [(box.x_m + c * x - s * y, box.y_m + s * x + c * y) for x, y in sizes]
-    return _solid(pymunk.Poly(static, corners))
-
-
-def _solid(shape: pymunk.Shape) -> pymunk.Shape:
-    shape.elasticity = shape.friction = 1.0
-    shape.filter = pymunk.ShapeFilter(categories=WALL, mask=MEETS_WALLS)
-    return shape
+def _shifts(pairs: Ints, normals: Floats, depths: Floats, lightness: Floats) -> Floats:
+    """Return the way out of the overlaps (n, 2), shared by inverse mass."""
+    way = np.zeros((len(lightness), 2))
+    if len(pairs):
+        a, b = pairs.T
+        out = SHARE_CORRECTED * np.maximum(depths - OVERLAP_KEPT, 0.0)
+        out /= lightness[a] + lightness[b]
+        np.add.at(way, a, -normals * (out * lightness[a])[:, None])
+        np.add.at(way, b, normals * (out * lightness[b])[:, None])
+    return way[:-1]

@@ -4,7 +4,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.vehicles.car import Car
-from scm.world.contacts import Hull
+from scm.world.solids import Hull
 
 
 def hull_of(car: Car, *, movable: bool = True) -> Hull:

@@ -39,10 +39,20 @@ class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True):
     lights: tuple[str, ...] = ()
 
 
+class SnapshotBox(msgspec.Struct, kw_only=True, frozen=True):
+    """One construction box that cars can push; pose of its middle, map frame."""
+
+    name: str
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
 class WorldSnapshot(Message, kw_only=True, frozen=True):
     """The city at `t_ns`.
 
     Attributes:
+        boxes: Those that can be moved, in the map's order.
         real_time_factor: Simulated over elapsed time, over the last second.
         late_ticks: Ticks that ended after the next was due, since the start.
     """
@@ -53,6 +63,7 @@ class WorldSnapshot(Message, kw_only=True, frozen=True):
     t_ns: int
     tick: int
     vehicles: tuple[SnapshotVehicle, ...]
+    boxes: tuple[SnapshotBox, ...] = ()
     real_time_factor: float = 1.0
     late_ticks: int = 0
 

@@ -1,0 +1,121 @@
+"""Cars, boxes and walls as pymunk bodies and shapes, and walls as boxes for the first sieve."""
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pymunk
+
+from scm.arrays import Floats
+from scm.maps.model import Box, CityMap, Wall
+from scm.world.boxes import GRAVITY, arm_of, inertia_of, mass_of
+
+MEETS_CARS, MEETS_WALLS, WALL, BOX = 0b0001, 0b0010, 0b0100, 0b1000
+BOX_GRIP = 0.5  # between two boxes, and of a box on a wall
+
+
+class Hull(NamedTuple):
+    """What a car is to others: a box about its centre of gravity, body frame, SI."""
+
+    mass: float
+    yaw_inertia: float
+    rear: float
+    front: float
+    right: float
+    left: float
+    restitution: float
+    friction: float
+
+
+def outline_of(hull: Hull) -> tuple[float, float, float, float, float]:
+    """Return middle ahead and left of the centre of gravity, half length, half width, reach."""
+    ahead, left = 0.5 * (hull.front + hull.rear), 0.5 * (hull.left + hull.right)
+    reach = math.hypot(max(hull.front, -hull.rear), max(hull.left, -hull.right))
+    return ahead, left, 0.5 * (hull.front - hull.rear), 0.5 * (hull.left - hull.right), reach
+
+
+def car_body(hull: Hull) -> pymunk.Body:
+    """Return a car with its two shapes."""
+    body = pymunk.Body(hull.mass, hull.yaw_inertia)
+    corners = [
+        (hull.rear, hull.right),
+        (hull.front, hull.right),
+        (hull.front, hull.left),
+        (hull.rear, hull.left),
+    ]
+    root = math.sqrt(hull.restitution), math.sqrt(hull.friction)
+    _shape(pymunk.Poly(body, corners), MEETS_CARS, MEETS_CARS, *root)
+    _shape(pymunk.Poly(body, corners), MEETS_WALLS, WALL, hull.restitution, hull.friction)
+    return body
+
+
+def box_body(box: Box, static: pymunk.Body, scale: float) -> pymunk.Body:
+    """Return a box that slides, with its shapes and its brakes on the floor.
+
+    Args:
+        box: A movable one.
+        static: The floor.
+        scale: Duration between two steps over that of a step: a brake's limit is a force.
+    """
+    body = pymunk.Body(mass_of(box), inertia_of(box))
+    a, b = 0.5 * box.length_m, 0.5 * box.width_m
+    corners = [(a, b), (-a, b), (-a, -b), (a, -b)]
+    _shape(pymunk.Poly(body, corners), WALL, MEETS_WALLS, 1.0, 1.0)
+    _shape(pymunk.Poly(body, corners), BOX, BOX | WALL, 0.0, BOX_GRIP)
+    slides = pymunk.PivotJoint(static, body, (0.0, 0.0), (0.0, 0.0))
+    turns = pymunk.GearJoint(static, body, 0.0, 1.0)
+    slides.max_force = scale * box.friction * mass_of(box) * GRAVITY
+    turns.max_force = slides.max_force * arm_of(box)
+    for brake in (slides, turns):
+        brake.max_bias = 0.0  # a brake forgets where the box once was
+    return body
+
+
+def _shape(
+    shape: pymunk.Shape, category: int, mask: int, restitution: float, friction: float
+) -> pymunk.Shape:
+    shape.elasticity, shape.friction = restitution, friction
+    shape.filter = pymunk.ShapeFilter(categories=category, mask=mask)
+    return shape
+
+
+def solids(static: pymunk.Body, city_map: CityMap) -> Iterator[pymunk.Shape]:
+    """Yield the shapes of all that never moves."""
+    for wall in city_map.walls:
+        for a, b in _runs(wall):
+            yield _solid(pymunk.Segment(static, a, b, 0.5 * wall.thickness_m))
+    for box in city_map.boxes:
+        if box.mass_kg is None:
+            c, s = math.cos(box.yaw_rad), math.sin(box.yaw_rad)
+            half = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+            sizes = [(0.5 * i * box.length_m, 0.5 * j * box.width_m) for i, j in half]
+            corners = [(box.x_m + c * x - s * y, box.y_m + s * x + c * y) for x, y in sizes]
+            yield _solid(pymunk.Poly(static, corners))
+
+
+def obstacle_boxes(city_map: CityMap) -> Floats:
+    """Return all that never moves as boxes (m, 6): x, y, cos, sin of yaw, half length and width."""
+    found = []
+    for wall in city_map.walls:
+        half = 0.5 * wall.thickness_m
+        for (x0, y0), (x1, y1) in _runs(wall):
+            length = math.hypot(x1 - x0, y1 - y0)
+            c, s = ((x1 - x0) / length, (y1 - y0) / length) if length else (1.0, 0.0)
+            found.append((0.5 * (x0 + x1), 0.5 * (y0 + y1), c, s, 0.5 * length + half, half))
+    found += [
+        (b.x_m, b.y_m, math.cos(b.yaw_rad), math.sin(b.yaw_rad), 0.5 * b.length_m, 0.5 * b.width_m)
+        for b in city_map.boxes
+        if b.mass_kg is None
+    ]
+    return np.array(found, dtype=float).reshape(-1, 6)
+
+
+def _runs(wall: Wall) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
+    points = [*wall.points, wall.points[0]] if wall.closed else list(wall.points)
+    return pairwise(points)
+
+
+def _solid(shape: pymunk.Shape) -> pymunk.Shape:
+    return _shape(shape, WALL, MEETS_WALLS | BOX, 1.0, 1.0)
