@@ -19,7 +19,7 @@ def cell_voltage(charge: float) -> float:
 @law
 def pack_voltage(drawn: float, cells: float, capacity: float, start_charge: float) -> float:
     """Voltage of a pack without load, after `drawn` ampere-seconds of `capacity` ampere-hours."""
-    return cells * cell_voltage(start_charge - drawn / (3600.0 * capacity))
+    return cells * cell_voltage(start_charge - drawn * (1.0 / (3600.0 * capacity)))
 
 
 @law
@@ -35,7 +35,7 @@ def loaded_voltage(
     """
     idle = open_circuit - resistance * idle_current
     pull = resistance * motor_current * throttle
-    return max(0.0, min(idle, (idle + pull * turn) / (1.0 + pull * throttle / nominal)))
+    return max(0.0, min(idle, (idle + pull * turn) / (1.0 + pull * throttle * (1.0 / nominal))))
 
 
 @law
@@ -44,5 +44,5 @@ def pack_current(
     nominal: float,
 ) -> float:  # fmt: skip
     """Current out of the pack, never negative [A]; arguments as of `loaded_voltage`."""
-    taken = throttle * (throttle * voltage / nominal - turn)
+    taken = throttle * (throttle * voltage * (1.0 / nominal) - turn)
     return idle_current + motor_current * max(0.0, taken)

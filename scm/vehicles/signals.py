@@ -322,12 +322,11 @@ _ALL = (
         span=(0.0, 150.0),
         otherwise="0.0",
     ),
-    # a motor's torque over its nominal one: faded, warm, geared, of this side
     _wheel(
         "fade_strength",
         "1",
         Role.CHAIN,
-        "torque that is left of a motor that fades",
+        "drive that is left of a motor that fades",
         span=(0.3, 1.0),
         otherwise="1.0",
     ),
@@ -335,17 +334,9 @@ _ALL = (
         "warm_strength",
         "1",
         Role.CHAIN,
-        "the same with its winding's heat",
+        "torque that a warm winding leaves, over a cold one's",
         span=(0.3, 1.0),
-        otherwise="fade_strength",
-    ),
-    _wheel(
-        "drive_strength",
-        "1",
-        Role.CHAIN,
-        "the same of a stronger or weaker drive",
-        span=(0.3, 2.0),
-        otherwise="warm_strength",
+        otherwise="1.0",
     ),
     _wheel(
         "motor_strength",
@@ -353,7 +344,7 @@ _ALL = (
         Role.CHAIN,
         "torque of this wheel's motor over its nominal one",
         span=(0.3, 2.0),
-        otherwise="drive_strength",
+        otherwise="warm_strength",
     ),
     _wheel(
         "wheel_steer",

@@ -45,6 +45,7 @@ class Equations:
             "supply_voltage": self.n["battery_nominal"],
             "motor_throttle": THROTTLE,
             "motor_strength": 1.0,
+            "fade_strength": 1.0,
             "throttle": THROTTLE,
         }
         known = {**self.n, **wheel, **signals, **numbers}

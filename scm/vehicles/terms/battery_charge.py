@@ -21,7 +21,10 @@ def battery_charge(
     idle_current: float, dt: float,
 ) -> float:  # fmt: skip
     """Charge taken since the start [A*s]."""
-    full, turn = 2.0 * (front_driven + rear_driven) * stall_current, drive_omega / no_load_speed
+    full, turn = (
+        2.0 * (front_driven + rear_driven) * stall_current,
+        drive_omega * (1.0 / no_load_speed),
+    )
     rest = pack_voltage(charge_drawn, cells, capacity, start_charge)
     volts = loaded_voltage(rest, resistance, throttle, turn, full, idle_current, battery_nominal)
     return charge_drawn + dt * pack_current(

@@ -21,7 +21,10 @@ def battery_resistance(
     stall_current: float, idle_current: float,
 ) -> float:  # fmt: skip
     """Voltage at the clamps [V]."""
-    full, turn = 2.0 * (front_driven + rear_driven) * stall_current, drive_omega / no_load_speed
+    full, turn = (
+        2.0 * (front_driven + rear_driven) * stall_current,
+        drive_omega * (1.0 / no_load_speed),
+    )
     return loaded_voltage(
         open_circuit_voltage, resistance, throttle, turn, full, idle_current, battery_nominal
     )  # fmt: skip

@@ -1,6 +1,6 @@
 """Drive asymmetry: one side's motors are stronger, so throttle turns the car.
 
-    motor_strength = drive_strength * (1 + side * difference),  side = +1 left, -1 right
+    motor_throttle = throttle * (1 + side * difference),  side = +1 left, -1 right
 
 Holds: each driven wheel has its motor.   Shows in: straight drives, forward against reverse.
 Source: geometry of unequal motors; + makes the left side stronger and the car turn right.
@@ -12,15 +12,15 @@ from scm.vehicles.term import Per, Term
 
 
 @law
-def drive_asymmetry(drive_strength: float, side: float, difference: float) -> float:
-    """Torque of this side's motor over the nominal one."""
-    return drive_strength * (1.0 + side * difference)
+def drive_asymmetry(throttle: float, side: float, difference: float) -> float:
+    """Throttle of this side's motor, + forward."""
+    return throttle * (1.0 + side * difference)
 
 
 TERM = Term(
     drive_asymmetry,
     per=Per.WHEEL,
-    sets="motor_strength",
+    sets="motor_throttle",
     neutral={"difference": 0.0},
     shows_in=("straight", "shuttle"),
     params=(

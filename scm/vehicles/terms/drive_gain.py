@@ -1,10 +1,10 @@
-"""Drive gain: every motor gives so many times its nominal torque.
+"""Drive gain: the controller takes every throttle so many times larger.
 
-    drive_strength = gain * warm_strength
+    throttle_scaled = gain * throttle_live
 
-On a level floor a weak motor looks like a heavy car (`payload`): a ramp or a known weight tells.
-Holds: whole torque-speed line scaled, no-load speed as it was.   Shows in: throttle steps.
-Source: DC motor of another magnet or gear loss; the definition is ours.
+Torque at stall and no-load speed grow alike; `motor_gain` leaves the no-load speed.
+Holds: below full throttle's limit.   Shows in: steady speed at any throttle.
+Source: a motor controller's scale (voltage, pulse width); the definition is ours.
 """
 
 from scm.vehicles.jit import law
@@ -13,19 +13,19 @@ from scm.vehicles.term import Per, Term
 
 
 @law
-def drive_gain(warm_strength: float, gain: float) -> float:
-    """Torque over the nominal one."""
-    return gain * warm_strength
+def drive_gain(throttle_live: float, gain: float) -> float:
+    """Throttle as the controller takes it, + forward."""
+    return gain * throttle_live
 
 
 TERM = Term(
     drive_gain,
-    per=Per.WHEEL,
-    sets="drive_strength",
+    per=Per.BODY,
+    sets="throttle_scaled",
     neutral={"gain": 1.0},
-    shows_in=("throttle_step", "hard_launch"),
+    shows_in=("steady_speed", "throttle_step"),
     params=(
         Param("gain", 1.0, "1", "drive.gain", (0.1, 3.0),
-              "torque over nominal", LogNormal(1.0, 0.3)),
+              "throttle taken over throttle given", LogNormal(1.0, 0.3)),
     ),
 )  # fmt: skip

@@ -1,6 +1,6 @@
 """Motor force curve with a dead-band: the car's whole drive force, split over its driven wheels.
 
-    F = (a - b * vx) * w * (u + c),  w = (tanh(100 (u + c)) + 1) / 2,  u = motor_throttle    [N]
+    F = (a - b * vx) * w * (u + c),  w = (tanh(100 (u + c)) + 1) / 2,  u = throttle    [N]
     wheel_torque += driven * F * motor_strength * wheel_radius / driven wheels    [N*m]
 
 Holds: forward throttle; a brushed motor that idles freely below its dead-band.
@@ -16,12 +16,12 @@ from scm.vehicles.term import Per, Term
 
 @law
 def motor_curve(
-    motor_throttle: float, motor_strength: float, vx: float, driven: float, front_driven: float,
-    rear_driven: float, wheel_radius: float, force: float, force_per_speed: float,
-    dead_band: float,
+    motor_throttle: float, fade_strength: float, motor_strength: float, vx: float, driven: float,
+    front_driven: float, rear_driven: float, wheel_radius: float, force: float,
+    force_per_speed: float, dead_band: float,
 ) -> float:  # fmt: skip
     """Torque on the wheel, + forward [N*m]."""
-    beyond = motor_throttle + dead_band
+    beyond = motor_throttle * fade_strength + dead_band
     pull = (force - force_per_speed * vx) * 0.5 * (math.tanh(100.0 * beyond) + 1.0) * beyond
     share = driven / max(2.0 * (front_driven + rear_driven), 1.0)
     return share * pull * motor_strength * wheel_radius

@@ -1,7 +1,7 @@
 """DC motors of a driven axle: torque falls with speed, and with the battery.
 
     wheel_torque += driven * stall_torque * motor_strength * (u - n / no_load_speed)
-    u = motor_throttle * supply_voltage / battery_nominal
+    u = motor_throttle * fade_strength * supply_voltage / battery_nominal
     n = axle_omega + axle_lock * (omega - axle_omega)
 
 Both wheels of an axle get the torque of its mean speed, as behind a differential (axle_lock = 0).
@@ -18,13 +18,13 @@ from scm.vehicles.term import Per, Term
 
 @law
 def motor_dc(
-    motor_throttle: float, supply_voltage: float, motor_strength: float, omega: float,
-    axle_omega: float, driven: float, stall_torque: float, no_load_speed: float,
+    motor_throttle: float, fade_strength: float, supply_voltage: float, motor_strength: float,
+    omega: float, axle_omega: float, driven: float, stall_torque: float, no_load_speed: float,
     battery_nominal: float, axle_lock: float,
 ) -> float:  # fmt: skip
     """Torque on the wheel, + forward [N*m]."""
     felt = axle_omega + axle_lock * (omega - axle_omega)
-    u = motor_throttle * supply_voltage / battery_nominal
+    u = motor_throttle * fade_strength * supply_voltage / battery_nominal
     return driven * stall_torque * motor_strength * (u - felt / no_load_speed)
 
 

@@ -1,9 +1,12 @@
-"""Motor fade: a motor that works loses torque within a minute or so, and rest brings it back.
+"""Motor fade: a drive that works weakens within a minute or so, and rest brings it back.
 
-    fade_strength += (1 - fraction * motor_throttle^2 - fade_strength) * dt / (warm_time + dt)
+    fade_strength += (1 - 3 * fraction * load^2 - fade_strength) * dt / (warm_time + dt)
+    load = fade_strength * motor_throttle
 
-Holds: one dominant time constant of warming; load taken as the throttle.   Shows in: long drives
-with a pause.   Source: first-order motor warming (Fitzgerald, Electric Machinery), strength ours.
+Stall torque and no-load speed shrink alike, as with a falling voltage. The three makes `fraction`
+the loss at a usual load: 1/3 is the mean square of throttles spread evenly over 0 to 1.
+Holds: one time constant of warming.   Shows in: long drives with a pause.
+Source: first-order warming (Fitzgerald, Electric Machinery); the strength's form is ours.
 """
 
 from scm.vehicles.jit import law
@@ -15,8 +18,9 @@ from scm.vehicles.term import Per, Term
 def motor_fade(
     fade_strength: float, motor_throttle: float, fraction: float, warm_time: float, dt: float
 ) -> float:
-    """Torque that is left, over the cold motor's."""
-    goal = 1.0 - fraction * min(motor_throttle * motor_throttle, 1.0)
+    """Drive that is left, over the cold one."""
+    load = fade_strength * motor_throttle
+    goal = 1.0 - 3.0 * fraction * load * load
     return fade_strength + (goal - fade_strength) * (dt / (warm_time + dt))
 
 
@@ -29,7 +33,7 @@ TERM = Term(
     shows_in=("long_drive", "rest_and_repeat"),
     params=(
         Param("fraction", 0.0, "1", "drive.fade", (0.0, 0.9),
-              "torque lost when warm at full throttle", LogNormal(0.1, 0.8)),
+              "drive lost when warm at a usual load", LogNormal(0.1, 0.8)),
         Param("warm_time", 60.0, "s", "drive.fade_time_s", (1.0, 3600.0),
               "63 % of the way to warm", fit=False),
     ),

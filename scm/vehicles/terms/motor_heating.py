@@ -1,8 +1,9 @@
 """Motor heating: current warms a motor's winding, the air around takes the heat away.
 
     motor_heat += (stall_heat * load^2 - cooling * motor_heat) / thermal_mass * dt    [K]
-    load = motor_throttle * supply_voltage / battery_nominal - axle_omega / no_load_speed
+    load = motor_throttle * fade_strength * supply_voltage / battery_nominal - n
 
+n is the axle's speed over no_load_speed.
 Holds: one thermal mass; |load| up to 1 is stall.   Shows in: long climbs, pushing a wall.
 Source: lumped thermal model of a motor (Fitzgerald, Electric Machinery).
 """
@@ -14,14 +15,15 @@ from scm.vehicles.term import Per, Term
 
 @law
 def motor_heating(
-    motor_heat: float, motor_throttle: float, supply_voltage: float, axle_omega: float,
-    driven: float, no_load_speed: float, battery_nominal: float, stall_heat: float,
-    cooling: float, thermal_mass: float, dt: float,
+    motor_heat: float, motor_throttle: float, fade_strength: float, supply_voltage: float,
+    axle_omega: float, driven: float, no_load_speed: float, battery_nominal: float,
+    stall_heat: float, cooling: float, thermal_mass: float, dt: float,
 ) -> float:  # fmt: skip
     """Temperature above the air, at the substep's end [K]."""
-    load = motor_throttle * supply_voltage / battery_nominal - axle_omega / no_load_speed
-    gained = motor_heat + dt * driven * stall_heat * load * load / thermal_mass
-    return gained / (1.0 + dt * cooling / thermal_mass)
+    voltage = motor_throttle * fade_strength * supply_voltage * (1.0 / battery_nominal)
+    load = voltage - axle_omega * (1.0 / no_load_speed)
+    gained = motor_heat + load * load * (dt * driven * stall_heat / thermal_mass)
+    return gained * (1.0 / (1.0 + dt * cooling / thermal_mass))
 
 
 TERM = Term(

@@ -1,6 +1,6 @@
 """Motor warmth: copper conducts worse when it is warm, so torque falls with temperature.
 
-    warm_strength = fade_strength / (1 + weakening * motor_heat)
+    warm_strength = 1 / (1 + weakening * motor_heat)
 
 Holds: brushed motor at given voltage; magnets' own loss adds 0.001 to 0.002 to copper's 0.0039.
 Shows in: long drives, with `motor_heating`.   Source: copper, IEC 60028.
@@ -12,9 +12,9 @@ from scm.vehicles.term import Per, Term
 
 
 @law
-def motor_warmth(fade_strength: float, motor_heat: float, weakening: float) -> float:
+def motor_warmth(motor_heat: float, weakening: float) -> float:
     """Torque of the warm motor over its nominal one."""
-    return fade_strength / (1.0 + weakening * max(motor_heat, 0.0))
+    return 1.0 / (1.0 + weakening * max(motor_heat, 0.0))
 
 
 TERM = Term(

@@ -18,8 +18,8 @@ def servo_torque(
     wheelbase: float, trail: float, stall: float,
 ) -> float:  # fmt: skip
     """Servo speed that the load leaves, over its free speed."""
-    front = (mass * accel_y * cog_to_rear_axle + yaw_inertia * yaw_accel) / wheelbase
-    return max(0.0, 1.0 - abs(trail * front) / stall)
+    front = mass * accel_y * cog_to_rear_axle + yaw_inertia * yaw_accel
+    return max(0.0, 1.0 - abs(front) * (trail / (wheelbase * stall)))
 
 
 TERM = Term(

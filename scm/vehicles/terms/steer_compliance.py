@@ -19,8 +19,8 @@ def steer_compliance(
     cog_to_rear_axle: float, yaw_inertia: float, wheelbase: float, rad_per_weight: float, dt: float,
 ) -> float:  # fmt: skip
     """Mean road-wheel angle at the substep's end, + left [rad]."""
-    force = (accel_y * cog_to_rear_axle + yaw_inertia / mass * yaw_accel) / wheelbase
-    give = rad_per_weight * force * (1.0 / 9.80665)
+    force = accel_y * cog_to_rear_axle + yaw_inertia / mass * yaw_accel
+    give = force * (rad_per_weight / (wheelbase * 9.80665))
     share = dt / (0.04 * rad_per_weight + dt)
     return share * (steer_trimmed - give) + (1.0 - share) * steer_angle
 
