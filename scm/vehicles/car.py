@@ -205,7 +205,7 @@ def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _known_keys() -> dict[str, Param | Fact]:
-    params = [*body14.PARAMS, *(p for term in all_terms().values() for p in term.params)]
+    params = [*body14.PARAMS, *(p for term in flat(all_terms().values()) for p in term.params)]
     return {**FACTS, **{param.key: param for param in params}}
 
 

@@ -1,11 +1,12 @@
 """Tyre that must roll a length before its side force has built up, and holds like a spring at rest.
 
     length * d(side_lag)/dt + |v_long| * side_lag = v_lat
-    side_lag_speed = length / dt
+    side_lag_speed = length / max(dt, rubber)
 
-side_lag is the slip that the contact patch still carries. At rest the left side loses its second
-part: the patch is a spring, so a car on a side slope stands where a quasi-static tyre creeps. A
-patch that slides carries no more than the slip of the slide, at rest that of most grip.
+side_lag is the slip that the contact patch still carries. At rest nothing is forgotten: the patch
+is a spring, so a car on a side slope stands where a quasi-static tyre creeps. A patch that slides
+carries no more than the slip of the slide, at rest that of most grip. rubber = 10 ms at rest, 0
+from twice low_speed on, damps that spring.
 Holds: lengths above 1 mm at 1 ms substeps.   Shows in: steering steps at speed, standing.
 Source: Pacejka, Tire and Vehicle Dynamics, single contact point transient model.
 """
@@ -17,6 +18,9 @@ from scm.vehicles.term import Per, Term
 _LENGTH = Param("length", 0.0, "m", "tyre_relaxation.length_m", (0.0, 2.0),
                 "rolled for 63 % of the side force", LogNormal(0.05, 1.0),
                 report="length_m")  # fmt: skip
+_LOW_SPEED = Param("low_speed", 0.05, "m/s", "tyre.low_speed_m_s", (0.01, 1.0),
+                   "floor of the slip's denominator", fit=False)  # fmt: skip
+_RUBBER = 0.01  # s, how long rubber at rest resists; ours, it ends the swing in some tenths
 
 
 @law
@@ -32,9 +36,10 @@ def tyre_relaxation(
 
 
 @law
-def tyre_relaxation_speed(dt: float, length: float) -> float:
-    """How much of the carried slip stays [m/s]."""
-    return length / dt
+def tyre_relaxation_speed(v_long: float, dt: float, length: float, low_speed: float) -> float:
+    """How much of the carried slip the tyre feels beside the new one [m/s]."""
+    rubber = _RUBBER * (1.0 - abs(v_long) * (0.5 / low_speed))
+    return length / max(dt, rubber)
 
 
 TERM = Term(
@@ -44,9 +49,9 @@ TERM = Term(
         _LENGTH,
         Param("slip_extremum", 0.2, "1", "tyre.lateral_slip_extremum", (0.01, 1.0),
               "slip of most grip", LogNormal(0.2, 0.3)),
-        Param("low_speed", 0.05, "m/s", "tyre.low_speed_m_s", (0.01, 1.0),
-              "floor of the slip's denominator", fit=False),
+        _LOW_SPEED,
     ),
-    also=(Term(tyre_relaxation_speed, per=Per.WHEEL, sets="side_lag_speed", params=(_LENGTH,),
-               neutral={"length": 0.0}, shows_in=("steering_step",)),),
+    also=(Term(tyre_relaxation_speed, per=Per.WHEEL, sets="side_lag_speed",
+               neutral={"length": 0.0}, params=(_LENGTH, _LOW_SPEED),
+               shows_in=("steering_step",)),),
 )  # fmt: skip

@@ -1,10 +1,10 @@
 """Tyre that winds up before it drives or brakes, and holds the car like a spring at rest.
 
     length * d(spin_lag)/dt + |v_long| * spin_lag = wheel_radius * omega - v_long
-    spin_lag_speed = length / dt
+    spin_lag_speed = length / max(dt, rubber)
 
-The same as tyre_relaxation, along the wheel: with both a car whose motors hold stands on any slope
-without creep, where quasi-static tyres let it slip by a fraction of a millimetre a second.
+The same as tyre_relaxation, along the wheel, rubber too. With both, a car whose motors hold
+stands on a slope; quasi-static tyres let it creep by a fraction of a millimetre a second.
 Holds: lengths above 1 mm at 1 ms substeps.   Shows in: launch, standing on a slope.
 Source: Pacejka, Tire and Vehicle Dynamics, single contact point transient model.
 """
@@ -16,6 +16,9 @@ from scm.vehicles.term import Per, Term
 _LENGTH = Param("length", 0.0, "m", "tyre_windup.length_m", (0.0, 2.0),
                 "rolled for 63 % of the force along", LogNormal(0.02, 1.0),
                 report="length_m")  # fmt: skip
+_LOW_SPEED = Param("low_speed", 0.05, "m/s", "tyre.low_speed_m_s", (0.01, 1.0),
+                   "floor of the slip's denominator", fit=False)  # fmt: skip
+_RUBBER = 0.01  # s, how long rubber at rest resists; ours, it ends the swing in some tenths
 
 
 @law
@@ -32,9 +35,10 @@ def tyre_windup(
 
 
 @law
-def tyre_windup_speed(dt: float, length: float) -> float:
-    """How much of the carried slip stays [m/s]."""
-    return length / dt
+def tyre_windup_speed(v_long: float, dt: float, length: float, low_speed: float) -> float:
+    """How much of the carried slip the tyre feels beside the new one [m/s]."""
+    rubber = _RUBBER * (1.0 - abs(v_long) * (0.5 / low_speed))
+    return length / max(dt, rubber)
 
 
 TERM = Term(
@@ -44,9 +48,9 @@ TERM = Term(
         _LENGTH,
         Param("slip_extremum", 0.2, "1", "tyre.slip_extremum", (0.01, 1.0),
               "slip of most grip", LogNormal(0.2, 0.3)),
-        Param("low_speed", 0.05, "m/s", "tyre.low_speed_m_s", (0.01, 1.0),
-              "floor of the slip's denominator", fit=False),
+        _LOW_SPEED,
     ),
-    also=(Term(tyre_windup_speed, per=Per.WHEEL, sets="spin_lag_speed", params=(_LENGTH,),
-               neutral={"length": 0.0}, shows_in=("launch",)),),
+    also=(Term(tyre_windup_speed, per=Per.WHEEL, sets="spin_lag_speed",
+               neutral={"length": 0.0}, params=(_LENGTH, _LOW_SPEED),
+               shows_in=("launch",)),),
 )  # fmt: skip
