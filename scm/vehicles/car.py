@@ -23,9 +23,9 @@ TYPES_DIR = Path(__file__).parent / "types"
 TERMS = "scm.vehicles.terms"
 STANDARD_TERMS = (
     "suspension_spring", "suspension_damper", "bump_stop", "tyre_contact", "tyre_longitudinal",
-    "tyre_lateral", "motor_dc", "motor_damping", "motor_hold", "stiction", "reflected_inertia",
-    "wheel_damping", "rolling_resistance", "steer_limit", "servo", "ackermann", "viscous_drag",
-    "aero_drag", "yaw_drag",
+    "tyre_lateral", "motor_dc", "motor_damping", "motor_hold", "coulomb_friction",
+    "reflected_inertia", "wheel_damping", "rolling_resistance", "steer_limit", "servo", "ackermann",
+    "viscous_drag", "aero_drag", "yaw_drag",
 )  # fmt: skip
 
 Value = float | tuple[float, ...] | str

@@ -1,20 +1,22 @@
-"""Dry friction of a motor and its gear: nothing moves until the torque beats it.
+"""Stiction: dry friction of motor and gear that is there at rest and fades as the wheel turns.
 
-    dry_torque += driven * torque    [N*m]
+    dry_torque += driven * torque * exp(-(omega / fade_speed)^2)    [N*m]
 
-Holds: Coulomb friction, breakaway equal to sliding.   Shows in: throttle dead-band, sudden stop.
-Source: textbook Coulomb friction; the real Nigel needs about 0.2 throttle to move.
+Holds: Stribeck's falling branch, beside `coulomb_friction` that stays.   Shows in: crawling,
+throttle ramps from rest.   Source: Armstrong-Helouvry, Control of Machines with Friction (1991).
 """
 
 from scm.vehicles.jit import law
+from scm.vehicles.lane_math import exp_neg
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
 @law
-def stiction(driven: float, torque: float) -> float:
+def stiction(omega: float, driven: float, torque: float, fade_speed: float) -> float:
     """Torque that dry friction can hold, never negative [N*m]."""
-    return driven * torque
+    turn = omega * (1.0 / fade_speed)
+    return driven * torque * exp_neg(turn * turn)
 
 
 TERM = Term(
@@ -23,9 +25,11 @@ TERM = Term(
     adds="dry_torque",
     passive=True,
     neutral={"torque": 0.0},
-    shows_in=("throttle_ramp", "coast_down"),
+    shows_in=("throttle_ramp", "crawl"),
     params=(
-        Param("torque", 0.0, "N*m", "drive.coulomb_torque_nm", (0.0, 5.0),
-              "per driven wheel", LogNormal(0.01, 1.0), report="torque_nm"),
+        Param("torque", 0.0, "N*m", "drive.stiction_torque_nm", (0.0, 5.0),
+              "at rest, per driven wheel", LogNormal(0.03, 0.8), report="torque_nm"),
+        Param("fade_speed", 0.6, "rad/s", "drive.stiction_fade_rad_s", (0.01, 50.0),
+              "wheel speed where a third is left", fit=False),
     ),
 )  # fmt: skip
