@@ -197,7 +197,7 @@ class AgentPart:
     def _on_contact(self, item: Incoming) -> list[Outgoing]:
         contact = item.message
         if isinstance(contact, Contact) and self._stay is not None and is_possible(contact):
-            self._body.push(contact)
+            self._stay.push(contact)
         return []
 
     def _on_command(self, item: Incoming) -> list[Outgoing]:

@@ -9,6 +9,7 @@ from scm.v2x.cam_trigger import CamTrigger
 from scm.v2x.etsi_convert import cam_of
 from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.vehicle_state import VehicleState
@@ -47,7 +48,12 @@ class Stay:
         self.trips = Trips(vehicle, Roads(city_map), body.limits, body.motion().pose, now_ns)
         self.switches = OFF
         self._cam = CamTrigger()
-        self._seq = 0
+        self._seq = self._felt = 0
+
+    def push(self, contact: Contact) -> None:
+        """Let the body feel a contact; the next report says so."""
+        self._body.push(contact)
+        self._felt = contact.number
 
     def begin(self, request: RouteRequest, now_ns: int) -> RouteReply:
         """Send the car on a trip; MapError when the lanes do not allow it."""
@@ -123,4 +129,5 @@ class Stay:
                 self.switches, guarded.throttle, motion.speed, now_ns, hazard=guarded.hazard
             ),
             car=self._car,
+            contacts=self._felt,
         )

@@ -1,8 +1,9 @@
 """A car with dynamics of its own, as the world keeps it: a body that follows its agent's reports.
 
 Between reports the body goes on as reported. A contact changes the body at once and is told to the
-agent; until the agent's reports can reflect it (`ECHO_NS`) the change is kept on top of them, so
-that one hit is not told twice.
+agent under a number; until a report says that the agent has felt this number, the change is kept on
+top of its reports, so that one hit is not told twice. What the agent drove on before it felt a hit
+is told as a shift of place. Agents that never say what they felt are given `ECHO_NS`.
 """
 
 from collections import deque
@@ -23,6 +24,8 @@ FARTHEST_M = 10_000.0
 FASTEST = 100.0
 STALE_NS = NS_PER_S
 ECHO_NS = 60 * NS_PER_MS
+ANSWER_NS = 300 * NS_PER_MS
+REPORT_NS = 20 * NS_PER_MS
 GONE_NS = 3 * NS_PER_S
 
 
@@ -31,6 +34,22 @@ def is_plausible(state: VehicleState) -> bool:
     where = (state.x_m, state.y_m)
     speeds = (state.yaw_rad, state.speed_mps, state.lateral_speed_mps, state.yaw_rate_radps)
     return all(abs(v) <= FARTHEST_M for v in where) and all(abs(v) <= FASTEST for v in speeds)
+
+
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """A push that the agent's reports do not show yet.
+
+    Attributes:
+        number: Of the contact that tells of it.
+        dv: (3,) change of velocity x, y and yaw rate.
+        shift: (3,) change of x, y and yaw.
+    """
+
+    number: int
+    hit_ns: int
+    dv: Floats
+    shift: Floats
 
 
 @dataclass(slots=True)
@@ -59,9 +78,10 @@ class RemoteCar:
     state: VehicleState | None = None
     lost_ns: int | None = None
     dead: bool = False
-    _echo: deque[tuple[int, Floats, Floats]] = field(default_factory=deque)
+    _echo: deque[Echo] = field(default_factory=deque)
+    _told: int = 0
     _dv: Floats = field(default_factory=lambda: np.zeros(3))
-    _shift: Floats = field(default_factory=lambda: np.zeros(2))
+    _shift: Floats = field(default_factory=lambda: np.zeros(3))
     _against: set[str] = field(default_factory=set)
 
     @property
@@ -84,7 +104,19 @@ class RemoteCar:
             return False
         self.state, self.heard_ns, self.lost_ns = state, now_ns, None
         self.pose = Pose2(state.x_m, state.y_m, state.yaw_rad)
+        while self._echo and self._echo[0].number <= state.contacts:
+            self._make_up(self._echo.popleft(), now_ns)
         return True
+
+    def _make_up(self, felt: Echo, now_ns: int) -> None:
+        """Tell the agent to make up for the way it went on before it felt a push.
+
+        Its report comes one step after it felt it: that much of the way is in the report.
+        """
+        late = seconds(min(max(0, now_ns - felt.hit_ns - REPORT_NS), ANSWER_NS))
+        if felt.dv.any() and late:
+            self._shift += late * felt.dv
+            self._echo.append(Echo(self._told + 1, now_ns, np.zeros(3), late * felt.dv))
 
     def motion(self, now_ns: int) -> Floats:
         """Return x, y, yaw, vx, vy, yaw rate of the centre of gravity, (6,), map frame."""
@@ -95,35 +127,39 @@ class RemoteCar:
         row: Floats = cog_motion(self.car, np.array([[*self.pose, *speeds]]))[0]
         age = seconds(min(self.age_ns(now_ns), STALE_NS))
         row[:3] += row[3:] * age
-        while self._echo and now_ns - self._echo[0][0] > ECHO_NS:
+        patience_ns = ANSWER_NS if state is not None and state.contacts else ECHO_NS
+        while self._echo and now_ns - self._echo[0].hit_ns > patience_ns:
             self._echo.popleft()
-        for hit_ns, dv, shift in self._echo:
-            row[3:] += dv
-            row[:3] += dv * seconds(max(0, now_ns - hit_ns))
-            row[:2] += shift
+        for echo in self._echo:
+            row[3:] += echo.dv
+            row[:3] += echo.dv * seconds(max(0, now_ns - echo.hit_ns)) + echo.shift
         return row
 
     def hit(self, dv: Floats, shift: Floats, against: set[str], now_ns: int) -> None:
         """Note what one contact step did to it."""
-        self._echo.append((now_ns, dv, shift))
+        whole = np.array([*shift, 0.0])
+        self._echo.append(Echo(self._told + 1, now_ns, dv, whole))
         self._dv += dv
-        self._shift += shift
+        self._shift += whole
         self._against |= against
 
     def contact(self, now_ns: int) -> Contact | None:
         """Return what is to be told to its agent since the last time, if anything."""
         if not (self._dv.any() or self._shift.any()):
             return None
-        (dvx, dvy, rate), (dx, dy) = self._dv.tolist(), self._shift.tolist()
+        (dvx, dvy, rate), (dx, dy, turn) = self._dv.tolist(), self._shift.tolist()
+        self._told += 1
         told = Contact(
             vehicle=self.name,
             t_ns=now_ns,
+            number=self._told,
             dvx_mps=dvx,
             dvy_mps=dvy,
             dyaw_rate_radps=rate,
             dx_m=dx,
             dy_m=dy,
+            dyaw_rad=turn,
             against=tuple(sorted(self._against)),
         )
-        self._dv, self._shift, self._against = np.zeros(3), np.zeros(2), set()
+        self._dv, self._shift, self._against = np.zeros(3), np.zeros(3), set()
         return told

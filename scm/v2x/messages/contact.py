@@ -9,7 +9,9 @@ class Contact(Message, kw_only=True, frozen=True):
     """What contacts did to the centre of gravity since the last one sent, map frame.
 
     Attributes:
-        dx_m: Position correction out of the overlap; likewise `dy_m`, `dyaw_rad`.
+        number: Counts the contacts told to this car, from 1; its reports say what it has felt.
+        dx_m: Position correction out of the overlap, and for what it drove on before it felt the
+            hit; likewise `dy_m`, `dyaw_rad`.
         against: What it touched: names of cars, or `wall`.
     """
 
@@ -18,6 +20,7 @@ class Contact(Message, kw_only=True, frozen=True):
 
     vehicle: str
     t_ns: int
+    number: int = 0
     dvx_mps: float
     dvy_mps: float
     dyaw_rate_radps: float

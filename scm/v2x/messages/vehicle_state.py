@@ -17,6 +17,7 @@ class VehicleState(Message, kw_only=True, frozen=True):
         mode: `drive`, `hold` (commands late), `stop` (commands lost or city stopped), `idle`.
         lights: Names of those that are on: `head_low head_high left right tail brake reverse`.
         car: Its car file's name.
+        contacts: Number of the newest `Contact` that this motion has felt; 0: it tells nothing.
     """
 
     KEY: ClassVar[str] = "v/{vehicle}/state"
@@ -39,6 +40,7 @@ class VehicleState(Message, kw_only=True, frozen=True):
     mode: str = "drive"
     lights: tuple[str, ...] = ()
     car: str = "nigel"
+    contacts: int = 0
 
 
 MESSAGE = VehicleState
