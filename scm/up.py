@@ -146,6 +146,8 @@ def _parts(plan: _Plan, latched: Latched) -> list[Job]:
         Job("monitor", "part", "second channel: doubts the signals, latches flash", monitor),
         Job("world", "part", cars, world),
         *eye,
+        part("camera", "cars' own cameras, rendered while somebody looks"),
+        part("camera", "cars' own cameras, rendered while somebody looks"),
         part("api", "REST, event stream, dashboard", "--host", HOST, "--port", str(plan.port)),
     ]
 

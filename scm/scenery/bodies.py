@@ -1,10 +1,23 @@
-"""What the eye knows of a kind of car: where its tag sits, and its outline for the picture."""
+"""What a picture knows of a kind of car: its outline, its paint, and where its tag sits."""
 
+import math
 import tomllib
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.scenery.canvas import Colour, colour_of
+from scm.v2x.messages.world_snapshot import SnapshotVehicle
+
+PALETTE = tuple(
+    colour_of(text)
+    for text in ("#c23b32", "#2f6db3", "#d9a520", "#3d8b57", "#d2691e", "#7a4fa3", "#b8bec4",
+                 "#2a9d9a")
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,3 +74,20 @@ def _value(values: dict[str, Any], key: str) -> Any:
     section, name = key.split(".")
     value = values.get(section, {}).get(name, {}).get("value")
     return tuple(value) if isinstance(value, list) else value
+
+
+def colour_of_car(car: SnapshotVehicle) -> Colour:
+    """Return the paint of a car: its tag chooses it."""
+    return PALETTE[(car.tag_id - 1) % len(PALETTE)]
+
+
+def car_rotation(car: SnapshotVehicle) -> Floats:
+    """Return map_R_body, (3, 3): yaw, then pitch (nose down positive), then roll (left up)."""
+    cz, sz = math.cos(car.yaw_rad), math.sin(car.yaw_rad)
+    cy, sy = math.cos(car.pitch_rad), math.sin(car.pitch_rad)
+    cx, sx = math.cos(car.roll_rad), math.sin(car.roll_rad)
+    about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
+    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
+    rotation: Floats = about_z @ about_y @ about_x
+    return rotation

@@ -18,6 +18,8 @@ TEXELS_PER_M = 800.0
 TABLE: Colour = (44, 58, 74)
 ASPHALT: Colour = (62, 58, 56)
 PAINT: Colour = (222, 226, 228)
+CARD: Colour = (104, 148, 178)
+BRICK: Colour = (150, 176, 192)
 EDGE_LINE_M = 0.009
 INK, PAPER = 26, 236
 """Grey of a print's black and white."""

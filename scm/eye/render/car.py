@@ -1,6 +1,5 @@
 """A car from above: body, glass, lamps, turned front wheels, shadow, and the tag on its roof."""
 
-import math
 from functools import lru_cache
 
 import cv2
@@ -9,8 +8,9 @@ import numpy as np
 from scm.arrays import Floats, Image
 from scm.eye.camera import CameraModel
 from scm.eye.render.floor import Obstacle, Scenery
-from scm.scenery.bodies import CarBody, car_body
-from scm.scenery.canvas import Canvas, Colour, colour_of
+from scm.scenery.bodies import CarBody, car_body, car_rotation, colour_of_car
+from scm.scenery.canvas import Canvas, Colour
+from scm.scenery.car_shape import RUBBER, rounded, shell_of
 from scm.scenery.sheet import printed_tag
 from scm.scenery.solids import (
     LIGHT,
@@ -24,30 +24,8 @@ from scm.scenery.solids import (
 from scm.scenery.tags import PRINT_SCALE, tag_corners
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
-PALETTE = tuple(
-    colour_of(text)
-    for text in ("#c23b32", "#2f6db3", "#d9a520", "#3d8b57", "#d2691e", "#7a4fa3", "#b8bec4",
-                 "#2a9d9a")
-)  # fmt: skip
-RUBBER: Colour = (30, 30, 32)
-GLASS: Colour = (74, 62, 52)
-BLACK: Colour = (24, 24, 26)
-LAMP: Colour = (214, 240, 246)
-TAIL: Colour = (44, 36, 150)
 SHADOW = 0.42
 SHADOW_BLUR_PX = 11
-
-
-def car_rotation(car: SnapshotVehicle) -> Floats:
-    """Return map_R_body, (3, 3): yaw, then pitch (nose down positive), then roll (left up)."""
-    cz, sz = math.cos(car.yaw_rad), math.sin(car.yaw_rad)
-    cy, sy = math.cos(car.pitch_rad), math.sin(car.pitch_rad)
-    cx, sx = math.cos(car.roll_rad), math.sin(car.roll_rad)
-    about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
-    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
-    rotation: Floats = about_z @ about_y @ about_x
-    return rotation
 
 
 def tag_on_roof(car: SnapshotVehicle, scale: float = 1.0) -> Floats:
@@ -68,7 +46,7 @@ def draw_car(frame: Image, model: CameraModel, scenery: Scenery, car: SnapshotVe
     """Paint one car into a frame, and over it whatever stands between it and the camera."""
     rotation, origin = car_rotation(car), np.array([car.x_m, car.y_m, 0.0])
     body = car_body(car.car)
-    colour = PALETTE[(car.tag_id - 1) % len(PALETTE)]
+    colour = colour_of_car(car)
     shape = _shape(body, colour, round(car.steering_rad, 2)).placed(rotation, origin)
     shadow = _shadow(body) @ rotation.T + origin + _shadow_offset(body)
     points = np.concatenate((shape.points, shadow, tag_on_roof(car, PRINT_SCALE), origin[None]))
@@ -132,7 +110,7 @@ def _hide_behind(
 
 @lru_cache(maxsize=64)
 def _shadow(body: CarBody) -> Floats:
-    outline = _rounded(*body.x_span, *body.y_span, 0.03)
+    outline = rounded(*body.x_span, *body.y_span, 0.03)
     return np.column_stack((outline, np.zeros(len(outline))))
 
 
@@ -143,7 +121,7 @@ def _shadow_offset(body: CarBody) -> Floats:
 
 @lru_cache(maxsize=1024)
 def _shape(body: CarBody, colour: Colour, steering: float) -> Shape:
-    return shape_of((*_wheels(body, steering), *_shell(body, colour)))
+    return shape_of((*_wheels(body, steering), *shell_of(body, colour)))
 
 
 def _wheels(body: CarBody, steering: float) -> tuple[Solid, ...]:
@@ -155,55 +133,3 @@ def _wheels(body: CarBody, steering: float) -> tuple[Solid, ...]:
             )
             wheels.append(prism(tread, 0.0, 1.7 * body.wheel_radius, RUBBER, taper=0.12))
     return tuple(wheels)
-
-
-def _shell(body: CarBody, colour: Colour) -> tuple[Solid, ...]:
-    """Everything but the wheels, from the floor up."""
-    rear, front = body.x_span
-    half = body.y_span[1]
-    tag_x, _, roof = body.tag_position
-    plate = body.tag_size * PRINT_SCALE
-    inner = 0.78 * half
-    nose = front - 0.016
-    dark: Colour = (colour[0] * 2 // 3, colour[1] * 2 // 3, colour[2] * 2 // 3)
-    deck = 0.62 * roof
-    puck_x = min(front - 0.05, tag_x + plate / 2 + 0.062)
-    angles = np.linspace(0.0, 2.0 * math.pi, 14, endpoint=False)
-    ring = np.column_stack((np.cos(angles), np.sin(angles)))
-    cabin_front = tag_x + plate / 2 + 0.03
-    cabin = _rounded(tag_x - plate / 2 - 0.012, cabin_front, -inner * 0.86, inner * 0.86, 0.012)
-    return (
-        prism(rectangle(front - 0.008, 0.0, 0.016, 1.8 * half), 0.02, 0.05, BLACK),
-        prism(rectangle(rear + 0.008, 0.0, 0.016, 1.7 * half), 0.02, 0.05, BLACK),
-        prism(_rounded(rear, front - 0.006, -inner, inner, 0.022), 0.02, deck, colour, taper=0.04),
-        prism(
-            rectangle((puck_x + nose) / 2, 0.0, nose - puck_x, 0.5 * inner),
-            deck,
-            deck + 0.002,
-            dark,
-        ),
-        *(
-            prism(rectangle(nose - 0.012, s * 0.68 * inner, 0.014, 0.024), deck, deck + 0.001, LAMP)
-            for s in (1.0, -1.0)
-        ),
-        *(
-            prism(rectangle(rear + 0.016, s * 0.68 * inner, 0.01, 0.03), deck, deck + 0.001, TAIL)
-            for s in (1.0, -1.0)
-        ),
-        prism(cabin, deck, roof - 0.006, GLASS, taper=0.1),
-        prism(
-            rectangle(tag_x, 0.0, plate + 0.006, plate + 0.006), roof - 0.006, roof - 0.0005, dark
-        ),
-        prism(ring * 0.026 + (puck_x, 0.0), deck, roof + 0.012, BLACK),
-        prism(ring * 0.03 + (puck_x, 0.0), roof + 0.014, roof + 0.032, (52, 50, 48)),
-    )
-
-
-def _rounded(x0: float, x1: float, y0: float, y1: float, cut: float) -> Floats:
-    """Return a rectangle whose corners are cut off, counter-clockwise, (8, 2)."""
-    return np.array(
-        [
-            [x0 + cut, y0], [x1 - cut, y0], [x1, y0 + cut], [x1, y1 - cut],
-            [x1 - cut, y1], [x0 + cut, y1], [x0, y1 - cut], [x0, y0 + cut],
-        ]
-    )  # fmt: skip

@@ -10,7 +10,7 @@ from scm.eye.camera import CameraModel
 from scm.geometry import Pose2
 from scm.maps.model import CityMap, MapTag
 from scm.scenery.canvas import Canvas
-from scm.scenery.sheet import FloorSheet, paint_floor, printed_tag, wall_pieces
+from scm.scenery.sheet import BRICK, CARD, FloorSheet, paint_floor, printed_tag, wall_pieces
 from scm.scenery.solids import Solid, draw_shape, prism, rectangle, shape_of
 from scm.scenery.tags import PRINT_SCALE, tag_corners
 
@@ -134,13 +134,12 @@ def _light(width: int, height: int) -> Floats:
 
 
 def _standing(city_map: CityMap) -> list[Solid]:
-    card, brick = (104, 148, 178), (150, 176, 192)
     solids = [
-        prism(rectangle(b.x_m, b.y_m, b.length_m, b.width_m, b.yaw_rad), 0.0, b.height_m, card)
+        prism(rectangle(b.x_m, b.y_m, b.length_m, b.width_m, b.yaw_rad), 0.0, b.height_m, CARD)
         for b in city_map.boxes
     ]
     for wall in city_map.walls:
-        solids += [prism(piece, 0.0, wall.height_m, brick) for piece in wall_pieces(wall)]
+        solids += [prism(piece, 0.0, wall.height_m, BRICK) for piece in wall_pieces(wall)]
     for light in city_map.lights:
         foot = rectangle(light.x_m, light.y_m, 0.03, 0.03, light.yaw_rad)
         solids.append(prism(foot, 0.0, 0.012, (48, 48, 48)))

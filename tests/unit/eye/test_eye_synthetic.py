@@ -6,12 +6,12 @@ import pytest
 
 from scm.eye.camera import camera_model
 from scm.eye.detect import detect_tags
-from scm.eye.render.car import car_rotation, tag_on_roof
+from scm.eye.render.car import tag_on_roof
 from scm.eye.source import Frame
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.maps.load import load_map
 from scm.maps.model import Box
-from scm.scenery.bodies import NIGEL, car_body
+from scm.scenery.bodies import NIGEL, car_body, car_rotation
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 CITY = load_map("driving_school")

@@ -1,0 +1,171 @@
+"""The floor through a car's lens: the map's flat picture laid out by one homography a strip.
+
+Far away one pixel covers many texels in depth and few across. So the frame is cut into strips of
+rows by distance; each takes the picture at a fitting size (a pyramid), far ones are painted
+finer in depth than the frame and averaged.
+"""
+
+import math
+
+import cv2
+import numpy as np
+
+from scm.arrays import Image
+from scm.camera.daylight import Daylight
+from scm.camera.lens import Lens, View
+from scm.maps.draw import bounds
+from scm.maps.model import CityMap
+from scm.scenery.sheet import TABLE, FloorSheet, paint_floor, printed_tag, wall_pieces
+from scm.scenery.solids import rectangle
+from scm.scenery.tags import PRINT_SCALE
+
+MOST_TEXELS = 14e6
+FINEST_TEXELS_PER_M = 1000.0
+BESIDE_M = 0.3
+LEVELS = 6
+FINER_IN_DEPTH = 3
+SHADE = 0.5
+"""What a shadow leaves of the light."""
+INVERSE = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+
+
+class Floor:
+    """The floor of a city in some light, ready to be seen from anywhere.
+
+    Args:
+        city_map: The city.
+        daylight: The light on it; shadows of what stands still are painted on.
+        rng: Of the floor's grain.
+    """
+
+    def __init__(self, city_map: CityMap, daylight: Daylight, rng: np.random.Generator) -> None:
+        x0, y0, x1, y1 = bounds(city_map)
+        extent = np.array([x1 - x0, y1 - y0]) + 2 * BESIDE_M
+        fits = math.sqrt(MOST_TEXELS / float(extent.prod()))
+        self.texels_per_m = min(FINEST_TEXELS_PER_M, fits)
+        sheet = FloorSheet(x0 - BESIDE_M, y1 + BESIDE_M, extent, rng, self.texels_per_m)
+        paint_floor(sheet, city_map)
+        _lay_tag(sheet, city_map)
+        _shade(sheet, city_map, daylight)
+        self.corner = (sheet.left, sheet.upper)
+        self._levels = [sheet.picture]
+        for _ in range(LEVELS - 1):
+            self._levels.append(np.asarray(cv2.pyrDown(self._levels[-1]), dtype=np.uint8))
+        self._lit: dict[float, list[Image]] = {}
+
+    def paint(self, canvas: Image, lens: Lens, view: View, light: float) -> None:
+        """Paint what lies below the horizon.
+
+        Args:
+            canvas: Of the lens; rows above the horizon are left as they are.
+            lens: The camera's.
+            view: Where it is.
+            light: Factor on the picture: how bright it is times the camera's exposure.
+        """
+        levels = self._in_light(light)
+        table = tuple(min(255.0, part * light) for part in TABLE)
+        height, width = canvas.shape[:2]
+        # Texels of the finest level to canvas pixels, and back.
+        over = np.column_stack((view.camera_R_map[:, :2], -view.camera_R_map @ view.position))
+        texel = 1.0 / self.texels_per_m
+        placed = np.array([
+            [texel, 0.0, self.corner[0] + texel / 2],
+            [0.0, -texel, self.corner[1] - texel / 2],
+            [0.0, 0.0, 1.0],
+        ])  # fmt: skip
+        back = np.linalg.inv(lens.canvas_matrix @ over @ placed)
+        for top, bottom, level, finer in self._strips(lens, view, height, width):
+            size = (width, (bottom - top) * finer)
+            rows = np.array([[1, 0, 0], [0, 1 / finer, top + 0.5 / finer - 0.5], [0, 0, 1.0]])
+            share = 0.5**level
+            # OpenCV halves a picture about its first texel's centre.
+            smaller = np.diag([share, share, 1.0])
+            strip = cv2.warpPerspective(
+                levels[level], smaller @ back @ rows, size, flags=INVERSE,
+                borderMode=cv2.BORDER_CONSTANT, borderValue=table,
+            )  # fmt: skip
+            if finer > 1:
+                strip = cv2.resize(strip, (width, bottom - top), interpolation=cv2.INTER_AREA)
+            canvas[top:bottom] = strip
+
+    def _strips(
+        self, lens: Lens, view: View, height: int, width: int
+    ) -> list[tuple[int, int, int, int]]:
+        """Return (first row, row after the last, level, how much finer in depth) from the top."""
+        horizon = max(horizon_rows(lens, view, width))
+        begin = max(0, math.floor(min(horizon_rows(lens, view, width))))
+        f, high = lens.canvas_matrix[0, 0], max(float(view.position[2]), 1e-3)
+        strips, last = [], height
+        for level in range(LEVELS):
+            for finer in (1, FINER_IN_DEPTH):
+                # Where a pixel covers 1.4 texels of this level, by the mean of both directions.
+                texels = 1.4 * 2.0**level / self.texels_per_m
+                far = (texels**2 * finer * f * f * high) ** (1 / 3)
+                row = max(begin, math.ceil(horizon + f * high / far))
+                if level == LEVELS - 1 and finer == FINER_IN_DEPTH:
+                    row = begin
+                if row < last:
+                    strips.append((row, last, level, finer))
+                    last = row
+        return strips
+
+    def _in_light(self, light: float) -> list[Image]:
+        if light not in self._lit:
+            table = np.clip(np.arange(256) * light, 0.0, 255.0).round().astype(np.uint8)
+            self._lit[light] = [np.asarray(cv2.LUT(one, table)) for one in self._levels]
+        return self._lit[light]
+
+
+def horizon_rows(lens: Lens, view: View, width: int) -> tuple[float, float]:
+    """Return where the horizon crosses the canvas's left and right edge [px]."""
+    up = view.camera_R_map[:, 2]  # of the map, in the camera's axes
+    k = lens.canvas_matrix
+    left, right = ((edge - k[0, 2]) / k[0, 0] for edge in (0.0, width - 1.0))
+    rows = [float(k[1, 2] - k[1, 1] * (up[0] * a + up[2]) / up[1]) for a in (left, right)]
+    return rows[0], rows[1]
+
+
+def _lay_tag(sheet: FloorSheet, city_map: CityMap) -> None:
+    """Put the map's tag on the floor."""
+    tag = city_map.tag
+    print_ = printed_tag(tag.tag_id)
+    size = tag.size_m * PRINT_SCALE
+    corners = rectangle(tag.x_m, tag.y_m, size, size, tag.yaw_rad)
+    onto = np.column_stack((corners[:, 0] - sheet.left, sheet.upper - corners[:, 1]))
+    onto = onto * sheet.texels_per_m - 0.5
+    high, wide = print_.shape[:2]
+    edge = np.array([[0, high], [wide, high], [wide, 0], [0, 0]]) - 0.5
+    low = np.maximum(np.floor(onto.min(axis=0)).astype(int) - 1, 0)
+    top = np.ceil(onto.max(axis=0)).astype(int) + 2
+    part = np.ascontiguousarray(sheet.picture[low[1] : top[1], low[0] : top[0]])
+    if part.size:
+        place = cv2.getPerspectiveTransform(
+            edge.astype(np.float32), (onto - low).astype(np.float32)
+        )
+        shape = (part.shape[1], part.shape[0])
+        cv2.warpPerspective(
+            print_, place, shape, dst=part, flags=cv2.INTER_AREA, borderMode=cv2.BORDER_TRANSPARENT
+        )
+        sheet.picture[low[1] : top[1], low[0] : top[0]] = part
+
+
+def _shade(sheet: FloorSheet, city_map: CityMap, daylight: Daylight) -> None:
+    """Darken the floor in the shadows of walls, softly; boxes may move, theirs are not painted."""
+    height, width = sheet.picture.shape[:2]
+    coarse = 4
+    mask = np.zeros((height // coarse + 1, width // coarse + 1), dtype=np.uint8)
+    for wall in city_map.walls:
+        for foot in wall_pieces(wall):
+            top = np.column_stack((foot, np.full(len(foot), wall.height_m)))
+            both = np.concatenate((foot, daylight.shadow_of(top))).astype(np.float32)
+            hull = cv2.convexHull(both)[:, 0]
+            at = np.column_stack((hull[:, 0] - sheet.left, sheet.upper - hull[:, 1]))
+            fixed = np.rint(at * sheet.texels_per_m / coarse * 16.0).astype(np.int32)
+            cv2.fillConvexPoly(mask, fixed, 255, cv2.LINE_AA, 4)
+    if not mask.any():
+        return
+    reach = 2 * max(1, round(0.008 * sheet.texels_per_m / coarse)) + 1
+    soft = cv2.GaussianBlur(mask, (reach, reach), 0.0)
+    keep = 1.0 - (1.0 - SHADE) * (1.0 - daylight.ambient) * 1.2 * (soft / 255.0)
+    fine = cv2.resize(keep.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
+    sheet.picture[:] = (sheet.picture * fine[..., None]).astype(np.uint8)

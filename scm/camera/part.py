@@ -1,0 +1,205 @@
+"""The cameras of all cars as one part: frames are made only while somebody subscribes to them.
+
+While nobody does, the part hears nothing: no snapshot is even read. A frame's time lies on the
+camera's own grid; it is pictured when the world's snapshots have passed that time, from the two
+around it. So a frame is up to one snapshot late (50 ms), as a real camera's is, and smooth.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import cv2
+
+from scm.camera.daylight import Daylight
+from scm.camera.optics import Optics, cameras_of, optics_of
+from scm.camera.studio import Studio
+from scm.camera.tween import between
+from scm.clock import NS_PER_MS, NS_PER_S, Clock
+from scm.errors import CarError, EyeError
+from scm.maps.model import CityMap
+from scm.part import Hears, IsWanted, Serves
+from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.message import Message
+from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.world_snapshot import WorldSnapshot
+from scm.vehicles.car import car_names, load_car
+
+LOOK_NS = 100 * NS_PER_MS
+FLASH_NS = 500 * NS_PER_MS
+DEFAULT_CAR = "nigel"
+AWAKE = (Hears(WorldSnapshot), Hears(Spat))
+ASLEEP: tuple[Hears, ...] = ()
+
+Which = tuple[str, str]
+"""A vehicle and one of its cameras."""
+
+
+@dataclass
+class _Counted:
+    """What the part tells of itself."""
+
+    frames: int = 0
+    told_ns: int = 0
+    wanted: set[Which] = field(default_factory=set)
+
+
+class CameraPart:
+    """Pictures the city through whichever cameras are wanted.
+
+    Args:
+        city_map: The city.
+        seed: Of the floor's grain and the sensors' noise.
+        daylight: The light in the city; None: a well lit room.
+        clock: Times the pictures for the status line; None: it is left out.
+    """
+
+    name = "camera"
+    role = "part"
+    period_ns = 20 * NS_PER_MS
+    serves: Sequence[Serves] = ()
+
+    def __init__(
+        self,
+        city_map: CityMap,
+        seed: int = 0,
+        daylight: Daylight | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self.hears: Sequence[Hears] = ASLEEP
+        self._map = city_map
+        self._seed = seed
+        self._daylight = daylight or Daylight()
+        self._clock = clock
+        self._studio: Studio | None = None
+        self._is_wanted: IsWanted = _nobody
+        self._look_ns: int | None = None
+        self._snapshots: list[WorldSnapshot] = []
+        self._spats: dict[str, Spat] = {}
+        self._sent_ns: dict[Which, int] = {}
+        self._counted = _Counted()
+        self._spent_ns = 0
+
+    def learn_wishes(self, is_wanted: IsWanted) -> None:
+        """Learn whom to ask whether a picture is wanted."""
+        self._is_wanted = is_wanted
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Look whether anybody wants pictures; make those that are due."""
+        if self._look_ns is None or now_ns >= self._look_ns:
+            self._look_ns = now_ns + LOOK_NS
+            self._look()
+        status = self._status(now_ns)
+        if not self.hears:
+            return status
+        fresh = False
+        for item in inbox:
+            if isinstance(item.message, Spat):
+                self._spats[item.message.junction] = item.message
+            elif isinstance(item.message, WorldSnapshot):
+                self._snapshots = [*self._snapshots[-1:], item.message]
+                fresh = True
+        return [*self._frames(), *status] if fresh else status
+
+    def finish(self, now_ns: int) -> list[Outgoing]:
+        """Leave without a word."""
+        del now_ns
+        return []
+
+    def _look(self) -> None:
+        if self._is_wanted(CameraFrame, {}):
+            self.hears = AWAKE
+        elif self.hears:
+            self.hears = ASLEEP
+            self._snapshots.clear()
+            self._spats.clear()
+            self._sent_ns.clear()
+            self._counted.wanted.clear()
+
+    def _frames(self) -> list[Outgoing]:
+        """Picture every wanted camera whose grid has a time between the last two snapshots."""
+        if len(self._snapshots) < 2 or self._snapshots[0].t_ns >= self._snapshots[1].t_ns:
+            return []  # the first one, or the world's time went back
+        before, after = self._snapshots
+        frames: list[Outgoing] = []
+        self._counted.wanted.clear()
+        for car in after.vehicles:
+            if not self._is_wanted(CameraFrame, {"vehicle": car.vehicle}):
+                continue
+            for camera, optics in _cameras(car.car).items():
+                which = (car.vehicle, camera)
+                if not self._is_wanted(CameraFrame, {"vehicle": car.vehicle, "camera": camera}):
+                    continue
+                self._counted.wanted.add(which)
+                period_ns = round(NS_PER_S / optics.rate_hz)
+                due_ns = after.t_ns // period_ns * period_ns
+                if due_ns > max(before.t_ns, self._sent_ns.get(which, -1)):
+                    self._sent_ns[which] = due_ns
+                    frames.append(self._frame(which, optics, due_ns))
+        return frames
+
+    def _frame(self, which: Which, optics: Optics, t_ns: int) -> CameraFrame:
+        began_ns = self._clock.now_ns() if self._clock else 0
+        if self._studio is None:
+            self._studio = Studio(self._map, self._daylight, self._seed)
+        vehicle, camera = which
+        cars = between(self._snapshots[0], self._snapshots[1], t_ns)
+        own = next(car for car in cars if car.vehicle == vehicle)
+        image = self._studio.picture(optics, own, cars, self._shown(t_ns), camera, t_ns)
+        quality = [cv2.IMWRITE_JPEG_QUALITY, round(optics.jpeg_quality)]
+        good, data = cv2.imencode(".jpg", image, quality)
+        if not good:
+            raise EyeError(f"cannot encode a frame of shape {image.shape} as JPEG")
+        self._counted.frames += 1
+        self._spent_ns += self._clock.now_ns() - began_ns if self._clock else 0
+        height, width = image.shape[:2]
+        return CameraFrame(
+            vehicle=vehicle, camera=camera, t_ns=t_ns, width_px=width, height_px=height,
+            payload=data.tobytes(),
+        )  # fmt: skip
+
+    def _shown(self, t_ns: int) -> dict[int, str | None]:
+        """Return the lamp that is on at each signal head."""
+        colours = {
+            (spat.junction, group.group): group.colour
+            for spat in self._spats.values()
+            for group in spat.groups
+        }
+        lit = t_ns // FLASH_NS % 2 == 0
+        shown: dict[int, str | None] = {}
+        for light in self._map.lights:
+            colour = colours.get((light.junction, light.group), "dark")
+            if colour == "flashing_red":
+                shown[light.light_id] = "red" if lit else None
+            else:
+                shown[light.light_id] = None if colour == "dark" else colour
+        return shown
+
+    def _status(self, now_ns: int) -> list[Outgoing]:
+        counted = self._counted
+        if now_ns - counted.told_ns < NS_PER_S:
+            return []
+        counted.told_ns = now_ns
+        count = len(counted.wanted)
+        detail = "nobody looks" if not self.hears else f"{count} camera{'s' * (count != 1)}"
+        if counted.frames and self._clock is not None:
+            detail += f", {self._spent_ns / counted.frames / NS_PER_MS:.0f} ms a frame"
+        counted.frames = self._spent_ns = 0
+        return [PartStatus(station=self.name, t_ns=now_ns, detail=detail)]
+
+
+def _nobody(kind: type[Message], where: Mapping[str, str]) -> bool:
+    del kind, where
+    return False
+
+
+@lru_cache(maxsize=64)
+def _cameras(car: str) -> dict[str, Optics]:
+    """Return the cameras of a car file of that name; a car that is not among ours is a Nigel."""
+    model = load_car(car if car in car_names() else DEFAULT_CAR)
+    try:
+        return {camera: optics_of(model, camera) for camera in cameras_of(model)}
+    except CarError:
+        return {}

@@ -1,0 +1,138 @@
+"""One picture of the city through one camera: sky, floor, shadows, things, lens, sensor."""
+
+from collections.abc import Mapping, Sequence
+
+import cv2
+import numpy as np
+
+from scm.arrays import Floats, Image
+from scm.camera.car_mesh import car_thing, footprint
+from scm.camera.daylight import Daylight
+from scm.camera.floor import SHADE, Floor, horizon_rows
+from scm.camera.lens import Lens, View
+from scm.camera.optics import Optics
+from scm.camera.painter import Painter
+from scm.camera.sensor import Noise
+from scm.camera.standing import box_shadow, box_thing, light_thing, sign_thing, wall_things
+from scm.maps.model import CityMap
+from scm.scenery.bodies import car_rotation
+from scm.scenery.canvas import Colour
+from scm.v2x.messages.world_snapshot import SnapshotVehicle
+
+SKY_HIGH: Colour = (226, 206, 178)
+SKY_LOW: Colour = (238, 232, 224)
+SKY_RAD = 0.6
+
+Shown = Mapping[int, str | None]
+"""Which lamp of each signal head is on, by the light's id."""
+
+
+class Studio:
+    """A city ready to be pictured by any number of cameras.
+
+    Args:
+        city_map: The city.
+        daylight: The light in it.
+        seed: Of the floor's grain and the sensors' noise.
+    """
+
+    def __init__(self, city_map: CityMap, daylight: Daylight, seed: int = 0) -> None:
+        self._map = city_map
+        self._daylight = daylight
+        self._seed = seed
+        self._floor = Floor(city_map, daylight, np.random.default_rng([seed, *b"floor"]))
+        self._standing = [*wall_things(city_map), *(sign_thing(sign) for sign in city_map.signs)]
+        self._boxes = [(box_thing(box), box_shadow(box)) for box in city_map.boxes]
+        self._kinds: dict[Optics, _Kind] = {}
+
+    def picture(
+        self,
+        optics: Optics,
+        car: SnapshotVehicle,
+        cars: Sequence[SnapshotVehicle],
+        shown: Shown,
+        camera: str,
+        t_ns: int,
+    ) -> Image:
+        """Return a frame, (height, width, 3); it is valid until the next one.
+
+        Args:
+            optics: Of the camera.
+            car: The one that carries it, which it does not see.
+            cars: All cars, that one included.
+            shown: What the signal heads show.
+            camera: Its name, and with it its noise.
+            t_ns: When it is exposed.
+        """
+        kind = self._kind(optics)
+        view = kind.lens.view(car_rotation(car), np.array([car.x_m, car.y_m, 0.0]))
+        canvas = kind.canvas
+        self._sky(canvas, kind, view)
+        self._floor.paint(canvas, kind.lens, view, self._daylight.intensity * kind.exposure)
+        self._shadows(canvas, kind, view, cars)
+        others = [car_thing(other) for other in cars if other.vehicle != car.vehicle]
+        heads = [light_thing(light, shown.get(light.light_id)) for light in self._map.lights]
+        boxes = [box for box, _ in self._boxes]
+        kind.painter.paint(canvas, view, [*self._standing, *boxes, *heads, *others])
+        frame = kind.lens.bend(canvas)
+        kind.noise.add(frame, car.vehicle, camera, t_ns)
+        return frame
+
+    def _kind(self, optics: Optics) -> "_Kind":
+        if optics not in self._kinds:
+            self._kinds[optics] = _Kind(optics, self._daylight, self._seed)
+        return self._kinds[optics]
+
+    def _sky(self, canvas: Image, kind: "_Kind", view: View) -> None:
+        """Paint what is above the horizon; the floor then covers the rest."""
+        height, width = canvas.shape[:2]
+        rows = horizon_rows(kind.lens, view, width)
+        low = int(np.clip(np.ceil(max(rows)) + 1, 0, height))
+        start = len(kind.sky) - kind.sky_below - round(sum(rows) / 2)
+        picked = np.clip(np.arange(start, start + low), 0, len(kind.sky) - 1)
+        canvas[:low] = kind.sky[picked][:, None]
+
+    def _shadows(
+        self, canvas: Image, kind: "_Kind", view: View, cars: Sequence[SnapshotVehicle]
+    ) -> None:
+        keep = 1.0 - (1.0 - SHADE) * (1.0 - self._daylight.ambient) * 1.2
+        for _, corners in self._boxes:
+            self._shadow(canvas, kind, view, corners, keep)
+        for car in cars:
+            foot, deck = footprint(car)
+            if kind.painter.sees(view, foot.mean(axis=0), 0.35):
+                under = foot.mean(axis=0) + 0.96 * (foot - foot.mean(axis=0))
+                self._shadow(canvas, kind, view, _raised(foot, deck), keep)
+                kind.painter.shade(canvas, view, under[:, :2], 0.62)
+
+    def _shadow(
+        self, canvas: Image, kind: "_Kind", view: View, corners: Floats, keep: float
+    ) -> None:
+        thrown = self._daylight.shadow_of(corners).astype(np.float32)
+        hull = np.asarray(cv2.convexHull(thrown), dtype=np.float64)[:, 0]
+        kind.painter.shade(canvas, view, hull, keep)
+
+
+def _raised(foot: Floats, height: float) -> Floats:
+    """Return a foot and the same at a height."""
+    top = foot.copy()
+    top[:, 2] += height
+    return np.concatenate((foot, top))
+
+
+class _Kind:
+    """What all cameras of equal optics share."""
+
+    def __init__(self, optics: Optics, daylight: Daylight, seed: int) -> None:
+        self.lens = Lens(optics)
+        self.exposure = optics.exposure * optics.gain
+        self.painter = Painter(self.lens, daylight, self.exposure)
+        self.noise = Noise(optics, seed)
+        width, height = self.lens.canvas_size
+        self.canvas: Image = np.zeros((height, width, 3), dtype=np.uint8)
+        rows = round(SKY_RAD * optics.focal_px)
+        self.sky_below = 0
+        share = np.linspace(1.0, 0.0, max(rows, 2))[:, None]
+        colours = np.array(SKY_LOW) + share * (np.array(SKY_HIGH, dtype=np.float64) - SKY_LOW)
+        lit = colours * daylight.intensity * self.exposure
+        self.sky = lit.clip(0.0, 255.0).round().astype(np.uint8)

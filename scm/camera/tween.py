@@ -1,0 +1,42 @@
+"""Where the cars were between two snapshots."""
+
+import math
+
+import msgspec
+
+from scm.geometry import wrap_angle
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
+
+JUMP_M = 0.3
+
+
+def between(before: WorldSnapshot, after: WorldSnapshot, t_ns: int) -> tuple[SnapshotVehicle, ...]:
+    """Return the cars of `after` where they were at a time between the two.
+
+    One that was not there before, or was put elsewhere, is where it is.
+    """
+    span_ns = after.t_ns - before.t_ns
+    share = (t_ns - before.t_ns) / span_ns if span_ns else 1.0
+    if share >= 1.0:
+        return after.vehicles
+    earlier = {car.vehicle: car for car in before.vehicles}
+    return tuple(_between(earlier.get(car.vehicle), car, share) for car in after.vehicles)
+
+
+def _between(start: SnapshotVehicle | None, end: SnapshotVehicle, share: float) -> SnapshotVehicle:
+    if start is None or math.hypot(end.x_m - start.x_m, end.y_m - start.y_m) > JUMP_M:
+        return end
+
+    def mixed(a: float, b: float) -> float:
+        return a + share * (b - a)
+
+    return msgspec.structs.replace(
+        end,
+        x_m=mixed(start.x_m, end.x_m),
+        y_m=mixed(start.y_m, end.y_m),
+        yaw_rad=wrap_angle(start.yaw_rad + share * wrap_angle(end.yaw_rad - start.yaw_rad)),
+        steering_rad=mixed(start.steering_rad, end.steering_rad),
+        roll_rad=mixed(start.roll_rad, end.roll_rad),
+        pitch_rad=mixed(start.pitch_rad, end.pitch_rad),
+        lights=start.lights if share < 0.5 else end.lights,
+    )
