@@ -5,7 +5,6 @@ import msgspec
 from scm.api.picture import Held, Picture, SeenPose
 from scm.api.residual import Residual
 from scm.v2x.messages.trip import Trip
-from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 POSE_SHOWN_S = 2.0
@@ -73,7 +72,6 @@ def cars_topic(picture: Picture) -> CarsTopic:
         _row(
             car,
             since_ms,
-            picture.states.get(car.vehicle),
             _trip(picture.trips.get(car.vehicle), picture.now_ns),
             residuals.get(car.vehicle),
         )
@@ -91,7 +89,6 @@ def cars_topic(picture: Picture) -> CarsTopic:
 def _row(
     car: SnapshotVehicle,
     since_ms: float,
-    state: Held[VehicleState] | None,
     trip: TripRow | None,
     eye: Residual | None,
 ) -> CarRow:
@@ -111,7 +108,7 @@ def _row(
         age_ms=round(car.age_ms + since_ms, 1),
         alive=car.alive,
         lights=car.lights,
-        throttle=None if state is None else round(state.message.throttle, 3),
+        throttle=None if car.throttle is None else round(car.throttle, 3),
         trip=trip,
         eye=eye,
     )

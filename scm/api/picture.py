@@ -14,7 +14,6 @@ from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.trip import Trip
-from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
@@ -47,7 +46,7 @@ class Picture:
 
     Attributes:
         spats, monitors: By junction.
-        trips, states: By vehicle.
+        trips: By vehicle.
         frames, tags: By camera, the last few, oldest first.
         poses: By (camera, vehicle).
         stations: Everybody who is there, and who was lost lately.
@@ -61,7 +60,6 @@ class Picture:
     spats: dict[str, Held[Spat]] = field(default_factory=dict)
     monitors: dict[str, Held[MonitorStatus]] = field(default_factory=dict)
     trips: dict[str, Held[Trip]] = field(default_factory=dict)
-    states: dict[str, Held[VehicleState]] = field(default_factory=dict)
     frames: dict[str, tuple[Held[EyeFrame], ...]] = field(default_factory=dict)
     tags: dict[str, tuple[Held[EyeTags], ...]] = field(default_factory=dict)
     poses: dict[tuple[str, str], SeenPose] = field(default_factory=dict)

@@ -27,7 +27,6 @@ from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.trip import Trip
-from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
@@ -55,7 +54,6 @@ class CityView:
         self._spats: dict[str, Held[Spat]] = {}
         self._monitors: dict[str, Held[MonitorStatus]] = {}
         self._trips: dict[str, Held[Trip]] = {}
-        self._states: dict[str, Held[VehicleState]] = {}
         self._frames: dict[str, deque[Held[EyeFrame]]] = {}
         self._tags: dict[str, deque[Held[EyeTags]]] = {}
         self._poses: dict[tuple[str, str], SeenPose] = {}
@@ -74,7 +72,6 @@ class CityView:
             CityEvent: lambda m, _: self._log.add(m),
             Trip: lambda m, t: self._trips.update({m.vehicle: Held(m, t)}),
             CityStop: self._take_stop,
-            VehicleState: lambda m, t: self._states.update({m.vehicle: Held(m, t)}),
         }
         self.hears: Sequence[Hears] = tuple(Hears(kind) for kind in self._takers)
 
@@ -107,7 +104,6 @@ class CityView:
                 spats=dict(self._spats),
                 monitors=dict(self._monitors),
                 trips=dict(self._trips),
-                states=dict(self._states),
                 frames={camera: tuple(frames) for camera, frames in self._frames.items()},
                 tags={camera: tuple(tags) for camera, tags in self._tags.items()},
                 poses=dict(self._poses),
@@ -147,8 +143,7 @@ class CityView:
     def _forget(self, now_ns: int) -> None:
         self._stations.forget(now_ns)
         oldest_ns = now_ns - FORGET_NS
-        for held in (self._trips, self._states):
-            for name in [name for name, item in held.items() if item.arrived_ns < oldest_ns]:
-                del held[name]
+        for name in [n for n, trip in self._trips.items() if trip.arrived_ns < oldest_ns]:
+            del self._trips[name]
         for key in [k for k, seen in self._poses.items() if seen.held.arrived_ns < oldest_ns]:
             del self._poses[key]

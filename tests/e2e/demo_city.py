@@ -34,7 +34,6 @@ from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.trip import Trip
-from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 PARTS = ("world", "traffic", "monitor", "eye", "api", "record")
@@ -204,30 +203,13 @@ class DemoCity:
                 mode="drive" if moving else "stop",
                 age_ms=0.0 if kind == "hosted" else 14.0,
                 alive=alive,
+                throttle=0.5,
                 lights=(*lights, "left") if steering > 0.2 else lights,
             )
             rows.append(row)
-            if kind != "hosted" and alive:
-                self._own_report(row, now_ns)
         return WorldSnapshot(
             t_ns=now_ns, tick=self.tick, vehicles=tuple(rows), real_time_factor=0.999
         )
-
-    def _own_report(self, row, now_ns):
-        state = VehicleState(
-            vehicle=row.vehicle,
-            t_ns=now_ns,
-            seq=self.tick,
-            x_m=row.x_m,
-            y_m=row.y_m,
-            yaw_rad=row.yaw_rad,
-            speed_mps=row.speed_mps,
-            yaw_rate_radps=0.0,
-            steering_rad=row.steering_rad,
-            throttle=0.5,
-            source="simulated",
-        )
-        self.say(state, now_ns)
 
     def spat(self, now_ns):
         junction = self.city_map.junctions[0]

@@ -15,6 +15,7 @@ class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         kind: `hosted`, `remote` or `real`.
+        throttle: As commanded, or as its agent reports it; None: it has not reported yet.
         owner: Who holds its lease.
         age_ms: How old its newest state is: 0 for hosted cars.
         alive: False from the moment its agent is known to be gone until it is taken off the map.
@@ -29,6 +30,7 @@ class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True):
     yaw_rad: float
     speed_mps: float
     steering_rad: float
+    throttle: float | None = None
     roll_rad: float = 0.0
     pitch_rad: float = 0.0
     owner: str = "world"

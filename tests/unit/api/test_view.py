@@ -6,7 +6,6 @@ from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.trip import Trip
-from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
 
 
@@ -90,25 +89,12 @@ def test_a_world_that_starts_again_brings_its_own_truth(view, hear, snapshot):
 
 
 def test_what_is_not_heard_of_for_a_minute_is_forgotten(view, hear):
-    state = VehicleState(
-        vehicle="n1",
-        t_ns=1,
-        seq=1,
-        x_m=0.0,
-        y_m=0.0,
-        yaw_rad=0.0,
-        speed_mps=0.0,
-        yaw_rate_radps=0.0,
-        steering_rad=0.0,
-        throttle=0.0,
-        source="simulated",
-    )
-    hear(1.0, trip_of("n1"), state, pose_at(1.0, 0.0))
+    hear(1.0, trip_of("n1"), pose_at(1.0, 0.0))
     hear(60.9)
     assert "n1" in view.picture().trips
     hear(62.0)
     picture = view.picture()
-    assert (picture.trips, picture.states, picture.poses) == ({}, {}, {})
+    assert (picture.trips, picture.poses) == ({}, {})
 
 
 def test_events_are_numbered_as_they_arrive(view, hear, event):
