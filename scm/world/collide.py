@@ -8,6 +8,7 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.clock import NS_PER_S
+from scm.world.contacts import WALL as A_WALL
 from scm.world.contacts import Touches
 from scm.world.world import World
 
@@ -38,28 +39,42 @@ def everybody(world: World, t_ns: int) -> tuple[Ints, Floats]:
 
 
 def _tell(world: World, slots: Ints, touches: Touches, t_ns: int) -> None:
-    names = {car.slot: car.name for car in world.cars()}
-    name_of_row = [names[slot] for slot in slots.tolist()]
-    against = _against(touches.pairs, name_of_row)
-    for row in np.flatnonzero(touches.touched).tolist():
-        dv, shift, name = touches.dv[row], touches.shift[row], name_of_row[row]
+    rows = np.flatnonzero(touches.touched)
+    names = dict(zip(rows.tolist(), names_of(world, slots[rows]), strict=True))
+    against = _against(world, touches.pairs, names)
+    for row in rows.tolist():
+        dv, shift, name = touches.dv[row], touches.shift[row], names[row]
         if not (dv.any() or shift.any()):
             continue
         if name in world.hosted:
             car = world.hosted[name]
             car.fleet.push(car.row, *dv.tolist(), *shift.tolist())
+            world.impacts.add(car.fleet, car.row, dv)
         else:
             world.remote[name].hit(dv, shift, against[name], t_ns)
         _report(world, name, against[name], float(np.hypot(dv[0], dv[1])), t_ns)
 
 
-def _against(pairs: Ints, name_of_row: list[str]) -> dict[str, set[str]]:
-    found: dict[str, set[str]] = {}
+def names_of(world: World, slots: Ints) -> list[str]:
+    """Return the names of the cars of some slots."""
+    wanted = set(slots.tolist())
+    names = {car.slot: car.name for car in world.cars() if car.slot in wanted}
+    return [names[slot] for slot in slots.tolist()]
+
+
+def _against(world: World, pairs: Ints, names: dict[int, str]) -> dict[str, set[str]]:
+    """Return whom or what each car touches, by name."""
+    boxes = world.contacts.boxes.names
+    found: dict[str, set[str]] = {name: set() for name in names.values()}
     for a, b in pairs.tolist():
-        first = WALL if a < 0 else name_of_row[a]
-        second = WALL if b < 0 else name_of_row[b]
-        found.setdefault(first, set()).add(second)
-        found.setdefault(second, set()).add(first)
+        for one, other in ((a, b), (b, a)):
+            if one < 0:
+                continue
+            if other >= 0:
+                thing = names[other]
+            else:
+                thing = WALL if other == A_WALL else f"box {boxes[-2 - other]}"
+            found[names[one]].add(thing)
     return found
 
 

@@ -47,7 +47,10 @@ def _steer(world: World, now_ns: int) -> None:
 def _move(world: World, now_ns: int) -> None:
     """Advance all hosted cars at 1 kHz and solve the contacts of all cars at 200 Hz."""
     steps = world.pace.steps(now_ns)
+    world.impacts.begin(steps * seconds(CONTACT_STEP_NS))
     for left in range(steps - 1, -1, -1):
+        for fleet in world.garage.fleets.values():
+            world.ground.feel(fleet, now_ns - (left + 1) * CONTACT_STEP_NS)
         world.garage.advance(seconds(CONTACT_STEP_NS))
         collide(world, now_ns - left * CONTACT_STEP_NS)
 

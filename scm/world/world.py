@@ -20,19 +20,22 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.vehicles.car import Car
+from scm.vehicles.ground import Ground
 from scm.vehicles.guard import Guard
 from scm.vehicles.sensor import Around, Sampler, Sensor
 from scm.vehicles.sensors.lidar import scan
 from scm.vehicles.signal_view import SignalView
 from scm.world import lease as rules
-from scm.world.contacts import Contacts, Hull
+from scm.world.contacts import Contacts
 from scm.world.garage import Garage
 from scm.world.hosted import HostedCar
 from scm.world.hull import hull_of
+from scm.world.impacts import Impacts
 from scm.world.pace import Every, Pace
 from scm.world.radio import Radio, roadside_places
 from scm.world.remote import RemoteCar
 from scm.world.seeds import generator
+from scm.world.solids import Hull
 
 NAME = "world"
 PERIOD_NS = 20 * NS_PER_MS
@@ -56,6 +59,8 @@ class World:
     Attributes:
         hosted: Cars simulated here, by name, in the order they came; likewise `remote`.
         walls: (m, 4) faces of everything that never moves.
+        ground: The floor under the wheels, and the wind.
+        impacts: What contacts add to the cars' accelerations in this tick.
         sensors: All kinds of sensors, by name.
         scanners: One LIDAR a remote car, by its name: only the world can see for it.
         stop: The red button as it stands.
@@ -78,7 +83,9 @@ class World:
         self.roads = Roads(city_map)
         self.walls = wall_segments(city_map)
         self.garage = Garage(capacity)
+        self.ground = Ground(city_map, seed)
         self.contacts = Contacts(city_map)
+        self.impacts = Impacts()
         self.radio = Radio(city_map.radio_range_m, generator(seed, NAME, "radio"), loss)
         self.roadside = roadside_places(city_map)
         self.sensors: Mapping[str, Sensor] = {
@@ -97,7 +104,8 @@ class World:
         self.verdicts: dict[str, MonitorStatus] = {}
         self._came = 0
         for name in prepare:
-            self.garage.prepare(name)
+            self.ground.warm(self.garage.prepare(name))
+        self.contacts.warm()
         self._warm_scanner()
         self._slots: set[int] = set()
 
@@ -141,6 +149,7 @@ class World:
         hull = hull_of(model)
         slot = self._free_slot()
         fleet, row = self.garage.park(car_name, pose, slot)
+        self.ground.settle(fleet, row)
         self._take_slot(slot, hull)
         lease = rules.grant(NAME, first_epoch(now_ns))
         car = HostedCar(

@@ -1,0 +1,141 @@
+"""What lies under the wheels: a map's grip, rolling resistance, heights and wind, for fleets.
+
+The world and every agent make a `Ground` of the same map and feel the same floor and the same wind.
+On a map without floor data and wind it does nothing at all.
+"""
+
+import math
+
+import numpy as np
+
+from scm.arrays import Bools, Floats, Ints
+from scm.maps.floor_shapes import outline_of, pieces_of
+from scm.maps.grey import full_scale, unpack
+from scm.maps.model import CityMap, Floor, Point
+from scm.vehicles.fleet import Fleet
+from scm.vehicles.ground_kernel import ANYTHING, CLIMBS, Sheet, feel
+from scm.vehicles.wind import Gusts
+
+CELL_M = 0.25
+MOST_CELLS = 1_000_000
+WHEEL_REACH_M = 0.25  # wheels this large see an edge before their middle is in its cell
+
+
+class Ground:
+    """One map's floor and air.
+
+    Args:
+        city_map: The city.
+        seed: Of the gusts; everybody who is given the same one feels the same wind.
+
+    Attributes:
+        is_flat: Whether the floor is level and holds as it should everywhere.
+        is_calm: Whether there is no wind.
+    """
+
+    def __init__(self, city_map: CityMap, seed: int = 0) -> None:
+        floor, wind = city_map.floor, city_map.wind
+        self.is_flat = not (
+            floor.patches or floor.ramps or floor.plates or floor.friction_map or floor.height_map
+        ) and (floor.grip, floor.rolling) == (1.0, 0.0)
+        self.is_calm = not (wind.x_mps or wind.y_mps or wind.gust_mps)
+        self._sheet = None if self.is_flat else sheet_of(floor)
+        self._gusts = None if self.is_calm else Gusts(wind, seed)
+
+    def feel(self, fleet: Fleet, t_ns: int) -> None:
+        """Write floor and wind of the instant `t_ns` into a fleet: before each of its advances."""
+        if self._sheet is not None:
+            self._write(self._sheet, fleet, CLIMBS)
+        if self._gusts is not None:
+            fleet.air_x[:], fleet.air_y[:] = self._gusts.at(t_ns)
+
+    def settle(self, fleet: Fleet, row: int) -> None:
+        """Let a car that was just placed stand on the highest ground under its wheels."""
+        if self._sheet is None:
+            return
+        only = np.zeros(fleet.capacity, np.bool_)
+        only[row] = True
+        self._write(self._sheet, fleet, rows=only)
+        fleet.settle(row)
+
+    def warm(self, fleet: Fleet) -> None:
+        """Compile or load now what `feel` needs, not when the first car drives."""
+        if self._sheet is not None:
+            self._write(self._sheet, fleet, rows=np.zeros(fleet.capacity, np.bool_))
+
+    def _write(
+        self, sheet: Sheet, fleet: Fleet, climbs: float = ANYTHING, rows: Bools | None = None
+    ) -> None:
+        """Write the floor under `rows`; only what is at most `climbs` wheel radii up counts."""
+        radius = fleet.car.value("wheel.radius_m")
+        feel(
+            sheet, fleet.alive if rows is None else rows,
+            fleet.wheel_x, fleet.wheel_y, fleet.yaw, fleet.steer_angle, radius, climbs * radius,
+            fleet.floor_height, fleet.floor_slope_x, fleet.floor_slope_y,
+            fleet.floor_grip, fleet.floor_rolling,
+        )  # fmt: skip
+
+
+def sheet_of(floor: Floor) -> Sheet:
+    """Return a floor as the kernel reads it."""
+    pieces = pieces_of(floor)
+    outlines = [() if patch.radius_m is not None else outline_of(patch) for patch in floor.patches]
+    reaches = [outline_of(patch) for patch in floor.patches] + [p.corners for p in pieces]
+    outlines += [piece.corners for piece in pieces]
+    frame, cells, starts, items = _cells(reaches)
+    circles = [(p.x_m or 0.0, p.y_m or 0.0, p.radius_m or 0.0) for p in floor.patches]
+    friction, heights = floor.friction_map, floor.height_map
+    grey, grey_frame = np.zeros((0, 0)), np.zeros(8)
+    if friction is not None and friction.samples is not None:
+        grey = unpack(friction.samples) / full_scale(friction.samples)
+        extent = _frame(grey, friction.x_m, friction.y_m)
+        grey_frame = np.array([*extent, *friction.grip, *friction.rolling])
+    hills, hills_frame = np.zeros((0, 0)), np.zeros(4)
+    if heights is not None and heights.samples is not None:
+        hills = (unpack(heights.samples) - heights.zero_grey) * heights.m_per_grey
+        hills_frame = np.array(_frame(hills, heights.x_m, heights.y_m))
+    return Sheet(
+        frame=np.array([*frame, floor.grip, floor.rolling]),
+        cells=cells,
+        starts=starts,
+        items=items,
+        first=np.cumsum([0, *(len(outline) for outline in outlines)]),
+        corners=np.array([p for outline in outlines for p in outline]).reshape(-1, 2),
+        circles=np.array(circles).reshape(-1, 3),
+        holds=np.array([(p.grip, p.rolling) for p in floor.patches]).reshape(-1, 2),
+        planes=np.array([piece[2:] for piece in pieces]).reshape(-1, 3),
+        friction=grey,
+        friction_frame=grey_frame,
+        heights=hills,
+        height_frame=hills_frame,
+    )
+
+
+def _frame(
+    picture: Floats, x_m: tuple[float, float], y_m: tuple[float, float]
+) -> tuple[float, float, float, float]:
+    rows, columns = picture.shape
+    return x_m[0], y_m[0], (x_m[1] - x_m[0]) / columns, (y_m[1] - y_m[0]) / rows
+
+
+def _cells(reaches: list[tuple[Point, ...]]) -> tuple[tuple[float, float, float], Ints, Ints, Ints]:
+    """Sort shapes into square cells: each into all that a wheel touching it can be in."""
+    if not reaches:
+        return (0.0, 0.0, CELL_M), np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros(0, int)
+    boxes = np.array([[*np.min(r, axis=0), *np.max(r, axis=0)] for r in reaches])
+    boxes += np.array([-1.0, -1.0, 1.0, 1.0]) * WHEEL_REACH_M
+    x_low, y_low = boxes[:, :2].min(axis=0).tolist()
+    x_high, y_high = boxes[:, 2:].max(axis=0).tolist()
+    area = (x_high - x_low) * (y_high - y_low)
+    cell = max(CELL_M, math.sqrt(area / MOST_CELLS))
+    columns = math.floor((x_high - x_low) / cell) + 1
+    rows = math.floor((y_high - y_low) / cell) + 1
+    found: list[list[int]] = [[] for _ in range(columns * rows)]
+    spans = np.floor((boxes - np.array([x_low, y_low, x_low, y_low])) / cell).astype(int)
+    for i, (first, lowest, last, highest) in enumerate(spans.tolist()):
+        for row in range(lowest, highest + 1):
+            for column in range(first, last + 1):
+                found[row * columns + column].append(i)
+    starts = np.cumsum([0, *map(len, found)])
+    items = np.array([i for held in found for i in held], dtype=np.int64)
+    return (x_low, y_low, cell), np.array([columns, rows]), starts, items
