@@ -15,7 +15,7 @@ from starlette.types import Scope
 from scm.api import problem
 from scm.api.city import Ask, City
 from scm.api.gate import Gate, content_policy
-from scm.api.routes import cars, events, eye, health, live, map, signals, stations, stop  # noqa: A004  named for its noun
+from scm.api.routes import cameras, cars, events, eye, health, live, map, signals, stations, stop  # noqa: A004  named for its noun
 from scm.api.stream import Stream
 from scm.api.view import CityView
 from scm.maps.model import CityMap
@@ -69,6 +69,7 @@ def create_app(
     api = APIRouter(prefix="/api/v1")
     for noun in (cars, signals, stations, events, map, eye, stop):
         api.include_router(noun.router(city), responses=problem.RESPONSES)
+    api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)
     app.include_router(api)
     app.include_router(health.router(city), responses=problem.RESPONSES)

@@ -100,6 +100,11 @@ class Stream:
         """How many pages listen."""
         return len(self._listeners)
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether the server is ending: nothing may stream on."""
+        return self._closed
+
     async def run(self) -> None:
         """Send a frame every 50 ms until `close`."""
         while not self._closed:

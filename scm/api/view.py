@@ -1,11 +1,13 @@
 """The view: a part that only hears, and keeps the newest of everything a person wants to see.
 
-`step` runs on the runner's thread, `picture` and `events_after` are called by the web's threads.
+`step` runs on the runner's thread, everything else is called by the web's. Pictures of cars'
+cameras are heard only while somebody watches them: they are rendered for whoever hears them.
 """
 
 import threading
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from scm.api.event_log import EventLog, LoggedEvent
@@ -17,6 +19,7 @@ from scm.geometry import Pose2
 from scm.part import Hears, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
+from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
@@ -56,6 +59,8 @@ class CityView:
         self._trips: dict[str, Held[Trip]] = {}
         self._frames: dict[str, deque[Held[EyeFrame]]] = {}
         self._tags: dict[str, deque[Held[EyeTags]]] = {}
+        self._watched: Counter[tuple[str, str]] = Counter()
+        self._camera_frames: dict[tuple[str, str], Held[CameraFrame]] = {}
         self._poses: dict[tuple[str, str], SeenPose] = {}
         self._stations = StationTable()
         self._log = EventLog()
@@ -73,7 +78,9 @@ class CityView:
             Trip: lambda m, t: self._trips.update({m.vehicle: Held(m, t)}),
             CityStop: self._take_stop,
         }
-        self.hears: Sequence[Hears] = tuple(Hears(kind) for kind in self._takers)
+        self._always = tuple(Hears(kind) for kind in self._takers)
+        self._takers[CameraFrame] = self._take_camera_frame
+        self.hears: Sequence[Hears] = self._always
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Keep what came in; never answers."""
@@ -115,6 +122,43 @@ class CityView:
         """Return up to `limit` events numbered above `seq`, oldest first; safe from any thread."""
         with self._lock:
             return self._log.after(seq, limit)
+
+    @contextmanager
+    def watching(self, vehicle: str, camera: str) -> Iterator[None]:
+        """Hear the pictures of a car's camera for as long as this lasts; safe from any thread."""
+        which = (vehicle, camera)
+        self._watch(which, 1)
+        try:
+            yield
+        finally:
+            self._watch(which, -1)
+
+    def camera_frame(self, vehicle: str, camera: str) -> Held[CameraFrame] | None:
+        """Return the newest picture of a watched camera; safe from any thread."""
+        with self._lock:
+            return self._camera_frames.get((vehicle, camera))
+
+    def watched(self, vehicle: str) -> tuple[str, ...]:
+        """Return which of a car's cameras somebody watches; safe from any thread."""
+        with self._lock:
+            return tuple(sorted(camera for name, camera in self._watched if name == vehicle))
+
+    def _watch(self, which: tuple[str, str], more: int) -> None:
+        with self._lock:
+            self._watched[which] += more
+            if self._watched[which] <= 0:
+                del self._watched[which]
+                self._camera_frames.pop(which, None)
+            cameras = (
+                Hears(CameraFrame, {"vehicle": vehicle, "camera": camera})
+                for vehicle, camera in self._watched
+            )
+            self.hears = (*self._always, *cameras)
+
+    def _take_camera_frame(self, frame: CameraFrame, t_ns: int) -> None:
+        which = (frame.vehicle, frame.camera)
+        if which in self._watched:
+            self._camera_frames[which] = Held(frame, t_ns)
 
     def _take_snapshot(self, snapshot: WorldSnapshot, t_ns: int) -> None:
         self._snapshot = Held(snapshot, t_ns)

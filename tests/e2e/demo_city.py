@@ -14,16 +14,21 @@ import numpy as np
 from scm.api.app import create_app
 from scm.api.server import serve
 from scm.api.view import CityView
+from scm.camera.daylight import Daylight
+from scm.camera.optics import optics_of
+from scm.camera.studio import Studio
 from scm.clock import NS_PER_MS, NS_PER_S, WallClock
 from scm.maps.load import load_map
 from scm.maps.route import Path, Roads
 from scm.v2x.exchange import Incoming
 from scm.v2x.message import Refused
+from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_tags import EyeTags, TagSeen
+from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.monitor_reset import MonitorReset
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
@@ -35,6 +40,8 @@ from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
+from scm.vehicles.car import load_car
+from scm.vehicles.lights import OFF, lamps
 
 PARTS = ("world", "traffic", "monitor", "eye", "api", "record")
 KINDS = {"n5": "remote", "n6": "remote", "n7": "real"}
@@ -57,6 +64,9 @@ class DemoCity:
         self.plan = "calm"
         self.fault = None
         self.ask_refuses = ""
+        self.switches = {}
+        self.studio = None
+        self.pictured = []
         self.tick = 0
         self.clock = WallClock()
         self._lock = threading.Lock()
@@ -122,6 +132,13 @@ class DemoCity:
                 return Refused(code="not_found", detail=f"no car {request.vehicle}")
             self.event("info", "world", "vehicle_removed", f"{request.vehicle} was taken away")
             return RemoveReply(vehicle=request.vehicle)
+        if isinstance(request, LightRequest):
+            told = self.switches.get(request.vehicle, OFF)
+            told = told.told(request.headlights, request.indicators)
+            self.switches[request.vehicle] = told
+            return LightReply(
+                vehicle=request.vehicle, headlights=told.headlights, indicators=told.indicators
+            )
         return Refused(code="timeout", detail=f"{type(request).__name__}: no answer")
 
     def _run(self):
@@ -141,11 +158,33 @@ class DemoCity:
             if self.tick % 4 == 0:
                 for message in self.eye(now_ns):
                     self.say(message, now_ns)
+                self._picture_cameras(now_ns)
             if self.tick % 10 == 0:
                 self._slow(now_ns)
         with self._lock:
             inbox, self._inbox = self._inbox, []
         self.view.step(now_ns, inbox)
+
+    def _picture_cameras(self, now_ns):
+        """Send a picture of each camera that the page watches, as the real city does."""
+        for hears in self.view.hears:
+            if hears.kind is not CameraFrame:
+                continue
+            self.pictured.append(tuple(hears.where.values()))
+            self.studio = self.studio or Studio(self.city_map, Daylight())
+            cars = self.snapshot(now_ns).vehicles
+            own = next(car for car in cars if car.vehicle == hears.where["vehicle"])
+            optics = optics_of(load_car("nigel"), hears.where["camera"])
+            shown = {light.light_id: "green" for light in self.city_map.lights}
+            image = self.studio.picture(optics, own, cars, shown, hears.where["camera"], now_ns)
+            frame = CameraFrame(
+                **hears.where,
+                t_ns=now_ns,
+                width_px=image.shape[1],
+                height_px=image.shape[0],
+                payload=cv2.imencode(".jpg", image)[1].tobytes(),
+            )
+            self.say(frame, now_ns)
 
     def _move(self):
         if self.stopped is None and not self.fault:
@@ -187,7 +226,10 @@ class DemoCity:
             pose, alive = self.path.at(s), name not in self.lost
             moving = alive and self.stopped is None and not self.fault
             steering = self._steering(s)
-            lights = ("head_low", "tail") if moving else ("head_low", "tail", "brake")
+            told = self.switches.get(name, OFF)
+            turn = "left" if steering > 0.2 else "off"
+            throttle, speed = (0.5, 0.25) if moving else (0.0, 0.0)
+            lights = lamps(told, throttle, speed, now_ns, turn=turn)
             kind = KINDS.get(name, "hosted")
             row = SnapshotVehicle(
                 vehicle=name,
@@ -204,7 +246,7 @@ class DemoCity:
                 age_ms=0.0 if kind == "hosted" else 14.0,
                 alive=alive,
                 throttle=0.5,
-                lights=(*lights, "left") if steering > 0.2 else lights,
+                lights=lights,
             )
             rows.append(row)
         return WorldSnapshot(

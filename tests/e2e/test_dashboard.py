@@ -87,6 +87,15 @@ def wait_for(page, expression, argument=None):
     page.wait_for_function(expression, arg=argument, timeout=10_000)
 
 
+def wait_until(page, condition, patience_ms=10_000):
+    """Wait for something on our side; the page lives on meanwhile."""
+    for _ in range(patience_ms // 20):
+        if condition():
+            return
+        page.wait_for_timeout(20)
+    assert condition()
+
+
 def pixels(page):
     """A fingerprint of what is drawn on the map's canvas."""
     return page.evaluate("document.querySelector('.map canvas').toDataURL()")
@@ -177,6 +186,35 @@ def test_a_lost_vehicle_is_shown_as_lost(open_page, served):
     page.wait_for_selector('[data-station="n6"][data-state="lost"]')
     page.wait_for_selector('[data-car="n6"][data-alive="false"]')
     wait_for(page, "() => document.querySelector('.events').innerText.includes('n6 is gone')")
+
+
+def test_a_chosen_cars_camera_is_watched_for_as_long_as_it_is_shown(open_page, served):
+    page = open_page().page
+    assert served.view.watched("n2") == ()
+    page.click('[data-car="n2"] .name')
+    page.wait_for_selector('.film[data-seen="true"]')
+    assert page.evaluate("document.querySelector('.film img').naturalWidth") == 1280
+    assert served.view.watched("n2") == ("front",)
+    page.click('.tabs button:has-text("rear")')
+    wait_until(page, lambda: served.view.watched("n2") == ("rear",))
+    page.wait_for_selector('.film[data-seen="true"]')
+    page.click('.car [aria-label="Close"]')
+    page.wait_for_selector(".eye")
+    wait_until(page, lambda: served.view.watched("n2") == ())
+    assert set(served.city.pictured) == {("n2", "front"), ("n2", "rear")}
+
+
+def test_lights_are_switched_and_shown(open_page, served):
+    page = open_page().page
+    page.click('[data-car="n3"] .name')
+    page.click('[aria-label="Headlights high"]')
+    page.wait_for_selector('[aria-label="Headlights high"][aria-pressed="true"]')
+    page.wait_for_selector('[data-lamp="tail"][data-on="true"]')
+    page.click('[aria-label="Indicators hazard"]')
+    page.wait_for_selector('[aria-label="Indicators hazard"][aria-pressed="true"]')
+    page.click('[aria-label="Indicators off"]')
+    page.wait_for_selector('[aria-label="Indicators hazard"][aria-pressed="false"]')
+    assert served.city.switches["n3"].headlights == "high"
 
 
 def test_silence_of_the_world_is_greyed_and_then_said(open_page, served):

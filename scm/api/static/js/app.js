@@ -1,6 +1,7 @@
 /** The dashboard: lays out the panels and starts the store. */
 import { render } from "preact";
 import { html } from "./html.js";
+import { CarPanel, chosenCar } from "./car_panel.js";
 import { CarsTable } from "./cars_table.js";
 import { EventFeed } from "./event_feed.js";
 import { EyePanel } from "./eye_panel.js";
@@ -12,6 +13,7 @@ import { Banners, TitleBar } from "./title_bar.js";
 import { link, start } from "./store.js";
 
 function Dashboard() {
+  const car = chosenCar();
   return html`
     <div class="page" data-link=${link.value}>
       <${TitleBar} />
@@ -26,7 +28,7 @@ function Dashboard() {
         </div>
         <div class="side">
           <${SignalsPanel} />
-          <${EyePanel} />
+          ${car ? html`<${CarPanel} car=${car} />` : html`<${EyePanel} />`}
           <${StationsPanel} />
         </div>
       </main>

@@ -12,7 +12,6 @@ const PAINT = {
   real: ["#f0a13c", "#b9711a"],
   lost: ["#8a929c", "#5c636c"],
 };
-const BLINK_MS = 400;
 
 export function footprint(car) {
   const { rear, front, half, wheelbase } = OUTLINES[car] ?? OUTLINES.nigel;
@@ -26,10 +25,12 @@ export function drawCar(paper, view, car, chosen) {
   paper.translate(view.x(car.x_m), view.y(car.y_m));
   paper.rotate(-car.yaw_rad);
   paper.scale(view.scale, -view.scale);
+  const on = new Set(car.alive ? car.lights : []);
+  beams(paper, shape, on);
   if (chosen) halo(paper, shape);
   wheels(paper, shape, car.steering_rad);
   body(paper, shape, paint);
-  lamps(paper, shape, new Set(car.alive ? car.lights : []));
+  lamps(paper, shape, on);
   if (!car.alive) cross(paper, shape);
   paper.restore();
   label(paper, view, car, shape, paint, chosen);
@@ -87,9 +88,26 @@ function pane(paper, x0, x1, half0, half1) {
   paper.fill();
 }
 
+/** What the headlights throw on the road: the high beam reaches farther. */
+function beams(paper, { front, half }, on) {
+  if (!on.has("head_low")) return;
+  const reach = on.has("head_high") ? 0.42 : 0.24;
+  const light = paper.createLinearGradient(front, 0, front + reach, 0);
+  light.addColorStop(0, "rgba(255, 244, 190, 0.5)");
+  light.addColorStop(1, "rgba(255, 244, 190, 0)");
+  paper.fillStyle = light;
+  paper.beginPath();
+  paper.moveTo(front - 0.01, half - 0.02);
+  paper.lineTo(front + reach, half + 0.3 * reach);
+  paper.lineTo(front + reach, -half - 0.3 * reach);
+  paper.lineTo(front - 0.01, 0.02 - half);
+  paper.closePath();
+  paper.fill();
+}
+
 function lamps(paper, { rear, front, half }, on) {
   const side = half - 0.034;
-  const head = on.has("head_low") || on.has("head_high");
+  const head = on.has("head_low");
   const pair = (x, colour, size) => {
     paper.fillStyle = colour;
     for (const y of [-side, side]) dot(paper, x, y, size);
@@ -97,7 +115,6 @@ function lamps(paper, { rear, front, half }, on) {
   pair(front - 0.012, head ? "#fff6cf" : "rgba(255, 255, 255, 0.4)", 0.011);
   pair(rear + 0.011, on.has("brake") ? "#ff3b30" : on.has("tail") ? "#b3312b" : "#64201f", 0.011);
   if (on.has("reverse")) dot(paper, rear + 0.01, 0, 0.009, "#ffffff");
-  if (Math.floor(performance.now() / BLINK_MS) % 2) return;
   for (const [name, y] of [["left", half - 0.016], ["right", 0.016 - half]]) {
     if (!on.has(name)) continue;
     for (const x of [rear + 0.02, front - 0.03]) dot(paper, x, y, 0.011, "#ffb02e");

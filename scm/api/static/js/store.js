@@ -45,7 +45,29 @@ function takeCars(topic) {
     live.sequence += 1;
   }
   live.cars = topic.cars;
+  noteIndicators(topic.cars, at);
   live.topic = topic;
+}
+
+/** When each indicator was last seen lit: it is dark for half of each second though it is on. */
+const litAt = new Map();
+const BLINK_MS = 1100;
+
+function noteIndicators(cars, at) {
+  for (const car of cars) {
+    for (const side of ["left", "right"]) {
+      if (car.lights.includes(side)) litAt.set(`${car.vehicle}/${side}`, at);
+    }
+  }
+}
+
+/** How a car's indicators are switched: `off`, `left`, `right` or `hazard`. */
+export function indicatorsOf(car) {
+  const at = performance.now();
+  const [left, right] = ["left", "right"].map(
+    (side) => at - (litAt.get(`${car.vehicle}/${side}`) ?? -Infinity) < BLINK_MS,
+  );
+  return left && right ? "hazard" : left ? "left" : right ? "right" : "off";
 }
 
 function takeEvents(list) {
