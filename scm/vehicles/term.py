@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from scm.errors import TermError
+from scm.vehicles import effect_text
 from scm.vehicles.jit import plain
 from scm.vehicles.param import Param
 from scm.vehicles.signals import Per
@@ -81,23 +82,17 @@ class Term:
 
     def doc_line(self, heading: str) -> str:
         """Return what the file says after `Holds:`, `Shows in:`, `Source:`; empty when nothing."""
-        text = inspect.getdoc(inspect.getmodule(plain(self.law))) or ""
-        after = text.partition(f"{heading}:")[2]
-        for stop in ("Holds:", "Shows in:", "Source:"):
-            after = after.partition(stop)[0]
-        return " ".join(after.split())
+        return effect_text.after_heading(self.law, heading)
 
     @property
     def about(self) -> str:
         """The first line of the file: what the effect is."""
-        text = inspect.getdoc(inspect.getmodule(plain(self.law))) or ""
-        return text.partition("\n")[0]
+        return effect_text.about(self.law)
 
     @property
     def equation(self) -> str:
         """The indented lines of the file's docstring, joined."""
-        text = inspect.getdoc(inspect.getmodule(plain(self.law))) or ""
-        return "; ".join(line.strip() for line in text.splitlines() if line.startswith("    "))
+        return effect_text.equation(self.law)
 
 
 def flat(terms: Iterable[Term]) -> tuple[Term, ...]:

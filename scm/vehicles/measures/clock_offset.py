@@ -1,0 +1,30 @@
+"""Clock offset: the clock of the poses is ahead of the car's.
+
+    t_measured = t + offset    [s]
+
+Holds: clocks of equal rate.   Shows in: steering steps and launches, against encoders and gyro.
+Source: unsynchronised computers; + where the poses' clock is ahead. A positive offset looks like
+`pose_latency`; only a negative one can be told for certain. Other channels may be named.
+"""
+
+from scm.arrays import Floats
+from scm.vehicles.measure import Measure
+from scm.vehicles.param import Normal, Param
+
+
+def clock_offset(t: Floats, offset: float) -> Floats:
+    """Stamp that the recording carries [s]."""
+    return t + offset
+
+
+MEASURE = Measure(
+    laws={"*": clock_offset},
+    stamps=True,
+    neutral={"offset": 0.0},
+    shows_in=("steering_step", "throttle_step"),
+    acts_on=("pose.*",),
+    params=(
+        Param("offset", 0.0, "s", "measure.clock_offset_s", (-5.0, 5.0),
+              "ahead of the car's clock", Normal(0.0, 0.1), report="offset_s"),
+    ),
+)  # fmt: skip

@@ -1,0 +1,27 @@
+"""Gyro bias: the gyro shows a turn when there is none.
+
+    gyro_z_measured = gyro_z + bias    [rad/s]
+
+Holds: minutes at steady temperature.   Shows in: standing still, straight drives.
+Source: IEEE Std 952, gyro error model; + shows a turn to the left.
+"""
+
+from scm.arrays import Floats
+from scm.vehicles.measure import Measure
+from scm.vehicles.param import Normal, Param
+
+
+def gyro_bias(value: Floats, bias: float) -> Floats:
+    """Yaw rate that the recording carries [rad/s]."""
+    return value + bias
+
+
+MEASURE = Measure(
+    laws={"imu.gyro_z": gyro_bias},
+    neutral={"bias": 0.0},
+    shows_in=("standing", "straight"),
+    params=(
+        Param("bias", 0.0, "rad/s", "measure.gyro_bias_rad_s", (-1.0, 1.0),
+              "added, + left", Normal(0.0, 0.02), report="bias_rad_s"),
+    ),
+)  # fmt: skip

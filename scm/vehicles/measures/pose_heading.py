@@ -1,0 +1,28 @@
+"""Pose heading: the tracked marker is glued on at an angle.
+
+    yaw_measured = yaw + offset    [rad]
+
+The sum is not wrapped.
+Holds: rigid marker.   Shows in: straight drives, where the car seems to drive slantwise.
+Source: rigid-body geometry; + where the marker is turned counter-clockwise on the car.
+"""
+
+from scm.arrays import Floats
+from scm.vehicles.measure import Measure
+from scm.vehicles.param import Normal, Param
+
+
+def pose_heading(value: Floats, offset: float) -> Floats:
+    """Heading that the recording carries [rad]."""
+    return value + offset
+
+
+MEASURE = Measure(
+    laws={"pose.yaw": pose_heading},
+    neutral={"offset": 0.0},
+    shows_in=("straight",),
+    params=(
+        Param("offset", 0.0, "rad", "measure.pose_heading_rad", (-3.15, 3.15),
+              "marker's turn on the car, + left", Normal(0.0, 0.03), report="offset_rad"),
+    ),
+)  # fmt: skip

@@ -1,0 +1,30 @@
+"""Pose latency: a pose is stamped when it arrives, so it shows where the car was before.
+
+    t_measured = t + delay    [s]
+
+A pose stamped t shows the car at t - delay. From stamps alone it is `clock_offset`'s twin, but
+is never negative.
+Holds: constant delay.   Shows in: steering steps and launches, against encoders and gyro.
+Source: textbook dead time; camera exposure, detection and radio together.
+"""
+
+from scm.arrays import Floats
+from scm.vehicles.measure import Measure
+from scm.vehicles.param import LogNormal, Param
+
+
+def pose_latency(t: Floats, delay: float) -> Floats:
+    """Stamp that the recording carries [s]."""
+    return t + delay
+
+
+MEASURE = Measure(
+    laws={"pose.*": pose_latency},
+    stamps=True,
+    neutral={"delay": 0.0},
+    shows_in=("steering_step", "throttle_step"),
+    params=(
+        Param("delay", 0.0, "s", "measure.pose_delay_s", (0.0, 1.0),
+              "from the moment shown to the stamp", LogNormal(0.05, 0.8), report="delay_s"),
+    ),
+)  # fmt: skip

@@ -1,0 +1,27 @@
+"""Pose scale: the tracking system's metre is longer or shorter than a metre.
+
+    measured = scale * true    (x and y, from the world's origin)    [m]
+
+Holds: one scale both ways.   Shows in: any drive, against encoders or a measured distance.
+Source: ground-plane calibration; a camera believed at the wrong height does this.
+"""
+
+from scm.arrays import Floats
+from scm.vehicles.measure import Measure
+from scm.vehicles.param import Normal, Param
+
+
+def pose_scale(value: Floats, scale: float) -> Floats:
+    """Coordinate that the recording carries [m]."""
+    return scale * value
+
+
+MEASURE = Measure(
+    laws={"pose.x": pose_scale, "pose.y": pose_scale},
+    neutral={"scale": 1.0},
+    shows_in=("straight", "circle"),
+    params=(
+        Param("scale", 1.0, "1", "measure.pose_scale", (0.2, 5.0),
+              "measured over true distance", Normal(1.0, 0.03)),
+    ),
+)  # fmt: skip

@@ -1,0 +1,30 @@
+"""Wheel radius: wheels larger than believed turn less for the same way.
+
+    measured = true / scale    (wheel angles, speeds and counts at nominal radius)
+
+`scale` is the true rolling radius over the nominal one. Where the car itself is simulated, its
+number `wheel.radius_m` times `scale` shows the same and the drive's change besides.
+Holds: all wheels alike, no slip.   Shows in: straight drives, pose against encoders.
+Source: rolling without slip; worn, soft or wrong tyres.
+"""
+
+from scm.arrays import Floats
+from scm.vehicles.measure import Measure
+from scm.vehicles.param import Normal, Param
+
+
+def wheel_radius(value: Floats, scale: float) -> Floats:
+    """Counts, or wheel speed, that the recording carries."""
+    return value / scale
+
+
+MEASURE = Measure(
+    laws={"encoder.*": wheel_radius, "wheel_speed.*": wheel_radius},
+    neutral={"scale": 1.0},
+    shows_in=("straight",),
+    stands_for="wheel.radius_m",
+    params=(
+        Param("scale", 1.0, "1", "measure.wheel_radius_scale", (0.5, 2.0),
+              "true rolling radius over nominal", Normal(1.0, 0.02)),
+    ),
+)  # fmt: skip
