@@ -10,6 +10,7 @@ from xml.sax.saxutils import escape
 
 from scm.geometry import Pose2
 from scm.maps import furniture
+from scm.maps.floor_draw import floor_layers, wind_arrow
 from scm.maps.model import CityMap, Crosswalk, Wall
 from scm.maps.route import LanePath, Roads
 from scm.maps.segments import box_outline, wall_outlines
@@ -42,6 +43,7 @@ def draw_svg(city_map: CityMap, *, spawns: bool = False) -> str:
     layers = [
         _ground(city_map),
         _road(city_map),
+        floor_layers(city_map),
         _paint(city_map, roads),
         _walls(city_map),
         _tag(city_map),
@@ -49,6 +51,7 @@ def draw_svg(city_map: CityMap, *, spawns: bool = False) -> str:
         layer("signs", map(furniture.sign, city_map.signs)),
         layer("lights", map(furniture.light, city_map.lights)),
         _scale(city_map, x_low, x_high, y_low),
+        wind_arrow(city_map, x_high - 1.2, y_low - MARGIN_M / 2.0 - STRIP_M / 2.0),
     ]
     return element(
         "svg",
@@ -232,7 +235,7 @@ def _walls(city_map: CityMap) -> str:
         element(
             "path",
             id=f"box-{box.name}",
-            class_="box",
+            class_="box" if box.mass_kg is None else "box movable",
             d=outline(box_outline(box)[:-1], closed=True),
             fill=BOX,
             stroke=BOX_EDGE,

@@ -204,11 +204,22 @@ class Conflict(Record, kw_only=True, frozen=True):
 
 
 class Group(Record, kw_only=True, frozen=True):
-    """A signal group and the one movement it releases; `number` is its id in SPATEM."""
+    """A signal group and what it releases; `number` is its id in SPATEM.
+
+    Attributes:
+        movement: Its way through the junction.
+        more: Further ways, where an approach parts: straight on, left, right.
+    """
 
     name: str
     number: int
     movement: Conflict
+    more: tuple[Conflict, ...] = ()
+
+    @property
+    def movements(self) -> tuple[Conflict, ...]:
+        """All ways that it releases."""
+        return (self.movement, *self.more)
 
 
 class Junction(Record, kw_only=True, frozen=True):

@@ -2,16 +2,20 @@
 
 import heapq
 import math
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from scm.arrays import Floats
 from scm.errors import MapError, nearest
 from scm.geometry import Pose2, wrap_angle
-from scm.maps.model import CityMap, Lane, Spawn, StopLine
-from scm.maps.polyline import Polyline, join, sample
+from scm.maps.model import CityMap, Conflict, Lane, Spawn, StopLine
+from scm.maps.polyline import Polyline, advance, extent, join, sample
 
 SAME_WAY_RAD = math.radians(60.0)
 MOST_PASSES = 400
+NEAR_M = 0.5
 
 
 class LanePath(Polyline):
@@ -31,6 +35,26 @@ class LanePath(Polyline):
         self.speed_limit_mps = lane.speed_limit_mps
 
 
+class _Lanes(Mapping[str, LanePath]):
+    """Lanes by name; thousands of them are laid only as far as somebody asks for them."""
+
+    def __init__(self, lanes: Sequence[Lane]) -> None:
+        self._known = {lane.name: lane for lane in lanes}
+        self._laid: dict[str, LanePath] = {}
+
+    def __getitem__(self, name: str) -> LanePath:
+        laid = self._laid.get(name)
+        if laid is None:
+            laid = self._laid[name] = LanePath(self._known[name])
+        return laid
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._known)
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+
 class OnLane(NamedTuple):
     """A place on a lane: distance from its start and to the left of its centre line [m]."""
 
@@ -44,28 +68,50 @@ class Roads:
 
     Attributes:
         city_map: The map they come from.
-        lanes: By name, in the order of the file.
+        lanes: By name, in the order of the file; each is laid when it is first asked for.
+        streets: The same lanes for compiled drivers, once somebody has made them.
     """
 
     def __init__(self, city_map: CityMap) -> None:
         self.city_map = city_map
-        self.lanes = {lane.name: LanePath(lane) for lane in city_map.lanes}
+        self.lanes: Mapping[str, LanePath] = _Lanes(city_map.lanes)
+        self.streets: Any = None
         self._next = {lane.name: lane.next for lane in city_map.lanes}
+        self._length = {
+            lane.name: sum(extent(segment)[0] for segment in lane.segments)
+            for lane in city_map.lanes
+        }
         self._spawns = {spawn.name: spawn for spawn in city_map.spawns}
+        self._lines: dict[str, list[StopLine]] = {}
+        for line in sorted(city_map.stop_lines, key=lambda line: line.at_m):
+            self._lines.setdefault(line.lane, []).append(line)
+        self._movements: dict[str, list[tuple[str, Conflict]]] = {}
+        for junction in city_map.junctions:
+            for group in junction.groups:
+                for move in group.movements:
+                    self._movements.setdefault(move.lane, []).append((junction.name, move))
+        self._boxes: Floats | None = None
 
     def lane(self, name: str) -> LanePath:
         """Return a lane; MapError names the nearest one if there is none of that name."""
-        found = self.lanes.get(name)
-        if found is None:
+        self.check_lane(name)
+        return self.lanes[name]
+
+    def check_lane(self, name: str) -> str:
+        """Return the name of a lane that exists; MapError names the nearest one otherwise."""
+        if name not in self._next:
             raise MapError(
                 f"map {self.city_map.name}: no lane {name!r}{nearest(name, list(self.lanes))}"
             )
-        return found
+        return name
+
+    def length_of(self, lane: str) -> float:
+        """Return the length of a lane's centre line [m], without laying it."""
+        return self._length[self.check_lane(lane)]
 
     def successors(self, lane: str) -> tuple[str, ...]:
         """Return the lanes that begin where this one ends."""
-        self.lane(lane)
-        return self._next[lane]
+        return self._next[self.check_lane(lane)]
 
     def nearest(self, pose: Pose2) -> OnLane | None:
         """Return the closest lane that runs within 60 degrees of the pose's direction.
@@ -73,20 +119,23 @@ class Roads:
         None if the map has no lane of such a direction, or the pose is over 0.5 m off all of them.
         """
         best: tuple[float, OnLane] | None = None
-        for lane in self.lanes.values():
+        for lane in self._lanes_near(pose.x, pose.y):
             s, lateral = lane.project(pose.x, pose.y)
             foot = lane.at(s)
             if abs(wrap_angle(foot.yaw - pose.yaw)) > SAME_WAY_RAD:
                 continue
             away = math.hypot(pose.x - foot.x, pose.y - foot.y)
-            if away <= 0.5 and (best is None or away < best[0] - 1e-9):
+            if away <= NEAR_M and (best is None or away < best[0] - 1e-9):
                 best = away, OnLane(lane.name, s, lateral)
         return best[1] if best else None
 
     def stop_lines_on(self, lane: str) -> tuple[StopLine, ...]:
         """Return the stop lines of a lane in driving order."""
-        on_lane = (line for line in self.city_map.stop_lines if line.lane == lane)
-        return tuple(sorted(on_lane, key=lambda line: line.at_m))
+        return tuple(self._lines.get(lane, ()))
+
+    def movements_on(self, lane: str) -> tuple[tuple[str, Conflict], ...]:
+        """Return (junction, stretch) of every movement on a lane, in the order of the file."""
+        return tuple(self._movements.get(lane, ()))
 
     def spawn_pose(self, name: str) -> Pose2:
         """Return the pose of a spawn place (rear axle of the car put there)."""
@@ -129,17 +178,17 @@ class Roads:
             raise MapError(msg)
         if not via:
             return self.loop(start_lane) * laps
-        lanes = [self.lane(start_lane).name]
+        lanes = [self.check_lane(start_lane)]
         wanted = list(via) * laps
         if wanted[0] == start_lane:
             del wanted[0]
         for name in wanted:
-            lanes += self._way(lanes[-1], self.lane(name).name)
+            lanes += self._way(lanes[-1], self.check_lane(name))
         return tuple(lanes)
 
     def circulate(self, start_lane: str) -> Iterator[str]:
         """Yield lanes for ever, at each end the first lane that follows; stops at a dead end."""
-        lane = self.lane(start_lane).name
+        lane = self.check_lane(start_lane)
         while True:
             yield lane
             following = self._next[lane]
@@ -172,9 +221,18 @@ class Roads:
             for following in self._next[lanes[-1]]:
                 if following not in done:
                     done.add(following)
-                    way = length + self.lanes[following].length_m
+                    way = length + self._length[following]
                     heapq.heappush(queue, (way, [*lanes, following]))
         raise MapError(f"map {self.city_map.name}: no way from lane {start!r} to {goal!r}")
+
+    def _lanes_near(self, x: float, y: float) -> list[LanePath]:
+        """Return the lanes that may come within reach of a point, in the order of the file."""
+        if self._boxes is None:
+            boxes = [_box_of(lane) for lane in self.city_map.lanes]
+            self._boxes = np.array(boxes, np.float64).reshape(-1, 4)
+        left, low, right, high = self._boxes.T
+        near = (left <= x) & (x <= right) & (low <= y) & (y <= high)
+        return [self.lanes[self.city_map.lanes[k].name] for k in np.flatnonzero(near)]
 
     def _pose_of(self, spawn: Spawn) -> Pose2:
         """Return the pose that a spawn's lane and distance, or its own pose, stands for."""
@@ -189,6 +247,7 @@ class Path:
     """The lanes of a route as one polyline; all distances count from the route's start.
 
     Attributes:
+        roads: Where its lanes come from.
         lanes: The route.
         closed: The route goes round for ever: every distance may exceed `length_m` or be negative,
             and `project` near a hint counts on through the laps.
@@ -200,6 +259,7 @@ class Path:
     def __init__(self, roads: Roads, lanes: Sequence[str], *, closed: bool = False) -> None:
         if not lanes:
             raise MapError("route: expected at least one lane, got none")
+        self.roads = roads
         self.lanes = tuple(lanes)
         self.closed = closed
         self._check_follows(roads)
@@ -216,11 +276,9 @@ class Path:
             for line in roads.stop_lines_on(name)
         ]
         self.conflicts = sorted(
-            (start + group.movement.from_m, start + group.movement.to_m, junction.name)
+            (start + move.from_m, start + move.to_m, junction)
             for start, name in zip(self._starts, lanes, strict=False)
-            for junction in roads.city_map.junctions
-            for group in junction.groups
-            if group.movement.lane == name
+            for junction, move in roads.movements_on(name)
         )
 
     @classmethod
@@ -249,8 +307,13 @@ class Path:
 
     def place_at(self, s: float) -> tuple[str, float]:
         """Return the lane at a distance, and the distance from that lane's start [m]."""
+        index, on_lane = self.index_at(s)
+        return self.lanes[index], on_lane
+
+    def index_at(self, s: float) -> tuple[int, float]:
+        """Return which lane of the route holds a distance, and the distance from its start [m]."""
         index = self._lane_index(s)
-        return self.lanes[index], self._inside(s) - self._starts[index]
+        return index, self._inside(s) - self._starts[index]
 
     def speed_limit_mps(self, s: float) -> float:
         """Return the limit of the lane at a distance."""
@@ -297,3 +360,18 @@ class Path:
                     f"route: lane {after!r} does not follow {before!r}; expected one of "
                     f"{', '.join(roads.successors(before)) or 'none: it is a dead end'}"
                 )
+
+
+def _box_of(lane: Lane) -> tuple[float, float, float, float]:
+    """Return left, low, right, high of a lane, wide enough for all that counts as near it [m]."""
+    pose = Pose2(*lane.start)
+    xs, ys, bulge = [pose.x], [pose.y], 0.0
+    for segment in lane.segments:
+        length, curvature = extent(segment)
+        pose = advance(pose, length, curvature)
+        xs.append(pose.x)
+        ys.append(pose.y)
+        if curvature:
+            bulge = max(bulge, min(0.5 * length, 2.0 / abs(curvature)))
+    out = bulge + NEAR_M
+    return min(xs) - out, min(ys) - out, max(xs) + out, max(ys) + out
