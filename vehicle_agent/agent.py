@@ -6,6 +6,7 @@ commands, the guard has the last word.
 
 import logging
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from scm import registry
 from scm.clock import NS_PER_MS, NS_PER_S
@@ -29,7 +30,9 @@ from scm.v2x.messages.spatem_rx import SpatemRx
 from scm.v2x.messages.world_definition import WorldDefinition
 from vehicle_agent.body import BodyKind
 from vehicle_agent.link import Link
-from vehicle_agent.stay import Stay
+
+if TYPE_CHECKING:
+    from vehicle_agent.stay import Stay
 
 BODIES = "vehicle_agent.bodies"
 HARDEST = 100.0
@@ -145,6 +148,8 @@ class AgentPart:
             self._stay.guard.set_epoch(self._link.epoch, now_ns)
 
     def _begin_stay(self, city_map: CityMap, now_ns: int) -> None:
+        from vehicle_agent.stay import Stay  # noqa: PLC0415 drivers bring the compiler with them
+
         try:
             stay = Stay(self.name, self._car, self._body, city_map, self._link.epoch, now_ns)
         except MapError as error:

@@ -1,14 +1,16 @@
 """The contract of a driver: what it is shown, what it knows of its car, what it answers.
 
-Drivers are pure: no bus, no clock, no compiled physics. A simulated and a real car, hosted by the
-world or driven by an agent, use the same ones. To add one, copy `drivers/route.py`.
+Drivers are pure: no bus, no clock, no physics. A simulated and a real car, hosted by the world or
+driven by an agent, one or ten thousand of them, follow the same compiled law: `drivers/law.py`.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from scm.geometry import Pose2
-from scm.vehicles.signal_view import SignalView
+
+if TYPE_CHECKING:  # what reads signals is compiled; who only describes a car needs no compiler
+    from scm.vehicles.signal_view import SignalView
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +44,7 @@ class RouteView:
     now_ns: int
     pose: Pose2
     speed: float
-    signals: SignalView
+    signals: "SignalView"
     others: tuple[Other, ...] = ()
     stop: bool = False
 

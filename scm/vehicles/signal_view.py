@@ -1,56 +1,42 @@
 """What a car believes of the signals: green only on fresh, undisputed and matching evidence."""
 
-from dataclasses import dataclass
+import math
 
-from scm.clock import NS_PER_S, seconds
 from scm.maps.model import CityMap
 from scm.v2x.etsi import SpatemBody
-from scm.v2x.etsi_convert import REVISIONS, Told, colours_of
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Colour
+from scm.vehicles.drivers.signal_table import COLOURS, SignalTable, believed
+from scm.vehicles.jit import plain
 
-FRESH_NS = NS_PER_S
-RESOLUTION_S = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class _Heard:
-    """The newest SPATEM of one junction; times in seconds after its arrival."""
-
-    arrived_ns: int
-    flashing: bool
-    colours: dict[int, Told]
+_believed = plain(believed)
 
 
 class SignalView:
-    """The signals as one car knows them, by the names its map uses."""
+    """The signals as one car knows them, by the names its map uses.
+
+    Attributes:
+        table: What drivers look at.
+    """
 
     def __init__(self, city_map: CityMap) -> None:
-        self._revision = city_map.revision % REVISIONS
-        self._names = {junction.number: junction.name for junction in city_map.junctions}
-        self._numbers = {
-            (junction.name, group.name): group.number
-            for junction in city_map.junctions
-            for group in junction.groups
-        }
-        self._heard: dict[str, _Heard] = {}
-        self._faults: dict[str, str] = {}
-        self.ignored = 0
+        self.table = SignalTable(city_map)
+        self._junctions = {junction.name: n for n, junction in enumerate(city_map.junctions)}
+        names = ((j.name, group.name) for j in city_map.junctions for group in j.groups)
+        self._groups = {name: number for number, name in enumerate(names)}
+
+    @property
+    def ignored(self) -> int:
+        """How many frames were of another map, or of another revision of it."""
+        return self.table.ignored
 
     def hear_spatem(self, body: SpatemBody, arrived_ns: int) -> None:
         """Take a SPATEM that arrived at `arrived_ns`; one of another map is ignored and counted."""
-        name = self._names.get(body.intersection)
-        if name is None or body.revision != self._revision:
-            self.ignored += 1
-            return
-        self._heard[name] = _Heard(arrived_ns, "failureFlash" in body.status, colours_of(body))
+        self.table.hear_spatem(body, arrived_ns)
 
     def hear_monitor(self, status: MonitorStatus) -> None:
         """Take the monitor's verdict on a junction; a fault stands until the monitor lifts it."""
-        if status.fault is None:
-            self._faults.pop(status.junction, None)
-        else:
-            self._faults[status.junction] = status.fault
+        self.table.hear_monitor(status)
 
     def colour(self, junction: str, group: str, now_ns: int) -> Colour | None:
         """Return the colour to act on, or None when nothing is to be believed.
@@ -58,18 +44,13 @@ class SignalView:
         A green whose promised earliest end has passed counts as yellow until the next SPATEM says
         that it goes on: a car that can stop then does.
         """
-        heard = self._heard.get(junction)
-        if heard is None or abs(now_ns - heard.arrived_ns) > FRESH_NS:
+        number = self._groups.get((junction, group))
+        if number is None:
             return None
-        if heard.flashing or junction in self._faults:
-            return "flashing_red"
-        number = self._numbers.get((junction, group))
-        if number is None or number not in heard.colours:
-            return None
-        told = heard.colours[number]
-        age_s = seconds(now_ns - heard.arrived_ns)
-        lapsed = told.min_end_s is not None and age_s > told.min_end_s + RESOLUTION_S
-        return "yellow" if told.colour == "green" and lapsed else told.colour
+        at, told = self._junctions[junction], self.table.told
+        place = int(told.newest[at]) if told.number[told.newest[at], at] >= 0 else -1
+        colour: Colour | None = COLOURS[_believed(told, number, at, place, now_ns)]
+        return colour
 
     def may_go(self, junction: str, group: str, now_ns: int) -> bool:
         """Return whether a car may pass the group's stop line now."""
@@ -79,8 +60,9 @@ class SignalView:
         """Return for how long the colour will last at least [s]; None when that is not known."""
         if self.colour(junction, group, now_ns) in (None, "flashing_red"):
             return None
-        heard = self._heard[junction]
-        min_end_s = heard.colours[self._numbers[junction, group]].min_end_s
-        if min_end_s is None:
+        at, told = self._junctions[junction], self.table.told
+        place = told.newest[at]
+        min_end = float(told.min_end[place, self._groups[junction, group]])
+        if math.isnan(min_end):
             return None
-        return max(0.0, min_end_s - seconds(now_ns - heard.arrived_ns))
+        return max(0.0, min_end - 1e-9 * int(now_ns - told.arrived_ns[place, at]))

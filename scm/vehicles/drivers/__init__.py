@@ -1,12 +1,11 @@
-"""Drivers: who steers a car when nobody else does.
+"""Drivers: who steers a car when nobody else does. One law, compiled, for one car or ten thousand.
 
-route       follows a path through the city: signals, other cars, speed, steering
-track       the path as the driver looks at it: sampled, with a view ahead
-trips       the errands of one car: route requests in, progress out
-steering    path and pose to a steering command
-heard       the other cars, as their CAMs tell
-limits      what a driver must know of its car
-ahead       which cars stand or drive on the way, and how far they are
-stop_lines  stop or go at a line: signals, dilemma zone, room behind the junction
-pace        speeds: how fast the way allows, and which throttle gives a speed
+law          all that a driver decides, in order          crowd    any number of drivers on one map
+way          where a car is along its lanes               errands  route requests in, progress out
+ahead        which cars stand or drive on the way         alone    one car with a crowd of its own
+stop_lines   stop or go: signals, room behind junctions   trips    the errands of one car alone
+pace         how fast, and which throttle for it          route    one car along a path, for scripts
+steering     a way and a pose to a steering command       heard    cars around one car, by their CAMs
+Tables of arrays: streets the map, memory the drivers, stations the CAMs, signal_table the signals.
+chance decides whose radio frames get lost; limits reads what a driver must know from a car file.
 """

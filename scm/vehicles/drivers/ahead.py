@@ -1,67 +1,223 @@
-"""Which cars are on the way ahead: outlines against the corridor that the own car will sweep."""
+"""Which cars are on the way ahead: outlines against the corridor that the own car will sweep.
+
+Along a segment of the way a car's outline is the box that holds it, with sides along and across the
+way at its middle. In a bend it is taken as wider by what the way curves over its length, and the
+corridor as wider on the outside by what the own front swings out.
+"""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from scm.arrays import Bools, Floats, Ints
-from scm.geometry import Pose2
-from scm.vehicles.driver import Other
-from scm.vehicles.drivers.track import Track
+from scm.arrays import Floats, Ints
+from scm.vehicles.drivers.memory import FRONT, WIDTH
+from scm.vehicles.drivers.stations import (
+    CELLS_X,
+    CELLS_Y,
+    LARGEST,
+    LOW_X,
+    LOW_Y,
+    Heard,
+    cell_number,
+    known_to,
+)
+from scm.vehicles.drivers.streets import COS, CURVATURE, LENGTH, SIN, Ways, X, Y
+from scm.vehicles.drivers.way import foot
+from scm.vehicles.jit import law
 
 REACH = 2.0
 MARGIN = 0.01
+MOST_AHEAD = 24
+MOST_SEGMENTS = 32
+
+# Columns of a car ahead: where its rear is along the way, its speed along it, its length.
+REAR_AT, SPEED_OF, LENGTH_OF = range(3)
+# Columns of a window over the floor.
+LEFT, LOW, RIGHT, HIGH = range(4)
 
 
-class Ahead(NamedTuple):
-    """A car on the way.
+class Scratch(NamedTuple):
+    """Room to work in, one a thread.
 
     Attributes:
-        rear: Where along the way it begins [m].
-        speed: Along the way, never negative [m/s].
-        length: Of the car [m].
+        ids: (32,) segments of the way; `begins` (33,) where each begins, from the rear axle on.
+        ahead: (24, 3) cars ahead, nearest first.
+        window: (4,) over the floor.
     """
 
-    rear: float
-    speed: float
-    length: float
+    ids: Ints
+    begins: Floats
+    ahead: Floats
+    window: Floats
 
 
+def scratch() -> Scratch:
+    """Return room for one thread."""
+    return Scratch(
+        ids=np.zeros(MOST_SEGMENTS, np.int64),
+        begins=np.zeros(MOST_SEGMENTS + 1),
+        ahead=np.zeros((MOST_AHEAD, 3)),
+        window=np.zeros(4),
+    )
+
+
+@law
 def cars_ahead(
-    track: Track, front: float, width: float, pose: Pose2, others: tuple[Other, ...]
-) -> list[Ahead]:
-    """Return the cars that stand in the way from `front` on, nearest first.
+    ways: Ways,
+    heard: Heard,
+    room: Scratch,
+    kind: Floats,
+    car: int,
+    count: int,
+    now_ns: int,
+    loss: float,
+    seed: int,
+) -> int:
+    """Find the cars on the surveyed way from the own front on, nearest first; return how many.
 
     Args:
-        track: The way.
-        front: Where the own front bumper is along it [m].
-        width: Of the own car [m].
-        pose: Of the own car: what is farther off than the reach is not looked at.
-        others: Every other car.
+        ways: The lanes.
+        heard: Everybody's CAMs.
+        room: Holds the surveyed segments; takes the cars.
+        kind: The row of the own kind of car.
+        car: The own number.
+        count: Of surveyed segments.
+        now_ns: The present time [ns].
+        loss: Share of frames that get lost.
+        seed: Of the luck.
     """
-    near = [o for o in others if math.hypot(o.x - pose.x, o.y - pose.y) < REACH]
-    if not near:
-        return []
-    s, index = track.samples(front, front + REACH)
-    inside, along = _overlaps(track, index, 0.5 * width + MARGIN, near)
-    found = []
-    for other, hit, same_way in zip(near, inside, along, strict=True):
-        if hit.any():
-            first = int(np.argmax(hit))
-            speed = max(0.0, other.speed * float(same_way[first]))
-            found.append(Ahead(float(s[first]), speed, other.length))
-    return sorted(found)
+    span(ways, room, count, kind[FRONT])
+    margin = 0.5 * kind[WIDTH] + MARGIN + heard.floor[LARGEST]
+    floor, window = heard.floor, room.window
+    across = int(floor[CELLS_X])
+    left = cell_number(floor, window[LEFT] - margin, LOW_X, CELLS_X)
+    right = cell_number(floor, window[RIGHT] + margin, LOW_X, CELLS_X)
+    low = cell_number(floor, window[LOW] - margin, LOW_Y, CELLS_Y)
+    high = cell_number(floor, window[HIGH] + margin, LOW_Y, CELLS_Y)
+    found = 0
+    for row in range(low, high + 1):
+        first = heard.cell_first[row * across + left]
+        last = heard.cell_first[row * across + right + 1]
+        for at in range(first, last):
+            other = heard.in_cell[at]
+            if other == car:
+                continue
+            known, x, y, cos, sin, speed = known_to(heard, other, car, now_ns, loss, seed)
+            if not known:
+                continue
+            half_length, half_width = 0.5 * heard.size[other, 0], 0.5 * heard.size[other, 1]
+            hit, rear, same_way = first_overlap(
+                ways, room, kind, count, x, y, cos, sin, half_length, half_width
+            )
+            if hit:
+                found = insert(
+                    room.ahead, found, rear, max(0.0, speed * same_way), 2.0 * half_length
+                )
+    return found
 
 
-def _overlaps(track: Track, index: Ints, half: float, others: list[Other]) -> tuple[Bools, Floats]:
-    """Return (which samples of the corridor each car covers, cosine of the angle to it): (m, n)."""
-    boxes = np.array([(o.x, o.y, o.yaw, 0.5 * o.length, 0.5 * o.width) for o in others])
-    x, y, yaw, half_length, half_width = boxes.T[:, :, None]
-    dx, dy = track.x[index] - x, track.y[index] - y
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    turned = track.yaw[index] - yaw
-    same_way, across = np.cos(turned), np.sin(turned)
-    lengthwise = np.abs(cos * dx + sin * dy) <= half_length + half * np.abs(across)
-    sideways = np.abs(cos * dy - sin * dx) <= half_width + half * np.abs(same_way)
-    return lengthwise & sideways, same_way
+@law
+def span(ways: Ways, room: Scratch, count: int, front: float) -> None:
+    """Lay a window over the way from the front bumper to the end of the reach."""
+    window = room.window
+    window[LEFT] = window[LOW] = math.inf
+    window[RIGHT] = window[HIGH] = -math.inf
+    for at in range(count):
+        row = ways.segments[room.ids[at]]
+        begin = max(front, room.begins[at]) - room.begins[at]
+        end = min(front + REACH, room.begins[at + 1]) - room.begins[at]
+        if end < begin:
+            continue
+        k = row[CURVATURE]
+        pieces = 1 + int(abs(k) * (end - begin))
+        for piece in range(pieces + 1):
+            s = begin + (end - begin) * piece / pieces
+            u, v = s, 0.0
+            if k != 0.0:
+                u, v = math.sin(k * s) / k, (1.0 - math.cos(k * s)) / k
+            x = row[X] + row[COS] * u - row[SIN] * v
+            y = row[Y] + row[SIN] * u + row[COS] * v
+            window[LEFT], window[RIGHT] = min(window[LEFT], x), max(window[RIGHT], x)
+            window[LOW], window[HIGH] = min(window[LOW], y), max(window[HIGH], y)
+
+
+@law
+def first_overlap(
+    ways: Ways,
+    room: Scratch,
+    kind: Floats,
+    count: int,
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    half_length: float,
+    half_width: float,
+) -> tuple[bool, float, float]:
+    """Return whether an outline reaches into the corridor, where first, and how much it goes along.
+
+    The last is the cosine of the angle between its heading and the way.
+    """
+    front = kind[FRONT]
+    half = 0.5 * kind[WIDTH] + MARGIN
+    for at in range(count):
+        begin, end = max(front, room.begins[at]), min(front + REACH, room.begins[at + 1])
+        if end < begin:
+            continue
+        row = ways.segments[room.ids[at]]
+        along, beside, turn_cos, turn_sin = foot(row, x, y, 0.5 * row[LENGTH])
+        way_cos = row[COS] * turn_cos - row[SIN] * turn_sin
+        way_sin = row[SIN] * turn_cos + row[COS] * turn_sin
+        same, across = way_cos * cos + way_sin * sin, abs(way_cos * sin - way_sin * cos)
+        lengthwise = half_length * abs(same) + half_width * across
+        sideways = half_length * across + half_width * abs(same)
+        bend = 0.5 * row[CURVATURE] * lengthwise * lengthwise
+        swing = 0.5 * row[CURVATURE] * front * front
+        right_edge = beside - sideways - max(0.0, bend)
+        left_edge = beside + sideways + max(0.0, -bend)
+        if left_edge < -half - max(0.0, swing) or right_edge > half + max(0.0, -swing):
+            continue
+        if room.begins[at] + along + lengthwise < begin:
+            continue
+        rear = max(
+            begin, room.begins[at] + rear_end(row, x, y, cos, sin, same, half_length, half_width)
+        )
+        if rear <= end:
+            return True, rear, same
+    return False, 0.0, 0.0
+
+
+@law
+def rear_end(
+    row: Floats,
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    same: float,
+    half_length: float,
+    half_width: float,
+) -> float:
+    """Return where along a segment an outline begins [m], seen from the bumper that is nearer."""
+    back = -half_length if same >= 0.0 else half_length
+    along, _, turn_cos, turn_sin = foot(row, x + back * cos, y + back * sin, 0.5 * row[LENGTH])
+    way_cos = row[COS] * turn_cos - row[SIN] * turn_sin
+    way_sin = row[SIN] * turn_cos + row[COS] * turn_sin
+    across: float = abs(way_cos * sin - way_sin * cos)
+    return along - half_width * across
+
+
+@law
+def insert(ahead: Floats, found: int, rear: float, speed: float, length: float) -> int:
+    """Put a car in its place, the farthest out if there are too many; return how many there are."""
+    at = found
+    if found == len(ahead):
+        at -= 1
+        if ahead[at, REAR_AT] <= rear:
+            return found
+    while at > 0 and ahead[at - 1, REAR_AT] > rear:
+        ahead[at, :] = ahead[at - 1]
+        at -= 1
+    ahead[at, REAR_AT], ahead[at, SPEED_OF], ahead[at, LENGTH_OF] = rear, speed, length
+    return min(found + 1, len(ahead))

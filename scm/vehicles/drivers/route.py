@@ -1,26 +1,12 @@
 """Follow a path through the city: stop at red, keep a distance, never block a junction.
 
-Of all that limits the speed, the slowest wins: the lane and its curves, the end of the route, the
-next stop line, the car ahead (time gap in flow, a fixed gap at rest), the order to stop.
+For scripts and experiments that lay a path themselves; who takes errands uses `trips`.
 """
-
-from typing import NamedTuple
 
 from scm.maps.route import Path
 from scm.vehicles.driver import CarLimits, RouteView
-from scm.vehicles.drivers.ahead import Ahead, cars_ahead
-from scm.vehicles.drivers.pace import STANDSTILL, Pace, free_speeds, stopping_speed
-from scm.vehicles.drivers.steering import Steering
-from scm.vehicles.drivers.stop_lines import STANDSTILL_GAP, StopLines
-from scm.vehicles.drivers.track import Track
-
-TIME_GAP = 0.8
-ARRIVED_WITHIN = 0.02
-
-
-class _Limit(NamedTuple):
-    speed: float
-    reason: str | None
+from scm.vehicles.drivers.alone import OWN, Alone
+from scm.vehicles.drivers.law import ARRIVED_WITHIN
 
 
 class RouteDriver:
@@ -46,8 +32,7 @@ class RouteDriver:
         self.limits = limits
         self.cross_track = 0.0
         self.waiting_for: str | None = None
-        self._pace = Pace(limits)
-        self._steering = Steering(limits)
+        self._driver = Alone(path.roads, limits)
         self.follow(path, speed=speed, trip_m=trip_m, near=near)
 
     def follow(
@@ -72,10 +57,6 @@ class RouteDriver:
         self._started = 0.0
         self._near = near
         self._speed = speed
-        self._track = Track(path)
-        self._free = free_speeds(self._track, self.limits)
-        self._lines = StopLines(self._track, self.limits)
-        self._steering.follow(self._track)
 
     @property
     def done_m(self) -> float:
@@ -89,47 +70,19 @@ class RouteDriver:
 
     def decide(self, view: RouteView) -> tuple[float, float]:
         """Return (throttle, steering), both -1 to 1: + forward, + left."""
-        near = self._near if self.s is None else self.s
-        s, lateral = self.path.project(view.pose.x, view.pose.y, near)
         if self.s is None:
-            self._begin(s)
-        self.s, self.cross_track = s, lateral
-        limit = min(self._limits_at(s, view), key=lambda one: one.speed)
-        throttle = self._pace.throttle(limit.speed, view.speed, view.now_ns)
-        standing = view.speed < STANDSTILL and throttle == 0.0
-        self.waiting_for = limit.reason if standing else None
-        rolling = max(0.0, view.speed)
-        return throttle, self._steering.command(s, lateral, view.pose, rolling, view.now_ns)
+            self._begin(view)
+        commands = self._driver.decide(view)
+        self.s = self._started + self._driver.done_m
+        self.cross_track = self._driver.cross_track
+        self.waiting_for = self._driver.waiting_for
+        return commands
 
-    def _begin(self, s: float) -> None:
-        self._started = s
-        if self.trip_m is None and not self.path.closed:
-            self.trip_m = self.path.length_m - s
-
-    def _limits_at(self, s: float, view: RouteView) -> list[_Limit]:
-        front = s + self.limits.front
-        ahead = cars_ahead(self._track, front, self.limits.width, view.pose, view.others)
-        found = [_Limit(self._free_speed(s), None)]
-        if view.stop:
-            found.append(_Limit(0.0, "stop"))
-        if not self.path.closed:
-            found.append(_Limit(self._stopping(self.path.length_m - s), None))
-        line = self._lines.target(front, view, ahead)
-        if line is not None:
-            found.append(_Limit(self._stopping(line[0] - front), line[1]))
-        found.extend(self._behind(front, car) for car in ahead[:1])
-        return found
-
-    def _free_speed(self, s: float) -> float:
-        allowed = self._free[self._track.cell(s)]
-        return allowed if self._speed is None else min(allowed, self._speed)
-
-    def _behind(self, front: float, car: Ahead) -> _Limit:
-        """Return the speed that keeps the gap to a car ahead, and still stops if it brakes."""
-        room = max(0.0, car.rear - front - STANDSTILL_GAP)
-        decel = self.limits.decel
-        stopping = stopping_speed(room + car.speed**2 / (2.0 * decel), decel)
-        return _Limit(min(stopping, room / TIME_GAP), "vehicle")
-
-    def _stopping(self, distance: float) -> float:
-        return stopping_speed(distance, self.limits.decel)
+    def _begin(self, view: RouteView) -> None:
+        path = self.path
+        self._started, _ = path.project(view.pose.x, view.pose.y, self._near)
+        if self.trip_m is None and not path.closed:
+            self.trip_m = path.length_m - self._started
+        first, s = path.index_at(self._started)
+        after = "loop" if path.closed else "stop"
+        self._driver.crowd.send(OWN, path.lanes, s, after, self._speed, first)

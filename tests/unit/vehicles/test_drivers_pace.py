@@ -1,58 +1,71 @@
 """Speeds and throttle."""
 
+import numpy as np
 import pytest
 
-from scm.clock import NS_PER_MS
 from scm.maps.load import load_map
-from scm.maps.route import Path, Roads
+from scm.maps.route import Roads
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers.pace import Pace, free_speeds, stopping_speed
-from scm.vehicles.drivers.track import Track
+from scm.vehicles.drivers.memory import kind_row
+from scm.vehicles.drivers.pace import free_speed, stopping_speed, throttle
+from scm.vehicles.drivers.streets import Streets
 
 TABLE = CarLimits(0.14, 0.52, 0.42, 0.23, 0.07, 0.175, speeds=(0.1, 0.2, 0.3, 0.4))
 BARE = CarLimits(0.14, 0.52, 0.42, 0.23, 0.07, 0.175)
+TICK_S = 0.02
 
 
-def settled(pace, wished, speed, ticks=100):
-    """Return the throttle after a while at one speed."""
-    value = 0.0
-    for tick in range(ticks):
-        value = pace.throttle(wished, speed, tick * 20 * NS_PER_MS)
-    return value
+class Pedal:
+    """The throttle law of one car, with what it remembers."""
+
+    def __init__(self, limits):
+        self.kind, self.floats, self.passed = kind_row(limits, 0.3), np.zeros(8), -1.0
+
+    def press(self, wished, speed, ticks=1):
+        for _ in range(ticks):
+            value = throttle(self.kind, self.floats, wished, speed, self.passed)
+            self.passed = TICK_S
+        return value
 
 
 def test_the_steady_throttle_is_that_of_the_table():
-    assert settled(Pace(TABLE), 0.25, 0.25) == pytest.approx(0.625)
+    assert Pedal(TABLE).press(0.25, 0.25, 100) == pytest.approx(0.625)
 
 
 @pytest.mark.parametrize("limits", [TABLE, BARE])
 def test_a_car_too_slow_gets_more_throttle_and_one_too_fast_less(limits):
     wished = 0.25
-    slow, right, fast = (settled(Pace(limits), wished, wished + d) for d in (-0.05, 0.0, 0.05))
+    slow, right, fast = (
+        Pedal(limits).press(wished, wished + off, 100) for off in (-0.05, 0.0, 0.05)
+    )
     assert slow > right > fast or slow > fast == 0.0
 
 
 def test_a_standing_car_is_held_until_it_may_really_go():
-    pace = Pace(TABLE)
-    assert pace.throttle(0.03, 0.0, 0) == 0.0
-    assert pace.throttle(0.05, 0.0, 20 * NS_PER_MS) > 0.0
+    pedal = Pedal(TABLE)
+    assert pedal.press(0.03, 0.0) == 0.0
+    assert pedal.press(0.05, 0.0) > 0.0
 
 
 def test_a_wish_of_zero_is_no_throttle_at_once():
-    pace = Pace(TABLE)
-    settled(pace, 0.25, 0.25)
-    assert pace.throttle(0.0, 0.25, 10**10) == 0.0
+    pedal = Pedal(TABLE)
+    pedal.press(0.25, 0.25, 100)
+    assert pedal.press(0.0, 0.25) == 0.0
 
 
 def test_a_start_is_not_faster_than_comfortable():
-    pace = Pace(TABLE)
-    first = pace.throttle(0.4, 0.0, 0)
-    assert first < 0.5
+    assert Pedal(TABLE).press(0.4, 0.0) < 0.5
 
 
 def test_without_a_table_the_throttle_grows_until_the_car_moves():
-    pace = Pace(BARE)
-    assert settled(pace, 0.25, 0.0, ticks=10) < settled(pace, 0.25, 0.0, ticks=200)
+    assert Pedal(BARE).press(0.25, 0.0, 10) < Pedal(BARE).press(0.25, 0.0, 200)
+
+
+def test_a_table_longer_than_the_law_holds_means_the_same_speeds():
+    fine = CarLimits(
+        0.14, 0.52, 0.42, 0.23, 0.07, 0.175, speeds=tuple(0.4 * k / 64 for k in range(1, 65))
+    )
+    assert Pedal(fine).press(0.25, 0.25, 100) == pytest.approx(0.625)
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.01, 0.1, 1.0])
@@ -67,12 +80,32 @@ def test_at_the_end_the_stopping_speed_is_zero():
     assert stopping_speed(-1.0, 0.5) == 0.0
 
 
-def test_curves_and_lanes_limit_the_speed_and_braking_for_them_starts_before():
-    roads = Roads(load_map("driving_school"))
-    track = Track(Path.circulation(roads, "east_loop"))
-    assert max(free_speeds(track, TABLE)) == pytest.approx(0.25)
+@pytest.fixture
+def eight():
+    """Return segments of the eight: a straight, the east loop, and what comes after it."""
+    ways = Streets(Roads(load_map("driving_school"))).ways
+    ids = np.array([1, 2, 3, 4], np.int64)
+    return ways, ids, np.cumsum([0.0, *ways.segments[ids, 1]])
+
+
+def speeds_along(eight, limits):
+    ways, ids, begins = eight
+    places = np.arange(0.0, begins[2], 0.02)
+    found = []
+    for s in places:
+        here = int(np.searchsorted(begins, s, side="right")) - 1
+        found.append(free_speed(ways, ids, begins - s, 4, here, limits.lateral_accel, limits.decel))
+    return places, np.array(found)
+
+
+def test_the_lane_limits_the_speed(eight):
+    assert speeds_along(eight, TABLE)[1].max() == pytest.approx(0.25)
+
+
+def test_curves_limit_the_speed_and_braking_for_them_starts_before(eight):
     slow = CarLimits(0.14, 0.52, 0.42, 0.23, 0.07, 0.175, lateral_accel=0.02, decel=0.05)
-    speeds = free_speeds(track, slow)
-    assert min(speeds) == pytest.approx((0.02 * 0.5145) ** 0.5, rel=0.03)
-    steps = [(b**2 - a**2) / 2.0 / track.s[1] for a, b in zip(speeds[1:], speeds, strict=False)]
-    assert max(steps) <= 0.05 + 1e-6
+    places, speeds = speeds_along(eight, slow)
+    assert speeds.min() == pytest.approx((0.02 * 0.5145) ** 0.5, rel=0.03)
+    assert speeds[0] > speeds.min()
+    braking = -np.diff(speeds**2) / 2.0 / np.diff(places)
+    assert braking.max() <= 0.05 + 1e-6

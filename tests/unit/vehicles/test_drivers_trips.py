@@ -81,10 +81,11 @@ def test_two_trips_have_two_ids(trips, start):
 
 
 def test_an_impossible_trip_is_refused_and_changes_nothing(trips, start):
-    driver_path = trips.driver.path
+    before = trips.begin(RouteRequest(vehicle="n7", via=("west_loop",)), start, 0)
     with pytest.raises(MapError, match="nowhere"):
         trips.begin(RouteRequest(vehicle="n7", via=("nowhere",)), start, 0)
-    assert trips.driver.path is driver_path
+    (told,) = trips.reports(0)
+    assert (told.trip_id, told.route) == (before.trip_id, before.route)
 
 
 def test_a_car_beside_all_lanes_cannot_begin(roads):

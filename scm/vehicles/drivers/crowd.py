@@ -1,0 +1,328 @@
+"""Any number of drivers over one map: who is where, who was sent where, and what all decide now.
+
+A car is a slot, a number below the capacity. Some slots are driven here, others are only seen: a
+car with a driver of its own is shown to the crowd by what it tells on the air.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scm.arrays import Bools, Floats, Ints
+from scm.errors import MapError
+from scm.v2x.etsi import SpatemBody
+from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.vehicles.driver import CarLimits
+from scm.vehicles.drivers import memory as m
+from scm.vehicles.drivers.ahead import scratch
+from scm.vehicles.drivers.law import decide
+from scm.vehicles.drivers.signal_table import KEPT_WHEN_LOSSY as FRAMES_KEPT
+from scm.vehicles.drivers.signal_table import SignalTable
+from scm.vehicles.drivers.stations import KEPT_WHEN_LOSSY as CAMS_KEPT
+from scm.vehicles.drivers.stations import find_cells, hear_cams, nobody
+from scm.vehicles.drivers.streets import Streets
+from scm.vehicles.drivers.way import look_from
+
+PACKED_FROM = 4096
+
+
+class Crowd:
+    """The drivers of many cars; see the module.
+
+    Args:
+        streets: The lanes of the map.
+        capacity: How many slots there are.
+        seed: Of the luck of radio frames.
+        loss: Share of radio frames that each receiver misses.
+
+    Attributes:
+        throttle: (capacity,) last decided, -1 to 1; likewise `steering`, + = left.
+        signals: What is told of the signals.
+    """
+
+    def __init__(
+        self, streets: Streets, capacity: int, *, seed: int = 0, loss: float = 0.0
+    ) -> None:
+        city_map = streets.roads.city_map
+        self.streets = streets
+        self.capacity = capacity
+        self._seed, self._loss = seed, loss
+        self._memory = m.empty_memory(capacity)
+        self._heard = nobody(city_map, capacity, CAMS_KEPT if loss else 1)
+        self.signals = SignalTable(city_map, FRAMES_KEPT if loss else 1)
+        self._room = scratch()
+        self._poses = np.zeros((capacity, 4))
+        self._commands = np.zeros((2, capacity))
+        self._kinds: dict[CarLimits, int] = {}
+        self._entered = np.zeros(capacity, np.bool_)
+        self._sent = np.zeros(capacity, np.bool_)
+        self._routes_used = 0
+        self.throttle: Floats = self._commands[0]
+        self.steering: Floats = self._commands[1]
+
+    @property
+    def lane(self) -> Ints:
+        """Lane of each car, as a place in `streets.names`; -1 before it was sent."""
+        return self._memory.sight[:, m.HERE]
+
+    @property
+    def s(self) -> Floats:
+        """Where each rear axle is along its lane [m]."""
+        return self._memory.floats[:, m.S]
+
+    @property
+    def cross_track(self) -> Floats:
+        """How far each rear axle is beside its lane's middle [m], + = left."""
+        return self._memory.floats[:, m.BESIDE]
+
+    @property
+    def done_m(self) -> Floats:
+        """How far each car has driven along its way since it was sent [m]."""
+        return self._memory.floats[:, m.DONE]
+
+    @property
+    def arrived(self) -> Bools:
+        """Whether each car's route is done; never that of a car that goes round."""
+        return self._memory.ints[:, m.ARRIVED] > 0
+
+    @property
+    def waiting(self) -> Ints:
+        """What holds each car at rest, as a place in `memory.WAITING_FOR`."""
+        return self._memory.ints[:, m.WAITING]
+
+    @property
+    def turn(self) -> Ints:
+        """Where each car's way turns next: 1 left, -1 right, 0 neither."""
+        return self._memory.ints[:, m.TURN]
+
+    @property
+    def passed(self) -> Ints:
+        """How many lanes of its way each car has passed since it was sent."""
+        return self._memory.ints[:, m.INDEX]
+
+    def enter(self, slot: int, limits: CarLimits, seed: int = 0) -> None:
+        """Put a driver into a car; it stands until it is sent.
+
+        Args:
+            slot: The car's.
+            limits: What the driver must know of it.
+            seed: Decides where it turns while it circulates.
+        """
+        self.leave(slot)
+        if limits not in self._kinds:
+            row = m.kind_row(limits, self.streets.sharpest_change(limits.wheelbase))
+            kinds = np.vstack([self._memory.kinds, row])
+            self._memory = self._memory._replace(kinds=kinds)
+            self._kinds[limits] = len(kinds) - 1
+        ints = self._memory.ints[slot]
+        ints[m.KIND], ints[m.SEED], ints[m.LAST_NS] = self._kinds[limits], seed, m.NEVER_NS
+        self._memory.floats[slot] = 0.0
+        self._entered[slot] = True
+        self.show(slot, limits.length, limits.width)
+
+    def show(self, slot: int, length: float, width: float) -> None:
+        """Let others see a car as an outline of this size [m], once it speaks."""
+        self._heard.size[slot] = length, width
+
+    def leave(self, slot: int) -> None:
+        """Take a car away, its driver and its outline."""
+        self._entered[slot] = self._sent[slot] = False
+        self._heard.size[slot] = 0.0
+        self._heard.number[:, slot] = -1
+        self._memory.sight[slot] = -1
+        self._memory.ints[slot, m.COUNT] = 0
+        self._commands[:, slot] = 0.0
+
+    def send(
+        self,
+        slot: int,
+        lanes: Sequence[str],
+        s: float,
+        after: str = "stop",
+        speed: float | None = None,
+        first: int = 0,
+    ) -> None:
+        """Send a car along lanes, without a jerk if it drives already.
+
+        Args:
+            slot: The car's.
+            lanes: In driving order.
+            s: Where on its lane the rear axle is, roughly [m].
+            after: What comes after the last lane: `stop` at its end, `loop` to the first one, or
+                `circulate`, any lane that follows.
+            speed: Wished on free road [m/s]; None: what lanes and curves allow.
+            first: Which of the lanes the car is on.
+
+        Raises:
+            MapError: when there is no such lane.
+        """
+        numbers = [self._number(name) for name in lanes]
+        ints, floats = self._memory.ints[slot], self._memory.floats[slot]
+        at = self._lay(numbers, slot)
+        ints[m.ROUTE], ints[m.COUNT], ints[m.INDEX] = at, len(numbers), first
+        ints[m.AFTER] = m.AFTERS.index(after)
+        ints[m.GOAL] = m.NO_GOAL if after == "loop" else len(numbers) - 1
+        ints[m.GOING_LINE], ints[m.ARRIVED] = -1, 0
+        floats[m.S], floats[m.DONE] = s, 0.0
+        floats[m.TOLD] = np.inf if speed is None else speed
+        look_from(self.streets.ways, self._memory, slot, numbers[first])
+        self._sent[slot] = True
+
+    def circulate(
+        self, slot: int, lane: str, s: float, speed: float | None = None
+    ) -> tuple[str, ...]:
+        """Send a car round without end, at each junction where its own seed takes it.
+
+        Returns:
+            The lanes it takes first; where there is no choice, those of its whole round.
+
+        Raises:
+            MapError: when there is no such lane, or it leads nowhere.
+        """
+        number = self._number(lane)
+        if not self.streets.goes_round[number]:
+            self.streets.roads.loop(lane)  # says what is wrong
+        self.send(slot, (lane,), s, "circulate", speed)
+        return self.go_on(slot)
+
+    def go_on(self, slot: int) -> tuple[str, ...]:
+        """Let a car circulate from where it is; return as `circulate` does."""
+        self._memory.ints[slot, m.GOAL] = m.NO_GOAL
+        self._memory.ints[slot, m.ARRIVED] = 0
+        self._memory.floats[slot, m.DONE] = 0.0
+        if self._memory.ints[slot, m.AFTER] != m.CIRCULATE:
+            msg = f"slot {slot} was not sent to circulate"
+            raise ValueError(msg)
+        lane = self.streets.names[self.lane[slot]]
+        return self.streets.round_from(lane) or self.in_sight(slot)
+
+    def halt(self, slot: int) -> None:
+        """Take a car off its way; it is not driven before it is sent again."""
+        self._sent[slot] = False
+
+    def in_sight(self, slot: int) -> tuple[str, ...]:
+        """Return the lanes of a car's way from the one it is on, as far as it has decided."""
+        return tuple(self.streets.names[n] for n in self._memory.sight[slot, m.HERE :] if n >= 0)
+
+    def hear(
+        self,
+        slots: Ints,
+        now_ns: int,
+        x: Floats,
+        y: Floats,
+        yaw: Floats,
+        speed: Floats,
+        yaw_rate: Floats,
+    ) -> None:
+        """Take what cars tell on the air now, shape (k,): of the middle of their front bumpers."""
+        cams = np.column_stack((x, y, yaw, speed, yaw_rate))
+        hear_cams(self._heard, np.asarray(slots, np.int64), now_ns, cams)
+
+    def hear_spatem(self, body: SpatemBody, now_ns: int) -> None:
+        """Take a SPATEM that is on the air now."""
+        self.signals.hear_spatem(body, now_ns)
+
+    def hear_monitor(self, status: MonitorStatus) -> None:
+        """Take the monitor's verdict on a junction."""
+        self.signals.hear_monitor(status)
+
+    def decide(
+        self,
+        now_ns: int,
+        x: Floats,
+        y: Floats,
+        yaw: Floats,
+        speed: Floats,
+        driven: Bools,
+        *,
+        stop: bool = False,
+    ) -> None:
+        """Let the drivers of the cars that are `driven` decide; the others keep their commands.
+
+        Args:
+            now_ns: The present time [ns].
+            x: Of each rear axle, map frame, by slot; likewise `y` and `yaw`.
+            y: See `x`.
+            yaw: See `x`.
+            speed: Along each body [m/s].
+            driven: Whose driver drives, by slot; cars that were never sent are left out.
+            stop: Whether all must come to rest in their lanes, wherever they are.
+        """
+        poses = self._poses
+        poses[:, 0], poses[:, 1], poses[:, 2], poses[:, 3] = x, y, yaw, speed
+        cars = np.flatnonzero(driven & self._sent)
+        self._decide(cars, now_ns, self.signals, stop=stop)
+
+    def decide_alone(
+        self,
+        slot: int,
+        now_ns: int,
+        pose: tuple[float, float, float, float],
+        signals: SignalTable,
+        *,
+        stop: bool,
+    ) -> tuple[float, float]:
+        """Return (throttle, steering) of one car by signals that it alone has heard.
+
+        Args:
+            slot: The car's.
+            now_ns: The present time [ns].
+            pose: x, y, yaw of its rear axle and speed along its body.
+            signals: What it knows of them.
+            stop: Whether it must come to rest.
+        """
+        self._poses[slot] = pose
+        self._decide(np.array([slot], np.int64), now_ns, signals, stop=stop)
+        return float(self.throttle[slot]), float(self.steering[slot])
+
+    def _decide(self, cars: Ints, now_ns: int, signals: SignalTable, *, stop: bool) -> None:
+        find_cells(self._heard, now_ns)
+        decide(
+            self.streets.ways,
+            self._memory,
+            self._heard,
+            signals.told,
+            self._room,
+            cars,
+            self._poses,
+            self._commands,
+            now_ns,
+            bool(stop),
+            self._loss,
+            self._seed,
+        )
+
+    def _number(self, lane: str) -> int:
+        number = self.streets.numbers.get(lane)
+        if number is None:
+            self.streets.roads.successors(lane)  # says what is wrong
+            msg = f"no lane {lane!r}"
+            raise MapError(msg)
+        return number
+
+    def _lay(self, numbers: list[int], slot: int) -> int:
+        """Put a route among all routes; return where it begins."""
+        self._memory.ints[slot, m.COUNT] = 0
+        if self._routes_used + len(numbers) > len(self._memory.routes):
+            self._pack(len(numbers))
+        at = self._routes_used
+        self._memory.routes[at : at + len(numbers)] = numbers
+        self._routes_used += len(numbers)
+        return at
+
+    def _pack(self, more: int) -> None:
+        """Drop the routes that nobody drives any more, and make room for more lanes."""
+        ints, before = self._memory.ints, self._memory.routes
+        slots = np.flatnonzero(ints[:, m.COUNT])
+        kept = [before[ints[k, m.ROUTE] : ints[k, m.ROUTE] + ints[k, m.COUNT]] for k in slots]
+        used = sum(len(route) for route in kept)
+        routes = np.zeros(
+            max(64 if self.capacity < 64 else PACKED_FROM, 2 * (used + more)), np.int64
+        )
+        self._routes_used = 0
+        for slot, route in zip(slots, kept, strict=True):
+            at = self._routes_used
+            routes[at : at + len(route)] = route
+            ints[slot, m.ROUTE] = at
+            self._routes_used += len(route)
+        self._memory = self._memory._replace(routes=routes)
