@@ -5,7 +5,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from scm.arrays import Bools, Floats, Image
+from scm.arrays import Bools, Floats, Image, Ints
 from scm.camera.daylight import Daylight
 from scm.camera.lens import Lens, View
 from scm.camera.mesh import Mesh
@@ -15,6 +15,7 @@ NEAREST_M = 0.02
 FARTHEST_PX = 1.0e4
 """Corners farther out are pulled in: OpenCV counts in 32 bits, 4 of them fractions."""
 HALO = 0.55
+MOST_HALO_PX = 120.0
 
 
 class Thing(NamedTuple):
@@ -55,7 +56,7 @@ class Painter:
         ])  # fmt: skip
         y, x = np.mgrid[-1.0:1.0:65j, -1.0:1.0:65j]
         fall = np.clip(1.0 - np.hypot(x, y), 0.0, 1.0) ** 2
-        self._halo = fall.astype(np.float32)
+        self._halo = np.rint(255.0 * fall).astype(np.uint8)
 
     def sees(self, view: View, middle: Floats, radius: float) -> bool:
         """Return whether any of a ball can be in the picture."""
@@ -102,15 +103,19 @@ class Painter:
         if not shown.any():
             return
         colours = self._colours(mesh, normals)
+        before_lens = np.maximum(corners, (-np.inf, -np.inf, NEAREST_M))
+        fixed = _fixed(self._on_canvas(before_lens))
         eye = (view.position - thing.origin) @ thing.rotation
         for part in mesh.order(eye):
             first, last = mesh.parts[part]
             for face in range(first, last):
-                if shown[face]:
-                    ring = corners[mesh.starts[face] : mesh.starts[face + 1]]
-                    if nearest[face] < NEAREST_M:
-                        ring = _in_front(ring)
-                    self._fill(canvas, self._on_canvas(ring), colours[face], mesh.shines[face])
+                if not shown[face]:
+                    continue
+                here = slice(mesh.starts[face], mesh.starts[face + 1])
+                ring = fixed[here]
+                if nearest[face] < NEAREST_M:
+                    ring = _fixed(self._on_canvas(_in_front(corners[here])))
+                self._fill(canvas, ring, colours[face], mesh.shines[face])
 
     def _colours(self, mesh: Mesh, normals: Floats) -> list[list[float]]:
         light = np.where(mesh.shines > 0.0, 1.0, self._daylight.on_faces(normals))
@@ -121,16 +126,14 @@ class Painter:
     def _on_canvas(self, corners: Floats) -> Floats:
         return np.clip(self._lens.on_canvas(corners), -FARTHEST_PX, FARTHEST_PX)
 
-    def _fill(self, canvas: Image, ring: Floats, colour: list[float], shines: float) -> None:
-        if len(ring) < 3:
-            return
+    def _fill(self, canvas: Image, ring: Ints, colour: list[float], shines: float) -> None:
         if shines > 0.0:
             self._glow(canvas, ring, colour, shines)
-        cv2.fillConvexPoly(canvas, _fixed(ring), colour, cv2.LINE_AA, SHIFT)
+        cv2.fillConvexPoly(canvas, ring, colour, cv2.LINE_AA, SHIFT)
 
-    def _glow(self, canvas: Image, ring: Floats, colour: list[float], wide: float) -> None:
-        middle = ring.mean(axis=0)
-        reach = min(160.0, wide * float(np.ptp(ring, axis=0).max()) / 2.0)
+    def _glow(self, canvas: Image, ring: Ints, colour: list[float], wide: float) -> None:
+        middle = ring.mean(axis=0) / (1 << SHIFT)
+        reach = min(MOST_HALO_PX, wide * float(np.ptp(ring, axis=0).max()) / (2 << SHIFT))
         low = np.floor(middle - reach).astype(int)
         size = int(2 * reach) + 1
         height, width = canvas.shape[:2]
@@ -139,8 +142,8 @@ class Painter:
         if size < 3 or x1 <= x0 or y1 <= y0:
             return
         fall = cv2.resize(self._halo, (size, size), interpolation=cv2.INTER_AREA)
-        part = fall[y0 - low[1] : y1 - low[1], x0 - low[0] : x1 - low[0], None]
-        light = (part * (HALO * np.array(colour, dtype=np.float32))).astype(np.uint8)
+        part = fall[y0 - low[1] : y1 - low[1], x0 - low[0] : x1 - low[0]]
+        light = cv2.merge([cv2.convertScaleAbs(part, alpha=HALO * c / 255.0) for c in colour])
         window = canvas[y0:y1, x0:x1]
         window[:] = cv2.add(window, light)
 
@@ -157,6 +160,6 @@ def _in_front(ring: Floats) -> Floats:
     return np.array(kept).reshape(-1, 3)
 
 
-def _fixed(ring: Floats) -> Image:
-    fixed: Image = np.rint(ring * (1 << SHIFT)).astype(np.int32)
+def _fixed(ring: Floats) -> Ints:
+    fixed: Ints = np.rint(ring * (1 << SHIFT)).astype(np.int32)
     return fixed

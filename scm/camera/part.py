@@ -133,8 +133,7 @@ class CameraPart:
                 if not self._is_wanted(CameraFrame, {"vehicle": car.vehicle, "camera": camera}):
                     continue
                 self._counted.wanted.add(which)
-                period_ns = round(NS_PER_S / optics.rate_hz)
-                due_ns = after.t_ns // period_ns * period_ns
+                due_ns = _on_grid(after.t_ns, optics.rate_hz)
                 if due_ns > max(before.t_ns, self._sent_ns.get(which, -1)):
                     self._sent_ns[which] = due_ns
                     frames.append(self._frame(which, optics, due_ns))
@@ -188,6 +187,13 @@ class CameraPart:
             detail += f", {self._spent_ns / counted.frames / NS_PER_MS:.0f} ms a frame"
         counted.frames = self._spent_ns = 0
         return [PartStatus(station=self.name, t_ns=now_ns, detail=detail)]
+
+
+def _on_grid(t_ns: int, rate_hz: float) -> int:
+    """Return the last whole period of a rate since time zero, exact to the nanosecond."""
+    millihertz = round(1000 * rate_hz)
+    frames = t_ns * millihertz // (1000 * NS_PER_S)
+    return frames * 1000 * NS_PER_S // millihertz
 
 
 def _nobody(kind: type[Message], where: Mapping[str, str]) -> bool:

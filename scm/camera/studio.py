@@ -88,9 +88,8 @@ class Studio:
         height, width = canvas.shape[:2]
         rows = horizon_rows(kind.lens, view, width)
         low = int(np.clip(np.ceil(max(rows)) + 1, 0, height))
-        start = len(kind.sky) - kind.sky_below - round(sum(rows) / 2)
-        picked = np.clip(np.arange(start, start + low), 0, len(kind.sky) - 1)
-        canvas[:low] = kind.sky[picked][:, None]
+        start = np.clip(kind.horizon - round(sum(rows) / 2), 0, len(kind.sky) - low)
+        canvas[:low] = kind.sky[start : start + low]
 
     def _shadows(
         self, canvas: Image, kind: "_Kind", view: View, cars: Sequence[SnapshotVehicle]
@@ -131,8 +130,9 @@ class _Kind:
         width, height = self.lens.canvas_size
         self.canvas: Image = np.zeros((height, width, 3), dtype=np.uint8)
         rows = round(SKY_RAD * optics.focal_px)
-        self.sky_below = 0
-        share = np.linspace(1.0, 0.0, max(rows, 2))[:, None]
+        self.horizon = height + rows
+        share = np.clip((rows - np.arange(2 * height + rows)[:, None]) / rows + height / rows, 0, 1)
         colours = np.array(SKY_LOW) + share * (np.array(SKY_HIGH, dtype=np.float64) - SKY_LOW)
         lit = colours * daylight.intensity * self.exposure
-        self.sky = lit.clip(0.0, 255.0).round().astype(np.uint8)
+        shown = lit.clip(0.0, 255.0).round().astype(np.uint8)
+        self.sky: Image = np.ascontiguousarray(np.repeat(shown[:, None], width, axis=1))
