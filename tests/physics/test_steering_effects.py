@@ -1,0 +1,129 @@
+"""Each effect between steering command and road wheel does what its equation says."""
+
+import math
+
+import numpy as np
+import pytest
+
+from scm.geometry import Pose2
+from scm.vehicles.car import all_terms, load_car
+from scm.vehicles.fleet import Fleet
+from scm.vehicles.jit import plain
+
+LIMIT = 0.5235988
+
+
+def fleet_with(names, values=None, car="nigel"):
+    fleet = Fleet(load_car(car).with_terms(names, values or {}), 1)
+    fleet.add(Pose2(0.0, 0.0, 0.0))
+    return fleet
+
+
+def angles(fleet, steering, step=0.01):
+    """Road-wheel angle after each step of a given series of commands."""
+    out = []
+    for command in steering:
+        fleet.steering[0] = command
+        fleet.advance(step)
+        out.append(float(fleet.steer_angle[0]))
+    return np.array(out)
+
+
+def law(name, **values):
+    return plain(all_terms()[name].law)(**values)
+
+
+def test_a_delayed_steering_turns_the_wheels_as_much_later():
+    command = np.r_[np.full(60, 0.6), np.full(60, -0.3)]
+    now, late = (
+        angles(fleet_with(["steer_delay"], {"steering.delay_s": delay}), command)
+        for delay in (0.0, 0.15)
+    )
+    np.testing.assert_allclose(late[:15], 0.0, atol=1e-9)
+    np.testing.assert_allclose(late[15:], now[:-15], atol=1e-9)
+
+
+def test_a_lag_reaches_63_percent_after_its_time_constant():
+    fleet = fleet_with(["steer_lag"], {"steering.lag_s": 0.3, "steering.rate_rad_s": 1e6})
+    angle = angles(fleet, np.ones(30))
+    assert angle[-1] == pytest.approx(LIMIT * (1.0 - math.exp(-1.0)), rel=3e-3)
+
+
+def test_a_trim_turns_wheels_left_whatever_the_command_even_at_the_stop():
+    fleet = fleet_with(["steer_trim"], {"steering.trim_rad": 0.05})
+    angle = angles(fleet, np.r_[np.zeros(10), np.ones(400), -np.ones(600)])
+    assert angle[9] == pytest.approx(0.05)
+    assert angle[409] == pytest.approx(LIMIT + 0.05)
+    assert angle[-1] == pytest.approx(-LIMIT + 0.05)
+
+
+def test_a_gain_multiplies_the_commanded_angle():
+    angle = angles(fleet_with(["steer_gain"], {"steering.gain": 1.2}), np.full(200, 0.5))
+    assert angle[-1] == pytest.approx(0.6 * LIMIT)
+
+
+def test_saturation_cuts_left_and_right_each_at_its_own_share():
+    values = {"steering.stop_left": 0.5, "steering.stop_right": 0.8}
+    fleet = fleet_with(["steer_saturation"], values)
+    angle = angles(fleet, np.r_[np.ones(300), np.full(300, 0.4), -np.ones(500)])
+    assert angle[299] == pytest.approx(0.5 * LIMIT)
+    assert angle[599] == pytest.approx(0.4 * LIMIT)
+    assert angle[-1] == pytest.approx(-0.8 * LIMIT)
+
+
+@pytest.mark.parametrize("scale", [0.5, 2.0])
+def test_a_rate_scale_multiplies_the_speed_of_the_servo(scale):
+    angle = angles(fleet_with(["steer_rate"], {"steering.rate_scale": scale}), np.ones(20))
+    assert angle[-1] == pytest.approx(scale * 0.42 * 0.2)
+
+
+def test_backlash_opens_a_loop_as_wide_as_the_play():
+    width = 0.08
+    values = {"steering.backlash_rad": width, "steering.rate_rad_s": 1e6}
+    fleet = fleet_with(["steer_backlash"], values)
+    up, down = np.linspace(-1.0, 1.0, 200), np.linspace(1.0, -1.0, 200)
+    angles(fleet, np.r_[np.zeros(1), -np.ones(1)])
+    going_up, going_down = angles(fleet, up), angles(fleet, down)
+    middle = np.interp(0.0, up, going_up), np.interp(0.0, up, going_down[::-1])
+    assert middle[1] - middle[0] == pytest.approx(width, rel=1e-6)
+    assert going_up.max() == pytest.approx(LIMIT - width / 2)
+    small = angles(fleet, 0.5 + 0.9 * (width / 2 / LIMIT) * np.sin(np.linspace(0.0, 30.0, 100)))
+    assert np.ptp(small[40:]) == 0.0  # within the play nothing moves
+
+
+def test_servo_torque_slows_a_servo_in_proportion_and_stalls_it():
+    fleet = fleet_with(["servo_torque"])
+    numbers = {"mass": 2.4, "cog_to_rear_axle": 0.07, "yaw_inertia": 0.02, "wheelbase": 0.14}
+    # 1.2 N on the front axle at 10 mm is 12 mN*m
+    pace = law("servo_torque", accel_y=1.0, yaw_accel=0.0, trail=0.01, stall=0.048, **numbers)
+    assert pace == pytest.approx(0.75)
+    assert law("servo_torque", accel_y=9.0, yaw_accel=0.0, trail=0.01, stall=0.048, **numbers) == 0
+    assert angles(fleet, np.ones(20))[-1] == pytest.approx(0.42 * 0.2, rel=1e-3)  # at rest
+
+
+def settled_circle(names, values):
+    """Steer angle and front side force over weight of the fast car in a steady circle."""
+    fleet = fleet_with(names, values, "f1tenth")
+    fleet.throttle[0], fleet.steering[0] = 0.35, 0.4
+    fleet.advance(4.0)
+    car = load_car("f1tenth")
+    share = car.value("body.cog_to_rear_axle_m") / car.value("body.wheelbase_m")
+    force = share * float(fleet.accel_y[0]) / 9.80665
+    wiggle = []
+    for _ in range(50):
+        fleet.advance(1e-3)
+        wiggle.append(float(fleet.steer_angle[0]))
+    return float(fleet.steer_angle[0]), force, np.ptp(wiggle)
+
+
+def test_compliance_gives_way_by_side_force_over_weight_and_stands_still():
+    stiff, _, _ = settled_circle([], {})
+    soft, force, wiggle = settled_circle(["steer_compliance"], {"steering.compliance_rad": 0.2})
+    assert force > 0.05
+    assert stiff - soft == pytest.approx(0.2 * force, rel=0.02)
+    assert wiggle < 1e-3
+
+
+def test_the_softest_steering_inside_its_bounds_does_not_chatter():
+    _, _, wiggle = settled_circle(["steer_compliance"], {"steering.compliance_rad": 1.0})
+    assert wiggle < 2e-3
