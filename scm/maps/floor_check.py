@@ -12,6 +12,7 @@ MOST_GRIP, MOST_ROLLING = 2.0, 0.5
 STEEPEST = 0.35
 STEEPEST_PIXELS = 1.0
 HIGHEST_M = 2.0
+RIM_M = 0.001
 STRONGEST_MPS = 50.0
 
 
@@ -33,7 +34,7 @@ def floor_problems(city_map: CityMap) -> Iterator[str]:
     if floor.friction_map is not None:
         yield from _friction_map(floor.friction_map)
     if floor.height_map is not None:
-        yield from _height_map(floor.height_map)
+        yield from _height_map(floor.height_map, floor)
     for key in ("x_mps", "y_mps"):
         speed = getattr(city_map.wind, key)
         yield from _within(f"wind.{key}", speed, -STRONGEST_MPS, STRONGEST_MPS)
@@ -102,12 +103,28 @@ def _friction_map(picture: FrictionMap) -> Iterator[str]:
             yield from _within(f"{where}.{key} ({shade})", value, 0.0, most)
 
 
-def _height_map(picture: HeightMap) -> Iterator[str]:
+def _height_map(picture: HeightMap, floor: Floor) -> Iterator[str]:
     where = "floor.height_map"
     extent = list(_extent(where, picture))
     yield from extent
     if picture.samples is not None and not extent:
         yield from _heights(where, picture, picture.samples)
+        yield from _rim(where, picture, picture.samples, floor)
+
+
+def _rim(where: str, picture: HeightMap, samples: Samples, floor: Floor) -> Iterator[str]:
+    """Doubt that the picture ends level, unless it covers all of the floor."""
+    sides = ((picture.x_m, floor.x_m), (picture.y_m, floor.y_m))
+    if all(low <= begin and end <= high for (low, high), (begin, end) in sides):
+        return
+    heights = (unpack(samples) - picture.zero_grey) * picture.m_per_grey
+    rim = (heights[0], heights[-1], heights[:, 0], heights[:, -1])
+    highest = max(float(np.abs(edge).max()) for edge in rim)
+    if highest > RIM_M:
+        yield (
+            f"{where}.zero_grey: expected the picture's rim at height 0 within {RIM_M:g} m, for "
+            f"the floor around it is level; got up to {highest:.3g} m"
+        )
 
 
 def _heights(where: str, picture: HeightMap, samples: Samples) -> Iterator[str]:

@@ -49,7 +49,7 @@ class FrictionMap(Record, kw_only=True, frozen=True):
 
 
 class HeightMap(Record, kw_only=True, frozen=True):
-    """A picture of hills and hollows; outside it the floor goes on as at its rim.
+    """A picture of hills and hollows; around it the floor is level, so its rim must be at 0.
 
     Attributes:
         image: PNG, PGM (8 or 16 bit) or NPY file beside the map file.

@@ -19,6 +19,9 @@ from scm.vehicles.wind import Gusts
 CELL_M = 0.25
 MOST_CELLS = 1_000_000
 WHEEL_REACH_M = 0.25  # wheels this large see an edge before their middle is in its cell
+CAR_REACH_M = 1.5  # a car this long reaches a cell with its front wheels
+
+Bounds = tuple[float, float, float, float]
 
 
 class Ground:
@@ -82,7 +85,6 @@ def sheet_of(floor: Floor) -> Sheet:
     outlines = [() if patch.radius_m is not None else outline_of(patch) for patch in floor.patches]
     reaches = [outline_of(patch) for patch in floor.patches] + [p.corners for p in pieces]
     outlines += [piece.corners for piece in pieces]
-    frame, cells, starts, items = _cells(reaches)
     circles = [(p.x_m or 0.0, p.y_m or 0.0, p.radius_m or 0.0) for p in floor.patches]
     friction, heights = floor.friction_map, floor.height_map
     grey, grey_frame = np.zeros((0, 0)), np.zeros(8)
@@ -94,11 +96,17 @@ def sheet_of(floor: Floor) -> Sheet:
     if heights is not None and heights.samples is not None:
         hills = (unpack(heights.samples) - heights.zero_grey) * heights.m_per_grey
         hills_frame = np.array(_frame(hills, heights.x_m, heights.y_m))
+    pictures = [p for p in (friction, heights) if p is not None]
+    frame, cells, starts, items, busy = _cells(
+        [_bounds(reach) for reach in reaches],
+        [(p.x_m[0], p.y_m[0], p.x_m[1], p.y_m[1]) for p in pictures],
+    )
     return Sheet(
         frame=np.array([*frame, floor.grip, floor.rolling]),
         cells=cells,
         starts=starts,
         items=items,
+        busy=busy,
         first=np.cumsum([0, *(len(outline) for outline in outlines)]),
         corners=np.array([p for outline in outlines for p in outline]).reshape(-1, 2),
         circles=np.array(circles).reshape(-1, 3),
@@ -107,6 +115,7 @@ def sheet_of(floor: Floor) -> Sheet:
         friction=grey,
         friction_frame=grey_frame,
         heights=hills,
+        level=_level(hills, hills_frame),
         height_frame=hills_frame,
     )
 
@@ -118,24 +127,54 @@ def _frame(
     return x_m[0], y_m[0], (x_m[1] - x_m[0]) / columns, (y_m[1] - y_m[0]) / rows
 
 
-def _cells(reaches: list[tuple[Point, ...]]) -> tuple[tuple[float, float, float], Ints, Ints, Ints]:
+def _level(heights: Floats, frame: Floats) -> Bools:
+    """Return where all within a wheel's reach is as high as the place itself."""
+    lowest, highest = heights.copy(), heights.copy()
+    for axis, size in ((1, frame[2]), (0, frame[3])):
+        count = min(math.ceil(WHEEL_REACH_M / size) + 1, heights.shape[axis]) if size else 0
+        wide = [(0, 0), (0, 0)]
+        wide[axis] = (count, count)
+        low, high = (np.pad(rim, wide, mode="edge") for rim in (lowest, highest))
+        for k in range(2 * count + 1):
+            cut = np.arange(k, k + heights.shape[axis])
+            lowest = np.minimum(lowest, np.take(low, cut, axis))
+            highest = np.maximum(highest, np.take(high, cut, axis))
+    return np.asarray(lowest == highest)
+
+
+def _bounds(points: tuple[Point, ...]) -> Bounds:
+    xs, ys = zip(*points, strict=True)
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def _cells(
+    shapes: list[Bounds], pictures: list[Bounds]
+) -> tuple[tuple[float, float, float], Ints, Ints, Ints, Bools]:
     """Sort shapes into square cells: each into all that a wheel touching it can be in."""
-    if not reaches:
-        return (0.0, 0.0, CELL_M), np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros(0, int)
-    boxes = np.array([[*np.min(r, axis=0), *np.max(r, axis=0)] for r in reaches])
-    boxes += np.array([-1.0, -1.0, 1.0, 1.0]) * WHEEL_REACH_M
-    x_low, y_low = boxes[:, :2].min(axis=0).tolist()
-    x_high, y_high = boxes[:, 2:].max(axis=0).tolist()
-    area = (x_high - x_low) * (y_high - y_low)
-    cell = max(CELL_M, math.sqrt(area / MOST_CELLS))
-    columns = math.floor((x_high - x_low) / cell) + 1
-    rows = math.floor((y_high - y_low) / cell) + 1
+    every = np.array([*shapes, *pictures]).reshape(-1, 4)
+    if not len(every):
+        every = np.zeros((1, 4))
+    around = np.array([-1.0, -1.0, 1.0, 1.0])
+    low = every[:, :2].min(axis=0) - CAR_REACH_M
+    size = every[:, 2:].max(axis=0) + CAR_REACH_M - low
+    cell = max(CELL_M, math.sqrt(float(np.prod(size)) / MOST_CELLS))
+    columns, rows = (math.floor(length / cell) + 1 for length in size.tolist())
+    corner = np.tile(low, 2)
+    busy = np.zeros((rows, columns), np.bool_)
+    for left, lower, right, upper in _spans(every + CAR_REACH_M * around - corner, cell):
+        busy[lower : upper + 1, left : right + 1] = bool(shapes or pictures)
     found: list[list[int]] = [[] for _ in range(columns * rows)]
-    spans = np.floor((boxes - np.array([x_low, y_low, x_low, y_low])) / cell).astype(int)
-    for i, (first, lowest, last, highest) in enumerate(spans.tolist()):
-        for row in range(lowest, highest + 1):
-            for column in range(first, last + 1):
+    here = np.array(shapes).reshape(-1, 4) + WHEEL_REACH_M * around - corner
+    for i, (left, lower, right, upper) in enumerate(_spans(here, cell)):
+        for row in range(lower, upper + 1):
+            for column in range(left, right + 1):
                 found[row * columns + column].append(i)
-    starts = np.cumsum([0, *map(len, found)])
+    starts = np.cumsum([0, *map(len, found), 0])
     items = np.array([i for held in found for i in held], dtype=np.int64)
-    return (x_low, y_low, cell), np.array([columns, rows]), starts, items
+    x, y = low.tolist()
+    return (x, y, cell), np.array([columns, rows]), starts, items, np.append(busy.ravel(), False)
+
+
+def _spans(bounds: Floats, cell: float) -> list[list[int]]:
+    spans: list[list[int]] = np.floor(bounds / cell).astype(int).tolist()
+    return spans

@@ -30,8 +30,11 @@ class Sheet(NamedTuple):
     Attributes:
         frame: x and y of the lower left of the cells, their edge, grip and rolling of the floor.
         cells: Columns and rows.
-        starts: (columns * rows + 1,) where each cell's shapes begin in `items`.
+        starts: (columns * rows + 2,) where each cell's shapes begin in `items`; the last cell is
+            the empty one around all others.
         items: Shapes that reach into a cell: patches by their number, then pieces of height.
+        busy: (columns * rows + 1,) whether a car whose rear left wheel is in a cell can reach
+            anything but the usual floor.
         first: (shapes + 1,) where each shape's corners begin; a circle has none.
         corners: (k, 2) counter-clockwise.
         circles: (patches, 3) x, y, radius.
@@ -41,6 +44,7 @@ class Sheet(NamedTuple):
         friction_frame: x, y of the picture's lower left, size of a pixel in x and y, then grip of
             black and white, rolling of black and white.
         heights: (rows, columns) from the lowest row up [m]; no rows: none.
+        level: (rows, columns) whether a wheel there stands level: nothing rises in its reach.
         height_frame: As the first four of `friction_frame`.
     """
 
@@ -48,6 +52,7 @@ class Sheet(NamedTuple):
     cells: Ints
     starts: Ints
     items: Ints
+    busy: Bools
     first: Ints
     corners: Floats
     circles: Floats
@@ -56,6 +61,7 @@ class Sheet(NamedTuple):
     friction: Floats
     friction_frame: Floats
     heights: Floats
+    level: Bools
     height_frame: Floats
 
 
@@ -91,13 +97,22 @@ def blend(picture: Floats, frame: Floats, x: float, y: float) -> tuple[float, fl
 
 @law
 def over_hills(
-    sheet: Sheet, x: float, y: float, ux: float, uy: float, radius: float
-) -> tuple[float, float, float]:
-    """Return height and gradient of a wheel over the height map."""
+    heights: Floats, level: Bools, frame: Floats,
+    x: float, y: float, way: float, radius: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return height and gradient of a wheel over the height map; 0 if there is none."""
+    rows, columns = heights.shape
+    if rows == 0:
+        return 0.0, 0.0, 0.0
+    i = int(min(max((x - frame[0]) / frame[2], 0.0), columns - 1.0))
+    j = int(min(max((y - frame[1]) / frame[3], 0.0), rows - 1.0))
+    if level[j, i]:
+        return heights[j, i], 0.0, 0.0
+    ux, uy = math.cos(way), math.sin(way)
     best, best_x, best_y = -ANYTHING, 0.0, 0.0
     for k in range(-LOOKS, LOOKS + 1):
         t = RIM * radius * k / LOOKS
-        value, rise_x, rise_y = blend(sheet.heights, sheet.height_frame, x + t * ux, y + t * uy)
+        value, rise_x, rise_y = blend(heights, frame, x + t * ux, y + t * uy)
         value += math.sqrt(radius * radius - t * t) - radius
         if value > best:
             best, best_x, best_y = value, rise_x, rise_y
@@ -106,14 +121,14 @@ def over_hills(
 
 @law
 def over_piece(
-    sheet: Sheet, shape: int, plane: int, x: float, y: float, ux: float, uy: float, radius: float
-) -> tuple[float, float, float]:
+    corners: Floats, low: int, high: int, plane: Floats,
+    x: float, y: float, way: float, radius: float,
+) -> tuple[float, float, float]:  # fmt: skip
     """Return height and gradient of a wheel over one plane piece; far below: it does not reach."""
+    ux, uy = math.cos(way), math.sin(way)
     nearest, farthest = -RIM * radius, RIM * radius
     near_x, near_y, near_run = 0.0, 0.0, 0.0
     far_x, far_y, far_run = 0.0, 0.0, 0.0
-    corners = sheet.corners
-    low, high = sheet.first[shape], sheet.first[shape + 1]
     before = high - 1
     for i in range(low, high):
         inward_x = corners[before, 1] - corners[i, 1]
@@ -129,7 +144,7 @@ def over_piece(
             return -ANYTHING, 0.0, 0.0
     if nearest > farthest:
         return -ANYTHING, 0.0, 0.0
-    rise_x, rise_y = sheet.planes[plane, 1], sheet.planes[plane, 2]
+    at, rise_x, rise_y = plane[0], plane[1], plane[2]
     rise = rise_x * ux + rise_y * uy
     t = radius * rise / math.sqrt(1.0 + rise * rise)
     edge_x, edge_y, run = 0.0, 0.0, 0.0
@@ -138,7 +153,7 @@ def over_piece(
     elif t > farthest:
         t, edge_x, edge_y, run = farthest, far_x, far_y, far_run
     drop = math.sqrt(radius * radius - t * t)
-    height = sheet.planes[plane, 0] + rise_x * x + rise_y * y + rise * t + drop - radius
+    height = at + rise_x * x + rise_y * y + rise * t + drop - radius
     if run != 0.0:
         steep = (t / drop - rise) / run
         rise_x, rise_y = rise_x + steep * edge_x, rise_y + steep * edge_y
@@ -146,61 +161,36 @@ def over_piece(
 
 
 @law
-def cell_of(sheet: Sheet, x: float, y: float) -> int:
-    """Return the number of the cell at a place; -1: outside of all that has shapes."""
-    column = math.floor((x - sheet.frame[0]) / sheet.frame[2])
-    row = math.floor((y - sheet.frame[1]) / sheet.frame[2])
-    if column < 0 or row < 0 or column >= sheet.cells[0] or row >= sheet.cells[1]:
-        return -1
-    return int(row * sheet.cells[0] + column)
+def cell_of(frame: Floats, columns: int, rows: int, x: float, y: float) -> int:
+    """Return the number of the cell at a place; outside of all that is one more, the empty one."""
+    column, row = math.floor((x - frame[0]) / frame[2]), math.floor((y - frame[1]) / frame[2])
+    if column < 0 or row < 0 or column >= columns or row >= rows:
+        return columns * rows
+    return int(row * columns + column)
 
 
 @law
-def holding(sheet: Sheet, cell: int, x: float, y: float) -> tuple[float, float]:
-    """Return grip and rolling at a place."""
-    grip, rolling = sheet.frame[3], sheet.frame[4]
-    if sheet.friction.shape[0] > 0:
-        frame = sheet.friction_frame
-        rows, columns = sheet.friction.shape
-        inside_x = 0.0 <= x - frame[0] <= columns * frame[2]
-        if inside_x and 0.0 <= y - frame[1] <= rows * frame[3]:
-            grey, _, _ = blend(sheet.friction, frame, x, y)
-            grip = frame[4] + grey * (frame[5] - frame[4])
-            rolling = frame[6] + grey * (frame[7] - frame[6])
-    if cell >= 0:
-        for k in range(sheet.starts[cell], sheet.starts[cell + 1]):
-            i = sheet.items[k]
-            if i >= sheet.holds.shape[0]:
-                continue
-            dx, dy, r = x - sheet.circles[i, 0], y - sheet.circles[i, 1], sheet.circles[i, 2]
-            within = dx * dx + dy * dy <= r * r
-            if sheet.first[i + 1] > sheet.first[i]:
-                within = is_inside(x, y, sheet.corners, sheet.first[i], sheet.first[i + 1])
-            if within:
-                grip, rolling = sheet.holds[i, 0], sheet.holds[i, 1]
-    return grip, rolling
+def painted(friction: Floats, frame: Floats, x: float, y: float) -> float:
+    """Return the grey of the friction map at a place; below 0 where there is none."""
+    rows, columns = friction.shape
+    if rows == 0:
+        return -1.0
+    over_x, over_y = x - frame[0], y - frame[1]
+    if over_x < 0.0 or over_y < 0.0 or over_x > columns * frame[2] or over_y > rows * frame[3]:
+        return -1.0
+    grey, _, _ = blend(friction, frame, x, y)
+    return grey
 
 
 @law
-def standing(
-    sheet: Sheet, cell: int, x: float, y: float, ux: float, uy: float, radius: float, top: float
-) -> tuple[float, float, float]:
-    """Return height and gradient of the floor under a wheel; nothing above `top` counts."""
-    best, best_x, best_y = 0.0, 0.0, 0.0
-    if sheet.heights.shape[0] > 0:
-        best, best_x, best_y = over_hills(sheet, x, y, ux, uy, radius)
-    if cell >= 0:
-        patches = sheet.holds.shape[0]
-        for k in range(sheet.starts[cell], sheet.starts[cell + 1]):
-            i = sheet.items[k]
-            if i < patches:
-                continue
-            height, rise_x, rise_y = over_piece(sheet, i, i - patches, x, y, ux, uy, radius)
-            if best < height <= top:
-                best, best_x, best_y = height, rise_x, rise_y
-    steep = math.sqrt(best_x * best_x + best_y * best_y)
-    less = STEEPEST / steep if steep > STEEPEST else 1.0
-    return best, less * best_x, less * best_y
+def is_on(
+    circles: Floats, corners: Floats, i: int, low: int, high: int, x: float, y: float
+) -> bool:
+    """Return whether a place lies on a patch."""
+    if high > low:
+        return is_inside(x, y, corners, low, high)
+    dx, dy, r = x - circles[i, 0], y - circles[i, 1], circles[i, 2]
+    return bool(dx * dx + dy * dy <= r * r)
 
 
 @array_kernel
@@ -226,16 +216,41 @@ def feel(
         grip: (n, 4) factor on the tyres' friction.
         rolling: (n, 4) coefficient on top of the tyres' own.
     """
+    frame, columns, lines = sheet.frame, sheet.cells[0], sheet.cells[1]
+    busy = sheet.busy
+    starts, items, first, corners = sheet.starts, sheet.items, sheet.first, sheet.corners
+    circles, holds, planes = sheet.circles, sheet.holds, sheet.planes
+    grey_map, black = sheet.friction, sheet.friction_frame
+    hills, level, hill_frame = sheet.heights, sheet.level, sheet.height_frame
+    patches = holds.shape[0]
     for row in range(alive.shape[0]):
         if not alive[row]:
             continue
-        c, s = math.cos(yaw[row]), math.sin(yaw[row])
-        c_front, s_front = math.cos(yaw[row] + steer[row]), math.sin(yaw[row] + steer[row])
+        if not busy[cell_of(frame, columns, lines, x[row, 2], y[row, 2])]:
+            grip[row, :], rolling[row, :] = frame[3], frame[4]
+            height[row, :], slope_x[row, :], slope_y[row, :] = 0.0, 0.0, 0.0
+            continue
         for w in range(4):
             at_x, at_y = x[row, w], y[row, w]
-            ux, uy = (c_front, s_front) if w < 2 else (c, s)
-            cell = cell_of(sheet, at_x, at_y)
-            grip[row, w], rolling[row, w] = holding(sheet, cell, at_x, at_y)
-            height[row, w], slope_x[row, w], slope_y[row, w] = standing(
-                sheet, cell, at_x, at_y, ux, uy, radius, height[row, w] + climbs
-            )
+            way = yaw[row] + (steer[row] if w < 2 else 0.0)
+            grey = painted(grey_map, black, at_x, at_y)
+            held = frame[3] if grey < 0.0 else black[4] + grey * (black[5] - black[4])
+            rolls = frame[4] if grey < 0.0 else black[6] + grey * (black[7] - black[6])
+            up, rise_x, rise_y = over_hills(hills, level, hill_frame, at_x, at_y, way, radius)
+            top = height[row, w] + climbs
+            cell = cell_of(frame, columns, lines, at_x, at_y)
+            for k in range(starts[cell], starts[cell + 1]):
+                i = items[k]
+                if i < patches:
+                    if is_on(circles, corners, i, first[i], first[i + 1], at_x, at_y):
+                        held, rolls = holds[i, 0], holds[i, 1]
+                    continue
+                reached, along_x, along_y = over_piece(
+                    corners, first[i], first[i + 1], planes[i - patches],
+                    at_x, at_y, way, radius,
+                )  # fmt: skip
+                if up < reached <= top:
+                    up, rise_x, rise_y = reached, along_x, along_y
+            less = STEEPEST / max(math.sqrt(rise_x * rise_x + rise_y * rise_y), STEEPEST)
+            grip[row, w], rolling[row, w], height[row, w] = held, rolls, up
+            slope_x[row, w], slope_y[row, w] = less * rise_x, less * rise_y
