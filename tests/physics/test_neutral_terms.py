@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from scm.geometry import Pose2
+from scm.vehicles.assemble import write_page
 from scm.vehicles.car import Quantity, all_terms, load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.signals import SIGNALS, Role
@@ -51,3 +52,38 @@ def test_every_neutral_effect_at_once_leaves_the_trajectory_bit_for_bit():
     for name in ("x", "y", "z", "roll", "pitch", "yaw", "speed", "wheel_speed", "wheel_load"):
         assert np.array_equal(getattr(few, name), getattr(many, name)), name
     assert few.x[0] > 0.1
+
+
+def test_nigel_with_every_neutral_effect_it_lacks_drives_as_before_bit_for_bit():
+    nigel = load_car("nigel")
+    own, set_already = (
+        {term.name for term in nigel.terms},
+        {term.sets for term in nigel.terms if term.sets},
+    )
+    lacking = [
+        term
+        for term in all_terms().values()
+        if term.neutral and term.name not in own and term.sets not in set_already
+    ]
+    numbers = {
+        param.key: part.neutral[param.name]
+        for term in lacking
+        for part in flat([term])
+        for param in part.params
+        if param.name in part.neutral
+    }
+    assert len(lacking) >= 30
+    before, after = drive(nigel), drive(nigel.with_terms([t.name for t in lacking], numbers))
+    for name in ("x", "y", "z", "roll", "pitch", "yaw", "speed", "wheel_speed", "wheel_load"):
+        assert np.array_equal(getattr(before, name), getattr(after, name)), name
+    assert before.x[0] > 0.1
+
+
+def test_a_car_carries_no_trace_of_an_effect_that_it_does_not_list():
+    nigel = load_car("nigel")
+    page = write_page("nigel", nigel.terms)
+    own = {term.name for term in flat(nigel.terms)}
+    for term in flat(all_terms().values()):
+        if term.name not in own:
+            assert f"{term.name}(" not in page
+            assert f"terms.{term.name} " not in page

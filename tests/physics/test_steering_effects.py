@@ -41,6 +41,7 @@ def test_a_delayed_steering_turns_the_wheels_as_much_later():
     )
     np.testing.assert_allclose(late[:15], 0.0, atol=1e-9)
     np.testing.assert_allclose(late[15:], now[:-15], atol=1e-9)
+    assert np.ptp(late) > 0.2
 
 
 def test_a_lag_reaches_63_percent_after_its_time_constant():
