@@ -68,13 +68,11 @@ def _one_shape(where: str, shape: Patch | Plate) -> Iterator[str]:
     elif shape.points:
         if len(shape.points) < 3 or signed_area(shape.points) == 0.0:
             yield f"{where}.points: expected at least 3 around an area, got {len(shape.points)}"
-    elif None in (shape.x_m, shape.y_m) or (
-        given[0] != "radius_m" and None in (shape.length_m, shape.width_m)
-    ):
-        keys = ("x_m", "y_m", "length_m", "width_m")
-        missing = [key for key in keys if getattr(shape, key) is None]
-        needed = missing if given[0] != "radius_m" else missing[:2]
-        yield f"{where}: key {', '.join(k for k in needed if k[0] in 'xylw')} is missing"
+    else:
+        sizes = () if given == ["radius_m"] else ("length_m", "width_m")
+        missing = [key for key in ("x_m", "y_m", *sizes) if getattr(shape, key) is None]
+        if missing:
+            yield f"{where}: key {', '.join(missing)} is missing"
 
 
 def _ramps(floor: Floor) -> Iterator[str]:
