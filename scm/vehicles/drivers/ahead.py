@@ -217,7 +217,8 @@ def insert(ahead: Floats, found: int, rear: float, speed: float, length: float) 
         if ahead[at, REAR_AT] <= rear:
             return found
     while at > 0 and ahead[at - 1, REAR_AT] > rear:
-        ahead[at, :] = ahead[at - 1]
+        for column in range(3):
+            ahead[at, column] = ahead[at - 1, column]
         at -= 1
     ahead[at, REAR_AT], ahead[at, SPEED_OF], ahead[at, LENGTH_OF] = rear, speed, length
     return min(found + 1, len(ahead))

@@ -100,11 +100,12 @@ def find_cells(heard: Heard, now_ns: int) -> None:
     """Work out where everybody is now, and sort the stations into cells."""
     first, floor = heard.cell_first, heard.floor
     across = int(floor[CELLS_X])
-    first[:] = 0
+    for cell in range(len(first)):
+        first[cell] = 0
     floor[LARGEST] = 0.0
     for station in range(len(heard.newest)):
         heard.cell_of[station] = -1
-        length, width = heard.size[station]
+        length, width = heard.size[station, 0], heard.size[station, 1]
         place = heard.newest[station]
         if length == 0.0 or heard.number[place, station] < 0:
             continue
@@ -164,4 +165,5 @@ def hear_cams(heard: Heard, stations: Ints, now_ns: int, cams: Floats) -> None:
         heard.newest[station] = place
         heard.number[place, station] = before + 1
         heard.t_ns[place, station] = now_ns
-        heard.cams[place, station, :] = cams[row]
+        for column in range(5):
+            heard.cams[place, station, column] = cams[row, column]

@@ -26,7 +26,7 @@ from scm.vehicles.drivers.memory import (
     S,
 )
 from scm.vehicles.drivers.streets import AT, COS, CURVATURE, LENGTH, SIN, Ways, X, Y
-from scm.vehicles.jit import law
+from scm.vehicles.jit import array_kernel, law
 
 TURN = 2.0 * math.pi
 MOST_STEPS = 16
@@ -49,7 +49,7 @@ def lane_at(ways: Ways, memory: Memory, car: int, index: int, before: int) -> in
     return int(ways.following[first + mixed(ints[SEED], index) % choices])
 
 
-@law
+@array_kernel
 def look_from(ways: Ways, memory: Memory, car: int, lane: int) -> None:
     """Fill a car's sight from the lane it is on; its INDEX says which of its way that is."""
     sight = memory.sight[car]
