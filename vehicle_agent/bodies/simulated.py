@@ -3,17 +3,18 @@
 The body's time never jumps: after a stall of the process it has moved by at most 0.1 s.
 """
 
-import numpy as np
-
 from scm import registry
+from scm.arrays import Floats
 from scm.clock import NS_PER_MS, seconds
 from scm.geometry import Pose2
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
+from scm.vehicles.bank import Bank
 from scm.vehicles.car import load_car
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.fleet import Fleet
-from scm.vehicles.sensor import Sampler, Sensor
+from scm.vehicles.sensed import ENCODERS, KINDS, sensors_message
+from scm.vehicles.sensor import Sensor
 from vehicle_agent.body import Body, BodyKind, Motion
 
 LONGEST_NS = 100 * NS_PER_MS
@@ -26,14 +27,11 @@ class SimulatedBody:
     def __init__(self, car: str, seed: int) -> None:
         self._fleet = Fleet(load_car(car), 1)
         self._row = self._fleet.add(Pose2(0.0, 0.0, 0.0))
-        self._rows = np.array([self._row])
         self._now_ns: int | None = None
         self.limits = limits_of(self._fleet.car)
-        generators = np.random.default_rng(seed).spawn(2)
-        self._encoders, self._imu = (
-            _Device(name, self._fleet, generator)
-            for name, generator in zip(("encoders", "imu"), generators, strict=True)
-        )
+        self._seed = seed
+        self._banks: list[Bank] = []
+        self._newest: dict[str, Floats] = {}
 
     def place(self, pose: Pose2, now_ns: int) -> None:
         """Stand at a pose."""
@@ -80,46 +78,20 @@ class SimulatedBody:
         )
 
     def sensors(self, vehicle: str, now_ns: int) -> list[VehicleSensors]:
-        """Return a message for each new reading of the encoders, with the newest of the IMU."""
-        self._imu.read(now_ns)
-        if not self._encoders.read(now_ns) or not self._imu.newest:
-            return []
-        left, right = self._encoders.newest
-        ax, ay, az, roll_rate, pitch_rate, yaw_rate = self._imu.newest[:6]
-        return [
-            VehicleSensors(
-                vehicle=vehicle,
-                t_ns=now_ns,
-                encoder_left=int(left),
-                encoder_right=int(right),
-                accel_mps2=(ax, ay, az),
-                gyro_radps=(roll_rate, pitch_rate, yaw_rate),
-            )
-        ]
-
-
-class _Device:
-    """One sensor on the one car."""
-
-    def __init__(self, name: str, fleet: Fleet, generator: np.random.Generator) -> None:
-        self._sensor = registry.load(SENSORS, name, "SENSOR", Sensor)
-        self._fleet = fleet
-        fitted = self._sensor.is_fitted(fleet.car)
-        self._sampler = Sampler(self._sensor.facts(fleet.car), generator) if fitted else None
-        self.newest: tuple[float, ...] = ()
-
-    def read(self, now_ns: int) -> bool:
-        """Take a reading if one is due; return whether there is a new one."""
-        if self._sampler is None:
-            return False
-        if self._sampler.is_due(now_ns):
-            rows = np.flatnonzero(self._fleet.alive)
-            exact = self._sensor.measure(self._fleet.car, self._fleet, rows, None)
-            self._sampler.take(now_ns, exact[0])
-        ready = self._sampler.ready(now_ns)
-        if ready:
-            self.newest = tuple(float(value) for value in ready[-1].values)
-        return bool(ready)
+        """Return a message for each new reading of the encoders, with the newest of the others."""
+        if not self._banks:
+            self._banks = [Bank(registry.load(SENSORS, kind, "SENSOR", Sensor), self._seed, 1)
+                           for kind in KINDS]  # fmt: skip
+            for bank in self._banks:
+                bank.fit(0, vehicle, self._fleet.car, self._fleet, self._row, now_ns)
+        counted: list[int] = []
+        for bank in self._banks:
+            for readings in bank.step(now_ns):
+                self._newest[bank.sensor.name] = readings.values[0]
+                if bank.sensor.name == ENCODERS:
+                    counted.append(readings.t_ns)
+        said = [sensors_message(vehicle, t_ns, self._newest) for t_ns in counted[-1:]]
+        return [message for message in said if message is not None]
 
 
 def _open(car: str, seed: int) -> Body:

@@ -6,9 +6,12 @@ from scm.v2x.message import Message
 
 
 class LidarScan(Message, kw_only=True, frozen=True):
-    """Ranges counter-clockwise from straight ahead, all of one instant.
+    """Ranges counter-clockwise about the scanner.
 
     Attributes:
+        t_ns: When the last of the beams looked.
+        bearing_first_rad: Where beam 0 looks, 0 is straight ahead, + = left.
+        bearing_step_rad: From each beam to the next; None: a full circle shared out evenly.
         payload: Little-endian float32, one range a beam [m]; infinity is a miss.
     """
 
@@ -21,6 +24,8 @@ class LidarScan(Message, kw_only=True, frozen=True):
     range_min_m: float
     range_max_m: float
     payload: bytes
+    bearing_first_rad: float = 0.0
+    bearing_step_rad: float | None = None
 
 
 MESSAGE = LidarScan

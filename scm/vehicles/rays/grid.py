@@ -1,14 +1,141 @@
-"""Walls sorted by place."""
+"""Faces sorted by place: square cells, each with the faces and bodies that may be in it.
+
+A face is listed in every cell that it crosses, so that whoever has looked at all cells within a
+distance has seen everything within it.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from scm.arrays import Floats
+from scm.vehicles.jit import array_kernel, law
+
+Numbers = NDArray[np.int32]
+
+CELLS_IN_REACH = 24.0
+SMALLEST_M = 0.5
+SLACK = 1e-9
+
+
+class Cells(NamedTuple):
+    """What lies in each cell (i, j) of a window, i across and j up, cell 0 at the map's origin.
+
+    Attributes:
+        size: Edge of a cell [m].
+        i0, j0: The window's first cell; `ni`, `nj`: how many cells it has.
+        starts: (ni * nj + 1,) where each cell's items begin; cells run along j first.
+        items: Numbers of faces or bodies, cell after cell.
+    """
+
+    size: float
+    i0: int
+    j0: int
+    ni: int
+    nj: int
+    starts: Numbers
+    items: Numbers
+
+
+def cell_size(farthest: float) -> float:
+    """Return the edge of cells that suits a scanner of some reach: a power of two, both in m."""
+    return float(2.0 ** math.ceil(math.log2(max(farthest / CELLS_IN_REACH, SMALLEST_M))))
 
 
 class WallGrid:
-    """Everything that never moves.
+    """Everything that never moves, sorted once for each size of cells that is asked for.
 
     Args:
         edges: (m, 4) x0, y0, x1, y1 of each face, map frame [m].
     """
 
     def __init__(self, edges: Floats) -> None:
-        self.edges = edges
+        self.edges = np.ascontiguousarray(edges, dtype=np.float64).reshape(-1, 4)
+        self._by_size: dict[float, Cells] = {}
+
+    def cells(self, size: float) -> Cells:
+        """Return the numbers of `edges` by cells of a size [m]."""
+        if size not in self._by_size:
+            self._by_size[size] = sort_faces(self.edges, size)
+        return self._by_size[size]
+
+
+def sort_faces(edges: Floats, size: float) -> Cells:
+    """Return the faces (m, 4) by the cells that they cross."""
+    window = _window(edges.reshape(-1, 2), size)
+    return _sorted(edges, 1, window, size)
+
+
+def sort_bodies(outlines: Floats, size: float, low: Floats, high: Floats) -> Cells:
+    """Return four-faced bodies (4 n, 4) by the cells they reach into, from corner `low` to `high`.
+
+    Bodies outside that window are left out.
+    """
+    window = _window(np.array([low, high]), size)
+    return _sorted(outlines, 4, window, size)
+
+
+def _window(points: Floats, size: float) -> tuple[int, int, int, int]:
+    if len(points) == 0:
+        return 0, 0, 0, 0
+    low = np.floor(points.min(axis=0) / size - SLACK).astype(int)
+    high = np.floor(points.max(axis=0) / size + SLACK).astype(int)
+    ni, nj = (high - low + 1).tolist()
+    return int(low[0]), int(low[1]), ni, nj
+
+
+def _sorted(edges: Floats, faces: int, window: tuple[int, int, int, int], size: float) -> Cells:
+    i0, j0, ni, nj = window
+    counts = np.zeros(ni * nj + 1, np.int32)
+    _list(edges, faces, i0, j0, ni, nj, size, counts, np.zeros(0, np.int32))
+    starts = np.zeros(ni * nj + 1, np.int32)
+    np.cumsum(counts[:-1], out=starts[1:])
+    items = np.empty(starts[-1], np.int32)
+    _list(edges, faces, i0, j0, ni, nj, size, starts[:-1].copy(), items)
+    return Cells(size, i0, j0, ni, nj, starts, items)
+
+
+@array_kernel
+def _list(
+    edges: Floats, faces: int, i0: int, j0: int, ni: int, nj: int, size: float,
+    places: Numbers, items: Numbers,
+) -> None:  # fmt: skip
+    """Count items in `places`, or, given room for `items`, write each where its place says."""
+    for number in range(edges.shape[0] // faces):
+        first, last = number * faces, (number + 1) * faces
+        left, right = _span(edges, first, last, 0, size)
+        low, high = _span(edges, first, last, 1, size)
+        for i in range(max(left, i0), min(right, i0 + ni - 1) + 1):
+            bottom, top = low, high
+            if faces == 1:
+                bottom, top = _within(edges[number], i * size, (i + 1) * size, size)
+            for j in range(max(bottom, j0), min(top, j0 + nj - 1) + 1):
+                cell = (i - i0) * nj + j - j0
+                if len(items):
+                    items[places[cell]] = number
+                places[cell] += 1
+
+
+@law
+def _span(edges: Floats, first: int, last: int, axis: int, size: float) -> tuple[int, int]:
+    """Return the first and the last column (or row) that some faces reach into."""
+    low = high = edges[first, axis]
+    for face in range(first, last):
+        low = min(low, edges[face, axis], edges[face, axis + 2])
+        high = max(high, edges[face, axis], edges[face, axis + 2])
+    return math.floor(low / size - SLACK), math.floor(high / size + SLACK)
+
+
+@law
+def _within(edge: Floats, left: float, right: float, size: float) -> tuple[int, int]:
+    """Return the rows that a face crosses between two abscissas."""
+    x0, y0, x1, y1 = edge
+    low, high = min(y0, y1), max(y0, y1)
+    if x0 != x1:
+        slope = (y1 - y0) / (x1 - x0)
+        at_left, at_right = y0 + (left - x0) * slope, y0 + (right - x0) * slope
+        low = max(low, min(at_left, at_right))
+        high = min(high, max(at_left, at_right))
+    return math.floor(low / size - SLACK), math.floor(high / size + SLACK)

@@ -1,26 +1,46 @@
-"""LIDAR: ranges to walls and cars all around, counter-clockwise from straight ahead.
+"""LIDAR: ranges to walls, boxes and cars, counter-clockwise about the scanner.
 
-Each face is drawn into the bearings it subtends, and every bearing keeps the nearest:
+    beam i looks at  first + i * field_of_view / beams  from straight ahead, + = left
 
-    range = (a x d) / (u x d)        a: the face's start seen from the scanner, d: its direction,
-                                     u: direction of the beam, x: cross product in the plane
-
-Holds: a level scanner, all of one turn at one instant, faces without end upwards. A hit nearer than
-the range's lower end counts as a miss, as everything beyond its upper end.   Source: AutoDRIVE
-simulator (7 Hz, 0.15 to 12 m, 360 beams, miss = infinity), noise from the paper's variability test.
+A full circle starts straight ahead, a narrower field of view at its right-hand end. How the ranges
+come about stands in `scm/vehicles/rays/cast.py`. A reading nearer than the range's lower end counts
+as a miss, as everything beyond its upper end.
+Holds: a level scanner, faces without end upwards, all cars where they are at the reading's instant.
+Source: AutoDRIVE simulator (7 Hz, 0.15 to 12 m, 360 beams, miss = infinity, beam 0 ahead,
+counter-clockwise); noise from the paper's variability test.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
-from scm.vehicles.jit import array_kernel
+from scm.vehicles.rays.cast import cast
+from scm.vehicles.rays.grid import WallGrid
+from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Around, Facts, Sensor, Sight, Truth
 
-EDGE = 1e-9
-SMALL = 1e-12
+NOISE_SPREADS = 6.0
+
+
+class Bearings(NamedTuple):
+    """Where the beams look: beam i at `first + i * step` from straight ahead, + = left [rad]."""
+
+    first: float
+    step: float
+    beams: int
+
+
+def bearings_of(car: Car) -> Bearings:
+    """Return the beams of a car's device: a full circle starts ahead, a narrower one at its right.
+
+    The last beam of a narrow field of view is one step short of its left end.
+    """
+    view, count = car.value("lidar.field_of_view_rad"), int(car.value("lidar.beams"))
+    whole = view > 2.0 * math.pi - 1e-6
+    return Bearings(0.0 if whole else -0.5 * view, view / count, count)
 
 
 def facts(car: Car) -> Facts:
@@ -37,80 +57,38 @@ def facts(car: Car) -> Facts:
 
 
 def measure(car: Car, truth: Truth, rows: Ints, around: Sight | Around | None) -> Floats:
-    """Return ranges (k, beams) [m]; infinity is a miss."""
-    if isinstance(around, Sight):
-        scene = around.scene
-        edges = np.concatenate((scene.walls.edges, scene.outlines))
-        owners = np.concatenate((np.full(len(scene.walls.edges), -1), np.repeat(scene.owners, 4)))
-        around = Around(edges, owners, around.own)
+    """Return ranges (k, beams) [m]; infinity is a miss.
+
+    The nearer end of the range is the device's own limit, and noise may carry a hit over its
+    farther end: both are for whoever spoils the readings.
+    """
     x, y, _ = car.vector("lidar.position_m")
     yaw = truth.yaw[rows]
     c, s = np.cos(yaw), np.sin(yaw)
     scanners = np.column_stack((truth.x[rows] + c * x - s * y, truth.y[rows] + s * x + c * y, yaw))
-    return scan(car, scanners, around)
+    beyond = NOISE_SPREADS * car.value("lidar.noise_m")
+    return _ranges(car, scanners, around, car.vector("lidar.range_m")[1] + beyond)
 
 
-def scan(car: Car, scanners: Floats, around: Around | None) -> Floats:
-    """Return what scanners like this car's see from given poses (k, 3) x, y, yaw."""
-    beams = int(car.value("lidar.beams"))
+def scan(car: Car, scanners: Floats, around: Sight | Around | None) -> Floats:
+    """Return what scanners like this car's tell without noise from poses (k, 3) x, y, yaw."""
     nearest, farthest = car.vector("lidar.range_m")
-    ranges = np.full((len(scanners), beams), np.inf)
-    if around is not None and len(around.edges):
-        bearing = np.arange(beams) * (2.0 * math.pi / beams)
-        cast(ranges, np.cos(bearing), np.sin(bearing), scanners, around.own, around.edges,
-             around.owners, farthest)  # fmt: skip
+    ranges = _ranges(car, scanners, around, farthest)
     ranges[ranges < nearest] = np.inf
     return ranges
 
 
-@array_kernel
-def cast(
-    ranges: Floats,
-    ux: Floats,
-    uy: Floats,
-    scanners: Floats,
-    own: Ints,
-    edges: Floats,
-    owners: Ints,
-    farthest: float,
-) -> None:
-    """Lower `ranges` (k, beams) to the nearest face that each scanner sees along each beam."""
-    beams = ranges.shape[1]
-    step = 2.0 * math.pi / beams
-    for k in range(scanners.shape[0]):
-        x, y = scanners[k, 0], scanners[k, 1]
-        c, s = math.cos(scanners[k, 2]), math.sin(scanners[k, 2])
-        for m in range(edges.shape[0]):
-            if owners[m] == own[k] and owners[m] >= 0:
-                continue
-            ex, ey = edges[m, 0] - x, edges[m, 1] - y
-            fx, fy = edges[m, 2] - x, edges[m, 3] - y
-            if (
-                min(ex, fx) > farthest
-                or max(ex, fx) < -farthest
-                or min(ey, fy) > farthest
-                or max(ey, fy) < -farthest
-            ):
-                continue
-            ax, ay = c * ex + s * ey, c * ey - s * ex
-            bx, by = c * fx + s * fy, c * fy - s * fx
-            if ax * by - ay * bx < 0.0:
-                ax, ay, bx, by = bx, by, ax, ay
-            dx, dy = bx - ax, by - ay
-            moment = ax * dy - ay * dx
-            if moment <= SMALL:
-                continue  # seen edge-on, or through the scanner itself
-            start = math.atan2(ay, ax)
-            span = math.atan2(moment, ax * bx + ay * by)
-            first = math.ceil((start - EDGE) / step)
-            last = math.floor((start + span + EDGE) / step)
-            for i in range(first, last + 1):
-                beam = i % beams
-                across = ux[beam] * dy - uy[beam] * dx
-                if across > 0.0:
-                    distance = moment / across
-                    if distance <= farthest and distance < ranges[k, beam]:
-                        ranges[k, beam] = distance
+def _ranges(car: Car, scanners: Floats, around: Sight | Around | None, farthest: float) -> Floats:
+    bearings = bearings_of(car)
+    if around is None:
+        return np.full((len(scanners), bearings.beams), np.inf)
+    if isinstance(around, Around):
+        fixed = around.owners < 0
+        scene = Scene(
+            WallGrid(around.edges[fixed]), around.edges[~fixed], around.owners[~fixed][::4]
+        )
+        around = Sight(scene, around.own)
+    return cast(around.scene, scanners, around.own, bearings, farthest)
 
 
 SENSOR = Sensor(

@@ -5,17 +5,18 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from scm.vehicles.car import load_car
-from scm.vehicles.sensor import Around
+from scm.vehicles.rays.grid import WallGrid
+from scm.vehicles.rays.scene import Scene
+from scm.vehicles.sensor import Sight
 from scm.vehicles.sensors.lidar import scan
 
 NIGEL = load_car("nigel")
 NEAREST, FARTHEST = NIGEL.vector("lidar.range_m")
 
 
-def around(edges, owners=None, own=(0,)):
-    edges = np.array(edges, float).reshape(-1, 4)
-    owners = np.full(len(edges), -1) if owners is None else np.array(owners)
-    return Around(edges, owners, np.array(own))
+def around(edges, own=(0,), outlines=(), owners=()):
+    edges, outlines = (np.array(faces, float).reshape(-1, 4) for faces in (edges, outlines))
+    return Sight(Scene(WallGrid(edges), outlines, np.array(owners, np.int64)), np.array(own))
 
 
 def room(half):
@@ -73,9 +74,9 @@ def test_ranges_equal_brute_force(seed):
 
 
 def test_a_scanner_does_not_see_its_own_car_but_others_do():
-    edges = [[1.0, -1.0, 1.0, 1.0]]
+    box = np.add(room(0.1), (1.1, 0.0, 1.1, 0.0))
     pose = np.zeros((2, 3))
-    ranges = scan(NIGEL, pose, around(edges, owners=[5], own=(5, 6)))
+    ranges = scan(NIGEL, pose, around([], own=(5, 6), outlines=box, owners=[5]))
     assert np.isinf(ranges[0]).all()
     assert ranges[1, 0] == pytest.approx(1.0)
 
