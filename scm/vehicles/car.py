@@ -16,6 +16,7 @@ from scm.errors import CarError, TermError, nearest
 from scm.vehicles import body14
 from scm.vehicles.assemble import setters_of
 from scm.vehicles.facts import FACTS, Fact
+from scm.vehicles.measure import Fault, all_measures, read_faults
 from scm.vehicles.param import Param
 from scm.vehicles.term import Term, flat
 
@@ -43,13 +44,26 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class Car:
-    """A car: its name, its effects in the file's order, and every value by `section.key`."""
+    """A car: its name, its effects in the file's order, and every value by `section.key`.
+
+    Attributes:
+        measures: What its recordings are known to get wrong, without numbers; see `faults`.
+    """
 
     name: str
     scale: str
     path: Path
     terms: tuple[Term, ...]
     values: Mapping[str, Quantity]
+    measures: tuple[Fault, ...] = ()
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """The faults of its measurements with the car's numbers, in the file's order."""
+        return tuple(
+            replace(fault, values={p.name: self.value(p.key) for p in fault.measure.params})
+            for fault in self.measures
+        )
 
     def has(self, key: str) -> bool:
         """Say whether the file, or an effect's default, gives this key a value."""
@@ -79,8 +93,28 @@ class Car:
         new = flat(known[name] for name in names if name in known)
         taken = {term.sets for term in new if term.sets}
         kept = [term for term in self.terms if term.sets not in taken and term not in new]
-        numbers = {**_defaults(new), **self.values}
-        for key, number in (values or {}).items():
+        numbers = self._numbers({**_defaults(new), **self.values}, values or {}, problems)
+        return replace(self, terms=(*kept, *new), values=numbers)
+
+    def with_measures(
+        self, entries: Sequence[str], values: Mapping[str, float] | None = None
+    ) -> "Car":
+        """Return this car with further faults of measurement, and with other numbers.
+
+        Raises:
+            CarError: naming every unknown fault and key, and every value outside its bounds.
+        """
+        problems: list[str] = []
+        new = read_faults(list(entries), problems)
+        kept = [old for old in self.measures if old.measure not in [f.measure for f in new]]
+        numbers = {**_fault_defaults(new), **self.values}
+        numbers = self._numbers(numbers, values or {}, problems)
+        return replace(self, measures=(*kept, *new), values=numbers)
+
+    def _numbers(
+        self, numbers: dict[str, Quantity], values: Mapping[str, float], problems: list[str]
+    ) -> dict[str, Quantity]:
+        for key, number in values.items():
             kind = _known_keys().get(key)
             if kind is None or key not in numbers:
                 problems.append(f"{key}: not in this car{nearest(key, sorted(numbers))}")
@@ -89,7 +123,7 @@ class Car:
                 numbers[key] = Quantity(float(number), None, kind.unit, "given")
         if problems:
             raise CarError("\n".join(f"{self.path}: {problem}" for problem in problems))
-        return replace(self, terms=(*kept, *new), values=numbers)
+        return numbers
 
     def value(self, key: str) -> float:
         """Return a number such as `value("body.mass_kg")`, in the unit its key ends in."""
@@ -156,7 +190,9 @@ def car_of(data: Mapping[str, Any], path: Path) -> Car:
     """
     problems: list[str] = []
     terms = _terms(data, problems)
-    values = _defaults(terms) | _fact_defaults(data) | _values(data, problems)
+    faults = read_faults(data.get("measures", []), problems)
+    values = _defaults(terms) | _fault_defaults(faults) | _fact_defaults(data)
+    values |= _values(data, problems)
     problems += _contradictions(data, values)
     try:
         setters_of(terms)
@@ -168,7 +204,7 @@ def car_of(data: Mapping[str, Any], path: Path) -> Car:
         rear = 0.0 if values["drive.layout"].value == "front" else 1.0
         values["drive.rear_driven"] = Quantity(rear, None, "1", "drive.layout")
     name, scale = str(data.get("name", path.stem)), str(data.get("scale", ""))
-    return Car(name, scale, path, terms, values)
+    return Car(name, scale, path, terms, values, faults)
 
 
 def _terms(data: Mapping[str, Any], problems: list[str]) -> tuple[Term, ...]:
@@ -191,6 +227,14 @@ def _defaults(terms: tuple[Term, ...]) -> dict[str, Quantity]:
     return {p.key: Quantity(p.default, None, p.unit, f"default of {owner}") for owner, p in own}
 
 
+def _fault_defaults(faults: Sequence[Fault]) -> dict[str, Quantity]:
+    return {
+        p.key: Quantity(p.default, None, p.unit, f"default of {fault.measure.name}")
+        for fault in faults
+        for p in fault.measure.params
+    }
+
+
 def _fact_defaults(data: Mapping[str, Any]) -> dict[str, Quantity]:
     return {
         key: Quantity(fact.default, None, fact.unit, "default")
@@ -206,6 +250,7 @@ def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
 
 def _known_keys() -> dict[str, Param | Fact]:
     params = [*body14.PARAMS, *(p for term in flat(all_terms().values()) for p in term.params)]
+    params += [param for fault in all_measures().values() for param in fault.params]
     return {**FACTS, **{param.key: param for param in params}}
 
 
@@ -238,8 +283,10 @@ def _top_problems(data: Mapping[str, Any], sections: set[str]) -> Iterator[str]:
                 yield f"{name}: expected text, got {body!r}"
             elif name == "name" and not re.fullmatch(r"[A-Za-z0-9_-]{1,40}", body):
                 yield f"name: expected up to 40 letters, digits, - and _, got {body!r}"
-        elif name != "terms" and (name not in sections or not isinstance(body, dict)):
-            valid = [*sorted(sections), "name", "scale", "terms"]
+        elif name not in {"terms", "measures"} and (
+            name not in sections or not isinstance(body, dict)
+        ):
+            valid = [*sorted(sections), "measures", "name", "scale", "terms"]
             yield f"[{name}]: no such section{nearest(name, valid)}"
 
 

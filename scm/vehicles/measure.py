@@ -128,6 +128,30 @@ def all_measures() -> Mapping[str, Measure]:
     return {name: registry.load(MEASURES, name, "MEASURE", Measure) for name in names}
 
 
+def read_faults(entries: object, problems: list[str]) -> tuple[Fault, ...]:
+    """Make faults of a car file's list such as `["gyro_bias", "unit_error on imu.gyro_z"]`.
+
+    Problems of the list are added to `problems`; the faults stand at their defaults.
+    """
+    if not isinstance(entries, list) or not all(isinstance(entry, str) for entry in entries):
+        problems.append(f"measures: expected a list of names, got {entries!r}")
+        return ()
+    known, found = all_measures(), list[Fault]()
+    for entry in entries:
+        name, _, channels = (part.strip() for part in entry.partition(" on "))
+        where = tuple(channel.strip() for channel in channels.split(",") if channel.strip())
+        if name not in known:
+            hint = nearest(name, list(known))
+            problems.append(f"measures: no fault of measurement {name!r}{hint}")
+        elif any(fault.measure is known[name] for fault in found):
+            problems.append(f"measures: {name!r} stands twice")
+        elif known[name].acts_on == () and not where:
+            problems.append(f"measures: expected {name!r} as '{name} on CHANNEL', got {entry!r}")
+        else:
+            found.append(Fault(known[name], {}, where))
+    return tuple(found)
+
+
 def measure(
     channels: Mapping[str, Series], faults: Iterable[Fault], start_s: float | None = None
 ) -> dict[str, Series]:
