@@ -16,8 +16,16 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=1.0,
         metavar="HZ",
-        help="camera pictures kept of each camera a second, 0: none (%(default)s); "
+        help="pictures kept of each overhead camera a second, 0: none (%(default)s); "
         "all else is always kept",
+    )
+    parser.add_argument(
+        "--cameras-hz",
+        type=float,
+        default=0.0,
+        metavar="HZ",
+        help="above 0: run all cameras of all cars, and keep so many pictures of each a second "
+        "(%(default)s)",
     )
 
 
@@ -25,7 +33,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.errors import LinkError
     from scm.recorder.part import RecorderPart
 
-    part = RecorderPart(arguments.out, arguments.city, arguments.frames_hz)
+    part = RecorderPart(arguments.out, arguments.city, arguments.frames_hz, arguments.cameras_hz)
     try:
         return run_part(part, arguments)
     except LinkError:

@@ -8,6 +8,8 @@ from scm.errors import RecordingError
 from scm.part import Hears, Serves
 from scm.recorder.mcap_file import RunFile
 from scm.v2x.exchange import Incoming, Outgoing, RawSample
+from scm.v2x.message import Message
+from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.part_status import PartStatus
 
@@ -18,8 +20,10 @@ FRAMES_HZ = 1.0
 class RecorderPart:
     """Writes every message of the city; what is older than half a second survives a kill.
 
-    Camera pictures alone would be nearly all of the file (some 30 MB a minute at 5 Hz), so of each
-    camera at most `frames_hz` a second are kept; 0 keeps none.
+    The Eye's pictures alone would be nearly all of the file (some 30 MB a minute at 5 Hz), so of
+    each of its cameras at most `frames_hz` a second are kept; 0 keeps none. The cars' own cameras
+    picture only what somebody asks for: `cameras_hz` above 0 makes all of them run, and keeps so
+    many of each.
     """
 
     name = "record"
@@ -29,12 +33,19 @@ class RecorderPart:
     serves: Sequence[Serves] = ()
     hears_raw = True
 
-    def __init__(self, path: Path, city: str = "city", frames_hz: float = FRAMES_HZ) -> None:
-        if not 0.0 <= frames_hz < float("inf"):
-            msg = f"frames_hz: got {frames_hz}, expected 0 or more"
-            raise RecordingError(msg)
+    def __init__(
+        self,
+        path: Path,
+        city: str = "city",
+        frames_hz: float = FRAMES_HZ,
+        cameras_hz: float = 0.0,
+    ) -> None:
+        self._period_ns = {
+            EyeFrame: _period_ns("frames_hz", frames_hz),
+            CameraFrame: _period_ns("cameras_hz", cameras_hz),
+        }
+        self.hears_raw_too: Sequence[type[Message]] = (CameraFrame,) if cameras_hz else ()
         self.file = RunFile(path, city)
-        self._frame_period_ns = round(NS_PER_S / frames_hz) if frames_hz else None
         self._frame_due_ns: dict[str, int] = {}
         self._flush_due_ns = 0
         self._status_due_ns = 0
@@ -55,14 +66,16 @@ class RecorderPart:
 
     def _is_kept(self, sample: RawSample) -> bool:
         """Say whether a message goes into the file: everything but pictures before their time."""
-        if self.file.kind_of(sample.key) is not EyeFrame:
+        kind = self.file.kind_of(sample.key)
+        if kind not in self._period_ns:
             return True
+        period_ns = self._period_ns[kind]
         due_ns = self._frame_due_ns.get(sample.key, sample.t_ns)
-        if self._frame_period_ns is None or sample.t_ns < due_ns:
+        if period_ns is None or sample.t_ns < due_ns:
             return False
         # Counted from when it was due: frames at 5 Hz that jitter still make 1 Hz, not 0.83.
-        late = sample.t_ns - due_ns >= self._frame_period_ns
-        self._frame_due_ns[sample.key] = (sample.t_ns if late else due_ns) + self._frame_period_ns
+        late = sample.t_ns - due_ns >= period_ns
+        self._frame_due_ns[sample.key] = (sample.t_ns if late else due_ns) + period_ns
         return True
 
     def finish(self, now_ns: int) -> list[Outgoing]:
@@ -70,3 +83,11 @@ class RecorderPart:
         del now_ns
         self.file.close()
         return []
+
+
+def _period_ns(name: str, rate_hz: float) -> int | None:
+    """Return the time between pictures, None for none of them."""
+    if not 0.0 <= rate_hz < float("inf"):
+        msg = f"{name}: got {rate_hz}, expected 0 or more"
+        raise RecordingError(msg)
+    return round(NS_PER_S / rate_hz) if rate_hz else None

@@ -1,0 +1,134 @@
+"""The part of the cameras: pictures only while somebody asks, at their own times."""
+
+import cv2
+import numpy as np
+import pytest
+
+from scm.camera.part import CameraPart
+from scm.camera.tween import between
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.lockstep import Lockstep
+from scm.part import Hears
+from scm.recorder.mcap_file import read_run
+from scm.recorder.part import RecorderPart
+from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.world_snapshot import WorldSnapshot
+
+N1_FRONT = Hears(CameraFrame, {"vehicle": "n1", "camera": "front"})
+
+
+class Stage:
+    """A world that only tells where its two cars are, 20 times a second."""
+
+    name, role, period_ns = "world", "part", 50 * NS_PER_MS
+    hears = serves = ()
+
+    def __init__(self, car):
+        self._car = car
+
+    def step(self, now_ns, inbox):
+        assert not inbox
+        x = 0.3 + 0.2 * now_ns / NS_PER_S
+        cars = (self._car(x, 0.3), self._car(x + 0.6, 0.3, name="n2", tag_id=2))
+        return [WorldSnapshot(t_ns=now_ns, tick=0, vehicles=cars)]
+
+    def finish(self, now_ns):
+        return []
+
+
+class Spy(CameraPart):
+    """Notes what it has had to read."""
+
+    read = 0
+
+    def step(self, now_ns, inbox):
+        self.read += len(inbox)
+        return super().step(now_ns, inbox)
+
+
+@pytest.fixture
+def spy(city_map):
+    return Spy(city_map)
+
+
+@pytest.fixture
+def city(car, spy):
+    with Lockstep([Stage(car), spy]) as city:
+        yield city
+
+
+def test_while_nobody_looks_nothing_is_read_or_sent(city, spy):
+    status = city.hear(Hears(PartStatus))
+    city.run_for(1.5)
+    assert spy.read == 0
+    assert status.drain()[-1].message.detail == "nobody looks"
+
+
+def test_a_subscriber_gets_frames_at_the_cameras_rate_and_times(city):
+    frames = city.hear(N1_FRONT)
+    city.run_for(0.5)
+    frames.drain()
+    city.run_for(1.0)
+    got = [item.message for item in frames.drain()]
+    assert len(got) == 15
+    assert all(-frame.t_ns * 15 % NS_PER_S < 15 for frame in got)
+    picture = cv2.imdecode(np.frombuffer(got[-1].payload, np.uint8), cv2.IMREAD_COLOR)
+    assert picture.shape == (720, 1280, 3) == (got[-1].height_px, got[-1].width_px, 3)
+
+
+def test_only_what_is_asked_for_is_pictured(city):
+    city.hear(N1_FRONT)
+    every = city.hear(Hears(CameraFrame, {"vehicle": "n2"}))
+    city.run_for(0.5)
+    assert {item.message.camera for item in every.drain()} == {"front", "rear"}
+
+
+def test_rendering_ends_with_the_last_subscriber(city, spy):
+    frames = city.hear(N1_FRONT)
+    city.run_for(0.5)
+    assert frames.drain()
+    city.bus.unsubscribe(frames)
+    city.run_for(0.2)
+    before = spy.read
+    city.run_for(0.5)
+    assert spy.read == before
+    again = city.hear(N1_FRONT)
+    city.run_for(0.5)
+    assert again.drain()
+
+
+@pytest.mark.parametrize(("cameras_hz", "kept"), [(0.0, 0), (5.0, 4 * 6)])
+def test_a_recorder_makes_cameras_run_only_when_told_to(city, spy, tmp_path, cameras_hz, kept):
+    recorder = RecorderPart(tmp_path / "run.mcap", "city", cameras_hz=cameras_hz)
+    city.add(recorder)
+    city.run_for(1.3)
+    city.remove(recorder)
+    pictures = [one for one in read_run(tmp_path / "run.mcap") if "@camera" in one.key]
+    assert abs(len(pictures) - kept) <= kept // 4
+    assert (spy.read > 0) is (cameras_hz > 0)
+
+
+def test_the_same_city_gives_the_same_pictures(city_map, car):
+    runs = []
+    for _ in range(2):
+        with Lockstep([Stage(car), CameraPart(city_map, seed=4)]) as city:
+            frames = city.hear(N1_FRONT)
+            city.run_for(0.5)
+            runs.append([(item.message.t_ns, item.message.payload) for item in frames.drain()])
+    assert runs[0]
+    assert runs[0] == runs[1]
+
+
+def test_between_two_snapshots_cars_are_on_their_way(car):
+    def shot(t_ns, *cars):
+        return WorldSnapshot(t_ns=t_ns, tick=0, vehicles=cars)
+
+    before = shot(0, car(0.0, 0.0, 3.1), car(0.0, 1.0, name="n2"))
+    after = shot(100, car(0.1, 0.2, -3.1), car(2.0, 1.0, name="n2"), car(5.0, 5.0, name="n3"))
+    first, second, third = between(before, after, 50)
+    assert (first.x_m, first.y_m) == pytest.approx((0.05, 0.1))
+    assert abs(first.yaw_rad) == pytest.approx(np.pi)  # the short way round
+    assert second.x_m == 2.0  # it was put there
+    assert third.x_m == 5.0  # it is new
+    assert between(before, after, 100) == after.vehicles
