@@ -19,7 +19,7 @@ from scm.v2x.message import Message, encode
 from scm.v2x.messages.route_request import RouteRequest
 from scm.world import step
 from scm.world.collide import everybody
-from scm.world.requests import send
+from scm.world.driving import send
 from scm.world.step import tick
 from scm.world.world import PERIOD_NS, World
 

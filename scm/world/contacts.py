@@ -189,6 +189,9 @@ class _Ring:
         dv[inside] = after[: len(inside), 3:] - block[:-1, 3:]
         lightness = np.zeros(len(keys) + 1)  # a wall is row -1: the last, immovable one
         lightness[inside] = self._lightness
+        # A box that the floor holds is no way out: shifts would creep it along under any push.
+        holds = (self._order < len(self._boxes)) & ~after[: len(inside), 3:].any(axis=1)
+        lightness[inside[holds]] = 0.0
         return dv, _shifts(pairs, normals, depths, lightness), pairs
 
     def _touching(self, row_of: Ints) -> tuple[Ints, Floats, Floats]:
@@ -251,7 +254,8 @@ def _shifts(pairs: Ints, normals: Floats, depths: Floats, lightness: Floats) -> 
     if len(pairs):
         a, b = pairs.T
         out = SHARE_CORRECTED * np.maximum(depths - OVERLAP_KEPT, 0.0)
-        out /= lightness[a] + lightness[b]
+        whole = lightness[a] + lightness[b]
+        out /= np.where(whole > 0.0, whole, np.inf)
         np.add.at(way, a, -normals * (out * lightness[a])[:, None])
         np.add.at(way, b, normals * (out * lightness[b])[:, None])
     return way[:-1]

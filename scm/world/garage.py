@@ -1,11 +1,15 @@
 """The hosted cars' dynamics: one fleet a car file, so that one kernel call moves all its cars."""
 
+from typing import cast
+
 import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.geometry import Pose2
 from scm.vehicles.car import Car, load_car
-from scm.vehicles.fleet import Fleet
+from scm.vehicles.fleet import Fleet, VehicleStatus
+from scm.vehicles.ground import Ground
+from scm.world.slots import Slots
 
 _NOBODY: Ints = np.empty(0, np.int64)
 
@@ -71,10 +75,47 @@ class Garage:
         """Return the world's numbers of the cars in `rows`."""
         return self._slots.get(name, _NOBODY)
 
-    def advance(self, duration: float) -> None:
-        """Let all cars move for a time [s]."""
-        for fleet in self.fleets.values():
-            fleet.advance(duration)
+    def command(self, slots: Slots) -> None:
+        """Tell all motors and servos what stands in the slots."""
+        for name, rows in self._rows.items():
+            fleet, own = self.fleets[name], self._slots[name]
+            fleet.throttle[rows] = slots.throttle[own]
+            fleet.steering[rows] = slots.steering[own]
+
+    def advance(self, ground: Ground, t_ns: int, duration: float) -> None:
+        """Let all cars move for a time [s] on the floor and in the wind of an instant."""
+        for name, rows in self._rows.items():
+            if len(rows):
+                ground.feel(self.fleets[name], t_ns)
+                self.fleets[name].advance(duration)
+
+    def locate(self, slots: Slots) -> None:
+        """Write where all cars are and how they move into the slots."""
+        for name, rows in self._rows.items():
+            fleet, own = self.fleets[name], self._slots[name]
+            slots.x[own] = fleet.x[rows]
+            slots.y[own] = fleet.y[rows]
+            slots.yaw[own] = fleet.yaw[rows]
+            slots.speed[own] = fleet.speed[rows]
+            slots.yaw_rate[own] = fleet.yaw_rate[rows]
+
+    def signal(self, name: str) -> Floats:
+        """Return one signal of all cars by slot, (capacity,); 0 where there is no hosted car."""
+        values = np.zeros(self._capacity)
+        for car_file, rows in self._rows.items():
+            of_fleet = cast("Floats", getattr(self.fleets[car_file], name))
+            values[self._slots[car_file]] = of_fleet[rows]
+        return values
+
+    def frozen(self) -> Ints:
+        """Return the slots of cars whose numbers left every physical range."""
+        return np.concatenate(
+            [
+                self._slots[name][self.fleets[name].status[rows] != VehicleStatus.OK]
+                for name, rows in self._rows.items()
+            ]
+            or [_NOBODY]
+        )
 
     def poses(self, name: str) -> Floats:
         """Return the rear-axle poses of the cars in `rows`, (n, 3)."""

@@ -3,7 +3,7 @@
 What comes from outside never stops the city: what fits nothing is counted in `World.ignored`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from scm.part import Hears
@@ -51,19 +51,18 @@ def _command(world: World, command: DriveCommand, now_ns: int) -> None:
     if car.lease.is_at_home or command.epoch != car.lease.epoch:
         world.ignored += 1
         return
-    if car.guard.take(command, now_ns):
+    if car.guard is not None and car.guard.take(command, now_ns):
         car.switches = car.switches.told(command.headlights, command.indicators)
 
 
 def _frame(world: World, frame: CamTx | SpatemTx, now_ns: int) -> None:
     if frame.station not in world.hosted:  # the bus brings our own cars' frames back
-        transmit(world, [frame], now_ns)
+        transmit(world, frame, now_ns)
 
 
 def _verdict(world: World, status: MonitorStatus, now_ns: int) -> None:
-    world.verdicts[status.junction] = status
-    for car in world.hosted.values():
-        car.signals.hear_monitor(status)
+    del now_ns
+    world.crowd.hear_monitor(status)
 
 
 def _presence(world: World, presence: Presence, now_ns: int) -> None:
@@ -85,4 +84,15 @@ _HANDLERS: dict[type[Message], Callable[[World, Any, int], None]] = {
     Presence: _presence,
 }
 
-HEARS = tuple(Hears(kind, {"role": VEHICLE_ROLE} if kind is Presence else {}) for kind in _HANDLERS)
+OF_CARS: dict[type[Message], str] = {VehicleState: "vehicle", CamTx: "station"}
+"""What is heard of remote cars alone, with its key part: what hosted cars say would come back."""
+
+
+def hears_of(cars: Iterable[str]) -> tuple[Hears, ...]:
+    """Return what the world hears while these remote cars are in it."""
+    shared = [
+        Hears(kind, {"role": VEHICLE_ROLE} if kind is Presence else {})
+        for kind in _HANDLERS
+        if kind not in OF_CARS
+    ]
+    return (*shared, *(Hears(kind, {key: car}) for car in cars for kind, key in OF_CARS.items()))

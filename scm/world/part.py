@@ -1,20 +1,23 @@
 """The world as a part of the city: its inbox goes into a tick, what the tick sends comes out."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from scm.errors import RunError, ScmError
-from scm.maps.model import CityMap
-from scm.part import Hears, Serves
+from scm.maps.model import CityMap, Spawn
+from scm.part import Hears, IsWanted, Serves
 from scm.v2x.exchange import Incoming, Outgoing
-from scm.v2x.message import Refused
+from scm.v2x.message import Message, Refused
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.world_definition import WorldDefinition
-from scm.world.hearing import HEARS
-from scm.world.requests import SERVES, reply_to, send
+from scm.world.driving import send
+from scm.world.hearing import hears_of
+from scm.world.requests import SERVES, reply_to
 from scm.world.step import tick
 from scm.world.world import DEFAULT_CAR, NAME, PERIOD_NS, World
+
+ROOM = 256
 
 
 class WorldPart:
@@ -25,12 +28,12 @@ class WorldPart:
         seed: Of all noise and of lost radio frames.
         hosted: (name, car file) of cars to spawn at the start; they circulate.
         stopped_by: Who engaged the city stop in a run before this one; None: nobody.
+        room: How many more cars may come.
     """
 
     name = NAME
     role = "part"
     period_ns = PERIOD_NS
-    hears: Sequence[Hears] = HEARS
     serves: Sequence[Serves] = SERVES
 
     def __init__(
@@ -39,20 +42,30 @@ class WorldPart:
         seed: int = 0,
         hosted: tuple[tuple[str, str], ...] = (),
         stopped_by: str | None = None,
+        room: int = ROOM,
     ) -> None:
         cars = {DEFAULT_CAR, *(car for _, car in hosted)}
-        self.world = World(city_map, seed, capacity=max(256, 2 * len(hosted)), prepare=sorted(cars))
+        self.world = World(city_map, seed, capacity=len(hosted) + room, prepare=sorted(cars))
+        self.hears: Sequence[Hears] = hears_of(())
         self._to_spawn = hosted
         self._stopped_by = stopped_by
         self._is_open = False
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Advance to `now_ns`; the first step also says what the city is and spawns its cars."""
-        if self._is_open:
-            return tick(self.world, now_ns, inbox)
-        self._is_open = True
-        first = self._open(now_ns)
-        return [*first, *tick(self.world, now_ns, inbox)]
+        first: list[Outgoing] = []
+        if not self._is_open:
+            self._is_open = True
+            first = self._open(now_ns)
+        joined = set(self.world.remote)
+        said = tick(self.world, now_ns, inbox)
+        if joined != set(self.world.remote):
+            self.hears = hears_of(self.world.remote)
+        return [*first, *said]
+
+    def learn_wishes(self, is_wanted: IsWanted) -> None:
+        """Ask the bus from now on before making what is dear."""
+        self.world.wishes.learn(is_wanted)
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """Leave without a word: presence tells."""
@@ -64,9 +77,9 @@ class WorldPart:
             reason = "still engaged when the world was started again"
             stop = StopRequest(engaged=True, by=self._stopped_by, reason=reason)
             reply_to(world, stop, now_ns)
+        places = iter(world.city_map.spawns)
         for name, car_file in self._to_spawn:
-            request = SpawnRequest(vehicle=name, car=car_file)
-            answer = reply_to(world, request, now_ns)
+            answer = self._spawn(name, car_file, places, now_ns)
             if isinstance(answer, Refused):
                 msg = f"{name}: {answer.detail}"
                 raise RunError(msg)
@@ -76,3 +89,12 @@ class WorldPart:
                 world.say("info", "no_circulation", f"{cause}; it stands", now_ns, name)
         definition = WorldDefinition(t_ns=now_ns, seed=world.seed, map=world.city_map)
         return [definition, *world.outbox]
+
+    def _spawn(self, name: str, car_file: str, places: Iterator[Spawn], now_ns: int) -> Message:
+        """Put a car of the start onto the next place; trying the first ones again would be slow."""
+        for place in places:
+            request = SpawnRequest(vehicle=name, car=car_file, spawn=place.name)
+            answer = reply_to(self.world, request, now_ns)
+            if not isinstance(answer, Refused) or answer.code != "occupied":
+                return answer
+        return reply_to(self.world, SpawnRequest(vehicle=name, car=car_file), now_ns)

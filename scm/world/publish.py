@@ -1,63 +1,105 @@
-"""The last stage of a tick: what the city is told, each kind at its own rate."""
+"""The last stage of a tick: what the city is told, each kind at its own rate.
 
-from scm.clock import NS_PER_MS
-from scm.v2x.etsi_convert import cam_of
+Hosted cars report themselves in turns, `STATES_A_TICK` a tick at most: up to so many cars each one
+reports every tick, beyond that each one's rate falls in proportion (1000 cars: 20 Hz each).
+"""
+
+from collections.abc import Iterator
+from typing import TypedDict
+
+import numpy as np
+
+from scm.arrays import Ints
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.v2x.message import Message
-from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
-from scm.vehicles.lights import lamps
+from scm.vehicles.lights import Indicators, lamps
 from scm.world.hosted import HostedCar
 from scm.world.remote import RemoteCar
+from scm.world.slots import MODES
 from scm.world.world import NAME, World
+
+STATES_A_TICK = 400
+TRIPS_A_SECOND = 1000
+TRIP_NS = NS_PER_S // 2
+TURNS: dict[int, Indicators] = {1: "left", -1: "right", 0: "off"}
+
+
+class Told(TypedDict):
+    """What the lamps of a car are told besides its switches."""
+
+    hazard: bool
+    turn: Indicators
+
+
+LAMPS = {
+    (hazard, code): Told(hazard=hazard, turn=turn)
+    for hazard in (False, True)
+    for code, turn in TURNS.items()
+}
 
 
 def publish(world: World, now_ns: int) -> None:
     """Put states, snapshot, trips, contacts and vital signs into the outbox."""
-    for car in world.hosted.values():
-        world.outbox.append(state_of(car, now_ns))
+    if world.wishes.any(VehicleState):
+        slots = _whose_turn(world)
+        world.slots.seq[slots] += 1
+        world.outbox += states_of(world, slots, now_ns)
     for remote in world.remote.values():
         contact = remote.contact(now_ns)
         if contact is not None:
             world.outbox.append(contact)
-    if world.every["snapshot"].is_due(now_ns):
+    if world.every["snapshot"].is_due(now_ns) and world.wishes.any(WorldSnapshot):
         world.outbox.append(snapshot(world, now_ns))
-    _trips(world, now_ns)
+    world.errands.every_ns = max(TRIP_NS, len(world.hosted) * NS_PER_S // TRIPS_A_SECOND)
+    world.outbox += world.errands.reports(now_ns)
     if world.every["second"].is_due(now_ns):
         world.outbox += _each_second(world, now_ns)
 
 
-def state_of(car: HostedCar, now_ns: int) -> VehicleState:
-    """Return a hosted car's report of itself, and count it."""
-    fleet, row = car.fleet, car.row
-    car.seq += 1
-    x, y, yaw = car.pose
-    return VehicleState(
-        vehicle=car.name,
-        t_ns=now_ns,
-        seq=car.seq,
-        x_m=x,
-        y_m=y,
-        yaw_rad=yaw,
-        speed_mps=float(fleet.speed[row]),
-        lateral_speed_mps=float(fleet.lateral_speed[row]),
-        yaw_rate_radps=float(fleet.yaw_rate[row]),
-        accel_mps2=float(fleet.accel_x[row]),
-        steering_rad=float(fleet.steer_angle[row]),
-        throttle=float(fleet.throttle[row]),
-        source="simulated",
-        epoch=car.lease.epoch,
-        mode=car.mode,
-        lights=lights_of(car, now_ns),
-        car=car.car_file,
+def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
+    """Yield the reports of the hosted cars in some slots."""
+    slots, signal = world.slots, world.garage.signal
+    columns = (
+        slots.seq, slots.x, slots.y, slots.yaw, slots.speed, signal("lateral_speed"),
+        slots.yaw_rate, signal("accel_x"), signal("steer_angle"), slots.throttle, slots.mode,
+    )  # fmt: skip
+    rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)
+    for (
+        car,
+        lit,
+    ), seq, x, y, yaw, speed, lateral, yaw_rate, accel, steering, throttle, mode in rows:
+        yield VehicleState(
+            vehicle=car.name,
+            t_ns=now_ns,
+            seq=seq,
+            x_m=x,
+            y_m=y,
+            yaw_rad=yaw,
+            speed_mps=speed,
+            lateral_speed_mps=lateral,
+            yaw_rate_radps=yaw_rate,
+            accel_mps2=accel,
+            steering_rad=steering,
+            throttle=throttle,
+            source="simulated",
+            epoch=car.lease.epoch,
+            mode=MODES[mode],
+            lights=lamps(car.switches, throttle, speed, now_ns, **lit),
+            car=car.car_file,
+        )
+
+
+def _cars(world: World, of: Ints) -> Iterator[tuple[HostedCar, Told]]:
+    """Yield the cars of some slots, and what their lamps are told by driver and guard."""
+    slots = world.slots
+    told = zip(
+        slots.hazard[of].tolist(), (world.crowd.turn * slots.driven)[of].tolist(), strict=True
     )
-
-
-def lights_of(car: HostedCar, now_ns: int) -> tuple[str, ...]:
-    """Return the names of the lamps that are on."""
-    throttle = float(car.fleet.throttle[car.row])
-    return lamps(car.switches, throttle, car.speed, now_ns, hazard=car.hazard)
+    for slot, (hazard, turn) in zip(of.tolist(), told, strict=True):
+        yield world.hosted[slots.names[slot]], LAMPS[hazard, turn]
 
 
 def snapshot(world: World, now_ns: int) -> WorldSnapshot:
@@ -66,34 +108,42 @@ def snapshot(world: World, now_ns: int) -> WorldSnapshot:
         t_ns=now_ns,
         tick=world.tick,
         vehicles=(
-            *(_hosted_in_snapshot(car, now_ns) for car in world.hosted.values()),
+            *_hosted_in_snapshot(world, now_ns),
             *(_remote_in_snapshot(car, now_ns) for car in world.remote.values()),
         ),
+        boxes=world.contacts.boxes.in_snapshot(),
         real_time_factor=world.pace.real_time_factor,
         late_ticks=world.pace.late_ticks,
     )
 
 
-def _hosted_in_snapshot(car: HostedCar, now_ns: int) -> SnapshotVehicle:
-    fleet, row = car.fleet, car.row
-    x, y, yaw = car.pose
-    return SnapshotVehicle(
-        vehicle=car.name,
-        kind=car.kind,
-        car=car.car_file,
-        tag_id=car.tag_id,
-        x_m=x,
-        y_m=y,
-        yaw_rad=yaw,
-        speed_mps=car.speed,
-        steering_rad=float(fleet.steer_angle[row]),
-        roll_rad=float(fleet.roll[row]),
-        pitch_rad=float(fleet.pitch[row]),
-        owner=car.lease.owner,
-        epoch=car.lease.epoch,
-        mode=car.mode,
-        lights=lights_of(car, now_ns),
-    )
+def _hosted_in_snapshot(world: World, now_ns: int) -> Iterator[SnapshotVehicle]:
+    slots, signal = world.slots, world.garage.signal
+    of = np.flatnonzero(slots.hosted)
+    columns = (
+        slots.x, slots.y, slots.yaw, slots.speed, slots.throttle, signal("steer_angle"),
+        signal("roll"), signal("pitch"), slots.mode,
+    )  # fmt: skip
+    rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)
+    for (car, lit), x, y, yaw, speed, throttle, steering, roll, pitch, mode in rows:
+        yield SnapshotVehicle(
+            vehicle=car.name,
+            kind=car.kind,
+            car=car.car_file,
+            tag_id=car.tag_id,
+            x_m=x,
+            y_m=y,
+            yaw_rad=yaw,
+            speed_mps=speed,
+            steering_rad=steering,
+            throttle=throttle,
+            roll_rad=roll,
+            pitch_rad=pitch,
+            owner=car.lease.owner,
+            epoch=car.lease.epoch,
+            mode=MODES[mode],
+            lights=lamps(car.switches, throttle, speed, now_ns, **lit),
+        )
 
 
 def _remote_in_snapshot(car: RemoteCar, now_ns: int) -> SnapshotVehicle:
@@ -109,6 +159,7 @@ def _remote_in_snapshot(car: RemoteCar, now_ns: int) -> SnapshotVehicle:
         yaw_rad=yaw,
         speed_mps=car.speed,
         steering_rad=0.0 if state is None else state.steering_rad,
+        throttle=None if state is None else state.throttle,
         owner=car.lease.owner,
         epoch=car.lease.epoch,
         mode="idle" if state is None else state.mode,
@@ -118,23 +169,13 @@ def _remote_in_snapshot(car: RemoteCar, now_ns: int) -> SnapshotVehicle:
     )
 
 
-def cams_due(world: World, states: list[VehicleState], now_ns: int) -> list[CamTx]:
-    """Return the CAMs that hosted cars owe the air."""
-    cams = []
-    for state in states:
-        car = world.hosted[state.vehicle]
-        if car.cam_trigger.due(state, now_ns):
-            rear, front = car.car.vector("body.footprint_x_m")
-            right, left = car.car.vector("body.footprint_y_m")
-            body = cam_of(state, length_m=front - rear, width_m=left - right, front_m=front)
-            cams.append(CamTx(station=car.name, t_ns=now_ns, body=body))
-    return cams
-
-
-def _trips(world: World, now_ns: int) -> None:
-    for car in world.hosted.values():
-        if car.trips is not None and car.is_sent:
-            world.outbox += car.trips.reports(now_ns)
+def _whose_turn(world: World) -> Ints:
+    """Return the slots of the hosted cars that report in this tick."""
+    hosted = np.flatnonzero(world.slots.hosted)
+    if len(hosted) <= STATES_A_TICK:
+        return hosted
+    first = world.tick * STATES_A_TICK % len(hosted)
+    return np.sort(np.take(hosted, np.arange(first, first + STATES_A_TICK), mode="wrap"))
 
 
 def _each_second(world: World, now_ns: int) -> list[Message]:

@@ -1,15 +1,16 @@
 """The radio: who hears what is sent, by distance and luck.
 
 A frame sent by one station reaches every other station within the map's range, unless the seeded
-loss takes it. Stations are cars, and the roadside units at their junctions.
+loss takes it. Stations are cars, and the roadside units at their junctions. What hosted cars hear
+their drivers keep, all for themselves (`vehicles/drivers/crowd.py`); here are all other receivers.
 """
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from scm.arrays import Bools, Floats
 from scm.maps.model import CityMap, Point
 from scm.v2x.etsi_convert import roadside_station
 
@@ -29,6 +30,25 @@ class RadioCounts:
     unknown: int = 0
 
 
+class Receivers:
+    """Stations that frames are brought to.
+
+    Attributes:
+        names: Theirs, in order.
+        x, y: Where their antennas are, map frame [m].
+    """
+
+    def __init__(self, places: Mapping[str, Point]) -> None:
+        self.names: Sequence[str] = sorted(places)
+        at = np.array([places[name] for name in self.names]).reshape(-1, 2)
+        self.x, self.y = at.T
+        self._number = {name: number for number, name in enumerate(self.names)}
+
+    def number(self, name: str) -> int | None:
+        """Return which of them a station is; None: none."""
+        return self._number.get(name)
+
+
 class Radio:
     """A channel of one range and one loss probability."""
 
@@ -38,31 +58,24 @@ class Radio:
         self._loss = loss
         self.counts = RadioCounts()
 
-    def receivers(self, sender: str, places: Mapping[str, Point]) -> list[str]:
-        """Return who hears a frame of `sender`, in order of name.
+    def reach(self, senders: Sequence[str], x: Floats, y: Floats, receivers: Receivers) -> Bools:
+        """Return who hears the frames of senders at x (k,), y (k,): (k, number of receivers).
 
-        Args:
-            sender: A station of `places`; a frame of anybody else reaches nobody.
-            places: Where every station's antenna is, map frame [m].
+        Nobody hears itself.
         """
+        near: Bools = np.hypot(receivers.x - x[:, None], receivers.y - y[:, None]) <= self._range_m
+        own = np.zeros_like(near)
+        for row, sender in enumerate(senders):
+            column = receivers.number(sender)
+            if column is not None:
+                own[row, column] = True
+        near &= ~own
+        heard = near & (self._rng.random(near.shape) >= self._loss) if self._loss else near
         counts = self.counts
-        counts.sent += 1
-        if sender not in places:
-            counts.unknown += 1
-            return []
-        x, y = places[sender]
-        heard = []
-        for station in sorted(places):
-            if station == sender:
-                continue
-            at_x, at_y = places[station]
-            if math.hypot(at_x - x, at_y - y) > self._range_m:
-                counts.out_of_range += 1
-            elif self._loss and self._rng.random() < self._loss:
-                counts.lost += 1
-            else:
-                counts.delivered += 1
-                heard.append(station)
+        counts.sent += len(senders)
+        counts.delivered += int(heard.sum())
+        counts.lost += int((near & ~heard).sum())
+        counts.out_of_range += int((~near & ~own).sum())
         return heard
 
 

@@ -20,15 +20,14 @@ from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.vehicles.car import car_names
-from scm.vehicles.drivers.limits import limits_of
-from scm.vehicles.drivers.trips import Trips
 from scm.world import lease as rules
-from scm.world.driving import take_over
+from scm.world.driving import send, take_over
 from scm.world.hosted import HostedCar
 from scm.world.remote import RemoteCar
 from scm.world.world import NAME, AnyCar, World
 
 KINDS = ("remote", "real")
+CLEARANCE_M = 0.45  # between rear axles: half a Nigel stays free between two of them
 
 
 class _RefusedError(ScmError):
@@ -102,23 +101,10 @@ def _remove(world: World, request: RemoveRequest, now_ns: int) -> RemoveReply:
 
 
 def _route(world: World, request: RouteRequest, now_ns: int) -> RouteReply:
-    return send(world, _at_home(world, request.vehicle), request, now_ns)
-
-
-def send(world: World, car: HostedCar, request: RouteRequest, now_ns: int) -> RouteReply:
-    """Send a hosted car along a route, from the lane it stands on.
-
-    Raises:
-        ScmError: when the lanes do not allow the route, or the car stands on none.
-    """
+    car = _at_home(world, request.vehicle)
     if request.speed_mps is not None and not request.speed_mps > 0.0:
         raise _RefusedError("invalid", f"speed_mps: got {request.speed_mps}, expected above 0")
-    if car.trips is None:
-        car.trips = Trips(car.name, world.roads, limits_of(car.car), car.pose, now_ns)
-    reply = car.trips.begin(request, car.pose, now_ns)
-    car.is_sent = True
-    car.hazard = False
-    return reply
+    return send(world, car, request, now_ns)
 
 
 def _lease(world: World, request: LeaseRequest, now_ns: int) -> LeaseReply:
@@ -137,7 +123,7 @@ def _lease(world: World, request: LeaseRequest, now_ns: int) -> LeaseReply:
         text = f"{owner} took {car.name} from {before.owner}: {request.reason}"
         world.say("warning", "lease_stolen", text, now_ns, car.name)
     if isinstance(car, HostedCar) and lease.epoch != before.epoch:
-        take_over(car, lease, now_ns)
+        take_over(world, car, lease, now_ns)
     car.lease = lease
     return LeaseReply(vehicle=car.name, owner=lease.owner, epoch=lease.epoch, ttl_ms=lease.ttl_ms)
 
@@ -192,15 +178,21 @@ def _check_new(world: World, name: str, car_file: str) -> None:
 
 def _place(world: World, spawn: str) -> Pose2:
     """Return a free place to stand: the wished one, or the first."""
-    free = world.roads.free_spawns([car.pose for car in world.cars()])
+    roads = world.roads
     if spawn:
-        pose = world.roads.spawn_pose(spawn)
-        if spawn not in free:
+        pose = roads.spawn_pose(spawn)
+        if not _is_free(world, pose):
             raise _RefusedError("occupied", f"spawn: a car stands at {spawn!r}")
         return pose
-    if not free:
-        raise _RefusedError("full", f"no spawn place of map {world.city_map.name} is free")
-    return world.roads.spawn_pose(free[0])
+    for place in world.city_map.spawns:
+        pose = roads.spawn_pose(place.name)
+        if _is_free(world, pose):
+            return pose
+    raise _RefusedError("full", f"no spawn place of map {world.city_map.name} is free")
+
+
+def _is_free(world: World, pose: Pose2) -> bool:
+    return world.slots.nearest_m(pose.x, pose.y) >= CLEARANCE_M
 
 
 _ANSWERS: dict[type[Message], Callable[[World, Any, int], Message]] = {

@@ -1,124 +1,117 @@
-"""The sensor stage: measure every car whose device is due, all cars of one file in one call."""
+"""The sensor stage: every device that is due and wanted reads; what comes out of them is told.
+
+To add a kind that is told, give it a place in `_sensors`; a kind of its own message, a line in
+`sense`.
+"""
+
+import math
+from collections.abc import Iterator
 
 import numpy as np
 
-from scm.arrays import Floats, Ints
+from scm.arrays import Bools, Floats, Ints
 from scm.v2x.message import Message
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
-from scm.vehicles.car import Car
-from scm.vehicles.sensor import Around, Reading
+from scm.vehicles.bank import Readings
+from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensors import lidar
-from scm.world.hosted import HostedCar
 from scm.world.hull import outline
 from scm.world.world import SCANNER, World
 
-ENCODERS, IMU = "encoders", "imu"
+ENCODERS, IMU, IPS = "encoders", "imu", "ips"
+THROTTLE, STEERING = "throttle_feedback", "steering_feedback"
 
 
 def sense(world: World, now_ns: int) -> list[Message]:
     """Read all devices that are due; return what came out of them by now."""
-    faces = _Faces(world, now_ns)
-    for kind in world.sensors:
-        due: dict[str, list[HostedCar]] = {}
-        for car in world.hosted.values():
-            if kind in car.samplers and car.samplers[kind].is_due(now_ns):
-                due.setdefault(car.car_file, []).append(car)
-        for cars in due.values():
-            _measure(world, kind, cars, faces, now_ns)
-    _scan_for_remote(world, faces, now_ns)
+    scans, sensors = _wanted(world, LidarScan), _wanted(world, VehicleSensors)
     out: list[Message] = []
-    for hosted in world.hosted.values():
-        out += _readings(hosted, now_ns)
-    for name, scanner in world.scanners.items():
-        out += _scans(name, world.remote[name].car, scanner.ready(now_ns))
-    return out
-
-
-class _Faces:
-    """What LIDARs can see, put together only when one of them looks."""
-
-    def __init__(self, world: World, now_ns: int) -> None:
-        self._world = world
-        self._now_ns = now_ns
-        self._seen: tuple[Floats, Ints] | None = None
-
-    def around(self, own: Ints) -> Around:
-        """Return walls and cars, for scanners on the cars of these slots."""
-        if self._seen is None:
-            self._seen = self._all()
-        return Around(*self._seen, own)
-
-    def _all(self) -> tuple[Floats, Ints]:
-        world = self._world
-        edges, owners = [world.walls], [np.full(len(world.walls), -1)]
-        for name, fleet in world.garage.fleets.items():
-            edges.append(outline(fleet.car, world.garage.poses(name)))
-            owners.append(np.repeat(world.garage.slots(name), 4))
-        for car in world.remote.values():
-            edges.append(outline(car.car, np.array([car.pose])))
-            owners.append(np.full(4, car.slot))
-        return np.concatenate(edges), np.concatenate(owners)
-
-
-def _measure(world: World, kind: str, cars: list[HostedCar], faces: _Faces, now_ns: int) -> None:
-    rows = np.array([car.row for car in cars])
-    around = faces.around(np.array([car.slot for car in cars])) if kind == SCANNER else None
-    exact = world.sensors[kind].measure(cars[0].car, cars[0].fleet, rows, around)
-    for car, values in zip(cars, exact, strict=True):
-        car.samplers[kind].take(now_ns, values)
-
-
-def _scan_for_remote(world: World, faces: _Faces, now_ns: int) -> None:
-    for name, scanner in world.scanners.items():
-        if scanner.is_due(now_ns):
-            car = world.remote[name]
-            x, y, _ = car.car.vector("lidar.position_m")
-            at = (*car.pose.apply(x, y), car.pose.yaw)
-            scanner.take(
-                now_ns, lidar.scan(car.car, np.array([at]), faces.around(np.array([car.slot])))[0]
-            )
-
-
-def _readings(car: HostedCar, now_ns: int) -> list[Message]:
-    """Return a car's scans, and a message for each new reading of the encoders."""
-    out: list[Message] = []
-    counted = False
-    for kind, sampler in car.samplers.items():
-        ready = sampler.ready(now_ns)
+    fresh: list[Readings] = []
+    for kind, bank in world.banks.items():
+        bank.wanted[:] = scans if kind == SCANNER else sensors
         if kind == SCANNER:
-            out += _scans(car.name, car.car, ready)
-        elif ready:
-            car.readings[kind] = ready[-1]
-            counted = counted or kind == ENCODERS
-    if counted and IMU in car.readings:
-        out.append(_sensors(car))
+            for readings in bank.step(now_ns, lambda: _scene(world)):
+                out += _scans(world, readings)
+            continue
+        for readings in bank.step(now_ns):
+            world.readings[kind][readings.slots] = readings.values
+            if kind == ENCODERS:
+                fresh.append(readings)
+    for readings in fresh:
+        out += _sensors(world, readings)
     return out
 
 
-def _sensors(car: HostedCar) -> VehicleSensors:
-    left, right = car.readings[ENCODERS].values.tolist()
-    ax, ay, az, p, q, r = car.readings[IMU].values[:6].tolist()
-    return VehicleSensors(
-        vehicle=car.name,
-        t_ns=car.readings[ENCODERS].t_ns,
-        encoder_left=int(left),
-        encoder_right=int(right),
-        accel_mps2=(ax, ay, az),
-        gyro_radps=(p, q, r),
-    )
+def _wanted(world: World, kind: type[Message]) -> Bools:
+    """Return by slot whether anybody wants such messages of its car."""
+    slots, wishes = world.slots, world.wishes
+    if wishes.all(kind, "vehicle"):
+        return slots.used
+    wanted = np.zeros(slots.capacity, np.bool_)
+    if not wishes.any(kind):
+        return wanted
+    used = np.flatnonzero(slots.used)
+    names = [slots.names[slot] for slot in used.tolist()]
+    wanted[used] = wishes.of(kind, "vehicle", names)
+    return wanted
 
 
-def _scans(name: str, car: Car, readings: list[Reading]) -> list[Message]:
-    nearest, farthest = car.vector("lidar.range_m")
-    return [
-        LidarScan(
-            vehicle=name,
-            t_ns=reading.t_ns,
-            beams=len(reading.values),
+def _scene(world: World) -> Scene:
+    """Return all that LIDARs can see now: walls, boxes, cars."""
+    boxes = world.contacts.boxes
+    outlines: list[Floats] = [boxes.outline()]
+    owners: list[Ints] = [np.full(len(boxes), -1)]
+    for name in world.garage.fleets:
+        if len(own := world.garage.slots(name)):
+            outlines.append(outline(world.garage.car(name), world.garage.poses(name)))
+            owners.append(own)
+    for car in world.remote.values():
+        outlines.append(outline(car.car, np.array([car.pose])))
+        owners.append(np.array([car.slot]))
+    return Scene(world.wall_grid, np.concatenate(outlines), np.concatenate(owners))
+
+
+def _sensors(world: World, encoders: Readings) -> Iterator[VehicleSensors]:
+    """Yield a message for each new reading of encoders, with the newest of all other devices."""
+    of = encoders.slots[~np.isnan(world.readings[IMU][encoders.slots, 0])]
+    newest = [
+        world.readings[kind][of].tolist() for kind in (ENCODERS, IMU, THROTTLE, STEERING, IPS)
+    ]
+    for slot, (left, right), imu, (throttle,), (steering,), (x, y, yaw) in zip(
+        of.tolist(), *newest, strict=True
+    ):
+        yield VehicleSensors(
+            vehicle=world.slots.names[slot],
+            t_ns=encoders.t_ns,
+            encoder_left=int(left),
+            encoder_right=int(right),
+            accel_mps2=(imu[0], imu[1], imu[2]),
+            gyro_radps=(imu[3], imu[4], imu[5]),
+            orientation_rad=(imu[6], imu[7], imu[8]),
+            throttle=_known(throttle),
+            steering_rad=_known(steering),
+            ips_m=None if math.isnan(x) else (x, y),
+            ips_yaw_rad=_known(yaw),
+        )
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _scans(world: World, scans: Readings) -> Iterator[LidarScan]:
+    nearest, farthest = scans.car.vector("lidar.range_m")
+    first, step, _ = lidar.bearings_of(scans.car)
+    ranges = scans.values.astype("<f4")
+    for row, slot in enumerate(scans.slots.tolist()):
+        yield LidarScan(
+            vehicle=world.slots.names[slot],
+            t_ns=scans.t_ns,
+            beams=ranges.shape[1],
             range_min_m=nearest,
             range_max_m=farthest,
-            payload=reading.values.astype("<f4").tobytes(),
+            payload=ranges[row].tobytes(),
+            bearing_first_rad=first,
+            bearing_step_rad=step,
         )
-        for reading in readings
-    ]

@@ -14,11 +14,13 @@ def watch(world: World, now_ns: int) -> None:
     for car in list(world.remote.values()):
         _watch_agent(world, car, now_ns)
         _watch_lease(world, car, now_ns)
-    for hosted in world.hosted.values():
-        if hosted.has_diverged and not hosted.diverged:
-            hosted.diverged = True
+    slots = world.slots
+    for slot in world.garage.frozen().tolist():
+        if not slots.diverged[slot]:
+            slots.diverged[slot] = True
+            slots.driven[slot] = False
             sentence = VehicleStatus.DIVERGED.sentence
-            world.say("error", "vehicle_diverged", sentence, now_ns, hosted.name)
+            world.say("error", "vehicle_diverged", sentence, now_ns, slots.names[slot])
 
 
 def lose(world: World, car: RemoteCar, why: str, now_ns: int, *, dead: bool) -> None:

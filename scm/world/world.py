@@ -12,30 +12,36 @@ import numpy as np
 from scm import registry
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
-from scm.maps.model import CityMap, Point
+from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.maps.segments import wall_segments
 from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
-from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.vehicles.bank import Bank
 from scm.vehicles.car import Car
+from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.errands import Errands
+from scm.vehicles.drivers.limits import limits_of
+from scm.vehicles.drivers.streets import streets_of
 from scm.vehicles.ground import Ground
-from scm.vehicles.guard import Guard
-from scm.vehicles.sensor import Around, Sampler, Sensor
-from scm.vehicles.sensors.lidar import scan
-from scm.vehicles.signal_view import SignalView
+from scm.vehicles.placed import Placed
+from scm.vehicles.rays.grid import WallGrid
+from scm.vehicles.rays.scene import Scene
+from scm.vehicles.sensor import Sensor
 from scm.world import lease as rules
+from scm.world.cams import CamTriggers
 from scm.world.contacts import Contacts
 from scm.world.garage import Garage
 from scm.world.hosted import HostedCar
 from scm.world.hull import hull_of
 from scm.world.impacts import Impacts
 from scm.world.pace import Every, Pace
-from scm.world.radio import Radio, roadside_places
+from scm.world.radio import Radio, Receivers, roadside_places
 from scm.world.remote import RemoteCar
-from scm.world.seeds import generator
-from scm.world.solids import Hull
+from scm.world.seeds import generator, number
+from scm.world.slots import Numbers, Slots
+from scm.world.wishes import Wishes
 
 NAME = "world"
 PERIOD_NS = 20 * NS_PER_MS
@@ -52,22 +58,27 @@ class World:
     Args:
         city_map: The city.
         seed: Of all noise and of lost radio frames.
-        capacity: Most hosted cars of one car file.
+        capacity: Most cars at a time.
         loss: Share of radio frames that get lost.
         prepare: Car files whose kernels are compiled now and not when their first car comes.
 
     Attributes:
-        hosted: Cars simulated here, by name, in the order they came; likewise `remote`.
-        walls: (m, 4) faces of everything that never moves.
+        slots: What every car has, as arrays.
         ground: The floor under the wheels, and the wind.
         impacts: What contacts add to the cars' accelerations in this tick.
-        sensors: All kinds of sensors, by name.
-        scanners: One LIDAR a remote car, by its name: only the world can see for it.
+        hosted: Cars simulated here, by name, in the order they came; likewise `remote`.
+        leased: Those of the hosted that somebody else drives.
+        crowd: The drivers of the hosted cars, and what they hear over the radio.
+        errands: Where these were sent.
+        front: By slot, from the rear axle to the front bumper [m].
+        placed: Where the remote cars are, for their LIDARs: only the world can see for them.
+        banks: The devices of all cars, by kind of sensor.
+        readings: By kind and slot the newest reading, NaN before the first; not of LIDARs.
+        wishes: What anybody would hear.
         stop: The red button as it stands.
         outbox: What the tick under way sends.
         ignored: Messages that fitted nothing: unknown cars, commands without the lease.
         last_hit_ns: When a car's contact was last told.
-        verdicts: The monitors' newest, by junction.
     """
 
     def __init__(
@@ -81,19 +92,32 @@ class World:
         self.city_map = city_map
         self.seed = seed
         self.roads = Roads(city_map)
-        self.walls = wall_segments(city_map)
-        self.garage = Garage(capacity)
         self.ground = Ground(city_map, seed)
+        self.wall_grid = WallGrid(wall_segments(city_map))
+        self.slots = Slots(capacity)
+        self.garage = Garage(capacity)
         self.contacts = Contacts(city_map)
         self.impacts = Impacts()
+        self.crowd = Crowd(streets_of(self.roads), capacity, seed=seed, loss=loss)
+        self.errands = Errands(self.crowd, spread=True)
         self.radio = Radio(city_map.radio_range_m, generator(seed, NAME, "radio"), loss)
         self.roadside = roadside_places(city_map)
-        self.sensors: Mapping[str, Sensor] = {
+        self.cams = CamTriggers(capacity)
+        self.front = np.zeros(capacity)
+        self.placed = Placed(capacity)
+        sensors: Mapping[str, Sensor] = {
             name: registry.load(SENSORS, name, "SENSOR", Sensor) for name in registry.names(SENSORS)
         }
+        self.banks = {name: Bank(sensor, seed, capacity) for name, sensor in sensors.items()}
+        self.readings = {
+            name: np.full((capacity, len(sensor.values)), np.nan)
+            for name, sensor in sensors.items()
+            if name != SCANNER
+        }
+        self.wishes = Wishes()
         self.hosted: dict[str, HostedCar] = {}
         self.remote: dict[str, RemoteCar] = {}
-        self.scanners: dict[str, Sampler] = {}
+        self.leased: dict[str, HostedCar] = {}
         self.pace = Pace(PERIOD_NS)
         self.every = {"snapshot": Every(20.0), "second": Every(1.0)}
         self.stop = CityStop(t_ns=0, engaged=False)
@@ -101,13 +125,14 @@ class World:
         self.tick = 0
         self.ignored = 0
         self.last_hit_ns: dict[str, int] = {}
-        self.verdicts: dict[str, MonitorStatus] = {}
+        self._tags = Numbers(city_map.first_vehicle_tag_id, never=city_map.tag.tag_id)
+        self._unnamed = 0
         self._came = 0
+        self._receivers = Receivers(self.roadside)
         for name in prepare:
             self.ground.warm(self.garage.prepare(name))
         self.contacts.warm()
         self._warm_scanner()
-        self._slots: set[int] = set()
 
     def cars(self) -> Iterator[AnyCar]:
         """Yield all cars, hosted ones first."""
@@ -118,10 +143,24 @@ class World:
         """Return a car by name."""
         return self.hosted.get(name) or self.remote.get(name)
 
-    def places(self) -> dict[str, Point]:
-        """Return where the antennas of all stations are, map frame [m]."""
-        cars = {car.name: (car.pose.x, car.pose.y) for car in self.cars()}
-        return {**self.roadside, **cars}
+    def receivers(self) -> Receivers:
+        """Return all stations that frames are brought to, but for the hosted cars."""
+        if not self.remote:
+            return self._receivers
+        cars = {car.name: (car.pose.x, car.pose.y) for car in self.remote.values()}
+        return Receivers({**self.roadside, **cars})
+
+    def locate(self) -> None:
+        """Note where all cars are and how they move."""
+        slots, placed = self.slots, self.placed
+        self.garage.locate(slots)
+        for car in self.remote.values():
+            slots.put(car.slot, car.pose)
+            placed.x[car.slot], placed.y[car.slot], placed.yaw[car.slot] = car.pose
+            if car.state is not None:
+                placed.speed[car.slot] = car.state.speed_mps
+                placed.lateral_speed[car.slot] = car.state.lateral_speed_mps
+                placed.yaw_rate[car.slot] = car.state.yaw_rate_radps
 
     def say(
         self,
@@ -146,33 +185,24 @@ class World:
             RunError: when no room is left for cars of this file.
         """
         model = self.garage.car(car_name)
-        hull = hull_of(model)
-        slot = self._free_slot()
+        slot = self._take(name, model, pose, hosted=True)
         fleet, row = self.garage.park(car_name, pose, slot)
         self.ground.settle(fleet, row)
-        self._take_slot(slot, hull)
-        lease = rules.grant(NAME, first_epoch(now_ns))
-        car = HostedCar(
+        self.crowd.enter(slot, limits_of(model), number(self.seed, name, "driver"))
+        for kind, bank in self.banks.items():
+            bank.fit(slot, name, model, fleet, row, now_ns, self._offset(kind))
+        self.hosted[name] = HostedCar(
             name=name,
             car=model,
             car_file=car_name,
-            tag_id=self.free_tag(),
+            tag_id=self._tags.take(),
             slot=slot,
+            slots=self.slots,
             fleet=fleet,
             row=row,
-            lease=lease,
-            signals=SignalView(self.city_map),
-            guard=Guard(lease.epoch),
-            samplers={
-                kind: self._sampler(sensor, name, model)
-                for kind, sensor in self.sensors.items()
-                if sensor.is_fitted(model)
-            },
+            lease=rules.grant(NAME, first_epoch(now_ns)),
         )
-        for verdict in self.verdicts.values():
-            car.signals.hear_monitor(verdict)
-        self.hosted[name] = car
-        return car
+        return self.hosted[name]
 
     def admit(
         self, name: str, kind: str, session: str, car_name: str, pose: Pose2, now_ns: int
@@ -183,69 +213,75 @@ class World:
             CarError: when there is no such car file.
         """
         model = self.garage.car(car_name)
-        hull = hull_of(model, movable=kind != "real")
-        slot = self._free_slot()
-        self._take_slot(slot, hull)
-        car = RemoteCar(
+        slot = self._take(name, model, pose, hosted=False, movable=kind != "real")
+        if kind != "real":
+            placed, offset = self.placed, self._offset(SCANNER)
+            self.banks[SCANNER].fit(slot, name, model, placed, slot, now_ns, offset)
+        self.remote[name] = RemoteCar(
             name=name,
             kind=kind,
             session=session,
             car=model,
             car_file=car_name,
-            tag_id=self.free_tag(),
+            tag_id=self._tags.take(),
             slot=slot,
             lease=rules.grant(name, first_epoch(now_ns)),
             pose=pose,
             heard_ns=now_ns,
         )
-        self.remote[name] = car
-        if kind != "real" and self.sensors[SCANNER].is_fitted(model):
-            self.scanners[name] = self._sampler(self.sensors[SCANNER], name, model)
-        return car
+        return self.remote[name]
 
     def remove(self, name: str) -> None:
         """Take a car off the map; nothing happens when there is none of that name."""
         if name in self.hosted:
             car = self.hosted.pop(name)
+            self.leased.pop(name, None)
             self.garage.scrap(car.car_file, car.row)
-            self._forget(car.slot)
+            self._forget(car)
         elif name in self.remote:
-            self._forget(self.remote.pop(name).slot)
-            self.scanners.pop(name, None)
-
-    def free_tag(self) -> int:
-        """Return the lowest tag id that no car wears."""
-        worn = {car.tag_id for car in self.cars()} | {self.city_map.tag.tag_id}
-        first = self.city_map.first_vehicle_tag_id
-        return next(i for i in range(first, first + len(worn) + 1) if i not in worn)
+            self._forget(self.remote.pop(name))
 
     def free_name(self) -> str:
         """Return a name for a car that has none."""
-        taken = {car.name for car in self.cars()}
-        return next(f"n{i}" for i in range(1, len(taken) + 2) if f"n{i}" not in taken)
+        while self.car(f"n{self._unnamed + 1}") is not None:
+            self._unnamed += 1
+        return f"n{self._unnamed + 1}"
 
     def _warm_scanner(self) -> None:
-        """Scan once for nobody, so that the kernel is compiled before the first car scans."""
-        nowhere = Around(np.zeros((1, 4)), np.zeros(1, np.int64), np.zeros(1, np.int64))
-        scan(self.garage.car(DEFAULT_CAR), np.zeros((1, 3)), nowhere)
+        """Scan once for nobody, so that the kernels are there before the first car scans."""
+        bank, model = Bank(self.banks[SCANNER].sensor, self.seed, 1), self.garage.car(DEFAULT_CAR)
+        bank.fit(0, "nobody", model, Placed(1), 0, 0)
+        nowhere = Scene(self.wall_grid, np.zeros((0, 4)), np.zeros(0, np.int64))
+        bank.step(0, lambda: nowhere)
 
-    def _take_slot(self, slot: int, hull: Hull) -> None:
+    def _take(
+        self, name: str, model: Car, pose: Pose2, *, hosted: bool, movable: bool = True
+    ) -> int:
+        hull = hull_of(model, movable=movable)
+        slot = self.slots.take(name, pose, hosted=hosted)
         self.contacts.add(slot, hull)
-        self._slots.add(slot)
+        _, self.front[slot] = model.vector("body.footprint_x_m")
+        return slot
 
-    def _forget(self, slot: int) -> None:
+    def _forget(self, car: AnyCar) -> None:
+        slot = car.slot
         self.contacts.remove(slot)
-        self._slots.remove(slot)
+        self.errands.forget(slot)
+        self.crowd.leave(slot)
+        self.cams.forget(slot)
+        for bank in self.banks.values():
+            bank.unfit(slot)
+        for values in self.readings.values():
+            values[slot] = np.nan
+        self.last_hit_ns.pop(car.name, None)
+        self._tags.give_back(car.tag_id)
+        self._unnamed = 0
+        self.slots.free(slot)
 
-    def _free_slot(self) -> int:
-        return next(i for i in range(len(self._slots) + 1) if i not in self._slots)
-
-    def _sampler(self, sensor: Sensor, name: str, model: Car) -> Sampler:
+    def _offset(self, kind: str) -> float:
         # The golden ratio spreads the cars' first scans evenly over a period, however many come.
-        self._came += 1
-        offset = self._came * 0.618034 % 1.0 if sensor.name == SCANNER else 0.0
-        rng = generator(self.seed, name, sensor.name)
-        return Sampler(sensor.facts(model), rng, offset)
+        self._came += kind == SCANNER
+        return self._came * 0.618034 % 1.0 if kind == SCANNER else 0.0
 
 
 def first_epoch(now_ns: int) -> int:

@@ -14,10 +14,12 @@ from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.join_request import JoinRequest
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.v2x.messages.spatem_tx import SpatemTx
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
+from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 MAP = load_map("driving_school")
@@ -110,10 +112,12 @@ def test_a_fault_of_the_monitor_outweighs_every_green(make_city):
 def test_a_car_that_comes_later_knows_of_the_fault_too(city):
     junction = MAP.junctions[0]
     city.run(1, MonitorStatus(junction=junction.name, t_ns=0, fault="dark", since_ns=0))
-    city.ask(SpawnRequest(vehicle="n1"))
-    city.run(1, green(city))
-    signals = city.world.hosted["n1"].signals
-    assert signals.colour(junction.name, junction.groups[0].name, city.now) == "flashing_red"
+    city.ask(SpawnRequest(vehicle="n1", spawn="a"))
+    city.ask(RouteRequest(vehicle="n1"))
+    for _ in range(40):
+        city.run_for(0.5, green(city))
+    assert city.shown("n1").speed_mps == pytest.approx(0.0, abs=1e-3)
+    assert city.heard(Trip)[-1].waiting_for == "signal"
 
 
 def test_a_remote_car_gets_scans_of_walls_and_cars_but_not_of_itself(city):

@@ -1,0 +1,168 @@
+"""A whole city beside real time: lockstep with 10 000 cars, with 2 000 LIDARs, and live with 1 000.
+
+Run with `python -m bench city`, or `python -m bench.city [large | lidar | flat | live ...]`. Cars
+circulate on a grid of streets with signals, one at each crossing. Ratios are simulated time over
+elapsed time: 1 is real time, more is faster. Stages are processor time of a tick of 20 ms.
+"""
+
+import gc
+import itertools
+import math
+import os
+import resource
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from scm.geometry import Pose2
+from scm.lockstep import Lockstep
+from scm.maps.load import load_map
+from scm.maps.model import CityMap
+from scm.part import Hears
+from scm.traffic.monitor_part import MonitorPart
+from scm.traffic.part import TrafficPart
+from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.route_request import RouteRequest
+from scm.world import step
+from scm.world.driving import send
+from scm.world.part import WorldPart
+from scm.world.world import PERIOD_NS, World
+
+STAGES = ("hear", "steer", "move", "watch", "sense", "publish", "call_out")
+WARM_S, SPAN_S = 2.0, 4.0
+GAP_M = 0.55
+TICK_MS = PERIOD_NS / 1e6
+
+
+class Stages:
+    """Adds up what each stage of a tick takes, by standing in for its name in `step`."""
+
+    def __init__(self) -> None:
+        self.spent_s = dict.fromkeys(STAGES, 0.0)
+        for name in STAGES:
+            setattr(step, name, self._timed(name, getattr(step, name)))
+
+    def _timed(self, name: str, stage: Callable[..., object]) -> Callable[..., object]:
+        def call(*given: object) -> object:
+            start = time.perf_counter()
+            try:
+                return stage(*given)
+            finally:
+                self.spent_s[name] += time.perf_counter() - start
+
+        return call
+
+    def clear(self) -> None:
+        self.spent_s = dict.fromkeys(STAGES, 0.0)
+
+
+def grid_for(cars: int, signals: int = 0) -> CityMap:
+    """Return the smallest grid city with room for so many cars, and at least so many signals."""
+    side = max(2, math.ceil(math.sqrt(signals)))
+    while True:
+        city_map = load_map(f"grid:{side}x{side}")
+        if sum(1 for _ in places(city_map)) >= cars:
+            return city_map
+        side += max(1, side // 8)
+
+
+def places(city_map: CityMap) -> Iterator[Pose2]:
+    """Yield places on lanes, a car's length and gap apart, and away from where lanes cross."""
+    from scm.maps.route import Roads
+
+    for lane in Roads(city_map).lanes.values():
+        free_m = lane.length_m - 2.0 * GAP_M
+        if "to" in lane.name or free_m <= 0.0:
+            continue
+        for i in range(int(free_m / GAP_M)):
+            yield lane.at(GAP_M * (i + 1))
+
+
+def fill(world: World, cars: int) -> None:
+    """Put cars onto the lanes, evenly over the map, and let them circulate."""
+    spots = list(places(world.city_map))
+    chosen = [spots[int(i * len(spots) / cars)] for i in range(cars)]
+    for i, pose in enumerate(chosen):
+        car = world.host(f"n{i + 1}", "nigel", pose, 0)
+        send(world, car, RouteRequest(vehicle=car.name), 0)
+
+
+def memory_mib() -> float:
+    """Return what this process holds in memory now."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 2**20
+
+
+def run(cars: int, stages: Stages, *, signals: int = 0, lidar: bool = False) -> dict[str, float]:
+    """Run a city in lockstep; return what it took."""
+    city_map = grid_for(cars, signals)
+    part = WorldPart(city_map, room=cars)
+    gc.collect()
+    before_mib = memory_mib()
+    fill(part.world, cars)
+    held_kib = (memory_mib() - before_mib) * 1024.0 / cars
+    part.world.garage.use_threads(os.cpu_count() or 1)
+    parts = [part, TrafficPart(city_map), MonitorPart(city_map)]
+    with Lockstep(parts) as city:
+        scans = city.hear(Hears(LidarScan)) if lidar else None
+        city.run_for(WARM_S)
+        stages.clear()
+        if scans is not None:
+            scans.take()
+        began, used = time.perf_counter(), time.process_time()
+        city.run_for(SPAN_S)
+        took, busy = time.perf_counter() - began, time.process_time() - used
+    return {
+        "cars": cars,
+        "ratio": SPAN_S / took,
+        "busy": busy / took,
+        "us_a_car": took / (SPAN_S * 1e9 / PERIOD_NS) / cars * 1e6,
+        "kib_a_car": held_kib,
+        "junctions": len(city_map.junctions),
+        "scans": len(scans.take()) / SPAN_S if scans is not None else 0.0,
+        "speed": float(part.world.slots.speed[part.world.slots.hosted].mean()),
+    }
+
+
+def report(name: str, stages: Stages, row: dict[str, float]) -> None:
+    ticks = SPAN_S * 1e9 / PERIOD_NS
+    parts = "  ".join(f"{n} {s / ticks * 1e3:.2f}" for n, s in stages.spent_s.items())
+    others = SPAN_S / row["ratio"] / ticks - sum(stages.spent_s.values()) / ticks
+    print(
+        f"{name:<28} {row['cars']:>6.0f} cars {row['junctions']:>4.0f} signals "
+        f"{row['ratio']:>6.2f} x real time  {row['us_a_car']:>6.2f} us a car and tick  "
+        f"{row['kib_a_car']:>5.2f} KiB a car  mean {row['speed']:.2f} m/s"
+        + (f"  {row['scans']:.0f} scans/s" if row["scans"] else "")
+    )
+    print(f"    ms a tick: {parts}  other parts and bus {others * 1e3:.2f}", flush=True)
+
+
+def flat(stages: Stages) -> None:
+    """Print how the cost of a car depends on their number."""
+    cost = {}
+    for cars in (100, 300, 1000, 3000, 10_000):
+        row = run(cars, stages)
+        cost[cars] = row["us_a_car"]
+        report("scaling", stages, row)
+    for cars, us in itertools.islice(cost.items(), 1, None):
+        print(f"    {cars:>6} cars: a car costs {us / cost[100]:.2f} of what it costs among 100")
+
+
+def main(wanted: tuple[str, ...] = ("large", "lidar", "flat")) -> None:
+    stages = Stages()
+    if "large" in wanted:
+        report("lockstep, contacts", stages, run(10_000, stages))
+    if "lidar" in wanted:
+        row = run(2000, stages, signals=100, lidar=True)
+        report("lockstep, LIDAR on all", stages, row)
+    if "flat" in wanted:
+        flat(stages)
+    if "live" in wanted:
+        from bench.city_live import live
+
+        live()
+
+
+if __name__ == "__main__":
+    main(tuple(sys.argv[1:]) or ("large", "lidar", "flat"))

@@ -1,0 +1,105 @@
+"""What every car of the city has, as arrays by slot: stages of a tick work on these, not on cars.
+
+A slot is a car's number in the whole world, hosted or remote, the lowest free one first. Motion is
+read from the fleets once a tick; what only a person asks for is read from them on demand.
+"""
+
+import heapq
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.errors import RunError
+from scm.geometry import Pose2
+
+MODES = ("drive", "hold", "stop", "idle")
+DRIVE, HOLD, STOP, IDLE = range(4)
+CODES = {mode: code for code, mode in enumerate(MODES)}
+
+
+class Numbers:
+    """Gives out whole numbers from `first` on, the lowest free one first."""
+
+    def __init__(self, first: int = 0, never: int | None = None) -> None:
+        self._next = first
+        self._never = never
+        self._returned: list[int] = []
+
+    def take(self) -> int:
+        """Return a number and keep it from others."""
+        if self._returned:
+            return heapq.heappop(self._returned)
+        self._next += self._next == self._never
+        self._next += 1
+        return self._next - 1
+
+    def give_back(self, number: int) -> None:
+        """Let a number be taken again."""
+        heapq.heappush(self._returned, number)
+
+
+class Slots:
+    """Arrays of shape (capacity,).
+
+    Attributes:
+        names: Of the car in each slot; empty where there is none.
+        used: Whether a car has the slot; `hosted`: and the world simulates it.
+        x, y, yaw: Pose of the rear axle, map frame, at the end of the last tick.
+        speed, yaw_rate: Along the body, about the vertical; 0 for remote cars.
+        driven: Whether its own driver drives it: at home, sent, and in one piece.
+        throttle, steering: What the hosted cars are commanded.
+        mode: Number in `MODES` of what `VehicleState` calls so.
+        arrived: Whether it stands at the end of its trip.
+        hazard: Whether the hazard lights must flash: its commander was lost.
+        diverged: Whether its numbers left every physical range, and that was told.
+        seq: Reports sent.
+    """
+
+    def __init__(self, capacity: int) -> None:
+        self.capacity = capacity
+        self.names = [""] * capacity
+        self.used, self.hosted, self.driven, self.arrived, self.hazard, self.diverged = (
+            np.zeros(capacity, np.bool_) for _ in range(6)
+        )
+        self.x, self.y, self.yaw, self.speed, self.yaw_rate, self.throttle, self.steering = (
+            np.zeros(capacity) for _ in range(7)
+        )
+        self.mode = np.full(capacity, IDLE, np.int8)
+        self.seq = np.zeros(capacity, np.int64)
+        self._numbers = Numbers()
+
+    def take(self, name: str, pose: Pose2, *, hosted: bool) -> int:
+        """Give a car a slot.
+
+        Raises:
+            RunError: when all are in use.
+        """
+        slot = self._numbers.take()
+        if slot >= self.capacity:
+            self._numbers.give_back(slot)
+            msg = f"the city is full: it holds {self.capacity} cars"
+            raise RunError(msg)
+        self.names[slot], self.used[slot], self.hosted[slot] = name, True, hosted
+        self.put(slot, pose)
+        return slot
+
+    def put(self, slot: int, pose: Pose2) -> None:
+        """Say where a car is."""
+        self.x[slot], self.y[slot], self.yaw[slot] = pose
+
+    def free(self, slot: int) -> None:
+        """Take a slot back and forget what its car was doing."""
+        self.names[slot] = ""
+        for flags in (
+            self.used, self.hosted, self.driven, self.arrived, self.hazard, self.diverged,
+        ):  # fmt: skip
+            flags[slot] = False
+        for values in (self.speed, self.yaw_rate, self.throttle, self.steering):
+            values[slot] = 0.0
+        self.mode[slot], self.seq[slot] = IDLE, 0
+        self._numbers.give_back(slot)
+
+    def nearest_m(self, x: float, y: float) -> float:
+        """Return how far the nearest car's rear axle is [m]; infinity in an empty city."""
+        away: Floats = np.hypot(self.x - x, self.y - y)[self.used]
+        return float(away.min()) if len(away) else float("inf")

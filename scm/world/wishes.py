@@ -1,0 +1,51 @@
+"""What anybody would hear of what the world could say: what is dear is not made for nobody."""
+
+from collections.abc import Sequence
+
+from scm.part import IsWanted
+from scm.v2x.message import Message
+
+ASK_EVERY_TICKS = 50
+NOBODY = "_"
+
+
+class Wishes:
+    """Asks the bus, for single stations only once a second; without a bus everything is wanted."""
+
+    def __init__(self) -> None:
+        self._is_wanted: IsWanted | None = None
+        self._tick = 0
+        self._asked: dict[tuple[type[Message], str], bool] = {}
+
+    def learn(self, is_wanted: IsWanted) -> None:
+        """Take the bus's word from now on."""
+        self._is_wanted = is_wanted
+
+    def begin_tick(self) -> None:
+        """Let a tick pass: answers about single stations grow old."""
+        self._tick += 1
+        if self._tick % ASK_EVERY_TICKS == 0:
+            self._asked.clear()
+
+    def any(self, kind: type[Message]) -> bool:
+        """Return whether anybody hears any message of a class."""
+        return self._is_wanted is None or self._is_wanted(kind, {})
+
+    def all(self, kind: type[Message], key: str) -> bool:
+        """Return whether somebody hears a class whatever the key part: even that of nobody."""
+        return self._is_wanted is None or self._one(kind, key, NOBODY)
+
+    def of(self, kind: type[Message], key: str, names: Sequence[str]) -> list[bool]:
+        """Return for each name whether messages of a class with this key part are heard."""
+        if self.all(kind, key):
+            return [True] * len(names)
+        if not self.any(kind):
+            return [False] * len(names)
+        return [self._one(kind, key, name) for name in names]
+
+    def _one(self, kind: type[Message], key: str, name: str) -> bool:
+        known = self._asked.get((kind, name))
+        if known is None:
+            known = self._is_wanted is None or self._is_wanted(kind, {key: name})
+            self._asked[kind, name] = known
+        return known

@@ -1,0 +1,49 @@
+"""Slots: the lowest number first, nothing of the last car left in them, and a city that is full."""
+
+import pytest
+
+from scm.errors import RunError
+from scm.geometry import Pose2
+from scm.world.slots import IDLE, Numbers, Slots
+
+SOMEWHERE = Pose2(1.0, 2.0, 0.5)
+
+
+def test_numbers_come_back_lowest_first_and_the_forbidden_one_never():
+    numbers = Numbers(3, never=5)
+    taken = [numbers.take() for _ in range(4)]
+    numbers.give_back(6)
+    numbers.give_back(4)
+    assert taken == [3, 4, 6, 7]
+    assert [numbers.take() for _ in range(3)] == [4, 6, 8]
+
+
+def test_a_slot_is_given_again_clean():
+    slots = Slots(2)
+    first = slots.take("n1", SOMEWHERE, hosted=True)
+    slots.driven[first] = slots.hazard[first] = slots.arrived[first] = True
+    slots.throttle[first], slots.mode[first], slots.seq[first] = 0.5, 0, 7
+    slots.free(first)
+    again = slots.take("n2", SOMEWHERE, hosted=False)
+    assert (again, slots.names[again], bool(slots.hosted[again])) == (first, "n2", False)
+    left = [bool(flags[again]) for flags in (slots.driven, slots.hazard, slots.arrived)]
+    assert left == [False, False, False]
+    assert (slots.throttle[again], slots.mode[again], slots.seq[again]) == (0.0, IDLE, 0)
+
+
+def test_a_full_city_takes_nobody_until_somebody_leaves():
+    slots = Slots(1)
+    slots.take("n1", SOMEWHERE, hosted=True)
+    with pytest.raises(RunError, match="1 cars"):
+        slots.take("n2", SOMEWHERE, hosted=True)
+    slots.free(0)
+    assert slots.take("n2", SOMEWHERE, hosted=True) == 0
+
+
+def test_the_nearest_car_is_looked_for_among_those_that_are_there():
+    slots = Slots(3)
+    assert slots.nearest_m(0.0, 0.0) == float("inf")
+    gone = slots.take("n1", Pose2(0.1, 0.0, 0.0), hosted=True)
+    slots.take("n2", Pose2(3.0, 4.0, 0.0), hosted=False)
+    slots.free(gone)
+    assert slots.nearest_m(0.0, 0.0) == 5.0
