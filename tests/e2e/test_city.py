@@ -15,7 +15,7 @@ import pytest
 from scm.recorder.mcap_file import read_run
 from tests.e2e.city_process import CityProcess, city, wait_for
 
-PARTS = {"world", "traffic", "monitor", "eye", "api", "record"}
+PARTS = {"world", "traffic", "monitor", "eye", "camera", "api", "record"}
 
 
 @pytest.fixture(scope="module")
