@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from scm.arrays import Floats
+from scm.arrays import Bools, Floats
 from scm.maps.model import Box
 from scm.v2x.messages.world_snapshot import SnapshotBox
 
@@ -62,8 +62,7 @@ class Boxes:
         """Change velocities (k, 3) and places (k, 2); what is next to no velocity becomes none."""
         self.motion[:, 3:] += dv
         self.motion[:, :2] += shift
-        slow = np.hypot(self.motion[:, 3], self.motion[:, 4]) < STILL_MPS
-        self.motion[slow & (np.abs(self.motion[:, 5]) < STILL_RADPS), 3:] = 0.0
+        self.motion[is_still(self.motion[:, 3:]), 3:] = 0.0
 
     def outline(self) -> Floats:
         """Return their faces, (4 k, 4) x0, y0, x1, y1, counter-clockwise [m]."""
@@ -81,6 +80,12 @@ class Boxes:
             SnapshotBox(name=name, x_m=x, y_m=y, yaw_rad=yaw)
             for name, (x, y, yaw) in zip(self.names, self.poses.tolist(), strict=True)
         )
+
+
+def is_still(velocity: Floats) -> Bools:
+    """Return which velocities (k, 3) x, y, yaw rate are no more than dust of the solver."""
+    slow = np.hypot(velocity[:, 0], velocity[:, 1]) < STILL_MPS
+    return np.asarray(slow & (np.abs(velocity[:, 2]) < STILL_RADPS))
 
 
 def mass_of(box: Box) -> float:

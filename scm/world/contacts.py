@@ -21,7 +21,7 @@ from pymunk import batch
 
 from scm.arrays import Bools, Floats, Ints
 from scm.maps.model import CityMap
-from scm.world.boxes import Boxes
+from scm.world.boxes import Boxes, is_still
 from scm.world.near import Near, obstacles_of
 from scm.world.solids import Hull, box_body, car_body, obstacle_boxes, outline_of, solids
 
@@ -190,7 +190,7 @@ class _Ring:
         lightness = np.zeros(len(keys) + 1)  # a wall is row -1: the last, immovable one
         lightness[inside] = self._lightness
         # A box that the floor holds is no way out: shifts would creep it along under any push.
-        holds = (self._order < len(self._boxes)) & ~after[: len(inside), 3:].any(axis=1)
+        holds = (self._order < len(self._boxes)) & is_still(after[: len(inside), 3:])
         lightness[inside[holds]] = 0.0
         return dv, _shifts(pairs, normals, depths, lightness), pairs
 
