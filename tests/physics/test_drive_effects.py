@@ -1,6 +1,7 @@
 """Each effect between throttle command and wheel does what its equation says."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -12,10 +13,28 @@ from scm.vehicles.jit import plain
 from scm.vehicles.lipo import cell_voltage, loaded_voltage, pack_current
 
 BATTERY = ["battery_charge", "battery_curve", "battery_resistance"]
+# one kernel for all tests: whatever a test does not name stays neutral
+DRIVE = [
+    "drive_lag", "drive_deadband", "drive_gain", "motor_gain", "drive_asymmetry",
+    "battery_sag", "motor_fade", "motor_heating", "motor_warmth", "stiction",
+]  # fmt: skip
+
+
+@cache
+def car_with(names):
+    terms = all_terms()
+    numbers = {
+        p.key: terms[n].neutral.get(p.name, p.default) for n in DRIVE for p in terms[n].params
+    }
+    more = [name for name in names if name not in DRIVE]
+    return load_car("nigel").with_terms([*DRIVE, *more], numbers)
 
 
 def fleet_with(names, values=None, throttle=1.0):
-    fleet = Fleet(load_car("nigel").with_terms(names, values or {}), 1)
+    terms = all_terms()
+    own = {p.key: p.default for n in names if n in DRIVE for p in terms[n].params}
+    car = car_with(tuple(sorted(n for n in names if n not in DRIVE)))
+    fleet = Fleet(car.with_terms([], own | (values or {})), 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
     fleet.throttle[0] = throttle
     return fleet

@@ -11,10 +11,22 @@ from scm.vehicles.fleet import Fleet
 from scm.vehicles.jit import plain
 
 LIMIT = 0.5235988
+# one kernel for all tests: whatever a test does not name stays neutral
+STEERING = [
+    "steer_saturation", "steer_gain", "steer_lag", "servo_torque", "steer_rate",
+    "steer_backlash", "steer_trim", "steer_compliance",
+]  # fmt: skip
 
 
 def fleet_with(names, values=None, car="nigel"):
-    fleet = Fleet(load_car(car).with_terms(names, values or {}), 1)
+    terms = all_terms()
+    numbers = {
+        p.key: p.default if n in names else terms[n].neutral.get(p.name, p.default)
+        for n in STEERING
+        for p in terms[n].params
+    }
+    more = [name for name in names if name not in STEERING]
+    fleet = Fleet(load_car(car).with_terms([*STEERING, *more], numbers | (values or {})), 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
     return fleet
 
