@@ -1,6 +1,7 @@
 """`scm show`: a map, a car, the physical effects or the messages, for people."""
 
 import argparse
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,10 +22,13 @@ _MAP_KINDS = {
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("what", choices=("map", "car", "terms", "messages"))
     parser.add_argument(
-        "name", nargs="?", help="map or car, by name or file; without: the names there are"
+        "name", nargs="?", help="map or car, by name or file, or an effect; without: what there is"
     )
     parser.add_argument(
         "--out", type=Path, metavar="FILE", help="map: the SVG picture to write (NAME.svg)"
+    )
+    parser.add_argument(
+        "--docs", type=Path, metavar="DIR", help="terms: write a page and a picture of each"
     )
 
 
@@ -66,10 +70,26 @@ def _car(arguments: argparse.Namespace) -> str:
 
 
 def _terms(arguments: argparse.Namespace) -> str:
-    from scm.vehicles.describe import describe_terms
+    from scm.vehicles.describe_effects import describe_term, list_effects
 
-    del arguments
-    return describe_terms()
+    if arguments.docs is not None:
+        return _manual(arguments.docs, arguments.name)
+    return list_effects() if arguments.name is None else describe_term(arguments.name)
+
+
+def _manual(folder: Path, name: str | None) -> str:
+    from scm.vehicles.manual.folder import chosen_effects, write_manual
+
+    chosen = chosen_effects(name)
+    count = len(chosen)
+
+    def tell(done: int, effect: str) -> None:
+        bar = "#" * (30 * done // count)
+        print(f"\r[{bar:<30}] {done}/{count} {effect:<24}", end="", file=sys.stderr, flush=True)
+
+    write_manual(folder, chosen, tell, index=name is None)
+    print(f"\r{'':<66}\r", end="", file=sys.stderr)
+    return f"{count} page{'s' * (count > 1)} with pictures in {folder}"
 
 
 def _messages(arguments: argparse.Namespace) -> str:

@@ -1,68 +1,116 @@
-"""A car and its effects as text for people: `scm show car nigel`, `scm show terms`."""
+"""A car as text for people, `scm show car nigel`: its effects, its numbers, and what is odd."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from scm.vehicles import body14
 from scm.vehicles.car import Car, Quantity, all_terms
 from scm.vehicles.facts import FACTS
 from scm.vehicles.param import Param
-from scm.vehicles.term import Term
+from scm.vehicles.term import Term, flat
 
 _Row = tuple[str, str, str, str, str]
 
 
 def describe_car(car: Car) -> str:
-    """Return the assembled car: every effect with its equation, every number with its source."""
+    """Return the car: its effects in a line each, every number of its file, and warnings."""
     title = f"{car.name}  {car.scale}".rstrip()
+    effects = _effects(car)
     lines = [
         title,
         "=" * len(title),
-        f"{len(car.terms)} effects on 14 degrees of freedom: 6 of the body, 4 wheel hops, 4 spins",
-        f"file  {car.path}",
+        f"file     {car.path}",
+        "skeleton 14 degrees of freedom: body 6, wheel hops 4, wheel spins 4",
+        f"effects  {len(effects)} of the {len(all_terms())} known; "
+        "`scm show terms NAME` shows an equation",
         "",
-        "body  masses and measures of the skeleton; no effect",
-        *_table([_param_row(car, param) for param in body14.PARAMS]),
+        "EFFECTS, in the file's order",
+        *_columns([(f"  {term.name}", _without_name(term)) for term in effects]),
+        "",
+        "NUMBERS, by the car file's sections: value ± one standard deviation, unit, source",
     ]
-    for term in car.terms:
-        lines += ["", *_term_head(term)]
-        lines += _table([_param_row(car, param) for param in term.params])
-    facts = [key for key in FACTS if car.has(key)]
-    lines += ["", "outline, contacts, sensors"]
-    lines += _table([_row(key, car.values[key], "") for key in facts])
+    for section, rows in _sections(car).items():
+        lines += ["", f"  [{section}]", *_table(rows)]
+    warnings = list(warnings_of(car))
+    lines += ["", f"WARNINGS  {len(warnings) or 'none'}", *(f"  ! {text}" for text in warnings)]
     return "\n".join(lines) + "\n"
 
 
-def describe_terms() -> str:
-    """Return every effect known: equation, where it holds, what it shows in, its source."""
-    lines: list[str] = []
-    for term in all_terms().values():
-        lines += [*_term_head(term)]
-        lines += [
-            f"    {heading.lower()}: {term.doc_line(heading)}"
-            for heading in ("Holds", "Shows in", "Source")
-        ]
-        lines += _table(
-            [
-                (p.name, f"{p.default:g}", p.unit, f"{p.bounds[0]:g} to {p.bounds[1]:g}", p.about)
-                for p in term.params
-            ]
-        )
-        lines.append("")
-    return "\n".join(lines)
+def warnings_of(car: Car) -> Iterator[str]:
+    """Say what is allowed, but seldom meant: silent defaults, numbers without effect or source."""
+    params = _params(car)
+    defaults = [key for key in params if car.values[key].source.startswith("default of")]
+    if defaults:
+        yield f"not in the file, so at their defaults: {', '.join(defaults)}"
+    for reader, keys in _idle(car, {*params, *FACTS}).items():
+        yield f"{reader} is not listed, so nothing reads {', '.join(keys)}"
+    for key, quantity in car.values.items():
+        if not quantity.source:
+            yield f"{key}: nobody says where {_value(quantity)} comes from; add source = ..."
+    yield from _at_bounds(car, params)
+    yield from _tips_over(car)
 
 
-def _term_head(term: Term) -> Iterator[str]:
-    yield f"{term.name}  {term.about}"
-    yield from (f"    {line}" for line in term.equation.split("; ") if line)
+def _idle(car: Car, used: set[str]) -> dict[str, list[str]]:
+    """Keys that no listed effect reads, by the first effect that would."""
+    found: dict[str, list[str]] = {}
+    for key in car.values:
+        if key not in used:
+            reader = next(term.name for term in all_terms().values() if key in _keys(term))
+            found.setdefault(reader, []).append(key)
+    return found
 
 
-def _param_row(car: Car, param: Param) -> _Row:
-    name, value, unit, source, _ = _row(param.name, car.values[param.key], "")
-    return name, value, unit, source, param.about
+def _at_bounds(car: Car, params: Mapping[str, Param]) -> Iterator[str]:
+    for key, param in params.items():
+        quantity, (low, high) = car.values[key], param.bounds
+        if quantity.std is not None and isinstance(quantity.value, float) and param.fit:
+            least, most = quantity.value - quantity.std, quantity.value + quantity.std
+            if least < low < quantity.value or quantity.value < high < most:
+                yield f"{key}: {_value(quantity)} reaches past its bounds {low:g} to {high:g}"
 
 
-def _row(name: str, quantity: Quantity, about: str) -> _Row:
-    return name, _value(quantity), quantity.unit, quantity.source, about
+def _tips_over(car: Car) -> Iterator[str]:
+    grip = next(
+        (car.value(k) for k in ("tyre.lateral_force_extremum", "tyre.front_d") if car.has(k)), None
+    )
+    leans = 0.5 * car.value("body.track_m") / car.value("body.cog_height_m")
+    if grip is not None and grip > leans:
+        yield f"its tyres hold {grip:.2g} times the load, but it rolls over at {leans:.2g}"
+
+
+def _effects(car: Car) -> list[Term]:
+    known = all_terms()
+    further = {part.name for term in car.terms for part in term.also}
+    return [term for term in car.terms if term.name in known or term.name not in further]
+
+
+def _without_name(term: Term) -> str:
+    """The effect's sentence; where it opens with its own name, only what follows."""
+    head, colon, rest = term.about.partition(": ")
+    same = head.lower().replace("-", "").split() == term.name.split("_")
+    return rest[:1].upper() + rest[1:] if colon and same else term.about
+
+
+def _keys(term: Term) -> set[str]:
+    return {param.key for part in flat([term]) for param in part.params}
+
+
+def _params(car: Car) -> dict[str, Param]:
+    own = [*body14.PARAMS, *(param for term in car.terms for param in term.params)]
+    return {param.key: param for param in own}
+
+
+def _sections(car: Car) -> dict[str, list[_Row]]:
+    params = _params(car)
+    sections: dict[str, list[_Row]] = {}
+    for key in dict.fromkeys([*params, *car.values]):
+        quantity = car.values[key]
+        section, _, name = key.partition(".")
+        about = params[key].about if key in params else ""
+        unit = "" if quantity.unit == "1" else quantity.unit
+        row = (name, _value(quantity), unit, about, quantity.source)
+        sections.setdefault(section, []).append(row)
+    return sections
 
 
 def _value(quantity: Quantity) -> str:
@@ -75,7 +123,16 @@ def _value(quantity: Quantity) -> str:
 
 
 def _table(rows: Sequence[_Row]) -> Iterator[str]:
-    widths = [max(9, *(min(len(row[i]), 34) for row in rows)) for i in range(3)] if rows else []
-    for name, value, unit, source, about in rows:
-        head = f"      {name:<{widths[0]}}  {value:<{widths[1]}}  {unit:<{widths[2]}}"
-        yield f"{head}  {about}{'  ' if about else ''}[{source}]".rstrip()
+    widths = [max(min(len(row[i]), most) for row in rows) for i, most in enumerate((28, 24, 12))]
+    meaning = max(len(row[3]) for row in rows)
+    for name, value, unit, about, source in rows:
+        head = f"    {name:<{widths[0]}}  {value:<{widths[1]}}  {unit:<{widths[2]}}"
+        if len(value) > widths[1]:  # a long list takes a line of its own
+            yield f"    {name:<{widths[0]}}  {value}"
+            head = f"    {'':<{widths[0]}}  {'':<{widths[1]}}  {unit:<{widths[2]}}"
+        yield f"{head}  {about:<{meaning}}  {source}".rstrip()
+
+
+def _columns(rows: Sequence[tuple[str, str]]) -> Iterator[str]:
+    width = max(len(name) for name, _ in rows)
+    yield from (f"{name:<{width}}  {text}" for name, text in rows)

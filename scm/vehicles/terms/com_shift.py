@@ -1,4 +1,4 @@
-"""Centre of gravity that lies elsewhere along the car than the car file says.
+"""Com shift: the centre of gravity lies elsewhere along the car than its file says.
 
     added_cog_x += shift    [m]
 

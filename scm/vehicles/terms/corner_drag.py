@@ -1,4 +1,4 @@
-"""Drag that comes with turning: tyres dragged sideways, scrubbing linkages.
+"""Corner drag: turning costs speed, by tyres dragged sideways and scrubbing linkages.
 
     force_x += -coefficient * mass * |yaw_rate| * vx    [N]
 

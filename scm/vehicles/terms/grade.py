@@ -1,4 +1,4 @@
-"""Floor that is one tilted plane: gravity pulls the car down it.
+"""Grade: the floor is one tilted plane, and gravity pulls the car down it.
 
     F = mass * gravity * slope / sqrt(1 + slope^2)        [N]
     force_x += -F * cos(uphill - yaw),  force_y += -F * sin(uphill - yaw)

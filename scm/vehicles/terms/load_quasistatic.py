@@ -1,4 +1,4 @@
-"""Load of a wheel from accelerations at once, in place of what springs and dampers let through.
+"""Quasi-static load: accelerations move load at once, past springs and dampers.
 
     along  = (1 - 2 front) * mass * accel_x * cog_height / (2 wheelbase)                [N]
     across = -side * 2 rest_load / gravity * accel_y * cog_height / track               [N]

@@ -1,4 +1,4 @@
-"""Centre of gravity higher than the car file says: more load changes wheels in turns and stops.
+"""Load transfer: a higher centre of gravity moves more load in turns and stops.
 
     added_cog_z += height    [m]
 

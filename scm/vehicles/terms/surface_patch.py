@@ -1,4 +1,4 @@
-"""A round spot of floor with other grip and other rolling resistance.
+"""Surface patch: a round spot of floor has other grip and other rolling resistance.
 
     inside = clip(1/2 + (radius - distance) / edge, 0, 1),  edge = 0.02 m
     grip_here = floor_grip * (1 + (grip - 1) * inside),  rolling = floor_rolling + rolling * inside

@@ -1,4 +1,4 @@
-"""Tyre forces along and across that share one friction: who brakes hard holds less in a turn.
+"""Combined slip: forces along and across share one friction, so hard brakes hold less.
 
     p = spin slip / slip_extremum,  q = side slip / side_slip_extremum,  r = sqrt(p^2 + q^2)
     tyre_x += load * grip * p / r * F(r),  tyre_y += -load * grip * q / r * F_side(r)    [N]

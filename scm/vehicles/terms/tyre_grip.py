@@ -1,4 +1,4 @@
-"""Tyre with more or less friction than the car file says, on any floor.
+"""Tyre grip: more or less friction than the car file says, on any floor.
 
     grip = scale * grip_here,  both of the tyre's forces times grip
 

@@ -1,4 +1,4 @@
-"""Tyre that must roll a length before its side force has built up, and holds like a spring at rest.
+"""Tyre relaxation: side force needs a rolled length to build up, and at rest it holds.
 
     length * d(side_lag)/dt + |v_long| * side_lag = v_lat
     side_lag_speed = length / max(dt, rubber)

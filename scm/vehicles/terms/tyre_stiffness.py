@@ -1,4 +1,4 @@
-"""Tyre stiffer or softer than the car file says: its slip counts more, or less.
+"""Tyre stiffness: the tyre slips more or less under a force than the car file says.
 
     slip_scale = scale,  slip of both directions times slip_scale, before the tyre's curve
 

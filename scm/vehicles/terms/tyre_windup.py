@@ -1,4 +1,4 @@
-"""Tyre that winds up before it drives or brakes, and holds the car like a spring at rest.
+"""Tyre windup: force along needs a rolled length to build up, and at rest it holds.
 
     length * d(spin_lag)/dt + |v_long| * spin_lag = wheel_radius * omega - v_long
     spin_lag_speed = length / max(dt, rubber)

@@ -1,4 +1,4 @@
-"""Front wheels that point less into a turn the harder the car turns.
+"""Understeer: the front wheels point less into a turn the harder the car turns.
 
     road_angle = steer_angle - gradient * vx * yaw_rate    [rad]
 

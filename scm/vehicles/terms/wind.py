@@ -1,4 +1,4 @@
-"""Steady force on the body in one direction of the world: a fan, a cable, a draught.
+"""Wind: a steady force in one direction of the world, of a fan, a cable or a draught.
 
     force_x += push_x * cos(yaw) + push_y * sin(yaw)    [N]
     force_y += push_y * cos(yaw) - push_x * sin(yaw)    [N]

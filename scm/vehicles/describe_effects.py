@@ -1,0 +1,109 @@
+"""All effects as text for people, `scm show terms`: a line each, and one of them whole."""
+
+from collections.abc import Iterator, Sequence
+
+from scm.errors import TermError, nearest
+from scm.vehicles.car import all_terms
+from scm.vehicles.chapters import CHAPTERS, OTHERS, chapter_of
+from scm.vehicles.measure import Measure, all_measures
+from scm.vehicles.param import Param
+from scm.vehicles.signals import SIGNALS
+from scm.vehicles.term import Term, flat, reads
+
+Effect = Term | Measure
+
+
+def all_effects() -> dict[str, Effect]:
+    """Return every effect on a car, then every fault of measuring it, by name."""
+    return {**all_terms(), **all_measures()}
+
+
+def effect_named(name: str) -> Effect:
+    """Return one effect.
+
+    Raises:
+        TermError: when there is none of this name.
+    """
+    known = all_effects()
+    if name not in known:
+        msg = f"no effect {name!r}{nearest(name, list(known))}; `scm show terms` lists them"
+        raise TermError(msg)
+    return known[name]
+
+
+def list_effects() -> str:
+    """Return a line for each effect, by what it acts on."""
+    terms, faults = list(all_terms().values()), list(all_measures().values())
+    width = max(len(name) for name in all_effects())
+    lines = [f"{len(terms)} effects on a car, {len(faults)} faults of measuring it; "
+             "`scm show terms NAME` tells one whole"]  # fmt: skip
+    for title in [*(title for title, _ in CHAPTERS), OTHERS]:
+        chosen = [term for term in terms if chapter_of(term) == title]
+        lines += ["", title, *_lines(chosen, width)] if chosen else []
+    lines += ["", "Faults of measuring", *_lines(faults, width)]
+    return "\n".join(lines)
+
+
+def describe_term(name: str) -> str:
+    """Return one effect whole: equation, numbers, where it holds and shows, source.
+
+    Raises:
+        TermError: when there is none of this name.
+    """
+    effect = effect_named(name)
+    lines = [name, "=" * len(name), effect.about, ""]
+    lines += [f"    {line}" for line in effect.equation.split("; ")]
+    lines += [""]
+    for heading in ("Holds", "Shows in", "Source"):
+        lines.append(f"{heading + ':':<10} {effect.doc_line(heading)}")
+    if isinstance(effect, Term):
+        lines += [f"{'Reads:':<10} {_reads(effect)}", f"{'Acts on:':<10} {_acts_on(effect)}"]
+    lines += ["", *_table(params_of(effect), neutral_of(effect))]
+    return "\n".join(lines)
+
+
+def params_of(effect: Effect) -> list[Param]:
+    """Return the numbers of an effect, each once."""
+    found = effect.params if isinstance(effect, Measure) else _of_term(effect)
+    return list({param.key: param for param in found}.values())
+
+
+def _of_term(term: Term) -> Iterator[Param]:
+    yield from (param for part in flat([term]) for param in part.params)
+
+
+def neutral_of(effect: Effect) -> dict[str, float]:
+    """Return the values at which an effect does nothing, by parameter name."""
+    parts = flat([effect]) if isinstance(effect, Term) else (effect,)
+    return {name: value for part in parts for name, value in part.neutral.items()}
+
+
+def _lines(effects: Sequence[Effect], width: int) -> Iterator[str]:
+    yield from (f"  {effect.name:<{width}}  {effect.about}" for effect in effects)
+
+
+def _reads(term: Term) -> str:
+    laws = [law for part in flat([term]) for law in (part.law, part.damping) if law]
+    names = dict.fromkeys(name for law in laws for name in reads(law) if name in SIGNALS)
+    return ", ".join(names) or "only its own numbers"
+
+
+def _acts_on(term: Term) -> str:
+    return "; ".join(f"{t.target} ({SIGNALS[t.target].about})" for t in flat([term]))
+
+
+def _table(params: Sequence[Param], neutral: dict[str, float]) -> Iterator[str]:
+    if not params:
+        yield "It has no numbers of its own."
+        return
+    rows = [("key in a car file", "default", "unit", "bounds", "neutral", "meaning")]
+    for param in params:
+        low, high = param.bounds
+        nothing = f"{neutral[param.name]:g}" if param.name in neutral else ""
+        unit = "" if param.unit == "1" else param.unit
+        rows.append((param.key, f"{param.default:g}", unit, f"{low:g} to {high:g}", nothing,
+                     param.about))  # fmt: skip
+    widths = [max(len(row[i]) for row in rows) for i in range(5)]
+    for row in rows:
+        cells = [f"{cell:<{width}}" for cell, width in zip(row[:5], widths, strict=True)]
+        yield "  ".join([*cells, row[5]]).rstrip()

@@ -1,0 +1,73 @@
+"""The manual as a folder: a page and a picture for each effect and fault, and an index."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from scm.vehicles.chapters import CHAPTERS, OTHERS, chapter_of
+from scm.vehicles.describe_effects import Effect, all_effects, effect_named
+from scm.vehicles.manual.measure_page import draw_measure, measure_page
+from scm.vehicles.manual.picture import draw_term
+from scm.vehicles.manual.term_page import term_page
+from scm.vehicles.term import Term
+
+INDEX = "README.md"
+_INTRODUCTION = """# Physical effects and faults of measuring
+
+A page for each effect that a car file can list under `terms`, and for each fault that a recording
+may carry: equation, numbers, range, source, and the drive that makes it visible.
+Written by `scm show terms --docs docs/physics` from the effects themselves; not edited by hand.
+"""
+
+
+def chosen_effects(name: str | None) -> list[Effect]:
+    """Return the effect of a name, or all.
+
+    Raises:
+        TermError: when there is none of this name.
+    """
+    return list(all_effects().values()) if name is None else [effect_named(name)]
+
+
+def pages_of(effects: Sequence[Effect]) -> dict[str, str]:
+    """Return every page's text by its file name, without driving anything."""
+    return {f"{effect.name}.md": _page(effect) for effect in effects}
+
+
+def index_page(effects: Mapping[str, Effect]) -> str:
+    """Return the list of all effects, by what they act on."""
+    titled = {title: list[Effect]() for title in (*(t for t, _ in CHAPTERS), OTHERS)}
+    titled["Faults of measuring"] = []
+    for effect in effects.values():
+        title = chapter_of(effect) if isinstance(effect, Term) else "Faults of measuring"
+        titled[title].append(effect)
+    lines = [_INTRODUCTION]
+    for title, chosen in titled.items():
+        if chosen:
+            lines += [f"## {title}", "", "| effect | what it is |", "|---|---|"]
+            lines += [
+                f"| [{effect.name}]({effect.name}.md) | {effect.about} |" for effect in chosen
+            ]
+            lines.append("")
+    return "\n".join(lines)
+
+
+def write_manual(
+    folder: Path, effects: Sequence[Effect], tell: Callable[[int, str], None], *, index: bool
+) -> None:
+    """Write pages and pictures; `tell` hears how many are done and which comes next."""
+    folder.mkdir(parents=True, exist_ok=True)
+    if index:
+        (folder / INDEX).write_text(index_page(all_effects()), encoding="utf-8")
+    for name, text in pages_of(effects).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    for i, effect in enumerate(effects):
+        tell(i, effect.name)
+        (folder / f"{effect.name}.svg").write_text(_picture(effect), encoding="utf-8")
+
+
+def _page(effect: Effect) -> str:
+    return term_page(effect) if isinstance(effect, Term) else measure_page(effect)
+
+
+def _picture(effect: Effect) -> str:
+    return draw_term(effect) if isinstance(effect, Term) else draw_measure(effect)

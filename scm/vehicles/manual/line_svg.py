@@ -1,0 +1,118 @@
+"""Lines over two axes as a small SVG picture: no library, the same text for the same numbers."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from html import escape
+
+from scm.arrays import Floats
+
+WIDTH, HEIGHT = 640, 320
+_LEFT, _RIGHT, _TOP, _BOTTOM = 64, 16, 40, 48
+_MOST_POINTS = 240
+COLOURS = ("#8b93a1", "#1d5fd1", "#d1571d")
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One curve: its name in the legend and its points, equally long."""
+
+    label: str
+    x: Floats
+    y: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class _Axis:
+    low: float
+    high: float
+    start: float
+    length: float
+
+    def at(self, value: float) -> float:
+        return self.start + (value - self.low) / (self.high - self.low) * self.length
+
+    @property
+    def step(self) -> float:
+        """A round distance between ticks that gives about six of them."""
+        rough = (self.high - self.low) / 6.0
+        power = 10.0 ** math.floor(math.log10(rough))
+        return next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= rough * 0.999)
+
+    def ticks(self) -> Iterator[float]:
+        first = math.ceil(self.low / self.step - 1e-9)
+        last = math.floor(self.high / self.step + 1e-9)
+        yield from (i * self.step for i in range(first, last + 1))
+
+
+def draw_lines(
+    lines: Sequence[Line], x_title: str, y_title: str, *, equal_scale: bool = False
+) -> str:
+    """Return the picture; with `equal_scale` a metre is as long on both axes, as on a floor."""
+    across = _axis([line.x for line in lines], _LEFT, WIDTH - _LEFT - _RIGHT)
+    up = _axis([line.y for line in lines], HEIGHT - _BOTTOM, -(HEIGHT - _TOP - _BOTTOM))
+    if equal_scale:
+        across, up = _equal(across, up)
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}"'
+        f' width="{WIDTH}" height="{HEIGHT}" font-family="system-ui,sans-serif" font-size="12">',
+        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
+        *_grid(across, up),
+        *_titles(x_title, y_title),
+    ]
+    for i, line in enumerate(lines):
+        parts += _curve(line, across, up, COLOURS[i % len(COLOURS)], i)
+    return "\n".join([*parts, "</svg>\n"])
+
+
+def _axis(values: Sequence[Floats], start: float, length: float) -> _Axis:
+    low = min(float(v.min()) for v in values)
+    high = max(float(v.max()) for v in values)
+    room = 0.06 * (high - low) or max(0.1 * abs(high), 1e-3)
+    return _Axis(low - room if low != 0.0 else low, high + room, start, length)
+
+
+def _equal(across: _Axis, up: _Axis) -> tuple[_Axis, _Axis]:
+    scale = max(
+        (across.high - across.low) / abs(across.length), (up.high - up.low) / abs(up.length)
+    )
+    return _widen(across, scale), _widen(up, scale)
+
+
+def _widen(axis: _Axis, scale: float) -> _Axis:
+    middle, half = 0.5 * (axis.low + axis.high), 0.5 * scale * abs(axis.length)
+    return _Axis(middle - half, middle + half, axis.start, axis.length)
+
+
+def _grid(across: _Axis, up: _Axis) -> Iterator[str]:
+    right, bottom = WIDTH - _RIGHT, HEIGHT - _BOTTOM
+    for value in across.ticks():
+        x = across.at(value)
+        yield f'<path d="M{x:.1f} {_TOP}V{bottom}" stroke="#e6e8ec"/>'
+        yield _text(x, bottom + 18, f"{value:.6g}", "middle")
+    for value in up.ticks():
+        y = up.at(value)
+        colour = "#b4b9c2" if abs(value) < 1e-12 else "#e6e8ec"
+        yield f'<path d="M{_LEFT} {y:.1f}H{right}" stroke="{colour}"/>'
+        yield _text(_LEFT - 8, y + 4, f"{value:.6g}", "end")
+
+
+def _titles(x_title: str, y_title: str) -> Iterator[str]:
+    yield _text(WIDTH - _RIGHT, HEIGHT - 10, x_title, "end")
+    yield _text(_LEFT - 48, 22, y_title, "start")
+
+
+def _curve(line: Line, across: _Axis, up: _Axis, colour: str, place: int) -> Iterator[str]:
+    keep = max(1, len(line.x) // _MOST_POINTS)
+    points = zip(line.x[::keep].tolist(), line.y[::keep].tolist(), strict=True)
+    path = "L".join(f"{across.at(x):.1f} {up.at(y):.1f}" for x, y in points)
+    dash = ' stroke-dasharray="6 4"' if place == 0 else ""
+    yield f'<path d="M{path}" fill="none" stroke="{colour}" stroke-width="2"{dash}/>'
+    x = 170 + 215 * place
+    yield f'<path d="M{x} 18h26" stroke="{colour}" stroke-width="2"{dash}/>'
+    yield _text(x + 32, 22, line.label, "start")
+
+
+def _text(x: float, y: float, text: str, anchor: str) -> str:
+    at = f'x="{x:.1f}" y="{y:.1f}"'
+    return f'<text {at} text-anchor="{anchor}" fill="#3a414d">{escape(text)}</text>'
