@@ -18,8 +18,24 @@ def conflicting_groups(junction: Junction, roads: Roads) -> frozenset[frozenset[
     return frozenset(
         frozenset((one.name, other.name))
         for one, other in combinations(junction.groups, 2)
-        if _overlap(one.movement, other.movement, roads)
+        if any(_meet(a, b, roads) for a in one.movements for b in other.movements)
     )
+
+
+def _meet(one: Conflict, other: Conflict, roads: Roads) -> bool:
+    """Return whether two movements overlap; a pair that looks like an earlier one is known."""
+    shape = _shape(one, other, roads)
+    if shape not in roads.overlaps:
+        roads.overlaps[shape] = _overlap(one, other, roads)
+    return roads.overlaps[shape]
+
+
+def _shape(one: Conflict, other: Conflict, roads: Roads) -> tuple[object, ...]:
+    """Return all that decides whether two movements meet, wherever they lie; to a micrometre."""
+    a, b = roads.definition(one.lane), roads.definition(other.lane)
+    apart = tuple(round(b.start[k] - a.start[k], 6) for k in (0, 1))
+    first = (a.start[2], a.segments, a.width_m, one.from_m, one.to_m)
+    return (first, apart, b.start[2], b.segments, b.width_m, other.from_m, other.to_m)
 
 
 def _overlap(one: Conflict, other: Conflict, roads: Roads) -> bool:

@@ -11,6 +11,7 @@ from scm.errors import MapError, nearest
 from scm.maps import model
 from scm.maps.check import problems_of
 from scm.maps.grey import read_grey
+from scm.maps.grid_city import named_city
 from scm.maps.model import CityMap
 from scm.maps.occupancy import map_from_occupancy
 
@@ -46,9 +47,14 @@ def map_names() -> list[str]:
 def load_map(name_or_path: str | Path) -> CityMap:
     """Return a map by its name, or by the path of a map file or a scanned grid's `.yaml`.
 
+    `grid:6x4` is a city made to measure; see `scm.maps.grid_city`.
+
     Raises:
         MapError: There is no such map; or it is wrong, with every reason that could be found.
     """
+    made = named_city(str(name_or_path))
+    if made is not None:
+        return made
     path = _find(name_or_path)
     if path.suffix in {".yaml", ".yml"}:
         return map_from_occupancy(path)

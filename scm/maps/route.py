@@ -69,6 +69,7 @@ class Roads:
     Attributes:
         city_map: The map they come from.
         lanes: By name, in the order of the file; each is laid when it is first asked for.
+        overlaps: Which shapes of movements are known to overlap, for `maps.conflicts`.
         streets: The same lanes for compiled drivers, once somebody has made them.
     """
 
@@ -76,7 +77,8 @@ class Roads:
         self.city_map = city_map
         self.lanes: Mapping[str, LanePath] = _Lanes(city_map.lanes)
         self.streets: Any = None
-        self._next = {lane.name: lane.next for lane in city_map.lanes}
+        self.overlaps: dict[tuple[object, ...], bool] = {}
+        self._definitions = {lane.name: lane for lane in city_map.lanes}
         self._length = {
             lane.name: sum(extent(segment)[0] for segment in lane.segments)
             for lane in city_map.lanes
@@ -85,6 +87,9 @@ class Roads:
         self._lines: dict[str, list[StopLine]] = {}
         for line in sorted(city_map.stop_lines, key=lambda line: line.at_m):
             self._lines.setdefault(line.lane, []).append(line)
+        self._group_lines: dict[tuple[str, str], list[StopLine]] = {}
+        for line in city_map.stop_lines:
+            self._group_lines.setdefault((line.junction, line.group), []).append(line)
         self._movements: dict[str, list[tuple[str, Conflict]]] = {}
         for junction in city_map.junctions:
             for group in junction.groups:
@@ -99,11 +104,15 @@ class Roads:
 
     def check_lane(self, name: str) -> str:
         """Return the name of a lane that exists; MapError names the nearest one otherwise."""
-        if name not in self._next:
+        if name not in self._definitions:
             raise MapError(
                 f"map {self.city_map.name}: no lane {name!r}{nearest(name, list(self.lanes))}"
             )
         return name
+
+    def definition(self, lane: str) -> Lane:
+        """Return a lane as the map says it."""
+        return self._definitions[self.check_lane(lane)]
 
     def length_of(self, lane: str) -> float:
         """Return the length of a lane's centre line [m], without laying it."""
@@ -111,7 +120,7 @@ class Roads:
 
     def successors(self, lane: str) -> tuple[str, ...]:
         """Return the lanes that begin where this one ends."""
-        return self._next[self.check_lane(lane)]
+        return self.definition(lane).next
 
     def nearest(self, pose: Pose2) -> OnLane | None:
         """Return the closest lane that runs within 60 degrees of the pose's direction.
@@ -132,6 +141,10 @@ class Roads:
     def stop_lines_on(self, lane: str) -> tuple[StopLine, ...]:
         """Return the stop lines of a lane in driving order."""
         return tuple(self._lines.get(lane, ()))
+
+    def stop_lines_of(self, junction: str, group: str) -> tuple[StopLine, ...]:
+        """Return the stop lines at which a signal group is obeyed."""
+        return tuple(self._group_lines.get((junction, group), ()))
 
     def movements_on(self, lane: str) -> tuple[tuple[str, Conflict], ...]:
         """Return (junction, stretch) of every movement on a lane, in the order of the file."""
@@ -191,7 +204,7 @@ class Roads:
         lane = self.check_lane(start_lane)
         while True:
             yield lane
-            following = self._next[lane]
+            following = self._definitions[lane].next
             if not following:
                 return
             lane = following[0]
@@ -218,7 +231,7 @@ class Roads:
             length, lanes = heapq.heappop(queue)
             if lanes[-1] == goal and len(lanes) > 1:
                 return lanes[1:]
-            for following in self._next[lanes[-1]]:
+            for following in self._definitions[lanes[-1]].next:
                 if following not in done:
                     done.add(following)
                     way = length + self._length[following]

@@ -14,11 +14,12 @@ published: two people can compare it with the one they agreed on.
 
 import hashlib
 import math
+from functools import cache
 from itertools import combinations
 
 import msgspec
 
-from scm.maps.model import CityMap, Conflict, Group, Junction, Lane, StopLine
+from scm.maps.model import CityMap, Conflict, Group, Junction, Lane, Segment, StopLine
 
 NIGEL_TOP_MPS = 0.267
 NIGEL_SLOW_MPS = 0.217
@@ -28,6 +29,9 @@ NIGEL_LENGTH_M = 0.30
 REACTS_IN_S = 0.3
 
 _STRIDE_M = 0.005
+
+# Where a movement heads at first, the pieces of its lane, and from where to where it counts on it.
+_Way = tuple[float, tuple[Segment, ...], float, float]
 
 
 class CardGroup(msgspec.Struct, kw_only=True, frozen=True):
@@ -62,16 +66,18 @@ def card_of(city_map: CityMap, junction: Junction) -> Card:
         conflicts=tuple(
             (min(one.name, other.name), max(one.name, other.name))
             for one, other in combinations(junction.groups, 2)
-            if _meet(one.movement, other.movement, lanes)
+            if any(_meet(a, b, lanes) for a in one.movements for b in other.movements)
         ),
     )
 
 
 def _group(group: Group, lanes: dict[str, Lane], lines: list[StopLine]) -> CardGroup:
-    slow_mps = min(NIGEL_SLOW_MPS, lanes[group.movement.lane].speed_limit_mps)
+    moves = group.movements
+    slow_mps = min(NIGEL_SLOW_MPS, *(lanes[move.lane].speed_limit_mps for move in moves))
+    own_lines = [line for line in lines if line.group == group.name]
     farthest_m = max(
-        (_to_end_m(line, group.movement, lanes) for line in lines if line.group == group.name),
-        default=group.movement.to_m - group.movement.from_m,
+        (_to_end_m(line, move, lanes) for line in own_lines for move in moves),
+        default=max(move.to_m - move.from_m for move in moves),
     )
     braking_s = NIGEL_TOP_MPS / NIGEL_BRAKES_MPS2
     starting_s = slow_mps / (2.0 * NIGEL_STARTS_MPS2) + NIGEL_LENGTH_M / slow_mps
@@ -97,18 +103,35 @@ def _length_m(lane: Lane) -> float:
 
 def _meet(one: Conflict, other: Conflict, lanes: dict[str, Lane]) -> bool:
     """Return whether two movements come closer than a lane is wide; of one lane always."""
-    near_m = (lanes[one.lane].width_m + lanes[other.lane].width_m) / 2.0
-    there = _walk(lanes[other.lane], other)
-    return one.lane == other.lane or any(
-        math.dist(here, place) < near_m for here in _walk(lanes[one.lane], one) for place in there
+    if one.lane == other.lane:
+        return True
+    first, second = lanes[one.lane], lanes[other.lane]
+    away = tuple(round(b - a, 6) for a, b in zip(first.start, second.start, strict=True))[:2]
+    return _come_near(
+        (first.start[2], first.segments, one.from_m, one.to_m),
+        (second.start[2], second.segments, other.from_m, other.to_m),
+        (away[0], away[1]),
+        (first.width_m + second.width_m) / 2.0,
     )
 
 
-def _walk(lane: Lane, movement: Conflict) -> list[tuple[float, float]]:
+@cache
+def _come_near(one: _Way, other: _Way, away: tuple[float, float], near_m: float) -> bool:
+    """Return whether two ways come near; the other one starts `away` from the start of the one.
+
+    Where they lie on the map does not matter: junctions that look alike are walked once.
+    """
+    there = _walk(away, other)
+    return any(
+        math.dist(here, place) < near_m for here in _walk((0.0, 0.0), one) for place in there
+    )
+
+
+def _walk(start: tuple[float, float], way: _Way) -> list[tuple[float, float]]:
     """Return places along a movement, one every stride, by plain dead reckoning [m]."""
-    x, y, yaw = lane.start
+    (x, y), (yaw, segments, from_m, to_m) = start, way
     gone_m, places = 0.0, []
-    for segment in lane.segments:
+    for segment in segments:
         turn_per_m = 0.0
         length_m = segment.length_m or 0.0
         if segment.radius_m is not None and segment.angle_rad is not None:
@@ -121,6 +144,6 @@ def _walk(lane: Lane, movement: Conflict) -> list[tuple[float, float]]:
             x, y = x + stride_m * math.cos(yaw), y + stride_m * math.sin(yaw)
             yaw += turn_per_m * stride_m / 2.0
             gone_m += stride_m
-            if movement.from_m <= gone_m <= movement.to_m:
+            if from_m <= gone_m <= to_m:
                 places.append((x, y))
     return places

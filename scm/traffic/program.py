@@ -5,7 +5,7 @@ import math
 from scm.clock import NS_PER_MS
 from scm.errors import PlanError
 from scm.maps.conflicts import conflicting_groups
-from scm.maps.model import Group, Junction, StopLine
+from scm.maps.model import Conflict, Group, Junction, StopLine
 from scm.maps.route import Roads
 from scm.traffic.kernel import GroupTimes, Program
 from scm.traffic.timing import NIGEL, CarFacts, clearance_s, min_green_s, yellow_s
@@ -32,17 +32,13 @@ def program_of(junction: Junction, roads: Roads, car: CarFacts = NIGEL) -> Progr
 
 
 def _times(junction: Junction, group: Group, roads: Roads, car: CarFacts) -> GroupTimes:
-    lines = [
-        line
-        for line in roads.city_map.stop_lines
-        if (line.junction, line.group) == (junction.name, group.name)
-    ]
+    lines = roads.stop_lines_of(junction.name, group.name)
     if not lines:
         msg = f"junction {junction.name}: group {group.name!r} has no stop line on map"
         raise PlanError(f"{msg} {roads.city_map.name}")
-    limit_mps = min(roads.lane(line.lane).speed_limit_mps for line in lines)
-    limit_mps = min(limit_mps, roads.lane(group.movement.lane).speed_limit_mps)
-    way_m = max(_way_m(line, group, roads) for line in lines)
+    lanes = [line.lane for line in lines] + [move.lane for move in group.movements]
+    limit_mps = min(roads.definition(lane).speed_limit_mps for lane in lanes)
+    way_m = max(_way_m(line, move, group, roads) for line in lines for move in group.movements)
     return GroupTimes(
         min_green=whole_steps_ns(min_green_s(car, limit_mps)),
         yellow=whole_steps_ns(yellow_s(car)),
@@ -50,12 +46,11 @@ def _times(junction: Junction, group: Group, roads: Roads, car: CarFacts) -> Gro
     )
 
 
-def _way_m(line: StopLine, group: Group, roads: Roads) -> float:
-    """Return the way from a stop line to the end of its group's movement [m]."""
-    movement = group.movement
+def _way_m(line: StopLine, movement: Conflict, group: Group, roads: Roads) -> float:
+    """Return the way from a stop line to the end of a movement of its group [m]."""
     if movement.lane == line.lane:
         return movement.to_m - line.at_m
     if movement.lane in roads.successors(line.lane):
-        return roads.lane(line.lane).length_m - line.at_m + movement.to_m
+        return roads.length_of(line.lane) - line.at_m + movement.to_m
     msg = f"stop line {line.name!r}: lane {line.lane!r} does not lead to {movement.lane!r}, the"
     raise PlanError(f"{msg} movement of group {group.name!r} on map {roads.city_map.name}")
