@@ -164,6 +164,7 @@ class AgentPart:
         message = item.message
         if isinstance(message, WorldDefinition) and message.t_ns != self._defined_ns:
             self._defined_ns, self._map = message.t_ns, message.map
+            self._body.learn(message.map, message.seed)
             if self._link.is_inside:
                 self._link.leave("the world began anew")
         return []

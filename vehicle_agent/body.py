@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from scm.geometry import Pose2
+from scm.maps.model import CityMap
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.driver import CarLimits
@@ -39,6 +40,10 @@ class Body(Protocol):
     """
 
     limits: CarLimits
+
+    def learn(self, city_map: CityMap, seed: int) -> None:
+        """Know the city's floor and air; everybody with the same seed feels the same gusts."""
+        ...
 
     def place(self, pose: Pose2, now_ns: int) -> None:
         """Be at rest with the rear axle at a pose: called at each joining."""

@@ -1,23 +1,30 @@
 """A body of one's own dynamics: a fleet of one, moved by the same kernel as the world's cars.
 
-The body's time never jumps: after a stall of the process it has moved by at most 0.1 s.
+It feels the floor and the wind of the city's map, as the world's cars do, every `FEEL_NS`. The
+body's time never jumps: after a stall of the process it has moved by at most 0.1 s.
 """
+
+import math
 
 from scm import registry
 from scm.arrays import Floats
 from scm.clock import NS_PER_MS, seconds
 from scm.geometry import Pose2
+from scm.maps.model import CityMap
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.bank import Bank
 from scm.vehicles.car import load_car
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.fleet import Fleet
+from scm.vehicles.ground import Ground
 from scm.vehicles.sensed import ENCODERS, KINDS, sensors_message
 from scm.vehicles.sensor import Sensor
 from vehicle_agent.body import Body, BodyKind, Motion
 
 LONGEST_NS = 100 * NS_PER_MS
+FEEL_NS = 5 * NS_PER_MS
+TICK_S = 0.02
 SENSORS = "scm.vehicles.sensors"
 
 
@@ -29,23 +36,34 @@ class SimulatedBody:
         self._row = self._fleet.add(Pose2(0.0, 0.0, 0.0))
         self._now_ns: int | None = None
         self.limits = limits_of(self._fleet.car)
+        self._ground: Ground | None = None
         self._seed = seed
         self._banks: list[Bank] = []
         self._newest: dict[str, Floats] = {}
 
+    def learn(self, city_map: CityMap, seed: int) -> None:
+        """Know the city's floor and air."""
+        self._ground = Ground(city_map, seed)
+        self._ground.warm(self._fleet)
+
     def place(self, pose: Pose2, now_ns: int) -> None:
         """Stand at a pose."""
         self._fleet.place(self._row, pose)
+        if self._ground is not None:
+            self._ground.settle(self._fleet, self._row)
         self._now_ns = now_ns
 
     def advance(self, now_ns: int) -> None:
         """Move by whole milliseconds up to now; what is left over is for the next time."""
         if self._now_ns is None or now_ns - self._now_ns > LONGEST_NS:
             self._now_ns = now_ns - (0 if self._now_ns is None else LONGEST_NS)
-        steps = (now_ns - self._now_ns) // NS_PER_MS
-        if steps > 0:
-            self._fleet.advance(seconds(steps * NS_PER_MS))
-            self._now_ns += steps * NS_PER_MS
+        while now_ns - self._now_ns >= NS_PER_MS:
+            whole_ns = (now_ns - self._now_ns) // NS_PER_MS * NS_PER_MS
+            step_ns = min(whole_ns, FEEL_NS)
+            if self._ground is not None:
+                self._ground.feel(self._fleet, self._now_ns)
+            self._fleet.advance(seconds(step_ns))
+            self._now_ns += step_ns
 
     def command(self, throttle: float, steering: float) -> None:
         """Set the kernel's commands."""
@@ -53,7 +71,12 @@ class SimulatedBody:
         self._fleet.steering[self._row] = steering
 
     def push(self, contact: Contact) -> None:
-        """Change velocity and place as the contact did."""
+        """Change velocity and place as the contact did; the next readings feel it."""
+        fleet, row, yaw = self._fleet, self._row, float(self._fleet.yaw[self._row])
+        c, s = math.cos(yaw), math.sin(yaw)
+        fleet.impact_x[row] += (c * contact.dvx_mps + s * contact.dvy_mps) / TICK_S
+        fleet.impact_y[row] += (c * contact.dvy_mps - s * contact.dvx_mps) / TICK_S
+        fleet.impact_yaw[row] += contact.dyaw_rate_radps / TICK_S
         self._fleet.push(
             self._row,
             contact.dvx_mps,
@@ -90,6 +113,8 @@ class SimulatedBody:
                 self._newest[bank.sensor.name] = readings.values[0]
                 if bank.sensor.name == ENCODERS:
                     counted.append(readings.t_ns)
+        fleet, row = self._fleet, self._row
+        fleet.impact_x[row] = fleet.impact_y[row] = fleet.impact_yaw[row] = 0.0
         said = [sensors_message(vehicle, t_ns, self._newest) for t_ns in counted[-1:]]
         return [message for message in said if message is not None]
 
