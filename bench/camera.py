@@ -1,4 +1,4 @@
-"""What a picture of a car's camera costs, beside one full-frame warp of OpenCV, the least it can be.
+"""What a picture of a car's camera costs, beside one full-frame warp of OpenCV.
 
 720p, driving school, six cars within sight, front and rear. CPU milliseconds of one thread, median.
 The warp is `cv2.warpPerspective` of the same floor picture onto 1280 x 720, linear, nothing else.

@@ -58,20 +58,34 @@ class Painter:
         fall = np.clip(1.0 - np.hypot(x, y), 0.0, 1.0) ** 2
         self._halo = np.rint(255.0 * fall).astype(np.uint8)
 
-    def sees(self, view: View, middle: Floats, radius: float) -> bool:
-        """Return whether any of a ball can be in the picture."""
-        x, y, z = view.seen(middle[None])[0]
+    def in_sight(self, view: View, middles: Floats, radii: Floats) -> Bools:
+        """Return of which balls any part can be in the picture, (n, 3) and (n,) [m] to (n,)."""
+        x, y, z = view.seen(middles).T
         a, b = self._reach
         wide, high = (1.0 + a * a) ** 0.5, (1.0 + b * b) ** 0.5
-        across = abs(x) < a * z + radius * wide and abs(y) < b * z + radius * high
-        return bool(across and z > NEAREST_M - radius)
+        across = (np.abs(x) < a * z + radii * wide) & (np.abs(y) < b * z + radii * high)
+        found: Bools = across & (z > NEAREST_M - radii)
+        return found
+
+    def sees(self, view: View, middle: Floats, radius: float) -> bool:
+        """Return whether any of a ball can be in the picture."""
+        return bool(self.in_sight(view, middle[None], np.array([radius]))[0])
 
     def paint(self, canvas: Image, view: View, things: list[Thing]) -> None:
         """Paint things, the farthest first."""
-        seen = [thing for thing in things if self.sees(view, thing.middle, thing.radius)]
+        seen = self.seen(view, things)
         seen.sort(key=lambda thing: -float(np.linalg.norm(thing.middle - view.position)))
         for thing in seen:
             self._paint_thing(canvas, view, thing)
+
+    def seen(self, view: View, things: list[Thing]) -> list[Thing]:
+        """Return the things of which any part can be in the picture."""
+        if not things:
+            return []
+        middles = np.array([thing.middle for thing in things])
+        radii = np.array([thing.radius for thing in things])
+        found = np.flatnonzero(self.in_sight(view, middles, radii))
+        return [things[i] for i in found]
 
     def shade(self, canvas: Image, view: View, outline: Floats, keep: float) -> None:
         """Leave a share of the light on a convex part of the floor, (n, 2) [m], softly."""

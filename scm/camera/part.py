@@ -14,7 +14,7 @@ import cv2
 from scm.camera.daylight import Daylight
 from scm.camera.optics import Optics, cameras_of, optics_of
 from scm.camera.studio import Studio
-from scm.camera.tween import between
+from scm.camera.tween import between, near
 from scm.clock import NS_PER_MS, NS_PER_S, Clock
 from scm.errors import CarError, EyeError
 from scm.maps.model import CityMap
@@ -29,6 +29,8 @@ from scm.vehicles.car import car_names, load_car
 
 LOOK_NS = 100 * NS_PER_MS
 FLASH_NS = 500 * NS_PER_MS
+FARTHEST_M = 12.0
+"""Cars farther away are not drawn: a Nigel is 15 pixels wide there."""
 DEFAULT_CAR = "nigel"
 AWAKE = (Hears(WorldSnapshot), Hears(Spat))
 ASLEEP: tuple[Hears, ...] = ()
@@ -144,9 +146,12 @@ class CameraPart:
         if self._studio is None:
             self._studio = Studio(self._map, self._daylight, self._seed)
         vehicle, camera = which
-        cars = between(self._snapshots[0], self._snapshots[1], t_ns)
+        before, after = self._snapshots
+        cars = between(before, near(after, vehicle, FARTHEST_M), t_ns)
         own = next(car for car in cars if car.vehicle == vehicle)
-        image = self._studio.picture(optics, own, cars, self._shown(t_ns), camera, t_ns)
+        image = self._studio.picture(
+            optics, own, cars, self._shown(t_ns), camera, t_ns, after.boxes
+        )
         quality = [cv2.IMWRITE_JPEG_QUALITY, round(optics.jpeg_quality)]
         good, data = cv2.imencode(".jpg", image, quality)
         if not good:

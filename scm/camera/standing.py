@@ -44,6 +44,7 @@ def wall_things(city_map: CityMap) -> list[Thing]:
     return things
 
 
+@lru_cache(maxsize=256)
 def box_thing(box: Box) -> Thing:
     """Return a construction box with its red and white band."""
     foot = rectangle(box.x_m, box.y_m, box.length_m, box.width_m, box.yaw_rad)

@@ -3,21 +3,22 @@
 from collections.abc import Mapping, Sequence
 
 import cv2
+import msgspec
 import numpy as np
 
-from scm.arrays import Floats, Image
+from scm.arrays import Floats, Image, Ints
 from scm.camera.car_mesh import car_thing, footprint
 from scm.camera.daylight import Daylight
 from scm.camera.floor import SHADE, Floor, horizon_rows
 from scm.camera.lens import Lens, View
 from scm.camera.optics import Optics
-from scm.camera.painter import Painter
+from scm.camera.painter import Painter, Thing
 from scm.camera.sensor import Noise
 from scm.camera.standing import box_shadow, box_thing, light_thing, sign_thing, wall_things
-from scm.maps.model import CityMap
+from scm.maps.model import Box, CityMap
 from scm.scenery.bodies import car_rotation
 from scm.scenery.canvas import Colour
-from scm.v2x.messages.world_snapshot import SnapshotVehicle
+from scm.v2x.messages.world_snapshot import SnapshotBox, SnapshotVehicle
 
 SKY_HIGH: Colour = (226, 206, 178)
 SKY_LOW: Colour = (238, 232, 224)
@@ -41,8 +42,8 @@ class Studio:
         self._daylight = daylight
         self._seed = seed
         self._floor = Floor(city_map, daylight, np.random.default_rng([seed, *b"floor"]))
-        self._standing = [*wall_things(city_map), *(sign_thing(sign) for sign in city_map.signs)]
-        self._boxes = [(box_thing(box), box_shadow(box)) for box in city_map.boxes]
+        self._walls = _Still([*wall_things(city_map), *map(sign_thing, city_map.signs)])
+        self._heads = _Still([light_thing(light, None) for light in city_map.lights])
         self._kinds: dict[Optics, _Kind] = {}
 
     def picture(
@@ -53,6 +54,7 @@ class Studio:
         shown: Shown,
         camera: str,
         t_ns: int,
+        moved: Sequence[SnapshotBox] = (),
     ) -> Image:
         """Return a frame, (height, width, 3); it is valid until the next one.
 
@@ -63,20 +65,36 @@ class Studio:
             shown: What the signal heads show.
             camera: Its name, and with it its noise.
             t_ns: When it is exposed.
+            moved: Where boxes are that were pushed; the others are where the map says.
         """
         kind = self._kind(optics)
         view = kind.lens.view(car_rotation(car), np.array([car.x_m, car.y_m, 0.0]))
         canvas = kind.canvas
         self._sky(canvas, kind, view)
         self._floor.paint(canvas, kind.lens, view, self._daylight.intensity * kind.exposure)
-        self._shadows(canvas, kind, view, cars)
-        others = [car_thing(other) for other in cars if other.vehicle != car.vehicle]
-        heads = [light_thing(light, shown.get(light.light_id)) for light in self._map.lights]
-        boxes = [box for box, _ in self._boxes]
-        kind.painter.paint(canvas, view, [*self._standing, *boxes, *heads, *others])
+        boxes = self._boxes(moved)
+        self._shadows(canvas, kind, view, cars, boxes)
+        lights = [self._map.lights[i] for i in self._heads.in_sight(kind.painter, view)]
+        things = [
+            *(self._walls.things[i] for i in self._walls.in_sight(kind.painter, view)),
+            *(box_thing(box) for box in boxes),
+            *(light_thing(light, shown.get(light.light_id)) for light in lights),
+            *(car_thing(other) for other in cars if other.vehicle != car.vehicle),
+        ]
+        kind.painter.paint(canvas, view, things)
         frame = kind.lens.bend(canvas)
         kind.noise.add(frame, car.vehicle, camera, t_ns)
         return frame
+
+    def _boxes(self, moved: Sequence[SnapshotBox]) -> list[Box]:
+        """Return the map's boxes where they are now."""
+        now = {box.name: box for box in moved}
+        boxes = []
+        for box in self._map.boxes:
+            at = now.get(box.name)
+            pose = {} if at is None else {"x_m": at.x_m, "y_m": at.y_m, "yaw_rad": at.yaw_rad}
+            boxes.append(msgspec.structs.replace(box, **pose))
+        return boxes
 
     def _kind(self, optics: Optics) -> "_Kind":
         if optics not in self._kinds:
@@ -92,11 +110,16 @@ class Studio:
         canvas[:low] = kind.sky[start : start + low]
 
     def _shadows(
-        self, canvas: Image, kind: "_Kind", view: View, cars: Sequence[SnapshotVehicle]
+        self,
+        canvas: Image,
+        kind: "_Kind",
+        view: View,
+        cars: Sequence[SnapshotVehicle],
+        boxes: Sequence[Box],
     ) -> None:
         keep = 1.0 - (1.0 - SHADE) * (1.0 - self._daylight.ambient) * 1.2
-        for _, corners in self._boxes:
-            self._shadow(canvas, kind, view, corners, keep)
+        for box in boxes:
+            self._shadow(canvas, kind, view, box_shadow(box), keep)
         for car in cars:
             foot, deck = footprint(car)
             if kind.painter.sees(view, foot.mean(axis=0), 0.35):
@@ -117,6 +140,19 @@ def _raised(foot: Floats, height: float) -> Floats:
     top = foot.copy()
     top[:, 2] += height
     return np.concatenate((foot, top))
+
+
+class _Still:
+    """Things that never move, and a quick way to find those in sight."""
+
+    def __init__(self, things: list[Thing]) -> None:
+        self.things = things
+        self._middles = np.array([thing.middle for thing in things]).reshape(-1, 3)
+        self._radii = np.array([thing.radius for thing in things])
+
+    def in_sight(self, painter: Painter, view: View) -> Ints:
+        """Return the numbers of those that can be in the picture."""
+        return np.flatnonzero(painter.in_sight(view, self._middles, self._radii))
 
 
 class _Kind:

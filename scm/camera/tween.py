@@ -40,3 +40,15 @@ def _between(start: SnapshotVehicle | None, end: SnapshotVehicle, share: float) 
         pitch_rad=mixed(start.pitch_rad, end.pitch_rad),
         lights=start.lights if share < 0.5 else end.lights,
     )
+
+
+def near(snapshot: WorldSnapshot, vehicle: str, reach_m: float) -> WorldSnapshot:
+    """Return a snapshot with the cars around one of them, itself included."""
+    own = next(car for car in snapshot.vehicles if car.vehicle == vehicle)
+    x, y = own.x_m, own.y_m
+    cars = tuple(
+        car
+        for car in snapshot.vehicles
+        if abs(car.x_m - x) < reach_m and abs(car.y_m - y) < reach_m
+    )
+    return msgspec.structs.replace(snapshot, vehicles=cars)

@@ -13,12 +13,24 @@ from scm.scenery.tags import PRINT_SCALE
 RUBBER: Colour = (30, 30, 32)
 GLASS: Colour = (74, 62, 52)
 BLACK: Colour = (24, 24, 26)
-LAMP: Colour = (214, 240, 246)
-TAIL: Colour = (44, 36, 150)
+LAMP: Colour = (172, 186, 190)
+LAMP_ON: Colour = (225, 252, 255)
+TAIL: Colour = (40, 32, 112)
+TAIL_ON: Colour = (44, 36, 172)
+BRAKE: Colour = (60, 50, 255)
+AMBER: Colour = (30, 168, 255)
 
 
-def shell_of(body: CarBody, colour: Colour) -> tuple[Solid, ...]:
-    """Everything but the wheels, from the floor up."""
+def shell_of(
+    body: CarBody, colour: Colour, lamps: frozenset[str] = frozenset()
+) -> tuple[Solid, ...]:
+    """Return everything but the wheels, from the floor up: bumpers, shell, lamps, cabin, sensors.
+
+    Args:
+        body: Its measures.
+        colour: Its paint.
+        lamps: Names of those that are on, as `VehicleState` has them.
+    """
     rear, front = body.x_span
     half = body.y_span[1]
     tag_x, _, roof = body.tag_position
@@ -42,14 +54,7 @@ def shell_of(body: CarBody, colour: Colour) -> tuple[Solid, ...]:
             deck + 0.002,
             dark,
         ),
-        *(
-            prism(rectangle(nose - 0.012, s * 0.68 * inner, 0.014, 0.024), deck, deck + 0.001, LAMP)
-            for s in (1.0, -1.0)
-        ),
-        *(
-            prism(rectangle(rear + 0.016, s * 0.68 * inner, 0.01, 0.03), deck, deck + 0.001, TAIL)
-            for s in (1.0, -1.0)
-        ),
+        *_lamps(nose, rear, inner, deck, lamps),
         prism(cabin, deck, roof - 0.006, GLASS, taper=0.1),
         prism(
             rectangle(tag_x, 0.0, plate + 0.006, plate + 0.006), roof - 0.006, roof - 0.0005, dark
@@ -57,6 +62,27 @@ def shell_of(body: CarBody, colour: Colour) -> tuple[Solid, ...]:
         prism(ring * 0.026 + (puck_x, 0.0), deck, roof + 0.012, BLACK),
         prism(ring * 0.03 + (puck_x, 0.0), roof + 0.014, roof + 0.032, (52, 50, 48)),
     )
+
+
+def _lamps(
+    nose: float, rear: float, inner: float, deck: float, lamps: frozenset[str]
+) -> list[Solid]:
+    """Return what is seen of the lamps from above: strips on the deck."""
+    head = LAMP_ON if "head_low" in lamps else LAMP
+    tail = BRAKE if "brake" in lamps else TAIL_ON if "tail" in lamps else TAIL
+
+    def strip(x: float, y: float, length: float, width: float, colour: Colour) -> Solid:
+        return prism(rectangle(x, y, length, width), deck, deck + 0.001, colour)
+
+    strips = []
+    for side, name in ((1.0, "left"), (-1.0, "right")):
+        strips.append(strip(nose - 0.012, side * 0.68 * inner, 0.014, 0.024, head))
+        strips.append(strip(rear + 0.016, side * 0.68 * inner, 0.01, 0.03, tail))
+        if name in lamps:
+            strips += [strip(x, side * 0.9 * inner, 0.02, 0.02, AMBER) for x in (nose, rear + 0.02)]
+    if "reverse" in lamps:
+        strips += [strip(rear + 0.016, s * 0.3 * inner, 0.01, 0.016, LAMP_ON) for s in (1.0, -1.0)]
+    return strips
 
 
 def rounded(x0: float, x1: float, y0: float, y1: float, cut: float) -> Floats:

@@ -47,7 +47,8 @@ def draw_car(frame: Image, model: CameraModel, scenery: Scenery, car: SnapshotVe
     rotation, origin = car_rotation(car), np.array([car.x_m, car.y_m, 0.0])
     body = car_body(car.car)
     colour = colour_of_car(car)
-    shape = _shape(body, colour, round(car.steering_rad, 2)).placed(rotation, origin)
+    shape = _shape(body, colour, round(car.steering_rad, 2), frozenset(car.lights))
+    shape = shape.placed(rotation, origin)
     shadow = _shadow(body) @ rotation.T + origin + _shadow_offset(body)
     points = np.concatenate((shape.points, shadow, tag_on_roof(car, PRINT_SCALE), origin[None]))
     pixels = model.project(points)
@@ -120,8 +121,8 @@ def _shadow_offset(body: CarBody) -> Floats:
 
 
 @lru_cache(maxsize=1024)
-def _shape(body: CarBody, colour: Colour, steering: float) -> Shape:
-    return shape_of((*_wheels(body, steering), *shell_of(body, colour)))
+def _shape(body: CarBody, colour: Colour, steering: float, lamps: frozenset[str]) -> Shape:
+    return shape_of((*_wheels(body, steering), *shell_of(body, colour, lamps)))
 
 
 def _wheels(body: CarBody, steering: float) -> tuple[Solid, ...]:

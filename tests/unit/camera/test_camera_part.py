@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from scm.camera.part import CameraPart
-from scm.camera.tween import between
+from scm.camera.tween import between, near
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.lockstep import Lockstep
 from scm.part import Hears
@@ -132,3 +132,9 @@ def test_between_two_snapshots_cars_are_on_their_way(car):
     assert second.x_m == 2.0  # it was put there
     assert third.x_m == 5.0  # it is new
     assert between(before, after, 100) == after.vehicles
+
+
+def test_only_cars_nearby_are_pictured(car):
+    cars = (car(0.0, 0.0), car(3.0, -3.0, name="n2"), car(0.0, 5.0, name="n3"))
+    around = near(WorldSnapshot(t_ns=0, tick=0, vehicles=cars), "n1", 4.0)
+    assert [one.vehicle for one in around.vehicles] == ["n1", "n2"]

@@ -17,6 +17,7 @@ from scm.maps.load import load_map
 from scm.scenery.bodies import car_rotation
 from scm.scenery.solids import prism, rectangle
 from scm.scenery.tags import tag_corners
+from scm.v2x.messages.world_snapshot import SnapshotBox
 
 UP = np.eye(3)
 RED, BLUE = (0, 0, 250), (250, 0, 0)
@@ -188,6 +189,16 @@ def test_the_floor_in_the_shadow_of_a_car_is_darker(studio, optics, car):
     shaded = take(studio, optics(), own, [car(1.0, 0.6, name="n2")]).astype(int)
     darker = (plain - shaded).sum(axis=2) > 30
     assert darker.sum() > 2000
+
+
+def test_a_pushed_box_is_seen_where_it_was_pushed_to(optics, car):
+    studio, own = Studio(load_map("parking_school_obstacles"), Daylight()), car(-0.4, 0.0)
+    before = take(studio, optics(), own)
+    box = SnapshotBox(name="right", x_m=0.5, y_m=0.0, yaw_rad=0.4)
+    pushed = studio.picture(optics(), own, [own], {}, "front", 0, [box])
+    # It stands in the way now: the middle of the picture was the far wall.
+    assert (pushed[250, 640] != before[250, 640]).any()
+    assert (studio.picture(optics(), own, [own], {}, "front", 0) == before).all()
 
 
 @pytest.mark.parametrize("name", ["parking_school", "parking_school_obstacles"])
