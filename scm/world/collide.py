@@ -6,13 +6,16 @@ A car that touches nothing is not written to at all.
 
 import numpy as np
 
-from scm.arrays import Floats, Ints
+from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_S
+from scm.vehicles.fleet import Fleet
+from scm.world.contacts import FIRST_BOX, Touches
 from scm.world.contacts import WALL as A_WALL
-from scm.world.contacts import Touches
 from scm.world.world import World
 
 WALL = "wall"
+NOTABLE_MPS = 0.01
+QUIET_NS = NS_PER_S
 
 
 def collide(world: World, t_ns: int) -> None:
@@ -39,54 +42,58 @@ def everybody(world: World, t_ns: int) -> tuple[Ints, Floats]:
 
 
 def _tell(world: World, slots: Ints, touches: Touches, t_ns: int) -> None:
-    rows = np.flatnonzero(touches.touched)
-    names = dict(zip(rows.tolist(), names_of(world, slots[rows]), strict=True))
-    against = _against(world, touches.pairs, names)
-    for row in rows.tolist():
-        dv, shift, name = touches.dv[row], touches.shift[row], names[row]
-        if not (dv.any() or shift.any()):
-            continue
-        if name in world.hosted:
-            car = world.hosted[name]
-            car.fleet.push(car.row, *dv.tolist(), *shift.tolist())
-            world.impacts.add(car.fleet, car.row, dv)
-        else:
-            world.remote[name].hit(dv, shift, against[name], t_ns)
-        _report(world, name, against[name], float(np.hypot(dv[0], dv[1])), t_ns)
+    """Hand out what was done, fleet by fleet, then to remote cars; rows are as in `everybody`."""
+    changed: Bools = np.asarray(np.hstack((touches.dv, touches.shift)).any(axis=1))
+    begin = 0
+    for name, fleet in world.garage.fleets.items():
+        rows = world.garage.rows(name)
+        struck = np.flatnonzero(changed[begin : begin + len(rows)])
+        if len(struck):
+            _push(world, fleet, rows[struck], touches, begin + struck)
+        begin += len(rows)
+    against = _Against(world, slots, touches.pairs)
+    for row, car in enumerate(world.remote.values(), start=begin):
+        if changed[row]:
+            car.hit(touches.dv[row], touches.shift[row], against.of(row), t_ns)
+    notable = np.hypot(touches.dv[:, 0], touches.dv[:, 1]) >= NOTABLE_MPS
+    for row in np.flatnonzero(notable).tolist():
+        _report(world, against, row, touches.dv[row], t_ns)
 
 
-def names_of(world: World, slots: Ints) -> list[str]:
-    """Return the names of the cars of some slots."""
-    wanted = set(slots.tolist())
-    names = {car.slot: car.name for car in world.cars() if car.slot in wanted}
-    return [names[slot] for slot in slots.tolist()]
+def _push(world: World, fleet: Fleet, rows: Ints, touches: Touches, struck: Ints) -> None:
+    """Change the motion of some rows of a fleet: those that stand at `struck` in `touches`."""
+    dv, shift = touches.dv[struck], touches.shift[struck]
+    for row, change in zip(rows.tolist(), np.hstack((dv, shift)).tolist(), strict=True):
+        fleet.push(row, *change)
+    world.impacts.add(fleet, rows, dv)
 
 
-def _against(world: World, pairs: Ints, names: dict[int, str]) -> dict[str, set[str]]:
-    """Return whom or what each car touches, by name."""
-    boxes = world.contacts.boxes.names
-    found: dict[str, set[str]] = {name: set() for name in names.values()}
-    for a, b in pairs.tolist():
-        for one, other in ((a, b), (b, a)):
-            if one < 0:
-                continue
-            if other >= 0:
-                thing = names[other]
-            else:
-                thing = WALL if other == A_WALL else f"box {boxes[-2 - other]}"
-            found[names[one]].add(thing)
-    return found
+class _Against:
+    """Says whom or what a car touches, by name: only for the few that somebody hears of."""
+
+    def __init__(self, world: World, slots: Ints, pairs: Ints) -> None:
+        self._names, self._slots, self._pairs = world.slots.names, slots, pairs
+        self._boxes = world.contacts.boxes.names
+
+    def name(self, row: int) -> str:
+        """Return what stands for a row: a car, `wall`, or a box."""
+        if row >= 0:
+            return self._names[int(self._slots[row])]
+        return WALL if row == A_WALL else f"box {self._boxes[FIRST_BOX - row]}"
+
+    def of(self, row: int) -> set[str]:
+        """Return what a row touches."""
+        a, b = self._pairs.T
+        others = np.concatenate((b[a == row], a[b == row]))
+        return {self.name(int(other)) for other in others}
 
 
-NOTABLE_MPS = 0.01
-QUIET_NS = NS_PER_S
-
-
-def _report(world: World, name: str, against: set[str], change: float, t_ns: int) -> None:
+def _report(world: World, against: _Against, row: int, dv: Floats, t_ns: int) -> None:
     """Tell a person of a hit worth telling, once a second and car at most."""
-    if change < NOTABLE_MPS or t_ns - world.last_hit_ns.get(name, -QUIET_NS) < QUIET_NS:
+    name = against.name(row)
+    if t_ns - world.last_hit_ns.get(name, -QUIET_NS) < QUIET_NS:
         return
     world.last_hit_ns[name] = t_ns
-    others = ", ".join(sorted(against))
-    text = f"{name} hit {others}: its speed changed by {change:.2f} m/s"
+    others = ", ".join(sorted(against.of(row)))
+    text = f"{name} hit {others}: its speed changed by {float(np.hypot(dv[0], dv[1])):.2f} m/s"
     world.say("warning", "contact", text, t_ns, name)
