@@ -17,6 +17,7 @@ from scm.vehicles import body14
 from scm.vehicles.assemble import setters_of
 from scm.vehicles.facts import FACTS, Fact
 from scm.vehicles.measure import Fault, all_measures, read_faults
+from scm.vehicles.own_term import SUFFIX, load_own_term
 from scm.vehicles.param import Param
 from scm.vehicles.term import Term, flat
 
@@ -80,21 +81,26 @@ class Car:
             raise CarError(msg)
         return self.values[key]
 
-    def with_terms(self, names: Sequence[str], values: Mapping[str, float] | None = None) -> "Car":
+    def with_terms(
+        self, names: Sequence[str | Term], values: Mapping[str, float] | None = None
+    ) -> "Car":
         """Return this car with further effects, and with other numbers by `section.key`.
 
-        An effect that sets what another one sets takes its place.
+        An effect, by its name or one of your own, takes the place of one that sets the same.
 
         Raises:
             CarError: naming every unknown effect and key, and every value outside its bounds.
         """
-        known, problems = all_terms(), list[str]()
-        problems += [f"no effect {n!r}{nearest(n, list(known))}" for n in names if n not in known]
-        new = flat(known[name] for name in names if name in known)
+        known, problems = {**all_terms(), **{t.name: t for t in self.terms}}, list[str]()
+        known |= {term.name: term for term in names if isinstance(term, Term)}
+        asked = [name.name if isinstance(name, Term) else name for name in names]
+        problems += [f"no effect {n!r}{nearest(n, list(known))}" for n in asked if n not in known]
+        new = flat(known[name] for name in asked if name in known)
         taken = {term.sets for term in new if term.sets}
         kept = [term for term in self.terms if term.sets not in taken and term not in new]
-        numbers = self._numbers({**_defaults(new), **self.values}, values or {}, problems)
-        return replace(self, terms=(*kept, *new), values=numbers)
+        car = replace(self, terms=(*kept, *new))
+        numbers = _filled(car, {**_defaults(new), **self.values}, values or {}, problems)
+        return replace(car, values=numbers)
 
     def with_measures(
         self, entries: Sequence[str], values: Mapping[str, float] | None = None
@@ -108,22 +114,8 @@ class Car:
         new = read_faults(list(entries), problems)
         kept = [old for old in self.measures if old.measure not in [f.measure for f in new]]
         numbers = {**_fault_defaults(new), **self.values}
-        numbers = self._numbers(numbers, values or {}, problems)
+        numbers = _filled(self, numbers, values or {}, problems)
         return replace(self, measures=(*kept, *new), values=numbers)
-
-    def _numbers(
-        self, numbers: dict[str, Quantity], values: Mapping[str, float], problems: list[str]
-    ) -> dict[str, Quantity]:
-        for key, number in values.items():
-            kind = _known_keys().get(key)
-            if kind is None or key not in numbers:
-                problems.append(f"{key}: not in this car{nearest(key, sorted(numbers))}")
-            else:
-                problems += _value_problems(key, number, kind)
-                numbers[key] = Quantity(float(number), None, kind.unit, "given")
-        if problems:
-            raise CarError("\n".join(f"{self.path}: {problem}" for problem in problems))
-        return numbers
 
     def value(self, key: str) -> float:
         """Return a number such as `value("body.mass_kg")`, in the unit its key ends in."""
@@ -148,6 +140,23 @@ class Car:
             msg = f"{self.path}: {key}: expected text, got {value!r}"
             raise CarError(msg)
         return value
+
+
+def _filled(
+    car: Car, numbers: dict[str, Quantity], values: Mapping[str, float], problems: list[str]
+) -> dict[str, Quantity]:
+    """Return the numbers with some given anew; refuse what does not fit this car's effects."""
+    known = _known_keys(car.terms)
+    for key, number in values.items():
+        kind = known.get(key)
+        if kind is None or key not in numbers:
+            problems.append(f"{key}: not in this car{nearest(key, sorted(numbers))}")
+        else:
+            problems += _value_problems(key, number, kind)
+            numbers[key] = Quantity(float(number), None, kind.unit, "given")
+    if problems:
+        raise CarError("\n".join(f"{car.path}: {problem}" for problem in problems))
+    return numbers
 
 
 def car_names() -> list[str]:
@@ -189,10 +198,10 @@ def car_of(data: Mapping[str, Any], path: Path) -> Car:
         CarError: naming every problem at once.
     """
     problems: list[str] = []
-    terms = _terms(data, problems)
+    terms = _terms(data, path.parent, problems)
     faults = read_faults(data.get("measures", []), problems)
     values = _defaults(terms) | _fault_defaults(faults) | _fact_defaults(data)
-    values |= _values(data, problems)
+    values |= _values(data, terms, problems)
     problems += _contradictions(data, values)
     try:
         setters_of(terms)
@@ -207,18 +216,33 @@ def car_of(data: Mapping[str, Any], path: Path) -> Car:
     return Car(name, scale, path, terms, values, faults)
 
 
-def _terms(data: Mapping[str, Any], problems: list[str]) -> tuple[Term, ...]:
+def _terms(data: Mapping[str, Any], folder: Path, problems: list[str]) -> tuple[Term, ...]:
     names = data.get("terms", list(STANDARD_TERMS))
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         problems.append(f"terms: expected a list of effect names, got {names!r}")
         return ()
-    known = all_terms()
+    own = [name for name in names if name.endswith(SUFFIX)]
+    known = {**all_terms(), **_own_terms(folder, own, problems)}
     for i, name in enumerate(names):
-        if name not in known:
+        if name not in known and name not in own:
             problems.append(f"terms: no effect {name!r}{nearest(name, list(known))}")
         elif name in names[:i]:
             problems.append(f"terms: {name!r} stands twice")
     return flat(known[name] for name in dict.fromkeys(names) if name in known)
+
+
+def _own_terms(folder: Path, names: list[str], problems: list[str]) -> dict[str, Term]:
+    found: dict[str, Term] = {}
+    for name in names:
+        try:
+            term = load_own_term(folder, name)
+        except TermError as error:
+            problems.append(f"terms: {error}")
+            continue
+        if term.name in all_terms():
+            problems.append(f"terms: {name}: {term.name!r} is an effect already; take another name")
+        found[name] = term
+    return found
 
 
 def _defaults(terms: tuple[Term, ...]) -> dict[str, Quantity]:
@@ -248,14 +272,17 @@ def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
     return {f"{s}.{key}": entry for s, body in sections.items() for key, entry in body.items()}
 
 
-def _known_keys() -> dict[str, Param | Fact]:
-    params = [*body14.PARAMS, *(p for term in flat(all_terms().values()) for p in term.params)]
+def _known_keys(terms: Sequence[Term]) -> dict[str, Param | Fact]:
+    known = flat([*all_terms().values(), *terms])
+    params = [*body14.PARAMS, *(param for term in known for param in term.params)]
     params += [param for fault in all_measures().values() for param in fault.params]
     return {**FACTS, **{param.key: param for param in params}}
 
 
-def _values(data: Mapping[str, Any], problems: list[str]) -> dict[str, Quantity]:
-    known = _known_keys()
+def _values(
+    data: Mapping[str, Any], terms: Sequence[Term], problems: list[str]
+) -> dict[str, Quantity]:
+    known = _known_keys(terms)
     sections = {key.partition(".")[0] for key in known}
     problems += _top_problems(data, sections)
     values: dict[str, Quantity] = {}
