@@ -208,6 +208,25 @@ class Fleet:
         self.status[row] = VehicleStatus.OK
         self._run(row, row + 1, 0, SUBSTEP_S)
 
+    def settle(self, row: int) -> None:
+        """Let a car that was just placed stand on the heights that `floor_height` has for it."""
+        front_left, front_right, rear_left, rear_right = self.floor_height[row].tolist()
+        rear, cog = 0.5 * (rear_left + rear_right), self._parameter(row, "cog_to_rear_axle")
+        rise = (0.5 * (front_left + front_right) - rear) / self._parameter(row, "wheelbase")
+        left_up = 0.5 * (front_left + rear_left - front_right - rear_right)
+        roll, height = left_up / self._parameter(row, "track"), self._parameter(row, "cog_height")
+        c, s = math.cos(float(self.yaw[row])), math.sin(float(self.yaw[row]))
+        for name, change in (
+            ("x_cog", height * (s * roll - c * rise)),
+            ("y_cog", -height * (c * roll + s * rise)),
+            ("z_cog", rear + cog * rise),
+            ("roll", roll),
+            ("pitch", -rise),
+            ("hop", self.floor_height[row].copy()),
+        ):
+            self._set(row, name, self._view(name)[row] + change)
+        self._run(row, row + 1, 0, SUBSTEP_S)
+
     def advance(self, duration: float, substep: float = SUBSTEP_S) -> None:
         """Advance all cars by whole substeps in one call, without the interpreter lock [s]."""
         self.advance_rows(0, self.capacity, duration, substep)
