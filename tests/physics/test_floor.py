@@ -8,6 +8,7 @@ import pytest
 from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.maps.model import Box, CityMap, Floor, MapTag, Patch, Plate, Ramp, Wall
+from scm.maps.segments import wall_segments
 from scm.v2x.messages.route_request import RouteRequest
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet, VehicleStatus
@@ -148,4 +149,4 @@ def test_a_pushed_box_moves_for_lidars_and_snapshots_too():
     (seen,) = world.contacts.boxes.in_snapshot()
     assert seen.name == "b"
     assert seen.x_m > 0.283
-    assert len(world.walls) == 4  # of the wall alone
+    assert len(wall_segments(world.city_map)) == 4  # of the wall alone
