@@ -22,8 +22,13 @@ def law(function: Function) -> Function:
 
 
 def array_kernel(function: Function) -> Function:
-    """Compile a function over arrays at its first call, without the interpreter lock, cached."""
-    return cast("Function", _cached(function))
+    """Compile a function over arrays at its first call, without the interpreter lock, cached.
+
+    What it calls may stand in any file of its folder: when one of them changes it is compiled anew.
+    """
+    compiled = _cached(function)
+    compiled._cache.stamp_folder(Path(function.__code__.co_filename).parent)  # noqa: SLF001
+    return cast("Function", compiled)
 
 
 def fleet_kernel(function: Function) -> Function:
@@ -38,6 +43,12 @@ _Cache: Any = FunctionCache
 
 class _ForgivingCache(_Cache):  # type: ignore[misc]
     """Numba's cache; files in it that are damaged are forgotten, so that they are written anew."""
+
+    def stamp_folder(self, folder: Path) -> None:
+        """Count what was compiled from other versions of any file in a folder as out of date."""
+        files = [(path.name, path.stat()) for path in sorted(folder.glob("*.py"))]
+        stamp = tuple((name, stat.st_mtime, stat.st_size) for name, stat in files)
+        self._cache_file._source_stamp = stamp  # noqa: SLF001 numba's own knows one file only
 
     def load_overload(self, sig: object, target_context: object) -> object:
         try:
