@@ -23,6 +23,7 @@ from scm.api.eye_rows import camera_rows
 from scm.api.picture import Picture
 from scm.api.routes.stop import stop_of
 from scm.api.signal_rows import junction_rows
+from scm.v2x.messages.world_snapshot import SnapshotBox
 
 _LOGGER = logging.getLogger(__name__)
 
@@ -37,6 +38,11 @@ class Topic(NamedTuple):
 
     make: Callable[[Picture], object]
     every: int
+
+
+def boxes_of(picture: Picture) -> tuple[SnapshotBox, ...]:
+    """Return where the boxes are that can be pushed."""
+    return picture.snapshot.message.boxes if picture.snapshot is not None else ()
 
 
 class Listener:
@@ -90,6 +96,7 @@ class Stream:
             "signals": Topic(
                 lambda picture: junction_rows(picture, city.city_map.junctions, city.plans), 2
             ),
+            "boxes": Topic(boxes_of, 2),
             "stop": Topic(stop_of, 2),
             "eye": Topic(camera_rows, 2),
             "stations": Topic(lambda picture: picture.stations, 10),

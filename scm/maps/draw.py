@@ -29,12 +29,13 @@ WALL, WALL_EDGE, BOX, BOX_EDGE = "#cfc6b4", "#9c9280", "#d9904a", "#8d5a28"
 CAR_OUTLINE = ((-0.07, -0.0875), (0.23, -0.0875), (0.23, 0.0875), (-0.07, 0.0875))
 
 
-def draw_svg(city_map: CityMap, *, spawns: bool = False) -> str:
+def draw_svg(city_map: CityMap, *, spawns: bool = False, movable: bool = True) -> str:
     """Return the map as one self-contained SVG whose units are map metres, y negated.
 
     Args:
         city_map: The map.
         spawns: Also draw the places where cars may be put.
+        movable: Also draw boxes that can be pushed, where the map has them.
     """
     x_low, y_low, x_high, y_high = bounds(city_map)
     width, height = x_high - x_low + 2 * MARGIN_M, y_high - y_low + 2 * MARGIN_M + STRIP_M
@@ -45,7 +46,7 @@ def draw_svg(city_map: CityMap, *, spawns: bool = False) -> str:
         _road(city_map),
         floor_layers(city_map),
         _paint(city_map, roads),
-        _walls(city_map),
+        _walls(city_map, movable=movable),
         _tag(city_map),
         layer("spawns", _spawns(city_map, roads) if spawns else ()),
         layer("signs", map(furniture.sign, city_map.signs)),
@@ -229,7 +230,7 @@ def _crosswalk(crossing: Crosswalk) -> str:
     )
 
 
-def _walls(city_map: CityMap) -> str:
+def _walls(city_map: CityMap, *, movable: bool) -> str:
     walls = [_wall(wall) for wall in city_map.walls]
     boxes = [
         element(
@@ -243,6 +244,7 @@ def _walls(city_map: CityMap) -> str:
             stroke_linejoin="round",
         )
         for box in city_map.boxes
+        if movable or box.mass_kg is None
     ]
     return layer("walls", walls) + layer("boxes", boxes)
 

@@ -19,7 +19,7 @@ def router(city: City) -> APIRouter:
     """Return the routes; both forms are made once, a map does not change while the city runs."""
     routes = APIRouter(tags=["map"])
     as_json = msgspec.json.encode(city.city_map)
-    as_svg = draw_svg(city.city_map).encode()
+    as_svg = draw_svg(city.city_map, movable=False).encode()  # the page draws those live
 
     @routes.get("/map", summary="The map as JSON")
     def map_json(request: Request) -> Response:

@@ -27,7 +27,9 @@ def test_a_page_first_gets_everything(stream, hear, snapshot, event):
         hear(1.0, snapshot(n1=(0.0, 0.0, 0.0)), event("hello"))
         _, (name, _, body) = await begin(stream)
         assert name == "snapshot"
-        assert set(body) == {"cars", "signals", "stop", "eye", "stations", "events", "run"}
+        assert set(body) == {
+            "cars", "signals", "boxes", "stop", "eye", "stations", "events", "run",
+        }  # fmt: skip
         assert body["cars"]["cars"][0]["vehicle"] == "n1"
         assert [item["text"] for item in body["events"]] == ["hello"]
 

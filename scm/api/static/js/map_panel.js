@@ -2,11 +2,12 @@
 import { effect } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "./html.js";
+import { drawBoxes } from "./box_shape.js";
 import { drawCar, footprint } from "./car_shape.js";
 import { drawLight } from "./light_shape.js";
 import { carsNow } from "./motion.js";
 import { selected } from "./selection.js";
-import { city, link, live, signals } from "./store.js";
+import { boxes, city, link, live, signals } from "./store.js";
 
 const FRAME_MS = 30;
 const ROADS = "/api/v1/map.svg";
@@ -99,6 +100,7 @@ function animate(canvas, box) {
     drawn = time;
     const view = prepare(canvas, paper, box);
     const colours = link.value === "live" ? groups : new Map();
+    drawBoxes(paper, view, boxes.value, city.value?.boxes ?? []);
     for (const car of carsNow()) drawCar(paper, view, car, car.vehicle === selected.value);
     // Lights last: no car's name may hide a colour.
     for (const light of city.value?.lights ?? []) {

@@ -12,6 +12,7 @@ export const live = { cars: [], tick: null, at: 0, sequence: 0 };
 export const world = signal({ t_ns: null, tick: null, real_time_factor: 0, late_ticks: 0, cars: [] });
 export const signals = signal([]);
 export const signalsAt = signal(0);
+export const boxes = signal([]);
 export const stop = signal({ engaged: false, by: "", reason: "" });
 export const cameras = signal([]);
 export const stations = signal([]);
@@ -84,6 +85,7 @@ function take(topics) {
       signals.value = topics.signals;
       signalsAt.value = performance.now();
     }
+    if (topics.boxes) boxes.value = topics.boxes;
     if (topics.stop) stop.value = topics.stop;
     if (topics.eye) cameras.value = topics.eye;
     if (topics.stations) stations.value = topics.stations;
