@@ -7,15 +7,11 @@ readings are the truth. To add one, copy `sensors/encoders.py`.
 """
 
 import math
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
-
-import numpy as np
+from typing import Protocol
 
 from scm.arrays import Floats, Ints
-from scm.clock import NS_PER_S
 from scm.vehicles.car import Car
 from scm.vehicles.rays.scene import Scene
 
@@ -75,21 +71,6 @@ class Truth(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Around:
-    """What stands around the cars, as vertical faces.
-
-    Attributes:
-        edges: (m, 4) x0, y0, x1, y1 in the map frame [m].
-        owners: (m,) who each face belongs to; -1 for walls.
-        own: (k,) who each measured car is: its own faces are not seen.
-    """
-
-    edges: Floats
-    owners: Ints
-    own: Ints
-
-
-@dataclass(frozen=True, slots=True)
 class Sight:
     """What stands around the measured cars; `own` (k,) are their slots: none sees itself."""
 
@@ -145,63 +126,8 @@ class Sensor:
     values: tuple[str, ...]
     needs: tuple[str, ...]
     facts: Callable[[Car], Facts]
-    measure: Callable[[Car, Truth, Ints, Sight | Around | None], Floats]
+    measure: Callable[[Car, Truth, Ints, Sight | None], Floats]
 
     def is_fitted(self, car: Car) -> bool:
         """Return whether a car has such a device: its file describes it."""
         return all(car.has(key) for key in self.needs)
-
-
-class Reading(NamedTuple):
-    """Values that were true at `t_ns`, as the device gives them."""
-
-    t_ns: int
-    values: Floats
-
-
-class Sampler:
-    """One car's device of a kind: takes exact values when due, gives readings when they are out.
-
-    Args:
-        facts: Of the device.
-        rng: Its own, spawned from the run's seed: the noise of one car depends on no other.
-        offset: Share of a period that the first reading waits, so that not all cars scan at once.
-    """
-
-    def __init__(self, facts: Facts, rng: np.random.Generator, offset: float = 0.0) -> None:
-        self.facts = facts
-        self._rng = rng
-        self._noise = np.array(facts.noise)
-        self._period_ns = round(NS_PER_S / facts.rate_hz)
-        self._offset_ns = round(offset * self._period_ns)
-        self._next_ns: int | None = None
-        self._under_way: deque[Reading] = deque()
-
-    def is_due(self, now_ns: int) -> bool:
-        """Return whether the device reads now; true once a period, a missed one is not made up."""
-        if self._next_ns is None:
-            self._next_ns = now_ns + self._offset_ns
-        if now_ns < self._next_ns:
-            return False
-        self._next_ns += ((now_ns - self._next_ns) // self._period_ns + 1) * self._period_ns
-        return True
-
-    def take(self, now_ns: int, exact: Floats) -> None:
-        """Read: spoil the exact values of `now_ns` and set them on their way."""
-        facts = self.facts
-        values = np.array(exact, dtype=float)
-        if self._noise.any():
-            values = values + self._noise * self._rng.standard_normal(len(values))
-        if facts.quantum:
-            values = np.floor(values / facts.quantum) * facts.quantum
-        if facts.drop_out and self._rng.random() < facts.drop_out:
-            return
-        self._under_way.append(Reading(now_ns, values))
-
-    def ready(self, now_ns: int) -> list[Reading]:
-        """Return, once each, the readings that have come out by now, oldest first."""
-        out = []
-        latency_ns = round(self.facts.latency_s * NS_PER_S)
-        while self._under_way and self._under_way[0].t_ns + latency_ns <= now_ns:
-            out.append(self._under_way.popleft())
-        return out

@@ -17,8 +17,8 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.jit import array_kernel, law
-from scm.vehicles.rays.grid import Cells, Numbers, cell_size, sort_bodies
-from scm.vehicles.rays.order import SECTORS, WIDTH, Bits, Order, Sectors, order_of, sectors_of
+from scm.vehicles.rays.grid import Cells, Numbers, Window, cell_size, sort_bodies
+from scm.vehicles.rays.order import SECTORS, WIDTH, Order, Sectors, order_of, sectors_of
 from scm.vehicles.rays.scene import Scene
 
 CORNER = 1e-9
@@ -41,13 +41,14 @@ def cast(
         farthest: Reach [m].
     """
     first, step, beams = bearings
-    angles = first + step * np.arange(beams)
+    angles = step * np.arange(beams)
+    lines = np.stack((angles, np.cos(angles), np.sin(angles)))
     ranges = np.full((len(scanners), beams), np.inf)
     walls, bodies = sorted_scene(scene, scanners[:, :2], farthest)
     _cast(
-        ranges, np.cos(angles), np.sin(angles), first, step, scanners, own, farthest,
-        order_of(walls.size, farthest), sectors_of(step, beams), scene.walls.edges, walls,
-        scene.outlines, scene.owners, bodies,
+        ranges, lines, first, step, scanners, own, farthest,
+        order_of(walls.window.size, farthest), sectors_of(step, beams), scene.walls.edges, *walls,
+        scene.outlines, scene.owners, *bodies,
     )  # fmt: skip
     return ranges
 
@@ -63,102 +64,78 @@ def sorted_scene(scene: Scene, places: Floats, farthest: float) -> tuple[Cells, 
 
 
 class Turn(NamedTuple):
-    """One scanner's turn under way.
+    """One scanner's turn; its frame has x along beam 0 and y to the left of it.
 
     Attributes:
-        ranges: (beams,) the nearest so far.
-        open: (1,) bit s is set while a beam of sector s, from beam 0, may still see farther.
-        sectors: The beams of each.
-        ux, uy: (beams,) directions of the beams, map frame.
-        zero: Bearing of beam 0, map frame; `step` from each beam to the next.
-        x, y: Place of the scanner.
-        farthest: Reach.
+        x, y: Place of the scanner, map frame.
+        c, s: Cosine and sine of beam 0's bearing, map frame.
+        a_step: Beams in a radian.
+        reach: The farthest that a range can be.
     """
 
-    ranges: Floats
-    open: Bits
-    sectors: Sectors
-    ux: Floats
-    uy: Floats
-    zero: float
-    step: float
     x: float
     y: float
-    farthest: float
+    c: float
+    s: float
+    a_step: float
+    reach: float
 
 
 @array_kernel
 def _cast(
-    ranges: Floats, ux: Floats, uy: Floats, first: float, step: float, scanners: Floats, own: Ints,
-    farthest: float, order: Order, sectors: Sectors, edges: Floats, walls: Cells, outlines: Floats,
-    owners: Ints, bodies: Cells,
+    ranges: Floats, beams: Floats, first: float, step: float, scanners: Floats, own: Ints,
+    farthest: float, order: Order, sectors: Sectors, edges: Floats, walls: Window,
+    wall_starts: Numbers, wall_items: Numbers, outlines: Floats, owners: Ints, bodies: Window,
+    body_starts: Numbers, body_items: Numbers,
 ) -> None:  # fmt: skip
-    beams = ranges.shape[1]
-    open_sectors = np.empty(1, np.uint64)
-    wx, wy = np.empty(beams), np.empty(beams)
+    """Fill `ranges`; `beams` (3, n) has room for a turn's ranges above the beams' directions."""
     wall_seen = np.full(edges.shape[0], -1, np.int32)
     body_seen = np.full(owners.shape[0], -1, np.int32)
     for k in range(scanners.shape[0]):
-        x, y, yaw = scanners[k, 0], scanners[k, 1], scanners[k, 2]
-        if not math.isfinite(x + y + yaw):
+        x, y, zero = scanners[k, 0], scanners[k, 1], scanners[k, 2] + first
+        if not math.isfinite(x + y + zero):
             continue
-        c, s = math.cos(yaw), math.sin(yaw)
-        for b in range(beams):
-            wx[b] = c * ux[b] - s * uy[b]
-            wy[b] = s * ux[b] + c * uy[b]
-        open_sectors[0] = ALL
-        turn = Turn(ranges[k], open_sectors, sectors, wx, wy, yaw + first, step, x, y, farthest)
-        _look_around(turn, k, own[k], order, edges, walls, wall_seen, outlines, owners, bodies,
-                     body_seen)  # fmt: skip
+        beams[0] = np.inf
+        turn = Turn(x, y, math.cos(zero), math.sin(zero), 1.0 / step, farthest)
+        i, j = math.floor(x / walls.size), math.floor(y / walls.size)
+        ahead = math.floor(zero / WIDTH)
+        still, open_bearings, reached = ALL, ALL, 0.0
+        for t in range(len(order.near)):
+            if order.near[t] > reached:
+                reached = order.near[t] + walls.size
+                still = _close(still, sectors.begin, sectors.end, beams, order.near[t])
+                if still == NONE:
+                    break
+                # a sector about the scanner lies across two of the map
+                open_bearings = _rotated(still, ahead) | _rotated(still, ahead + 1)
+            if (open_bearings & order.sectors[t]) != NONE:
+                cell = _cell(
+                    i - walls.i0 + order.i[t], j - walls.j0 + order.j[t], walls.ni, walls.nj
+                )
+                if cell >= 0 and wall_starts[cell] < wall_starts[cell + 1]:
+                    _look_at_walls(beams, turn, k, edges, wall_starts[cell],
+                                   wall_starts[cell + 1], wall_items, wall_seen)  # fmt: skip
+                cell = _cell(
+                    i - bodies.i0 + order.i[t], j - bodies.j0 + order.j[t], bodies.ni, bodies.nj
+                )
+                if cell >= 0 and body_starts[cell] < body_starts[cell + 1]:
+                    _look_at_bodies(beams, turn, k, own[k], outlines, owners, body_starts[cell],
+                                    body_starts[cell + 1], body_items, body_seen)  # fmt: skip
+        ranges[k] = beams[0]
 
 
 @law
-def _look_around(
-    turn: Turn, k: int, own: int, order: Order, edges: Floats, walls: Cells, wall_seen: Numbers,
-    outlines: Floats, owners: Ints, bodies: Cells, body_seen: Numbers,
-) -> None:  # fmt: skip
-    """Look into all cells that may hold something nearer than what each beam has met."""
-    i, j = math.floor(turn.x / walls.size), math.floor(turn.y / walls.size)
-    reached = 0.0
-    bearings = ALL
-    for t in range(len(order.near)):
-        if order.near[t] > reached:
-            reached = order.near[t] + 0.5 * walls.size
-            bearings = _close(turn, order.near[t])
-            if bearings == NONE:
-                break
-        if (bearings & order.sectors[t]) == NONE:
-            continue
-        wall = _cell(walls, i + order.i[t], j + order.j[t])
-        for n in range(walls.starts[wall], walls.starts[wall + 1] if wall >= 0 else 0):
-            m = walls.items[n]
-            if wall_seen[m] != k:
-                wall_seen[m] = k
-                _draw(turn, edges[m, 0], edges[m, 1], edges[m, 2], edges[m, 3])
-        body = _cell(bodies, i + order.i[t], j + order.j[t])
-        for n in range(bodies.starts[body], bodies.starts[body + 1] if body >= 0 else 0):
-            m = bodies.items[n]
-            if body_seen[m] != k and (owners[m] < 0 or owners[m] != own):
-                body_seen[m] = k
-                _draw_body(turn, outlines, 4 * m)
-
-
-@law
-def _close(turn: Turn, near: float) -> np.uint64:
-    """Close the sectors that see nothing beyond `near`; return those of the map still open."""
-    still = turn.open[0]
+def _close(still: np.uint64, begin: Numbers, end: Numbers, beams: Floats, near: float) -> np.uint64:
+    """Return the sectors, from beam 0, that still see beyond `near`, of those that did."""
     for sector in range(SECTORS):
         bit = ONE << np.uint64(sector)
         if (still & bit) != NONE:
-            b, end = turn.sectors.begin[sector], turn.sectors.end[sector]
-            while b < end and turn.ranges[b] <= near:
+            b = begin[sector]
+            while b < end[sector] and beams[0, b] <= near:
                 b += 1
-            if b == end:
+            if b == end[sector]:
                 still ^= bit
-    turn.open[0] = still
-    # a sector about the scanner lies across two of the map
-    ahead = math.floor(turn.zero / WIDTH)
-    return _rotated(still, ahead) | _rotated(still, ahead + 1)
+    return still
 
 
 @law
@@ -169,73 +146,122 @@ def _rotated(bits: np.uint64, by: int) -> np.uint64:
 
 
 @law
-def _cell(cells: Cells, i: int, j: int) -> int:
-    """Return the number of a cell that something is in; -1 where nothing is."""
-    a, b = i - cells.i0, j - cells.j0
-    if a < 0 or a >= cells.ni or b < 0 or b >= cells.nj:
-        return -1
-    cell = a * cells.nj + b
-    return cell if cells.starts[cell] < cells.starts[cell + 1] else -1
+def _look_at_walls(
+    beams: Floats, turn: Turn, k: int, edges: Floats, begin: int, end: int, items: Numbers,
+    seen: Numbers,
+) -> None:  # fmt: skip
+    """Draw those walls of a cell that turn k has not drawn yet."""
+    for n in range(begin, end):
+        m = items[n]
+        if seen[m] != k:
+            seen[m] = k
+            ax, ay = _seen_from(turn, edges[m, 0], edges[m, 1])
+            bx, by = _seen_from(turn, edges[m, 2], edges[m, 3])
+            moment = ax * by - ay * bx
+            if moment > 0.0:
+                _draw(beams, turn.a_step, turn.reach, ax, ay, bx, by, moment)
+            else:
+                _draw(beams, turn.a_step, turn.reach, bx, by, ax, ay, -moment)
 
 
 @law
-def _draw_body(turn: Turn, outlines: Floats, first: int) -> None:
+def _look_at_bodies(
+    beams: Floats, turn: Turn, k: int, own: int, outlines: Floats, owners: Ints, begin: int,
+    end: int, items: Numbers, seen: Numbers,
+) -> None:  # fmt: skip
+    """Draw those bodies of a cell that turn k has not drawn yet."""
+    for n in range(begin, end):
+        m = items[n]
+        if seen[m] != k and (owners[m] < 0 or owners[m] != own):
+            seen[m] = k
+            _draw_body(beams, turn, outlines, 4 * m)
+
+
+@law
+def _cell(i: int, j: int, ni: int, nj: int) -> int:
+    """Return the number of a cell of a window; -1 outside it."""
+    return i * nj + j if (i >= 0) & (i < ni) & (j >= 0) & (j < nj) else -1
+
+
+@law
+def _seen_from(turn: Turn, x: float, y: float) -> tuple[float, float]:
+    """Return a point of the map in the turn's frame."""
+    dx, dy = x - turn.x, y - turn.y
+    return turn.c * dx + turn.s * dy, turn.c * dy - turn.s * dx
+
+
+@law
+def _draw_body(beams: Floats, turn: Turn, outlines: Floats, first: int) -> None:
     """Draw the faces of a body that look towards the scanner; from inside it, all."""
-    outside = False
-    for n in range(first, first + 4):
-        outside = outside or _looks_here(turn, outlines, n)
-    for n in range(first, first + 4):
-        if not outside or _looks_here(turn, outlines, n):
-            _draw(turn, outlines[n, 0], outlines[n, 1], outlines[n, 2], outlines[n, 3])
+    x0, y0 = _seen_from(turn, outlines[first, 0], outlines[first, 1])
+    x1, y1 = _seen_from(turn, outlines[first + 1, 0], outlines[first + 1, 1])
+    x2, y2 = _seen_from(turn, outlines[first + 2, 0], outlines[first + 2, 1])
+    x3, y3 = _seen_from(turn, outlines[first + 3, 0], outlines[first + 3, 1])
+    m0, m1 = x1 * y0 - y1 * x0, x2 * y1 - y2 * x1
+    m2, m3 = x3 * y2 - y3 * x2, x0 * y3 - y0 * x3
+    inside = max(m0, m1, m2, m3) <= 0.0
+    for _ in range(4):
+        if m0 > 0.0:
+            _draw(beams, turn.a_step, turn.reach, x1, y1, x0, y0, m0)
+        elif inside:
+            _draw(beams, turn.a_step, turn.reach, x0, y0, x1, y1, -m0)
+        m0, m1, m2, m3 = m1, m2, m3, m0
+        x0, y0, x1, y1, x2, y2, x3, y3 = x1, y1, x2, y2, x3, y3, x0, y0
 
 
 @law
-def _looks_here(turn: Turn, faces: Floats, n: int) -> bool:
-    """Return whether the scanner stands outside a face, which is on its right-hand side."""
-    ax, ay = faces[n, 0] - turn.x, faces[n, 1] - turn.y
-    return bool(ax * (faces[n, 3] - turn.y) - ay * (faces[n, 2] - turn.x) < 0.0)
-
-
-@law
-def _draw(turn: Turn, x0: float, y0: float, x1: float, y1: float) -> None:
-    """Lower the ranges of all beams that meet the face between two points of the map."""
-    ax, ay, bx, by = x0 - turn.x, y0 - turn.y, x1 - turn.x, y1 - turn.y
-    reach = turn.farthest
-    if min(ax, bx) > reach or max(ax, bx) < -reach or min(ay, by) > reach or max(ay, by) < -reach:
-        return
-    moment = ax * by - ay * bx
-    if moment < 0.0:
-        ax, ay, bx, by, moment = bx, by, ax, ay, -moment
-    if moment <= EDGE_ON:
+def _draw(
+    beams: Floats, a_step: float, reach: float, ax: float, ay: float, bx: float, by: float,
+    moment: float,
+) -> None:  # fmt: skip
+    """Lower the ranges of all beams that meet the face from a to b, counter-clockwise."""
+    if (
+        moment <= EDGE_ON
+        or (min(ax, bx) > reach)
+        or (max(ax, bx) < -reach)
+        or (min(ay, by) > reach)
+        or (max(ay, by) < -reach)
+    ):
         return
     start = bearing(ax, ay) - MARGIN
     span = bearing(bx, by) + MARGIN - start
-    span -= TURN * math.floor(span / TURN)
-    start -= turn.zero
-    start -= TURN * math.floor(start / TURN)
-    for _ in range(2):
-        low = max(math.ceil(start / turn.step), 0)
-        high = min(math.floor((start + span) / turn.step), len(turn.ranges) - 1)
-        if low <= high:
-            _lower(turn, low, high, ax, ay, bx, by, moment)
-        start -= TURN
+    span = span + TURN if span < 0.0 else span
+    start = start + TURN if start < 0.0 else start
+    last = beams.shape[1] - 1
+    end = (start + span) * a_step
+    _lower(
+        beams,
+        reach,
+        math.ceil(start * a_step),
+        min(math.floor(end), last),
+        ax,
+        ay,
+        bx,
+        by,
+        moment,
+    )
+    if start + span >= TURN:
+        end -= TURN * a_step
+        _lower(beams, reach, 0, min(math.floor(end), last), ax, ay, bx, by, moment)
 
 
 @law
 def _lower(
-    turn: Turn, low: int, high: int, ax: float, ay: float, bx: float, by: float, moment: float
-) -> None:
+    beams: Floats, reach: float, low: int, high: int, ax: float, ay: float, bx: float, by: float,
+    moment: float,
+) -> None:  # fmt: skip
     """Lower the ranges of those beams, low to high, that pass between a and b."""
-    ranges, ux, uy = turn.ranges, turn.ux, turn.uy
     dx, dy = bx - ax, by - ay
     slack_a, slack_b = -CORNER * (abs(ax) + abs(ay)), -CORNER * (abs(bx) + abs(by))
-    for b in range(low, high + 1):
-        across = ux[b] * dy - uy[b] * dx
-        after_a, before_b = ax * uy[b] - ay * ux[b], ux[b] * by - uy[b] * bx
-        met = (across > 0.0) & (after_a >= slack_a) & (before_b >= slack_b)
-        distance = moment / across if met else np.inf
-        distance = distance if distance <= turn.farthest else np.inf
-        ranges[b] = min(ranges[b], distance)
+    b = low
+    while b <= high and ax * beams[2, b] - ay * beams[1, b] < slack_a:
+        b += 1
+    while b <= high and beams[1, b] * by - beams[2, b] * bx >= slack_b:
+        across = beams[1, b] * dy - beams[2, b] * dx
+        distance = moment / across if across > 0.0 else np.inf
+        distance = distance if distance <= reach else np.inf
+        beams[0, b] = min(beams[0, b], distance)
+        b += 1
 
 
 @law

@@ -20,14 +20,12 @@ SMALLEST_M = 0.5
 SLACK = 1e-9
 
 
-class Cells(NamedTuple):
-    """What lies in each cell (i, j) of a window, i across and j up, cell 0 at the map's origin.
+class Window(NamedTuple):
+    """Which cells (i, j) there are, i across and j up; cell (0, 0) begins at the map's origin.
 
     Attributes:
         size: Edge of a cell [m].
-        i0, j0: The window's first cell; `ni`, `nj`: how many cells it has.
-        starts: (ni * nj + 1,) where each cell's items begin; cells run along j first.
-        items: Numbers of faces or bodies, cell after cell.
+        i0, j0: The first cell; `ni`, `nj`: how many there are each way.
     """
 
     size: float
@@ -35,6 +33,17 @@ class Cells(NamedTuple):
     j0: int
     ni: int
     nj: int
+
+
+class Cells(NamedTuple):
+    """What lies in each cell of a window.
+
+    Attributes:
+        starts: (ni * nj + 1,) where each cell's items begin; cells run along j first.
+        items: Numbers of faces or bodies, cell after cell.
+    """
+
+    window: Window
     starts: Numbers
     items: Numbers
 
@@ -65,7 +74,7 @@ class WallGrid:
 def sort_faces(edges: Floats, size: float) -> Cells:
     """Return the faces (m, 4) by the cells that they cross."""
     window = _window(edges.reshape(-1, 2), size)
-    return _sorted(edges, 1, window, size)
+    return _sorted(edges, 1, window)
 
 
 def sort_bodies(outlines: Floats, size: float, low: Floats, high: Floats) -> Cells:
@@ -74,35 +83,33 @@ def sort_bodies(outlines: Floats, size: float, low: Floats, high: Floats) -> Cel
     Bodies outside that window are left out.
     """
     window = _window(np.array([low, high]), size)
-    return _sorted(outlines, 4, window, size)
+    return _sorted(outlines, 4, window)
 
 
-def _window(points: Floats, size: float) -> tuple[int, int, int, int]:
+def _window(points: Floats, size: float) -> Window:
     if len(points) == 0:
-        return 0, 0, 0, 0
+        return Window(size, 0, 0, 0, 0)
     low = np.floor(points.min(axis=0) / size - SLACK).astype(int)
     high = np.floor(points.max(axis=0) / size + SLACK).astype(int)
     ni, nj = (high - low + 1).tolist()
-    return int(low[0]), int(low[1]), ni, nj
+    return Window(size, int(low[0]), int(low[1]), ni, nj)
 
 
-def _sorted(edges: Floats, faces: int, window: tuple[int, int, int, int], size: float) -> Cells:
-    i0, j0, ni, nj = window
-    counts = np.zeros(ni * nj + 1, np.int32)
-    _list(edges, faces, i0, j0, ni, nj, size, counts, np.zeros(0, np.int32))
-    starts = np.zeros(ni * nj + 1, np.int32)
+def _sorted(edges: Floats, faces: int, window: Window) -> Cells:
+    cells = window.ni * window.nj
+    counts = np.zeros(cells + 1, np.int32)
+    _list(edges, faces, window, counts, np.zeros(0, np.int32))
+    starts = np.zeros(cells + 1, np.int32)
     np.cumsum(counts[:-1], out=starts[1:])
     items = np.empty(starts[-1], np.int32)
-    _list(edges, faces, i0, j0, ni, nj, size, starts[:-1].copy(), items)
-    return Cells(size, i0, j0, ni, nj, starts, items)
+    _list(edges, faces, window, starts[:-1].copy(), items)
+    return Cells(window, starts, items)
 
 
 @array_kernel
-def _list(
-    edges: Floats, faces: int, i0: int, j0: int, ni: int, nj: int, size: float,
-    places: Numbers, items: Numbers,
-) -> None:  # fmt: skip
+def _list(edges: Floats, faces: int, window: Window, places: Numbers, items: Numbers) -> None:
     """Count items in `places`, or, given room for `items`, write each where its place says."""
+    size, i0, j0, ni, nj = window
     for number in range(edges.shape[0] // faces):
         first, last = number * faces, (number + 1) * faces
         left, right = _span(edges, first, last, 0, size)

@@ -1,1 +1,1 @@
-"""Sensors of a car: one kind a file, with `SENSOR`. They measure exactly; `Sampler` spoils."""
+"""Sensors of a car: one kind a file, with `SENSOR`. They measure exactly; `Bank` spoils."""

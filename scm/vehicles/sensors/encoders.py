@@ -10,7 +10,7 @@ import math
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
-from scm.vehicles.sensor import Around, Facts, Sensor, Sight, Truth
+from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
 
 REAR = (2, 3)
 
@@ -26,7 +26,7 @@ def facts(car: Car) -> Facts:
     )
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Sight | Around | None) -> Floats:
+def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
     """Return the angles of the rear wheels in counts, not yet rounded, (k, 2)."""
     counts = car.value("encoder.counts_per_revolution")
     return truth.wheel_angle[rows][:, REAR] * (counts / (2.0 * math.pi))

@@ -18,7 +18,7 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.vehicles.body14 import GRAVITY
 from scm.vehicles.car import Car
-from scm.vehicles.sensor import Around, Facts, Sensor, Sight, Truth
+from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
 
 
 def facts(car: Car) -> Facts:
@@ -45,7 +45,7 @@ def facts(car: Car) -> Facts:
     )  # fmt: skip
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Sight | Around | None) -> Floats:
+def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
     """Return specific force [m/s^2], turn rate [rad/s] and orientation [rad], (k, 9)."""
     level = np.column_stack(
         (

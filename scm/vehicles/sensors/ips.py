@@ -11,7 +11,7 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
-from scm.vehicles.sensor import Around, Facts, Sensor, Sight, Truth
+from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
 
 
 def facts(car: Car) -> Facts:
@@ -26,7 +26,7 @@ def facts(car: Car) -> Facts:
     )
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Sight | Around | None) -> Floats:
+def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
     """Return the tag's pose (k, 3): x, y [m], yaw [rad]."""
     x, y, z = car.vector("ips.position_m")
     yaw, roll, pitch = truth.yaw[rows], truth.roll[rows], truth.pitch[rows]

@@ -18,9 +18,7 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
 from scm.vehicles.rays.cast import cast
-from scm.vehicles.rays.grid import WallGrid
-from scm.vehicles.rays.scene import Scene
-from scm.vehicles.sensor import Around, Facts, Sensor, Sight, Truth
+from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
 
 NOISE_SPREADS = 6.0
 
@@ -56,7 +54,7 @@ def facts(car: Car) -> Facts:
     )
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Sight | Around | None) -> Floats:
+def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
     """Return ranges (k, beams) [m]; infinity is a miss.
 
     The nearer end of the range is the device's own limit, and noise may carry a hit over its
@@ -70,7 +68,7 @@ def measure(car: Car, truth: Truth, rows: Ints, around: Sight | Around | None) -
     return _ranges(car, scanners, around, car.vector("lidar.range_m")[1] + beyond)
 
 
-def scan(car: Car, scanners: Floats, around: Sight | Around | None) -> Floats:
+def scan(car: Car, scanners: Floats, around: Sight | None) -> Floats:
     """Return what scanners like this car's tell without noise from poses (k, 3) x, y, yaw."""
     nearest, farthest = car.vector("lidar.range_m")
     ranges = _ranges(car, scanners, around, farthest)
@@ -78,16 +76,10 @@ def scan(car: Car, scanners: Floats, around: Sight | Around | None) -> Floats:
     return ranges
 
 
-def _ranges(car: Car, scanners: Floats, around: Sight | Around | None, farthest: float) -> Floats:
+def _ranges(car: Car, scanners: Floats, around: Sight | None, farthest: float) -> Floats:
     bearings = bearings_of(car)
     if around is None:
         return np.full((len(scanners), bearings.beams), np.inf)
-    if isinstance(around, Around):
-        fixed = around.owners < 0
-        scene = Scene(
-            WallGrid(around.edges[fixed]), around.edges[~fixed], around.owners[~fixed][::4]
-        )
-        around = Sight(scene, around.own)
     return cast(around.scene, scanners, around.own, bearings, farthest)
 
 

@@ -8,7 +8,7 @@ Source: steering sensor of the AutoDRIVE paper.
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
-from scm.vehicles.sensor import Around, Facts, Sensor, Sight, Truth
+from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
 
 
 def facts(car: Car) -> Facts:
@@ -23,7 +23,7 @@ def facts(car: Car) -> Facts:
     )
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Sight | Around | None) -> Floats:
+def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
     """Return the mean road-wheel angle (k, 1) [rad]."""
     return truth.steer_angle[rows][:, None]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
-from scm.vehicles.sensor import Around, Facts, Sensor, Sight, Truth
+from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
 
 
 def facts(car: Car) -> Facts:
@@ -24,7 +24,7 @@ def facts(car: Car) -> Facts:
     )
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Sight | Around | None) -> Floats:
+def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
     """Return the throttle in [-1, 1], (k, 1)."""
     return np.clip(truth.throttle[rows], -1.0, 1.0)[:, None]
 
