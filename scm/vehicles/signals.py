@@ -391,7 +391,7 @@ _ALL = (
         "slip_scale",
         "1",
         Role.CHAIN,
-        "factor on both slips before the tyre's curve",
+        "factor on side slip before the tyre's curve",
         span=(0.2, 3.0),
         otherwise="1.0",
     ),

@@ -51,8 +51,8 @@ def both_slips(
     """How far both slips together are toward most grip, 1 there."""
     p = slide / max(abs(v_long) + spin_lag_speed, low_speed) / slip_extremum
     side = (v_lat + side_lag_speed * side_lag) / max(abs(v_long) + side_lag_speed, low_speed)
-    q = side / side_slip_extremum
-    return slip_scale * math.sqrt(p * p + q * q)
+    q = slip_scale * side / side_slip_extremum
+    return math.sqrt(p * p + q * q)
 
 
 @law
@@ -69,7 +69,7 @@ def tyre_combined_damping(
         slip_extremum, side_slip_extremum,
     )  # fmt: skip
     curve = curve_over_slip(felt, slip_extremum, force_extremum, slip_asymptote, force_asymptote)
-    return grip_load * grip * slip_scale / max(abs(v_long) + spin_lag_speed, low_speed) * curve
+    return grip_load * grip / max(abs(v_long) + spin_lag_speed, low_speed) * curve
 
 
 @law

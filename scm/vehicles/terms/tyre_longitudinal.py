@@ -1,7 +1,7 @@
 """Longitudinal tyre force: grip against spin slip, the paper's two cubics times the load.
 
     tyre_x += load * grip * F(slip)    [N]
-    slip = slip_scale * (wheel_radius * omega - v_long) / max(|v_long|, low_speed)
+    slip = (wheel_radius * omega - v_long) / max(|v_long|, low_speed)
 
 A tyre with memory (tyre_windup) has m spin_lag more above the line and m more beside |v_long|,
 m = spin_lag_speed; without, m = 0.
@@ -18,13 +18,13 @@ from scm.vehicles.tyre_curve import curve_over_slip
 
 @law
 def tyre_longitudinal(
-    omega: float, v_long: float, grip_load: float, grip: float, slip_scale: float, spin_lag: float,
+    omega: float, v_long: float, grip_load: float, grip: float, spin_lag: float,
     spin_lag_speed: float, wheel_radius: float, slip_extremum: float, force_extremum: float,
     slip_asymptote: float, force_asymptote: float, low_speed: float,
 ) -> float:  # fmt: skip
     """Force along the wheel, + forward [N]."""
     speed = max(abs(v_long) + spin_lag_speed, low_speed)
-    slip = slip_scale * (wheel_radius * omega - v_long + spin_lag_speed * spin_lag) / speed
+    slip = (wheel_radius * omega - v_long + spin_lag_speed * spin_lag) / speed
     return grip_load * grip * slip * curve_over_slip(
         slip, slip_extremum, force_extremum, slip_asymptote, force_asymptote
     )  # fmt: skip
@@ -32,14 +32,14 @@ def tyre_longitudinal(
 
 @law
 def tyre_longitudinal_damping(
-    omega: float, v_long: float, grip_load: float, grip: float, slip_scale: float, spin_lag: float,
+    omega: float, v_long: float, grip_load: float, grip: float, spin_lag: float,
     spin_lag_speed: float, wheel_radius: float, slip_extremum: float, force_extremum: float,
     slip_asymptote: float, force_asymptote: float, low_speed: float,
 ) -> float:  # fmt: skip
     """Force per slip speed, the secant: beyond the peak it never overshoots zero slip [N*s/m]."""
     speed = max(abs(v_long) + spin_lag_speed, low_speed)
-    slip = slip_scale * (wheel_radius * omega - v_long + spin_lag_speed * spin_lag) / speed
-    return grip_load * grip * slip_scale / speed * curve_over_slip(
+    slip = (wheel_radius * omega - v_long + spin_lag_speed * spin_lag) / speed
+    return grip_load * grip / speed * curve_over_slip(
         slip, slip_extremum, force_extremum, slip_asymptote, force_asymptote
     )  # fmt: skip
 

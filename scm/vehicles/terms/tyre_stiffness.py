@@ -1,8 +1,9 @@
-"""Tyre stiffness: the tyre slips more or less under a force than the car file says.
+"""Tyre stiffness: tyres slip sideways more or less under a force than the car file says.
 
-    slip_scale = scale,  slip of both directions times slip_scale, before the tyre's curve
+    slip_scale = scale,  side slip times slip_scale before the tyre's curve
 
-The steepness at small slip changes by `scale`, the most that the tyre can hold does not.
+Cornering stiffness changes by `scale`, the most that the tyre can hold does not; driving and
+braking keep their slip.
 Holds: below the curve's peak.   Shows in: fast circles, steering steps.
 Source: Pacejka, Tire and Vehicle Dynamics (similarity method, scaling of slip stiffness).
 """
@@ -14,7 +15,7 @@ from scm.vehicles.term import Per, Term
 
 @law
 def tyre_stiffness(scale: float) -> float:
-    """Factor on both slips."""
+    """Factor on side slip."""
     return scale
 
 

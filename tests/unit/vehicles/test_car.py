@@ -1,7 +1,7 @@
 import pytest
 
 from scm.errors import CarError
-from scm.vehicles.car import STANDARD_TERMS, TYPES_DIR, load_car
+from scm.vehicles.car import TYPES_DIR, load_car
 
 NIGEL = (TYPES_DIR / "nigel.toml").read_text(encoding="utf-8")
 

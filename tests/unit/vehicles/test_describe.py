@@ -27,7 +27,7 @@ def test_a_fault_of_measuring_is_told_like_an_effect():
 
 
 def test_an_unknown_effect_is_refused_with_the_nearest_name():
-    with pytest.raises(TermError, match="no effect 'unterstear' .*mean 'understeer'"):
+    with pytest.raises(TermError, match=r"no effect .unterstear. .*mean .understeer."):
         describe_term("unterstear")
 
 

@@ -57,7 +57,7 @@ def test_own_effects_are_given_as_objects_too(folder):
         ("carpet_nap.py", "TERM = ", "OTHER = ", r"carpet_nap\.py: expected TERM = Term"),
         ("carpet_nap.py", "import law", "import lore", r"does not run: ImportError: .*'lore'"),
         ("carpet_nap.py", 'adds="force_x"', 'adds="force_xx"', r"'force_xx' is no such sum"),
-        ("carpet_nap.py", "cos_yaw: float", "cos_yav: float", r"reads 'cos_yav', .* mean 'cos_yaw'"),
+        ("carpet_nap.py", "cos_yaw: float", "cos_yav: float", r"'cos_yav', .* mean 'cos_yaw'"),
         ("buggy.toml", "coefficient_ns_m", "coeficient", r"mean 'carpet_nap\.coefficient_ns_m'"),
         ("buggy.toml", "value = 1.5,", "value = 99.0,", r"expected 0 to 50 N\*s/m, got 99"),
     ],
