@@ -8,7 +8,7 @@ import numpy as np
 from scm.arrays import Bools, Floats, Image
 from scm.eye.camera import CameraModel
 from scm.geometry import Pose2
-from scm.maps.model import CityMap, MapTag
+from scm.maps.model import Box, CityMap, MapTag
 from scm.scenery.canvas import Canvas
 from scm.scenery.sheet import BRICK, CARD, FloorSheet, paint_floor, printed_tag, wall_pieces
 from scm.scenery.solids import Solid, draw_shape, prism, rectangle, shape_of
@@ -82,6 +82,12 @@ def draw_scenery(city_map: CityMap, model: CameraModel, rng: np.random.Generator
     return Scenery(lit, light, tuple(one for one, height in drawn if height > LOW_M))
 
 
+def draw_box(frame: Image, model: CameraModel, box: Box, at: Pose2) -> None:
+    """Paint a box that can be pushed where it stands now."""
+    foot = rectangle(at.x, at.y, box.length_m, box.width_m, at.yaw)
+    _draw_obstacle(frame, model, prism(foot, 0.0, box.height_m, CARD))
+
+
 def draw_map_tag(frame: Image, model: CameraModel, tag: MapTag) -> None:
     """Paint the tag on the floor that fixes the map's frame."""
     pose = Pose2(tag.x_m, tag.y_m, tag.yaw_rad)
@@ -137,6 +143,7 @@ def _standing(city_map: CityMap) -> list[Solid]:
     solids = [
         prism(rectangle(b.x_m, b.y_m, b.length_m, b.width_m, b.yaw_rad), 0.0, b.height_m, CARD)
         for b in city_map.boxes
+        if b.mass_kg is None
     ]
     for wall in city_map.walls:
         solids += [prism(piece, 0.0, wall.height_m, BRICK) for piece in wall_pieces(wall)]

@@ -13,10 +13,11 @@ import numpy as np
 from scm.arrays import Image
 from scm.eye.camera import CameraModel
 from scm.eye.render.car import draw_car
-from scm.eye.render.floor import draw_scenery
+from scm.eye.render.floor import draw_box, draw_scenery
 from scm.eye.source import Frame
+from scm.geometry import Pose2
 from scm.maps.model import CityMap
-from scm.v2x.messages.world_snapshot import WorldSnapshot
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 NOISE_SHEETS = 2
 
@@ -28,6 +29,7 @@ class SyntheticSource:
         self._model = model
         self._rng = rng
         self._scenery = draw_scenery(city_map, model, rng)
+        self._boxes = {box.name: box for box in city_map.boxes if box.mass_kg is not None}
         self._frame: Image = self._scenery.picture.copy()
         self._brighter, self._darker = self._noise()
         self._taken_ns: int | None = None
@@ -44,8 +46,13 @@ class SyntheticSource:
         """Return the picture of a snapshot, (height, width, 3); it is valid until the next one."""
         np.copyto(self._frame, self._scenery.picture)
         x, y, _ = self._model.position
-        for car in sorted(light.vehicles, key=lambda car: -math.hypot(car.x_m - x, car.y_m - y)):
-            draw_car(self._frame, self._model, self._scenery, car)
+        things = [*light.vehicles, *(light.boxes or self._boxes.values())]
+        for thing in sorted(things, key=lambda one: -math.hypot(one.x_m - x, one.y_m - y)):
+            if isinstance(thing, SnapshotVehicle):
+                draw_car(self._frame, self._model, self._scenery, thing)
+            elif thing.name in self._boxes:
+                pose = Pose2(thing.x_m, thing.y_m, thing.yaw_rad)
+                draw_box(self._frame, self._model, self._boxes[thing.name], pose)
         self._add_noise()
         return self._frame
 
