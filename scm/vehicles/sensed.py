@@ -1,12 +1,9 @@
-"""A car's readings as messages: what the world says for hosted cars and an agent for its own."""
+"""A car's readings as a message: what an agent says of its own sensors."""
 
 from collections.abc import Mapping
 
 from scm.arrays import Floats
-from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
-from scm.vehicles.car import Car
-from scm.vehicles.sensors.lidar import bearings_of
 
 ENCODERS, IMU, IPS = "encoders", "imu", "ips"
 THROTTLE, STEERING = "throttle_feedback", "steering_feedback"
@@ -32,20 +29,4 @@ def sensors_message(vehicle: str, t_ns: int, newest: Mapping[str, Floats]) -> Ve
         steering_rad=None if steering is None else float(steering[0]),
         ips_m=None if place is None else (float(place[0]), float(place[1])),
         ips_yaw_rad=None if place is None else float(place[2]),
-    )
-
-
-def scan_message(vehicle: str, car: Car, t_ns: int, ranges: Floats) -> LidarScan:
-    """Return one car's turn, (beams,) [m]."""
-    nearest, farthest = car.vector("lidar.range_m")
-    bearings = bearings_of(car)
-    return LidarScan(
-        vehicle=vehicle,
-        t_ns=t_ns,
-        beams=len(ranges),
-        range_min_m=nearest,
-        range_max_m=farthest,
-        bearing_first_rad=bearings.first,
-        bearing_step_rad=bearings.step,
-        payload=ranges.astype("<f4").tobytes(),
     )

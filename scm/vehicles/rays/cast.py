@@ -17,13 +17,15 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.jit import array_kernel, law
-from scm.vehicles.rays.grid import Cells, Numbers, Window, cell_size, sort_bodies
+from scm.vehicles.rays.grid import Cells, Numbers, Window, cell_size, fits, sort_bodies, window_of
 from scm.vehicles.rays.order import SECTORS, WIDTH, Order, Sectors, order_of, sectors_of
 from scm.vehicles.rays.scene import Scene
 
 CORNER = 1e-9
 EDGE_ON = 1e-12  # so is a face through the scanner itself
 MARGIN = 3e-5
+CELLS_A_TILE = 1000
+FARTHEST_OUT = 1e8  # cells are counted in 32 bits
 ALL, NONE, ONE = np.uint64(2**SECTORS - 1), np.uint64(0), np.uint64(1)
 TURN = 2.0 * math.pi
 
@@ -43,24 +45,40 @@ def cast(
     first, step, beams = bearings
     angles = step * np.arange(beams)
     lines = np.stack((angles, np.cos(angles), np.sin(angles)))
-    ranges = np.full((len(scanners), beams), np.inf)
-    walls, bodies = sorted_scene(scene, scanners[:, :2], farthest)
-    _cast(
-        ranges, lines, first, step, scanners, own, farthest,
-        order_of(walls.window.size, farthest), sectors_of(step, beams), scene.walls.edges, *walls,
-        scene.outlines, scene.owners, *bodies,
-    )  # fmt: skip
+    ranges: Floats = np.full((len(scanners), beams), np.inf)
+    for some in near_each_other(scanners[:, :2], farthest):
+        seen = np.full((len(some), beams), np.inf)
+        walls, bodies = sorted_scene(scene, scanners[some, :2], farthest)
+        _cast(
+            seen, lines, first, step, scanners[some], own[some], farthest,
+            order_of(walls.window.size, farthest), sectors_of(step, beams), scene.walls.edges,
+            *walls, scene.outlines, scene.owners, *bodies,
+        )  # fmt: skip
+        ranges[some] = seen
     return ranges
 
 
 def sorted_scene(scene: Scene, places: Floats, farthest: float) -> tuple[Cells, Cells]:
     """Return walls and bodies by cells, for scanners at places (k, 2)."""
     size = cell_size(farthest)
-    finite = places[np.isfinite(places).all(axis=1)]
-    if len(finite) == 0:
-        finite = np.zeros((1, 2))
-    low, high = finite.min(axis=0) - farthest, finite.max(axis=0) + farthest
-    return scene.walls.cells(size), sort_bodies(scene.outlines, size, low, high)
+    window = window_of(places, size, farthest)
+    return scene.walls.cells(size, window), sort_bodies(scene.outlines, window)
+
+
+def near_each_other(places: Floats, farthest: float) -> list[Ints]:
+    """Return the scanners (k, 2) in batches, each in a window that can be laid out; most often one.
+
+    Scanners whose place is no number, or is beyond counting, are in none.
+    """
+    size = cell_size(farthest)
+    usable = np.flatnonzero((np.abs(places) < FARTHEST_OUT).all(axis=1))
+    if len(usable) == 0:
+        return []
+    if fits(window_of(places[usable], size, farthest)):
+        return [usable]
+    tiles = np.floor(places[usable] / (CELLS_A_TILE * size))
+    _, tile = np.unique(tiles, axis=0, return_inverse=True)
+    return [usable[tile == number] for number in range(tile.max() + 1)]
 
 
 class Turn(NamedTuple):
@@ -93,7 +111,7 @@ def _cast(
     body_seen = np.full(owners.shape[0], -1, np.int32)
     for k in range(scanners.shape[0]):
         x, y, zero = scanners[k, 0], scanners[k, 1], scanners[k, 2] + first
-        if not math.isfinite(x + y + zero):
+        if not math.isfinite(zero):
             continue
         beams[0] = np.inf
         turn = Turn(x, y, math.cos(zero), math.sin(zero), 1.0 / step, farthest)

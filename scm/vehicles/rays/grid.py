@@ -17,6 +17,7 @@ Numbers = NDArray[np.int32]
 
 CELLS_IN_REACH = 24.0
 SMALLEST_M = 0.5
+MOST_CELLS = 4_000_000
 SLACK = 1e-9
 
 
@@ -64,35 +65,37 @@ class WallGrid:
         self.edges = np.ascontiguousarray(edges, dtype=np.float64).reshape(-1, 4)
         self._by_size: dict[float, Cells] = {}
 
-    def cells(self, size: float) -> Cells:
-        """Return the numbers of `edges` by cells of a size [m]."""
+    def cells(self, size: float, around: Window) -> Cells:
+        """Return the numbers of `edges` by cells of a size [m].
+
+        Walls that are spread too wide to be sorted once are sorted `around` a window, every time.
+        """
         if size not in self._by_size:
-            self._by_size[size] = sort_faces(self.edges, size)
+            window = window_of(self.edges.reshape(-1, 2), size)
+            if not fits(window):
+                return _sorted(self.edges, 1, around)
+            self._by_size[size] = _sorted(self.edges, 1, window)
         return self._by_size[size]
 
 
-def sort_faces(edges: Floats, size: float) -> Cells:
-    """Return the faces (m, 4) by the cells that they cross."""
-    window = _window(edges.reshape(-1, 2), size)
-    return _sorted(edges, 1, window)
-
-
-def sort_bodies(outlines: Floats, size: float, low: Floats, high: Floats) -> Cells:
-    """Return four-faced bodies (4 n, 4) by the cells they reach into, from corner `low` to `high`.
-
-    Bodies outside that window are left out.
-    """
-    window = _window(np.array([low, high]), size)
+def sort_bodies(outlines: Floats, window: Window) -> Cells:
+    """Return four-faced bodies (4 n, 4) by those cells of a window that they reach into."""
     return _sorted(outlines, 4, window)
 
 
-def _window(points: Floats, size: float) -> Window:
+def window_of(points: Floats, size: float, margin: float = 0.0) -> Window:
+    """Return the cells of a size about points (n, 2) and a margin around them [m]."""
     if len(points) == 0:
         return Window(size, 0, 0, 0, 0)
-    low = np.floor(points.min(axis=0) / size - SLACK).astype(int)
-    high = np.floor(points.max(axis=0) / size + SLACK).astype(int)
+    low = np.floor((points.min(axis=0) - margin) / size - SLACK).astype(int)
+    high = np.floor((points.max(axis=0) + margin) / size + SLACK).astype(int)
     ni, nj = (high - low + 1).tolist()
     return Window(size, int(low[0]), int(low[1]), ni, nj)
+
+
+def fits(window: Window) -> bool:
+    """Return whether a window has few enough cells to be laid out."""
+    return window.ni * window.nj <= MOST_CELLS
 
 
 def _sorted(edges: Floats, faces: int, window: Window) -> Cells:

@@ -3,8 +3,9 @@
     beam i looks at  first + i * field_of_view / beams  from straight ahead, + = left
 
 A full circle starts straight ahead, a narrower field of view at its right-hand end. How the ranges
-come about stands in `scm/vehicles/rays/cast.py`. A reading nearer than the range's lower end counts
-as a miss, as everything beyond its upper end.
+come about stands in `scm/vehicles/rays/cast.py`; with `sweep = "moving"` each beam looks at its own
+time of the turn from where the car was then, `scm/vehicles/rays/march.py`. A reading nearer than
+the range's lower end counts as a miss, as everything beyond its upper end.
 Holds: a level scanner, faces without end upwards, all cars where they are at the reading's instant.
 Source: AutoDRIVE simulator (7 Hz, 0.15 to 12 m, 360 beams, miss = infinity, beam 0 ahead,
 counter-clockwise); noise from the paper's variability test.
@@ -18,6 +19,7 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
 from scm.vehicles.rays.cast import cast
+from scm.vehicles.rays.march import march
 from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
 
 NOISE_SPREADS = 6.0
@@ -60,27 +62,30 @@ def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
     The nearer end of the range is the device's own limit, and noise may carry a hit over its
     farther end: both are for whoever spoils the readings.
     """
+    bearings = bearings_of(car)
+    if around is None:
+        return np.full((len(rows), bearings.beams), np.inf)
+    farthest = car.vector("lidar.range_m")[1] + NOISE_SPREADS * car.value("lidar.noise_m")
     x, y, _ = car.vector("lidar.position_m")
     yaw = truth.yaw[rows]
     c, s = np.cos(yaw), np.sin(yaw)
     scanners = np.column_stack((truth.x[rows] + c * x - s * y, truth.y[rows] + s * x + c * y, yaw))
-    beyond = NOISE_SPREADS * car.value("lidar.noise_m")
-    return _ranges(car, scanners, around, car.vector("lidar.range_m")[1] + beyond)
+    if car.text("lidar.sweep") == "frozen":
+        return cast(around.scene, scanners, around.own, bearings, farthest)
+    rate = truth.yaw_rate[rows]
+    motion = np.column_stack(
+        (truth.speed[rows] - rate * y, truth.lateral_speed[rows] + rate * x, rate)
+    )
+    period = 1.0 / car.value("lidar.rate_hz")
+    return march(around.scene, scanners, motion, around.own, bearings, farthest, period)
 
 
-def scan(car: Car, scanners: Floats, around: Sight | None) -> Floats:
-    """Return what scanners like this car's tell without noise from poses (k, 3) x, y, yaw."""
+def scan(car: Car, scanners: Floats, around: Sight) -> Floats:
+    """Return what scanners like this car's tell at rest, without noise, from poses (k, 3)."""
     nearest, farthest = car.vector("lidar.range_m")
-    ranges = _ranges(car, scanners, around, farthest)
+    ranges = cast(around.scene, scanners, around.own, bearings_of(car), farthest)
     ranges[ranges < nearest] = np.inf
     return ranges
-
-
-def _ranges(car: Car, scanners: Floats, around: Sight | None, farthest: float) -> Floats:
-    bearings = bearings_of(car)
-    if around is None:
-        return np.full((len(scanners), bearings.beams), np.inf)
-    return cast(around.scene, scanners, around.own, bearings, farthest)
 
 
 SENSOR = Sensor(

@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from scm.clock import NS_PER_S
+from scm.vehicles.bank import Bank
 from scm.vehicles.car import load_car
+from scm.vehicles.placed import Placed
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sight
-from scm.vehicles.sensors.lidar import scan
+from scm.vehicles.sensors.lidar import SENSOR, bearings_of, scan
 
 NIGEL = load_car("nigel")
 NEAREST, FARTHEST = NIGEL.vector("lidar.range_m")
@@ -97,4 +100,43 @@ def test_no_beam_slips_through_where_two_walls_meet():
 
 
 def test_an_empty_city_is_all_misses():
-    assert_array_equal(scan(NIGEL, np.zeros((1, 3)), None), np.full((1, 360), np.inf))
+    assert_array_equal(scan(NIGEL, np.zeros((1, 3)), around([])), np.full((1, 360), np.inf))
+
+
+def test_a_narrow_field_of_view_begins_at_its_right_hand_end():
+    racer = load_car("f1tenth")
+    first, step, beams = bearings_of(racer)
+    assert (np.degrees(first), np.degrees(step), beams) == pytest.approx((-135.0, 0.25, 1080))
+    right_wall = [[-1.0, -1.0, 3.0, -1.0]]
+    ranges = scan(racer, np.zeros((1, 3)), around(right_wall))[0]
+    assert ranges[(135 - 90) * 4] == pytest.approx(1.0)
+    assert np.isinf(ranges[135 * 4 :]).all()
+
+
+def test_noise_may_carry_a_hit_over_the_range_but_no_reading_lies_beyond_it():
+    still = Placed(1)
+    x, _, _ = NIGEL.vector("lidar.position_m")
+    bank = Bank(SENSOR, 0)
+    bank.fit(0, "ann", NIGEL, still, 0, 0)
+    wall = x + FARTHEST + 0.01
+    scene = around([[wall, -9.0, wall, 9.0]]).scene
+    steps = range(0, 200 * NS_PER_S, NS_PER_S // 7 + 1)
+    ahead = np.array([bank.step(now, lambda: scene)[0].values[0, 0] for now in steps])
+    assert 0.2 < np.isfinite(ahead).mean() < 0.5
+    assert ahead[np.isfinite(ahead)].max() <= FARTHEST
+
+
+def test_a_moving_sweep_smears_what_a_frozen_one_does_not(tmp_path):
+    text = NIGEL.path.read_text(encoding="utf-8")
+    path = tmp_path / "sweeping.toml"
+    path.write_text(
+        text.replace("[lidar]", '[lidar]\nsweep = { value = "moving", source = "test" }')
+    )
+    truth = Placed(1)
+    truth.speed[0] = 0.25
+    sight = around([[3.0, -20.0, 3.0, 20.0]])
+    frozen, moving = (
+        SENSOR.measure(car, truth, np.array([0]), sight)[0] for car in (NIGEL, load_car(path))
+    )
+    assert moving[0] - frozen[0] == pytest.approx(0.25 / 7.0 * 359.0 / 360.0)
+    assert moving[359] == pytest.approx(frozen[359])
