@@ -82,6 +82,10 @@ def measure(parts: dict[str, int], endpoint: str, *, states: bool = False) -> No
             bus.subscribe(kind, {}, heard)
         if states:
             bus.subscribe(VehicleState, {}, told)
+        while not any(isinstance(item.message, WorldSnapshot) for item in heard.drain()):
+            time.sleep(0.1)
+        time.sleep(SETTLE_S)
+        heard.drain()
         before = {name: used_s(pid) for name, pid in parts.items()}
         began = time.perf_counter()
         time.sleep(SPAN_S)
@@ -113,7 +117,6 @@ def measure(parts: dict[str, int], endpoint: str, *, states: bool = False) -> No
 def live() -> None:
     print(f"live, {CARS} cars on {MAP}")
     with city() as (endpoint, parts, _):
-        time.sleep(SETTLE_S)
         measure(parts, endpoint)
 
 

@@ -41,16 +41,19 @@ class Station:
         self._follow()
         for serves in part.serves:
             bus.serve(serves.kind, serves.where, self._mailbox(Delivery.RPC))
-        if getattr(part, "hears_raw", False):
-            raw = RawMailbox(RAW_DEPTH)
-            self._boxes.append(raw)
-            bus.subscribe_raw(raw)
-            for kind in getattr(part, "hears_raw_too", ()):
-                bus.subscribe_raw(raw, kind)
+        self._hear_raw()
         learn = getattr(part, "learn_wishes", None)
         if learn is not None:
             learn(bus.is_wanted)
         bus.announce(part.role)
+
+    def _hear_raw(self) -> None:
+        raw = RawMailbox(RAW_DEPTH)
+        if getattr(self._part, "hears_raw", False):
+            self._bus.subscribe_raw(raw)
+        for kind in getattr(self._part, "hears_raw_too", ()):
+            self._bus.subscribe_raw(raw, kind)
+        self._boxes.append(raw)
 
     def _follow(self) -> None:
         """Subscribe to what the part wishes to hear now, and to nothing else any more."""

@@ -27,13 +27,24 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="above 0: run all cameras of all cars, and keep so many pictures of each a second "
         "(%(default)s)",
     )
+    parser.add_argument(
+        "--no-sensors",
+        action="store_true",
+        help="leave out what cars sense and hear, so that a large city need not make it",
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.errors import LinkError
     from scm.recorder.part import RecorderPart
 
-    part = RecorderPart(arguments.out, arguments.city, arguments.frames_hz, arguments.cameras_hz)
+    part = RecorderPart(
+        arguments.out,
+        arguments.city,
+        arguments.frames_hz,
+        arguments.cameras_hz,
+        sensors=not arguments.no_sensors,
+    )
     try:
         return run_part(part, arguments)
     except LinkError:

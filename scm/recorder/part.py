@@ -6,15 +6,21 @@ from pathlib import Path
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RecordingError
 from scm.part import Hears, Serves
-from scm.recorder.mcap_file import RunFile
+from scm.recorder.mcap_file import MESSAGES, RunFile
+from scm.registry import load, names
 from scm.v2x.exchange import Incoming, Outgoing, RawSample
-from scm.v2x.message import Message
+from scm.v2x.message import Delivery, Message
+from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.eye_frame import EyeFrame
+from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.spatem_rx import SpatemRx
+from scm.v2x.messages.vehicle_sensors import VehicleSensors
 
 FLUSH_NS = 250 * NS_PER_MS
 FRAMES_HZ = 1.0
+SENSED = (LidarScan, VehicleSensors, CamRx, SpatemRx, CameraFrame)
 
 
 class RecorderPart:
@@ -24,6 +30,10 @@ class RecorderPart:
     each of its cameras at most `frames_hz` a second are kept; 0 keeps none. The cars' own cameras
     picture only what somebody asks for: `cameras_hz` above 0 makes all of them run, and keeps so
     many of each.
+
+    In a large city the same would be true of what cars sense and hear: without `sensors` nothing is
+    recorded of LIDARs, other sensors and received radio frames, nor of keys that are not ours, and
+    the city need not make them.
     """
 
     name = "record"
@@ -31,7 +41,6 @@ class RecorderPart:
     period_ns = 50 * NS_PER_MS
     hears: Sequence[Hears] = ()
     serves: Sequence[Serves] = ()
-    hears_raw = True
 
     def __init__(
         self,
@@ -39,12 +48,18 @@ class RecorderPart:
         city: str = "city",
         frames_hz: float = FRAMES_HZ,
         cameras_hz: float = 0.0,
+        *,
+        sensors: bool = True,
     ) -> None:
         self._period_ns = {
             EyeFrame: _period_ns("frames_hz", frames_hz),
             CameraFrame: _period_ns("cameras_hz", cameras_hz),
         }
-        self.hears_raw_too: Sequence[type[Message]] = (CameraFrame,) if cameras_hz else ()
+        self.hears_raw = sensors
+        self.hears_raw_too = (
+            *(() if sensors else _without_sensors()),
+            *((CameraFrame,) if cameras_hz else ()),
+        )
         self.file = RunFile(path, city)
         self._frame_due_ns: dict[str, int] = {}
         self._flush_due_ns = 0
@@ -83,6 +98,18 @@ class RecorderPart:
         del now_ns
         self.file.close()
         return []
+
+
+def _without_sensors() -> tuple[type[Message], ...]:
+    """Return all classes but those that each car would multiply."""
+    kinds = (load(MESSAGES, name, "MESSAGE", type) for name in names(MESSAGES))
+    return tuple(
+        kind
+        for kind in kinds
+        if issubclass(kind, Message)
+        and kind.DELIVERY not in (Delivery.RPC, Delivery.PRESENCE)
+        and kind not in SENSED
+    )
 
 
 def _period_ns(name: str, rate_hz: float) -> int | None:

@@ -55,7 +55,7 @@ def key_of(city: str, message: Message) -> str:
     return _key(city, kind, tuple(str(getattr(message, name)) for _, name in _places(kind)))
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=65536)
 def _key(city: str, kind: type[Message], values: tuple[str, ...]) -> str:
     chunks = {name: value for (_, name), value in zip(_places(kind), values, strict=True)}
     for name, value in chunks.items():

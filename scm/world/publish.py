@@ -22,7 +22,7 @@ from scm.world.slots import MODES
 from scm.world.world import NAME, World
 
 STATES_A_TICK = 400
-TRIPS_A_SECOND = 1000
+TRIPS_A_SECOND = 200
 TRIP_NS = NS_PER_S // 2
 TURNS: dict[int, Indicators] = {1: "left", -1: "right", 0: "off"}
 

@@ -192,7 +192,7 @@ def _place(world: World, spawn: str) -> Pose2:
 
 
 def _is_free(world: World, pose: Pose2) -> bool:
-    return world.slots.nearest_m(pose.x, pose.y) >= CLEARANCE_M
+    return world.slots.nearest_m(pose) >= CLEARANCE_M
 
 
 _ANSWERS: dict[type[Message], Callable[[World, Any, int], Message]] = {

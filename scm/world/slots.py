@@ -5,6 +5,7 @@ read from the fleets once a tick; what only a person asks for is read from them 
 """
 
 import heapq
+import math
 
 import numpy as np
 
@@ -99,7 +100,11 @@ class Slots:
         self.mode[slot], self.seq[slot] = IDLE, 0
         self._numbers.give_back(slot)
 
-    def nearest_m(self, x: float, y: float) -> float:
-        """Return how far the nearest car's rear axle is [m]; infinity in an empty city."""
-        away: Floats = np.hypot(self.x - x, self.y - y)[self.used]
+    def nearest_m(self, pose: Pose2) -> float:
+        """Return how far the nearest car's rear axle is [m]; infinity in an empty city.
+
+        What lies to the side counts double: cars are longer than wide.
+        """
+        x, y, c, s = self.x - pose.x, self.y - pose.y, math.cos(pose.yaw), math.sin(pose.yaw)
+        away: Floats = np.hypot(c * x + s * y, 2.0 * (c * y - s * x))[self.used]
         return float(away.min()) if len(away) else float("inf")

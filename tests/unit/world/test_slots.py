@@ -42,8 +42,9 @@ def test_a_full_city_takes_nobody_until_somebody_leaves():
 
 def test_the_nearest_car_is_looked_for_among_those_that_are_there():
     slots = Slots(3)
-    assert slots.nearest_m(0.0, 0.0) == float("inf")
+    here = Pose2(0.0, 0.0, 0.0)
+    assert slots.nearest_m(here) == float("inf")
     gone = slots.take("n1", Pose2(0.1, 0.0, 0.0), hosted=True)
-    slots.take("n2", Pose2(3.0, 4.0, 0.0), hosted=False)
+    slots.take("n2", Pose2(3.0, 2.0, 0.0), hosted=False)
     slots.free(gone)
-    assert slots.nearest_m(0.0, 0.0) == 5.0
+    assert slots.nearest_m(here) == 5.0
