@@ -3,7 +3,7 @@
 import importlib
 import sys
 
-BENCHMARKS = ("kernel", "world", "bus", "eye", "camera")
+BENCHMARKS = ("kernel", "driver", "world", "bus", "eye", "camera")
 
 
 def main(names: list[str]) -> None:

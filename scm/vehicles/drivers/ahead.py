@@ -13,6 +13,8 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.vehicles.drivers.memory import FRONT, WIDTH
 from scm.vehicles.drivers.stations import (
+    AT_X,
+    AT_Y,
     CELLS_X,
     CELLS_Y,
     LARGEST,
@@ -22,13 +24,25 @@ from scm.vehicles.drivers.stations import (
     cell_number,
     known_to,
 )
-from scm.vehicles.drivers.streets import COS, CURVATURE, LENGTH, SIN, Ways, X, Y
+from scm.vehicles.drivers.streets import (
+    COS,
+    CURVATURE,
+    EAST,
+    LENGTH,
+    NORTH,
+    SIN,
+    SOUTH,
+    WEST,
+    X,
+    Y,
+)
 from scm.vehicles.drivers.way import foot
 from scm.vehicles.jit import law
 
 REACH = 2.0
 MARGIN = 0.01
-MOST_AHEAD = 24
+STANDSTILL_GAP = 0.08
+MOST_AHEAD = 32
 MOST_SEGMENTS = 32
 
 # Columns of a car ahead: where its rear is along the way, its speed along it, its length.
@@ -42,7 +56,7 @@ class Scratch(NamedTuple):
 
     Attributes:
         ids: (32,) segments of the way; `begins` (33,) where each begins, from the rear axle on.
-        ahead: (24, 3) cars ahead, nearest first.
+        ahead: (32, 3) cars ahead, nearest first.
         window: (4,) over the floor.
     """
 
@@ -64,12 +78,13 @@ def scratch() -> Scratch:
 
 @law
 def cars_ahead(
-    ways: Ways,
+    segments: Floats,
     heard: Heard,
     room: Scratch,
     kind: Floats,
     car: int,
     count: int,
+    reach: float,
     now_ns: int,
     loss: float,
     seed: int,
@@ -77,38 +92,52 @@ def cars_ahead(
     """Find the cars on the surveyed way from the own front on, nearest first; return how many.
 
     Args:
-        ways: The lanes.
+        segments: Of all lanes.
         heard: Everybody's CAMs.
         room: Holds the surveyed segments; takes the cars.
         kind: The row of the own kind of car.
         car: The own number.
         count: Of surveyed segments.
+        reach: How far to look from the front bumper on [m].
         now_ns: The present time [ns].
         loss: Share of frames that get lost.
         seed: Of the luck.
     """
-    span(ways, room, count, kind[FRONT])
-    margin = 0.5 * kind[WIDTH] + MARGIN + heard.floor[LARGEST]
+    span(segments, room.ids, room.begins, room.window, count, kind[FRONT], reach)
     floor, window = heard.floor, room.window
+    margin = 0.5 * kind[WIDTH] + MARGIN + floor[LARGEST]
+    window[LEFT], window[RIGHT] = window[LEFT] - margin, window[RIGHT] + margin
+    window[LOW], window[HIGH] = window[LOW] - margin, window[HIGH] + margin
     across = int(floor[CELLS_X])
-    left = cell_number(floor, window[LEFT] - margin, LOW_X, CELLS_X)
-    right = cell_number(floor, window[RIGHT] + margin, LOW_X, CELLS_X)
-    low = cell_number(floor, window[LOW] - margin, LOW_Y, CELLS_Y)
-    high = cell_number(floor, window[HIGH] + margin, LOW_Y, CELLS_Y)
+    left = cell_number(floor, window[LEFT], LOW_X, CELLS_X)
+    right = cell_number(floor, window[RIGHT], LOW_X, CELLS_X)
+    low = cell_number(floor, window[LOW], LOW_Y, CELLS_Y)
+    high = cell_number(floor, window[HIGH], LOW_Y, CELLS_Y)
     found = 0
     for row in range(low, high + 1):
         first = heard.cell_first[row * across + left]
         last = heard.cell_first[row * across + right + 1]
         for at in range(first, last):
             other = heard.in_cell[at]
-            if other == car:
+            if other == car or is_outside(window, heard.at[other]):
                 continue
             known, x, y, cos, sin, speed = known_to(heard, other, car, now_ns, loss, seed)
             if not known:
                 continue
             half_length, half_width = 0.5 * heard.size[other, 0], 0.5 * heard.size[other, 1]
             hit, rear, same_way = first_overlap(
-                ways, room, kind, count, x, y, cos, sin, half_length, half_width
+                segments,
+                room.ids,
+                room.begins,
+                kind,
+                count,
+                reach,
+                x,
+                y,
+                cos,
+                sin,
+                half_length,
+                half_width,
             )
             if hit:
                 found = insert(
@@ -118,36 +147,48 @@ def cars_ahead(
 
 
 @law
-def span(ways: Ways, room: Scratch, count: int, front: float) -> None:
+def is_outside(window: Floats, at: Floats) -> bool:
+    """Return whether a car's middle lies outside a window, and cannot reach into the way."""
+    x, y = at[AT_X], at[AT_Y]
+    return bool(x < window[LEFT] or x > window[RIGHT] or y < window[LOW] or y > window[HIGH])
+
+
+@law
+def span(
+    segments: Floats,
+    ids: Ints,
+    begins: Floats,
+    window: Floats,
+    count: int,
+    front: float,
+    reach: float,
+) -> None:
     """Lay a window over the way from the front bumper to the end of the reach."""
-    window = room.window
     window[LEFT] = window[LOW] = math.inf
     window[RIGHT] = window[HIGH] = -math.inf
     for at in range(count):
-        row = ways.segments[room.ids[at]]
-        begin = max(front, room.begins[at]) - room.begins[at]
-        end = min(front + REACH, room.begins[at + 1]) - room.begins[at]
+        begin = max(front, begins[at]) - begins[at]
+        end = min(front + reach, begins[at + 1]) - begins[at]
         if end < begin:
             continue
-        k = row[CURVATURE]
-        pieces = 1 + int(abs(k) * (end - begin))
-        for piece in range(pieces + 1):
-            s = begin + (end - begin) * piece / pieces
-            u, v = s, 0.0
-            if k != 0.0:
-                u, v = math.sin(k * s) / k, (1.0 - math.cos(k * s)) / k
-            x = row[X] + row[COS] * u - row[SIN] * v
-            y = row[Y] + row[SIN] * u + row[COS] * v
-            window[LEFT], window[RIGHT] = min(window[LEFT], x), max(window[RIGHT], x)
-            window[LOW], window[HIGH] = min(window[LOW], y), max(window[HIGH], y)
+        row = segments[ids[at]]
+        west, south, east, north = row[WEST], row[SOUTH], row[EAST], row[NORTH]
+        if row[CURVATURE] == 0.0:
+            x0, x1 = row[X] + row[COS] * begin, row[X] + row[COS] * end
+            y0, y1 = row[Y] + row[SIN] * begin, row[Y] + row[SIN] * end
+            west, east, south, north = min(x0, x1), max(x0, x1), min(y0, y1), max(y0, y1)
+        window[LEFT], window[RIGHT] = min(window[LEFT], west), max(window[RIGHT], east)
+        window[LOW], window[HIGH] = min(window[LOW], south), max(window[HIGH], north)
 
 
 @law
 def first_overlap(
-    ways: Ways,
-    room: Scratch,
+    segments: Floats,
+    ids: Ints,
+    begins: Floats,
     kind: Floats,
     count: int,
+    reach: float,
     x: float,
     y: float,
     cos: float,
@@ -162,10 +203,11 @@ def first_overlap(
     front = kind[FRONT]
     half = 0.5 * kind[WIDTH] + MARGIN
     for at in range(count):
-        begin, end = max(front, room.begins[at]), min(front + REACH, room.begins[at + 1])
-        if end < begin:
+        begin, end = max(front, begins[at]), min(front + reach, begins[at + 1])
+        row = segments[ids[at]]
+        swing = 0.5 * row[CURVATURE] * front * front
+        if end < begin or is_beside(row, x, y, half + abs(swing) + half_length + half_width):
             continue
-        row = ways.segments[room.ids[at]]
         along, beside, turn_cos, turn_sin = foot(row, x, y, 0.5 * row[LENGTH])
         way_cos = row[COS] * turn_cos - row[SIN] * turn_sin
         way_sin = row[SIN] * turn_cos + row[COS] * turn_sin
@@ -173,19 +215,32 @@ def first_overlap(
         lengthwise = half_length * abs(same) + half_width * across
         sideways = half_length * across + half_width * abs(same)
         bend = 0.5 * row[CURVATURE] * lengthwise * lengthwise
-        swing = 0.5 * row[CURVATURE] * front * front
         right_edge = beside - sideways - max(0.0, bend)
         left_edge = beside + sideways + max(0.0, -bend)
         if left_edge < -half - max(0.0, swing) or right_edge > half + max(0.0, -swing):
             continue
-        if room.begins[at] + along + lengthwise < begin:
+        if begins[at] + along + lengthwise < begin:
             continue
-        rear = max(
-            begin, room.begins[at] + rear_end(row, x, y, cos, sin, same, half_length, half_width)
-        )
+        own_rear = rear_end(row, x, y, cos, sin, same, half_length, half_width)
+        rear = max(begin, begins[at] + own_rear)
         if rear <= end:
             return True, rear, same
     return False, 0.0, 0.0
+
+
+@law
+def is_beside(row: Floats, x: float, y: float, wide: float) -> bool:
+    """Return whether a point lies farther beside the line of a segment than `wide` [m]."""
+    dx, dy = x - row[X], y - row[Y]
+    v = dy * row[COS] - dx * row[SIN]
+    k = row[CURVATURE]
+    if k == 0.0:
+        return bool(abs(v) > wide)
+    # between two circles about the arc's centre, of radii r - wide and r + wide; all times k^2
+    squared = k * k * (dx * dx + dy * dy) - 2.0 * k * v
+    spread = abs(k) * wide
+    is_inside = spread < 1.0 and squared < spread * (spread - 2.0)
+    return bool(is_inside or squared > spread * (2.0 + spread))
 
 
 @law

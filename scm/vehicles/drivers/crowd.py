@@ -5,6 +5,7 @@ car with a driver of its own is shown to the crowd by what it tells on the air.
 """
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from scm.v2x.etsi import SpatemBody
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers import memory as m
-from scm.vehicles.drivers.ahead import scratch
+from scm.vehicles.drivers.ahead import Scratch, scratch
 from scm.vehicles.drivers.law import decide
 from scm.vehicles.drivers.signal_table import KEPT_WHEN_LOSSY as FRAMES_KEPT
 from scm.vehicles.drivers.signal_table import SignalTable
@@ -24,6 +25,7 @@ from scm.vehicles.drivers.streets import Streets
 from scm.vehicles.drivers.way import look_from
 
 PACKED_FROM = 4096
+WORTH_THREADS = 256
 
 
 class Crowd:
@@ -38,6 +40,7 @@ class Crowd:
     Attributes:
         throttle: (capacity,) last decided, -1 to 1; likewise `steering`, + = left.
         signals: What is told of the signals.
+        threads: How many work on large crowds; what is decided does not depend on it.
     """
 
     def __init__(
@@ -50,7 +53,9 @@ class Crowd:
         self._memory = m.empty_memory(capacity)
         self._heard = nobody(city_map, capacity, CAMS_KEPT if loss else 1)
         self.signals = SignalTable(city_map, FRAMES_KEPT if loss else 1)
-        self._room = scratch()
+        self.threads = 1
+        self._rooms = [scratch()]
+        self._pool: ThreadPoolExecutor | None = None
         self._poses = np.zeros((capacity, 4))
         self._commands = np.zeros((2, capacity))
         self._kinds: dict[CarLimits, int] = {}
@@ -277,20 +282,31 @@ class Crowd:
 
     def _decide(self, cars: Ints, now_ns: int, signals: SignalTable, *, stop: bool) -> None:
         find_cells(self._heard, now_ns)
-        decide(
-            self.streets.ways,
-            self._memory,
-            self._heard,
-            signals.told,
-            self._room,
-            cars,
-            self._poses,
-            self._commands,
-            now_ns,
-            bool(stop),
-            self._loss,
-            self._seed,
-        )
+
+        def part(cars: Ints, room: Scratch) -> None:
+            decide(
+                self.streets.ways,
+                self._memory,
+                self._heard,
+                signals.told,
+                room,
+                cars,
+                self._poses,
+                self._commands,
+                now_ns,
+                bool(stop),
+                self._loss,
+                self._seed,
+            )
+
+        if self.threads == 1 or len(cars) < WORTH_THREADS:
+            part(cars, self._rooms[0])
+            return
+        if self._pool is None or len(self._rooms) != self.threads:
+            self._pool = ThreadPoolExecutor(self.threads)
+            self._rooms = [scratch() for _ in range(self.threads)]
+        for _ in self._pool.map(part, np.array_split(cars, self.threads), self._rooms):
+            pass
 
     def _number(self, lane: str) -> int:
         number = self.streets.numbers.get(lane)

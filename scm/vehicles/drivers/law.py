@@ -5,7 +5,15 @@ next stop line, the car ahead (time gap in flow, a fixed gap at rest), the order
 """
 
 from scm.arrays import Floats, Ints
-from scm.vehicles.drivers.ahead import REACH, REAR_AT, SPEED_OF, Scratch, cars_ahead
+from scm.vehicles.drivers.ahead import (
+    REACH,
+    REAR_AT,
+    SPEED_OF,
+    STANDSTILL_GAP,
+    Scratch,
+    cars_ahead,
+)
+from scm.vehicles.drivers.exits import has_room
 from scm.vehicles.drivers.memory import (
     ARRIVED,
     DECEL,
@@ -26,11 +34,18 @@ from scm.vehicles.drivers.memory import (
     Memory,
     S,
 )
-from scm.vehicles.drivers.pace import STANDSTILL, free_speed, stopping_speed, throttle
+from scm.vehicles.drivers.pace import STANDSTILL, braking, free_speed, stopping_speed, throttle
 from scm.vehicles.drivers.signal_table import Told
 from scm.vehicles.drivers.stations import Heard
 from scm.vehicles.drivers.steering import LEAST_HALF, steer
-from scm.vehicles.drivers.stop_lines import STANDSTILL_GAP, hold
+from scm.vehicles.drivers.stop_lines import (
+    LOOK_AHEAD,
+    NEAREST,
+    REACTION,
+    SHORT_OF_LINE,
+    next_line,
+    signal_says,
+)
 from scm.vehicles.drivers.streets import Ways
 from scm.vehicles.drivers.way import locate, survey, turned
 from scm.vehicles.jit import array_kernel, law
@@ -72,6 +87,7 @@ def decide(
         loss: Share of radio frames that get lost.
         seed: Of the luck.
     """
+    ids, begins = room.ids, room.begins
     for number in range(len(cars)):
         car = cars[number]
         ints, floats, sight = memory.ints[car], memory.floats[car], memory.sight[car]
@@ -80,33 +96,52 @@ def decide(
         locate(ways, memory, car, x, y)
         rolling = max(0.0, speed)
         back = max(LEAST_HALF, 0.5 * rolling * kind[SWING])
-        reach = kind[FRONT] + REACH
-        count, here, ends = survey(ways, sight, floats[S], back, reach, room.ids, room.begins)
-        found = cars_ahead(ways, heard, room, kind, car, count, now_ns, loss, seed)
-        wished, reason = wish(ways, room, kind, floats, count, here, found, ends, stop)
-        held, far = hold(
-            ways, told, kind, ints, sight, room.ahead, found, car, floats[S], speed, now_ns, loss,
-            seed,
-        )  # fmt: skip
-        if held != FREE:
-            before_line = stopping_speed(far, kind[DECEL])
-            if before_line < wished:
-                wished, reason = before_line, held
+        front = kind[FRONT]
+        count, here, ends = survey(
+            ways.segment_first, ways.segments, sight, floats[S], back, front + REACH, ids, begins
+        )
+        found = cars_ahead(ways.segments, heard, room, kind, car, count, REACH, now_ns, loss, seed)
+        wished, reason = wish(
+            ways.segments, ids, begins, room.ahead, kind, floats, count, here, found, ends, stop
+        )
         passed = 1e-9 * (now_ns - ints[LAST_NS]) if ints[LAST_NS] >= 0 else -1.0
         ints[LAST_NS] = now_ns
+        commands[1, car] = steer(
+            ways.segments, ids, begins, kind, floats, count, here, yaw, rolling, passed
+        )
+        beyond = turned(ways.segments, ids, begins, count, here, front + INDICATE_AHEAD)
+        ints[TURN] = 0 if abs(beyond) < INDICATE_FROM else (1 if beyond > 0.0 else -1)
+        brake = braking(rolling, kind[DECEL], REACTION)
+        far = LOOK_AHEAD + 2.0 * brake
+        line, at, distance = next_line(
+            ways.length, ways.line_first, ways.line_at, sight, floats[S], front, front + far
+        )
+        if distance >= 0.0:
+            can_stop = distance - front >= brake + NEAREST
+            index = ints[INDEX] + at - HERE
+            held = signal_says(
+                told, ways.line_links, ints, line, index, can_stop, car, now_ns, loss, seed
+            )
+            if held == VEHICLE and has_room(
+                ways, heard, room, kind, sight, found, car, line, at, distance, floats[S], speed,
+                now_ns, loss, seed,
+            ):  # fmt: skip
+                held = FREE
+            before_line = stopping_speed(distance - SHORT_OF_LINE - front, kind[DECEL])
+            if held != FREE and before_line < wished:
+                wished, reason = before_line, held
         commands[0, car] = throttle(kind, floats, wished, speed, passed)
-        commands[1, car] = steer(ways, room, kind, floats, count, here, yaw, rolling, passed)
         standing = speed < STANDSTILL and commands[0, car] == 0.0
         ints[WAITING] = reason if standing else FREE
-        beyond = turned(ways, room.ids, room.begins, count, here, kind[FRONT] + INDICATE_AHEAD)
-        ints[TURN] = 0 if abs(beyond) < INDICATE_FROM else (1 if beyond > 0.0 else -1)
-        ints[ARRIVED] = has_arrived(ways, ints, sight, floats[S])
+        ints[ARRIVED] = has_arrived(ways.length, ints, sight, floats[S])
 
 
 @law
 def wish(
-    ways: Ways,
-    room: Scratch,
+    segments: Floats,
+    ids: Ints,
+    begins: Floats,
+    ahead: Floats,
     kind: Floats,
     floats: Floats,
     count: int,
@@ -117,13 +152,13 @@ def wish(
 ) -> tuple[float, int]:
     """Return the speed that all but stop lines allow [m/s], and what would hold the car there."""
     decel, front = kind[DECEL], kind[FRONT]
-    wished = free_speed(ways, room.ids, room.begins, count, here, kind[LATERAL_ACCEL], decel)
+    wished = free_speed(segments, ids, begins, count, here, kind[LATERAL_ACCEL], decel)
     wished, reason = min(wished, floats[TOLD]), FREE
     if ends:
-        wished = min(wished, stopping_speed(room.begins[count], decel))
+        wished = min(wished, stopping_speed(begins[count], decel))
     if found > 0:
-        gap = max(0.0, room.ahead[0, REAR_AT] - front - STANDSTILL_GAP)
-        speed = room.ahead[0, SPEED_OF]
+        gap = max(0.0, ahead[0, REAR_AT] - front - STANDSTILL_GAP)
+        speed = ahead[0, SPEED_OF]
         behind = min(stopping_speed(gap + speed * speed / (2.0 * decel), decel), gap / TIME_GAP)
         if behind < wished:
             wished, reason = behind, VEHICLE
@@ -133,8 +168,8 @@ def wish(
 
 
 @law
-def has_arrived(ways: Ways, ints: Ints, sight: Ints, s: float) -> int:
+def has_arrived(length: Floats, ints: Ints, sight: Ints, s: float) -> int:
     """Return 1 when a car's route is done, else 0."""
     if ints[INDEX] != ints[GOAL]:
         return 1 if ints[INDEX] > ints[GOAL] else 0
-    return 1 if s >= ways.length[sight[HERE]] - ARRIVED_WITHIN else 0
+    return 1 if s >= length[sight[HERE]] - ARRIVED_WITHIN else 0

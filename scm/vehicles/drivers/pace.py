@@ -15,7 +15,7 @@ from scm.vehicles.drivers.memory import (
     STEPS,
     SUM,
 )
-from scm.vehicles.drivers.streets import CURVATURE, LIMIT, Ways
+from scm.vehicles.drivers.streets import CURVATURE, LIMIT
 from scm.vehicles.jit import law
 
 END_RATE = 5.0
@@ -35,14 +35,20 @@ def stopping_speed(distance: float, decel: float) -> float:
 
 @law
 def free_speed(
-    ways: Ways, ids: Ints, begins: Floats, count: int, here: int, lateral_accel: float, decel: float
+    segments: Floats,
+    ids: Ints,
+    begins: Floats,
+    count: int,
+    here: int,
+    lateral_accel: float,
+    decel: float,
 ) -> float:
     """Return the speed that lanes and curves allow here, and in time for what comes [m/s]."""
     slowest = math.inf
     for at in range(here, count):
-        row = ways.segments[ids[at]]
-        curve = lateral_accel / max(abs(row[CURVATURE]), 1e-3)
-        allowed = min(row[LIMIT] * row[LIMIT], curve)
+        limit = segments[ids[at], LIMIT]
+        curve = lateral_accel / max(abs(segments[ids[at], CURVATURE]), 1e-3)
+        allowed = min(limit * limit, curve)
         slowest = min(slowest, allowed + 2.0 * decel * max(0.0, begins[at]))
         if slowest <= 2.0 * decel * max(0.0, begins[at + 1]):
             break

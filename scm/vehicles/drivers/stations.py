@@ -19,7 +19,7 @@ REMEMBER_NS = 3 * NS_PER_S
 LONGEST_GUESS_S = 1.0
 CELL_M = 1.0
 MARGIN_M = 1.0
-KEPT_WHEN_LOSSY = 4
+KEPT_WHEN_LOSSY = 8
 
 # Columns of a CAM: the middle of the front bumper, speed along the heading, and turn of it.
 CAM_X, CAM_Y, CAM_YAW, CAM_SPEED, CAM_YAW_RATE = range(5)

@@ -15,8 +15,7 @@ Holds: small slip angles, |e| below a car's width.   Source: Frenet kinematics o
 
 import math
 
-from scm.arrays import Floats
-from scm.vehicles.drivers.ahead import Scratch
+from scm.arrays import Floats, Ints
 from scm.vehicles.drivers.memory import (
     ANGLE,
     BESIDE,
@@ -26,7 +25,7 @@ from scm.vehicles.drivers.memory import (
     SWING,
     WHEELBASE,
 )
-from scm.vehicles.drivers.streets import CURVATURE, YAW, Ways
+from scm.vehicles.drivers.streets import CURVATURE, YAW
 from scm.vehicles.drivers.way import turned
 from scm.vehicles.jit import law
 
@@ -38,8 +37,9 @@ LEAST_HALF = 0.02
 
 @law
 def steer(
-    ways: Ways,
-    room: Scratch,
+    segments: Floats,
+    ids: Ints,
+    begins: Floats,
     kind: Floats,
     floats: Floats,
     count: int,
@@ -51,8 +51,9 @@ def steer(
     """Return the steering command, -1 to 1, + = left.
 
     Args:
-        ways: The lanes.
-        room: Holds the surveyed way.
+        segments: Of all lanes.
+        ids: The surveyed segments; `begins` where each begins, from the rear axle on [m].
+        begins: See `ids`.
         kind: The row of the kind of car.
         floats: Its memory.
         count: Of surveyed segments.
@@ -63,14 +64,13 @@ def steer(
     """
     step = kind[STEER_RATE] * max(0.0, passed)
     floats[ANGLE] += max(-step, min(step, floats[STEER] - floats[ANGLE]))
-    ids, begins = room.ids, room.begins
     half = max(LEAST_HALF, 0.5 * speed * kind[SWING])
-    before = turned(ways, ids, begins, count, here, -half)
-    after = turned(ways, ids, begins, count, here, half)
-    quarters = turned(ways, ids, begins, count, here, -0.5 * half)
-    quarters += turned(ways, ids, begins, count, here, 0.5 * half)
-    row = ways.segments[ids[here]]
-    way_yaw = row[YAW] - row[CURVATURE] * begins[here]
+    before = turned(segments, ids, begins, count, here, -half)
+    after = turned(segments, ids, begins, count, here, half)
+    quarters = turned(segments, ids, begins, count, here, -0.5 * half)
+    quarters += turned(segments, ids, begins, count, here, 0.5 * half)
+    segment = ids[here]
+    way_yaw = segments[segment, YAW] - segments[segment, CURVATURE] * begins[here]
     mean_yaw = way_yaw + (before + 4.0 * quarters + after) / 12.0
     path_curvature = (after - before) / (2.0 * half)
     error = math.sin(yaw - mean_yaw)

@@ -18,8 +18,8 @@ from scm.maps.polyline import advance, extent
 from scm.maps.route import Roads
 
 # Columns of a segment: where on its lane, its length, its start pose, 1/radius (+ = left), the
-# lane's speed limit.
-AT, LENGTH, X, Y, COS, SIN, YAW, CURVATURE, LIMIT = range(9)
+# lane's speed limit; and the rectangle that holds it.
+AT, LENGTH, X, Y, COS, SIN, YAW, CURVATURE, LIMIT, WEST, SOUTH, EAST, NORTH = range(13)
 # Columns of a stop line: where on its lane. Columns of its links: group and junction by number.
 GROUP, JUNCTION = range(2)
 
@@ -29,7 +29,7 @@ class Ways(NamedTuple):
 
     Attributes:
         length: Of each lane [m].
-        segments: (n, 9), see the columns above.
+        segments: (n, 13), see the columns above.
         following: Lanes that begin where one ends, by number.
         line_at: Where on its lane each stop line is [m]; `line_links` its group and junction.
         stretches: (n, 2) from and to of where nobody may stop [m]; `stretch_junction` whose.
@@ -74,7 +74,7 @@ class Streets:
         self.ways = Ways(
             length=np.array([sum(row[LENGTH] for row in rows) for rows in segments], np.float64),
             segment_first=_firsts(segments),
-            segments=_table([row for rows in segments for row in rows], 9),
+            segments=_table([row for rows in segments for row in rows], 13),
             next_first=_firsts(following),
             following=np.array([n for row in following for n in row], np.int64),
             line_first=_firsts(lines),
@@ -161,10 +161,19 @@ def _segments(lane: Lane) -> list[tuple[float, ...]]:
     for segment in lane.segments:
         length, curvature = extent(segment)
         x, y, yaw = pose
-        row = (at, length, x, y, math.cos(yaw), math.sin(yaw), yaw, curvature, lane.speed_limit_mps)
-        rows.append(row)
+        held = _rectangle(pose, length, curvature)
+        cos, sin, limit = math.cos(yaw), math.sin(yaw), lane.speed_limit_mps
+        rows.append((at, length, x, y, cos, sin, yaw, curvature, limit, *held))
         pose, at = advance(pose, length, curvature), at + length
     return rows
+
+
+def _rectangle(start: Pose2, length: float, curvature: float) -> tuple[float, ...]:
+    """Return west, south, east, north of a segment, to a millimetre or so for arcs."""
+    pieces = 1 + int(32.0 * abs(curvature) * length)
+    places = [advance(start, length * k / pieces, curvature) for k in range(pieces + 1)]
+    xs, ys = [place.x for place in places], [place.y for place in places]
+    return min(xs), min(ys), max(xs), max(ys)
 
 
 def _firsts(rows: Sequence[Sequence[Any]]) -> Ints:

@@ -83,11 +83,11 @@ def go_back(memory: Memory, car: int) -> None:
 
 
 @law
-def segment_at(ways: Ways, lane: int, s: float) -> int:
+def segment_at(first: Ints, segments: Floats, lane: int, s: float) -> int:
     """Return the segment that holds a distance along a lane."""
-    segment = ways.segment_first[lane]
-    last = ways.segment_first[lane + 1] - 1
-    while segment < last and s >= ways.segments[segment + 1, AT]:
+    segment = first[lane]
+    last = first[lane + 1] - 1
+    while segment < last and s >= segments[segment + 1, AT]:
         segment += 1
     return int(segment)
 
@@ -115,7 +115,7 @@ def foot(row: Floats, x: float, y: float, near: float) -> tuple[float, float, fl
 def locate(ways: Ways, memory: Memory, car: int, x: float, y: float) -> None:
     """Find a car's foot on its way, walking from where it was; count what it has driven."""
     sight, floats = memory.sight[car], memory.floats[car]
-    segment = segment_at(ways, sight[HERE], floats[S])
+    segment = segment_at(ways.segment_first, ways.segments, sight[HERE], floats[S])
     near = floats[S] - ways.segments[segment, AT]
     gone, walked = -floats[S], 0
     along = beside = 0.0
@@ -150,12 +150,20 @@ def locate(ways: Ways, memory: Memory, car: int, x: float, y: float) -> None:
 
 @law
 def survey(
-    ways: Ways, sight: Ints, s: float, back: float, reach: float, ids: Ints, begins: Floats
+    first: Ints,
+    segments: Floats,
+    sight: Ints,
+    s: float,
+    back: float,
+    reach: float,
+    ids: Ints,
+    begins: Floats,
 ) -> tuple[int, int, bool]:
     """List the segments of a way around a place on it.
 
     Args:
-        ways: The lanes.
+        first: Of each lane, its first segment.
+        segments: Of all lanes.
         sight: The car's lanes in sight.
         s: Its place on the lane it is on [m].
         back: How far to look back [m].
@@ -169,41 +177,43 @@ def survey(
     """
     at = HERE
     lane = sight[HERE]
-    segment = segment_at(ways, lane, s)
-    begin = ways.segments[segment, AT] - s
+    segment = segment_at(first, segments, lane, s)
+    begin = segments[segment, AT] - s
     here = 0
     while begin > -back:
-        if segment > ways.segment_first[lane]:
+        if segment > first[lane]:
             segment -= 1
         elif at == HERE and sight[BEHIND] >= 0:
             at, lane = BEHIND, sight[BEHIND]
-            segment = ways.segment_first[lane + 1] - 1
+            segment = first[lane + 1] - 1
         else:
             break
-        begin -= ways.segments[segment, LENGTH]
+        begin -= segments[segment, LENGTH]
         here += 1
     count = 0
     while True:
         ids[count], begins[count] = segment, begin
         count += 1
-        begin += ways.segments[segment, LENGTH]
+        begin += segments[segment, LENGTH]
         if begin > reach or count == len(ids):
             ends = False
             break
         segment += 1
-        if segment == ways.segment_first[lane + 1]:
+        if segment == first[lane + 1]:
             at += 1
             if at == IN_SIGHT or sight[at] < 0:
                 ends = at < IN_SIGHT
                 break
             lane = sight[at]
-            segment = ways.segment_first[lane]
+            segment = first[lane]
     begins[count] = begin
     return count, min(here, count - 1), ends
 
 
 @law
-def turned(ways: Ways, ids: Ints, begins: Floats, count: int, here: int, offset: float) -> float:
+def turned(
+    segments: Floats, ids: Ints, begins: Floats, count: int, here: int, offset: float
+) -> float:
     """Return by how much the way turns from the car's place to an offset along it [rad], + = left.
 
     Beyond what was surveyed the way is taken as straight.
@@ -213,11 +223,11 @@ def turned(ways: Ways, ids: Ints, begins: Floats, count: int, here: int, offset:
     if offset >= 0.0:
         while at < count and begins[at] < offset:
             piece = min(offset, begins[at + 1]) - max(0.0, begins[at])
-            total += ways.segments[ids[at], CURVATURE] * piece
+            total += segments[ids[at], CURVATURE] * piece
             at += 1
         return total
     while at >= 0 and begins[at + 1] > offset:
         piece = min(0.0, begins[at + 1]) - max(offset, begins[at])
-        total -= ways.segments[ids[at], CURVATURE] * piece
+        total -= segments[ids[at], CURVATURE] * piece
         at -= 1
     return total
