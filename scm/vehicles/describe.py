@@ -46,6 +46,10 @@ def warnings_of(car: Car) -> Iterator[str]:
     for key, quantity in car.values.items():
         if not quantity.source:
             yield f"{key}: nobody says where {_value(quantity)} comes from; add source = ..."
+    for target in ("tyre_x", "tyre_y"):
+        names = [term.name for term in car.terms if term.adds == target]
+        if len(names) > 1:
+            yield f"{' and '.join(names)} add up in {target}: list one tyre"
     yield from _at_bounds(car, params)
     yield from _tips_over(car)
 

@@ -9,7 +9,7 @@ import importlib.util
 import sys
 from pathlib import Path
 
-from scm.errors import ScmError, TermError
+from scm.errors import ScmError, TermError, nearest
 from scm.vehicles.term import Term
 
 SUFFIX = ".py"
@@ -26,7 +26,8 @@ def load_own_term(folder: Path, name: str) -> Term:
         msg = f"{name}: expected a file beside the car file, got a path"
         raise TermError(msg)
     if not path.is_file():
-        msg = f"{name}: no such file in {folder.resolve()}"
+        there = [file.name for file in folder.glob(f"*{SUFFIX}")]
+        msg = f"{name}: no such file in {folder.resolve()}{nearest(name, there)}"
         raise TermError(msg)
     term = getattr(_module(path), "TERM", None)
     if not isinstance(term, Term):

@@ -1,6 +1,7 @@
 """The page and the picture of one fault of measuring: the same drive, true and as measured."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -41,9 +42,21 @@ def measure_page(fault: Measure) -> str:
     lines += [*parameter_table(fault.params, fault.neutral), *headings(fault)]
     lines += [f"**Acts on:** the stamps of {channels}" if fault.stamps else
               f"**Acts on:** {channels}", ""]  # fmt: skip
+    lines += list(_example(fault))
     code = fault.law.__module__.replace(".", "/")
     lines += [f"Code: `{code}.py` · [all effects](README.md)"]
     return "\n".join(lines) + "\n"
+
+
+def _example(fault: Measure) -> Iterator[str]:
+    """What a car file says."""
+    where = " on speed" if fault.acts_on == () else ""
+    shown = _numbers(fault)
+    yield from ("```toml", f'measures = ["{fault.name}{where}"]', "[measure]")
+    for param in fault.params:
+        key = param.key.partition(".")[2]
+        yield f'{key} = {{ value = {shown[param.name]:g}, source = "..." }}'
+    yield from ("```", "")
 
 
 def draw_measure(fault: Measure) -> str:

@@ -1,11 +1,12 @@
 """The page of one effect on a car, as Markdown: everything on it is read from the effect."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from scm.vehicles.car import car_names, load_car
 from scm.vehicles.describe_effects import neutral_of, params_of
 from scm.vehicles.manual.manoeuvres import MANOEUVRES
 from scm.vehicles.manual.page_parts import equations, headings, parameter_table, story
+from scm.vehicles.manual.picture import SIGHTS
 from scm.vehicles.manual.shown import DROPPED, Shown, shown_of
 from scm.vehicles.signals import SIGNALS
 from scm.vehicles.term import Term, flat, reads
@@ -27,9 +28,17 @@ def term_page(term: Term) -> str:
 
 def _caption(term: Term) -> str:
     shown = shown_of(term)
-    numbers = ", ".join(f"`{key} = {value:g}`" for key, value in shown.numbers.items())
-    with_it = f"Blue: {numbers}" if numbers else "Blue: listed"
-    return f"*{shown.car}, {MANOEUVRES[shown.manoeuvre].about}. {with_it}. Grey: {_other(shown)}.*"
+    said = [f"{shown.car}, {MANOEUVRES[shown.manoeuvre].about}"]
+    own = {param.key for param in params_of(term)}
+    both = {key: value for key, value in shown.both.items() if key not in own}
+    said += [f"Both with {_numbers(both)}"] if both else []
+    if SIGHTS[shown.see].labels is None:
+        said += [f"Blue: {_numbers(shown.numbers) or 'listed'}", f"Grey: {_other(shown)}"]
+    return f"*{'. '.join(said)}.*"
+
+
+def _numbers(numbers: Mapping[str, float]) -> str:
+    return ", ".join(f"`{key} = {value:g}`" for key, value in numbers.items())
 
 
 def _other(shown: Shown) -> str:
@@ -37,7 +46,7 @@ def _other(shown: Shown) -> str:
         return "the car without it"
     if shown.other is None:
         return "the same car with the effect at its neutral value"
-    return ", ".join(f"`{key} = {value:g}`" for key, value in shown.other.items())
+    return _numbers(shown.other)
 
 
 def _acts_on(term: Term) -> str:

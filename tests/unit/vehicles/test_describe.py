@@ -51,6 +51,11 @@ def test_a_car_that_tips_over_before_it_slides_is_warned_of():
     assert not any("rolls over" in text for text in warnings_of(load_car("nigel")))
 
 
+def test_two_tyres_on_one_wheel_are_warned_of():
+    said = list(warnings_of(load_car("nigel").with_terms(["tyre_combined"])))
+    assert "tyre_lateral and tyre_combined_across add up in tyre_y: list one tyre" in said
+
+
 def test_a_spread_that_leaves_the_bounds_is_warned_of():
     assert not any("past its bounds" in text for text in warnings_of(load_car("nigel")))
 
