@@ -67,7 +67,7 @@ def main() -> None:
         "front, no noise": quiet,
         "front, distorted": dataclasses.replace(given["front"], distortion=BARREL),
     }
-    flat = studio._floor._levels[0]  # noqa: SLF001  the picture that the limit must warp as well
+    flat = studio._floor.whole.levels[0]  # noqa: SLF001  the picture that the limit must warp as well
     tilt = np.array([[0.9, 0.4, 30.0], [-0.02, 1.6, 60.0], [0.0, 1.2e-3, 1.0]])
     size = (quiet.width_px, quiet.height_px)
     limit = median_ms(lambda _: cv2.warpPerspective(flat, tilt, size))

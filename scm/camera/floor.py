@@ -6,21 +6,30 @@ finer in depth than the frame and averaged.
 """
 
 import math
+from collections import OrderedDict
+from typing import NamedTuple
 
 import cv2
+import msgspec
 import numpy as np
 
-from scm.arrays import Image
+from scm.arrays import Floats, Image
 from scm.camera.daylight import Daylight
 from scm.camera.lens import Lens, View
 from scm.maps.draw import bounds
-from scm.maps.model import CityMap
+from scm.maps.model import CityMap, Crosswalk
+from scm.maps.polyline import extent
+from scm.maps.route import LanePath
+from scm.scenery.canvas import Colour, colour_of
 from scm.scenery.sheet import TABLE, FloorSheet, paint_floor, printed_tag, wall_pieces
 from scm.scenery.solids import rectangle
 from scm.scenery.tags import PRINT_SCALE
 
 MOST_TEXELS = 14e6
 FINEST_TEXELS_PER_M = 1000.0
+PATCHES_KEPT = 8
+ASLANT = 1.3
+"""How much farther a frame's corner is than its middle in the same row, for any lens of ours."""
 BESIDE_M = 0.3
 LEVELS = 6
 FINER_IN_DEPTH = 3
@@ -32,26 +41,28 @@ INVERSE = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
 class Floor:
     """The floor of a city in some light, ready to be seen from anywhere.
 
+    Of a large city only patches around whoever looks are painted, a fine one and a wide one; they
+    are kept for the next ones who look from there.
+
     Args:
         city_map: The city.
         daylight: The light on it; shadows of what stands still are painted on.
-        rng: Of the floor's grain.
+        seed: Of the floor's grain.
     """
 
-    def __init__(self, city_map: CityMap, daylight: Daylight, rng: np.random.Generator) -> None:
+    def __init__(self, city_map: CityMap, daylight: Daylight, seed: int = 0) -> None:
+        self._map = city_map
+        self._daylight = daylight
+        self._seed = seed
+        self._paths: dict[str, LanePath] = {}
+        self._patches: OrderedDict[tuple[Ring, int, int], Drawing] = OrderedDict()
         x0, y0, x1, y1 = bounds(city_map)
-        extent = np.array([x1 - x0, y1 - y0]) + 2 * BESIDE_M
-        fits = math.sqrt(MOST_TEXELS / float(extent.prod()))
-        self.texels_per_m = min(FINEST_TEXELS_PER_M, fits)
-        sheet = FloorSheet(x0 - BESIDE_M, y1 + BESIDE_M, extent, rng, self.texels_per_m)
-        paint_floor(sheet, city_map)
-        _lay_tag(sheet, city_map)
-        _shade(sheet, city_map, daylight)
-        self.corner = (sheet.left, sheet.upper)
-        self._levels = [sheet.picture]
-        for _ in range(LEVELS - 1):
-            self._levels.append(np.asarray(cv2.pyrDown(self._levels[-1]), dtype=np.uint8))
-        self._lit: dict[float, list[Image]] = {}
+        size = np.array([x1 - x0, y1 - y0]) + 2 * BESIDE_M
+        fits = min(FINEST_TEXELS_PER_M, math.sqrt(MOST_TEXELS / float(size.prod())))
+        self.whole: Drawing | None = None
+        if fits >= FINE.texels_per_m:
+            corner = (x0 - BESIDE_M, y1 + BESIDE_M)
+            self.whole = self._drawn(city_map, corner, size, fits, TABLE)
 
     def paint(self, canvas: Image, lens: Lens, view: View, light: float) -> None:
         """Paint what lies below the horizon.
@@ -62,9 +73,93 @@ class Floor:
             view: Where it is.
             light: Factor on the picture: how bright it is times the camera's exposure.
         """
-        levels = self._in_light(light)
-        table = tuple(min(255.0, part * light) for part in TABLE)
         height, width = canvas.shape[:2]
+        horizon = horizon_rows(lens, view, width)
+        top = max(0, math.floor(min(horizon)))
+        if self.whole is not None:
+            self.whole.paint(canvas, lens, view, light, (top, height))
+            return
+        x, y, high = (float(part) for part in view.position)
+        fine, reach = self._patch(FINE, x, y)
+        wide, _ = self._patch(WIDE, x, y)
+        near = max(horizon) + lens.canvas_matrix[0, 0] * max(high, 1e-3) / (reach / ASLANT)
+        split = int(np.clip(near, top, height))
+        wide.paint(canvas, lens, view, light, (top, split))
+        fine.paint(canvas, lens, view, light, (split, height))
+
+    def _patch(self, ring: "Ring", x: float, y: float) -> tuple["Drawing", float]:
+        """Return the patch around a place, and how far it reaches from there in every direction."""
+        key = ring, round(x / ring.cell_m), round(y / ring.cell_m)
+        at = np.array(key[1:]) * ring.cell_m
+        half = ring.size_m / 2
+        if key not in self._patches:
+            around = _around(self._map, float(at[0]), float(at[1]), ring.size_m)
+            corner = (float(at[0]) - half, float(at[1]) + half)
+            size = np.array([ring.size_m, ring.size_m])
+            beyond = colour_of(self._map.floor.colour)
+            self._patches[key] = self._drawn(around, corner, size, ring.texels_per_m, beyond)
+            if len(self._patches) > PATCHES_KEPT:
+                self._patches.popitem(last=False)
+        self._patches.move_to_end(key)
+        return self._patches[key], half - float(np.abs(at - (x, y)).max())
+
+    def _drawn(
+        self,
+        city_map: CityMap,
+        corner: tuple[float, float],
+        size: Floats,
+        texels_per_m: float,
+        beyond: Colour,
+    ) -> "Drawing":
+        for lane in city_map.lanes:
+            if lane.name not in self._paths:
+                self._paths[lane.name] = LanePath(lane)
+        rng = np.random.default_rng([self._seed, *b"floor"])
+        sheet = FloorSheet(*corner, size, rng, texels_per_m)
+        paint_floor(sheet, city_map, self._paths)
+        _lay_tag(sheet, city_map)
+        _shade(sheet, city_map, self._daylight)
+        return Drawing(sheet, beyond)
+
+
+class Ring(NamedTuple):
+    """How patches of a large city's floor are laid: one a cell."""
+
+    size_m: float
+    cell_m: float
+    texels_per_m: float
+
+
+FINE = Ring(5.0, 1.25, 400.0)
+WIDE = Ring(26.0, 4.0, 75.0)
+
+
+class Drawing:
+    """One flat picture of floor at several sizes.
+
+    Attributes:
+        corner: Map coordinates of its upper left corner [m].
+        texels_per_m: Of the finest.
+        levels: The picture, then each half the size of the one before.
+        beyond: The colour of what lies outside it.
+    """
+
+    def __init__(self, sheet: FloorSheet, beyond: Colour) -> None:
+        self.beyond = beyond
+        self.corner = (sheet.left, sheet.upper)
+        self.texels_per_m = sheet.texels_per_m
+        self.levels = [sheet.picture]
+        for _ in range(LEVELS - 1):
+            self.levels.append(np.asarray(cv2.pyrDown(self.levels[-1]), dtype=np.uint8))
+        self._lit: dict[float, list[Image]] = {}
+
+    def paint(
+        self, canvas: Image, lens: Lens, view: View, light: float, rows: tuple[int, int]
+    ) -> None:
+        """Paint some rows of a canvas, from the first to before the second."""
+        levels = self._in_light(light)
+        beyond = tuple(min(255.0, part * light) for part in self.beyond)
+        width = canvas.shape[1]
         # Texels of the finest level to canvas pixels, and back.
         over = np.column_stack((view.camera_R_map[:, :2], -view.camera_R_map @ view.position))
         texel = 1.0 / self.texels_per_m
@@ -74,28 +169,27 @@ class Floor:
             [0.0, 0.0, 1.0],
         ])  # fmt: skip
         back = np.linalg.inv(lens.canvas_matrix @ over @ placed)
-        for top, bottom, level, finer in self._strips(lens, view, height, width):
+        for top, bottom, level, finer in self._strips(lens, view, rows, width):
             size = (width, (bottom - top) * finer)
-            rows = np.array([[1, 0, 0], [0, 1 / finer, top + 0.5 / finer - 0.5], [0, 0, 1.0]])
-            share = 0.5**level
+            deep = np.array([[1, 0, 0], [0, 1 / finer, top + 0.5 / finer - 0.5], [0, 0, 1.0]])
             # OpenCV halves a picture about its first texel's centre.
-            smaller = np.diag([share, share, 1.0])
+            smaller = np.diag([0.5**level, 0.5**level, 1.0])
             strip = cv2.warpPerspective(
-                levels[level], smaller @ back @ rows, size, flags=INVERSE,
-                borderMode=cv2.BORDER_CONSTANT, borderValue=table,
+                levels[level], smaller @ back @ deep, size, flags=INVERSE,
+                borderMode=cv2.BORDER_CONSTANT, borderValue=beyond,
             )  # fmt: skip
             if finer > 1:
                 strip = cv2.resize(strip, (width, bottom - top), interpolation=cv2.INTER_AREA)
             canvas[top:bottom] = strip
 
     def _strips(
-        self, lens: Lens, view: View, height: int, width: int
+        self, lens: Lens, view: View, rows: tuple[int, int], width: int
     ) -> list[tuple[int, int, int, int]]:
-        """Return (first row, row after the last, level, how much finer in depth) from the top."""
+        """Return (first row, row after the last, level, how much finer in depth) from below."""
+        begin, last = rows
         horizon = max(horizon_rows(lens, view, width))
-        begin = max(0, math.floor(min(horizon_rows(lens, view, width))))
         f, high = lens.canvas_matrix[0, 0], max(float(view.position[2]), 1e-3)
-        strips, last = [], height
+        strips = []
         for level in range(LEVELS):
             for finer in (1, FINER_IN_DEPTH):
                 # Where a pixel covers 1.4 texels of this level, by the mean of both directions.
@@ -110,10 +204,34 @@ class Floor:
         return strips
 
     def _in_light(self, light: float) -> list[Image]:
+        if light == 1.0:
+            return self.levels
         if light not in self._lit:
             table = np.clip(np.arange(256) * light, 0.0, 255.0).round().astype(np.uint8)
-            self._lit[light] = [np.asarray(cv2.LUT(one, table)) for one in self._levels]
+            self._lit[light] = [np.asarray(cv2.LUT(one, table)) for one in self.levels]
         return self._lit[light]
+
+
+def _around(city_map: CityMap, x: float, y: float, reach: float) -> CityMap:
+    """Return what a map has on its floor within a reach of a place [m], perhaps a little more."""
+
+    def is_near(thing: Crosswalk | tuple[float, float], more: float) -> bool:
+        at = thing if isinstance(thing, tuple) else (thing.x_m, thing.y_m)
+        return math.hypot(at[0] - x, at[1] - y) < reach + more
+
+    lanes = tuple(
+        lane
+        for lane in city_map.lanes
+        if is_near((lane.start[0], lane.start[1]), sum(extent(one)[0] for one in lane.segments))
+    )
+    names = {lane.name for lane in lanes}
+    return msgspec.structs.replace(
+        city_map,
+        lanes=lanes,
+        stop_lines=tuple(line for line in city_map.stop_lines if line.lane in names),
+        crosswalks=tuple(one for one in city_map.crosswalks if is_near(one, one.width_m)),
+        walls=tuple(wall for wall in city_map.walls if any(is_near(p, 5.0) for p in wall.points)),
+    )
 
 
 def horizon_rows(lens: Lens, view: View, width: int) -> tuple[float, float]:

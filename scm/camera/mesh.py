@@ -6,6 +6,7 @@ this side of it later, so it is painted first. No distance between faces is ever
 thing; between things the farther one is painted first.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -133,10 +134,12 @@ def part_of(solid: Solid, *on_it: Face) -> Part:
 
 
 def _normal(points: Floats) -> Floats:
-    following = np.roll(points, -1, axis=0)
-    normal = np.cross(points, following).sum(axis=0)  # twice the area, whatever the corners
-    length = float(np.linalg.norm(normal))
-    outward: Floats = normal / length if length > 0.0 else normal
+    # Newell: twice the area as seen along each axis, whatever the corners.
+    x, y, z = points.T
+    u, v, w = np.roll(points, -1, axis=0).T
+    area = np.array(((y - v) @ (z + w), (z - w) @ (x + u), (x - u) @ (y + v)))
+    length = math.sqrt(float(area @ area))
+    outward: Floats = area / length if length > 0.0 else area
     return outward
 
 

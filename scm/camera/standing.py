@@ -1,7 +1,9 @@
 """What stands in a city and how it looks from the floor: walls, boxes, signal heads, signs."""
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -12,6 +14,9 @@ from scm.maps.model import Box, CityMap, Light, Sign, Wall
 from scm.scenery.canvas import Colour, colour_of, dimmed
 from scm.scenery.sheet import BRICK, CARD, wall_pieces
 from scm.scenery.solids import prism, rectangle
+
+S = TypeVar("S")
+P = TypeVar("P", Light, Sign)
 
 BLOCK_M = 0.2
 PANEL_M = 0.4
@@ -33,15 +38,44 @@ UPRIGHT = np.eye(3)
 MIDDLE = np.array([0.0, 0.0, 0.1])
 
 
-def wall_things(city_map: CityMap) -> list[Thing]:
+class Ball(NamedTuple, Generic[S]):
+    """Something that stands, and the ball that holds it [m]."""
+
+    of: S
+    middle: tuple[float, float, float]
+    radius: float
+
+
+class Block(NamedTuple):
+    """A piece of a wall: its outline on the floor, (4, 2), and its height [m]."""
+
+    foot: Floats
+    height: float
+    colour: Colour
+
+
+def wall_balls(city_map: CityMap) -> list[Ball[Block]]:
     """Return the walls as blocks, each of its own shade."""
-    things = []
+    balls = []
     for wall in city_map.walls:
         for number, foot in enumerate(_blocks(wall)):
             shade = 1.0 - 0.05 * (number % 2) - 0.03 * (number % 3 == 0)
-            solid = prism(foot, 0.0, wall.height_m, dimmed(BRICK, shade))
-            things.append(_thing(mesh_of((part_of(solid),)), foot, wall.height_m))
-    return things
+            block = Block(foot, wall.height_m, dimmed(BRICK, shade))
+            x, y = foot.mean(axis=0)
+            radius = math.hypot(*(np.ptp(foot, axis=0) / 2), wall.height_m / 2)
+            balls.append(Ball(block, (float(x), float(y), wall.height_m / 2), radius))
+    return balls
+
+
+def post_balls(posts: Sequence[P]) -> list[Ball[P]]:
+    """Return lights or signs with the balls that hold them."""
+    return [Ball(post, (post.x_m, post.y_m, 0.1), 0.13) for post in posts]
+
+
+def wall_thing(block: Block) -> Thing:
+    """Return a block of a wall."""
+    solid = prism(block.foot, 0.0, block.height, block.colour)
+    return _thing(mesh_of((part_of(solid),)), block.foot, block.height)
 
 
 @lru_cache(maxsize=256)

@@ -1,20 +1,30 @@
 """One picture of the city through one camera: sky, floor, shadows, things, lens, sensor."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Generic, TypeVar
 
 import cv2
 import msgspec
 import numpy as np
 
-from scm.arrays import Floats, Image, Ints
+from scm.arrays import Floats, Image
 from scm.camera.car_mesh import car_thing, footprint
 from scm.camera.daylight import Daylight
 from scm.camera.floor import SHADE, Floor, horizon_rows
 from scm.camera.lens import Lens, View
 from scm.camera.optics import Optics
-from scm.camera.painter import Painter, Thing
+from scm.camera.painter import Painter
 from scm.camera.sensor import Noise
-from scm.camera.standing import box_shadow, box_thing, light_thing, sign_thing, wall_things
+from scm.camera.standing import (
+    Ball,
+    box_shadow,
+    box_thing,
+    light_thing,
+    post_balls,
+    sign_thing,
+    wall_balls,
+    wall_thing,
+)
 from scm.maps.model import Box, CityMap
 from scm.scenery.bodies import car_rotation
 from scm.scenery.canvas import Colour
@@ -24,6 +34,8 @@ SKY_HIGH: Colour = (226, 206, 178)
 SKY_LOW: Colour = (238, 232, 224)
 SKY_RAD = 0.6
 
+S = TypeVar("S")
+T = TypeVar("T")
 Shown = Mapping[int, str | None]
 """Which lamp of each signal head is on, by the light's id."""
 
@@ -41,9 +53,10 @@ class Studio:
         self._map = city_map
         self._daylight = daylight
         self._seed = seed
-        self._floor = Floor(city_map, daylight, np.random.default_rng([seed, *b"floor"]))
-        self._walls = _Still([*wall_things(city_map), *map(sign_thing, city_map.signs)])
-        self._heads = _Still([light_thing(light, None) for light in city_map.lights])
+        self._floor = Floor(city_map, daylight, seed)
+        self._walls = _Still(wall_balls(city_map), wall_thing)
+        self._signs = _Still(post_balls(city_map.signs), sign_thing)
+        self._heads = _Still(post_balls(city_map.lights), lambda light: light)
         self._kinds: dict[Optics, _Kind] = {}
 
     def picture(
@@ -74,9 +87,10 @@ class Studio:
         self._floor.paint(canvas, kind.lens, view, self._daylight.intensity * kind.exposure)
         boxes = self._boxes(moved)
         self._shadows(canvas, kind, view, cars, boxes)
-        lights = [self._map.lights[i] for i in self._heads.in_sight(kind.painter, view)]
+        lights = self._heads.in_sight(kind.painter, view)
         things = [
-            *(self._walls.things[i] for i in self._walls.in_sight(kind.painter, view)),
+            *self._walls.in_sight(kind.painter, view),
+            *self._signs.in_sight(kind.painter, view),
             *(box_thing(box) for box in boxes),
             *(light_thing(light, shown.get(light.light_id)) for light in lights),
             *(car_thing(other) for other in cars if other.vehicle != car.vehicle),
@@ -142,17 +156,24 @@ def _raised(foot: Floats, height: float) -> Floats:
     return np.concatenate((foot, top))
 
 
-class _Still:
-    """Things that never move, and a quick way to find those in sight."""
+class _Still(Generic[S, T]):
+    """What never moves: which of it is in sight is found at once, and only that is ever made."""
 
-    def __init__(self, things: list[Thing]) -> None:
-        self.things = things
-        self._middles = np.array([thing.middle for thing in things]).reshape(-1, 3)
-        self._radii = np.array([thing.radius for thing in things])
+    def __init__(self, balls: Sequence[Ball[S]], make: Callable[[S], T]) -> None:
+        self._balls = balls
+        self._make = make
+        self._made: dict[int, T] = {}
+        self._middles = np.array([ball.middle for ball in balls]).reshape(-1, 3)
+        self._radii = np.array([ball.radius for ball in balls])
 
-    def in_sight(self, painter: Painter, view: View) -> Ints:
-        """Return the numbers of those that can be in the picture."""
-        return np.flatnonzero(painter.in_sight(view, self._middles, self._radii))
+    def in_sight(self, painter: Painter, view: View) -> list[T]:
+        """Return what can be in the picture."""
+        mask = painter.in_sight(view, self._middles, self._radii)
+        found: list[int] = np.flatnonzero(mask).tolist()
+        for i in found:
+            if i not in self._made:
+                self._made[i] = self._make(self._balls[i].of)
+        return [self._made[i] for i in found]
 
 
 class _Kind:

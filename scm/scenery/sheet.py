@@ -1,6 +1,7 @@
 """The floor as one flat picture: what is painted on it, whoever looks at it from wherever."""
 
 import math
+from collections.abc import Mapping
 from itertools import pairwise
 
 import cv2
@@ -71,14 +72,23 @@ class FloorSheet:
         self.picture = np.clip(rough, 0.0, 255.0).astype(np.uint8)
 
 
-def paint_floor(sheet: FloorSheet, city_map: CityMap) -> None:
-    """Paint what lies on a map's floor: plate, roads, crosswalks, stop lines; with its grain."""
+def paint_floor(
+    sheet: FloorSheet, city_map: CityMap, paths: Mapping[str, LanePath] | None = None
+) -> None:
+    """Paint what lies on a map's floor: plate, roads, crosswalks, stop lines; with its grain.
+
+    Args:
+        sheet: Where to.
+        city_map: What to paint.
+        paths: Its lanes by name, where somebody has them already.
+    """
     floor = city_map.floor
     (x0, x1), (y0, y1) = floor.x_m, floor.y_m
     middle = (x0 + x1) / 2, (y0 + y1) / 2
     sheet.polygon(rectangle(*middle, x1 - x0 + 0.016, y1 - y0 + 0.016), dimmed(TABLE, 0.6))
     sheet.polygon(rectangle(*middle, x1 - x0, y1 - y0), colour_of(floor.colour))
-    lanes = {lane.name: LanePath(lane) for lane in city_map.lanes}
+    known = paths or {}
+    lanes = {lane.name: known.get(lane.name) or LanePath(lane) for lane in city_map.lanes}
     for path in lanes.values():
         sheet.polygon(_strip(path, path.width_m / 2 + EDGE_LINE_M / 2), PAINT)
     for path in lanes.values():

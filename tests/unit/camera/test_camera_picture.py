@@ -14,6 +14,7 @@ from scm.camera.painter import Painter, Thing
 from scm.camera.studio import Studio
 from scm.errors import EyeError
 from scm.maps.load import load_map
+from scm.maps.route import LanePath
 from scm.scenery.bodies import car_rotation
 from scm.scenery.solids import prism, rectangle
 from scm.scenery.tags import tag_corners
@@ -52,20 +53,21 @@ def test_the_corners_of_the_maps_tag_are_seen_where_they_are_projected(
 
 @pytest.mark.parametrize(("x", "y"), [(0.45, 0.02), (0.55, 0.1), (0.8, -0.2), (1.3, 0.1)])
 def test_a_spot_on_the_floor_is_exactly_where_it_is_projected(city_map, optics, car, x, y):
-    floor = Floor(city_map, FLAT, np.random.default_rng(0))
-    sheet = floor._levels[0]
+    floor = Floor(city_map, FLAT).whole
+    assert floor is not None
+    sheet = floor.levels[0]
     rows, columns = np.indices(sheet.shape[:2])
     texels = floor.texels_per_m
     at = (x - floor.corner[0]) * texels - 0.5, (floor.corner[1] - y) * texels - 0.5
     spot = 255.0 * np.exp(-((columns - at[0]) ** 2 + (rows - at[1]) ** 2) / 8.0)
     levels = [np.repeat(np.rint(spot)[:, :, None], 3, axis=2).astype(np.uint8)]
-    for _ in floor._levels[1:]:
+    for _ in floor.levels[1:]:
         levels.append(cv2.pyrDown(levels[-1]))
-    floor._levels = levels
+    floor.levels = levels
     lens, pose = Lens(optics()), car(0.0, 0.0)
     view = seen_from(lens, pose)
     canvas = np.zeros((720, 1280, 3), np.uint8)
-    floor.paint(canvas, lens, view, 1.0)
+    floor.paint(canvas, lens, view, 1.0, (224, 720))
     column, row = lens.project(view.seen(np.array([[x, y, 0.0]])))[0]
     left, top = round(column) - 40, round(row) - 40
     grey = canvas[top : top + 81, left : left + 81, 0].astype(float)
@@ -199,6 +201,19 @@ def test_a_pushed_box_is_seen_where_it_was_pushed_to(optics, car):
     # It stands in the way now: the middle of the picture was the far wall.
     assert (pushed[250, 640] != before[250, 640]).any()
     assert (studio.picture(optics(), own, [own], {}, "front", 0) == before).all()
+
+
+def test_a_large_city_is_drawn_in_patches_and_looks_alike_from_next_door(optics, car):
+    city = load_map("grid:6x6")
+    studio = Studio(city, Daylight())
+    assert studio._floor.whole is None
+    lane = LanePath(city.lanes[0]).at(0.3)
+    near, next_door = (car(lane.x + dx, lane.y, lane.yaw) for dx in (0.0, 0.004))
+    first = take(studio, optics(), near).astype(int)
+    assert first.std() > 20.0
+    # Four millimetres on nearly every pixel is as it was, whichever patch it came from.
+    second = take(studio, optics(), next_door).astype(int)
+    assert (np.abs(first - second).max(axis=2) < 40).mean() > 0.95
 
 
 @pytest.mark.parametrize("name", ["parking_school", "parking_school_obstacles"])
