@@ -136,8 +136,10 @@ class Bank:
         if len(due):
             seen = scene() if scene is not None else None
             models = self._model[due]
-            for number in np.unique(models):
-                self._read(self._models[number], due[models == number], now_ns, seen)
+            for number, model in enumerate(self._models):
+                slots = due if len(self._models) == 1 else due[models == number]
+                if len(slots):
+                    self._read(model, slots, now_ns, seen)
         out = [r for model in self._models for r in self._come_out(model, now_ns)]
         return [readings for readings in out if len(readings.slots)]
 
