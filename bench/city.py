@@ -7,6 +7,7 @@ elapsed time: 1 is real time, more is faster. Stages are processor time of a tic
 
 import gc
 import itertools
+import os
 import resource
 import sys
 import time
@@ -100,6 +101,7 @@ def run(cars: int, stages: Stages, *, signals: int = 0, lidar: bool = False) -> 
     part, many_mib = built(city_map, cars)
     held_kib = (many_mib - few_mib) * 1024.0 / (cars - 1)
     del few
+    part.world.use_threads(os.cpu_count() or 1)
     parts = [part, TrafficPart(city_map), MonitorPart(city_map)]
     with Lockstep(parts) as city:
         scans = city.hear(Hears(LidarScan)) if lidar else None

@@ -81,11 +81,7 @@ class Garage:
         return self._slots.get(name, _NOBODY)
 
     def use_threads(self, count: int) -> None:
-        """Let cars advance on several threads: for lockstep, on cores that would idle.
-
-        It changes no number: a car's row depends on no other. Live, with the processors shared,
-        two threads wait for each other: there one is better.
-        """
+        """Let cars advance on several threads; it changes no number, no row depends on another."""
         self._pool = ThreadPoolExecutor(count, "garage") if count > 1 else None
         self._threads = count
 

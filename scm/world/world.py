@@ -143,6 +143,15 @@ class World:
         """Return a car by name."""
         return self.hosted.get(name) or self.remote.get(name)
 
+    def use_threads(self, count: int) -> None:
+        """Let dynamics and drivers use several threads: for lockstep, on cores that would idle.
+
+        It changes no number. Live, with the processors shared, threads wait for each other: there
+        one is better.
+        """
+        self.garage.use_threads(count)
+        self.crowd.threads = count
+
     def receivers(self) -> Receivers:
         """Return all stations that frames are brought to, but for the hosted cars."""
         if not self.remote:
