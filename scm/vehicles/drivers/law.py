@@ -47,12 +47,13 @@ from scm.vehicles.drivers.stop_lines import (
     signal_says,
 )
 from scm.vehicles.drivers.streets import Ways
-from scm.vehicles.drivers.way import locate, survey, turned
+from scm.vehicles.drivers.way import choose_again, locate, survey, turned
 from scm.vehicles.jit import array_kernel, law
 
 TIME_GAP = 0.8
 ARRIVED_WITHIN = 0.02
 INDICATE_AHEAD = 1.2
+PATIENCE_NS = 1_500_000_000
 INDICATE_FROM = 0.5
 
 
@@ -127,6 +128,8 @@ def decide(
                 now_ns, loss, seed,
             ):  # fmt: skip
                 held = FREE
+            elif held == VEHICLE and at == HERE and speed < STANDSTILL and is_turn(now_ns, passed):
+                choose_again(ways, memory, car)
             before_line = stopping_speed(distance - SHORT_OF_LINE - front, kind[DECEL])
             if held != FREE and before_line < wished:
                 wished, reason = before_line, held
@@ -165,6 +168,13 @@ def wish(
     if stop:
         wished, reason = 0.0, ORDER
     return wished, reason
+
+
+@law
+def is_turn(now_ns: int, passed: float) -> bool:
+    """Return whether a car that finds no room may try another way: once in a while."""
+    before_ns = now_ns - int(1e9 * max(0.0, passed))
+    return now_ns // PATIENCE_NS != before_ns // PATIENCE_NS
 
 
 @law

@@ -62,6 +62,16 @@ def look_from(ways: Ways, memory: Memory, car: int, lane: int) -> None:
 
 
 @law
+def choose_again(ways: Ways, memory: Memory, car: int) -> None:
+    """Let a car that circulates turn elsewhere behind the lane it is on; a route stays as it is."""
+    ints, sight = memory.ints[car], memory.sight[car]
+    ints[SEED] = mixed(ints[SEED], ints[INDEX])
+    for ahead in range(HERE + 1, IN_SIGHT):
+        index = ints[INDEX] + ahead - HERE
+        sight[ahead] = lane_at(ways, memory, car, index, sight[ahead - 1])
+
+
+@law
 def go_on(ways: Ways, memory: Memory, car: int) -> None:
     """Move a car's sight on by one lane."""
     sight = memory.sight[car]
