@@ -7,7 +7,6 @@ thread. The share is that of one core at 200 Hz.
 """
 
 import math
-import statistics
 import sys
 import time
 from collections.abc import Callable
@@ -24,7 +23,7 @@ from scm.world.solids import Hull, car_body, solids
 HULL = Hull(2.4, 0.0229, -0.14, 0.16, -0.0875, 0.0875, restitution=0.2, friction=0.5)
 SIZES = (100, 1000, 10_000)
 RATE_HZ = 200
-STEPS, WARM_STEPS = 60, 20
+STEPS, LONGEST_S = 100, 1.0
 LANE_M, GAP_M = 0.5, 1.0
 MOTION = (
     batch.BodyFields.POSITION
@@ -56,9 +55,12 @@ def streets(cars: int) -> tuple[CityMap, Floats]:
     motion[:, 3] = 0.25
     motion[::100, 1] += 0.5 * LANE_M - HULL.left - 0.0025 + 0.0005
     walls = [
-        Wall(points=tuple((GAP_M * k - 1.0, LANE_M * (row + 0.5)) for k in range(a_street + 8)), thickness_m=0.005)
+        Wall(
+            points=tuple((GAP_M * k - 1.0, LANE_M * (row + 0.5)) for k in range(a_street + 8)),
+            thickness_m=0.005,
+        )
         for row in range(-1, math.ceil(cars / a_street))
-    ]  # fmt: skip
+    ]
     return city_of(walls), motion
 
 
@@ -73,24 +75,16 @@ def jam(cars: int) -> tuple[CityMap, Floats]:
     return city_of([Wall(points=((end, -1.0), (end, 1.0)), thickness_m=0.005)]), motion
 
 
-def timed(work: Callable[[int], object]) -> float:
-    """Return the median processor time of a step [ms]."""
-    spans = []
-    for step in range(WARM_STEPS + STEPS):
-        start = time.thread_time()
-        work(step)
-        spans.append((time.thread_time() - start) * 1e3)
-    return statistics.median(spans[WARM_STEPS:])
-
-
 def mean_timed(work: Callable[[int], object]) -> float:
-    """Return the mean processor time of a step [ms]: lists that are made anew count."""
-    for step in range(WARM_STEPS):
-        work(step)
+    """Return the mean processor time of a step [ms] over half a second or so, lists included."""
+    work(0)
+    first = time.thread_time()
+    work(1)
+    steps = max(3, min(STEPS, int(LONGEST_S / max(time.thread_time() - first, 1e-9))))
     start = time.thread_time()
-    for step in range(WARM_STEPS, WARM_STEPS + STEPS):
+    for step in range(2, 2 + steps):
         work(step)
-    return (time.thread_time() - start) * 1e3 / STEPS
+    return (time.thread_time() - start) * 1e3 / steps
 
 
 def at(motion: Floats, step: int, *, moving: bool) -> Floats:
@@ -140,9 +134,7 @@ def plain(city_map: CityMap, motion: Floats, *, moving: bool) -> Callable[[int],
 
 def main(sizes: tuple[int, ...] = SIZES) -> None:
     """Print the table."""
-    print(
-        f"{'':8} {'cars':>6} {'pairs':>6} {'ours ms':>8} {'ns a car':>9} {'core':>6}  pymunk ms  ratio"
-    )
+    print(" " * 11 + "cars  pairs  ours ms  ns a car   core  pymunk ms  ratio")
     for name, scene in (("streets", streets), ("jam", jam)):
         for cars in sizes:
             city_map, motion = scene(cars)
