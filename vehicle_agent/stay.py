@@ -14,10 +14,11 @@ from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.driver import RouteView
+from scm.vehicles.drivers.alone import OWN
 from scm.vehicles.drivers.heard import HeardCars
 from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.guard import Guard, Guarded
-from scm.vehicles.lights import OFF, Headlights, Indicators, Switches, lamps
+from scm.vehicles.lights import OFF, TURNS, Headlights, Indicators, Switches, lamps
 from scm.vehicles.signal_view import SignalView
 from vehicle_agent.body import Body
 
@@ -49,6 +50,7 @@ class Stay:
         self.switches = OFF
         self._cam = CamTrigger()
         self._seq = self._felt = 0
+        self._turn: Indicators = "off"
 
     def push(self, contact: Contact) -> None:
         """Let the body feel a contact; the next report says so."""
@@ -72,6 +74,7 @@ class Stay:
             epoch: Under which the car's own driver commands; None: it must not.
         """
         self._body.advance(now_ns)
+        self._turn = "off"
         if epoch is not None:
             self.guard.take(self._own_command(now_ns, epoch), now_ns)
         guarded = self.guard.output(now_ns)
@@ -88,6 +91,7 @@ class Stay:
             others=self.cars.others(now_ns, motion.pose),
         )
         throttle, steering = self.trips.decide(view)
+        self._turn = TURNS[int(self.trips.driver.crowd.turn[OWN])]
         return DriveCommand(
             vehicle=self._vehicle,
             t_ns=now_ns,
@@ -126,7 +130,12 @@ class Stay:
             epoch=self.guard.epoch,
             mode="stop" if guarded.mode == "lost" else guarded.mode,
             lights=lamps(
-                self.switches, guarded.throttle, motion.speed, now_ns, hazard=guarded.hazard
+                self.switches,
+                guarded.throttle,
+                motion.speed,
+                now_ns,
+                hazard=guarded.hazard,
+                turn=self._turn,
             ),
             car=self._car,
             contacts=self._felt,

@@ -41,6 +41,9 @@ class Switches:
 
 OFF = Switches()
 
+TURNS: dict[int, Indicators] = {1: "left", -1: "right", 0: "off"}
+"""What a driver shows who is about to turn that way."""
+
 _HEAD: dict[Headlights, tuple[str, ...]] = {
     "off": (),
     "low": ("head_low", "tail"),
