@@ -205,6 +205,16 @@ def test_a_push_sideways_is_held_by_the_tyres_and_leaves_no_creep():
     assert abs(there.yaw - where.yaw) < 1e-6
 
 
+def test_reverse_is_as_fast_as_forward_and_steers_the_same_circle():
+    ends = []
+    for way in (1.0, -1.0):
+        fleet = placed(load_car("nigel"))
+        fleet.throttle[0], fleet.steering[0] = way * 0.8, 0.5
+        fleet.advance(5.0)
+        ends.append((way * fleet.speed[0], fleet.yaw_rate[0] / fleet.speed[0]))
+    assert ends[1] == pytest.approx(ends[0], rel=0.01)
+
+
 def test_combined_slip_is_the_pure_curve_when_driving_straight():
     ends = []
     for names in ((), ("tyre_combined",)):
