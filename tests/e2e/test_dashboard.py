@@ -195,6 +195,11 @@ def test_a_chosen_cars_camera_is_watched_for_as_long_as_it_is_shown(open_page, s
     page.wait_for_selector('.film[data-seen="true"]')
     assert page.evaluate("document.querySelector('.film img').naturalWidth") == 1280
     assert served.view.watched("n2") == ("front",)
+    page.click(".film")
+    assert page.locator(".film").bounding_box()["width"] > 1000
+    page.keyboard.press("Escape")
+    assert page.locator(".film").bounding_box()["width"] < 400
+    assert served.view.watched("n2") == ("front",)
     page.click('.tabs button:has-text("rear")')
     wait_until(page, lambda: served.view.watched("n2") == ("rear",))
     page.wait_for_selector('.film[data-seen="true"]')

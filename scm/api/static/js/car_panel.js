@@ -49,6 +49,7 @@ export function CarPanel({ car }) {
 function Film({ src, label }) {
   const image = useRef(null);
   const [seen, setSeen] = useState(false);
+  const [large, setLarge] = useState(false);
   useEffect(() => {
     const follow = () => {
       if (document.hidden) image.current.removeAttribute("src");
@@ -63,10 +64,17 @@ function Film({ src, label }) {
     };
   }, [src]);
   return html`
-    <div class="film" data-seen=${seen}>
+    <button
+      class="film ${large ? "large" : ""}"
+      data-seen=${seen}
+      aria-pressed=${large}
+      title=${large ? "Smaller" : "Larger"}
+      onClick=${() => setLarge(!large)}
+      onKeyDown=${(event) => event.key === "Escape" && setLarge(false)}
+    >
       <img ref=${image} alt=${label} onLoad=${() => setSeen(true)} onError=${() => setSeen(false)} />
-      ${!seen && html`<p class="empty">Waiting for a picture.</p>`}
-    </div>
+      ${!seen && html`<span class="empty">Waiting for a picture.</span>`}
+    </button>
   `;
 }
 
