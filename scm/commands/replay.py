@@ -37,7 +37,8 @@ def _run(arguments: argparse.Namespace) -> int:
     runs = []
     for path in arguments.recording:
         for recording in read_recordings(path, arguments.data):
-            car = load_car(arguments.car or recording.vehicle)
+            chosen = arguments.car or recording.vehicle
+            car = load_car(chosen, trusted=arguments.car is not None)
             run = free_run(recording, car, arguments.horizon_s)
             print(
                 f"{path}  car {car.name}: {len(run.start_s)} windows of {arguments.horizon_s:g} s,"

@@ -170,8 +170,13 @@ def all_terms() -> Mapping[str, Term]:
     return {name: registry.load(TERMS, name, "TERM", Term) for name in registry.names(TERMS)}
 
 
-def load_car(name_or_path: str | Path) -> Car:
+def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
     """Read a car by the name of a shipped one, or by the path of any car file.
+
+    Args:
+        name_or_path: Of the car.
+        trusted: False where the path comes with somebody's data: a file that lists an effect of
+            its own, which is code, is then refused.
 
     Raises:
         CarError: naming every problem of the file at once.
@@ -188,17 +193,17 @@ def load_car(name_or_path: str | Path) -> Car:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         msg = f"{path}: not a TOML file: {error}"
         raise CarError(msg) from error
-    return car_of(data, path)
+    return car_of(data, path, trusted=trusted)
 
 
-def car_of(data: Mapping[str, Any], path: Path) -> Car:
-    """Make a car of a parsed file; `path` only names it in errors.
+def car_of(data: Mapping[str, Any], path: Path, *, trusted: bool = True) -> Car:
+    """Make a car of a parsed file; `path` names it in errors, effects of its own stand beside it.
 
     Raises:
         CarError: naming every problem at once.
     """
     problems: list[str] = []
-    terms = _terms(data, path.parent, problems)
+    terms = _terms(data, path.parent if trusted else None, problems)
     faults = read_faults(data.get("measures", []), problems)
     values = _defaults(terms) | _fault_defaults(faults) | _fact_defaults(data)
     values |= _values(data, terms, problems)
@@ -216,7 +221,7 @@ def car_of(data: Mapping[str, Any], path: Path) -> Car:
     return Car(name, scale, path, terms, values, faults)
 
 
-def _terms(data: Mapping[str, Any], folder: Path, problems: list[str]) -> tuple[Term, ...]:
+def _terms(data: Mapping[str, Any], folder: Path | None, problems: list[str]) -> tuple[Term, ...]:
     names = data.get("terms", list(STANDARD_TERMS))
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         problems.append(f"terms: expected a list of effect names, got {names!r}")
@@ -231,9 +236,12 @@ def _terms(data: Mapping[str, Any], folder: Path, problems: list[str]) -> tuple[
     return flat(known[name] for name in dict.fromkeys(names) if name in known)
 
 
-def _own_terms(folder: Path, names: list[str], problems: list[str]) -> dict[str, Term]:
+def _own_terms(folder: Path | None, names: list[str], problems: list[str]) -> dict[str, Term]:
     found: dict[str, Term] = {}
     for name in names:
+        if folder is None:
+            problems.append(f"terms: {name} is code; if you trust it, give this car file yourself")
+            continue
         try:
             term = load_own_term(folder, name)
         except TermError as error:

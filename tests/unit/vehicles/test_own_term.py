@@ -68,6 +68,11 @@ def test_a_wrong_file_is_refused_by_name(folder, file, old, new, said):
         load_car(folder / "buggy.toml")
 
 
+def test_a_car_file_that_came_with_data_may_not_run_code(folder):
+    with pytest.raises(CarError, match=r"carpet_nap\.py is code; if you trust it"):
+        load_car(folder / "buggy.toml", trusted=False)
+
+
 def test_an_effect_may_not_take_the_name_of_another(folder):
     text = (folder / "carpet_nap.py").read_text(encoding="utf-8")
     (folder / "wind.py").write_text(text.replace("def carpet_nap(", "def wind(").replace(
