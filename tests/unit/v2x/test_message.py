@@ -10,6 +10,7 @@ from scm.v2x.message import Refused, decode, encode
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.spawn_request import SpawnReply
 from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.vehicle_state import VehicleState
 
@@ -30,7 +31,8 @@ def test_a_payload_is_the_body_and_the_rest_is_the_attachment():
     body, attachment = encode(scan())
     assert body == b"\x00\xffab"
     assert attachment == (
-        b'{"vehicle":"n1","t_ns":5,"beams":1,"range_min_m":0.15,"range_max_m":12.0}'
+        b'{"vehicle":"n1","t_ns":5,"beams":1,"range_min_m":0.15,"range_max_m":12.0,'
+        b'"bearing_first_rad":0.0,"bearing_step_rad":null}'
     )
     assert decode(LidarScan, body, attachment) == scan()
 
@@ -61,6 +63,12 @@ def test_bytes_that_are_no_such_message_are_refused_with_class_and_field(body, s
 def test_long_digits_are_fine_where_they_are_no_integers():
     body = b'{"t_ns":-9223372036854775808,"engaged":true,"reason":"%s"}' % (b"9" * 30)
     assert decode(CityStop, body).reason == "9" * 30
+
+
+def test_long_fractions_are_fine():
+    seen = SpawnReply(vehicle="n1", x_m=0.00012345678901234567, y_m=1 / 3, yaw_rad=0.0, tag_id=1)
+    body, _ = encode(seen)
+    assert decode(SpawnReply, body) == seen
 
 
 @pytest.mark.parametrize("attachment", [None, b"{", b"[1]", b'{"vehicle":"n1"}', b"[" * 100_000])
