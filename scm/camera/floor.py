@@ -28,6 +28,8 @@ from scm.scenery.tags import PRINT_SCALE
 MOST_TEXELS = 14e6
 FINEST_TEXELS_PER_M = 1000.0
 PATCHES_KEPT = 8
+LEAST_UPRIGHT = 0.01
+"""Of a camera that looks straight up or down the horizon is as far away as this says."""
 ASLANT = 1.3
 """How much farther a frame's corner is than its middle in the same row, for any lens of ours."""
 BESIDE_M = 0.3
@@ -236,9 +238,11 @@ def _around(city_map: CityMap, x: float, y: float, reach: float) -> CityMap:
 
 def horizon_rows(lens: Lens, view: View, width: int) -> tuple[float, float]:
     """Return where the horizon crosses the canvas's left and right edge [px]."""
-    up = view.camera_R_map[:, 2]  # of the map, in the camera's axes
+    up = view.camera_R_map[:, 2].copy()  # of the map, in the camera's axes
     k = lens.canvas_matrix
     left, right = ((edge - k[0, 2]) / k[0, 0] for edge in (0.0, width - 1.0))
+    if abs(up[1]) < LEAST_UPRIGHT:
+        up[1] = -LEAST_UPRIGHT
     rows = [float(k[1, 2] - k[1, 1] * (up[0] * a + up[2]) / up[1]) for a in (left, right)]
     return rows[0], rows[1]
 

@@ -138,17 +138,19 @@ class CameraPart:
                 due_ns = _on_grid(after.t_ns, optics.rate_hz)
                 if due_ns > max(before.t_ns, self._sent_ns.get(which, -1)):
                     self._sent_ns[which] = due_ns
-                    frames.append(self._frame(which, optics, due_ns))
+                    frames += self._frame(which, optics, due_ns)
         return frames
 
-    def _frame(self, which: Which, optics: Optics, t_ns: int) -> CameraFrame:
+    def _frame(self, which: Which, optics: Optics, t_ns: int) -> list[Outgoing]:
         began_ns = self._clock.now_ns() if self._clock else 0
         if self._studio is None:
             self._studio = Studio(self._map, self._daylight, self._seed)
         vehicle, camera = which
         before, after = self._snapshots
         cars = between(before, near(after, vehicle, FARTHEST_M), t_ns)
-        own = next(car for car in cars if car.vehicle == vehicle)
+        own = next((car for car in cars if car.vehicle == vehicle), None)
+        if own is None:
+            return []
         image = self._studio.picture(
             optics, own, cars, self._shown(t_ns), camera, t_ns, after.boxes
         )
@@ -159,10 +161,11 @@ class CameraPart:
         self._counted.frames += 1
         self._spent_ns += self._clock.now_ns() - began_ns if self._clock else 0
         height, width = image.shape[:2]
-        return CameraFrame(
+        frame = CameraFrame(
             vehicle=vehicle, camera=camera, t_ns=t_ns, width_px=width, height_px=height,
             payload=data.tobytes(),
         )  # fmt: skip
+        return [frame]
 
     def _shown(self, t_ns: int) -> dict[int, str | None]:
         """Return the lamp that is on at each signal head."""

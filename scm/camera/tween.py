@@ -43,12 +43,20 @@ def _between(start: SnapshotVehicle | None, end: SnapshotVehicle, share: float) 
 
 
 def near(snapshot: WorldSnapshot, vehicle: str, reach_m: float) -> WorldSnapshot:
-    """Return a snapshot with the cars around one of them, itself included."""
+    """Return a snapshot with the cars around one of them, itself included.
+
+    A car whose numbers are none is left out: nobody can say where it is.
+    """
     own = next(car for car in snapshot.vehicles if car.vehicle == vehicle)
     x, y = own.x_m, own.y_m
     cars = tuple(
         car
         for car in snapshot.vehicles
-        if abs(car.x_m - x) < reach_m and abs(car.y_m - y) < reach_m
+        if abs(car.x_m - x) < reach_m and abs(car.y_m - y) < reach_m and _is_somewhere(car)
     )
     return msgspec.structs.replace(snapshot, vehicles=cars)
+
+
+def _is_somewhere(car: SnapshotVehicle) -> bool:
+    turned = car.yaw_rad + car.roll_rad + car.pitch_rad + car.steering_rad
+    return math.isfinite(car.x_m + car.y_m + turned)

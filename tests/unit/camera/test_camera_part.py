@@ -138,3 +138,11 @@ def test_only_cars_nearby_are_pictured(car):
     cars = (car(0.0, 0.0), car(3.0, -3.0, name="n2"), car(0.0, 5.0, name="n3"))
     around = near(WorldSnapshot(t_ns=0, tick=0, vehicles=cars), "n1", 4.0)
     assert [one.vehicle for one in around.vehicles] == ["n1", "n2"]
+
+
+def test_a_car_that_is_nowhere_is_left_out(car):
+    cars = (car(0.0, 0.0), car(0.3, 0.0, float("nan"), name="n2"), car(float("inf"), 0, name="n3"))
+    around = near(WorldSnapshot(t_ns=0, tick=0, vehicles=cars), "n1", 4.0)
+    assert [one.vehicle for one in around.vehicles] == ["n1"]
+    nowhere = near(WorldSnapshot(t_ns=0, tick=0, vehicles=cars), "n2", 4.0)
+    assert [one.vehicle for one in nowhere.vehicles] == ["n1"]

@@ -222,6 +222,12 @@ def test_maps_without_roads_are_pictured_too(optics, car, name):
     assert picture.std() > 10.0
 
 
+@pytest.mark.parametrize(("roll", "pitch"), [(3.14, 0.0), (1.57, 0.0), (0.0, 1.444), (0.0, -1.7)])
+def test_a_car_on_its_roof_side_or_nose_has_pictures_too(studio, optics, car, roll, pitch):
+    own = car(1.0, 0.6, roll_rad=roll, pitch_rad=pitch)
+    assert take(studio, optics(), own, [car(1.4, 0.6, name="n2")]).shape == (720, 1280, 3)
+
+
 def test_the_same_instant_is_the_same_picture(city_map, optics, car):
     given = optics(read_noise=2.0, shot_noise=3.0)
     cars = [car(0.3, 0.6), car(0.9, 0.6, name="n2", lights=("left",))]
