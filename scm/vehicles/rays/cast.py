@@ -53,6 +53,8 @@ def cast(
             seen, lines, first, step, scanners[some], own[some], farthest,
             order_of(walls.window.size, farthest), sectors_of(step, beams), scene.walls.edges,
             *walls, scene.outlines, scene.owners, *bodies,
+            np.full(len(scene.walls.edges), -1, np.int32),
+            np.full(len(scene.owners), -1, np.int32),
         )  # fmt: skip
         ranges[some] = seen
     return ranges
@@ -104,16 +106,18 @@ def _cast(
     ranges: Floats, beams: Floats, first: float, step: float, scanners: Floats, own: Ints,
     farthest: float, order: Order, sectors: Sectors, edges: Floats, walls: Window,
     wall_starts: Numbers, wall_items: Numbers, outlines: Floats, owners: Ints, bodies: Window,
-    body_starts: Numbers, body_items: Numbers,
+    body_starts: Numbers, body_items: Numbers, wall_seen: Numbers, body_seen: Numbers,
 ) -> None:  # fmt: skip
-    """Fill `ranges`; `beams` (3, n) has room for a turn's ranges above the beams' directions."""
-    wall_seen = np.full(edges.shape[0], -1, np.int32)
-    body_seen = np.full(owners.shape[0], -1, np.int32)
+    """Fill `ranges`, a row a turn.
+
+    `beams` (3, n) has room for a turn's ranges above the directions of the beams. In `wall_seen`
+    and `body_seen` stands which turn drew each last; all begin with -1.
+    """
     for k in range(scanners.shape[0]):
         x, y, zero = scanners[k, 0], scanners[k, 1], scanners[k, 2] + first
         if not math.isfinite(zero):
             continue
-        beams[0] = np.inf
+        _begin(beams)
         turn = Turn(x, y, math.cos(zero), math.sin(zero), 1.0 / step, farthest)
         i, j = math.floor(x / walls.size), math.floor(y / walls.size)
         ahead = math.floor(zero / WIDTH)
@@ -139,7 +143,19 @@ def _cast(
                 if cell >= 0 and body_starts[cell] < body_starts[cell + 1]:
                     _look_at_bodies(beams, turn, k, own[k], outlines, owners, body_starts[cell],
                                     body_starts[cell + 1], body_items, body_seen)  # fmt: skip
-        ranges[k] = beams[0]
+        _keep(beams, ranges, k)
+
+
+@law
+def _begin(beams: Floats) -> None:
+    for b in range(beams.shape[1]):  # a plain loop: numba takes 2 s to compile `beams[0] = inf`
+        beams[0, b] = np.inf
+
+
+@law
+def _keep(beams: Floats, ranges: Floats, k: int) -> None:
+    for b in range(beams.shape[1]):
+        ranges[k, b] = beams[0, b]
 
 
 @law
@@ -176,10 +192,9 @@ def _look_at_walls(
             ax, ay = _seen_from(turn, edges[m, 0], edges[m, 1])
             bx, by = _seen_from(turn, edges[m, 2], edges[m, 3])
             moment = ax * by - ay * bx
-            if moment > 0.0:
-                _draw(beams, turn.a_step, turn.reach, ax, ay, bx, by, moment)
-            else:
-                _draw(beams, turn.a_step, turn.reach, bx, by, ax, ay, -moment)
+            if moment < 0.0:
+                ax, ay, bx, by, moment = bx, by, ax, ay, -moment
+            _draw(beams, turn.a_step, turn.reach, ax, ay, bx, by, moment)
 
 
 @law
@@ -217,12 +232,13 @@ def _draw_body(beams: Floats, turn: Turn, outlines: Floats, first: int) -> None:
     x3, y3 = _seen_from(turn, outlines[first + 3, 0], outlines[first + 3, 1])
     m0, m1 = x1 * y0 - y1 * x0, x2 * y1 - y2 * x1
     m2, m3 = x3 * y2 - y3 * x2, x0 * y3 - y0 * x3
-    inside = max(m0, m1, m2, m3) <= 0.0
+    if max(m0, m1, m2, m3) <= 0.0:
+        # from inside, the other way round
+        x1, y1, x3, y3 = x3, y3, x1, y1
+        m0, m1, m2, m3 = -m3, -m2, -m1, -m0
     for _ in range(4):
         if m0 > 0.0:
             _draw(beams, turn.a_step, turn.reach, x1, y1, x0, y0, m0)
-        elif inside:
-            _draw(beams, turn.a_step, turn.reach, x0, y0, x1, y1, -m0)
         m0, m1, m2, m3 = m1, m2, m3, m0
         x0, y0, x1, y1, x2, y2, x3, y3 = x1, y1, x2, y2, x3, y3, x0, y0
 
@@ -259,8 +275,8 @@ def _draw(
         moment,
     )
     if start + span >= TURN:
-        end -= TURN * a_step
-        _lower(beams, reach, 0, min(math.floor(end), last), ax, ay, bx, by, moment)
+        begin, end = max(start - TURN, 0.0) * a_step, end - TURN * a_step
+        _lower(beams, reach, math.ceil(begin), min(math.floor(end), last), ax, ay, bx, by, moment)
 
 
 @law
