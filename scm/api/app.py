@@ -15,7 +15,19 @@ from starlette.types import Scope
 from scm.api import problem
 from scm.api.city import Ask, City
 from scm.api.gate import Gate, content_policy
-from scm.api.routes import cameras, cars, events, eye, health, live, map, signals, stations, stop  # noqa: A004  named for its noun
+from scm.api.routes import (
+    boxes,
+    cameras,
+    cars,
+    events,
+    eye,
+    health,
+    live,
+    map,  # noqa: A004  named for its noun
+    signals,
+    stations,
+    stop,
+)
 from scm.api.stream import Stream
 from scm.api.view import CityView
 from scm.maps.model import CityMap
@@ -67,7 +79,7 @@ def create_app(
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
     app.add_middleware(Gate, api_key=api_key, policy=policy)
     api = APIRouter(prefix="/api/v1")
-    for noun in (cars, signals, stations, events, map, eye, stop):
+    for noun in (cars, signals, stations, events, map, boxes, eye, stop):
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)

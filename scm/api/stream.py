@@ -21,9 +21,9 @@ from scm.api.city import City
 from scm.api.encoding import encode
 from scm.api.eye_rows import camera_rows
 from scm.api.picture import Picture
+from scm.api.routes.boxes import boxes_of
 from scm.api.routes.stop import stop_of
 from scm.api.signal_rows import junction_rows
-from scm.v2x.messages.world_snapshot import SnapshotBox
 
 _LOGGER = logging.getLogger(__name__)
 
@@ -38,11 +38,6 @@ class Topic(NamedTuple):
 
     make: Callable[[Picture], object]
     every: int
-
-
-def boxes_of(picture: Picture) -> tuple[SnapshotBox, ...]:
-    """Return where the boxes are that can be pushed."""
-    return picture.snapshot.message.boxes if picture.snapshot is not None else ()
 
 
 class Listener:

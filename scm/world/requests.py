@@ -11,6 +11,7 @@ from scm.geometry import Pose2
 from scm.part import Serves
 from scm.v2x.key import check_name
 from scm.v2x.message import Message, Refused, Request
+from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.join_request import JoinReply, JoinRequest
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
@@ -195,6 +196,15 @@ def _is_free(world: World, pose: Pose2) -> bool:
     return world.slots.nearest_m(pose) >= CLEARANCE_M
 
 
+def _boxes(world: World, request: BoxesRequest, now_ns: int) -> BoxesReply:
+    boxes = world.contacts.boxes
+    boxes.reset()
+    if len(boxes):
+        by = request.by or "somebody"
+        world.say("info", "boxes_reset", f"{by} put the boxes back to their places", now_ns)
+    return BoxesReply(boxes=len(boxes))
+
+
 _ANSWERS: dict[type[Message], Callable[[World, Any, int], Message]] = {
     SpawnRequest: _spawn,
     JoinRequest: _join,
@@ -202,9 +212,11 @@ _ANSWERS: dict[type[Message], Callable[[World, Any, int], Message]] = {
     RouteRequest: _route,
     LeaseRequest: _lease,
     LightRequest: _lights,
+    BoxesRequest: _boxes,
     StopRequest: _stop,
 }
 
 SERVES = tuple(Serves(kind) for kind in (
-    SpawnRequest, JoinRequest, RemoveRequest, RouteRequest, LeaseRequest, LightRequest, StopRequest,
+    SpawnRequest, JoinRequest, RemoveRequest, RouteRequest, LeaseRequest, LightRequest,
+    BoxesRequest, StopRequest,
 ))  # fmt: skip

@@ -25,6 +25,8 @@ PLAIN_NUMBERS = {
     "dropped": "a count",
     "beams": "a count",
     "laps": "a count",
+    "boxes": "a count",
+    "contacts": "a count",
     "revision": "a count",
     "number": "an identity",
     "seed": "a seed",

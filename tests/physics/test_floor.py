@@ -9,6 +9,7 @@ from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.maps.model import Box, CityMap, Floor, MapTag, Patch, Plate, Ramp, Wall
 from scm.maps.segments import wall_segments
+from scm.v2x.messages.boxes_request import BoxesRequest
 from scm.v2x.messages.route_request import RouteRequest
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet, VehicleStatus
@@ -150,3 +151,22 @@ def test_a_pushed_box_moves_for_lidars_and_snapshots_too():
     assert seen.name == "b"
     assert seen.x_m > 0.283
     assert len(wall_segments(world.city_map)) == 4  # of the wall alone
+    reply = reply_to(world, BoxesRequest(by="test"), 40 * PERIOD_NS)
+    assert reply.boxes == 1
+    assert world.contacts.boxes.in_snapshot()[0].x_m == 0.282
+
+
+def test_an_accelerometer_feels_a_hit_as_the_mean_of_its_tick():
+    wall = Wall(points=((0.5, -2.0), (0.5, 2.0)))
+    world = World(city(walls=(wall,)), capacity=4)
+    car = world.host("a", "nigel", Pose2(0.0, 0.0, 0.0), 0)
+    car.fleet.place(car.row, Pose2(0.262, 0.0, 0.0), 0.25)
+    felt = []
+    for i in range(20):
+        tick(world, i * PERIOD_NS, [])
+        felt.append(float(car.fleet.impact_x[car.row]))
+    hardest = min(felt)
+    bounce = NIGEL.value("body.bounce_restitution")
+    # The motor holds the wheels, so the car has lost some of its 0.25 m/s before the wall.
+    assert -(1.0 + bounce) * 0.25 / 0.02 < hardest < -0.3 * (1.0 + bounce) * 0.25 / 0.02
+    assert felt[-1] == 0.0

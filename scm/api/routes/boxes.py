@@ -1,0 +1,28 @@
+"""Construction boxes that cars can push: where they are, and back to their places."""
+
+from fastapi import APIRouter, Response
+
+from scm.api.city import City, IdempotencyKey, json_response
+from scm.api.picture import Picture
+from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
+from scm.v2x.messages.world_snapshot import SnapshotBox
+
+
+def boxes_of(picture: Picture) -> tuple[SnapshotBox, ...]:
+    """Return where the boxes are that can be pushed."""
+    return picture.snapshot.message.boxes if picture.snapshot is not None else ()
+
+
+def router(city: City) -> APIRouter:
+    """Return the routes."""
+    routes = APIRouter(prefix="/boxes", tags=["boxes"])
+
+    @routes.get("", summary="Where the boxes are that cars can push")
+    def boxes() -> Response:
+        return json_response({"boxes": boxes_of(city.view.picture())})
+
+    @routes.post("/reset", summary="Put all boxes back where the map has them")
+    def reset(key: IdempotencyKey = "") -> Response:
+        return json_response(city.ask(BoxesRequest(request_id=key, by="api"), BoxesReply))
+
+    return routes
