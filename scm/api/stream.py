@@ -30,6 +30,7 @@ _LOGGER = logging.getLogger(__name__)
 PERIOD_S = 0.05
 BEAT_FRAMES = 20
 EVENTS_SHOWN = 100
+CARS_A_FRAME = 250  # so many more cars, one frame longer to wait: pages draw on by themselves
 QUEUE_DEPTH = 20  # frames: one second
 
 
@@ -163,7 +164,7 @@ class Stream:
     def _changed(self, picture: Picture) -> dict[str, msgspec.Raw]:
         changed: dict[str, msgspec.Raw] = {}
         for name, topic in self._topics.items():
-            if self._frame % topic.every == 0:
+            if self._frame % (topic.every + _crowding(name, picture)) == 0:
                 body = encode(topic.make(picture))
                 if self._sent.get(name) != body:
                     self._sent[name] = body
@@ -192,3 +193,10 @@ class Stream:
     def _resume_seq(self, last_event_id: str) -> int | None:
         run_id, _, seq = [*last_event_id.split("-"), "", ""][:3]
         return int(seq) if run_id == self._run_id and seq.isascii() and seq.isdigit() else None
+
+
+def _crowding(topic: str, picture: Picture) -> int:
+    """Return how many frames longer a topic waits in a large city."""
+    if topic != "cars" or picture.snapshot is None:
+        return 0
+    return len(picture.snapshot.message.vehicles) // CARS_A_FRAME

@@ -194,3 +194,23 @@ def test_a_listener_behind_takes_no_more_until_it_was_told():
         assert listener.behind
 
     asyncio.run(scenario())
+
+
+def test_a_large_citys_cars_come_in_every_fifth_frame_only(stream, hear, snapshot):
+    async def scenario():
+        page, _ = await begin(stream)
+        told = 0
+        for tick in range(50):
+            crowd = {f"n{i}": (float(tick), float(i), 0.0) for i in range(1000)}
+            hear(1.0 + tick, snapshot(1.0 + tick, tick, **crowd))
+            stream.send_frame()
+            if tick % 10 == 9:  # as a page that keeps up
+                while page_frames(stream):
+                    _, _, body = parsed(await anext(page))
+                    told += "cars" in body
+        assert told == 10
+
+    def page_frames(stream):
+        return any(listener._frames for listener in stream._listeners)
+
+    asyncio.run(scenario())
