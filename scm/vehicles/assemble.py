@@ -4,22 +4,26 @@ Terms are sorted by what they read and set, ties by name, so sums keep their ord
 fit together is refused by name: unknown names, two setters, a missing one, a circle.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+import ast
+from collections.abc import Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 
 from scm.errors import TermError, nearest
-from scm.vehicles import body14, page
-from scm.vehicles.layout import columns_of, slots_of
+from scm.vehicles import body14, lane_math, substep
+from scm.vehicles.inline import Functions, Inliner, Line
+from scm.vehicles.layout import columns_of, slots_of, states_of
+from scm.vehicles.print_plain import print_plain
+from scm.vehicles.print_tiles import print_tiles
+from scm.vehicles.program import Program, Stage
 from scm.vehicles.signals import DAMPED_BY, SIGNALS, Per, Role
 from scm.vehicles.term import Law, Term, reads
 
-_FRAME = "wheel frame"  # the skeleton's own node: needs wheel_steer, gives v_long and v_lat
-_FRAME_LINES = (
-    "cos_steer = math.cos(wheel_steer) if wheel_steer != 0.0 else 1.0",
-    "sin_steer = math.sin(wheel_steer) if wheel_steer != 0.0 else 0.0",
-    "v_long = cos_steer * over_x + sin_steer * over_y",
-    "v_lat = cos_steer * over_y - sin_steer * over_x",
-)
+# the skeleton's own steps between the terms: what each gives, needs and says
+_NODES = {
+    Per.BODY: {"road_slope": ("road_angle", substep.ROAD)},
+    Per.WHEEL: {"frame": ("wheel_slope", substep.FRAME)},
+}
+_FROM_FRAME = {"v_long": "frame", "v_lat": "frame"}
 _SKELETON = {param.name for param in body14.PARAMS}
 
 
@@ -55,29 +59,34 @@ def _problems(term: Term) -> Iterator[str]:
             elif term.per is Per.BODY and name in SIGNALS and SIGNALS[name].per is Per.WHEEL:
                 yield f"{term.name} is once a body and cannot read {name}, which each wheel has"
     target = SIGNALS.get(term.target)
-    wanted = Role.SUM if term.adds else Role.CHAIN
-    if target is None or target.role is not wanted or target.per is not term.per:
-        names = [s.name for s in SIGNALS.values() if s.role is wanted and s.per is term.per]
-        yield f"{term.name}: {term.target!r} is no such {wanted.value} of each {term.per.value}"
+    wanted = (Role.SUM, Role.SHAPE) if term.adds else (Role.CHAIN,)
+    if target is None or target.role not in wanted or target.per is not term.per:
+        names = [
+            signal.name
+            for role in wanted
+            for signal in SIGNALS.values()
+            if signal.role is role and signal.per is term.per
+        ]
+        yield f"{term.name}: {term.target!r} is no such {wanted[0].value} of each {term.per.value}"
         yield f"expected one of {', '.join(names)}"
     elif term.damping is not None and term.target not in DAMPED_BY:
         yield f"{term.name}: nothing damps {term.target}; expected one of {', '.join(DAMPED_BY)}"
 
 
 def _order(terms: Sequence[Term], per: Per, setters: dict[str, Term]) -> list[str]:
-    """Return term, chain-signal and frame names of one stage in an order that can be computed."""
+    """Return term, chain-signal and own steps' names of a stage in an order that can be computed."""
     graph: dict[str, set[str]] = {}
     chain = {s.name: s for s in SIGNALS.values() if s.role is Role.CHAIN and s.per is per}
     for name, signal in chain.items():
         source = setters[name].name if name in setters else signal.otherwise or ""
-        graph[name] = {source} if source in chain or name in setters else set()
-    for term in (t for t in terms if t.per is per):
+        known = source in chain or source in _NODES[per] or name in setters
+        graph[name] = {source} if known else set()
+    for term in _running(terms, per):
         names = {name for law in (term.law, term.damping) if law for name in reads(law)}
         names -= {term.target} if term.keeps is not None else set()
-        waits = {_FRAME if n in {"v_long", "v_lat"} else n for n in names}
-        graph[term.name] = waits & {*chain, _FRAME}
-    if per is Per.WHEEL:
-        graph[_FRAME] = {"wheel_steer"}
+        graph[term.name] = {_FROM_FRAME.get(n, n) for n in names} & {*chain, *_NODES[per]}
+    for name, (needs, _) in _NODES[per].items():
+        graph[name] = {needs}
     sorter = TopologicalSorter(graph)
     try:
         sorter.prepare()
@@ -92,68 +101,131 @@ def _order(terms: Sequence[Term], per: Per, setters: dict[str, Term]) -> list[st
     return order
 
 
-def _stage(terms: Sequence[Term], per: Per, setters: dict[str, Term]) -> Iterator[str]:
-    slots, by_name = slots_of(terms), {term.name: term for term in terms}
-    own = {c.param.key: c.variable for c in columns_of(terms)}
-
-    def call(term: Term, law: Law) -> str:
-        names = {param.name: own[param.key] for param in term.params}
-        return f"{law.__name__}({', '.join(names.get(n, n) for n in reads(law))})"
-
-    for name in _order(terms, per, setters):
-        if name == _FRAME:
-            yield from _FRAME_LINES
-        elif name in by_name:
-            term = by_name[name]
-            kept = term.keeps is not None and per is Per.WHEEL
-            where = f"car[{slots[term.target][0]} + w]" if kept else ""
-            if kept:
-                yield f"{term.target} = {where}"
-            yield f"{term.target} {'+=' if term.adds else '='} {call(term, term.law)}"
-            if term.damping is not None:
-                yield f"{term.target}_damping += {call(term, term.damping)}"
-            if kept:
-                yield f"{where} = {term.target}"
-        elif name not in setters:
-            yield f"{name} = {SIGNALS[name].otherwise}"
+def _running(terms: Sequence[Term], per: Per) -> list[Term]:
+    """Return the terms of a stage that act in every substep."""
+    shapes = {signal.name for signal in SIGNALS.values() if signal.role is Role.SHAPE}
+    return [term for term in terms if term.per is per and term.target not in shapes]
 
 
-def _given(terms: Sequence[Term], slots: Mapping[str, tuple[int, int]]) -> Iterator[str]:
-    """Yield what the skeleton gives to those effects only that read it."""
-    asked = {name for term in terms for name in reads(term.law)}
-    if "drive_omega" in asked:
-        spin = [f"car[{slots['wheel_speed'][0]} + {w}]" for w in range(4)]
-        both = f"front_driven * ({spin[0]} + {spin[1]}) + rear_driven * ({spin[2]} + {spin[3]})"
-        yield f"drive_omega = ({both}) / max(2.0 * (front_driven + rear_driven), 1.0)"
+class _Writer:
+    """Writes a car's stages: the skeleton's text with the terms' laws in its gaps."""
+
+    def __init__(self, terms: Sequence[Term]) -> None:
+        self.terms, self.setters = terms, setters_of(terms)
+        self.own = {c.param.key: c.variable for c in columns_of(terms)}
+        self.names = {t.name: f"{t.name}_" if t.name in SIGNALS else t.name for t in terms}
+        own = (f"{name}{end}" for name in self.names.values() for end in ("", "_damping"))
+        self.laws: set[str] = set()
+        self.inliner = Inliner({*SIGNALS, *substep.NAMES, *self.own.values(), *own})
+        self.scope: Functions = {**vars(body14), **vars(lane_math)}
+
+    def text(self, text: str) -> list[Line]:
+        return list(self.inliner.lines(text, self.scope))
+
+    def value(self, term: Term, law: Law, name: str) -> list[Line]:
+        """Write one law of a term; its value gets this name."""
+        names = {param.name: self.own[param.key] for param in term.params}
+        arguments: list[ast.expr] = [ast.Name(names.get(n, n)) for n in reads(law)]
+        *before, (_, value) = self.inliner.call(law, arguments)
+        lines = [*before, (name, value)]
+        self.laws.update(name for name, _ in lines)
+        return lines
+
+    def sums(self, terms: Sequence[Term], role: Role, per: Per) -> list[Line]:
+        """Write every sum of a role as its terms' values, one after the other."""
+        lines: list[Line] = []
+        damps = role is Role.SUM
+        self.laws.update(DAMPED_BY, (f"{name}_damping" for name in DAMPED_BY))
+        for signal in SIGNALS.values():
+            if signal.role is role and signal.per is per:
+                mine = sorted((t for t in terms if t.adds == signal.name), key=lambda t: t.name)
+                damped = [f"{term.name}_damping" for term in mine if term.damping]
+                lines += self.text(f"{signal.name} = {_sum([self.names[t.name] for t in mine])}")
+                lines += self.text(f"{signal.name}_damping = {_sum(damped)}" if damps else "")
+        return lines
+
+    def stage(self, per: Per) -> list[Line]:
+        """Write the effects of one stage in an order that can be computed."""
+        terms = _running(self.terms, per)
+        by_name = {term.name: term for term in terms}
+        lines: list[Line] = []
+        for name in _order(self.terms, per, self.setters):
+            if name in _NODES[per]:
+                lines += self.text(_NODES[per][name][1])
+            elif name in by_name:
+                term = by_name[name]
+                lines += self.value(term, term.law, term.sets or self.names[name])
+                if term.damping is not None:
+                    lines += self.value(term, term.damping, f"{term.name}_damping")
+            elif name not in self.setters:
+                lines += self.text(f"{name} = {SIGNALS[name].otherwise}")
+        for name in (n for n in DAMPED_BY if n in self.setters and SIGNALS[n].per is per):
+            damped = self.setters[name].damping is not None
+            value = f"{self.setters[name].name}_damping" if damped else "0.0"
+            lines += self.text(f"{name}_damping = {value}")
+        return [*lines, *self.sums(terms, Role.SUM, per)]
+
+    def start(self) -> list[Line]:
+        """Write what happens once a call: commands kept in range, the car's numbers added up."""
+        shaping = [term for term in self.terms if SIGNALS[term.target].role is Role.SHAPE]
+        lines = [line for t in shaping for line in self.value(t, t.law, self.names[t.name])]
+        return [*lines, *self.sums(shaping, Role.SHAPE, Per.BODY), *self.text(substep.START)]
 
 
-def write_page(car_name: str, terms: Sequence[Term]) -> str:
-    """Return the text of a car's kernel.
+def _sum(names: Sequence[str]) -> str:
+    return " + ".join(names) or "0.0"
+
+
+def write_program(terms: Sequence[Term]) -> Program:
+    """Return a car's substep, ready to be printed.
 
     Raises:
         TermError: when the terms do not fit together; all problems in one message.
     """
-    setters = setters_of(terms)
-    slots = slots_of(terms)
-    kept = [t.target for t in terms if t.keeps is not None and t.per is Per.BODY]
-    held = [n for n, width in body14.STATES if width == 1]
-    held += ["steer_angle", *(n for n in sorted(kept) if n != "steer_angle")]
-    laws = sorted({(t.module, law.__name__) for t in terms for law in (t.law, t.damping) if law})
-    load = [f"{c.variable} = parameters[row, {i}]" for i, c in enumerate(columns_of(terms))]
-    inputs = [n for n, width in body14.INPUTS if width == 1]
-    load += [f"{n} = car[{slots[n][0]}]" for n in [*held, *inputs]]
-    load += [f"{n} = min(max({n}, -1.0), 1.0)" for n in ("throttle_command", "steering_command")]
-    return page.PAGE.format(
-        title=f"Kernel of the car {car_name!r}: {len(terms)} effects on 14 degrees of freedom.",
-        imports="\n".join(f"from {module} import {law}" for module, law in laws),
-        gravity=body14.GRAVITY,
-        load=_indent(load, 8),
-        body_terms=_indent([*_given(terms, slots), *_stage(terms, Per.BODY, setters)], 12),
-        wheel_terms=_indent(_stage(terms, Per.WHEEL, setters), 16),
-        store=_indent([f"car[{slots[n][0]}] = {n}" for n in held], 8),
-        **{name: offset for name, (offset, _) in slots.items()},
+    write = _Writer(terms)
+    body, wheel, solve, roll, end, end_wheel = (
+        Stage("effects on the body", Per.BODY, [*write.text(substep.BODY), *write.stage(Per.BODY)]),
+        Stage(
+            "effects on each wheel",
+            Per.WHEEL,
+            [
+                *write.text(substep.WHEEL),
+                *write.stage(Per.WHEEL),
+                *write.text(substep.ELIMINATE),
+            ],
+        ),
+        Stage("one implicit step of the whole car", Per.BODY, write.text(substep.SOLVE)),
+        Stage("what it does to each wheel", Per.WHEEL, write.text(substep.ROLL)),
+        Stage("what others read of the car", Per.BODY, write.text(substep.FINISH)),
+        Stage("what others read of each wheel", Per.WHEEL, write.text(substep.FINISH_WHEEL)),
     )
+    constant = dict.fromkeys([c.variable for c in columns_of(terms)], Per.BODY) | {"dt": Per.BODY}
+    kept = {"verdict"}
+    for per in Per:
+        constant |= dict.fromkeys(body14.INPUTS[per], per)
+        kept |= {*states_of(terms, per), *body14.OUTPUTS[per]}
+    constant |= {"front": Per.WHEEL, "side": Per.WHEEL}
+    program = Program(
+        [Stage("commands and numbers", Per.BODY, write.start())],
+        [body, wheel, solve, roll],
+        [end, end_wheel],
+        constant,
+        {name for per in Per for name in body14.INPUTS[per]},
+        kept,
+        write.laws,
+    )
+    program.settle()
+    return program
 
 
-def _indent(lines: Iterator[str] | list[str], width: int) -> str:
-    return "\n".join(" " * width + line for line in lines)
+def write_page(car_name: str, terms: Sequence[Term], *, plain: bool = False) -> str:
+    """Return the text of a car's kernel; `plain` goes car by car instead of tile by tile.
+
+    Raises:
+        TermError: when the terms do not fit together; all problems in one message.
+    """
+    title = f"Kernel of the car {car_name!r}: {len(terms)} effects on 14 degrees of freedom."
+    program, slots = write_program(terms), slots_of(terms)
+    columns = [column.variable for column in columns_of(terms)]
+    printer = print_plain if plain else print_tiles
+    return printer(title, program, slots, columns)

@@ -13,12 +13,12 @@ at 1 ms: with K the secant of the tyre curve, a step never overshoots the veloci
 
 import math
 
-from scm.arrays import Floats
 from scm.vehicles.jit import law
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.signals import Per
 
 GRAVITY = 9.80665
-STATUS_OK, STATUS_DIVERGED = 0, 1
+STATUS_OK, STATUS_DIVERGED, STATUS_ROLLED = 0, 1, 2
 
 PARAMS = (
     Param("mass", 2.4, "kg", "body.mass_kg", (0.2, 60.0), "whole car, wheels included",
@@ -49,26 +49,34 @@ PARAMS = (
           "1 where the rear wheels are driven", fit=False),
 )  # fmt: skip
 
-# A row of the fleet's block, (name, width): the skeleton's states, inputs and outputs in order.
-STATES = (
-    ("x_cog", 1), ("y_cog", 1), ("z_cog", 1), ("roll", 1), ("pitch", 1), ("yaw", 1),
-    ("vx_world", 1), ("vy_world", 1), ("vz", 1),
-    ("roll_rate", 1), ("pitch_rate", 1), ("yaw_rate", 1),
-    ("time", 1), ("hop", 4), ("hop_rate", 4), ("wheel_speed", 4), ("wheel_angle", 4),
+# What a fleet's block holds of each car and of each wheel, beside what terms keep. Velocities and
+# what follows from them stand together: a car that is frozen loses them.
+INPUTS = {
+    Per.BODY: (
+        "throttle_command", "steering_command", "throttle_past", "steering_past", "battery",
+        "air_x", "air_y",
+    ),
+    Per.WHEEL: ("floor_slope_x", "floor_slope_y", "floor_grip", "floor_rolling"),
+}  # fmt: skip
+STATES = {
+    Per.BODY: (
+        "x_cog", "y_cog", "z_cog", "roll", "pitch", "yaw", "time", "steer_angle",
+        "vx_world", "vy_world", "vz", "roll_rate", "pitch_rate", "yaw_rate",
+        "accel_x", "accel_y", "accel_z", "roll_accel", "pitch_accel", "yaw_accel",
+    ),
+    Per.WHEEL: (
+        "floor_height", "hop", "wheel_angle", "wheel_load", "wheel_slope", "hop_rate", "wheel_speed",
+    ),
+}  # fmt: skip
+OUTPUTS = {
+    Per.BODY: ("speed", "lateral_speed", "x", "y", "z"),
+    Per.WHEEL: ("wheel_steer", "ground_x", "ground_y"),
+}
+MOTION = (
+    "vx_world", "vy_world", "vz", "roll_rate", "pitch_rate", "yaw_rate", "accel_x", "accel_y",
+    "accel_z", "roll_accel", "pitch_accel", "yaw_accel", "hop_rate", "wheel_speed", "speed",
+    "lateral_speed",
 )  # fmt: skip
-INPUTS = (
-    ("throttle_command", 1), ("steering_command", 1), ("throttle_past", 1), ("steering_past", 1),
-    ("battery", 1), ("air_x", 1), ("air_y", 1), ("floor_height", 4), ("floor_slope_x", 4),
-    ("floor_slope_y", 4), ("floor_grip", 4), ("floor_rolling", 4),
-)  # fmt: skip
-OUTPUTS = (
-    ("x", 1), ("y", 1), ("z", 1), ("speed", 1), ("lateral_speed", 1),
-    ("accel_x", 1), ("accel_y", 1), ("accel_z", 1),
-    ("roll_accel", 1), ("pitch_accel", 1), ("yaw_accel", 1),
-    ("steer_angle", 1),
-    ("wheel_steer", 4), ("wheel_load", 4), ("wheel_x", 4), ("wheel_y", 4),
-)  # fmt: skip
-SCRATCH_SHAPE = (6, 10)  # rows 0-3: one wheel each; 4: sums over hops; 5: over contact points
 
 
 @law
@@ -90,35 +98,16 @@ def corner_height(z: float, roll: float, pitch: float, wheel_x: float, wheel_y: 
 
 
 @law
-def start_sums(scratch: Floats) -> None:
-    """Forget the forces of the last substep."""
-    for i in range(9):
-        scratch[4, i] = 0.0
-        scratch[5, i] = 0.0
-
-
-@law
 def eliminate_hop(
-    scratch: Floats, w: int, dt: float, wheel_x: float, wheel_y: float, wheel_mass: float,
-    suspension_force: float, suspension_damping: float, load: float, load_damping: float,
-) -> None:  # fmt: skip
-    """Solve one wheel's hop for its share in the body's heave, roll and pitch."""
-    inertia = wheel_mass + dt * (suspension_damping + load_damping)
-    free = dt * (load - suspension_force - wheel_mass * GRAVITY) / inertia
-    follow = dt * suspension_damping / inertia
+    dt: float, wheel_mass: float, suspension_force: float, suspension_damping: float, load: float,
+    load_damping: float,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Solve one wheel's hop: (its free change, its share in the corner's, force, force lost)."""
+    per_inertia = 1.0 / (wheel_mass + dt * (suspension_damping + load_damping))
+    free = dt * (load - suspension_force - wheel_mass * GRAVITY) * per_inertia
+    follow = dt * suspension_damping * per_inertia
     force = suspension_force + suspension_damping * free
-    stiff = suspension_damping * (1.0 - follow)
-    scratch[w, 0] = free
-    scratch[w, 1] = follow
-    scratch[4, 0] += force
-    scratch[4, 1] += wheel_y * force
-    scratch[4, 2] -= wheel_x * force
-    scratch[4, 3] += stiff
-    scratch[4, 4] += stiff * wheel_y
-    scratch[4, 5] -= stiff * wheel_x
-    scratch[4, 6] += stiff * wheel_y * wheel_y
-    scratch[4, 7] -= stiff * wheel_y * wheel_x
-    scratch[4, 8] += stiff * wheel_x * wheel_x
+    return free, follow, force, suspension_damping * (1.0 - follow)
 
 
 @law
@@ -130,41 +119,28 @@ def eliminate_spin(
 
     Dry friction holds the wheel where it can, and else brakes it: it never turns a wheel back.
     """
-    whole = inertia + dt * (torque_damping + radius * radius * tyre_x_damping)
-    free = omega + dt * (torque - radius * tyre_x) / whole
-    held = dt * dry_torque / whole
-    if abs(free) <= held and held > 0.0:
-        return 0.0, 0.0, tyre_x - tyre_x_damping * radius * omega, tyre_x_damping
-    spin = free - math.copysign(held, free)
-    follow = dt * radius * tyre_x_damping / whole
-    force = tyre_x + tyre_x_damping * radius * (spin - omega)
-    return spin, follow, force, tyre_x_damping * (1.0 - radius * follow)
+    grip = radius * tyre_x_damping
+    per_whole = 1.0 / (inertia + dt * (torque_damping + radius * grip))
+    free = omega + dt * (torque - radius * tyre_x) * per_whole
+    held = dt * dry_torque * per_whole
+    beyond = abs(free) - held
+    spin = math.copysign(max(beyond, 0.0), free)
+    follow = 0.0 if beyond < 0.0 else dt * grip * per_whole
+    return spin, follow, tyre_x + grip * (spin - omega), tyre_x_damping * (1.0 - radius * follow)
 
 
 @law
-def add_contact(
-    scratch: Floats, w: int, wheel_x: float, wheel_y: float, cos_steer: float, sin_steer: float,
-    force_long: float, stiff_long: float, force_lat: float, stiff_lat: float,
-) -> None:  # fmt: skip
-    """Add one contact point's force, and how it falls with velocity, to the body's sums."""
+def turn_contact(
+    cos_steer: float, sin_steer: float, force_long: float, stiff_long: float, force_lat: float,
+    stiff_lat: float,
+) -> tuple[float, float, float, float, float]:  # fmt: skip
+    """Turn one contact's force, and how it falls with velocity, from the wheel to the body."""
     fx = cos_steer * force_long - sin_steer * force_lat
     fy = sin_steer * force_long + cos_steer * force_lat
-    kxx = cos_steer * cos_steer * stiff_long + sin_steer * sin_steer * stiff_lat
-    kxy = cos_steer * sin_steer * (stiff_long - stiff_lat)
-    kyy = sin_steer * sin_steer * stiff_long + cos_steer * cos_steer * stiff_lat
-    turn_x = wheel_x * kxy - wheel_y * kxx
-    turn_y = wheel_x * kyy - wheel_y * kxy
-    scratch[w, 2] = cos_steer
-    scratch[w, 3] = sin_steer
-    scratch[5, 0] += fx
-    scratch[5, 1] += fy
-    scratch[5, 2] += wheel_x * fy - wheel_y * fx
-    scratch[5, 3] += kxx
-    scratch[5, 4] += kxy
-    scratch[5, 5] += kyy
-    scratch[5, 6] += turn_x
-    scratch[5, 7] += turn_y
-    scratch[5, 8] += wheel_x * turn_y - wheel_y * turn_x
+    more = stiff_long - stiff_lat
+    turned = sin_steer * more
+    kxx = stiff_long - sin_steer * turned
+    return fx, fy, kxx, cos_steer * turned, stiff_lat + sin_steer * turned
 
 
 Six = tuple[float, float, float, float, float, float]
@@ -172,36 +148,39 @@ Six = tuple[float, float, float, float, float, float]
 
 @law
 def body_step(
-    scratch: Floats, dt: float, force_x: float, force_y: float, moment_z: float,
-    force_x_damping: float, force_y_damping: float, moment_z_damping: float, mass: float,
-    sprung_mass: float, roll_inertia: float, pitch_inertia: float, yaw_inertia: float,
-    cog_height: float,
+    dt: float, mass: float, sprung_mass: float, roll_inertia: float, pitch_inertia: float,
+    yaw_inertia: float, cog_height: float, force_x: float, force_y: float, moment_z: float,
+    force_x_damping: float, force_y_damping: float, moment_z_damping: float,
+    seat: float, seat_roll: float, seat_pitch: float, stiff: float, stiff_y: float, stiff_x: float,
+    stiff_yy: float, stiff_xy: float, stiff_xx: float,
+    contact_x: float, contact_y: float, contact_turn: float, kxx: float, kxy: float, kyy: float,
+    turn_x: float, turn_y: float, turn_turn: float,
 ) -> Six:  # fmt: skip
     """Change of the body's six velocities: vx, vy, vz, roll rate, pitch rate, yaw rate.
 
     Heave couples only with roll and pitch, so it is eliminated first; five equations are left.
     """
-    hop, touch, h = scratch[4], scratch[5], cog_height
-    heave = 1.0 / (sprung_mass + dt * hop[3])
-    heave_roll, heave_pitch = dt * hop[4], dt * hop[5]
-    lift = dt * (hop[0] - sprung_mass * GRAVITY)
-    hx, hy = dt * h * touch[3], dt * h * touch[5]
-    cross = dt * h * touch[4]
-    roll = roll_inertia + h * hy + dt * hop[6] - heave * heave_roll * heave_roll
-    pitch = pitch_inertia + h * hx + dt * hop[8] - heave * heave_pitch * heave_pitch
-    both = dt * hop[7] - h * cross - heave * heave_roll * heave_pitch
+    h = cog_height
+    heave = 1.0 / (sprung_mass + dt * stiff)
+    heave_roll, heave_pitch = dt * stiff_y, -(dt * stiff_x)
+    lift = dt * (seat - sprung_mass * GRAVITY)
+    roll_heave, pitch_heave = heave * heave_roll, heave * heave_pitch
+    hx, hy, cross = dt * h * kxx, dt * h * kyy, dt * h * kxy
+    roll = roll_inertia + h * hy + dt * stiff_yy - roll_heave * heave_roll
+    pitch = pitch_inertia + h * hx + dt * stiff_xx - pitch_heave * heave_pitch
+    both = -(dt * stiff_xy + h * cross + roll_heave * heave_pitch)
     dvx, dvy, droll, dpitch, dyaw = solve_five(
-        mass + dt * (touch[3] + force_x_damping),
-        dt * touch[4], mass + dt * (touch[5] + force_y_damping),
+        mass + dt * (kxx + force_x_damping),
+        dt * kxy, mass + dt * (kyy + force_y_damping),
         cross, hy, roll,
         -hx, -cross, both, pitch,
-        dt * touch[6], dt * touch[7], dt * h * touch[7], -dt * h * touch[6],
-        yaw_inertia + dt * (touch[8] + moment_z_damping),
-        dt * (touch[0] + force_x),
-        dt * (touch[1] + force_y),
-        dt * (hop[1] + h * touch[1]) - heave * heave_roll * lift,
-        dt * (hop[2] - h * touch[0]) - heave * heave_pitch * lift,
-        dt * (touch[2] + moment_z),
+        dt * turn_x, dt * turn_y, dt * h * turn_y, -(dt * h * turn_x),
+        yaw_inertia + dt * (turn_turn + moment_z_damping),
+        dt * (contact_x + force_x),
+        dt * (contact_y + force_y),
+        dt * (seat_roll + h * contact_y) - roll_heave * lift,
+        dt * (seat_pitch - h * contact_x) - pitch_heave * lift,
+        dt * (contact_turn + moment_z),
     )  # fmt: skip
     dvz = heave * (lift - heave_roll * droll - heave_pitch * dpitch)
     return dvx, dvy, dvz, droll, dpitch, dyaw

@@ -5,18 +5,27 @@ centre on the ground; wheels stand front-left, front-right, rear-left, rear-righ
 """
 
 import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
+from itertools import pairwise
 
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.errors import RunError
+from scm.errors import RunError, TermError, nearest
 from scm.geometry import Pose2
-from scm.vehicles.body14 import GRAVITY, STATUS_DIVERGED, STATUS_OK
+from scm.vehicles.body14 import GRAVITY, STATUS_DIVERGED, STATUS_OK, STATUS_ROLLED
 from scm.vehicles.car import Car
+from scm.vehicles.jit import plain
 from scm.vehicles.kernel_file import compile_kernel
+from scm.vehicles.lanes import LANES
 from scm.vehicles.layout import columns_of, find_column, slots_of
-from scm.vehicles.signals import SIGNALS
+from scm.vehicles.past import COMMANDS, DELAYS, CommandPast
+from scm.vehicles.signals import SIGNALS, Role
+from scm.vehicles.term import reads
 
 SUBSTEP_S = 1e-3
 
@@ -26,16 +35,53 @@ class VehicleStatus(IntEnum):
 
     OK = STATUS_OK
     DIVERGED = STATUS_DIVERGED
+    ROLLED = STATUS_ROLLED
 
     @property
     def sentence(self) -> str:
         """Say it in words."""
         if self is VehicleStatus.OK:
             return "The car drives."
+        if self is VehicleStatus.ROLLED:
+            return "The car rolled over: it is frozen where it last stood on its wheels."
         return (
-            "The car rolled over, its motion left every physical range, or a command was no number:"
-            " it is frozen where it last made sense."
+            "The car's motion left every physical range, or a command was no number: it is frozen "
+            "where it last made sense."
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """Mass [kg] and centre of gravity [m] of one car, payload and shifts included."""
+
+    mass: float
+    cog_to_rear_axle: float
+    cog_height: float
+
+
+_SHAPED = {
+    "added_mass": "mass", "added_cog_x": "cog_to_rear_axle", "added_cog_z": "cog_height",
+}  # fmt: skip
+
+
+# what others write, and what they read: names here, slots of the block where those differ
+_WRITTEN = {
+    "throttle": "throttle_command", "steering": "steering_command",
+    **{name: name for name in (
+        "battery", "air_x", "air_y", "floor_height", "floor_slope_x", "floor_slope_y",
+        "floor_grip", "floor_rolling", "time",
+    )},
+}  # fmt: skip
+_READ = (
+    "x", "y", "z", "roll", "pitch", "yaw", "speed", "lateral_speed", "yaw_rate",
+    "roll_rate", "pitch_rate", "accel_x", "accel_y", "accel_z", "roll_accel", "pitch_accel",
+    "yaw_accel", "steer_angle", "wheel_speed", "wheel_angle", "wheel_steer", "wheel_load",
+    "wheel_x", "wheel_y",
+)  # fmt: skip
+_SLOT_OF = {"wheel_x": "ground_x", "wheel_y": "ground_y"}
+_COG = ("x_cog", "y_cog", "yaw", "vx_world", "vy_world", "yaw_rate")
+_COG_CHANGED = ("vx_world", "vy_world", "yaw_rate", "x_cog", "y_cog", "yaw")
+_TILES_A_THREAD = 8  # below, a second thread costs more than it does
 
 
 class Fleet:
@@ -57,6 +103,7 @@ class Fleet:
         time: Since the car was placed [s], shape (capacity,); may be written.
         impact_x, impact_y, impact_yaw: What contacts added to the acceleration over the last tick,
             level body frame [m/s^2, rad/s^2], shape (capacity,); written by who finds the contacts.
+        threads: How many threads `advance` uses for big fleets; 1 from the start.
         alive: Rows in use, shape (capacity,).
         status: `VehicleStatus` of each row, shape (capacity,).
         x, y, z, roll, pitch, yaw: Rear-axle pose in the world [m, rad]; yaw in (-pi, pi]. The
@@ -73,40 +120,43 @@ class Fleet:
 
     def __init__(self, car: Car, capacity: int) -> None:
         self.car, self.capacity = car, capacity
+        self.threads = 1
         self._columns = columns_of(car.terms)
         self._slots = slots_of(car.terms)
-        self._advance = compile_kernel(car.name, car.terms)
-        width = sum(slot[1] for slot in self._slots.values())
-        self._block: Floats = np.zeros((capacity, width))
+        self._kernel = compile_kernel(car.name, car.terms)
+        self._shaping = [t for t in car.terms if SIGNALS[t.target].role is Role.SHAPE]
+        padded = -(-capacity // LANES) * LANES
+        height = max(offset + width for offset, width in self._slots.values())
+        self._block: Floats = _aligned((height, padded))
         self._nominal: Floats = np.array([car.value(c.param.key) for c in self._columns])
         self.parameter_names = tuple(column.name for column in self._columns)
-        self.parameters: Floats = np.tile(self._nominal, (capacity, 1))
-        self.alive: Bools = np.zeros(capacity, dtype=np.bool_)
-        self.status: Ints = np.zeros(capacity, dtype=np.int64)
-        self.throttle, self.steering = (
-            self._view("throttle_command"),
-            self._view("steering_command"),
-        )
-        self.battery = self._view("battery")
-        self.air_x, self.air_y = self._view("air_x"), self._view("air_y")
-        self.floor_height = self._view("floor_height")
-        self.floor_slope_x = self._view("floor_slope_x")
-        self.floor_slope_y = self._view("floor_slope_y")
-        self.floor_grip = self._view("floor_grip")
-        self.floor_rolling = self._view("floor_rolling")
-        self.time = self._view("time")
+        self._numbers: Floats = _aligned((len(self._columns), padded))
+        self._numbers[:] = self._nominal[:, None]
+        self.parameters: Floats = self._numbers[:, :capacity].T
+        self._alive: Bools = np.zeros(padded, dtype=np.bool_)
+        self.alive: Bools = self._alive[:capacity]
+        self._status: Ints = np.zeros(padded, dtype=np.int64)
+        self.status: Ints = self._status[:capacity]
+        self._past = self._past_of(padded)
         self.impact_x, self.impact_y, self.impact_yaw = np.zeros((3, capacity))
-        for name in (
-            "x", "y", "z", "roll", "pitch", "yaw", "speed", "lateral_speed", "yaw_rate",
-            "roll_rate", "pitch_rate", "accel_x", "accel_y", "accel_z", "roll_accel", "pitch_accel",
-            "yaw_accel", "steer_angle", "wheel_speed", "wheel_angle", "wheel_steer", "wheel_load",
-            "wheel_x", "wheel_y",
-        ):  # fmt: skip
-            view = self._view(name)
+        for name, slot in _WRITTEN.items():
+            setattr(self, name, self._view(slot))
+        for name in _READ:
+            view = self._view(_SLOT_OF.get(name, name))
             view.flags.writeable = False
             setattr(self, name, view)
-        self._run(0, capacity, 0, SUBSTEP_S)  # loads or compiles now, not at the first car
 
+    throttle: Floats
+    steering: Floats
+    battery: Floats
+    air_x: Floats
+    air_y: Floats
+    floor_height: Floats
+    floor_slope_x: Floats
+    floor_slope_y: Floats
+    floor_grip: Floats
+    floor_rolling: Floats
+    time: Floats
     x: Floats
     y: Floats
     z: Floats
@@ -149,9 +199,14 @@ class Fleet:
         return row
 
     def remove(self, row: int) -> None:
-        """Take a car off the floor; its row is free again."""
+        """Take a car off the floor; its row is free again.
+
+        Raises:
+            RunError: when there is no such row.
+        """
+        self._check(row)
         self.alive[row] = False
-        self._block[row] = 0.0
+        self._block[:, row] = 0.0
         self.status[row] = VehicleStatus.OK
 
     def place(
@@ -171,16 +226,21 @@ class Fleet:
         Lags start settled at `steer_angle` [rad] and `throttle`; the commands themselves start at
         zero and the battery at its nominal voltage, so write commands after placing. With
         `keep_actuators` lags and servo stay as they are, whatever angle and throttle are given.
+
+        Raises:
+            RunError: when there is no such row.
         """
-        car, param = self._block[row], self._parameter
+        self._check(row)
+        car, param = self._block[:, row], self._parameter
         lags = [term.target for term in self.car.terms if term.keeps is not None]
         kept = {name: self._view(name)[row].copy() for name in {*lags, "steer_angle"}}
         car[:] = 0.0
-        cog, c, s = param(row, "cog_to_rear_axle"), math.cos(pose.yaw), math.sin(pose.yaw)
+        shape = self.shape(row)
+        cog, c, s = shape.cog_to_rear_axle, math.cos(pose.yaw), math.sin(pose.yaw)
         across = lateral_speed + cog * yaw_rate
         self._set(row, "x_cog", pose.x + c * cog)
         self._set(row, "y_cog", pose.y + s * cog)
-        self._set(row, "z_cog", param(row, "cog_height"))
+        self._set(row, "z_cog", shape.cog_height)
         self._set(row, "yaw", pose.yaw)
         self._set(row, "vx_world", c * speed - s * across)
         self._set(row, "vy_world", s * speed + c * across)
@@ -202,24 +262,26 @@ class Fleet:
         car[offset : offset + 4] = rolling / param(row, "wheel_radius")
         front = cog / param(row, "wheelbase")
         offset = self._slots["wheel_load"][0]
-        weight = 0.5 * GRAVITY * (param(row, "mass") - 4.0 * param(row, "wheel_mass"))
+        weight = 0.5 * GRAVITY * (shape.mass - 4.0 * param(row, "wheel_mass"))
         load = np.array([front, front, 1.0 - front, 1.0 - front]) * weight
         car[offset : offset + 4] = load + param(row, "wheel_mass") * GRAVITY
         self.status[row] = VehicleStatus.OK
+        if self._past is not None and not keep_actuators:
+            self._past.forget(row, throttle, 0.0 if steer_angle is None else None)
         self._run(row, row + 1, 0, SUBSTEP_S)
 
     def settle(self, row: int) -> None:
         """Let a car that was just placed stand on the heights that `floor_height` has for it."""
         front_left, front_right, rear_left, rear_right = self.floor_height[row].tolist()
-        rear, cog = 0.5 * (rear_left + rear_right), self._parameter(row, "cog_to_rear_axle")
+        shape, rear = self.shape(row), 0.5 * (rear_left + rear_right)
         rise = (0.5 * (front_left + front_right) - rear) / self._parameter(row, "wheelbase")
         left_up = 0.5 * (front_left + rear_left - front_right - rear_right)
-        roll, height = left_up / self._parameter(row, "track"), self._parameter(row, "cog_height")
+        roll, height = left_up / self._parameter(row, "track"), shape.cog_height
         c, s = math.cos(float(self.yaw[row])), math.sin(float(self.yaw[row]))
         for name, change in (
             ("x_cog", height * (s * roll - c * rise)),
             ("y_cog", -height * (c * roll + s * rise)),
-            ("z_cog", rear + cog * rise),
+            ("z_cog", rear + shape.cog_to_rear_axle * rise),
             ("roll", roll),
             ("pitch", -rise),
             ("hop", self.floor_height[row].copy()),
@@ -227,15 +289,97 @@ class Fleet:
             self._set(row, name, self._view(name)[row] + change)
         self._run(row, row + 1, 0, SUBSTEP_S)
 
+    def shape(self, row: int) -> Shape:
+        """Return one car's mass properties, with all that its effects add to them."""
+        names = ("mass", "cog_to_rear_axle", "cog_height")
+        totals = {name: self._parameter(row, name) for name in names}
+        variables = {column.variable: i for i, column in enumerate(self._columns)}
+        for term in self._shaping:
+            keys = {param.name: param.key for param in term.params}
+            own = {c.param.key: c.variable for c in self._columns}
+            numbers = [
+                float(self.parameters[row, variables[own[keys[name]]]]) for name in reads(term.law)
+            ]
+            totals[_SHAPED[term.target]] += plain(term.law)(*numbers)
+        return Shape(**totals)
+
     def advance(self, duration: float, substep: float = SUBSTEP_S) -> None:
-        """Advance all cars by whole substeps in one call, without the interpreter lock [s]."""
-        self.advance_rows(0, self.capacity, duration, substep)
+        """Advance all cars by whole substeps in one call, without the interpreter lock [s].
+
+        With `threads` above 1 big fleets are shared by whole tiles; the result is the same.
+
+        Raises:
+            RunError: when duration or substep is negative or no number.
+        """
+        tiles = self._alive.size // LANES
+        parts = min(self.threads, tiles // _TILES_A_THREAD)
+        if parts < 2:
+            self.advance_rows(0, self.capacity, duration, substep)
+            return
+        cuts = [LANES * (tiles * i // parts) for i in range(parts)] + [self.capacity]
+        work = [
+            _pool(self.threads).submit(self.advance_rows, first, last, duration, substep)
+            for first, last in pairwise(cuts[1:])
+        ]
+        self.advance_rows(0, cuts[1], duration, substep)
+        for part in work:
+            part.result()
 
     def advance_rows(
         self, first: int, last: int, duration: float, substep: float = SUBSTEP_S
     ) -> None:
-        """Advance the rows first..last-1 only: threads may share a fleet by rows."""
-        self._run(first, last, round(duration / substep), substep)
+        """Advance the rows first..last-1 only: threads may share a fleet by rows.
+
+        Raises:
+            RunError: when there are no such rows, or duration or substep is negative or no number.
+        """
+        if not 0 <= first <= last <= self.capacity:
+            msg = f"rows {first} to {last}: expected rows between 0 and {self.capacity}"
+            raise RunError(msg)
+        self._run(first, last, _whole_steps(duration, substep), substep)
+
+    def rollout(
+        self,
+        throttle: Floats,
+        steering: Floats,
+        step_s: float,
+        signals: Sequence[str] = ("x", "y", "yaw", "speed"),
+        substep: float = SUBSTEP_S,
+    ) -> dict[str, Floats]:
+        """Drive all cars through a recording in one call, each with its own numbers.
+
+        Args:
+            throttle: Commands at the start of each step, (T,), or (T, capacity) for each car.
+            steering: Likewise.
+            step_s: Length of one step of the recording [s], in whole substeps.
+            signals: Results to keep, by their names here; not those of each wheel.
+            substep: Length of a substep [s].
+
+        Returns:
+            Each signal after every step, (T, capacity).
+
+        Raises:
+            RunError: when shapes do not fit, or a signal is not one of each car.
+        """
+        commands = [np.ascontiguousarray(_columns_of_command(c, self.capacity), dtype=np.float64)
+                    for c in (throttle, steering)]  # fmt: skip
+        if len(commands[0]) != len(commands[1]):
+            msg = f"{len(commands[0])} throttles and {len(commands[1])} steerings: expected as many"
+            raise RunError(msg)
+        slots = np.array([self._slot_of_signal(name) for name in signals])
+        out = np.zeros((len(commands[0]), len(slots), self._alive.size))
+        steps = _whole_steps(step_s, substep)
+        if self._past is None:
+            self._kernel.rollout(
+                self._block, self._numbers, self._alive, self._status, 0, self.capacity, steps,
+                substep, *commands, slots, out,
+            )  # fmt: skip
+        else:
+            for t in range(len(out)):
+                self.throttle[:], self.steering[:] = commands[0][t], commands[1][t]
+                self._run(0, self.capacity, steps, substep)
+                out[t] = self._block[slots]
+        return {name: out[:, k, : self.capacity] for k, name in enumerate(signals)}
 
     def pose(self, row: int) -> Pose2:
         """Return the rear axle's pose in the world."""
@@ -243,15 +387,13 @@ class Fleet:
 
     def planar_cog(self, row: int) -> tuple[float, float, float, float, float, float]:
         """Return (x, y, yaw, vx, vy, yaw_rate) of the centre of gravity in the world frame."""
-        names = ("x_cog", "y_cog", "yaw", "vx_world", "vy_world", "yaw_rate")
-        x, y, yaw, vx, vy, rate = (float(self._block[row, self._slots[n][0]]) for n in names)
+        x, y, yaw, vx, vy, rate = (float(self._block[self._slots[n][0], row]) for n in _COG)
         return x, y, yaw, vx, vy, rate
 
     def planar_cogs(self, rows: Ints) -> Floats:
         """Return `planar_cog` of many rows at once, shape (n, 6)."""
-        names = ("x_cog", "y_cog", "yaw", "vx_world", "vy_world", "yaw_rate")
-        columns = [self._slots[name][0] for name in names]
-        return self._block[rows[:, None], columns]
+        slots = [self._slots[name][0] for name in _COG]
+        return self._block[slots, rows[:, None]]
 
     def push(
         self,
@@ -273,18 +415,79 @@ class Fleet:
         if not all(map(math.isfinite, changes)):
             self.status[row] = VehicleStatus.DIVERGED
             return
-        names = ("vx_world", "vy_world", "yaw_rate", "x_cog", "y_cog", "yaw")
-        for name, change in zip(names, changes, strict=True):
-            self._block[row, self._slots[name][0]] += change
+        for name, change in zip(_COG_CHANGED, changes, strict=True):
+            self._block[self._slots[name][0], row] += change
         self._run(row, row + 1, 0, SUBSTEP_S)
+
+    def push_rows(self, rows: Ints, changes: Floats) -> None:
+        """`push` many cars at once: each row once, changes (n, 6) in the order of `push`."""
+        rows, changes = np.asarray(rows), np.asarray(changes)
+        fine = self.status[rows] == VehicleStatus.OK
+        finite = np.isfinite(changes).all(axis=1)
+        self.status[rows[fine & ~finite]] = VehicleStatus.DIVERGED
+        rows, changes = rows[fine & finite], changes[fine & finite]
+        for name, change in zip(_COG_CHANGED, changes.T, strict=True):
+            self._block[self._slots[name][0], rows] += change
+        tiles = np.unique(rows // LANES) * LANES
+        for start in tiles:
+            self._run(start, min(start + LANES, self.capacity), 0, SUBSTEP_S)
 
     def set_parameter(self, row: int, name: str, value: float) -> None:
         """Give one car another number, by the parameter's name or its key in the car file.
 
         Raises:
-            TermError: when the car has no such parameter.
+            TermError: when the car has no such parameter, or the value lies outside its bounds.
+            RunError: when there is no such row.
         """
-        self.parameters[row, find_column(self._columns, name)] = value
+        self._check(row)
+        column = find_column(self._columns, name)
+        param = self._columns[column].param
+        low, high = param.bounds
+        if not low <= value <= high:
+            msg = f"{param.key} = {value}: expected {low:g} to {high:g} {param.unit}"
+            raise TermError(msg)
+        self.parameters[row, column] = value
+
+    @property
+    def bytes_per_car(self) -> int:
+        """Memory that one more car takes."""
+        arrays = (self._block, self._numbers, self._alive, self._status)
+        past = self._past.bytes_per_car if self._past else 0
+        return sum(a.nbytes for a in arrays) // self._alive.size + past + 3 * 8
+
+    def _check(self, row: int) -> None:
+        if not 0 <= row < self.capacity:
+            msg = f"fleet of {self.car.name}: no row {row}, expected 0 to {self.capacity - 1}"
+            raise RunError(msg)
+
+    def _past_of(self, padded: int) -> CommandPast | None:
+        """Return the memory of commands where an effect reads it.
+
+        Raises:
+            TermError: when an effect reads the past, and the car has no such delay.
+        """
+        asked = {name for term in self.car.terms for name in reads(term.law)} & DELAYS.keys()
+        if not asked:
+            return None
+        keys = {column.param.key: i for i, column in enumerate(self._columns)}
+        for name in sorted(asked):
+            if DELAYS[name] not in keys:
+                msg = f"an effect reads {name}, but no effect has the parameter {DELAYS[name]}"
+                raise TermError(msg)
+        slots = [self._slots[name][0] for name in (*COMMANDS, *DELAYS)]
+        columns = [keys.get(key, -1) for key in DELAYS.values()]
+        return CommandPast(padded, np.array(slots), np.array(columns))
+
+    def _slot_of_signal(self, name: str) -> int:
+        slot, width = self._slots.get(_WRITTEN.get(name, _SLOT_OF.get(name, name)), (0, 0))
+        if width != 1:
+            known = [n for n in (*_READ, *_WRITTEN) if self._view_width(n) == 1]
+            msg = f"rollout: {name!r} is no signal of each car{nearest(name, known)}"
+            raise RunError(msg)
+        return slot
+
+    def _view_width(self, name: str) -> int:
+        return self._slots[_WRITTEN.get(name, _SLOT_OF.get(name, name))][1]
 
     def _parameter(self, row: int, name: str) -> float:
         return float(self.parameters[row, self.parameter_names.index(name)])
@@ -298,13 +501,48 @@ class Fleet:
 
     def _view(self, name: str) -> Floats:
         offset, width = self._slots[name]
-        return self._block[:, offset] if width == 1 else self._block[:, offset : offset + width]
+        if width == 1:
+            return self._block[offset, : self.capacity]
+        return self._block[offset : offset + width, : self.capacity].T
 
     def _set(self, row: int, name: str, value: float | Floats) -> None:
         offset, width = self._slots[name]
-        self._block[row, offset : offset + width] = value
+        self._block[offset : offset + width, row] = value
 
     def _run(self, first: int, last: int, steps: int, substep: float) -> None:
-        self._advance(
-            self._block, self.parameters, self.alive, self.status, first, last, steps, substep
+        if self._past is not None and steps > 0:
+            self._past.recall(self._block, self._numbers, first, last, steps * substep)
+        self._kernel.advance(
+            self._block, self._numbers, self._alive, self._status, first, last, steps, substep
         )
+
+
+def _whole_steps(duration: float, substep: float) -> int:
+    if not (0.0 <= duration < math.inf and 0.0 < substep < math.inf):
+        msg = f"{duration} s in substeps of {substep} s: expected a duration, and a substep above 0"
+        raise RunError(msg)
+    return round(duration / substep)
+
+
+def _columns_of_command(command: Floats, capacity: int) -> Floats:
+    """Return a recording's command as (T, 1) or (T, capacity)."""
+    values = np.asarray(command, dtype=np.float64)
+    if values.ndim == 1:
+        return values[:, None]
+    if values.ndim != 2 or values.shape[1] != capacity:
+        msg = f"commands of shape {values.shape}: expected (T,) or (T, {capacity})"
+        raise RunError(msg)
+    return values
+
+
+def _aligned(shape: tuple[int, int]) -> Floats:
+    """Return zeros that begin on a cache line."""
+    size = shape[0] * shape[1]
+    room = np.zeros(size + 8)
+    begin = -room.ctypes.data % 64 // 8
+    return room[begin : begin + size].reshape(shape)
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, thread_name_prefix="fleet")

@@ -3,14 +3,24 @@
 Fast-math stays off: sums keep their order, so equal inputs give equal bits on every run.
 """
 
+import ast
+import contextlib
+import inspect
 import os
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import numba.extending
+from llvmlite import ir
+from numba.core import cgutils
 from numba.core.caching import FunctionCache
 
+from scm.vehicles.lanes import LANES, WIDTH, Rows, copy_lanes
+
+_SOURCES: dict[Callable[..., Any], str] = {}
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _ROWS = "(float64[:,::1],float64[:,::1],boolean[::1],int64[::1],int64,int64,int64,float64)"
@@ -18,7 +28,19 @@ _ROWS = "(float64[:,::1],float64[:,::1],boolean[::1],int64[::1],int64,int64,int6
 
 def law(function: Function) -> Function:
     """Let a scalar function be called from compiled kernels; plain calls work as before."""
+    with contextlib.suppress(OSError):  # typed in by hand: it has no source
+        _SOURCES[function] = inspect.getsource(function)
     return cast("Function", numba.njit(nogil=True, error_model="numpy")(function))
+
+
+def inlined(function: Function) -> Function:
+    """As `law`, but laid into its caller always: arrays are passed without being counted."""
+    return cast("Function", numba.njit(nogil=True, error_model="numpy", forceinline=True)(function))
+
+
+def source_of(function: Callable[..., Any]) -> str:
+    """Return a law's source as it stood when the law was loaded."""
+    return _SOURCES.get(function) or inspect.getsource(function)
 
 
 def array_kernel(function: Function) -> Function:
@@ -36,6 +58,70 @@ def fleet_kernel(function: Function) -> Function:
     compiled = _cached(function)
     compiled.compile(_ROWS)
     return cast("Function", compiled)
+
+
+def rollout_kernel(function: Function) -> Function:
+    """Compile a kernel that drives a recording at its first call, cached beside its file."""
+    return cast("Function", _cached(function))
+
+
+def stage(function: Function) -> Function:
+    """Compile a stage of row arithmetic, `(car, wheel, w, dt)`, for use in a fleet kernel.
+
+    Both buffers begin on a cache line; `wheel` holds four wheels of WHEEL_ROWS rows each.
+    """
+    (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
+    lines = cast("ast.FunctionDef", tree).body
+    rows = {name: v for name, v in function.__globals__.items() if isinstance(v, int)}
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        car, wheel = (
+            context.make_array(kind)(context, builder, value=value).data
+            for kind, value in zip(signature.args[:2], arguments, strict=False)
+        )
+        size = ir.Constant(arguments[2].type, LANES * rows["WHEEL_ROWS"])
+        at = builder.mul(arguments[2], size)
+        with cgutils.for_range(builder, ir.Constant(arguments[2].type, LANES // WIDTH)) as loop:
+            first = builder.mul(loop.index, ir.Constant(arguments[2].type, WIDTH))
+            bases = {"car": builder.gep(car, [first]), "wheel": builder.gep(wheel, [first])}
+            write = Rows(builder, bases, rows, {"w": at}, {"dt": arguments[3]})
+            for line in lines:
+                write.line(line)
+        return context.get_dummy_value()
+
+    @numba.extending.intrinsic  # type: ignore[untyped-decorator]
+    def compiled(_: object, car: Any, wheel: Any, w: Any, dt: Any) -> Any:
+        return numba.void(car, wheel, numba.int64, numba.float64), code
+
+    return cast("Function", compiled)
+
+
+@numba.extending.intrinsic  # type: ignore[untyped-decorator]
+def fetch(_: object, rows: Any, row: Any, block: Any, slot: Any, start: Any) -> Any:
+    """Copy the lanes from `start` of one slot of the block into a row of a buffer."""
+    return _copying(rows, row, block, slot, start, into_block=False)
+
+
+@numba.extending.intrinsic  # type: ignore[untyped-decorator]
+def put(_: object, rows: Any, row: Any, block: Any, slot: Any, start: Any) -> Any:
+    """Copy a row of a buffer into the lanes from `start` of one slot of the block."""
+    return _copying(rows, row, block, slot, start, into_block=True)
+
+
+def _copying(rows: Any, row: Any, block: Any, slot: Any, start: Any, *, into_block: bool) -> Any:
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        near, far = (
+            context.make_array(signature.args[i])(context, builder, value=arguments[i])
+            for i in (0, 2)
+        )
+        width = cgutils.unpack_tuple(builder, far.shape, 2)[1]
+        lanes = ir.Constant(arguments[1].type, LANES)
+        own = builder.gep(near.data, [builder.mul(arguments[1], lanes)])
+        other = builder.gep(far.data, [builder.add(builder.mul(arguments[3], width), arguments[4])])
+        copy_lanes(builder, *((other, own) if into_block else (own, other)))
+        return context.get_dummy_value()
+
+    return numba.void(rows, numba.int64, block, numba.int64, numba.int64), code
 
 
 _Cache: Any = FunctionCache

@@ -10,7 +10,7 @@ from scm.vehicles.jit import law
 
 _QUARTER = 0.6366197723675814  # quarter turns in a radian
 # half pi in three parts: whole quarter turns up to 2^20 subtract without loss
-_HALF_PI = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21)
+_HALF_PI, _HALF_PI_2, _HALF_PI_3 = 1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21
 
 
 @law
@@ -91,9 +91,8 @@ def atan(x: float) -> float:
 @law
 def sin_cos(x: float) -> tuple[float, float]:
     """Sine and cosine of |x| < 1e6, error below 1e-15."""
-    n = math.floor(x * _QUARTER + 0.5)
-    turns = float(n)
-    r = ((x - turns * _HALF_PI[0]) - turns * _HALF_PI[1]) - turns * _HALF_PI[2]
+    turns = float(math.floor(x * _QUARTER + 0.5))
+    r = ((x - turns * _HALF_PI) - turns * _HALF_PI_2) - turns * _HALF_PI_3
     z = r * r
     p = 2.755731338241015e-06 + z * (-2.5050717544078517e-08 + z * 1.5894753989656358e-10)
     p = 0.008333333333320416 + z * (-0.00019841269828677557 + z * p)
@@ -104,6 +103,6 @@ def sin_cos(x: float) -> tuple[float, float]:
     p = 0.04166666666666656 + z * (-0.001388888888887176 + z * p)
     c = 1.0 - 0.5 * z + z * z * p
     quarter = turns - 4.0 * float(math.floor(turns * 0.25))
-    odd = quarter == 1.0 or quarter == 3.0  # noqa: PLR1714 a select, no search in a tuple
-    sine, cosine = (c if odd else s), (s if odd else c)
-    return (-sine if quarter > 1.5 else sine), (-cosine if 0.5 < quarter < 2.5 else cosine)
+    odd = abs(quarter - 2.0) == 1.0
+    sine, cosine = c if odd else s, s if odd else c
+    return -sine if quarter > 1.5 else sine, -cosine if abs(quarter - 1.5) < 1.0 else cosine

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from scm.errors import TermError, nearest
 from scm.vehicles import body14
 from scm.vehicles.param import Param
-from scm.vehicles.signals import Per
+from scm.vehicles.signals import SIGNALS, Per
 from scm.vehicles.term import Term
 
 
@@ -21,8 +21,8 @@ class Column:
 
     @property
     def variable(self) -> str:
-        """What the generated kernel calls it."""
-        return self.name.replace(".", "_")
+        """What the generated kernel calls it: with its term's name, so that nothing collides."""
+        return f"{self.term}_{self.param.name}" if self.term else self.name
 
 
 def columns_of(terms: Sequence[Term]) -> tuple[Column, ...]:
@@ -32,8 +32,9 @@ def columns_of(terms: Sequence[Term]) -> tuple[Column, ...]:
         for param in term.params:
             found.setdefault(param.key, (term.name, param))
     uses = Counter(param.name for _, param in found.values())
+    uses.update(SIGNALS.keys())
     return tuple(
-        Column(param.name if uses[param.name] == 1 else f"{term}.{param.name}", term, param)
+        Column(f"{term}.{param.name}" if term and uses[param.name] > 1 else param.name, term, param)
         for term, param in found.values()
     )
 
@@ -53,14 +54,21 @@ def find_column(columns: Sequence[Column], name: str) -> int:
 
 
 def slots_of(terms: Sequence[Term]) -> dict[str, tuple[int, int]]:
-    """Return offset and width of everything in a fleet row, what the terms keep at the end."""
-    entries = dict(body14.STATES + body14.INPUTS + body14.OUTPUTS)
-    for term in terms:
-        if term.keeps is not None:
-            entries.setdefault(term.target, 4 if term.per is Per.WHEEL else 1)
+    """Return first row and width of everything in a fleet's block.
+
+    Once a car, then once a wheel; each time inputs, states with what terms keep, results: so what
+    a call loads stands together, and so does what it stores.
+    """
     slots: dict[str, tuple[int, int]] = {}
     offset = 0
-    for name, width in entries.items():
-        slots[name] = (offset, width)
-        offset += width
+    for per, width in ((Per.BODY, 1), (Per.WHEEL, 4)):
+        for name in [*body14.INPUTS[per], *states_of(terms, per), *body14.OUTPUTS[per]]:
+            slots[name] = (offset, width)
+            offset += width
     return slots
+
+
+def states_of(terms: Sequence[Term], per: Per) -> tuple[str, ...]:
+    """Return what outlives a call: the skeleton's states, and what the terms keep."""
+    kept = {term.target for term in terms if term.keeps is not None and term.per is per}
+    return (*body14.STATES[per], *sorted(kept - set(body14.STATES[per])))

@@ -19,8 +19,8 @@ def curve_over_slip(
 ) -> float:
     """F(s) / s: the secant of the curve, positive and even; its limit at s = 0 included."""
     size = abs(slip)
-    if size <= slip_extremum:
-        q = size / slip_extremum
-        return force_extremum / slip_extremum * (1.5 - 0.5 * q * q)
+    q = size / slip_extremum
+    rising = force_extremum / slip_extremum * (1.5 - 0.5 * q * q)
     p = min((size - slip_extremum) / max(slip_asymptote - slip_extremum, 1e-9), 1.0)
-    return (force_extremum + (force_asymptote - force_extremum) * p * p * (3.0 - 2.0 * p)) / size
+    falling = force_extremum + (force_asymptote - force_extremum) * (p * p * (3.0 - 2.0 * p))
+    return rising if size <= slip_extremum else falling / size

@@ -84,7 +84,7 @@ def energy(fleet, row):
 
     def state(name):
         offset, width = fleet._slots[name]
-        return fleet._block[row, offset] if width == 1 else fleet._block[row, offset : offset + 4]
+        return fleet._block[offset, row] if width == 1 else fleet._block[offset : offset + 4, row]
 
     wheel = number("wheel_mass")
     sprung, base, cog = number("mass") - 4 * wheel, number("wheelbase"), number("cog_to_rear_axle")
@@ -171,7 +171,7 @@ def test_a_diverged_car_freezes_and_the_others_go_on():
     for row in range(2):
         fleet.throttle[fleet.add(Pose2(0.0, float(row), 0.0))] = 0.5
     fleet.advance(0.5)
-    fleet.set_parameter(0, "mass", float("nan"))
+    fleet.parameters[0, fleet.parameter_names.index("mass")] = float("nan")
     fleet.advance(0.5)
     frozen = fleet.pose(0)
     fleet.advance(0.5)

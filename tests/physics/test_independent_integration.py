@@ -30,7 +30,9 @@ class Equations:
         self.y = 0.5 * n["track"] * np.array([1.0, -1.0, 1.0, -1.0])
         self.sprung = n["mass"] - 4 * n["wheel_mass"]
         self.share = 0.5 * np.array([back, back, front, front]) / n["wheelbase"]
-        self.steer = [self.law("ackermann", w, {"steer_angle": STEER}) for w in range(4)]
+        self.steer = [
+            math.atan(self.law("ackermann", w, {"road_slope": math.tan(STEER)})) for w in range(4)
+        ]
 
     def law(self, name, w, signals):
         term = next(term for term in self.car.terms if term.name == name)
@@ -47,6 +49,10 @@ class Equations:
             "motor_strength": 1.0,
             "fade_strength": 1.0,
             "throttle": THROTTLE,
+            "grip": 1.0,
+            "slip_scale": 1.0,
+            "rolling": 0.0,
+            **dict.fromkeys(("side_lag", "side_lag_speed", "spin_lag", "spin_lag_speed"), 0.0),
         }
         known = {**self.n, **wheel, **signals, **numbers}
         return plain(term.law)(*(known[argument] for argument in reads(term.law)))
@@ -68,7 +74,7 @@ class Equations:
             "tyre_deflection": -hop,
             "tyre_deflection_rate": -hop_rate,
         }
-        signals["load"] = self.law("tyre_contact", w, signals)
+        signals["load"] = signals["grip_load"] = self.law("tyre_contact", w, signals)
         sums = dict.fromkeys(
             ("suspension_force", "tyre_x", "tyre_y", "wheel_torque", "dry_torque"), 0.0
         )

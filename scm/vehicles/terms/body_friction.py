@@ -9,6 +9,7 @@ Shows in: coast-down.   Source: Lorenzo-Lyons/DART, vehicle model (rolling frict
 import math
 
 from scm.vehicles.jit import law
+from scm.vehicles.lane_math import tanh
 from scm.vehicles.param import LogNormal, Normal, Param
 from scm.vehicles.term import Per, Term
 
@@ -19,7 +20,7 @@ def body_friction(
 ) -> float:
     """Force against the motion [N]."""
     size = abs(vx)
-    force = static * math.tanh(sharpness * size) + linear * size + quadratic * size * size
+    force = static * tanh(sharpness * size) + linear * size + quadratic * size * size
     return -math.copysign(max(0.0, force), vx)
 
 
@@ -29,7 +30,7 @@ def body_friction_damping(
 ) -> float:
     """Force lost per speed, the secant: it never pushes a car back [N*s/m]."""
     size = abs(vx)
-    near_rest = sharpness if size < 1e-9 else math.tanh(sharpness * size) / size
+    near_rest = sharpness if size < 1e-9 else tanh(sharpness * size) / max(size, 1e-9)
     return max(0.0, static * near_rest + linear + quadratic * size)
 
 

@@ -7,9 +7,8 @@ Holds: forward throttle; a brushed motor that idles freely below its dead-band.
 Shows in: throttle steps and ramps.   Source: Lorenzo-Lyons/DART, vehicle model (motor curve).
 """
 
-import math
-
 from scm.vehicles.jit import law
+from scm.vehicles.lane_math import tanh
 from scm.vehicles.param import LogNormal, Normal, Param
 from scm.vehicles.term import Per, Term
 
@@ -22,7 +21,7 @@ def motor_curve(
 ) -> float:  # fmt: skip
     """Torque on the wheel, + forward [N*m]."""
     beyond = motor_throttle * fade_strength + dead_band
-    pull = (force - force_per_speed * vx) * 0.5 * (math.tanh(100.0 * beyond) + 1.0) * beyond
+    pull = (force - force_per_speed * vx) * 0.5 * (tanh(100.0 * beyond) + 1.0) * beyond
     share = driven / max(2.0 * (front_driven + rear_driven), 1.0)
     return share * pull * motor_strength * wheel_radius
 

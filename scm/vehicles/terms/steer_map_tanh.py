@@ -7,9 +7,8 @@ Holds: commands in [-1, 1].   Shows in: slow circles, both ways.
 Source: Lorenzo-Lyons/DART, vehicle model (steering curve).
 """
 
-import math
-
 from scm.vehicles.jit import law
+from scm.vehicles.lane_math import tanh
 from scm.vehicles.param import LogNormal, Normal, Param
 from scm.vehicles.term import Per, Term
 
@@ -20,7 +19,7 @@ def steer_map_tanh(
 ) -> float:
     """Mean road-wheel angle that the command means, + left [rad]."""
     s = min(max(steering, -1.0), 1.0) + offset
-    return left * math.tanh(left_slope * s) if s > 0.0 else right * math.tanh(right_slope * s)
+    return (left if s > 0.0 else right) * tanh((left_slope if s > 0.0 else right_slope) * s)
 
 
 TERM = Term(

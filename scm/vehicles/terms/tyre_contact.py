@@ -30,9 +30,7 @@ def tyre_contact_damping(
 ) -> float:  # fmt: skip
     """Load lost per speed of the hub upward within a substep; none in the air [N*s/m]."""
     force = stiffness * tyre_deflection + contact_damping * tyre_deflection_rate
-    if rest_load + force <= 0.0:
-        return 0.0
-    return contact_damping + stiffness * dt
+    return contact_damping + stiffness * dt if rest_load + force > 0.0 else 0.0
 
 
 TERM = Term(

@@ -6,35 +6,40 @@ Holds: steady slip; fitted on one floor.   Shows in: fast circles until the tyre
 Source: Pacejka, Tire and Vehicle Dynamics; values of Lorenzo-Lyons/DART.
 """
 
-import math
-
 from scm.vehicles.jit import law
+from scm.vehicles.lane_math import atan, sin_cos
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
 @law
-def tyre_pacejka(
-    v_long: float, v_lat: float, load: float, front: float, low_speed: float,
-    front_d: float, front_c: float, front_b: float, rear_d: float, rear_c: float, rear_b: float,
+def tyre_pacejka_damping(
+    v_long: float, v_lat: float, grip_load: float, grip: float, slip_scale: float, side_lag: float,
+    side_lag_speed: float, front: float, low_speed: float, front_d: float, front_c: float,
+    front_b: float, rear_d: float, rear_c: float, rear_b: float,
 ) -> float:  # fmt: skip
-    """Force across the wheel, + to its left [N]."""
-    d, c, b = (front_d, front_c, front_b) if front > 0.5 else (rear_d, rear_c, rear_b)
-    alpha = math.atan(v_lat / max(abs(v_long), low_speed))
-    return -load * d * math.sin(c * math.atan(b * alpha))
+    """Force per side speed, the secant: beyond the peak it never overshoots zero slip [N*s/m]."""
+    d = front_d if front > 0.5 else rear_d
+    c = front_c if front > 0.5 else rear_c
+    b = front_b if front > 0.5 else rear_b
+    speed = max(abs(v_long) + side_lag_speed, low_speed)
+    slip = abs(slip_scale * (v_lat + side_lag_speed * side_lag) / speed)
+    sine, _cosine = sin_cos(c * atan(b * atan(slip)))
+    secant = c * b if slip < 1e-6 else sine / max(slip, 1e-6)
+    return grip_load * grip * slip_scale / speed * d * secant
 
 
 @law
-def tyre_pacejka_damping(
-    v_long: float, v_lat: float, load: float, front: float, low_speed: float,
-    front_d: float, front_c: float, front_b: float, rear_d: float, rear_c: float, rear_b: float,
+def tyre_pacejka(
+    v_long: float, v_lat: float, grip_load: float, grip: float, slip_scale: float, side_lag: float,
+    side_lag_speed: float, front: float, low_speed: float, front_d: float, front_c: float,
+    front_b: float, rear_d: float, rear_c: float, rear_b: float,
 ) -> float:  # fmt: skip
-    """Force per side speed, the secant: beyond the peak it never overshoots zero slip [N*s/m]."""
-    d, c, b = (front_d, front_c, front_b) if front > 0.5 else (rear_d, rear_c, rear_b)
-    speed = max(abs(v_long), low_speed)
-    if abs(v_lat) < 1e-6 * speed:
-        return load * d * c * b / speed
-    return load * d * math.sin(c * math.atan(b * math.atan(v_lat / speed))) / v_lat
+    """Force across the wheel, + to its left [N]."""
+    return -(v_lat + side_lag_speed * side_lag) * tyre_pacejka_damping(
+        v_long, v_lat, grip_load, grip, slip_scale, side_lag, side_lag_speed, front, low_speed,
+        front_d, front_c, front_b, rear_d, rear_c, rear_b,
+    )  # fmt: skip
 
 
 TERM = Term(

@@ -1,4 +1,6 @@
+import importlib
 import os
+import re
 import subprocess
 import sys
 
@@ -9,7 +11,7 @@ from scm.vehicles.assemble import setters_of, write_page
 from scm.vehicles.car import STANDARD_TERMS, all_terms
 from scm.vehicles.kernel_file import compile_kernel
 from scm.vehicles.param import Param
-from scm.vehicles.signals import Per
+from scm.vehicles.signals import SIGNALS, Per, Role
 from scm.vehicles.term import Term
 
 STANDARD = [all_terms()[name] for name in STANDARD_TERMS]
@@ -79,8 +81,9 @@ def test_effects_that_wait_for_each_other_are_named():
 
 def test_an_unset_signal_passes_on_the_one_before():
     page = write_page("nigel", STANDARD)
-    assert "throttle_live = throttle_received" in page
-    assert page.index("throttle_live = throttle_received") < page.index("motor_dc(")
+    assert "motor_dc_u = throttle_command * battery * (1.0 / motor_dc_battery_nominal)" in page
+    lagged = write_page("nigel", [*STANDARD, all_terms()["drive_lag"]])
+    assert "motor_throttle = throttle\n" in lagged
 
 
 def test_a_term_left_out_leaves_no_trace():
@@ -89,18 +92,47 @@ def test_a_term_left_out_leaves_no_trace():
 
 
 def test_the_order_of_the_list_does_not_change_the_order_of_sums():
-    def calls(terms):
-        lines = write_page("nigel", terms).splitlines()
-        return [line.split("(")[0] for line in lines if "+=" in line and "_damping" not in line]
+    def sums(terms):
+        lines = [line.strip() for line in write_page("nigel", terms).splitlines()]
+        totals = {name for name, signal in SIGNALS.items() if signal.role is Role.SUM}
+        return [line for line in lines if line.split(" = ")[0] in totals and " + " in line]
 
-    assert calls(STANDARD) == calls(STANDARD[::-1])
+    assert sums(STANDARD) == sums(STANDARD[::-1])
+    assert any(line.startswith("wheel_torque = ") for line in sums(STANDARD))
 
 
 def test_terms_that_share_a_bare_parameter_name_keep_their_own_numbers():
     page = write_page("nigel", STANDARD)
-    assert "tyre_lateral_slip_extremum = parameters" in page
-    assert "tyre_longitudinal_slip_extremum = parameters" in page
-    assert page.count(" low_speed = parameters") == 1
+    assert "\nTYRE_LATERAL_SLIP_EXTREMUM = " in page
+    assert "\nTYRE_LONGITUDINAL_SLIP_EXTREMUM = " in page
+    assert page.count("LOW_SPEED = ") == 1
+
+
+def test_a_law_that_is_not_straight_line_text_is_refused_with_what_may_stand_there():
+    def jumpy(vx: float) -> float:
+        if vx > 0.0:
+            return 1.0
+        return 0.0
+
+    with pytest.raises(TermError, match=r"jumpy: 'if vx > 0.0:' is not straight-line text; expec"):
+        write_page("jumpy", [*STANDARD, of(jumpy, adds="force_x")])
+
+
+@pytest.mark.parametrize("line", ["vx and vy", "0.0 < vx < 1.0", "vx ** 2.0", "(vx, vy)[0]"])
+def test_a_law_may_not_use_what_a_lane_cannot(line, tmp_path, monkeypatch):
+    name = f"lane_{abs(hash(line))}"
+    (tmp_path / f"{name}.py").write_text(f"def odd(vx, vy):\n    return {line}\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    odd = importlib.import_module(name).odd
+    with pytest.raises(TermError, match="law odd: .* is not straight-line text"):
+        write_page("odd", [*STANDARD, of(odd, adds="force_x")])
+
+
+def test_what_holds_still_during_a_call_is_worked_out_once():
+    page = write_page("nigel", STANDARD)
+    once, _, substep = page.partition("def effects_on_the_body")
+    assert "per_tyre_lateral_slip_extremum = 1.0 / tyre_lateral_slip_extremum" in once
+    assert "/ tyre_lateral_slip_extremum" not in substep
 
 
 def test_a_term_of_somebody_else_joins_by_its_argument_names(tmp_path, monkeypatch):
@@ -115,8 +147,7 @@ def test_a_term_of_somebody_else_joins_by_its_argument_names(tmp_path, monkeypat
     strength = Param("strength", 0.0, "N", "body.wind_n", (-5.0, 5.0), "from the right")
     term = of(side_wind.side_wind, adds="force_y", params=(strength,))
     page = write_page("windy", [*STANDARD, term])
-    assert "from side_wind import side_wind" in page
-    assert "force_y += side_wind(strength)" in page
+    assert re.search(r"= .*contact_y.*side_wind_strength", page)
 
 
 def test_the_same_terms_give_the_same_kernel_object():

@@ -21,7 +21,7 @@ if len(sys.argv) > 2:
     Path(sys.argv[1], "calm.py").write_text(sys.argv[2])
 names = ("suspension_spring", "tyre_contact")
 terms = [*(all_terms()[name] for name in names), Term(calm.calm, per=Per.BODY, adds="force_x")]
-print(compile_kernel("small", terms).__module__)
+print(compile_kernel("small", terms).__name__)
 """
 CURVE = "from scm.vehicles.jit import law\n\n\n@law\ndef curve(vx):\n    return {slope} * vx\n"
 LAW = (

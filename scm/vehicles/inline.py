@@ -1,0 +1,165 @@
+"""Laws become lines: a call of a law is replaced by what the law's source says.
+
+A law is straight-line text: assignments and one return, of arithmetic, comparisons, selects
+(`a if c else b`), abs, min, max, math.sqrt, math.floor, math.copysign and other laws. So it means
+the same for one car as in every lane of a tile.
+"""
+
+import ast
+import copy
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+from scm.errors import TermError
+from scm.vehicles.jit import plain, source_of
+
+Line = tuple[str, ast.expr]  # a name, and what it is
+Functions = Mapping[str, Callable[..., Any]]
+
+_OPERATORS = (
+    ast.BinOp, ast.UnaryOp, ast.Compare, ast.IfExp, ast.Name, ast.Constant, ast.Call, ast.Attribute,
+    ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub, ast.BitAnd, ast.BitOr, ast.Load, ast.Gt, ast.Lt,
+    ast.GtE, ast.LtE, ast.Eq, ast.NotEq,
+)  # fmt: skip
+_BUILT_IN = {"abs": 1, "min": 2, "max": 2, "float": 1}
+_MATH = {"sqrt": 1, "floor": 1, "copysign": 2}
+
+
+class Inliner:
+    """Turns text into lines of built-in arithmetic; every name that a law makes stays unique."""
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        self._used = set(taken)
+
+    def lines(self, text: str, functions: Functions) -> Iterator[Line]:
+        """Return the lines of some statements; `functions` are the laws they may call."""
+        for statement in ast.parse(textwrap.dedent(text)).body:
+            yield from _Body("the page", functions, {}, self).statement(statement, as_is=True)
+
+    def call(self, law: Callable[..., Any], arguments: list[ast.expr]) -> list[Line]:
+        """Return the lines of a law's body; the last ones are its results, all named ""."""
+        function = plain(law)
+        tree = copy.deepcopy(_tree(function))
+        names = [argument.arg for argument in tree.args.args]
+        if len(names) != len(arguments):
+            msg = f"law {tree.name}: expected {len(names)} arguments, got {len(arguments)}"
+            raise TermError(msg)
+        lines: list[Line] = []
+        given: dict[str, ast.expr] = {}
+        for name, value in zip(names, arguments, strict=True):
+            if isinstance(value, ast.Name | ast.Constant):
+                given[name] = value
+            else:
+                lines.append((self.name(f"{tree.name}_{name}"), value))
+                given[name] = ast.Name(lines[-1][0])
+        body = _Body(tree.name, function.__globals__, given, self)
+        for statement in tree.body:
+            lines += body.statement(statement)
+        return lines
+
+    def name(self, wish: str) -> str:
+        """Return a name that no other line has."""
+        name, k = wish, 2
+        while name in self._used:
+            name, k = f"{wish}{k}", k + 1
+        self._used.add(name)
+        return name
+
+
+class _Body(ast.NodeTransformer):
+    """One law at work: `known` says what each of its names means outside."""
+
+    def __init__(
+        self, where: str, scope: Mapping[str, Any], known: dict[str, ast.expr], inliner: Inliner
+    ) -> None:
+        self.where, self.scope, self.known, self.inliner = where, scope, known, inliner
+        self.before: list[Line] = []
+
+    def statement(self, node: ast.stmt, *, as_is: bool = False) -> list[Line]:
+        self.before = []
+        match node:
+            case ast.Expr(value=ast.Constant()):
+                return []
+            case ast.Return(value=ast.Tuple(elts=values)):
+                results = [self.visit(value) for value in values]
+                return [*self.before, *(("", result) for result in results)]
+            case ast.Return(value=ast.expr() as value):
+                result = self.visit(value)
+                return [*self.before, ("", result)]
+            case ast.AugAssign(target=ast.Name(id=name), op=op, value=value):
+                targets, values = [name], [ast.BinOp(ast.Name(name), op, value)]
+            case ast.Assign(targets=[ast.Name(id=name)], value=value):
+                targets, values = [name], [value]
+            case ast.Assign(targets=[ast.Tuple(elts=left)], value=ast.Tuple(elts=values)):
+                targets = [ast.unparse(target) for target in left]
+            case ast.Assign(targets=[ast.Tuple(elts=left)], value=ast.Call() as value):
+                targets = [ast.unparse(target) for target in left]
+                return self._named(targets, self._results(value), as_is=as_is)
+            case _:
+                raise self._refuse(node)
+        return self._named(targets, [self.visit(value) for value in values], as_is=as_is)
+
+    def _named(self, targets: list[str], values: list[ast.expr], *, as_is: bool) -> list[Line]:
+        names = targets if as_is else [self.inliner.name(f"{self.where}_{t}") for t in targets]
+        self.known.update(
+            {} if as_is else {t: ast.Name(n) for t, n in zip(targets, names, strict=True)}
+        )
+        return [*self.before, *zip(names, values, strict=True)]
+
+    def _results(self, node: ast.Call) -> list[ast.expr]:
+        law = self.scope.get(node.func.id) if isinstance(node.func, ast.Name) else None
+        if law is None or node.keywords:
+            raise self._refuse(node)
+        lines = self.inliner.call(law, [self.visit(argument) for argument in node.args])
+        self.before += [line for line in lines if line[0]]
+        return [value for name, value in lines if not name]
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id in self.known:
+            return self.known[node.id]
+        value = self.scope.get(node.id)
+        return ast.Constant(float(value)) if isinstance(value, int | float) else node
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        match node.func:
+            case ast.Name(id="float"):
+                return self.visit(node.args[0])
+            case ast.Name(id=name) if name in _BUILT_IN:
+                wanted = _BUILT_IN[name]
+            case ast.Attribute(value=ast.Name(id="math"), attr=name) if name in _MATH:
+                wanted = _MATH[name]
+            case _:
+                (result,) = self._results(node)
+                return result
+        if len(node.args) != wanted or node.keywords:
+            raise self._refuse(node)
+        return ast.Call(ast.Name(name), [self.visit(argument) for argument in node.args], [])
+
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        if not isinstance(node, _OPERATORS) or (
+            isinstance(node, ast.Compare) and len(node.ops) > 1
+        ):
+            raise self._refuse(node)
+        return super().generic_visit(node)
+
+    def _refuse(self, node: ast.AST) -> TermError:
+        what = (ast.unparse(node) or type(node).__name__).splitlines()[0]
+        return TermError(
+            f"law {self.where}: {what!r} is not straight-line text; expected assignments and one "
+            "return, of + - * /, one comparison at a time, `a if c else b`, abs, min and max of "
+            "two, math.sqrt, math.floor, math.copysign and laws (see lane_math)"
+        )
+
+
+_trees: dict[Callable[..., Any], ast.FunctionDef] = {}
+
+
+def _tree(function: Callable[..., Any]) -> ast.FunctionDef:
+    if function not in _trees:
+        node = ast.parse(textwrap.dedent(source_of(function))).body[0]
+        if not isinstance(node, ast.FunctionDef):
+            msg = f"{function.__name__}: expected the source of a function"
+            raise TermError(msg)
+        _trees[function] = node
+    return _trees[function]

@@ -1,0 +1,104 @@
+"""A program as one loop over cars: the same lines as the tiles', a car after the other.
+
+It is what one would write by hand. Tests hold the tiles against it, the benchmark measures by it.
+"""
+
+from collections.abc import Sequence
+from textwrap import indent
+
+from scm.vehicles import body14
+from scm.vehicles.print_tiles import Slots, loads_of, motion_slots, print_line
+from scm.vehicles.program import Program, Stage
+from scm.vehicles.signals import Per
+
+_PAGE = '''"""{title}
+
+Generated from the car's list of terms, car by car: the reference of the kernel in tiles.
+"""
+
+import math
+
+import numpy as np
+
+from scm.vehicles.jit import fleet_kernel
+
+# rows of each wheel in `wheel`
+{wheel_rows}
+
+
+@fleet_kernel
+def advance(block, numbers, alive, status, first, last, steps, dt):
+    """Advance rows first..last-1 by `steps` substeps; a car that diverges is put back, marked."""
+    wheel = np.empty((4, {wheel_count}))
+    for row in range(first, last):
+        if not alive[row] or status[row] != 0:
+            continue
+        for w in range(4):
+            for slot in range({wheel_loads}):
+                wheel[w, slot] = block[{first_wheel} + 4 * slot + w, row]
+{load}
+{once}
+        for _ in range(steps):
+{substep}
+{end}
+        if verdict != 0.0:
+            status[row] = int(verdict)
+            for slot in {motion}:
+                block[slot, row] = 0.0
+            continue
+{store}
+        for w in range(4):
+            for slot in range({wheel_inputs}, {wheel_slots}):
+                block[{first_wheel} + 4 * slot + w, row] = wheel[w, slot]
+'''
+
+
+def print_plain(title: str, program: Program, slots: Slots, columns: Sequence[str]) -> str:
+    """Return the text of a kernel that goes car by car; `columns` names the car's numbers."""
+    first_wheel = min(offset for offset, width in slots.values() if width == 4)
+    stages = [*program.once, *program.substep, *program.end]
+    wheel = [name for name, (_, width) in slots.items() if width == 4]
+    for stage in (stage for stage in stages if stage.per is Per.WHEEL):
+        others = {name for other in stages if other is not stage for name in other.reads}
+        wheel += [name for name in stage.sets if name in others and name not in wheel]
+    for stage in (stage for stage in stages if stage.per is Per.BODY):
+        wheel = [name for name in wheel if name not in stage.sets]
+    body = [name for name, (_, width) in slots.items() if width == 1]
+    loaded = body[: first_wheel - len(body14.OUTPUTS[Per.BODY])]
+    kept = body[len(body14.INPUTS[Per.BODY]) :]
+    load = [f"{name} = block[{slots[name][0]}, row]" for name in loaded]
+    load += [f"{name} = numbers[{k}, row]" for k, name in enumerate(columns)]
+
+    def write(some: Sequence[Stage], width: int) -> str:
+        return indent("\n".join(_text(s, wheel) for s in some if s.lines), " " * width)
+
+    return _PAGE.format(
+        title=title,
+        wheel_rows="\n".join(f"{name.upper()} = {k}" for k, name in enumerate(wheel)),
+        wheel_count=len(wheel),
+        wheel_loads=sum(1 for name in wheel if name in slots) - len(body14.OUTPUTS[Per.WHEEL]),
+        wheel_inputs=len(body14.INPUTS[Per.WHEEL]),
+        wheel_slots=sum(1 for name in wheel if name in slots),
+        first_wheel=first_wheel,
+        load=indent("\n".join(load), " " * 8),
+        once=write(program.once, 8),
+        substep=write(program.substep, 12),
+        end=write(program.end, 8),
+        motion=motion_slots(slots),
+        store=indent("\n".join(f"block[{slots[n][0]}, row] = {n}" for n in kept), " " * 8),
+    )
+
+
+def _text(stage: Stage, wheel: Sequence[str]) -> str:
+    """Return one stage: a wheel's names wait in `wheel` from one loop to the next."""
+    lines = [print_line(line, branches=True) for line in stage.lines]
+    if stage.per is Per.BODY:
+        far = [name for name in loads_of(stage) if name[-3:-1] == "__"]
+        lines = [f"{n} = wheel[{n[-1]}, {n[:-3].upper()}]" for n in far] + lines
+        return f"# {stage.name}\n" + "\n".join(lines)
+    before = [f"{name} = wheel[w, {name.upper()}]" for name in loads_of(stage) if name in wheel]
+    after = [f"wheel[w, {name.upper()}] = {name}" for name in stage.sets if name in wheel]
+    place = ["front = 1.0 if w < 2 else 0.0", "side = 1.0 if w % 2 == 0 else -1.0"]
+    return f"# {stage.name}\nfor w in range(4):\n" + indent(
+        "\n".join([*place, *before, *lines, *after]), "    "
+    )

@@ -1,0 +1,247 @@
+"""A program as loops over lanes: tiles of cars, each in a local buffer of fixed shape.
+
+Every inner loop is straight-line text that runs a fixed number of times over neighbours in memory,
+so the compiler turns it into vector instructions without a question left open.
+"""
+
+import ast
+import copy
+from collections.abc import Mapping, Sequence
+from textwrap import indent
+
+from scm.vehicles import body14
+from scm.vehicles.inline import Line
+from scm.vehicles.lanes import LANES
+from scm.vehicles.program import Program, Stage
+from scm.vehicles.signals import Per
+
+Slots = Mapping[str, tuple[int, int]]
+
+_HEAD = '''"""{title}
+
+Generated from the car's list of terms: {lanes} cars at a time, one in each lane. `car` and `wheel`
+hold a tile of cars while it is worked on; a name in capitals is the row that a quantity waits in.
+A stage works on whole rows, so `a * b` is the product for each car; see `scm/vehicles/lanes.py`.
+"""
+
+import numpy as np
+
+from scm.vehicles.jit import fetch, fleet_kernel, put, rollout_kernel, stage
+
+# rows of `car`: those of the fleet's block, then the car's numbers, then what is worked out
+{car_rows}
+# rows of each wheel in `wheel`
+{wheel_rows}
+CAR_ROWS = {car_count}
+WHEEL_ROWS = {wheel_count}
+
+
+{stages}
+
+
+@fleet_kernel
+def advance(block, numbers, alive, status, first, last, steps, dt):
+    """Advance rows first..last-1 by `steps` substeps; a car that diverges is put back, marked."""
+    room = np.empty({lanes} * (CAR_ROWS + 4 * WHEEL_ROWS) + 8)
+    begin = (64 - room.ctypes.data % 64) // 8 % 8  # rows begin on a cache line
+    car = room[begin : begin + {lanes} * CAR_ROWS].reshape((CAR_ROWS, {lanes}))
+    wheel = room[begin + {lanes} * CAR_ROWS : begin + {lanes} * (CAR_ROWS + 4 * WHEEL_ROWS)]
+    wheel = wheel.reshape((4, WHEEL_ROWS, {lanes}))
+    for w in range(4):
+        wheel[w, FRONT] = 1.0 if w < 2 else 0.0
+        wheel[w, SIDE] = 1.0 if w % 2 == 0 else -1.0
+    going = np.empty({lanes}, np.bool_)
+    for start in range(first // {lanes} * {lanes}, last, {lanes}):
+        cars = 0
+        for i in range({lanes}):
+            row = start + i
+            going[i] = row >= first and row < last and alive[row] and status[row] == 0
+            cars += going[i]
+        if cars == 0:
+            continue
+        for slot in range({body_loads}):
+            fetch(car, slot, block, slot, start)
+        for column in range({columns}):
+            fetch(car, {first_wheel} + column, numbers, column, start)
+        for w in range(4):
+            for slot in range({wheel_loads}):
+                fetch(wheel, w * WHEEL_ROWS + slot, block, {first_wheel} + 4 * slot + w, start)
+{once}
+        for _ in range(steps):
+{substep}
+{end}
+        for i in range({lanes}):
+            if going[i] and car[VERDICT, i] != 0.0:
+                status[start + i] = int(car[VERDICT, i])
+                for slot in {motion}:
+                    block[slot, start + i] = 0.0
+                going[i] = False
+                cars = -1
+        if cars == {lanes}:
+            for slot in range({body_inputs}, {first_wheel}):
+                put(car, slot, block, slot, start)
+            for w in range(4):
+                for slot in range({wheel_inputs}, {wheel_slots}):
+                    put(wheel, w * WHEEL_ROWS + slot, block, {first_wheel} + 4 * slot + w, start)
+            continue
+        for i in range({lanes}):
+            if going[i]:
+                for slot in range({body_inputs}, {first_wheel}):
+                    block[slot, start + i] = car[slot, i]
+                for w in range(4):
+                    for slot in range({wheel_inputs}, {wheel_slots}):
+                        block[{first_wheel} + 4 * slot + w, start + i] = wheel[w, slot, i]
+
+
+@rollout_kernel
+def rollout(
+    block, numbers, alive, status, first, last, steps, dt, throttle, steering, slots, out
+):
+    """Drive rows first..last-1 through a recording; keep the slots after each of its steps."""
+    for start in range(first, last, {lanes}):
+        stop = min(last, start + {lanes})
+        for t in range(throttle.shape[0]):
+            for row in range(start, stop):
+                block[THROTTLE_COMMAND, row] = throttle[t, min(row, throttle.shape[1] - 1)]
+                block[STEERING_COMMAND, row] = steering[t, min(row, steering.shape[1] - 1)]
+            advance(block, numbers, alive, status, start, stop, steps, dt)
+            for k in range(slots.shape[0]):
+                for row in range(start, stop):
+                    out[t, k, row] = block[slots[k], row]
+'''
+
+
+def print_tiles(title: str, program: Program, slots: Slots, columns: Sequence[str]) -> str:
+    """Return the text of a kernel that goes tile by tile; `columns` names the car's numbers."""
+    first_wheel = min(offset for offset, width in slots.values() if width == 4)
+    rows = _Rows(program, slots, columns)
+    outputs, inputs = body14.OUTPUTS, body14.INPUTS
+    wheel_slots = sum(1 for _, width in slots.values() if width == 4)
+    stages = [stage for stage in rows.stages if stage.lines]
+
+    def calls(some: Sequence[Stage], width: int) -> str:
+        return indent("\n".join(rows.call(stage) for stage in some if stage.lines), " " * width)
+
+    return _HEAD.format(
+        title=title,
+        lanes=LANES,
+        car_rows=_named_rows(rows.car),
+        wheel_rows=_named_rows(rows.wheel),
+        car_count=len(rows.car),
+        wheel_count=len(rows.wheel),
+        stages="\n\n\n".join(rows.function(stage) for stage in stages),
+        columns=len(columns),
+        first_wheel=first_wheel,
+        body_inputs=len(inputs[Per.BODY]),
+        body_loads=first_wheel - len(outputs[Per.BODY]),
+        wheel_inputs=len(inputs[Per.WHEEL]),
+        wheel_loads=wheel_slots - len(outputs[Per.WHEEL]),
+        wheel_slots=wheel_slots,
+        once=calls(program.once, 8),
+        substep=calls(program.substep, 12),
+        end=calls(program.end, 8),
+        motion=motion_slots(slots),
+    )
+
+
+class _Rows:
+    """Which names of a program cross from one loop into another, and where they wait."""
+
+    def __init__(self, program: Program, slots: Slots, columns: Sequence[str]) -> None:
+        self.laws, self.fused = program.laws, program.substep
+        self.stages = [*program.once, *program.substep, *program.end]
+        self.car = [*(n for n, (_, width) in slots.items() if width == 1), *columns]
+        self.wheel = [*(n for n, (_, width) in slots.items() if width == 4), "front", "side"]
+        reads = [set(stage.reads) for stage in self.stages]
+        for k, stage in enumerate(self.stages):
+            others = set().union(*reads[:k], *reads[k + 1 :])
+            crossing = [n for n in stage.sets if n == "verdict" or n in others]
+            mine = self.car if stage.per is Per.BODY else self.wheel
+            mine += [n for n in crossing if n not in self.car and n not in self.wheel]
+        self.slots = set(slots)
+
+    def function(self, stage: Stage) -> str:
+        """Return one stage as a function of whole rows."""
+        body = [f"{n} = {self._place(n)}" for n in loads_of(stage) if n != "dt"]
+        fused = stage in self.fused
+        for k, line in enumerate(stage.lines):
+            if fused and (k == 0 or (line[0] in self.laws) != (stage.lines[k - 1][0] in self.laws)):
+                body.append('"laws"' if line[0] in self.laws else '"skeleton"')
+            body.append(print_line(line))
+        kept = [n for n in stage.sets if n in self.car or n in self.wheel]
+        body += [f"{self._place(n)} = {n}" for n in kept]
+        text = indent("\n".join(body), "    ")
+        return f"@stage\ndef {_function_name(stage)}(car, wheel, w, dt):\n{text}"
+
+    def call(self, stage: Stage) -> str:
+        """Return the call of one stage, for each wheel where it is a wheel's."""
+        if stage.per is Per.BODY:
+            return f"{_function_name(stage)}(car, wheel, 0, dt)"
+        return f"for w in range(4):\n    {_function_name(stage)}(car, wheel, w, dt)"
+
+    def _place(self, name: str) -> str:
+        if name[-3:-1] == "__":
+            return f"wheel[{name[-1]}, {name[:-3].upper()}]"
+        return f"car[{name.upper()}]" if name in self.car else f"wheel[w, {name.upper()}]"
+
+
+def _function_name(stage: Stage) -> str:
+    return stage.name.replace(" ", "_")
+
+
+def loads_of(stage: Stage) -> list[str]:
+    """Return what a stage reads from outside, a wheel's name with its wheel as it is written."""
+    names: dict[str, None] = {}
+    known: set[str] = set()
+    for name, value in stage.lines:
+        called = {id(n.func) for n in ast.walk(value) if isinstance(n, ast.Call)}
+        found = [n.id for n in ast.walk(value) if isinstance(n, ast.Name) and id(n) not in called]
+        names |= dict.fromkeys(n for n in found if n not in known)
+        known.add(name)
+    return list(names)
+
+
+def motion_slots(slots: Slots) -> str:
+    """Return the block's rows that a frozen car loses, as the text of a tuple."""
+    found = [
+        offset + w for n in body14.MOTION for offset, width in [slots[n]] for w in range(width)
+    ]
+    return f"({', '.join(map(str, sorted(found)))})"
+
+
+def _named_rows(names: Sequence[str]) -> str:
+    return "\n".join(f"{name.upper()} = {k}" for k, name in enumerate(names))
+
+
+def print_line(line: Line, *, branches: bool = False) -> str:
+    """Return a line as text; without branches its selects become `where`."""
+    name, value = line
+    spelled = _Spell(branches).visit(copy.deepcopy(value))
+    return f"{name} = {ast.unparse(ast.fix_missing_locations(spelled))}"
+
+
+class _Spell(ast.NodeTransformer):
+    def __init__(self, branches: bool) -> None:
+        self.branches = branches
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+        self.generic_visit(node)
+        if self.branches:
+            return node
+        return ast.Call(_numpy("where"), [node.test, node.body, node.orelse], [])
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        self.generic_visit(node)
+        match node.func:
+            case ast.Name(id="floor"):
+                return ast.Call(_numpy("floor"), node.args, [])
+            case ast.Name(id="sqrt" | "copysign" as name):
+                module = "math" if self.branches else "np"
+                return ast.Call(ast.Attribute(ast.Name(module), name), node.args, [])
+            case ast.Name(id="min" | "max" as name) if not self.branches:
+                return ast.Call(_numpy(f"{name}imum"), node.args, [])
+        return node
+
+
+def _numpy(name: str) -> ast.expr:
+    return ast.Attribute(ast.Name("np"), name)
