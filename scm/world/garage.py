@@ -1,6 +1,5 @@
 """The hosted cars' dynamics: one fleet a car file, so that one kernel call moves all its cars."""
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import cast
 
 import numpy as np
@@ -12,8 +11,6 @@ from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.ground import Ground
 from scm.world.slots import Slots
 
-WORTH_A_THREAD = 500
-TILE = 16
 _NOBODY: Ints = np.empty(0, np.int64)
 
 
@@ -30,7 +27,6 @@ class Garage:
         self.fleets: dict[str, Fleet] = {}
         self._rows: dict[str, Ints] = {}
         self._slots: dict[str, Ints] = {}
-        self._pool: ThreadPoolExecutor | None = None
         self._threads = 1
 
     def car(self, name: str) -> Car:
@@ -51,6 +47,7 @@ class Garage:
         """
         if name not in self.fleets:
             self.fleets[name] = Fleet(self.car(name), self._capacity)
+            self.fleets[name].threads = self._threads
         return self.fleets[name]
 
     def park(self, name: str, pose: Pose2, slot: int) -> tuple[Fleet, int]:
@@ -81,9 +78,10 @@ class Garage:
         return self._slots.get(name, _NOBODY)
 
     def use_threads(self, count: int) -> None:
-        """Let cars advance on several threads; it changes no number, no row depends on another."""
-        self._pool = ThreadPoolExecutor(count, "garage") if count > 1 else None
+        """Let fleets advance on several threads, those of today and those to come."""
         self._threads = count
+        for fleet in self.fleets.values():
+            fleet.threads = count
 
     def command(self, slots: Slots) -> None:
         """Tell all motors and servos what stands in the slots."""
@@ -97,19 +95,7 @@ class Garage:
         for name, rows in self._rows.items():
             if len(rows):
                 ground.feel(self.fleets[name], t_ns)
-                self._advance(self.fleets[name], int(rows.max()) + 1, duration)
-
-    def _advance(self, fleet: Fleet, count: int, duration: float) -> None:
-        if self._pool is None or count < WORTH_A_THREAD * self._threads:
-            fleet.advance_rows(0, count, duration)
-            return
-        share = -(-count // (self._threads * TILE)) * TILE
-        starts = range(0, count, share)
-        list(
-            self._pool.map(
-                lambda first: fleet.advance_rows(first, min(first + share, count), duration), starts
-            )
-        )
+                self.fleets[name].advance(duration)
 
     def locate(self, slots: Slots) -> None:
         """Write where all cars are and how they move into the slots."""

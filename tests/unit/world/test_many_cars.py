@@ -14,7 +14,8 @@ from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
-from scm.world import garage, publish
+from scm.vehicles import fleet
+from scm.world import publish
 from scm.world.part import WorldPart
 
 TICK_NS = 20_000_000
@@ -41,7 +42,7 @@ def messages(said, kind):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_city_runs_the_same_again_on_any_number_of_threads(threads, monkeypatch):
-    monkeypatch.setattr(garage, "WORTH_A_THREAD", 1)
+    monkeypatch.setattr(fleet, "_TILES_A_THREAD", 1)
     first, _ = run(100, cars(40))
     again, _ = run(100, cars(40), threads)
     for name in ("x", "y", "yaw", "speed", "throttle", "steering"):
