@@ -74,7 +74,7 @@ def _problems(term: Term) -> Iterator[str]:
 
 
 def _order(terms: Sequence[Term], per: Per, setters: dict[str, Term]) -> list[str]:
-    """Return term, chain-signal and own steps' names of a stage in an order that can be computed."""
+    """Return a stage's terms, chain signals and own steps in an order that can be computed."""
     graph: dict[str, set[str]] = {}
     chain = {s.name: s for s in SIGNALS.values() if s.role is Role.CHAIN and s.per is per}
     for name, signal in chain.items():

@@ -65,7 +65,8 @@ STATES = {
         "accel_x", "accel_y", "accel_z", "roll_accel", "pitch_accel", "yaw_accel",
     ),
     Per.WHEEL: (
-        "floor_height", "hop", "wheel_angle", "wheel_load", "wheel_slope", "hop_rate", "wheel_speed",
+        "floor_height", "hop", "wheel_angle", "wheel_load", "wheel_slope", "hop_rate",
+        "wheel_speed",
     ),
 }  # fmt: skip
 OUTPUTS = {

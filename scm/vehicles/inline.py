@@ -9,7 +9,7 @@ import ast
 import copy
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, cast
 
 from scm.errors import TermError
 from scm.vehicles.jit import plain, source_of
@@ -124,7 +124,7 @@ class _Body(ast.NodeTransformer):
     def visit_Call(self, node: ast.Call) -> ast.expr:
         match node.func:
             case ast.Name(id="float"):
-                return self.visit(node.args[0])
+                return cast("ast.expr", self.visit(node.args[0]))
             case ast.Name(id=name) if name in _BUILT_IN:
                 wanted = _BUILT_IN[name]
             case ast.Attribute(value=ast.Name(id="math"), attr=name) if name in _MATH:

@@ -89,20 +89,20 @@ def stage(function: Function) -> Function:
                 write.line(line)
         return context.get_dummy_value()
 
-    @numba.extending.intrinsic  # type: ignore[untyped-decorator]
+    @numba.extending.intrinsic
     def compiled(_: object, car: Any, wheel: Any, w: Any, dt: Any) -> Any:
         return numba.void(car, wheel, numba.int64, numba.float64), code
 
     return cast("Function", compiled)
 
 
-@numba.extending.intrinsic  # type: ignore[untyped-decorator]
+@numba.extending.intrinsic
 def fetch(_: object, rows: Any, row: Any, block: Any, slot: Any, start: Any) -> Any:
     """Copy the lanes from `start` of one slot of the block into a row of a buffer."""
     return _copying(rows, row, block, slot, start, into_block=False)
 
 
-@numba.extending.intrinsic  # type: ignore[untyped-decorator]
+@numba.extending.intrinsic
 def put(_: object, rows: Any, row: Any, block: Any, slot: Any, start: Any) -> Any:
     """Copy a row of a buffer into the lanes from `start` of one slot of the block."""
     return _copying(rows, row, block, slot, start, into_block=True)
@@ -114,7 +114,7 @@ def _copying(rows: Any, row: Any, block: Any, slot: Any, start: Any, *, into_blo
             context.make_array(signature.args[i])(context, builder, value=arguments[i])
             for i in (0, 2)
         )
-        width = cgutils.unpack_tuple(builder, far.shape, 2)[1]
+        width = cast("Any", cgutils).unpack_tuple(builder, far.shape, 2)[1]
         lanes = ir.Constant(arguments[1].type, LANES)
         own = builder.gep(near.data, [builder.mul(arguments[1], lanes)])
         other = builder.gep(far.data, [builder.add(builder.mul(arguments[3], width), arguments[4])])

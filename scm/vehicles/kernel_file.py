@@ -1,8 +1,9 @@
 """A kernel's text becomes a file in the cache folder, and that file a compiled function.
 
 The file holds all laws of the car; its name holds a hash of it and of the machine that reads it,
-because numba's cache does not see imported files change. Several processes may do this at the same time, also while files are being edited:
-what counts is the code that this process has loaded. Damaged files are written anew.
+because numba's cache does not see imported files change. Several processes may do this at the same
+time, also while files are being edited: what counts is the code that this process has loaded.
+Damaged files are written anew.
 """
 
 import hashlib

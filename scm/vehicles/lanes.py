@@ -8,7 +8,7 @@ and the result of a lane does not depend on its neighbours.
 
 import ast
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 from llvmlite import ir
 from numba.core import cgutils
@@ -31,8 +31,8 @@ class Rows:
     """Writes a stage's lines for the lanes that begin at `first`, into an LLVM function."""
 
     def __init__(
-        self, builder: Any, bases: Mapping[str, Any], rows: Mapping[str, int], strides: Mapping[str, Any],
-        scalars: Mapping[str, Any],
+        self, builder: Any, bases: Mapping[str, Any], rows: Mapping[str, int],
+        strides: Mapping[str, Any], scalars: Mapping[str, Any],
     ) -> None:  # fmt: skip
         self.builder, self.bases, self.rows, self.strides = builder, bases, rows, strides
         self.flags: tuple[str, ...] = ()
@@ -48,9 +48,10 @@ class Rows:
             case ast.Assign(targets=[ast.Subscript() as place], value=value):
                 self.builder.store(self.value(value), self._address(place), align=64)
             case _:
-                raise TermError(f"{ast.unparse(line)!r} is not row arithmetic")
+                msg = f"{ast.unparse(line)!r} is not row arithmetic"
+                raise TermError(msg)
 
-    def value(self, node: ast.expr) -> Any:
+    def value(self, node: ast.expr) -> Any:  # noqa: PLR0911 one for each kind of expression
         """Write an expression; return its vector."""
         match node:
             case ast.Name(id=name):
@@ -73,7 +74,8 @@ class Rows:
             case ast.Call(func=function, args=arguments):
                 name = ast.unparse(function).rpartition(".")[2]
                 return self._call(name, [self.value(argument) for argument in arguments])
-        raise TermError(f"{ast.unparse(node)!r} is not row arithmetic")
+        msg = f"{ast.unparse(node)!r} is not row arithmetic"
+        raise TermError(msg)
 
     def _call(self, name: str, values: list[Any]) -> Any:
         match name, values:
@@ -86,31 +88,32 @@ class Rows:
             case _ if name in _INTRINSICS:
                 kind = ir.FunctionType(_VECTOR, [_VECTOR] * len(values))
                 full = f"{_INTRINSICS[name]}.v{WIDTH}f64"
-                function = cgutils.insert_pure_function(self.builder.module, kind, full)
+                module: Any = self.builder.module
+                function = cast("Any", cgutils).insert_pure_function(module, kind, full)
                 return self.builder.call(function, values)
-        raise TermError(f"{name} is not row arithmetic")
+        msg = f"{name} is not row arithmetic"
+        raise TermError(msg)
 
     def _compare(self, how: str, left: Any, right: Any) -> Any:
         compare = self.builder.fcmp_unordered if how == "!=" else self.builder.fcmp_ordered
         return compare(how, left, right)
 
     def _address(self, place: ast.Subscript) -> Any:
-        base = self.bases[ast.unparse(place.value)]
+        base, lanes = self.bases[ast.unparse(place.value)], ir.IntType(64)
         match place.slice:
             case ast.Name(id=row):
-                offset = ir.Constant(ir.IntType(64), LANES * self.rows[row])
-            case ast.Tuple(elts=[wheel, ast.Name(id=row)]):
-                first = ir.Constant(ir.IntType(64), LANES * self.rows[row])
-                at = (
-                    ir.Constant(ir.IntType(64), wheel.value * LANES * self.rows["WHEEL_ROWS"])
-                    if isinstance(wheel, ast.Constant)
-                    else self.strides["w"]
+                offset = ir.Constant(lanes, LANES * self.rows[row])
+            case ast.Tuple(elts=[ast.Constant(value=int() as wheel), ast.Name(id=row)]):
+                offset = ir.Constant(
+                    lanes, LANES * (wheel * self.rows["WHEEL_ROWS"] + self.rows[row])
                 )
-                offset = self.builder.add(first, at)
+            case ast.Tuple(elts=[ast.Name(id="w"), ast.Name(id=row)]):
+                own = ir.Constant(lanes, LANES * self.rows[row])
+                offset = self.builder.add(own, self.strides["w"])
             case _:
-                raise TermError(f"{ast.unparse(place)!r} is not a row")
-        pointer = self.builder.gep(base, [offset])
-        return self.builder.bitcast(pointer, _VECTOR.as_pointer())
+                msg = f"{ast.unparse(place)!r} is not a row"
+                raise TermError(msg)
+        return _pointer(self.builder, base, [offset])
 
     def _splat(self, scalar: Any) -> Any:
         one = self.builder.insert_element(

@@ -1,7 +1,7 @@
 """What a car was commanded a while ago: its commands' integral over time, at a few instants.
 
-The mean of a command over the last call, one delay earlier, is a difference of that integral: smooth
-in the delay, exact where calls are regular and where there is no delay.
+The mean of a command over the last call, one delay earlier, is a difference of that integral:
+smooth in the delay, exact where calls are regular and where there is no delay.
 """
 
 import math
@@ -89,10 +89,10 @@ def _integral(knots: Floats, newest: int, k: int, time: float, before: float) ->
     """Integral of command k up to a time; before the first knot it was `before`."""
     oldest = max(0, newest - KNOTS + 1)
     if time <= knots[oldest % KNOTS, 0]:
-        return knots[oldest % KNOTS, k + 1] + before * (time - knots[oldest % KNOTS, 0])
+        return float(knots[oldest % KNOTS, k + 1] + before * (time - knots[oldest % KNOTS, 0]))
     j = newest
     while j > oldest + 1 and knots[(j - 1) % KNOTS, 0] >= time:
         j -= 1
     late, early = knots[j % KNOTS], knots[(j - 1) % KNOTS]
     share = (time - early[0]) / (late[0] - early[0])
-    return early[k + 1] + share * (late[k + 1] - early[k + 1])
+    return float(early[k + 1] + share * (late[k + 1] - early[k + 1]))

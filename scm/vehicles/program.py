@@ -9,6 +9,7 @@ import ast
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import cast
 
 from scm.vehicles.inline import Line
 from scm.vehicles.signals import Per
@@ -89,7 +90,8 @@ class Program:
         return numbers
 
     def _part_constants(self) -> None:
-        counts, made = self._counts(), {}
+        counts = self._counts()
+        made: dict[str, str] = {}
         for stage in self._stages():
             live: list[Line] = []
             for name, value in stage.lines:
@@ -97,7 +99,7 @@ class Program:
                 if counts[name] == 1 and name not in self.kept and hoist.is_constant(value):
                     hoist.keep(name, value)
                 else:
-                    live.append((name, hoist.visit(value)))
+                    live.append((name, cast("ast.expr", hoist.visit(value))))
             stage.lines = live
 
     def _drop_unread(self) -> None:
@@ -252,7 +254,7 @@ class _Products(ast.NodeTransformer):
         return node
 
     def _one_over(self, node: ast.BinOp) -> ast.expr:
-        """Return a division of numbers: by a name of this stage as a product with its reciprocal."""
+        """Return a division of numbers: by a name of this stage as a product."""
         if not isinstance(node.right, ast.Name) or node.right.id not in self.here:
             return node
         self.divisors.add(node.right.id)

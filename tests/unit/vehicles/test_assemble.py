@@ -124,7 +124,7 @@ def test_a_law_may_not_use_what_a_lane_cannot(line, tmp_path, monkeypatch):
     (tmp_path / f"{name}.py").write_text(f"def odd(vx, vy):\n    return {line}\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     odd = importlib.import_module(name).odd
-    with pytest.raises(TermError, match="law odd: .* is not straight-line text"):
+    with pytest.raises(TermError, match=r"law odd: .* is not straight-line text"):
         write_page("odd", [*STANDARD, of(odd, adds="force_x")])
 
 
