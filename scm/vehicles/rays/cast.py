@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, inlined
 from scm.vehicles.rays.grid import Cells, Numbers, Window, cell_size, fits, sort_bodies, window_of
 from scm.vehicles.rays.order import SECTORS, WIDTH, Order, Sectors, order_of, sectors_of
 from scm.vehicles.rays.scene import Scene
@@ -146,19 +146,19 @@ def _cast(
         _keep(beams, ranges, k)
 
 
-@law
+@inlined
 def _begin(beams: Floats) -> None:
     for b in range(beams.shape[1]):  # a plain loop: numba takes 2 s to compile `beams[0] = inf`
         beams[0, b] = np.inf
 
 
-@law
+@inlined
 def _keep(beams: Floats, ranges: Floats, k: int) -> None:
     for b in range(beams.shape[1]):
         ranges[k, b] = beams[0, b]
 
 
-@law
+@inlined
 def _close(still: np.uint64, begin: Numbers, end: Numbers, beams: Floats, near: float) -> np.uint64:
     """Return the sectors, from beam 0, that still see beyond `near`, of those that did."""
     for sector in range(SECTORS):
@@ -172,14 +172,14 @@ def _close(still: np.uint64, begin: Numbers, end: Numbers, beams: Floats, near: 
     return still
 
 
-@law
+@inlined
 def _rotated(bits: np.uint64, by: int) -> np.uint64:
     left = np.uint64(by % SECTORS)
     right = np.uint64((SECTORS - by % SECTORS) % SECTORS)
     return (bits << left) | (bits >> right)
 
 
-@law
+@inlined
 def _look_at_walls(
     beams: Floats, turn: Turn, k: int, edges: Floats, begin: int, end: int, items: Numbers,
     seen: Numbers,
@@ -197,7 +197,7 @@ def _look_at_walls(
             _draw(beams, turn.a_step, turn.reach, ax, ay, bx, by, moment)
 
 
-@law
+@inlined
 def _look_at_bodies(
     beams: Floats, turn: Turn, k: int, own: int, outlines: Floats, owners: Ints, begin: int,
     end: int, items: Numbers, seen: Numbers,
@@ -210,20 +210,20 @@ def _look_at_bodies(
             _draw_body(beams, turn, outlines, 4 * m)
 
 
-@law
+@inlined
 def _cell(i: int, j: int, ni: int, nj: int) -> int:
     """Return the number of a cell of a window; -1 outside it."""
     return i * nj + j if (i >= 0) & (i < ni) & (j >= 0) & (j < nj) else -1
 
 
-@law
+@inlined
 def _seen_from(turn: Turn, x: float, y: float) -> tuple[float, float]:
     """Return a point of the map in the turn's frame."""
     dx, dy = x - turn.x, y - turn.y
     return turn.c * dx + turn.s * dy, turn.c * dy - turn.s * dx
 
 
-@law
+@inlined
 def _draw_body(beams: Floats, turn: Turn, outlines: Floats, first: int) -> None:
     """Draw the faces of a body that look towards the scanner; from inside it, all."""
     x0, y0 = _seen_from(turn, outlines[first, 0], outlines[first, 1])
@@ -243,7 +243,7 @@ def _draw_body(beams: Floats, turn: Turn, outlines: Floats, first: int) -> None:
         x0, y0, x1, y1, x2, y2, x3, y3 = x1, y1, x2, y2, x3, y3, x0, y0
 
 
-@law
+@inlined
 def _draw(
     beams: Floats, a_step: float, reach: float, ax: float, ay: float, bx: float, by: float,
     moment: float,
@@ -279,7 +279,7 @@ def _draw(
         _lower(beams, reach, math.ceil(begin), min(math.floor(end), last), ax, ay, bx, by, moment)
 
 
-@law
+@inlined
 def _lower(
     beams: Floats, reach: float, low: int, high: int, ax: float, ay: float, bx: float, by: float,
     moment: float,
@@ -298,7 +298,7 @@ def _lower(
         b += 1
 
 
-@law
+@inlined
 def bearing(x: float, y: float) -> float:
     """Return the angle of a vector from the x axis to 2e-5 rad [rad]."""
     a, b = abs(x), abs(y)

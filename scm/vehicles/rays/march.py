@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, inlined
 from scm.vehicles.rays.cast import CORNER, EDGE_ON, near_each_other, sorted_scene
 from scm.vehicles.rays.grid import Numbers, Window
 from scm.vehicles.rays.scene import Scene
@@ -107,7 +107,7 @@ def _march(
             ranges[k, b] = nearest if nearest < farthest else np.inf
 
 
-@law
+@inlined
 def _meet_body(x: float, y: float, ux: float, uy: float, outlines: Floats, first: int) -> float:
     """Return how far along a beam it meets a body; infinity where it does not."""
     nearest = math.inf
@@ -116,7 +116,7 @@ def _meet_body(x: float, y: float, ux: float, uy: float, outlines: Floats, first
     return nearest
 
 
-@law
+@inlined
 def _to_border(x: float, u: float, cell: int, size: float) -> tuple[float, float]:
     """Return how far along a beam the next border of cells is, and how far apart they are."""
     if abs(u) < SLOW:
@@ -125,7 +125,7 @@ def _to_border(x: float, u: float, cell: int, size: float) -> tuple[float, float
     return (border - x) / u, size / abs(u)
 
 
-@law
+@inlined
 def _listed(window: Window, starts: Numbers, i: int, j: int) -> tuple[int, int]:
     """Return where the items of a cell begin and end."""
     a, b = i - window.i0, j - window.j0
@@ -135,7 +135,7 @@ def _listed(window: Window, starts: Numbers, i: int, j: int) -> tuple[int, int]:
     return starts[cell], starts[cell + 1]
 
 
-@law
+@inlined
 def _meet(x: float, y: float, ux: float, uy: float, faces: Floats, m: int) -> float:
     """Return how far along a beam it meets a face; infinity where it does not."""
     ax, ay = faces[m, 0] - x, faces[m, 1] - y
