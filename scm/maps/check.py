@@ -9,7 +9,7 @@ import msgspec
 from scm.errors import nearest
 from scm.geometry import wrap_angle
 from scm.maps.floor_check import floor_problems
-from scm.maps.model import CityMap, Segment
+from scm.maps.model import CityMap, Conflict, Group, Segment
 from scm.maps.route import LanePath
 
 JOIN_M = 0.001
@@ -148,8 +148,9 @@ def _references(city_map: CityMap) -> Iterator[str]:
     groups = {j.name: [group.name for group in j.groups] for j in city_map.junctions}
     for index, junction in enumerate(city_map.junctions):
         for number, group in enumerate(junction.groups):
-            where = f"junctions[{index}].groups[{number}] ({group.name}).movement.lane"
-            yield from _known(where, "lane", group.movement.lane, lanes)
+            where = f"junctions[{index}].groups[{number}] ({group.name})"
+            for key, move in _movements(group):
+                yield from _known(f"{where}.{key}.lane", "lane", move.lane, lanes)
     for index, line in enumerate(city_map.stop_lines):
         where = f"stop_lines[{index}] ({line.name})"
         yield from _known(f"{where}.lane", "lane", line.lane, lanes)
@@ -220,14 +221,23 @@ def _places(city_map: CityMap, paths: dict[str, LanePath]) -> Iterator[str]:
             yield from _on_lane(where, spawn.at_m, paths[spawn.lane])
     for index, junction in enumerate(city_map.junctions):
         for number, group in enumerate(junction.groups):
-            move, where = group.movement, f"junctions[{index}].groups[{number}] ({group.name})"
-            yield from _on_lane(f"{where}.movement.from_m", move.from_m, paths[move.lane])
-            yield from _on_lane(f"{where}.movement.to_m", move.to_m, paths[move.lane])
-            if move.from_m >= move.to_m:
-                yield (
-                    f"{where}.movement.to_m: expected more than from_m = {move.from_m}, "
-                    f"got {move.to_m}"
-                )
+            where = f"junctions[{index}].groups[{number}] ({group.name})"
+            for key, move in _movements(group):
+                yield from _stretch(f"{where}.{key}", move, paths[move.lane])
+
+
+def _movements(group: Group) -> list[tuple[str, Conflict]]:
+    """Return the ways that a group releases, each with its key in the file."""
+    more = [(f"more[{number}]", move) for number, move in enumerate(group.more)]
+    return [("movement", group.movement), *more]
+
+
+def _stretch(where: str, move: Conflict, path: LanePath) -> Iterator[str]:
+    """Doubt that a movement lies on its lane and runs forward."""
+    yield from _on_lane(f"{where}.from_m", move.from_m, path)
+    yield from _on_lane(f"{where}.to_m", move.to_m, path)
+    if move.from_m >= move.to_m:
+        yield f"{where}.to_m: expected more than from_m = {move.from_m}, got {move.to_m}"
 
 
 def _on_lane(where: str, at_m: float, path: LanePath) -> Iterator[str]:

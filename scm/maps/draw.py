@@ -8,6 +8,9 @@ import itertools
 import math
 from xml.sax.saxutils import escape
 
+import numpy as np
+
+from scm.arrays import Floats
 from scm.geometry import Pose2
 from scm.maps import furniture
 from scm.maps.floor_draw import floor_layers, wind_arrow
@@ -125,9 +128,8 @@ def _road(city_map: CityMap) -> str:
 
 def _paint(city_map: CityMap, roads: Roads) -> str:
     """Return what is painted on the road: arrows, crosswalks, stop lines."""
-    kept_clear = [
-        (crossing.x_m, crossing.y_m, crossing.length_m) for crossing in city_map.crosswalks
-    ]
+    crossings = [(walk.x_m, walk.y_m, walk.length_m) for walk in city_map.crosswalks]
+    kept_clear = np.array(crossings, np.float64).reshape(-1, 3)
     arrows = [arrow for lane in roads.lanes.values() for arrow in _arrows(lane, roads, kept_clear)]
     stops = []
     for line in city_map.stop_lines:
@@ -154,47 +156,46 @@ def _paint(city_map: CityMap, roads: Roads) -> str:
 
 def _movements(roads: Roads) -> list[str]:
     """Return each group's way through its junction as a faint dashed guide."""
+    ways = (
+        (junction.name, group.name, count, move)
+        for junction in roads.city_map.junctions
+        for group in junction.groups
+        for count, move in enumerate(group.movements)
+    )
     drawn = []
-    for junction in roads.city_map.junctions:
-        for group in junction.groups:
-            move, lane = group.movement, roads.lanes[group.movement.lane]
-            inside = lane.points[(lane.s >= move.from_m) & (lane.s <= move.to_m)]
-            points = [(float(x), float(y)) for x, y in inside[::2]]
-            drawn.append(
-                element(
-                    "path",
-                    id=f"movement-{group.name}",
-                    class_="movement",
-                    fill="none",
-                    d=outline(points, closed=False),
-                    stroke=PAINT,
-                    stroke_opacity=0.35,
-                    stroke_width=0.008,
-                    stroke_dasharray="0.03 0.03",
-                    data_group=group.name,
-                    data_junction=junction.name,
-                )
+    for junction, group, count, move in ways:
+        lane = roads.lanes[move.lane]
+        inside = lane.points[(lane.s >= move.from_m) & (lane.s <= move.to_m)]
+        points = [(float(x), float(y)) for x, y in inside[::2]]
+        drawn.append(
+            element(
+                "path",
+                id=f"movement-{group}" if count == 0 else f"movement-{group}-{count}",
+                class_="movement",
+                fill="none",
+                d=outline(points, closed=False),
+                stroke=PAINT,
+                stroke_opacity=0.35,
+                stroke_width=0.008,
+                stroke_dasharray="0.03 0.03",
+                data_group=group,
+                data_junction=junction,
             )
+        )
     return drawn
 
 
-def _arrows(
-    lane: LanePath, roads: Roads, kept_clear: list[tuple[float, float, float]]
-) -> list[str]:
+def _arrows(lane: LanePath, roads: Roads, kept_clear: Floats) -> list[str]:
     """Return arrows along a lane, none on its crosswalks, stop lines or conflict stretches."""
-    stretches = [
-        (group.movement.from_m - 0.12, group.movement.to_m)
-        for junction in roads.city_map.junctions
-        for group in junction.groups
-        if group.movement.lane == lane.name
-    ]
+    stretches = [(move.from_m - 0.12, move.to_m) for _, move in roads.movements_on(lane.name)]
     count = max(1, round(lane.length_m / ARROW_EVERY_M))
     arrows = []
     for k in range(count):
         s = (k + 0.5) * lane.length_m / count
         pose = lane.at(s)
         in_conflict = any(low <= s <= high for low, high in stretches)
-        on_stripes = any(math.hypot(pose.x - x, pose.y - y) < r + 0.06 for x, y, r in kept_clear)
+        x, y, reach = kept_clear.T
+        on_stripes = bool((np.hypot(pose.x - x, pose.y - y) < reach + 0.06).any())
         if not in_conflict and not on_stripes:
             arrows.append(_arrow(pose))
     return arrows

@@ -79,7 +79,7 @@ def _find(name_or_path: str | Path) -> Path:
     names = map_names()
     raise MapError(
         f"no map {str(name_or_path)!r}{nearest(str(name_or_path), names)}: "
-        f"expected a file, or one of {', '.join(names)}"
+        f"expected a file, one of {', '.join(names)}, or a made city as in grid:6x4"
     )
 
 
