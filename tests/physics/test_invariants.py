@@ -89,6 +89,20 @@ def test_a_car_whose_tyres_remember_stands_on_a_slope(slope, uphill, steering, l
 
 
 @FEW
+@given(slope_x=st.floats(-0.1, 0.1), slope_y=st.floats(-0.1, 0.1), yaw=st.floats(-3.1, 3.1))
+def test_it_stands_on_a_floor_that_slopes_too(slope_x, slope_y, yaw):
+    held = {"tyre_relaxation.length_m": 0.02, "tyre_windup.length_m": 0.02}
+    fleet = one(load_car("nigel").with_terms((*HOLDING, "grade"), held), yaw)
+    fleet.floor_slope_x[0], fleet.floor_slope_y[0] = slope_x, slope_y
+    fleet.floor_height[0] = slope_x * fleet.wheel_x[0] + slope_y * fleet.wheel_y[0]
+    fleet.advance(4.0)
+    settled = np.array([fleet.x[0], fleet.y[0], fleet.yaw[0]])
+    fleet.advance(4.0)
+    moved = np.abs(np.array([fleet.x[0], fleet.y[0], fleet.yaw[0]]) - settled).max()
+    assert moved < 1e-6
+
+
+@FEW
 @given(
     drags=numbers(DRAGS),
     speed=st.floats(0.5, 3.0),
