@@ -10,6 +10,7 @@ a device that nobody wanted for a while go on as if it had been wanted all along
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_S
 from scm.vehicles.car import Car
 from scm.vehicles.jit import array_kernel
-from scm.vehicles.noise import Keys, bases_of, key_of, uniforms
+from scm.vehicles.noise import Keys, bases_of, key_of, normals, uniforms
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
 from scm.vehicles.spoil import spoil, wander
@@ -79,6 +80,7 @@ class Bank:
         self._key: Keys = np.zeros(0, np.uint64)
         self._wandered: Floats = np.zeros((0, 0))
         self._grow(capacity)
+        _warm()
 
     def fit(
         self, slot: int, name: str, car: Car, truth: Truth, row: int, now_ns: int,
@@ -219,6 +221,14 @@ class Bank:
         self._period, self._number = longer(self._period, 1), longer(self._number, 0)
         self._life, self._second = longer(self._life, 0), longer(self._second, NOBODY)
         self._key = longer(self._key, 0)
+
+
+@cache
+def _warm() -> None:
+    """Compile or load the kernels now, and not at the first reading."""
+    nobody: Ints = np.zeros(0, np.int64)
+    normals(bases_of(nobody.astype(np.uint64), nobody), 1)
+    _find_due(0, 0, np.zeros(0, np.bool_), nobody, nobody, nobody, nobody, nobody)
 
 
 @array_kernel
