@@ -114,8 +114,9 @@ def plain(city_map: CityMap, motion: Floats, *, moving: bool) -> Callable[[int],
     space = pymunk.Space()
     space.iterations = ITERATIONS
     space.add(*solids(space.static_body, city_map))
-    for _ in range(len(motion)):
+    for x, y, yaw in motion[:, :3].tolist():
         body = car_body(HULL)
+        body.position, body.angle = (x, y), yaw
         space.add(body, *body.shapes)
     into, out = batch.Buffer(), batch.Buffer()
     block = np.zeros((len(motion) + 1, 6))

@@ -172,7 +172,7 @@ class _Ring:
             motion: (n, 6).
             rows: Those that touch something.
         """
-        self._let_in(keys[rows].tolist())
+        self._let_in(keys[rows].tolist(), motion[rows, :3].tolist())
         row_of = np.empty(int(keys.max()) + 1, np.int64)
         row_of[keys] = np.arange(len(keys))
         inside = row_of[self._order]
@@ -207,16 +207,20 @@ class _Ring:
         depths = -np.minimum(floats[:, 2], np.where(ints[:, 2] > 1, floats[:, 3], np.inf))
         return pairs, floats[:, :2], depths
 
-    def _let_in(self, keys: list[int]) -> None:
-        """Take in who touches something; let go who has not for long."""
+    def _let_in(self, keys: list[int], poses: list[list[float]]) -> None:
+        """Take in who touches something; let go who has not for long.
+
+        Each comes in at its place: where all came in at one, the space would pair all with all.
+        """
         left = {key: steps - 1 for key, steps in self._left.items()}
-        new = [key for key in keys if key not in left]
+        new = {key: pose for key, pose in zip(keys, poses, strict=True) if key not in left}
         left.update(dict.fromkeys(keys, KEPT_STEPS))
         self._left = left
-        for key in new:
+        for key, (x, y, yaw) in new.items():
             if key not in self._bodies:
                 self._bodies[key] = self._made(key)
             body = self._bodies[key]
+            body.position, body.angle = (x, y), yaw
             self._space.add(body, *body.shapes, *body.constraints)
         old = [key for key, steps in left.items() if steps <= 0]
         if old:

@@ -1,6 +1,6 @@
 """Collisions of whole cars in the world: momentum, bounce, walls, and nobody else disturbed.
 
-Where momentum is judged the tyres' force is set to zero: on ice the floor takes nothing, and what
+Where momentum is judged the floor has no grip: on ice the floor takes nothing, and what
 is left is what the contact impulses say.
 """
 
@@ -42,9 +42,7 @@ def put(world, name, pose, speed=0.0, car="nigel", ice=False):
     hosted = world.host(name, car, Pose2(*pose), 0)
     hosted.fleet.place(hosted.row, Pose2(*pose), speed)
     if ice:
-        for parameter in ("force_extremum", "force_asymptote"):
-            hosted.fleet.set_parameter(hosted.row, f"tyre.{parameter}", 0.0)
-            hosted.fleet.set_parameter(hosted.row, f"tyre.lateral_{parameter}", 0.0)
+        hosted.fleet.floor_grip[hosted.row] = 0.0
     return hosted
 
 
@@ -190,9 +188,7 @@ class Agent:
         self.fleet.add(Pose2(*pose), speed)
         self.told, self._under_way, self.felt = [], [], 0
         if ice:
-            for key in ("force_extremum", "force_asymptote"):
-                self.fleet.set_parameter(0, f"tyre.{key}", 0.0)
-                self.fleet.set_parameter(0, f"tyre.lateral_{key}", 0.0)
+            self.fleet.floor_grip[0] = 0.0
 
     def step(self, now):
         """Move a tick, having heard the contacts of the tick before last; report."""
