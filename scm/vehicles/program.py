@@ -159,7 +159,11 @@ class _Tidy(ast.NodeTransformer):
         return isinstance(value, ast.Name) and self._is_steady(value.id) and "__" not in value.id
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
-        return self.known.get(node.id, node)
+        name, _, wheel = node.id.partition("__")
+        known = self.known.get(name)
+        if known is None:
+            return node
+        return ast.Name(f"{known.id}__{wheel}") if wheel and isinstance(known, ast.Name) else known
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
         self.generic_visit(node)

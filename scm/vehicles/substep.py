@@ -28,23 +28,6 @@ axle_rear = 0.5 * (wheel_speed__2 + wheel_speed__3)
 drive_omega = (2.0 * front_driven * axle_front + 2.0 * rear_driven * axle_rear) * (
     1.0 / max(2.0 * (front_driven + rear_driven), 1.0)
 )
-all_seat_force = 0.0
-all_seat_roll = 0.0
-all_seat_pitch = 0.0
-all_seat_stiff = 0.0
-all_seat_stiff_y = 0.0
-all_seat_stiff_x = 0.0
-all_seat_stiff_xy = 0.0
-all_seat_stiff_xx = 0.0
-all_contact_x = 0.0
-all_contact_y = 0.0
-all_contact_turn = 0.0
-all_stiff_xx = 0.0
-all_stiff_xy = 0.0
-all_stiff_yy = 0.0
-all_turn_x = 0.0
-all_turn_y = 0.0
-all_turn_turn = 0.0
 """
 
 WHEEL = """
@@ -94,42 +77,62 @@ spin, spin_follow, force_long, stiff_long = eliminate_spin(
     dt, omega, spin_inertia + extra_inertia, wheel_radius, wheel_torque, wheel_torque_damping,
     dry_torque, tyre_x, tyre_x_damping
 )
-contact_x, contact_y, stiff_xx, stiff_xy, stiff_yy = turn_contact(
+turned_x, turned_y, stiff_xx, stiff_xy, stiff_yy = turn_contact(
     cos_steer, sin_steer, force_long, stiff_long, tyre_y, tyre_y_damping
 )
-contact_x = contact_x - load * slope_x
-contact_y = contact_y - load * slope_y
-turn_x = wheel_x * stiff_xy - wheel_y * stiff_xx
-turn_y = wheel_x * stiff_yy - wheel_y * stiff_xy
-all_seat_force += seat_force
-all_seat_roll += wheel_y * seat_force
-all_seat_pitch -= wheel_x * seat_force
-all_seat_stiff += seat_stiff
-all_seat_stiff_y += wheel_y * seat_stiff
-all_seat_stiff_x += wheel_x * seat_stiff
-all_seat_stiff_xy += wheel_x * wheel_y * seat_stiff
-all_seat_stiff_xx += wheel_x * wheel_x * seat_stiff
-all_contact_x += contact_x
-all_contact_y += contact_y
-all_contact_turn += wheel_x * contact_y - wheel_y * contact_x
-all_stiff_xx += stiff_xx
-all_stiff_xy += stiff_xy
-all_stiff_yy += stiff_yy
-all_turn_x += turn_x
-all_turn_y += turn_y
-all_turn_turn += wheel_x * turn_y - wheel_y * turn_x
+contact_x = turned_x - load * slope_x
+contact_y = turned_y - load * slope_y
 floor_height = floor_height + dt * floor_rate
 wheel_load = load
 """
 
 SOLVE = """
+x_front = wheelbase - cog_to_rear_axle
+x_rear = -cog_to_rear_axle
+y_left = 0.5 * track
+seat_front = seat_force__0 + seat_force__1
+seat_rear = seat_force__2 + seat_force__3
+seat_left = (seat_force__0 - seat_force__1) + (seat_force__2 - seat_force__3)
+hold_front = seat_stiff__0 + seat_stiff__1
+hold_rear = seat_stiff__2 + seat_stiff__3
+hold_front_left = seat_stiff__0 - seat_stiff__1
+hold_rear_left = seat_stiff__2 - seat_stiff__3
+pull_left = (contact_x__0 - contact_x__1) + (contact_x__2 - contact_x__3)
+pull = (contact_x__0 + contact_x__1) + (contact_x__2 + contact_x__3)
+side_front = contact_y__0 + contact_y__1
+side_rear = contact_y__2 + contact_y__3
+long_left = (stiff_xx__0 - stiff_xx__1) + (stiff_xx__2 - stiff_xx__3)
+all_stiff_xx = (stiff_xx__0 + stiff_xx__1) + (stiff_xx__2 + stiff_xx__3)
+cross_front = stiff_xy__0 + stiff_xy__1
+cross_rear = stiff_xy__2 + stiff_xy__3
+cross_front_left = stiff_xy__0 - stiff_xy__1
+cross_rear_left = stiff_xy__2 - stiff_xy__3
+lat_front = stiff_yy__0 + stiff_yy__1
+lat_rear = stiff_yy__2 + stiff_yy__3
+turn_cross = x_front * cross_front_left + x_rear * cross_rear_left
+all_seat_stiff = hold_front + hold_rear
 dvx, dvy, dvz, droll_rate, dpitch_rate, dyaw_rate = body_step(
     dt, mass, sprung_mass, roll_inertia, pitch_inertia, yaw_inertia, cog_height,
     force_x, force_y, moment_z, force_x_damping, force_y_damping, moment_z_damping,
-    all_seat_force, all_seat_roll, all_seat_pitch, all_seat_stiff, all_seat_stiff_y,
-    all_seat_stiff_x, 0.25 * track * track * all_seat_stiff, all_seat_stiff_xy, all_seat_stiff_xx,
-    all_contact_x, all_contact_y, all_contact_turn, all_stiff_xx, all_stiff_xy, all_stiff_yy,
-    all_turn_x, all_turn_y, all_turn_turn
+    seat_front + seat_rear,
+    y_left * seat_left,
+    -(x_front * seat_front + x_rear * seat_rear),
+    all_seat_stiff,
+    y_left * (hold_front_left + hold_rear_left),
+    x_front * hold_front + x_rear * hold_rear,
+    y_left * y_left * all_seat_stiff,
+    y_left * (x_front * hold_front_left + x_rear * hold_rear_left),
+    x_front * x_front * hold_front + x_rear * x_rear * hold_rear,
+    pull,
+    side_front + side_rear,
+    x_front * side_front + x_rear * side_rear - y_left * pull_left,
+    all_stiff_xx,
+    cross_front + cross_rear,
+    lat_front + lat_rear,
+    x_front * cross_front + x_rear * cross_rear - y_left * long_left,
+    x_front * lat_front + x_rear * lat_rear - y_left * (cross_front_left + cross_rear_left),
+    x_front * x_front * lat_front + x_rear * x_rear * lat_rear
+    + y_left * (y_left * all_stiff_xx - 2.0 * turn_cross),
 )
 accel_x = dvx * (1.0 / dt)
 accel_y = dvy * (1.0 / dt)
