@@ -63,8 +63,8 @@ def _tell(world: World, slots: Ints, touches: Touches, t_ns: int) -> None:
 def _push(world: World, fleet: Fleet, rows: Ints, touches: Touches, struck: Ints) -> None:
     """Change the motion of some rows of a fleet: those that stand at `struck` in `touches`."""
     dv, shift = touches.dv[struck], touches.shift[struck]
-    for row, change in zip(rows.tolist(), np.hstack((dv, shift)).tolist(), strict=True):
-        fleet.push(row, *change)
+    turn = np.zeros((len(rows), 1))
+    fleet.push_rows(rows, np.hstack((dv, shift, turn)))
     world.impacts.add(fleet, rows, dv)
 
 
