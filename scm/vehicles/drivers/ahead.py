@@ -89,19 +89,10 @@ def cars_ahead(
     loss: float,
     seed: int,
 ) -> int:
-    """Find the cars on the surveyed way from the own front on, nearest first; return how many.
+    """Find the cars on the surveyed way, nearest first; return how many.
 
-    Args:
-        segments: Of all lanes.
-        heard: Everybody's CAMs.
-        room: Holds the surveyed segments; takes the cars.
-        kind: The row of the own kind of car.
-        car: The own number.
-        count: Of surveyed segments.
-        reach: How far to look from the front bumper on [m].
-        now_ns: The present time [ns].
-        loss: Share of frames that get lost.
-        seed: Of the luck.
+    They are looked for from the own front bumper on, as far as `reach` [m]. `room` holds the
+    surveyed segments, `count` of them, and takes the cars.
     """
     span(segments, room.ids, room.begins, room.window, count, kind[FRONT], reach)
     floor, window = heard.floor, room.window

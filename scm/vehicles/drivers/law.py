@@ -72,21 +72,11 @@ def decide(
     loss: float,
     seed: int,
 ) -> None:
-    """Let drivers decide.
+    """Let the drivers of some cars, given by number, decide.
 
-    Args:
-        ways: The lanes.
-        memory: Of all drivers.
-        heard: The cars around; their cells must be up to date.
-        told: The signals.
-        room: To work in.
-        cars: Who decides, by number.
-        poses: (capacity, 4) x, y, yaw of the rear axle and speed along the body.
-        commands: (2, capacity) takes throttle and steering, -1 to 1.
-        now_ns: The present time [ns].
-        stop: Whether all must come to rest in their lanes, wherever they are.
-        loss: Share of radio frames that get lost.
-        seed: Of the luck.
+    `heard` must have its cells up to date. `poses` (capacity, 4) are x, y, yaw of the rear axle and
+    the speed along the body; `commands` (2, capacity) takes throttle and steering, -1 to 1. `stop`
+    brings all to rest in their lanes; `loss` and `seed` decide which radio frames get lost.
     """
     ids, begins = room.ids, room.begins
     for number in range(len(cars)):
@@ -112,24 +102,15 @@ def decide(
         )
         beyond = turned(ways.segments, ids, begins, count, here, front + INDICATE_AHEAD)
         ints[TURN] = 0 if abs(beyond) < INDICATE_FROM else (1 if beyond > 0.0 else -1)
-        brake = braking(rolling, kind[DECEL], REACTION)
-        far = LOOK_AHEAD + 2.0 * brake
+        far = LOOK_AHEAD + 2.0 * braking(rolling, kind[DECEL], REACTION)
         line, at, distance = next_line(
             ways.length, ways.line_first, ways.line_at, sight, floats[S], front, front + far
         )
         if distance >= 0.0:
-            can_stop = distance - front >= brake + NEAREST
-            index = ints[INDEX] + at - HERE
-            held = signal_says(
-                told, ways.line_links, ints, line, index, can_stop, car, now_ns, loss, seed
-            )
-            if held == VEHICLE and has_room(
-                ways, heard, room, kind, sight, found, car, line, at, distance, floats[S], speed,
-                now_ns, loss, seed,
-            ):  # fmt: skip
-                held = FREE
-            elif held == VEHICLE and at == HERE and speed < STANDSTILL and is_turn(now_ns, passed):
-                choose_again(ways, memory, car)
+            held = hold(
+                ways, memory, heard, told, room, kind, car, found, line, at, distance, speed,
+                passed, now_ns, loss, seed,
+            )  # fmt: skip
             before_line = stopping_speed(distance - SHORT_OF_LINE - front, kind[DECEL])
             if held != FREE and before_line < wished:
                 wished, reason = before_line, held
@@ -137,6 +118,45 @@ def decide(
         standing = speed < STANDSTILL and commands[0, car] == 0.0
         ints[WAITING] = reason if standing else FREE
         ints[ARRIVED] = has_arrived(ways.length, ints, sight, floats[S])
+
+
+@law
+def hold(
+    ways: Ways,
+    memory: Memory,
+    heard: Heard,
+    told: Told,
+    room: Scratch,
+    kind: Floats,
+    car: int,
+    found: int,
+    line: int,
+    at: int,
+    distance: float,
+    speed: float,
+    passed: float,
+    now_ns: int,
+    loss: float,
+    seed: int,
+) -> int:
+    """Return what holds a car at a line, FREE if nothing does; a car without room looks elsewhere.
+
+    The line lies on lane `at` in sight, `distance` ahead of the rear axle [m].
+    """
+    ints, sight, s = memory.ints[car], memory.sight[car], memory.floats[car, S]
+    brake = braking(max(0.0, speed), kind[DECEL], REACTION)
+    can_stop = distance - kind[FRONT] >= brake + NEAREST
+    index = ints[INDEX] + at - HERE
+    held = signal_says(told, ways.line_links, ints, line, index, can_stop, car, now_ns, loss, seed)
+    if held != VEHICLE:
+        return held
+    if has_room(
+        ways, heard, room, kind, sight, found, car, line, at, distance, s, speed, now_ns, loss, seed
+    ):
+        return FREE
+    if at == HERE and speed < STANDSTILL and is_turn(now_ns, passed):
+        choose_again(ways, memory, car)
+    return VEHICLE
 
 
 @law

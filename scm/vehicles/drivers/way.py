@@ -185,21 +185,8 @@ def survey(
     Returns:
         How many there are, which of them holds the place, and whether the way ends in sight.
     """
-    at = HERE
-    lane = sight[HERE]
-    segment = segment_at(first, segments, lane, s)
-    begin = segments[segment, AT] - s
-    here = 0
-    while begin > -back:
-        if segment > first[lane]:
-            segment -= 1
-        elif at == HERE and sight[BEHIND] >= 0:
-            at, lane = BEHIND, sight[BEHIND]
-            segment = first[lane + 1] - 1
-        else:
-            break
-        begin -= segments[segment, LENGTH]
-        here += 1
+    at, segment, begin, here = look_back(first, segments, sight, s, back)
+    lane = sight[at]
     count = 0
     while True:
         ids[count], begins[count] = segment, begin
@@ -218,6 +205,32 @@ def survey(
             segment = first[lane]
     begins[count] = begin
     return count, min(here, count - 1), ends
+
+
+@law
+def look_back(
+    first: Ints, segments: Floats, sight: Ints, s: float, back: float
+) -> tuple[int, int, float, int]:
+    """Return the first segment that a survey needs.
+
+    Returns:
+        Which lane in sight it is on, its number, where it begins from the car's place on [m], and
+        how many segments later that place is.
+    """
+    at, lane, here = HERE, sight[HERE], 0
+    segment = segment_at(first, segments, lane, s)
+    begin = segments[segment, AT] - s
+    while begin > -back:
+        if segment > first[lane]:
+            segment -= 1
+        elif at == HERE and sight[BEHIND] >= 0:
+            at, lane = BEHIND, sight[BEHIND]
+            segment = first[lane + 1] - 1
+        else:
+            break
+        begin -= segments[segment, LENGTH]
+        here += 1
+    return at, segment, float(begin), here
 
 
 @law
