@@ -19,8 +19,10 @@ def watch(world: World, now_ns: int) -> None:
         if not slots.diverged[slot]:
             slots.diverged[slot] = True
             slots.driven[slot] = False
-            sentence = VehicleStatus.DIVERGED.sentence
-            world.say("error", "vehicle_diverged", sentence, now_ns, slots.names[slot])
+            hosted = world.hosted[slots.names[slot]]
+            status = VehicleStatus(int(hosted.fleet.status[hosted.row]))
+            name = f"vehicle_{status.name.lower()}"
+            world.say("error", name, status.sentence, now_ns, hosted.name)
 
 
 def lose(world: World, car: RemoteCar, why: str, now_ns: int, *, dead: bool) -> None:
