@@ -1,23 +1,37 @@
-"""Vehicle-steps per second of the car kernel, beside CommonRoad's multi-body model in the same run.
+"""Vehicle-steps per second of the car kernel, beside its limits and its peers in the same run.
 
-Run with `python bench/kernel.py`; the peer comes with `pip install commonroad-vehicle-models`.
-Two threads are a thread pool that shares the fleet by rows: the kernel holds no interpreter lock.
+Run with `python -m bench kernel`. Peers: the same laws as one numba loop over cars, and
+CommonRoad's multi-body model (`pip install commonroad-vehicle-models`). Limit: what this core
+multiplies and adds. Rates are per second of processor time, so a busy neighbour does not count;
+two threads go by the clock.
 """
 
+import os
+import resource
 import statistics
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
 
 from scm.geometry import Pose2
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
+from scm.vehicles.kernel_file import compile_kernel
 
 STEPS = 10  # substeps a call, as the world does: 10 ms of 1 ms
 REPEATS = 7
 SECONDS = 0.12  # of work a repeat
+START = (
+    "from scm.vehicles.car import load_car; from scm.vehicles.fleet import Fleet; "
+    "from scm.geometry import Pose2; fleet = Fleet(load_car('nigel'), 16); "
+    "fleet.add(Pose2(0.0, 0.0, 0.0)); fleet.advance(0.01)"
+)
 
 
 class Rate(NamedTuple):
@@ -50,27 +64,38 @@ def fleet_of(cars: int) -> Fleet:
         fleet.add(Pose2(float(row), 0.0, 0.0))
     fleet.throttle[:] = 0.6
     fleet.steering[:] = [0.9 * (row % 19 - 9) / 9 for row in range(cars)]
-    fleet.advance(1.0)
+    fleet.advance(0.5)
     return fleet
 
 
-def kernel_rate(cars: int, threads: int) -> Rate:
+def kernel_rate(cars: int, *, threads: int = 1, plain: bool = False) -> Rate:
+    """Rate of a fleet; `plain` is the same laws as one loop over cars."""
     fleet = fleet_of(cars)
-    duration = STEPS * 1e-3
-    if threads == 1:
-        return rate(lambda: fleet.advance(duration), cars * STEPS)
-    cuts = [cars * i // threads for i in range(threads + 1)]
-    with ThreadPoolExecutor(threads) as pool:
+    fleet.threads = threads
+    if plain:
+        fleet._kernel = compile_kernel("nigel", fleet.car.terms, plain=True)  # noqa: SLF001
+    return rate(lambda: fleet.advance(STEPS * 1e-3), cars * STEPS)
 
-        def work() -> None:
-            futures = [
-                pool.submit(fleet.advance_rows, first, last, duration)
-                for first, last in pairwise(cuts)
-            ]
-            for future in futures:
-                future.result()
 
-        return rate(work, cars * STEPS)
+def rollout_rate(cars: int) -> Rate:
+    """Rate of a batch of parameter sets over a recording of 5 s at 50 Hz."""
+    fleet = fleet_of(cars)
+    throttle = 0.5 + 0.4 * np.sin(np.arange(250) * 0.05)
+    return rate(lambda: fleet.rollout(throttle, 0.3 * throttle, 0.02), cars * 250 * 20)
+
+
+@numba.njit(fastmath={"contract"})
+def _multiply_and_add(rounds: int) -> float:
+    sums = np.arange(96.0)
+    for _ in range(rounds):
+        for i in range(96):
+            sums[i] = sums[i] * 0.999 + 0.001
+    return sums.sum()
+
+
+def peak_rate() -> Rate:
+    """Floating-point operations per second of this core: twelve chains of eight lanes."""
+    return rate(lambda: _multiply_and_add(20_000), 20_000 * 96 * 2)
 
 
 def peer_rate() -> Rate | None:
@@ -98,27 +123,49 @@ def peer_rate() -> Rate | None:
     return rate(step, 1)
 
 
+def starts() -> list[tuple[float, float]]:
+    """Seconds, of the clock and of the processor, until a process has made its first substep.
+
+    Once with nothing compiled, once with all compiled.
+    """
+    took = []
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(2):
+            begin, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+            environment: dict[str, Any] = {**os.environ, "SCM_CACHE_DIR": folder}
+            subprocess.run([sys.executable, "-c", START], env=environment, check=True)
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            worked = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            took.append((time.perf_counter() - begin, worked))
+    return took
+
+
 def main() -> None:
-    start = time.perf_counter()
-    Fleet(load_car("nigel"), 1)
-    print(f"kernel ready after {time.perf_counter() - start:.2f} s (numba already imported)\n")
-    peer = peer_rate()
-    print("| what | cars | threads | steps/s | steps/s of processor time | beside the peer |")
-    print("| --- | ---: | ---: | ---: | ---: | ---: |")
+    peer, plain = peer_rate(), kernel_rate(1000, plain=True)
+    rows = [
+        ("same laws, one numba loop over cars", "1,000", plain),
+        ("scm, tiles", "1", kernel_rate(1)),
+        ("scm, batch of parameter sets over a recording", "64", rollout_rate(64)),
+        ("scm, tiles", "100", kernel_rate(100)),
+        ("scm, tiles", "1,000", kernel_rate(1000)),
+        ("scm, tiles", "10,000", kernel_rate(10_000)),
+    ]
+    print("| what | cars | steps/s of one core | beside the loop | beside CommonRoad |")
+    print("|---|---:|---:|---:|---:|")
     if peer is None:
-        print("| CommonRoad multi-body, RK4: not installed | | | | | |")
+        print("| CommonRoad multi-body: not installed | | | | |")
     else:
-        print(f"| CommonRoad multi-body, RK4 (29 states) | 1 | 1 | {_cells(peer, peer)} |")
-    for cars in (1, 100, 10_000):
-        for threads in (1, 2):
-            if threads <= cars:
-                what = f"scm 14-DOF, {STEPS} substeps a call | {cars:,} | {threads}"
-                print(f"| {what} | {_cells(kernel_rate(cars, threads), peer)} |")
-
-
-def _cells(own: Rate, peer: Rate | None) -> str:
-    ratio = f"{own.processor / peer.processor:,.0f}" if peer else "-"
-    return f"{own.clock:,.0f} | {own.processor:,.0f} | {ratio}"
+        print(f"| CommonRoad multi-body, 29 states, RK4 | 1 | {peer.processor:,.0f} | | 1 |")
+    for what, cars, own in rows:
+        beside = f"{own.processor / peer.processor:,.0f}" if peer else "-"
+        ratio = own.processor / plain.processor
+        print(f"| {what} | {cars} | {own.processor:,.0f} | {ratio:.1f} | {beside} |")
+    one, two = kernel_rate(10_000), kernel_rate(10_000, threads=2)
+    print(f"\ntwo threads, 10,000 cars, by the clock: {two.clock / one.clock:.2f} times one")
+    print(f"this core at most: {peak_rate().processor / 1e9:.0f} GFLOP/s, multiply and add fused")
+    print(f"memory: {fleet_of(1600).bytes_per_car} bytes a car")
+    for name, (clock, processor) in zip(("cold", "warm"), starts(), strict=True):
+        print(f"start to the first substep, {name}: {clock:.1f} s, {processor:.1f} s of processor")
 
 
 if __name__ == "__main__":
