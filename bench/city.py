@@ -29,7 +29,8 @@ from scm.world.world import PERIOD_NS, World
 
 STAGES = ("hear", "steer", "move", "watch", "sense", "publish", "call_out")
 WARM_S, SPAN_S = 2.0, 4.0
-BLOCK_M, FULL = 12, 0.6
+TICKS = SPAN_S * 1e9 / PERIOD_NS
+BLOCK_M, FULL, LARGE = 12, 0.6, "grid:11x11:32"
 
 
 class Stages:
@@ -94,9 +95,8 @@ def built(city_map: CityMap, cars: int) -> tuple[WorldPart, float]:
     return part, memory_mib() - before_mib
 
 
-def run(cars: int, stages: Stages, *, signals: int = 0, lidar: bool = False) -> dict[str, float]:
+def run(city_map: CityMap, cars: int, stages: Stages, *, lidar: bool = False) -> dict[str, float]:
     """Run a city in lockstep; return what it took."""
-    city_map = grid_for(cars, signals)
     few, few_mib = built(city_map, 1)
     part, many_mib = built(city_map, cars)
     held_kib = (many_mib - few_mib) * 1024.0 / (cars - 1)
@@ -116,7 +116,8 @@ def run(cars: int, stages: Stages, *, signals: int = 0, lidar: bool = False) -> 
         "cars": cars,
         "ratio": SPAN_S / took,
         "busy": busy / took,
-        "us_a_car": took / (SPAN_S * 1e9 / PERIOD_NS) / cars * 1e6,
+        "us_a_car": took / TICKS / cars * 1e6,
+        "world_us_a_car": sum(stages.spent_s.values()) / TICKS / cars * 1e6,
         "kib_a_car": held_kib,
         "junctions": len(city_map.junctions),
         "scans": len(scans.take()) / SPAN_S if scans is not None else 0.0,
@@ -125,14 +126,15 @@ def run(cars: int, stages: Stages, *, signals: int = 0, lidar: bool = False) -> 
 
 
 def report(name: str, stages: Stages, row: dict[str, float]) -> None:
-    ticks = SPAN_S * 1e9 / PERIOD_NS
+    ticks = TICKS
     parts = "  ".join(f"{n} {s / ticks * 1e3:.2f}" for n, s in stages.spent_s.items())
     others = SPAN_S / row["ratio"] / ticks - sum(stages.spent_s.values()) / ticks
+    scans = f"  {row['scans']:.0f} scans/s" if row["scans"] else ""
     print(
-        f"{name:<28} {row['cars']:>6.0f} cars {row['junctions']:>4.0f} signals "
-        f"{row['ratio']:>6.2f} x real time  {row['us_a_car']:>6.2f} us a car and tick  "
-        f"{row['kib_a_car']:>5.2f} KiB a car  mean {row['speed']:.2f} m/s"
-        + (f"  {row['scans']:.0f} scans/s" if row["scans"] else "")
+        f"{name:<24} {row['cars']:>6.0f} cars {row['junctions']:>4.0f} signals "
+        f"{row['ratio']:>6.2f} x real time   {row['us_a_car']:.2f} us a car and tick, "
+        f"of it the world {row['world_us_a_car']:.2f}   {row['kib_a_car']:.2f} KiB a car   "
+        f"mean {row['speed']:.2f} m/s{scans}"
     )
     print(f"    ms a tick: {parts}  other parts and bus {others * 1e3:.2f}", flush=True)
 
@@ -141,20 +143,21 @@ def flat(stages: Stages) -> None:
     """Print how the cost of a car depends on their number."""
     cost = {}
     for cars in (100, 300, 1000, 3000, 10_000):
-        row = run(cars, stages)
-        cost[cars] = row["us_a_car"]
+        row = run(grid_for(cars), cars, stages)
+        cost[cars] = row["world_us_a_car"]
         report("scaling", stages, row)
     for cars, us in itertools.islice(cost.items(), 1, None):
-        print(f"    {cars:>6} cars: a car costs {us / cost[100]:.2f} of what it costs among 100")
+        share = us / cost[100]
+        print(f"    {cars:>6} cars: one costs the world {share:.2f} of what it costs among 100")
 
 
 def main(wanted: tuple[str, ...] = ("large", "lidar", "flat")) -> None:
     stages = Stages()
     built(grid_for(1), 1)  # compiles, and holds what one world or many need once
     if "large" in wanted:
-        report("lockstep, contacts", stages, run(10_000, stages))
+        report("lockstep, contacts", stages, run(load_map(LARGE), 10_000, stages))
     if "lidar" in wanted:
-        row = run(2000, stages, signals=100, lidar=True)
+        row = run(grid_for(2000, 100), 2000, stages, lidar=True)
         report("lockstep, LIDAR on all", stages, row)
     if "flat" in wanted:
         flat(stages)

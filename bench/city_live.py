@@ -74,14 +74,13 @@ def memory_mib(pid: int) -> float:
     return pages * os.sysconf("SC_PAGESIZE") / 2**20
 
 
-def measure(parts: dict[str, int], endpoint: str, *, states: bool = False) -> None:
+def measure(parts: dict[str, int], endpoint: str) -> None:
     """Watch a running city for a while and print what it took."""
     with ZenohBus("city", "bench", endpoint) as bus:
-        heard, told = Mailbox(100_000), Mailbox(100_000)
+        heard, told = Mailbox(10_000), Mailbox(1_000_000)
         for kind in (WorldSnapshot, PartStatus):
             bus.subscribe(kind, {}, heard)
-        if states:
-            bus.subscribe(VehicleState, {}, told)
+        bus.subscribe(VehicleState, {}, told)
         while not any(isinstance(item.message, WorldSnapshot) for item in heard.drain()):
             time.sleep(0.1)
         time.sleep(SETTLE_S)
@@ -99,9 +98,9 @@ def measure(parts: dict[str, int], endpoint: str, *, states: bool = False) -> No
     simulated_s = (last.t_ns - first.t_ns) / NS_PER_S
     late = last.late_ticks - first.late_ticks
     slowest = min(shot.real_time_factor for shot in shots)
-    rate = f", {sum(counts.values()) / took / len(counts):.1f} states/s a car" if counts else ""
+    rate = f"{sum(counts.values()) / took / len(counts):.1f} states/s a car"
     print(
-        f"    {len(last.vehicles)} cars, {len(shots) / took:.1f} snapshots/s{rate}, "
+        f"    {len(last.vehicles)} cars, {len(shots) / took:.1f} snapshots/s, {rate}, "
         f"slowest second {slowest:.3f} of real time, "
         f"{late} late of {simulated_s * TICKS_A_SECOND:.0f} ticks "
         f"({late / (simulated_s * TICKS_A_SECOND):.1%})"

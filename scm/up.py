@@ -20,7 +20,7 @@ from scm.v2x.messages.presence import Presence
 from scm.v2x.router import DEFAULT_ENDPOINT, Router, free_endpoint
 
 HOST = "127.0.0.1"
-MOST_SENSED = 50  # hosted cars whose sensors are recorded: beyond that they would be most of it
+MOST_RECORDED = 50  # hosted cars whose own messages are recorded: more would be nearly all of it
 LOOK_EVERY_NS = 50 * NS_PER_MS
 
 _say_now: Say = partial(print, flush=True)
@@ -127,8 +127,8 @@ def _parts(plan: _Plan, latched: Latched) -> list[Job]:
         """Name another file when a recorder died: a recording is never written over."""
         first = plan.recording
         out = first.with_stem(f"{plan.city}-{_stamp()}") if first.exists() else first
-        sensors = [] if plan.hosted <= MOST_SENSED else ["--no-sensors"]
-        return scm("record", "--out", str(out), *sensors)
+        sparse = ["--sparse"] if plan.hosted > MOST_RECORDED else []
+        return scm("record", "--out", str(out), *sparse)
 
     def monitor() -> Sequence[str]:
         return scm("monitor", *latched.monitor_arguments())

@@ -28,9 +28,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "(%(default)s)",
     )
     parser.add_argument(
-        "--no-sensors",
+        "--sparse",
         action="store_true",
-        help="leave out what cars sense and hear, so that a large city need not make it",
+        help="leave out each car's own states, sensors and radio frames: snapshots tell of all",
     )
 
 
@@ -43,7 +43,7 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.city,
         arguments.frames_hz,
         arguments.cameras_hz,
-        sensors=not arguments.no_sensors,
+        sparse=arguments.sparse,
     )
     try:
         return run_part(part, arguments)

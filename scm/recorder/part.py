@@ -11,16 +11,18 @@ from scm.registry import load, names
 from scm.v2x.exchange import Incoming, Outgoing, RawSample
 from scm.v2x.message import Delivery, Message
 from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.spatem_rx import SpatemRx
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
+from scm.v2x.messages.vehicle_state import VehicleState
 
 FLUSH_NS = 250 * NS_PER_MS
 FRAMES_HZ = 1.0
-SENSED = (LidarScan, VehicleSensors, CamRx, SpatemRx, CameraFrame)
+OF_EACH_CAR = (VehicleState, VehicleSensors, LidarScan, CameraFrame, CamTx, CamRx, SpatemRx)
 
 
 class RecorderPart:
@@ -31,9 +33,9 @@ class RecorderPart:
     picture only what somebody asks for: `cameras_hz` above 0 makes all of them run, and keeps so
     many of each.
 
-    In a large city the same would be true of what cars sense and hear: without `sensors` nothing is
-    recorded of LIDARs, other sensors and received radio frames, nor of keys that are not ours, and
-    the city need not make them.
+    In a large city the same would be true of what each car says: a `sparse` recording leaves out
+    the cars' own states, sensors and radio frames, and keys that are not ours, so that the city
+    need not make them; the snapshots tell of all cars.
     """
 
     name = "record"
@@ -49,15 +51,15 @@ class RecorderPart:
         frames_hz: float = FRAMES_HZ,
         cameras_hz: float = 0.0,
         *,
-        sensors: bool = True,
+        sparse: bool = False,
     ) -> None:
         self._period_ns = {
             EyeFrame: _period_ns("frames_hz", frames_hz),
             CameraFrame: _period_ns("cameras_hz", cameras_hz),
         }
-        self.hears_raw = sensors
+        self.hears_raw = not sparse
         self.hears_raw_too = (
-            *(() if sensors else _without_sensors()),
+            *(_without_cars() if sparse else ()),
             *((CameraFrame,) if cameras_hz else ()),
         )
         self.file = RunFile(path, city)
@@ -100,15 +102,15 @@ class RecorderPart:
         return []
 
 
-def _without_sensors() -> tuple[type[Message], ...]:
-    """Return all classes but those that each car would multiply."""
+def _without_cars() -> tuple[type[Message], ...]:
+    """Return all classes but those that each car multiplies."""
     kinds = (load(MESSAGES, name, "MESSAGE", type) for name in names(MESSAGES))
     return tuple(
         kind
         for kind in kinds
         if issubclass(kind, Message)
         and kind.DELIVERY not in (Delivery.RPC, Delivery.PRESENCE)
-        and kind not in SENSED
+        and kind not in OF_EACH_CAR
     )
 
 

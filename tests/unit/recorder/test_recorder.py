@@ -9,15 +9,19 @@ import pytest
 from mcap.reader import make_reader
 
 from scm.errors import RecordingError
+from scm.lockstep import Lockstep
 from scm.recorder.mcap_file import RunFile, read_run
 from scm.recorder.part import RecorderPart
 from scm.recorder.recover import recover
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of
 from scm.v2x.message import encode
+from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 MS = 1_000_000
 
@@ -229,3 +233,17 @@ def test_a_recovery_that_cannot_begin_leaves_nothing_behind(tmp_path: Path) -> N
     assert not list(tmp_path.iterdir())
     with pytest.raises(RecordingError, match="cannot be written"):
         recover(killed_after(tmp_path, 500), tmp_path / "nowhere" / "run.mcap")
+
+
+@pytest.mark.parametrize("sparse", [False, True])
+def test_a_sparse_recording_asks_for_snapshots_and_not_for_each_car(
+    tmp_path: Path, sparse: bool
+) -> None:
+    part = RecorderPart(tmp_path / "run.mcap", sparse=sparse)
+    with Lockstep([part]) as city:
+        assert city.bus.is_wanted(WorldSnapshot, {})
+        for kind in (VehicleState, LidarScan, CamRx):
+            assert city.bus.is_wanted(kind, {}) is not sparse
+        city.publish(WorldSnapshot(t_ns=1, tick=1, vehicles=()))
+        city.run_for(0.2)
+    assert "scm/@v1/city/world/snapshot" in {item.key for item in read_run(tmp_path / "run.mcap")}
