@@ -94,7 +94,9 @@ def speeds_along(eight, limits):
     found = []
     for s in places:
         here = int(np.searchsorted(begins, s, side="right")) - 1
-        found.append(free_speed(ways.segments, ids, begins - s, 4, here, limits.lateral_accel, limits.decel))
+        found.append(
+            free_speed(ways.segments, ids, begins - s, 4, here, limits.lateral_accel, limits.decel)
+        )
     return places, np.array(found)
 
 
