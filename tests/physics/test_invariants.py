@@ -11,6 +11,7 @@ from scm.geometry import Pose2
 from scm.vehicles.body14 import GRAVITY
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
+from scm.vehicles.layout import columns_of
 
 FEW = settings(max_examples=20, deadline=None, derandomize=True)
 HOLDING = ("tyre_relaxation", "tyre_windup")
@@ -29,9 +30,20 @@ def numbers(spans):
     return st.fixed_dictionaries({key: st.floats(*span) for key, span in spans.items()})
 
 
+_FLEETS = {}
+
+
 def one(car, yaw=0.0, speed=0.0, **state):
-    fleet = Fleet(car, 1)
+    """A fleet of this one car; fleets are kept by their effects, for making one takes a while."""
+    kind = (car.name, *(term.name for term in car.terms))
+    fleet = _FLEETS.setdefault(kind, None) or Fleet(car, 1)
+    _FLEETS[kind], fleet.car = fleet, car
+    if fleet.alive[0]:
+        fleet.remove(0)
     fleet.add(Pose2(0.0, 0.0, yaw))
+    for i, column in enumerate(columns_of(car.terms)):
+        fleet.parameters[0, i] = car.value(column.param.key)
+    fleet.throttle[0] = fleet.steering[0] = 0.0
     fleet.place(0, Pose2(0.0, 0.0, yaw), speed, **state)
     return fleet
 
