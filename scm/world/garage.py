@@ -9,7 +9,9 @@ from scm.geometry import Pose2
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.ground import Ground
+from scm.world.hull import hull_of
 from scm.world.slots import Slots
+from scm.world.solids import Hull
 
 _NOBODY: Ints = np.empty(0, np.int64)
 
@@ -24,6 +26,7 @@ class Garage:
     def __init__(self, capacity: int) -> None:
         self._capacity = capacity
         self._cars: dict[str, Car] = {}
+        self._hulls: dict[tuple[str, bool], Hull] = {}
         self.fleets: dict[str, Fleet] = {}
         self._rows: dict[str, Ints] = {}
         self._slots: dict[str, Ints] = {}
@@ -38,6 +41,16 @@ class Garage:
         if name not in self._cars:
             self._cars[name] = load_car(name)
         return self._cars[name]
+
+    def hull(self, name: str, *, movable: bool = True) -> Hull:
+        """Return what cars of a file are to others, one for all of them.
+
+        Raises:
+            CarError: when there is no such car file.
+        """
+        if (name, movable) not in self._hulls:
+            self._hulls[name, movable] = hull_of(self.car(name), movable=movable)
+        return self._hulls[name, movable]
 
     def prepare(self, name: str) -> Fleet:
         """Return the fleet of a car file; the first call compiles or loads its kernel, for seconds.

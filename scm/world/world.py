@@ -19,7 +19,6 @@ from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
-from scm.vehicles.car import Car
 from scm.vehicles.drivers.crowd import Crowd
 from scm.vehicles.drivers.errands import Errands
 from scm.vehicles.drivers.limits import limits_of
@@ -34,7 +33,6 @@ from scm.world.cams import CamTriggers
 from scm.world.contacts import Contacts
 from scm.world.garage import Garage
 from scm.world.hosted import HostedCar
-from scm.world.hull import hull_of
 from scm.world.impacts import Impacts
 from scm.world.pace import Every, Pace
 from scm.world.radio import Radio, Receivers, roadside_places
@@ -194,7 +192,7 @@ class World:
             RunError: when no room is left for cars of this file.
         """
         model = self.garage.car(car_name)
-        slot = self._take(name, model, pose, hosted=True)
+        slot = self._take(name, car_name, pose, hosted=True)
         fleet, row = self.garage.park(car_name, pose, slot)
         self.ground.settle(fleet, row)
         self.crowd.enter(slot, limits_of(model), number(self.seed, name, "driver"))
@@ -222,7 +220,7 @@ class World:
             CarError: when there is no such car file.
         """
         model = self.garage.car(car_name)
-        slot = self._take(name, model, pose, hosted=False, movable=kind != "real")
+        slot = self._take(name, car_name, pose, hosted=False, movable=kind != "real")
         if kind != "real":
             placed, offset = self.placed, self._offset(SCANNER)
             self.banks[SCANNER].fit(slot, name, model, placed, slot, now_ns, offset)
@@ -264,12 +262,12 @@ class World:
         bank.step(0, lambda: nowhere)
 
     def _take(
-        self, name: str, model: Car, pose: Pose2, *, hosted: bool, movable: bool = True
+        self, name: str, car_name: str, pose: Pose2, *, hosted: bool, movable: bool = True
     ) -> int:
-        hull = hull_of(model, movable=movable)
+        hull = self.garage.hull(car_name, movable=movable)
         slot = self.slots.take(name, pose, hosted=hosted)
         self.contacts.add(slot, hull)
-        _, self.front[slot] = model.vector("body.footprint_x_m")
+        _, self.front[slot] = self.garage.car(car_name).vector("body.footprint_x_m")
         return slot
 
     def _forget(self, car: AnyCar) -> None:
