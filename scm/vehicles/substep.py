@@ -18,9 +18,11 @@ cog_to_rear_axle = cog_to_rear_axle + added_cog_x
 cog_height = cog_height + added_cog_z
 """
 
+# forces act in the frame of the substep's end: in a steady turn one of its start sees the turning
+# of a whole substep as side slip
 BODY = """
 sprung_mass = mass - 4.0 * wheel_mass
-sin_yaw, cos_yaw = sin_cos(yaw)
+sin_yaw, cos_yaw = sin_cos(yaw + dt * yaw_rate)
 vx = cos_yaw * vx_world + sin_yaw * vy_world
 vy = cos_yaw * vy_world - sin_yaw * vx_world
 axle_front = 0.5 * (wheel_speed__0 + wheel_speed__1)
