@@ -108,7 +108,7 @@ def _curve(line: Line, across: _Axis, up: _Axis, colour: str, place: int) -> Ite
     path = "L".join(f"{across.at(x):.1f} {up.at(y):.1f}" for x, y in points)
     dash = ' stroke-dasharray="6 4"' if place == 0 else ""
     yield f'<path d="M{path}" fill="none" stroke="{colour}" stroke-width="2"{dash}/>'
-    x = 170 + 215 * place
+    x = 200 + 190 * place
     yield f'<path d="M{x} 18h26" stroke="{colour}" stroke-width="2"{dash}/>'
     yield _text(x + 32, 22, line.label, "start")
 

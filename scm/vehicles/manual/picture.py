@@ -102,7 +102,7 @@ def _label(term: Term, numbers: Mapping[str, float], otherwise: str) -> str:
     if not known:
         return otherwise
     param, number = known[0]
-    unit = "" if param.unit == "1" else f" {param.unit.replace('*', '·')}"
+    unit = "" if param.unit == "1" else f" {param.unit.replace('*', '·').replace('^2', '²')}"
     return f"{param.name.replace('_', ' ')} {number:g}{unit}"
 
 
