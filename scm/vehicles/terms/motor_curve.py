@@ -3,7 +3,8 @@
     F = (a - b * vx) * w * (u + c),  w = (tanh(100 (u + c)) + 1) / 2,  u = throttle    [N]
     wheel_torque += driven * F * motor_strength * wheel_radius / driven wheels    [N*m]
 
-Holds: forward throttle; a brushed motor that idles freely below its dead-band.
+Holds: forward throttle; a brushed motor that idles freely below its dead-band. No drive in reverse:
+none of the 95 recordings published with it has a throttle below zero.
 Shows in: throttle steps and ramps.   Source: Lorenzo-Lyons/DART, vehicle model (motor curve).
 """
 
