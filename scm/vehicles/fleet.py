@@ -6,10 +6,7 @@ centre on the ground; wheels stand front-left, front-right, rear-left, rear-righ
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from enum import IntEnum
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +16,19 @@ from scm.errors import RunError, TermError, nearest
 from scm.geometry import Pose2
 from scm.vehicles.body14 import GRAVITY, STATUS_DIVERGED, STATUS_OK, STATUS_ROLLED
 from scm.vehicles.car import Car
+from scm.vehicles.fleet_rows import (
+    COG,
+    COG_CHANGED,
+    READ,
+    SHAPED,
+    SLOT_OF,
+    WRITTEN,
+    Shape,
+    aligned,
+    columns_of_command,
+    pool,
+    whole_steps,
+)
 from scm.vehicles.jit import plain
 from scm.vehicles.kernel_file import compile_kernel
 from scm.vehicles.lanes import LANES
@@ -50,37 +60,6 @@ class VehicleStatus(IntEnum):
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """Mass [kg] and centre of gravity [m] of one car, payload and shifts included."""
-
-    mass: float
-    cog_to_rear_axle: float
-    cog_height: float
-
-
-_SHAPED = {
-    "added_mass": "mass", "added_cog_x": "cog_to_rear_axle", "added_cog_z": "cog_height",
-}  # fmt: skip
-
-
-# what others write, and what they read: names here, slots of the block where those differ
-_WRITTEN = {
-    "throttle": "throttle_command", "steering": "steering_command",
-    **{name: name for name in (
-        "battery", "air_x", "air_y", "floor_height", "floor_slope_x", "floor_slope_y",
-        "floor_grip", "floor_rolling", "time",
-    )},
-}  # fmt: skip
-_READ = (
-    "x", "y", "z", "roll", "pitch", "yaw", "speed", "lateral_speed", "yaw_rate",
-    "roll_rate", "pitch_rate", "accel_x", "accel_y", "accel_z", "roll_accel", "pitch_accel",
-    "yaw_accel", "steer_angle", "wheel_speed", "wheel_angle", "wheel_steer", "wheel_load",
-    "wheel_x", "wheel_y",
-)  # fmt: skip
-_SLOT_OF = {"wheel_x": "ground_x", "wheel_y": "ground_y"}
-_COG = ("x_cog", "y_cog", "yaw", "vx_world", "vy_world", "yaw_rate")
-_COG_CHANGED = ("vx_world", "vy_world", "yaw_rate", "x_cog", "y_cog", "yaw")
 _TILES_A_THREAD = 8  # below, a second thread costs more than it does
 
 
@@ -127,10 +106,10 @@ class Fleet:
         self._shaping = [t for t in car.terms if SIGNALS[t.target].role is Role.SHAPE]
         padded = -(-capacity // LANES) * LANES
         height = max(offset + width for offset, width in self._slots.values())
-        self._block: Floats = _aligned((height, padded))
+        self._block: Floats = aligned((height, padded))
         self._nominal: Floats = np.array([car.value(c.param.key) for c in self._columns])
         self.parameter_names = tuple(column.name for column in self._columns)
-        self._numbers: Floats = _aligned((len(self._columns), padded))
+        self._numbers: Floats = aligned((len(self._columns), padded))
         self._numbers[:] = self._nominal[:, None]
         self.parameters: Floats = self._numbers[:, :capacity].T
         self._alive: Bools = np.zeros(padded, dtype=np.bool_)
@@ -139,10 +118,10 @@ class Fleet:
         self.status: Ints = self._status[:capacity]
         self._past = self._past_of(padded)
         self.impact_x, self.impact_y, self.impact_yaw = np.zeros((3, capacity))
-        for name, slot in _WRITTEN.items():
+        for name, slot in WRITTEN.items():
             setattr(self, name, self._view(slot))
-        for name in _READ:
-            view = self._view(_SLOT_OF.get(name, name))
+        for name in READ:
+            view = self._view(SLOT_OF.get(name, name))
             view.flags.writeable = False
             setattr(self, name, view)
 
@@ -300,7 +279,7 @@ class Fleet:
             numbers = [
                 float(self.parameters[row, variables[own[keys[name]]]]) for name in reads(term.law)
             ]
-            totals[_SHAPED[term.target]] += plain(term.law)(*numbers)
+            totals[SHAPED[term.target]] += plain(term.law)(*numbers)
         return Shape(**totals)
 
     def advance(self, duration: float, substep: float = SUBSTEP_S) -> None:
@@ -318,7 +297,7 @@ class Fleet:
             return
         cuts = [LANES * (tiles * i // parts) for i in range(parts)] + [self.capacity]
         work = [
-            _pool(self.threads).submit(self.advance_rows, first, last, duration, substep)
+            pool(self.threads).submit(self.advance_rows, first, last, duration, substep)
             for first, last in pairwise(cuts[1:])
         ]
         self.advance_rows(0, cuts[1], duration, substep)
@@ -336,7 +315,7 @@ class Fleet:
         if not 0 <= first <= last <= self.capacity:
             msg = f"rows {first} to {last}: expected rows between 0 and {self.capacity}"
             raise RunError(msg)
-        self._run(first, last, _whole_steps(duration, substep), substep)
+        self._run(first, last, whole_steps(duration, substep), substep)
 
     def rollout(
         self,
@@ -361,14 +340,14 @@ class Fleet:
         Raises:
             RunError: when shapes do not fit, or a signal is not one of each car.
         """
-        commands = [np.ascontiguousarray(_columns_of_command(c, self.capacity), dtype=np.float64)
+        commands = [np.ascontiguousarray(columns_of_command(c, self.capacity), dtype=np.float64)
                     for c in (throttle, steering)]  # fmt: skip
         if len(commands[0]) != len(commands[1]):
             msg = f"{len(commands[0])} throttles and {len(commands[1])} steerings: expected as many"
             raise RunError(msg)
         slots = np.array([self._slot_of_signal(name) for name in signals])
         out = np.zeros((len(commands[0]), len(slots), self._alive.size))
-        steps = _whole_steps(step_s, substep)
+        steps = whole_steps(step_s, substep)
         if self._past is None:
             self._kernel.rollout(
                 self._block, self._numbers, self._alive, self._status, 0, self.capacity, steps,
@@ -387,12 +366,12 @@ class Fleet:
 
     def planar_cog(self, row: int) -> tuple[float, float, float, float, float, float]:
         """Return (x, y, yaw, vx, vy, yaw_rate) of the centre of gravity in the world frame."""
-        x, y, yaw, vx, vy, rate = (float(self._block[self._slots[n][0], row]) for n in _COG)
+        x, y, yaw, vx, vy, rate = (float(self._block[self._slots[n][0], row]) for n in COG)
         return x, y, yaw, vx, vy, rate
 
     def planar_cogs(self, rows: Ints) -> Floats:
         """Return `planar_cog` of many rows at once, shape (n, 6)."""
-        slots = [self._slots[name][0] for name in _COG]
+        slots = [self._slots[name][0] for name in COG]
         return self._block[slots, rows[:, None]]
 
     def push(
@@ -415,7 +394,7 @@ class Fleet:
         if not all(map(math.isfinite, changes)):
             self.status[row] = VehicleStatus.DIVERGED
             return
-        for name, change in zip(_COG_CHANGED, changes, strict=True):
+        for name, change in zip(COG_CHANGED, changes, strict=True):
             self._block[self._slots[name][0], row] += change
         self._run(row, row + 1, 0, SUBSTEP_S)
 
@@ -426,7 +405,7 @@ class Fleet:
         finite = np.isfinite(changes).all(axis=1)
         self.status[rows[fine & ~finite]] = VehicleStatus.DIVERGED
         rows, changes = rows[fine & finite], changes[fine & finite]
-        for name, change in zip(_COG_CHANGED, changes.T, strict=True):
+        for name, change in zip(COG_CHANGED, changes.T, strict=True):
             self._block[self._slots[name][0], rows] += change
         tiles = np.unique(rows // LANES) * LANES
         for start in tiles:
@@ -479,15 +458,15 @@ class Fleet:
         return CommandPast(padded, np.array(slots), np.array(columns))
 
     def _slot_of_signal(self, name: str) -> int:
-        slot, width = self._slots.get(_WRITTEN.get(name, _SLOT_OF.get(name, name)), (0, 0))
+        slot, width = self._slots.get(WRITTEN.get(name, SLOT_OF.get(name, name)), (0, 0))
         if width != 1:
-            known = [n for n in (*_READ, *_WRITTEN) if self._view_width(n) == 1]
+            known = [n for n in (*READ, *WRITTEN) if self._view_width(n) == 1]
             msg = f"rollout: {name!r} is no signal of each car{nearest(name, known)}"
             raise RunError(msg)
         return slot
 
     def _view_width(self, name: str) -> int:
-        return self._slots[_WRITTEN.get(name, _SLOT_OF.get(name, name))][1]
+        return self._slots[WRITTEN.get(name, SLOT_OF.get(name, name))][1]
 
     def _parameter(self, row: int, name: str) -> float:
         return float(self.parameters[row, self.parameter_names.index(name)])
@@ -515,34 +494,3 @@ class Fleet:
         self._kernel.advance(
             self._block, self._numbers, self._alive, self._status, first, last, steps, substep
         )
-
-
-def _whole_steps(duration: float, substep: float) -> int:
-    if not (0.0 <= duration < math.inf and 0.0 < substep < math.inf):
-        msg = f"{duration} s in substeps of {substep} s: expected a duration, and a substep above 0"
-        raise RunError(msg)
-    return round(duration / substep)
-
-
-def _columns_of_command(command: Floats, capacity: int) -> Floats:
-    """Return a recording's command as (T, 1) or (T, capacity)."""
-    values = np.asarray(command, dtype=np.float64)
-    if values.ndim == 1:
-        return values[:, None]
-    if values.ndim != 2 or values.shape[1] != capacity:
-        msg = f"commands of shape {values.shape}: expected (T,) or (T, {capacity})"
-        raise RunError(msg)
-    return values
-
-
-def _aligned(shape: tuple[int, int]) -> Floats:
-    """Return zeros that begin on a cache line."""
-    size = shape[0] * shape[1]
-    room = np.zeros(size + 8)
-    begin = -room.ctypes.data % 64 // 8
-    return room[begin : begin + size].reshape(shape)
-
-
-@cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads, thread_name_prefix="fleet")

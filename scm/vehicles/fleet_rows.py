@@ -1,0 +1,84 @@
+"""The names of a fleet's arrays, the memory behind them, and what may be asked of it."""
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.errors import RunError
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """Mass [kg] and centre of gravity [m] of one car, payload and shifts included."""
+
+    mass: float
+    cog_to_rear_axle: float
+    cog_height: float
+
+
+SHAPED = {
+    "added_mass": "mass", "added_cog_x": "cog_to_rear_axle", "added_cog_z": "cog_height",
+}  # fmt: skip
+
+# what others write, and what they read: names here, slots of the block where those differ
+WRITTEN = {
+    "throttle": "throttle_command", "steering": "steering_command",
+    **{name: name for name in (
+        "battery", "air_x", "air_y", "floor_height", "floor_slope_x", "floor_slope_y",
+        "floor_grip", "floor_rolling", "time",
+    )},
+}  # fmt: skip
+READ = (
+    "x", "y", "z", "roll", "pitch", "yaw", "speed", "lateral_speed", "yaw_rate",
+    "roll_rate", "pitch_rate", "accel_x", "accel_y", "accel_z", "roll_accel", "pitch_accel",
+    "yaw_accel", "steer_angle", "wheel_speed", "wheel_angle", "wheel_steer", "wheel_load",
+    "wheel_x", "wheel_y",
+)  # fmt: skip
+SLOT_OF = {"wheel_x": "ground_x", "wheel_y": "ground_y"}
+COG = ("x_cog", "y_cog", "yaw", "vx_world", "vy_world", "yaw_rate")
+COG_CHANGED = ("vx_world", "vy_world", "yaw_rate", "x_cog", "y_cog", "yaw")
+
+
+def whole_steps(duration: float, substep: float) -> int:
+    """Return how many substeps make a duration [s]; refuse what is no time.
+
+    Raises:
+        RunError: when one of them is negative or no number.
+    """
+    if not (0.0 <= duration < math.inf and 0.0 < substep < math.inf):
+        msg = f"{duration} s in substeps of {substep} s: expected a duration, and a substep above 0"
+        raise RunError(msg)
+    return round(duration / substep)
+
+
+def columns_of_command(command: Floats, capacity: int) -> Floats:
+    """Return a recording's command as (T, 1) or (T, capacity).
+
+    Raises:
+        RunError: when it has another shape.
+    """
+    values = np.asarray(command, dtype=np.float64)
+    if values.ndim == 1:
+        return values[:, None]
+    if values.ndim != 2 or values.shape[1] != capacity:
+        msg = f"commands of shape {values.shape}: expected (T,) or (T, {capacity})"
+        raise RunError(msg)
+    return values
+
+
+def aligned(shape: tuple[int, int]) -> Floats:
+    """Return zeros that begin on a cache line."""
+    size = shape[0] * shape[1]
+    room = np.zeros(size + 8)
+    begin = -room.ctypes.data % 64 // 8
+    return room[begin : begin + size].reshape(shape)
+
+
+@cache
+def pool(threads: int) -> ThreadPoolExecutor:
+    """Return the threads that all fleets share."""
+    return ThreadPoolExecutor(threads, thread_name_prefix="fleet")
