@@ -3,7 +3,7 @@
 import importlib
 import sys
 
-BENCHMARKS = ("kernel", "driver", "world", "bus", "eye", "camera", "lidar", "sensors")
+BENCHMARKS = ("kernel", "driver", "world", "city", "bus", "eye", "camera", "lidar", "sensors")
 
 
 def main(names: list[str]) -> None:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 import pymunk
 
 from scm.maps.model import CityMap, Floor, Lane, MapTag, Segment, Wall
+from scm.maps.segments import wall_segments
 from scm.v2x.message import Message, encode
 from scm.v2x.messages.route_request import RouteRequest
 from scm.world import step
@@ -27,7 +28,7 @@ RADIUS, BLOCK, CARS_A_BLOCK = 0.7, 2.0, 4
 WARM_TICKS, TICKS = 60, 100
 SIZES = (6, 100, 1000)
 LIMIT_MS = PERIOD_NS / 1e6
-STAGES = ("hear", "_steer", "_move", "watch", "sense", "publish", "_call_out")
+STAGES = ("hear", "steer", "move", "watch", "sense", "publish", "call_out")
 
 
 def city_of(blocks: int) -> CityMap:
@@ -111,7 +112,7 @@ def by_attribute(world: World) -> Callable[[], object]:
         body = pymunk.Body(2.4, 0.0229)
         space.add(body, pymunk.Poly.create_box(body, (0.3, 0.175)))
         bodies.append(body)
-    for x0, y0, x1, y1 in world.walls.tolist():
+    for x0, y0, x1, y1 in wall_segments(world.city_map).tolist():
         space.add(pymunk.Segment(space.static_body, (x0, y0), (x1, y1), 0.001))
     rows = motion.tolist()
 
