@@ -18,7 +18,8 @@ export function footprint(car) {
   return { rear, front, half, wheelbase, middle: (rear + front) / 2 };
 }
 
-export function drawCar(paper, view, car, chosen) {
+/** Draw a car; a chosen or lost one always with its name, others when there is room: `named`. */
+export function drawCar(paper, view, car, chosen, named = true) {
   const shape = footprint(car.car);
   const paint = car.alive ? (PAINT[car.kind] ?? PAINT.hosted) : PAINT.lost;
   paper.save();
@@ -33,7 +34,7 @@ export function drawCar(paper, view, car, chosen) {
   lamps(paper, shape, on);
   if (!car.alive) cross(paper, shape);
   paper.restore();
-  label(paper, view, car, shape, paint, chosen);
+  if (named || chosen || !car.alive) label(paper, view, car, shape, paint, chosen);
 }
 
 function halo(paper, { rear, front, half }) {

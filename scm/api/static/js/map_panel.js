@@ -10,6 +10,7 @@ import { selected } from "./selection.js";
 import { boxes, city, link, live, signals } from "./store.js";
 
 const FRAME_MS = 30;
+const MOST_NAMES = 60; // more would hide the cars
 const ROADS = "/api/v1/map.svg";
 
 export function MapPanel() {
@@ -101,7 +102,9 @@ function animate(canvas, box) {
     const view = prepare(canvas, paper, box);
     const colours = link.value === "live" ? groups : new Map();
     drawBoxes(paper, view, boxes.value, city.value?.boxes ?? []);
-    for (const car of carsNow()) drawCar(paper, view, car, car.vehicle === selected.value);
+    const cars = carsNow();
+    const named = cars.length <= MOST_NAMES;
+    for (const car of cars) drawCar(paper, view, car, car.vehicle === selected.value, named);
     // Lights last: no car's name may hide a colour.
     for (const light of city.value?.lights ?? []) {
       drawLight(paper, view, light, colours.get(`${light.junction}/${light.group}`));
