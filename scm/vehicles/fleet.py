@@ -20,21 +20,19 @@ from scm.vehicles.fleet_rows import (
     COG,
     COG_CHANGED,
     READ,
-    SHAPED,
     SLOT_OF,
     WRITTEN,
-    Shape,
     aligned,
     columns_of_command,
     pool,
     whole_steps,
 )
-from scm.vehicles.jit import plain
 from scm.vehicles.kernel_file import compile_kernel
 from scm.vehicles.lanes import LANES
 from scm.vehicles.layout import columns_of, find_column, slots_of
 from scm.vehicles.past import COMMANDS, DELAYS, CommandPast
-from scm.vehicles.signals import SIGNALS, Role
+from scm.vehicles.shape import Shape, shape_of
+from scm.vehicles.signals import SIGNALS
 from scm.vehicles.term import reads
 
 SUBSTEP_S = 1e-3
@@ -103,7 +101,6 @@ class Fleet:
         self._columns = columns_of(car.terms)
         self._slots = slots_of(car.terms)
         self._kernel = compile_kernel(car.name, car.terms)
-        self._shaping = [t for t in car.terms if SIGNALS[t.target].role is Role.SHAPE]
         padded = -(-capacity // LANES) * LANES
         height = max(offset + width for offset, width in self._slots.values())
         self._block: Floats = aligned((height, padded))
@@ -270,17 +267,8 @@ class Fleet:
 
     def shape(self, row: int) -> Shape:
         """Return one car's mass properties, with all that its effects add to them."""
-        names = ("mass", "cog_to_rear_axle", "cog_height")
-        totals = {name: self._parameter(row, name) for name in names}
-        variables = {column.variable: i for i, column in enumerate(self._columns)}
-        for term in self._shaping:
-            keys = {param.name: param.key for param in term.params}
-            own = {c.param.key: c.variable for c in self._columns}
-            numbers = [
-                float(self.parameters[row, variables[own[keys[name]]]]) for name in reads(term.law)
-            ]
-            totals[SHAPED[term.target]] += plain(term.law)(*numbers)
-        return Shape(**totals)
+        places = {column.param.key: i for i, column in enumerate(self._columns)}
+        return shape_of(self.car, lambda key: float(self.parameters[row, places[key]]))
 
     def advance(self, duration: float, substep: float = SUBSTEP_S) -> None:
         """Advance all cars by whole substeps in one call, without the interpreter lock [s].

@@ -2,27 +2,12 @@
 
 import math
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
 from scm.arrays import Floats
 from scm.errors import RunError
-
-
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """Mass [kg] and centre of gravity [m] of one car, payload and shifts included."""
-
-    mass: float
-    cog_to_rear_axle: float
-    cog_height: float
-
-
-SHAPED = {
-    "added_mass": "mass", "added_cog_x": "cog_to_rear_axle", "added_cog_z": "cog_height",
-}  # fmt: skip
 
 # what others write, and what they read: names here, slots of the block where those differ
 WRITTEN = {

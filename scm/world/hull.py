@@ -4,17 +4,19 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.vehicles.car import Car
+from scm.vehicles.shape import shape_of
 from scm.world.solids import Hull
 
 
 def hull_of(car: Car, *, movable: bool = True) -> Hull:
     """Return the contact body of a car file; an immovable one pushes and is not pushed."""
-    cog = car.value("body.cog_to_rear_axle_m")
+    shape = shape_of(car)
+    cog = shape.cog_to_rear_axle
     rear, front = car.vector("body.footprint_x_m")
     right, left = car.vector("body.footprint_y_m")
     heavy = 1.0 if movable else 1e6
     return Hull(
-        mass=car.value("body.mass_kg") * heavy,
+        mass=shape.mass * heavy,
         yaw_inertia=car.value("body.yaw_inertia_kgm2") * heavy,
         rear=rear - cog,
         front=front - cog,
@@ -45,7 +47,7 @@ def cog_motion(car: Car, motion: Floats) -> Floats:
         car: Says how far ahead of the rear axle they are.
         motion: (n, 6) of the rear axles: x, y, yaw, speed along and across the body, yaw rate.
     """
-    ahead = car.value("body.cog_to_rear_axle_m")
+    ahead = shape_of(car).cog_to_rear_axle
     x, y, yaw, speed, lateral, rate = motion.T
     c, s = np.cos(yaw), np.sin(yaw)
     across = lateral + ahead * rate

@@ -19,6 +19,7 @@ from scm.arrays import Floats, Ints
 from scm.vehicles.body14 import GRAVITY
 from scm.vehicles.car import Car
 from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
+from scm.vehicles.shape import shape_of
 
 
 def facts(car: Car) -> Facts:
@@ -72,8 +73,8 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 def lever_arm(car: Car) -> Floats:
     """Return the IMU's place as seen from the centre of gravity, body frame (3,) [m]."""
-    cog = (car.value("body.cog_to_rear_axle_m"), 0.0, car.value("body.cog_height_m"))
-    return np.array(car.vector("imu.position_m")) - cog
+    shape = shape_of(car)
+    return np.array(car.vector("imu.position_m")) - (shape.cog_to_rear_axle, 0.0, shape.cog_height)
 
 
 def tilted(level: Floats, roll: Floats, pitch: Floats) -> Floats:
