@@ -385,6 +385,16 @@ def _contradictions(data: Mapping[str, Any], values: Mapping[str, Quantity]) -> 
     cog, base = number("body.cog_to_rear_axle_m"), number("body.wheelbase_m")
     if cog is not None and base is not None and cog >= base:
         yield f"body.cog_to_rear_axle_m: expected less than body.wheelbase_m = {base}, got {cog}"
+    shift = number("com_shift.shift_m")
+    if cog is not None and base is not None and shift is not None and not 0 < cog + shift < base:
+        yield f"com_shift.shift_m: {shift:g} puts the centre of gravity outside the axles"
+    height, raised = number("body.cog_height_m"), number("load_transfer.height_m")
+    if height is not None and raised is not None and height + raised <= 0.0:
+        yield f"load_transfer.height_m: {raised:g} puts the centre of gravity below the floor"
+    for kind in ("slip", "lateral_slip"):
+        peak, slides = number(f"tyre.{kind}_extremum"), number(f"tyre.{kind}_asymptote")
+        if peak is not None and slides is not None and slides <= peak:
+            yield f"tyre.{kind}_asymptote: expected above the extremum at {peak:g}, got {slides:g}"
     front = number("drive.front_driven")
     layout = values["drive.layout"].value if "drive.layout" in values else None
     if front is not None and layout is not None and (front > 0.0) != (layout != "rear"):

@@ -250,7 +250,7 @@ _ALL = (
         span=(-0.6, 0.6),
         otherwise="steer_angle",
     ),
-    _body("road_slope", "1", Role.GIVEN, "tangent of road_angle", span=(-1.0, 1.0)),
+    _body("road_slope", "1", Role.GIVEN, "tangent of road_angle, to 1.2 rad", span=(-1.0, 1.0)),
     _body("added_mass", "kg", Role.SHAPE, "beyond the car file's mass", span=(-1.0, 5.0)),
     _body("added_cog_x", "m", Role.SHAPE, "centre of gravity, + forward", span=(-0.05, 0.05)),
     _body("added_cog_z", "m", Role.SHAPE, "centre of gravity, + up", span=(-0.05, 0.05)),

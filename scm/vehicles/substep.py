@@ -66,9 +66,9 @@ v_long = cos_steer * over_x + sin_steer * over_y
 v_lat = cos_steer * over_y - sin_steer * over_x
 """
 
-# after road_angle is known
+# after road_angle is known; 1.2 rad is where every linkage has ended
 ROAD = """
-road_slope = tan_small(road_angle)
+road_slope = tan_small(min(max(road_angle, -1.2), 1.2))
 """
 
 ELIMINATE = """

@@ -140,3 +140,12 @@ def test_compliance_gives_way_by_side_force_over_weight_and_stands_still():
 def test_the_softest_steering_inside_its_bounds_does_not_chatter():
     _, _, wiggle = settled_circle(["steer_compliance"], {"steering.compliance_rad": 1.0})
     assert wiggle < 2e-3
+
+
+def test_a_command_beyond_every_linkage_still_turns_the_car_its_way():
+    numbers = {"steering.limit_rad": 1.2, "steering.gain": 2.0, "steering.rate_rad_s": 1e6}
+    fleet = fleet_with(["steer_gain"], numbers)
+    fleet.throttle[0], fleet.steering[0] = 0.5, 1.0
+    fleet.advance(2.0)
+    assert fleet.steer_angle[0] == pytest.approx(2.4)  # asked for; the wheels end at 1.2 rad
+    assert fleet.yaw_rate[0] > 1.0

@@ -114,6 +114,27 @@ def test_a_wrong_unit_is_refused(tmp_path):
         (("value = 0.07077", "value = 0.2"), "cog_to_rear_axle_m: expected less than"),
         (("value = 0.045, ", "value = 0.7, "), "outweigh body.mass_kg = 2.4"),
         (("front_driven              = { value = 0", "front_driven = { value = 1"), "contradicts"),
+        (
+            (
+                "[suspension] ",
+                '[com_shift]\nshift_m = { value = 0.08, source = "x" }\n[suspension] ',
+            ),
+            "com_shift.shift_m: 0.08 puts the centre of gravity outside the axles",
+        ),
+        (
+            (
+                "[suspension] ",
+                '[load_transfer]\nheight_m = { value = -0.06, source = "x" }\n[suspension] ',
+            ),
+            "load_transfer.height_m: -0.06 puts the centre of gravity below the floor",
+        ),
+        (
+            (
+                "lateral_slip_asymptote    = { value = 0.50",
+                "lateral_slip_asymptote = { value = 0.15",
+            ),
+            "tyre.lateral_slip_asymptote: expected above the extremum at 0.2, got 0.15",
+        ),
         (('"servo", ', '"servo", "servo", '), "terms: 'servo' stands twice"),
         (("terms = [", "terms = [3,"), "terms: expected a list of effect names"),
         (('"tyre_contact", ', ""), "no term sets load"),
