@@ -4,6 +4,7 @@ import msgspec
 
 from scm.api.picture import Held, Picture, SeenPose
 from scm.api.residual import Residual
+from scm.camera.optics import fitted
 from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
@@ -26,6 +27,7 @@ class CarRow(msgspec.Struct, kw_only=True, frozen=True):
     """One car; pose of the rear axle's centre in the map frame.
 
     Attributes:
+        cameras: Those that its file gives it; may be empty.
         age_ms: How old its newest state is now, the snapshot's own age included.
         throttle: As the car reports it; None: it reports nothing.
         eye: What the Eye's newest pose differs from the truth; None: not seen lately.
@@ -34,6 +36,7 @@ class CarRow(msgspec.Struct, kw_only=True, frozen=True):
     vehicle: str
     kind: str
     car: str
+    cameras: tuple[str, ...]
     tag_id: int
     x_m: float
     y_m: float
@@ -96,6 +99,7 @@ def _row(
         vehicle=car.vehicle,
         kind=car.kind,
         car=car.car,
+        cameras=tuple(fitted(car.car)),
         tag_id=car.tag_id,
         x_m=round(car.x_m, 4),
         y_m=round(car.y_m, 4),

@@ -2,21 +2,22 @@
 
 While nobody does, the part hears nothing: no snapshot is even read. A frame's time lies on the
 camera's own grid; it is pictured when the world's snapshots have passed that time, from the two
-around it. So a frame is up to one snapshot late (50 ms), as a real camera's is, and smooth.
+around it. So a frame is up to one snapshot late (50 ms), as a real camera's is, and smooth; a car
+file's `latency_s` counts from the frame's time, so it is hidden in those 50 ms or adds to them.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 import cv2
 
 from scm.camera.daylight import Daylight
-from scm.camera.optics import Optics, cameras_of, optics_of
+from scm.camera.delivery import UnderWay, is_lost
+from scm.camera.optics import Optics, fitted
 from scm.camera.studio import Studio
 from scm.camera.tween import between, near
-from scm.clock import NS_PER_MS, NS_PER_S, Clock
-from scm.errors import CarError, EyeError
+from scm.clock import NS_PER_MS, NS_PER_S, Clock, nanoseconds
+from scm.errors import EyeError
 from scm.maps.model import CityMap
 from scm.part import Hears, IsWanted, Serves
 from scm.v2x.exchange import Incoming, Outgoing
@@ -25,13 +26,11 @@ from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.world_snapshot import WorldSnapshot
-from scm.vehicles.car import car_names, load_car
 
 LOOK_NS = 100 * NS_PER_MS
 FLASH_NS = 500 * NS_PER_MS
 FARTHEST_M = 12.0
 """Cars farther away are not drawn: a Nigel is 15 pixels wide there."""
-DEFAULT_CAR = "nigel"
 AWAKE = (Hears(WorldSnapshot), Hears(Spat))
 ASLEEP: tuple[Hears, ...] = ()
 
@@ -53,7 +52,7 @@ class CameraPart:
 
     Args:
         city_map: The city.
-        seed: Of the floor's grain and the sensors' noise.
+        seed: Of the floor's grain, the sensors' noise and the lost frames.
         daylight: The light in the city; None: a well lit room.
         clock: Times the pictures for the status line; None: it is left out.
     """
@@ -80,7 +79,8 @@ class CameraPart:
         self._look_ns: int | None = None
         self._snapshots: list[WorldSnapshot] = []
         self._spats: dict[str, Spat] = {}
-        self._sent_ns: dict[Which, int] = {}
+        self._exposed_ns: dict[Which, int] = {}
+        self._under_way = UnderWay()
         self._counted = _Counted()
         self._spent_ns = 0
 
@@ -96,14 +96,16 @@ class CameraPart:
         status = self._status(now_ns)
         if not self.hears:
             return status
-        fresh = False
+        heard_ns: int | None = None
         for item in inbox:
             if isinstance(item.message, Spat):
                 self._spats[item.message.junction] = item.message
             elif isinstance(item.message, WorldSnapshot):
                 self._snapshots = [*self._snapshots[-1:], item.message]
-                fresh = True
-        return [*self._frames(), *status] if fresh else status
+                heard_ns = min(item.t_ns, now_ns)
+        if heard_ns is not None:
+            self._expose(heard_ns)
+        return [*self._under_way.come_out(now_ns), *status]
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """Leave without a word."""
@@ -117,31 +119,36 @@ class CameraPart:
             self.hears = ASLEEP
             self._snapshots.clear()
             self._spats.clear()
-            self._sent_ns.clear()
+            self._exposed_ns.clear()
+            self._under_way.clear()
             self._counted.wanted.clear()
 
-    def _frames(self) -> list[Outgoing]:
+    def _expose(self, heard_ns: int) -> None:
         """Picture every wanted camera whose grid has a time between the last two snapshots."""
         if len(self._snapshots) < 2 or self._snapshots[0].t_ns >= self._snapshots[1].t_ns:
-            return []  # the first one, or the world's time went back
+            return  # the first one, or the world's time went back
         before, after = self._snapshots
-        frames: list[Outgoing] = []
         self._counted.wanted.clear()
         for car in after.vehicles:
             if not self._is_wanted(CameraFrame, {"vehicle": car.vehicle}):
                 continue
-            for camera, optics in _cameras(car.car).items():
+            for camera, optics in fitted(car.car).items():
                 which = (car.vehicle, camera)
                 if not self._is_wanted(CameraFrame, {"vehicle": car.vehicle, "camera": camera}):
                     continue
                 self._counted.wanted.add(which)
-                due_ns = _on_grid(after.t_ns, optics.rate_hz)
-                if due_ns > max(before.t_ns, self._sent_ns.get(which, -1)):
-                    self._sent_ns[which] = due_ns
-                    frames += self._frame(which, optics, due_ns)
-        return frames
+                number, due_ns = _on_grid(after.t_ns, optics.rate_hz)
+                if due_ns <= max(before.t_ns, self._exposed_ns.get(which, -1)):
+                    continue
+                self._exposed_ns[which] = due_ns
+                if is_lost(self._seed, *which, number, optics.drop_out):
+                    continue
+                # In the clock by which snapshots are heard: the world's may be another computer's.
+                out_ns = heard_ns - (after.t_ns - due_ns) + nanoseconds(optics.latency_s)
+                for frame in self._frame(which, optics, due_ns):
+                    self._under_way.put(frame, out_ns)
 
-    def _frame(self, which: Which, optics: Optics, t_ns: int) -> list[Outgoing]:
+    def _frame(self, which: Which, optics: Optics, t_ns: int) -> list[CameraFrame]:
         began_ns = self._clock.now_ns() if self._clock else 0
         if self._studio is None:
             self._studio = Studio(self._map, self._daylight, self._seed)
@@ -197,23 +204,13 @@ class CameraPart:
         return [PartStatus(station=self.name, t_ns=now_ns, detail=detail)]
 
 
-def _on_grid(t_ns: int, rate_hz: float) -> int:
-    """Return the last whole period of a rate since time zero, exact to the nanosecond."""
+def _on_grid(t_ns: int, rate_hz: float) -> tuple[int, int]:
+    """Return how many whole periods of a rate there were since time zero, and when the last was."""
     millihertz = round(1000 * rate_hz)
     frames = t_ns * millihertz // (1000 * NS_PER_S)
-    return frames * 1000 * NS_PER_S // millihertz
+    return frames, frames * 1000 * NS_PER_S // millihertz
 
 
 def _nobody(kind: type[Message], where: Mapping[str, str]) -> bool:
     del kind, where
     return False
-
-
-@lru_cache(maxsize=64)
-def _cameras(car: str) -> dict[str, Optics]:
-    """Return the cameras of a car file of that name; a car that is not among ours is a Nigel."""
-    model = load_car(car if car in car_names() else DEFAULT_CAR)
-    try:
-        return {camera: optics_of(model, camera) for camera in cameras_of(model)}
-    except CarError:
-        return {}

@@ -65,6 +65,7 @@ class DemoCity:
         self.fault = None
         self.ask_refuses = ""
         self.switches = {}
+        self.files = {}
         self.studio = None
         self.pictured = []
         self.tick = 0
@@ -234,7 +235,7 @@ class DemoCity:
             row = SnapshotVehicle(
                 vehicle=name,
                 kind=kind,
-                car="nigel",
+                car=self.files.get(name, "nigel"),
                 tag_id=number + 1,
                 x_m=pose.x,
                 y_m=pose.y,

@@ -35,4 +35,4 @@ def test_a_city_pictures_what_is_watched_and_nothing_else(tmp_path):
                     break
             wait_for(lambda: "1 camera," in detail(running), 10.0, "one camera is pictured")
         wait_for(lambda: detail(running) == "nobody looks", 10.0, "rendering ends with the film")
-        assert running.get("/cars/n1/camera") == {"watched": []}
+        assert running.get("/cars/n1/camera") == {"cameras": ["front", "rear"], "watched": []}

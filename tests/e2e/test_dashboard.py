@@ -209,6 +209,20 @@ def test_a_chosen_cars_camera_is_watched_for_as_long_as_it_is_shown(open_page, s
     assert set(served.city.pictured) == {("n2", "front"), ("n2", "rear")}
 
 
+def test_a_car_without_cameras_says_so_and_none_is_asked_for(open_page, served):
+    served.city.files |= {"n2": "dart", "n3": "f1tenth"}
+    page = open_page().page
+    page.click('[data-car="n1"] .name')
+    page.click('.tabs button:has-text("rear")')
+    page.click('[data-car="n2"] .name')
+    page.wait_for_selector('.car:has-text("This car has no cameras.")')
+    assert page.locator(".film, .tabs button").count() == 0
+    page.click('[data-car="n3"] .name')  # has none at its rear, which was chosen before
+    wait_until(page, lambda: served.view.watched("n3") == ("front",))
+    assert page.locator(".tabs button").all_text_contents() == ["front"]
+    assert served.view.watched("n2") == ()
+
+
 def test_lights_are_switched_and_shown(open_page, served):
     page = open_page().page
     page.click('[data-car="n3"] .name')

@@ -2,20 +2,20 @@
 
 import asyncio
 from collections.abc import AsyncIterator
-from typing import Literal
 
 from fastapi import APIRouter, Response
 from fastapi.responses import StreamingResponse
 
 from scm.api.city import City, Name, json_response, not_found
+from scm.api.problem import RefusedError
 from scm.api.stream import Stream
+from scm.camera.optics import fitted
+from scm.v2x.message import Refused
 from scm.v2x.messages.camera_frame import CameraFrame
 
 LOOK_S = 0.02
 PATIENCE_S = 3.0
 BOUNDARY = "frame"
-
-Camera = Literal["front", "rear"]
 
 
 def router(city: City, stream: Stream) -> APIRouter:
@@ -23,8 +23,8 @@ def router(city: City, stream: Stream) -> APIRouter:
     routes = APIRouter(prefix="/cars", tags=["cameras"])
 
     @routes.get("/{name}/camera/{camera}.jpg", summary="One picture", response_class=Response)
-    async def still(name: Name, camera: Camera) -> Response:
-        _check(city, name)
+    async def still(name: Name, camera: Name) -> Response:
+        _check(city, name, camera)
         with city.view.watching(name, camera):
             for _ in range(round(PATIENCE_S / LOOK_S)):
                 held = city.view.camera_frame(name, camera)
@@ -35,22 +35,22 @@ def router(city: City, stream: Stream) -> APIRouter:
         raise not_found("camera with a picture", f"{name}/{camera}")
 
     @routes.get("/{name}/camera/{camera}/film", summary="A film", response_class=Response)
-    async def film(name: Name, camera: Camera) -> Response:
-        _check(city, name)
+    async def film(name: Name, camera: Name) -> Response:
+        _check(city, name, camera)
         return StreamingResponse(
             _film(city, stream, name, camera),
             media_type=f"multipart/x-mixed-replace; boundary={BOUNDARY}",
             headers={"Cache-Control": "no-store"},
         )
 
-    @routes.get("/{name}/camera", summary="Whether anybody watches a car's cameras here")
-    def watched(name: Name) -> Response:
-        return json_response({"watched": city.view.watched(name)})
+    @routes.get("/{name}/camera", summary="A car's cameras, and which are watched here")
+    def cameras(name: Name) -> Response:
+        return json_response({"cameras": _cameras(city, name), "watched": city.view.watched(name)})
 
     return routes
 
 
-async def _film(city: City, stream: Stream, name: str, camera: Camera) -> AsyncIterator[bytes]:
+async def _film(city: City, stream: Stream, name: str, camera: str) -> AsyncIterator[bytes]:
     """Yield every new picture until the page goes away or the server ends."""
     shown_ns = None
     with city.view.watching(name, camera):
@@ -67,8 +67,19 @@ def _part(frame: CameraFrame) -> bytes:
     return head.encode() + f"X-Time-Ns: {frame.t_ns}\r\n\r\n".encode() + frame.payload + b"\r\n"
 
 
-def _check(city: City, name: str) -> None:
+def _cameras(city: City, name: str) -> tuple[str, ...]:
+    """Return the cameras that a car's file gives it."""
     snapshot = city.view.picture().snapshot
     cars = () if snapshot is None else snapshot.message.vehicles
-    if all(car.vehicle != name for car in cars):
+    car = next((car for car in cars if car.vehicle == name), None)
+    if car is None:
         raise not_found("car", name)
+    return tuple(fitted(car.car))
+
+
+def _check(city: City, name: str, camera: str) -> None:
+    cameras = _cameras(city, name)
+    if camera not in cameras:
+        has = f"cameras {' and '.join(cameras)}" if cameras else "no cameras"
+        detail = f"there is no camera named {camera!r}: {name} has {has}"
+        raise RefusedError(Refused(code="not_found", detail=detail))

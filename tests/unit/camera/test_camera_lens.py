@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from scm.camera.lens import Lens
-from scm.camera.optics import cameras_of, optics_of
+from scm.camera.optics import cameras_of, fitted, optics_of
 from scm.errors import CarError
 from scm.scenery.bodies import car_rotation
 from scm.vehicles.car import car_of, load_car
@@ -111,8 +111,40 @@ def test_a_car_file_may_say_more_of_its_cameras(tmp_path):
     data["camera"]["distortion"] = {"value": list(BARREL), "source": "ours"}
     data["camera"]["exposure"] = {"value": 0.5, "source": "ours"}
     data["camera"]["rate_hz"] = {"value": 30.0, "source": "ours"}
+    data["camera"]["latency_s"] = {"value": 0.1, "source": "ours"}
+    data["camera"]["drop_out"] = {"value": 0.2, "source": "ours"}
     found = optics_of(car_of(data, path), "rear")
     assert (found.distortion, found.exposure, found.rate_hz) == (BARREL, 0.5, 30.0)
+    assert (found.latency_s, found.drop_out) == (0.1, 0.2)
     assert found.jpeg_quality == 80.0
     del data["camera"]["rear_position_m"]
     assert cameras_of(car_of(data, path)) == ("front",)
+
+
+def test_a_vertical_field_of_view_reaches_from_the_upper_edge_to_the_lower():
+    found = optics_of(load_car("f1tenth"), "front")
+    half = math.radians(48.83 / 2.0)
+    assert 2.0 * math.atan(360.0 / found.focal_px) == pytest.approx(2.0 * half)
+    # The sensor's width and the focal length of the file say the same, cut to 16:9 or not.
+    assert math.tan(half) == pytest.approx(0.75 * 3.68 / 2.0 / 3.04, rel=1e-3)
+
+
+def test_a_field_of_view_is_horizontal_unless_the_file_says_otherwise():
+    found = optics_of(load_car("nigel"), "front")
+    assert 2.0 * math.atan(640.0 / found.focal_px) == pytest.approx(math.radians(62.2))
+
+
+def test_a_field_of_view_along_anything_else_is_refused_with_the_words_that_are_valid():
+    import tomllib
+
+    path = load_car("nigel").path
+    data = tomllib.loads(path.read_text(encoding="utf-8"))
+    data["camera"]["fov_axis"] = {"value": "diagonal", "source": "ours"}
+    told = r"nigel\.toml: camera\.fov_axis: expected 'horizontal' or 'vertical', got 'diagonal'"
+    with pytest.raises(CarError, match=told):
+        car_of(data, path)
+
+
+def test_cars_have_the_cameras_of_their_files():
+    found = {car: tuple(fitted(car)) for car in ("nigel", "f1tenth", "dart")}
+    assert found == {"nigel": ("front", "rear"), "f1tenth": ("front",), "dart": ()}

@@ -120,6 +120,65 @@ def test_the_same_city_gives_the_same_pictures(city_map, car):
     assert runs[0] == runs[1]
 
 
+@pytest.fixture
+def own_facts(monkeypatch, optics):
+    """Put cameras with other facts than Nigel's own on every car."""
+
+    def put(**facts):
+        small = {"width_px": 160, "height_px": 90, "focal_px": 130.0, **facts}
+        cameras = {name: optics(name, **small) for name in ("front", "rear")}
+        monkeypatch.setattr("scm.camera.part.fitted", lambda car: cameras)
+
+    return put
+
+
+def arrivals(city, seconds=1.5, which=N1_FRONT):
+    """Return when each frame was exposed and when it came [ns]."""
+    frames = city.hear(which)
+    city.run_for(seconds)
+    return [(item.message.t_ns, item.t_ns) for item in frames.drain()]
+
+
+def test_a_frame_comes_its_latency_after_its_exposure(city, own_facts):
+    own_facts(latency_s=0.3)
+    got = arrivals(city)
+    assert len(got) >= 12
+    late_ms = [(came_ns - t_ns) / NS_PER_MS for t_ns, came_ns in got]
+    assert min(late_ms) >= 300.0
+    assert max(late_ms) <= 300.0 + 2 * 20.0  # the part looks every 20 ms, and a step passes on
+    times = [t_ns for t_ns, _ in got]
+    assert times == sorted(times)
+
+
+def test_a_camera_without_latency_is_a_snapshot_late_at_most(city, own_facts):
+    own_facts()
+    assert max(came_ns - t_ns for t_ns, came_ns in arrivals(city)) <= 90 * NS_PER_MS
+
+
+def test_frames_under_way_end_with_the_last_subscriber(city, own_facts):
+    own_facts(latency_s=1.0)
+    frames = city.hear(N1_FRONT)
+    city.run_for(0.8)
+    city.bus.unsubscribe(frames)
+    city.run_for(0.2)
+    assert all(t_ns >= NS_PER_S - 50 * NS_PER_MS for t_ns, _ in arrivals(city, 1.4))
+
+
+def test_drop_out_loses_some_frames_and_no_others_change(city_map, car, own_facts):
+    def run(wanted, drop_out):
+        own_facts(drop_out=drop_out, read_noise=2.0)
+        with Lockstep([Stage(car), CameraPart(city_map, seed=4)]) as city:
+            frames = city.hear(wanted)
+            city.run_for(3.0)
+            got = [item.message for item in frames.drain()]
+        return {frame.t_ns: frame.payload for frame in got if frame.camera == "front"}
+
+    whole, some = run(N1_FRONT, 0.0), run(N1_FRONT, 0.5)
+    assert 0.25 * len(whole) < len(some) < 0.75 * len(whole)
+    assert some.items() <= whole.items()
+    assert run(Hears(CameraFrame, {"vehicle": "n1"}), 0.5) == some
+
+
 def test_between_two_snapshots_cars_are_on_their_way(car):
     def shot(t_ns, *cars):
         return WorldSnapshot(t_ns=t_ns, tick=0, vehicles=cars)

@@ -7,7 +7,6 @@ import { fixed } from "./format.js";
 import { selected } from "./selection.js";
 import { indicatorsOf, world } from "./store.js";
 
-const CAMERAS = ["front", "rear"];
 const HEADLIGHTS = [["off", "Off"], ["low", "Low"], ["high", "High"]];
 const INDICATORS = [["off", "Off"], ["left", "◀"], ["hazard", "◀ ▶"], ["right", "▶"]];
 const WORDS = { left: "left", right: "right", hazard: "hazard", off: "off", low: "low", high: "high" };
@@ -21,17 +20,18 @@ export function chosenCar() {
 }
 
 export function CarPanel({ car }) {
-  const film = `/api/v1/cars/${car.vehicle}/camera/${camera.value}/film`;
+  const shown = car.cameras.includes(camera.value) ? camera.value : car.cameras[0];
+  const film = `/api/v1/cars/${car.vehicle}/camera/${shown}/film`;
   return html`
     <section class="panel car" aria-label="Car ${car.vehicle}">
       <div class="panel-head">
         <h2>${car.vehicle} <small>${car.car}, ${fixed(car.speed_mps, 2)} m/s</small></h2>
         <div class="tabs" role="group" aria-label="Camera">
-          ${CAMERAS.map(
+          ${car.cameras.map(
             (name) => html`
               <button
                 class="small"
-                aria-pressed=${camera.value === name}
+                aria-pressed=${shown === name}
                 onClick=${() => (camera.value = name)}
               >${name}</button>
             `,
@@ -39,7 +39,9 @@ export function CarPanel({ car }) {
         </div>
         <button class="plain" aria-label="Close" title="Close" onClick=${() => (selected.value = null)}>✕</button>
       </div>
-      <${Film} key=${film} src=${film} label="What the ${camera.value} camera of ${car.vehicle} sees" />
+      ${shown
+        ? html`<${Film} key=${film} src=${film} label="What the ${shown} camera of ${car.vehicle} sees" />`
+        : html`<p class="empty">This car has no cameras.</p>`}
       <${Lights} car=${car} />
     </section>
   `;
