@@ -233,3 +233,14 @@ def test_stiction_holds_a_car_that_it_lets_roll_once_it_turns():
     rolling.throttle[0] = 0.3
     rolling.advance(2.0)
     assert rolling.speed[0] == pytest.approx(steady_speed(throttle=0.3), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["nigel", "f1tenth"])
+def test_no_motor_gives_more_than_it_takes_from_the_battery(name):
+    car = load_car(name).with_terms(["battery_charge", "motor_heating"])
+    power = car.value("drive.stall_torque_nm") * car.value("drive.no_load_speed_rad_s")
+    nominal = car.value("drive.battery_nominal_v")
+    assert car.value("battery.stall_current_a") * nominal >= power
+    # what is lost at stall is at most what goes in there, and no less than a lossless gear leaves
+    assert car.value("motor.stall_heat_w") <= 1.01 * car.value("battery.stall_current_a") * nominal
+    assert car.value("motor.stall_heat_w") >= power

@@ -3,7 +3,8 @@
     charge_drawn += (idle_current + motors * stall_current * max(0, u (u V / V_n - n))) * dt  [A*s]
 
 u is the throttle, n the driven wheels' speed over no-load speed, V the loaded voltage at charge.
-Holds: choppers that give nothing back when braking.   Shows in: long drives.
+Holds: choppers that give nothing back when braking; a stall_current of at least what gives the
+motor's power, stall torque times no-load speed over nominal voltage.   Shows in: long drives.
 Source: DC motor behind a chopper (Fitzgerald, Electric Machinery); state of charge by counting.
 """
 
