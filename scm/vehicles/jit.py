@@ -19,10 +19,12 @@ from numba.core import cgutils
 from numba.core.caching import FunctionCache
 
 from scm.vehicles.lanes import LANES, WIDTH, Rows, copy_lanes
+from scm.vehicles.nested import NestedDispatcher
 
 _SOURCES: dict[Callable[..., Any], str] = {}
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 _ROWS = "(float64[:,::1],float64[:,::1],boolean[::1],int64[::1],int64,int64,int64,float64)"
 
 
@@ -30,12 +32,12 @@ def law(function: Function) -> Function:
     """Let a scalar function be called from compiled kernels; plain calls work as before."""
     with contextlib.suppress(OSError):  # typed in by hand: it has no source
         _SOURCES[function] = inspect.getsource(function)
-    return cast("Function", numba.njit(nogil=True, error_model="numpy")(function))
+    return cast("Function", NestedDispatcher(function, _OPTIONS))
 
 
 def inlined(function: Function) -> Function:
     """As `law`, but laid into its caller always: arrays are passed without being counted."""
-    return cast("Function", numba.njit(nogil=True, error_model="numpy", forceinline=True)(function))
+    return cast("Function", NestedDispatcher(function, {**_OPTIONS, "forceinline": True}))
 
 
 def source_of(function: Callable[..., Any]) -> str:
@@ -51,6 +53,15 @@ def array_kernel(function: Function) -> Function:
     compiled = _cached(function)
     compiled._cache.stamp_folder(Path(function.__code__.co_filename).parent)  # noqa: SLF001
     return cast("Function", compiled)
+
+
+def is_kept(kernel: Callable[..., Any]) -> bool:
+    """Return whether an array kernel lies compiled in the cache, from the files as they are now."""
+    cache: Any = getattr(kernel, "_cache")  # noqa: B009 numba's, and no function has it
+    try:
+        return bool(cache._cache_file._load_index())  # noqa: SLF001
+    except Exception:  # noqa: BLE001 a damaged file may raise anything
+        return False
 
 
 def fleet_kernel(function: Function) -> Function:
@@ -145,7 +156,7 @@ class _ForgivingCache(_Cache):  # type: ignore[misc]
 
 
 def _cached(function: Callable[..., Any]) -> Any:
-    compiled: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    compiled: Any = numba.njit(**_OPTIONS, no_cfunc_wrapper=True)(function)
     compiled._cache = _ForgivingCache(function)  # noqa: SLF001 as its own enable_caching does
     return compiled
 

@@ -1,0 +1,67 @@
+"""Functions that only compiled functions call: numba types them and hands them on, no more.
+
+As numba stands, each function that another one calls becomes machine code of its own, with two
+wrappers for callers in Python and C that never come: half of the time that a kernel takes to
+compile. Here only the kernel at the top is optimised and becomes machine code, with all that it
+calls inside. A plain call from Python still works, and compiles as ever.
+"""
+
+from typing import Any
+
+from numba.core import types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+from numba.core.registry import CPUDispatcher
+
+_Library: Any = JITCodeLibrary
+_Compiler: Any = Compiler
+_Dispatcher: Any = CPUDispatcher
+
+
+class _Text(_Library):  # type: ignore[misc]
+    """LLVM text of one function and of those that it calls, to be linked into a caller."""
+
+    def _optimize_final_module(self) -> None:
+        """Leave this to the caller, who sees the whole."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    @property
+    def codegen(self) -> "_Text":
+        """Itself, for there is no engine that holds it."""
+        return self
+
+    def set_env(self, name: str, env: object) -> None:
+        """Do nothing: constants of Python's, which this would bring, are not for the nested."""
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return 0, as for any symbol that is not there: this is no machine code."""
+        return 0
+
+
+class _TextCompiler(_Compiler):  # type: ignore[misc]
+    """Numba's own steps, into text."""
+
+    def __init__(
+        self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, own: Any
+    ) -> None:
+        super().__init__(typing, target, library, args, result, flags, own)
+        if library is None:
+            self.state.library = _Text(self.state.targetctx.codegen(), "law")
+
+
+class NestedDispatcher(_Dispatcher):  # type: ignore[misc]
+    """What numba makes of a function, but for callers that are compiled only text."""
+
+    def __init__(self, function: Any, options: dict[str, object]) -> None:
+        options = {**options, "nopython": True}
+        super().__init__(function, targetoptions=options)
+        own = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        self._text = _Dispatcher(function, targetoptions=own, pipeline_class=_TextCompiler)
+
+    @property
+    def _numba_type_(self) -> Any:
+        return types.Dispatcher(self._text)
