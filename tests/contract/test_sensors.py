@@ -1,21 +1,25 @@
 """What every sensor keeps: its rate, one seed one noise, and the truth when nothing spoils it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 from scm import registry
+from scm.clock import NS_PER_S
 from scm.geometry import Pose2
 from scm.vehicles.bank import Bank
 from scm.vehicles.car import car_names, load_car
+from scm.vehicles.facts import FACTS
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sensor, Sight
 
 PACKAGE = "scm.vehicles.sensors"
+DOCS = Path(__file__).parents[2] / "docs"
 KINDS = registry.names(PACKAGE)
 WALL = np.array([[2.0, -5.0, 2.0, 5.0]])
 SCENE = Scene(WallGrid(WALL), np.zeros((0, 4)), np.zeros(0, np.int64))
@@ -110,3 +114,84 @@ def test_one_seed_one_noise(kind, fleet):
     if any(facts.noise):
         noisy &= np.broadcast_to(np.array(facts.noise) > 0.0, noisy.shape)
         assert (read(3)[noisy] != read(4)[noisy]).all()
+
+
+SECTION = {"encoders": "encoder"}
+"""Sections of the car file that are named otherwise than their sensor."""
+
+
+def section(kind):
+    return SECTION.get(kind, kind)
+
+
+def told(kind, **numbers):
+    """Return a Nigel whose file says other numbers of its device; keys without the section."""
+    return load_car("nigel").with_terms(
+        (), {f"{section(kind)}.{key}": number for key, number in numbers.items()}
+    )
+
+
+def noise_keys(kind):
+    start = f"{section(kind)}."
+    return [key.removeprefix(start) for key in FACTS if key.startswith(start) and "noise" in key]
+
+
+def read_for(kind, car, fleet, seconds, seed=0):
+    """Return the first car's readings as (came after [ns], values), looked at every 10 ms."""
+    bank = Bank(sensor(kind), seed)
+    bank.fit(0, "ann", car, fleet, 0, 0)
+    steps = range(0, round(seconds * NS_PER_S), NS_PER_S // 100)
+    return [(now - r.t_ns, r.values[0]) for now in steps for r in bank.step(now, lambda: SCENE)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_sensor_keeps_the_rate_of_its_file(kind, fleet):
+    assert len(read_for(kind, told(kind, rate_hz=20.0, drop_out=0.0), fleet, 2.0)) == 40
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_sensor_is_as_late_as_its_file_says(kind, fleet):
+    car = told(kind, rate_hz=20.0, drop_out=0.0, latency_s=0.03)
+    assert {late for late, _ in read_for(kind, car, fleet, 1.0)} == {30_000_000}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_sensor_loses_the_share_that_its_file_says(kind, fleet):
+    got = len(read_for(kind, told(kind, rate_hz=50.0, drop_out=0.4), fleet, 10.0))
+    # 500 readings: the share is known to 0.022 (one sigma).
+    assert got / 500 == pytest.approx(0.6, abs=0.09)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_noise_of_the_file_spreads_readings(kind, fleet):
+    assert noise_keys(kind)
+    for key in noise_keys(kind):
+        car = told(kind, rate_hz=50.0, **dict.fromkeys(noise_keys(kind), 0.0) | {key: 0.8})
+        got = np.array([values for _, values in read_for(kind, car, fleet, 1.0)])
+        never_missed = got[:, np.isfinite(got).all(axis=0)]
+        assert (np.ptp(never_missed, axis=0) > 0.5).any(), key
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_file_without_noise_gives_the_truth(kind, fleet):
+    others = [key for key in ("drop_out", "latency_s", "quantum", "quantum_m", "quantum_rad",
+                              "bias_rad", "heading_bias_rad", "heading_walk_rad_sqrt_s",
+                              "accel_walk_m_s2_sqrt_s", "gyro_walk_rad_s_sqrt_s")
+              if f"{section(kind)}.{key}" in FACTS]  # fmt: skip
+    car = told(kind, rate_hz=20.0, **dict.fromkeys(noise_keys(kind) + others, 0.0))
+    exact = sensor(kind).measure(car, fleet, np.array([0]), Sight(SCENE, np.array([0])))[0]
+    exact = np.floor(exact) if kind == "encoders" else exact
+    readings = read_for(kind, car, fleet, 1.0)
+    assert len(readings) == 20
+    for late, values in readings:
+        assert late == 0
+        assert_array_equal(values, exact)
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "camera"])
+def test_every_key_of_a_sensor_stands_in_its_page(kind):
+    page = DOCS / ("cameras.md" if kind == "camera" else "sensors.md")
+    text = page.read_text(encoding="utf-8")
+    keys = [key.partition(".")[2] for key in FACTS if key.startswith(f"{section(kind)}.")]
+    assert {"rate_hz", "latency_s", "drop_out"} <= set(keys)
+    assert [key for key in keys if f"`{key}`" not in text] == []
