@@ -156,7 +156,8 @@ class _ForgivingCache(_Cache):  # type: ignore[misc]
 
 
 def _cached(function: Callable[..., Any]) -> Any:
-    compiled: Any = numba.njit(**_OPTIONS, no_cfunc_wrapper=True)(function)
+    options: Any = {**_OPTIONS, "no_cfunc_wrapper": True}
+    compiled: Any = numba.njit(**options)(function)
     compiled._cache = _ForgivingCache(function)  # noqa: SLF001 as its own enable_caching does
     return compiled
 

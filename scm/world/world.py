@@ -20,6 +20,7 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
 from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.early import compiled_beside
 from scm.vehicles.drivers.errands import Errands
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.drivers.streets import streets_of
@@ -127,10 +128,12 @@ class World:
         self._unnamed = 0
         self._came = 0
         self._receivers = Receivers(self.roadside)
-        for name in prepare:
-            self.ground.warm(self.garage.prepare(name))
-        self.contacts.warm()
-        self._warm_scanner()
+        with compiled_beside():
+            for name in prepare:
+                self.ground.warm(self.garage.prepare(name))
+            self.contacts.warm()
+            self._warm_scanner()
+        self.crowd.warm()
 
     def cars(self) -> Iterator[AnyCar]:
         """Yield all cars, hosted ones first."""

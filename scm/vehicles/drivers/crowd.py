@@ -49,7 +49,7 @@ class Crowd:
         city_map = streets.roads.city_map
         self.streets = streets
         self.capacity = capacity
-        self._seed, self._loss = seed, loss
+        self._seed, self._loss = seed, float(loss)
         self._memory = m.empty_memory(capacity)
         self._heard = nobody(city_map, capacity, CAMS_KEPT if loss else 1)
         self.signals = SignalTable(city_map, FRAMES_KEPT if loss else 1)
@@ -64,6 +64,16 @@ class Crowd:
         self._routes_used = 0
         self.throttle: Floats = self._commands[0]
         self.steering: Floats = self._commands[1]
+
+    def warm(self) -> None:
+        """Compile or load now what driving needs; call it before the first car enters."""
+        nobody: Ints = np.zeros(0, np.int64)
+        none: Floats = np.zeros(0)
+        self.hear(nobody, 0, none, none, none, none, none)
+        self._decide(nobody, 0, self.signals, stop=False)
+        if self.capacity and self.streets.names:
+            look_from(self.streets.ways, self._memory, 0, 0)
+            self._memory.sight[0] = -1
 
     @property
     def lane(self) -> Ints:
