@@ -199,9 +199,10 @@ class Fleet:
     ) -> None:
         """Restart a row from a measured state of its rear axle; no angle means wheels straight.
 
-        Lags start settled at `steer_angle` [rad] and `throttle`; the commands themselves start at
-        zero and the battery at its nominal voltage, so write commands after placing. With
-        `keep_actuators` lags and servo stay as they are, whatever angle and throttle are given.
+        Lags and servo start settled at `steer_angle` [rad] and `throttle`; a trim adds its angle to
+        the servo's. The commands themselves start at zero and the battery at its nominal voltage,
+        so write commands after placing. With `keep_actuators` lags and servo stay as they are,
+        whatever angle and throttle are given.
 
         Raises:
             RunError: when there is no such row.

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from scm.geometry import Pose2
-from scm.vehicles.body14 import GRAVITY
+from scm.vehicles.body14 import GRAVITY, PARAMS
 from scm.vehicles.car import load_car
-from scm.vehicles.fleet import Fleet
+from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.layout import columns_of
 
 OUTPUTS = (
@@ -225,6 +225,27 @@ def test_no_car_inside_the_bounds_of_its_numbers_stirs_at_rest():
     fleet.advance(1.0)
     assert not fleet.status.any()
     assert np.abs(np.column_stack((fleet.x, fleet.y, fleet.z, fleet.pitch))).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["nigel", "f1tenth"])
+def test_no_car_inside_the_bounds_of_its_effects_numbers_diverges_when_driven_hard(name):
+    rng, rows = np.random.default_rng(5), 512
+    fleet = Fleet(load_car(name), rows)
+    for row in range(rows):
+        fleet.add(Pose2(0.0, 0.0, 0.01 * row))
+    body = {param.name for param in PARAMS}
+    for column, (low, high) in ((c.name, c.param.bounds) for c in columns_of(fleet.car.terms)):
+        if column not in body:
+            values = np.where(rng.random(rows) < 0.5, low, high)
+            nominal = fleet.parameters[:, fleet.parameter_names.index(column)]
+            nominal[:] = np.where(rng.random(rows) < 0.3, nominal, values)
+    for throttle in (1.0, -1.0, 0.0):
+        fleet.throttle[:] = throttle
+        fleet.steering[:] = rng.choice((-1.0, 0.0, 0.3, 1.0), rows)
+        fleet.advance(0.5)
+    assert not (fleet.status == VehicleStatus.DIVERGED).any()
+    assert np.isfinite(fleet.wheel_speed).all()
+    assert np.abs(fleet.yaw_rate).max() < 100.0
 
 
 def test_a_very_stiff_suspension_is_still_calm_at_one_millisecond():
