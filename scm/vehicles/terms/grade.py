@@ -4,7 +4,7 @@
     force_x += -F * cos(uphill - yaw),  force_y += -F * sin(uphill - yaw)
 
 The plane rises by `slope` toward the world direction `uphill`. The weight on the wheels stays as
-on the level: 0.5 % too much at a slope of 0.1.
+on the level: 0.5 % too much at a slope of 0.1. Accelerometers feel no lean, only what the car does.
 Holds: slopes below 0.3; a map's height map does the same locally, and tilts the car too.
 Shows in: throttle held in several headings, rolling from rest.   Source: statics.
 """
