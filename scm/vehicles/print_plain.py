@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from textwrap import indent
 
 from scm.vehicles import body14
-from scm.vehicles.print_tiles import Slots, loads_of, motion_slots, print_line
+from scm.vehicles.print_tiles import Slots, loads_of, motion_slots, print_line, range_text
 from scm.vehicles.program import Program, Stage
 from scm.vehicles.signals import Per
 
@@ -99,6 +99,6 @@ def _text(stage: Stage, wheel: Sequence[str]) -> str:
     before = [f"{name} = wheel[w, {name.upper()}]" for name in loads_of(stage) if name in wheel]
     after = [f"wheel[w, {name.upper()}] = {name}" for name in stage.sets if name in wheel]
     place = ["front = 1.0 if w < 2 else 0.0", "side = 1.0 if w % 2 == 0 else -1.0"]
-    return f"# {stage.name}\nfor w in range(4):\n" + indent(
+    return f"# {stage.name}\nfor w in {range_text(stage.wheels)}:\n" + indent(
         "\n".join([*place, *before, *lines, *after]), "    "
     )

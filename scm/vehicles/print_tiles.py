@@ -177,7 +177,8 @@ class _Rows:
         """Return the call of one stage, for each wheel where it is a wheel's."""
         if stage.per is Per.BODY:
             return f"{_function_name(stage)}(car, wheel, 0, dt)"
-        return f"for w in range(4):\n    {_function_name(stage)}(car, wheel, w, dt)"
+        wheels = range_text(stage.wheels)
+        return f"for w in {wheels}:\n    {_function_name(stage)}(car, wheel, w, dt)"
 
     def _place(self, name: str) -> str:
         if name[-3:-1] == "__":
@@ -187,6 +188,11 @@ class _Rows:
 
 def _function_name(stage: Stage) -> str:
     return stage.name.replace(" ", "_")
+
+
+def range_text(wheels: range) -> str:
+    """Return a run of wheels as it is written."""
+    return f"range({wheels.start}, {wheels.stop})" if wheels.start else f"range({wheels.stop})"
 
 
 def loads_of(stage: Stage) -> list[str]:

@@ -11,17 +11,19 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import cast
 
+from scm.vehicles.axles import AXLES, Known, fold_body
 from scm.vehicles.inline import Line
 from scm.vehicles.signals import Per
 
 
 @dataclass(slots=True)
 class Stage:
-    """Lines that run together, once a car or once a wheel."""
+    """Lines that run together, once a car or once a wheel, of those in `wheels`."""
 
     name: str
     per: Per
     lines: list[Line]
+    wheels: range = range(4)
 
     @property
     def reads(self) -> list[str]:
@@ -69,6 +71,8 @@ class Program:
             stage.lines = list(_without_divisions(stage.lines, numbers))
         self._part_constants()
         self._drop_unread()
+        self._part_axles()
+        self._drop_unread()
         self.once += [
             Stage(f"constant for each {per.value}", per, lines)
             for per, lines in self.prepared.items()
@@ -102,6 +106,27 @@ class Program:
                     live.append((name, cast("ast.expr", hoist.visit(value))))
             stage.lines = live
 
+    def _part_axles(self) -> None:
+        stored = self.kept.union(*(stage.reads for stage in self.end))
+        axles = [Known(axle, self._counts(), stored) for axle in AXLES]
+        for known in axles:
+            known.fold(self.prepared[Per.WHEEL])
+        parted: list[Stage] = []
+        for stage in self.substep:
+            if stage.per is Per.BODY:
+                for known in axles:
+                    stage.lines = fold_body(stage.lines, known.seen_from_the_body())
+                parted.append(stage)
+                continue
+            for known in axles:
+                name = stage.name.replace("each wheel", f"each {known.axle.name} wheel")
+                wheels = range(known.axle.first, known.axle.stop)
+                parted.append(Stage(name, stage.per, known.fold(stage.lines), wheels))
+        self.substep[:] = parted
+        for stage in self.substep:
+            others = (other.reads for other in self._stages() if other is not stage)
+            _drop_unneeded(stage.lines, self.kept.union(*others))
+
     def _drop_unread(self) -> None:
         needed, before = set(self.kept), -1
         groups = [*(stage.lines for stage in self._stages()), *self.prepared.values()]
@@ -112,6 +137,16 @@ class Program:
                     needed |= set(leaves(value)) if name in needed else set()
         for lines in groups:
             lines[:] = [line for line in lines if line[0] in needed]
+
+
+def _drop_unneeded(lines: list[Line], needed: set[str]) -> None:
+    """Drop the lines of a stage that nobody reads after it or, from below, in it."""
+    left: list[Line] = []
+    for name, value in reversed(lines):
+        if name in needed:
+            left.append((name, value))
+            needed |= set(leaves(value))
+    lines[:] = left[::-1]
 
 
 def leaves(value: ast.expr) -> Iterator[str]:
