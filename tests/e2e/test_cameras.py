@@ -21,7 +21,7 @@ def test_a_city_pictures_what_is_watched_and_nothing_else(tmp_path):
         wait_for(lambda: detail(running) == "nobody looks", 20.0, "the camera part tells of itself")
         for car in ("n1", "n3"):
             answer = running.web.get(f"/cars/{car}/camera/front.jpg", timeout=20.0)
-            assert answer.status_code == 200
+            assert answer.status_code == 200, answer.text
             image = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR)
             assert image.shape == (720, 1280, 3)
         film = f"{running.url}/api/v1/cars/n1/camera/rear/film"
