@@ -3,7 +3,18 @@
 import importlib
 import sys
 
-BENCHMARKS = ("kernel", "driver", "world", "city", "bus", "eye", "camera", "lidar", "sensors")
+BENCHMARKS = (
+    "kernel",
+    "driver",
+    "world",
+    "city",
+    "start",
+    "bus",
+    "eye",
+    "camera",
+    "lidar",
+    "sensors",
+)
 
 
 def main(names: list[str]) -> None:
