@@ -69,7 +69,7 @@ def test_a_change_in_a_file_that_a_law_calls_makes_another_kernel(tmp_path, kern
 
 def test_a_file_edited_while_a_process_runs_does_not_name_its_kernel(tmp_path, kernel_of):
     kernel = kernel_of()
-    changed = LAW.format(sign="+")
+    changed = LAW.format(sign="2.0 * ")
     assert kernel_of(changed) == kernel  # it had loaded the old law before the edit
     assert (tmp_path / "calm.py").read_text(encoding="utf-8") == changed
     assert kernel_of() != kernel
