@@ -1,0 +1,24 @@
+"""Laws within kernels are text only; called plainly they are functions as ever."""
+
+from scm.vehicles.jit import array_kernel, law
+
+
+@law
+def twice(x):
+    return 2.0 * x
+
+
+@array_kernel
+def four_times(x):
+    return twice(twice(x))
+
+
+def test_a_law_serves_a_kernel_first_and_a_plain_call_after():
+    assert (four_times(1.5), twice(1.5)) == (6.0, 3.0)
+
+
+def test_a_law_within_a_kernel_makes_no_machine_code_of_its_own():
+    four_times(2.5)
+    assert len(twice._text.overloads) == 1
+    (compiled,) = twice._text.overloads.values()
+    assert compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) == 0
