@@ -227,5 +227,7 @@ def write_page(car_name: str, terms: Sequence[Term], *, plain: bool = False) -> 
     title = f"Kernel of the car {car_name!r}: {len(terms)} effects on 14 degrees of freedom."
     program, slots = write_program(terms), slots_of(terms)
     columns = [column.variable for column in columns_of(terms)]
-    printer = print_plain if plain else print_tiles
-    return printer(title, program, slots, columns)
+    if plain:
+        return print_plain(title, program, slots, columns)
+    program.part_axles()
+    return print_tiles(title, program, slots, columns)

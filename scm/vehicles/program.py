@@ -71,8 +71,6 @@ class Program:
             stage.lines = list(_without_divisions(stage.lines, numbers))
         self._part_constants()
         self._drop_unread()
-        self._part_axles()
-        self._drop_unread()
         self.once += [
             Stage(f"constant for each {per.value}", per, lines)
             for per, lines in self.prepared.items()
@@ -106,7 +104,8 @@ class Program:
                     live.append((name, cast("ast.expr", hoist.visit(value))))
             stage.lines = live
 
-    def _part_axles(self) -> None:
+    def part_axles(self) -> None:
+        """Give front and rear wheels stages of their own; after settling."""
         stored = self.kept.union(*(stage.reads for stage in self.end))
         axles = [Known(axle, self._counts(), stored) for axle in AXLES]
         for known in axles:
@@ -126,6 +125,7 @@ class Program:
         for stage in self.substep:
             others = (other.reads for other in self._stages() if other is not stage)
             _drop_unneeded(stage.lines, self.kept.union(*others))
+        self._drop_unread()
 
     def _drop_unread(self) -> None:
         needed, before = set(self.kept), -1
