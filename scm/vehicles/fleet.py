@@ -208,7 +208,7 @@ class Fleet:
             RunError: when there is no such row.
         """
         self._check(row)
-        car, param = self._block[:, row], self._parameter
+        car = self._block[:, row]
         lags = [term.target for term in self.car.terms if term.keeps is not None]
         kept = {name: self._view(name)[row].copy() for name in {*lags, "steer_angle"}}
         car[:] = 0.0
@@ -233,19 +233,24 @@ class Fleet:
         self._set(row, "steer_angle", steer_angle or 0.0)
         for name in kept if keep_actuators else ():
             self._set(row, name, kept[name])
-        offset = self._slots["wheel_speed"][0]
-        half = 0.5 * param(row, "track") * yaw_rate
-        rolling = np.array([speed - half, speed + half, speed - half, speed + half])
-        car[offset : offset + 4] = rolling / param(row, "wheel_radius")
-        front = cog / param(row, "wheelbase")
-        offset = self._slots["wheel_load"][0]
-        weight = 0.5 * GRAVITY * (shape.mass - 4.0 * param(row, "wheel_mass"))
-        load = np.array([front, front, 1.0 - front, 1.0 - front]) * weight
-        car[offset : offset + 4] = load + param(row, "wheel_mass") * GRAVITY
+        self._roll(row, shape, speed, yaw_rate)
         self.status[row] = VehicleStatus.OK
         if self._past is not None and not keep_actuators:
             self._past.forget(row, throttle, 0.0 if steer_angle is None else None)
         self._run(row, row + 1, 0, SUBSTEP_S)
+
+    def _roll(self, row: int, shape: Shape, speed: float, yaw_rate: float) -> None:
+        """Start a placed car's wheels: rolling without slip, under the weight at rest."""
+        car, param = self._block[:, row], self._parameter
+        offset = self._slots["wheel_speed"][0]
+        half = 0.5 * param(row, "track") * yaw_rate
+        rolling = np.array([speed - half, speed + half, speed - half, speed + half])
+        car[offset : offset + 4] = rolling / param(row, "wheel_radius")
+        front = shape.cog_to_rear_axle / param(row, "wheelbase")
+        offset = self._slots["wheel_load"][0]
+        weight = 0.5 * GRAVITY * (shape.mass - 4.0 * param(row, "wheel_mass"))
+        load = np.array([front, front, 1.0 - front, 1.0 - front]) * weight
+        car[offset : offset + 4] = load + param(row, "wheel_mass") * GRAVITY
 
     def settle(self, row: int) -> None:
         """Let a car that was just placed stand on the heights that `floor_height` has for it."""
