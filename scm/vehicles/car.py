@@ -5,7 +5,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -299,7 +299,7 @@ def _values(
         if key.partition(".")[0] not in sections:
             continue
         if key not in known:
-            problems.append(f"{key}: no such key{nearest(key, list(known))}")
+            problems.append(f"{key}: no such key{_nearest_key(key, known)}")
             continue
         found = list(_entry_problems(key, entry, known[key]))
         problems += found
@@ -309,6 +309,11 @@ def _values(
         if param.required and param.key not in flat:
             problems.append(f"{param.key}: missing; expected {param.about} [{param.unit}]")
     return values
+
+
+def _nearest_key(key: str, known: Iterable[str]) -> str:
+    name = key.partition(".")[2]
+    return nearest(key, [valid for valid in known if nearest(name, [valid.partition(".")[2]])])
 
 
 def _top_problems(data: Mapping[str, Any], sections: set[str]) -> Iterator[str]:
@@ -326,11 +331,13 @@ def _top_problems(data: Mapping[str, Any], sections: set[str]) -> Iterator[str]:
 
 
 def _entry_problems(key: str, entry: Any, kind: Param | Fact) -> Iterator[str]:
+    fields = ["value", "std", "unit", "source"]
+    for name in entry if isinstance(entry, dict) else ():
+        if name not in fields:
+            yield f"{key}: no such field {name!r}{nearest(name, fields)}"
     if not isinstance(entry, dict) or "value" not in entry:
         yield f"{key}: expected {{ value = ..., source = ... }}, got {entry!r}"
         return
-    for name in entry.keys() - {"value", "std", "unit", "source"}:
-        yield f"{key}: no such field{nearest(name, ['value', 'std', 'unit', 'source'])}: {name!r}"
     if not isinstance(entry.get("source", ""), str):
         yield f"{key}.source: expected text, got {entry['source']!r}"
     if entry.get("unit", kind.unit) != kind.unit:

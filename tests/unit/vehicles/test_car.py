@@ -67,6 +67,21 @@ def test_a_misspelt_key_is_refused_with_file_key_and_nearest_name(tmp_path):
     assert "body.wheelbase_m: missing; expected front axle to rear axle [m]" in said
 
 
+def test_an_unknown_key_that_is_like_no_other_gets_no_suggestion(tmp_path):
+    said = refusal(changed(tmp_path, ("[drive] ", "[drive]\nmotor_curent = 3\n# ")))
+    assert "drive.motor_curent: no such key\n" in said + "\n"
+
+
+def test_a_key_in_the_wrong_section_is_told_the_right_one(tmp_path):
+    said = refusal(changed(tmp_path, ("[body]", "[body]\nstall_torque_nm = 3")))
+    assert "body.stall_torque_nm: no such key (did you mean 'drive.stall_torque_nm'?)" in said
+
+
+def test_a_misspelt_field_is_refused_with_the_nearest_name(tmp_path):
+    said = refusal(changed(tmp_path, ("value = 2.40, ", "vaule = 2.40, ")))
+    assert "body.mass_kg: no such field 'vaule' (did you mean 'value'?)" in said
+
+
 def test_all_problems_are_told_at_once(tmp_path):
     said = refusal(
         changed(
