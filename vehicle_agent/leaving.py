@@ -10,7 +10,7 @@ from scm.clock import NS_PER_MS
 from scm.part import Part
 from scm.v2x.exchange import Incoming, Outgoing
 
-PATIENCE_NS = 300 * NS_PER_MS
+PATIENCE_NS = 900 * NS_PER_MS
 
 
 class Leaving:
