@@ -66,9 +66,9 @@ def test_it_ends_when_the_last_words_are_answered(leaving, guest, wish, done):
 def test_it_ends_unanswered_after_a_while(leaving, wish, done):
     wish.set()
     leaving.step(0, [])
-    leaving.step(280 * NS_PER_MS, [])
+    leaving.step(880 * NS_PER_MS, [])
     assert not done.is_set()
-    leaving.step(300 * NS_PER_MS, [])
+    leaving.step(900 * NS_PER_MS, [])
     assert done.is_set()
 
 
