@@ -85,6 +85,7 @@ def measure(parts: dict[str, int], endpoint: str) -> None:
             time.sleep(0.1)
         time.sleep(SETTLE_S)
         heard.drain()
+        told.drain()
         before = {name: used_s(pid) for name, pid in parts.items()}
         began = time.perf_counter()
         time.sleep(SPAN_S)
