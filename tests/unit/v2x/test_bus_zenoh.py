@@ -8,13 +8,14 @@ import pytest
 from scm.clock import WallClock, seconds
 from scm.errors import LinkError, RunError
 from scm.v2x.bus import Mailbox
-from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.bus_zenoh import ASK_AGAIN_FOR_ALL, ZenohBus, ask_again
 from scm.v2x.exchange import Call
 from scm.v2x.message import encode
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.plan_request import PlanRequest
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.trip import Trip
 from scm.v2x.router import Router, free_endpoint
 
 CLOCK = WallClock()
@@ -72,6 +73,12 @@ def test_a_station_waits_for_a_router_that_comes_later(endpoint):
     with Router(endpoint):
         early.join(10.0)
     assert opened == [True]
+
+
+def test_only_events_without_a_rate_are_asked_for_again():
+    assert ask_again(CityEvent, ASK_AGAIN_FOR_ALL) == ASK_AGAIN_FOR_ALL
+    assert ask_again(None, ASK_AGAIN_FOR_ALL) == ASK_AGAIN_FOR_ALL
+    assert ask_again(Trip, ASK_AGAIN_FOR_ALL) is None
 
 
 def test_two_routers_at_one_endpoint_are_refused(router):
