@@ -1,0 +1,99 @@
+"""What a report shows beside the findings: arrays to draw, all on the recording's clock."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from scm.arrays import Floats
+from scm.mismatch.findings import Estimate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Residual:
+    """What acted on the car that the simulator does not know, along the drive.
+
+    Attributes:
+        channel: `drive force`, `yaw moment`, `wheel angle`, `pose.x` ... as a person would say it.
+        unit: Of `before` and `after`.
+        t_s, x_m, y_m: When, and where on the floor, shape (n,).
+        before, after: Smoothed, with the car as given and with what was found, shape (n,).
+        std: Of either, shape (n,).
+    """
+
+    channel: str
+    unit: str
+    t_s: Floats
+    x_m: Floats
+    y_m: Floats
+    before: Floats
+    after: Floats
+    std: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """An effect as a curve: what it does against what it depends on, with a 90 % band, (n,)."""
+
+    effect: str
+    x_name: str
+    x_unit: str
+    y_name: str
+    y_unit: str
+    x: Floats
+    y: Floats
+    low: Floats
+    high: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FreeRuns:
+    """Free runs of windows against the recording, arrays (windows, times); NaN in gaps.
+
+    Attributes:
+        part: `fit`, `choose` or `confirm` of each window.
+        start_s: (windows,); t_s: since the window's start, (times,).
+        measured, before, after: x, y [m] and yaw [rad] by name.
+    """
+
+    part: tuple[str, ...]
+    start_s: Floats
+    t_s: Floats
+    measured: Mapping[str, Floats]
+    before: Mapping[str, Floats]
+    after: Mapping[str, Floats]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ordinary:
+    """An ordinary number of the car file, before and after, with what the file allows it."""
+
+    key: str
+    given: float
+    given_std: float
+    found: Estimate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tried:
+    """An effect that was tried alone: how much better the recording is explained, and how sure.
+
+    Attributes:
+        gain: Decrease of the objective, in squared standard deviations.
+        needed: What chance alone may bring among so many tried.
+    """
+
+    name: str
+    gain: float
+    needed: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """All that is drawn; what a recording cannot show is empty."""
+
+    vehicle: str
+    recordings: tuple[str, ...]
+    residuals: tuple[Residual, ...] = ()
+    curves: tuple[Curve, ...] = ()
+    free_runs: FreeRuns | None = None
+    ordinary: tuple[Ordinary, ...] = ()
+    tried: tuple[Tried, ...] = ()
