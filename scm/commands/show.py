@@ -17,6 +17,7 @@ _MAP_KINDS = {
     "spawns": "spawn",
     "cameras": "camera",
 }
+_SLOPES = "its floor slopes: cars get what lets them stand on it, docs/floor.md says what\n"
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +58,8 @@ def _map(arguments: argparse.Namespace) -> str:
         for plural, singular in _MAP_KINDS.items()
         if (count := len(getattr(city_map, plural)))
     )
-    return f"{city_map.title}: {counts}\ndrawn in {out}"
+    slopes = "" if city_map.floor.is_level else _SLOPES
+    return f"{city_map.title}: {counts}\n{slopes}drawn in {out}"
 
 
 def _car(arguments: argparse.Namespace) -> str:

@@ -130,6 +130,11 @@ class Floor(Record, kw_only=True, frozen=True):
     ramps: tuple[Ramp, ...] = ()
     plates: tuple[Plate, ...] = ()
 
+    @property
+    def is_level(self) -> bool:
+        """Whether nothing on it slopes and it has no edges."""
+        return not (self.ramps or self.plates or self.height_map)
+
 
 class Wind(Record, kw_only=True, frozen=True):
     """The air over the whole map.

@@ -12,8 +12,10 @@ from scm.arrays import Bools, Floats, Ints
 from scm.maps.floor_shapes import outline_of, pieces_of
 from scm.maps.grey import full_scale, unpack
 from scm.maps.model import CityMap, Floor, Point
+from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground_kernel import ANYTHING, CLIMBS, Sheet, feel
+from scm.vehicles.standing import standing
 from scm.vehicles.wind import Gusts
 
 CELL_M = 0.25
@@ -38,12 +40,19 @@ class Ground:
 
     def __init__(self, city_map: CityMap, seed: int = 0) -> None:
         floor, wind = city_map.floor, city_map.wind
-        self.is_flat = not (
-            floor.patches or floor.ramps or floor.plates or floor.friction_map or floor.height_map
-        ) and (floor.grip, floor.rolling) == (1.0, 0.0)
+        self._is_level = floor.is_level
+        self.is_flat = (
+            floor.is_level
+            and not (floor.patches or floor.friction_map)
+            and (floor.grip, floor.rolling) == (1.0, 0.0)
+        )
         self.is_calm = not (wind.x_mps or wind.y_mps or wind.gust_mps)
         self._sheet = None if self.is_flat else sheet_of(floor)
         self._gusts = None if self.is_calm else Gusts(wind, seed)
+
+    def fit(self, car: Car) -> Car:
+        """Return a car as it drives here: where the floor slopes, one that can stand on it."""
+        return car if self._is_level else standing(car)
 
     def feel(self, fleet: Fleet, t_ns: int) -> None:
         """Write floor and wind of the instant `t_ns` into a fleet: before each of its advances."""

@@ -1,11 +1,14 @@
 """The hosted cars' dynamics: one fleet a car file, so that one kernel call moves all its cars."""
 
+import logging
+from collections.abc import Callable
 from typing import cast
 
 import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.geometry import Pose2
+from scm.log import event
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.ground import Ground
@@ -13,18 +16,24 @@ from scm.world.hull import hull_of
 from scm.world.slots import Slots
 from scm.world.solids import Hull
 
+_log = logging.getLogger(__name__)
 _NOBODY: Ints = np.empty(0, np.int64)
 
 
 class Garage:
     """Fleets by the name of their car file.
 
+    Args:
+        capacity: Most cars at a time.
+        fit: What a car file's car is here; the floor may give it more effects.
+
     Attributes:
         fleets: Those in use; a row's slot is the number its car has in the whole world.
     """
 
-    def __init__(self, capacity: int) -> None:
+    def __init__(self, capacity: int, fit: Callable[[Car], Car]) -> None:
         self._capacity = capacity
+        self._fit = fit
         self._cars: dict[str, Car] = {}
         self._hulls: dict[tuple[str, bool], Hull] = {}
         self.fleets: dict[str, Fleet] = {}
@@ -39,7 +48,10 @@ class Garage:
             CarError: when there is none of that name, or it is wrong.
         """
         if name not in self._cars:
-            self._cars[name] = load_car(name)
+            car = load_car(name)
+            self._cars[name] = self._fit(car)
+            if given := [t.name for t in self._cars[name].terms if t not in car.terms]:
+                event(_log, "car_given_effects", car=name, effects=",".join(given))
         return self._cars[name]
 
     def hull(self, name: str, *, movable: bool = True) -> Hull:

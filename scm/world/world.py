@@ -94,7 +94,7 @@ class World:
         self.ground = Ground(city_map, seed)
         self.wall_grid = WallGrid(wall_segments(city_map))
         self.slots = Slots(capacity)
-        self.garage = Garage(capacity)
+        self.garage = Garage(capacity, self.ground.fit)
         self.contacts = Contacts(city_map)
         self.impacts = Impacts()
         self.crowd = Crowd(streets_of(self.roads), capacity, seed=seed, loss=loss)

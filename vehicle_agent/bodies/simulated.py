@@ -32,7 +32,8 @@ class SimulatedBody:
     """One car in a kernel of its own."""
 
     def __init__(self, car: str, seed: int) -> None:
-        self._fleet = Fleet(load_car(car), 1)
+        self._car = load_car(car)
+        self._fleet = Fleet(self._car, 1)
         self._row = self._fleet.add(Pose2(0.0, 0.0, 0.0))
         self._now_ns: int | None = None
         self.limits = limits_of(self._fleet.car)
@@ -44,6 +45,11 @@ class SimulatedBody:
     def learn(self, city_map: CityMap, seed: int) -> None:
         """Know the city's floor and air."""
         self._ground = Ground(city_map, seed)
+        car = self._ground.fit(self._car)
+        if car.terms != self._fleet.car.terms:
+            pose = self._fleet.pose(self._row)
+            self._fleet, self._banks = Fleet(car, 1), []
+            self._row = self._fleet.add(pose)
         self._ground.warm(self._fleet)
 
     def place(self, pose: Pose2, now_ns: int) -> None:
