@@ -21,6 +21,7 @@ from scm.vehicles.fleet_rows import (
     COG_CHANGED,
     READ,
     SLOT_OF,
+    WHEELS,
     WRITTEN,
     aligned,
     columns_of_command,
@@ -325,7 +326,7 @@ class Fleet:
             throttle: Commands at the start of each step, (T,), or (T, capacity) for each car.
             steering: Likewise.
             step_s: Length of one step of the recording [s], in whole substeps.
-            signals: Results to keep, by their names here; not those of each wheel.
+            signals: Results to keep, by their names here; one wheel as `wheel_angle.rl`.
             substep: Length of a substep [s].
 
         Returns:
@@ -339,7 +340,7 @@ class Fleet:
         if len(commands[0]) != len(commands[1]):
             msg = f"{len(commands[0])} throttles and {len(commands[1])} steerings: expected as many"
             raise RunError(msg)
-        slots = np.array([self._slot_of_signal(name) for name in signals])
+        slots = np.array([self._slot_of_signal(name) for name in signals], dtype=np.int64)
         out = np.zeros((len(commands[0]), len(slots), self._alive.size))
         steps = whole_steps(step_s, substep)
         if self._past is None:
@@ -452,15 +453,15 @@ class Fleet:
         return CommandPast(padded, np.array(slots), np.array(columns))
 
     def _slot_of_signal(self, name: str) -> int:
-        slot, width = self._slots.get(WRITTEN.get(name, SLOT_OF.get(name, name)), (0, 0))
-        if width != 1:
-            known = [n for n in (*READ, *WRITTEN) if self._view_width(n) == 1]
-            msg = f"rollout: {name!r} is no signal of each car{nearest(name, known)}"
+        names = {n: WRITTEN.get(n, SLOT_OF.get(n, n)) for n in (*READ, *WRITTEN)}
+        slots = {n: self._slots[slot][0] for n, slot in names.items() if self._slots[slot][1] == 1}
+        for n in names.keys() - slots.keys():
+            first = self._slots[names[n]][0]
+            slots |= {f"{n}.{wheel}": first + w for w, wheel in enumerate(WHEELS)}
+        if name not in slots:
+            msg = f"rollout: {name!r} is no signal of each car{nearest(name, sorted(slots))}"
             raise RunError(msg)
-        return slot
-
-    def _view_width(self, name: str) -> int:
-        return self._slots[WRITTEN.get(name, SLOT_OF.get(name, name))][1]
+        return slots[name]
 
     def _parameter(self, row: int, name: str) -> float:
         return float(self.parameters[row, self.parameter_names.index(name)])

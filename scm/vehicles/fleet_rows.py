@@ -23,6 +23,7 @@ READ = (
     "yaw_accel", "steer_angle", "wheel_speed", "wheel_angle", "wheel_steer", "wheel_load",
     "wheel_x", "wheel_y",
 )  # fmt: skip
+WHEELS = ("fl", "fr", "rl", "rr")
 SLOT_OF = {"wheel_x": "ground_x", "wheel_y": "ground_y"}
 COG = ("x_cog", "y_cog", "yaw", "vx_world", "vy_world", "yaw_rate")
 COG_CHANGED = ("vx_world", "vy_world", "yaw_rate", "x_cog", "y_cog", "yaw")
