@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 
 from scm.arrays import Floats
@@ -23,23 +23,32 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class _Axis:
+class Axis:
+    """Values from `low` to `high` along a picture, from pixel `start` over `length` (negative: up).
+
+    Attributes:
+        wanted: About how many ticks there is room for.
+    """
+
     low: float
     high: float
     start: float
     length: float
+    wanted: int = 6
 
     def at(self, value: float) -> float:
+        """Return the pixel of a value."""
         return self.start + (value - self.low) / (self.high - self.low) * self.length
 
     @property
     def step(self) -> float:
-        """A round distance between ticks that gives about six of them."""
-        rough = (self.high - self.low) / 6.0
+        """A round distance between ticks that gives about as many as wanted."""
+        rough = (self.high - self.low) / self.wanted
         power = 10.0 ** math.floor(math.log10(rough))
         return next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= rough * 0.999)
 
     def ticks(self) -> Iterator[float]:
+        """Yield round values."""
         first = math.ceil(self.low / self.step - 1e-9)
         last = math.floor(self.high / self.step + 1e-9)
         yield from (i * self.step for i in range(first, last + 1))
@@ -52,7 +61,7 @@ def draw_lines(
     across = _axis([line.x for line in lines], _LEFT, WIDTH - _LEFT - _RIGHT)
     up = _axis([line.y for line in lines], HEIGHT - _BOTTOM, -(HEIGHT - _TOP - _BOTTOM))
     if equal_scale:
-        across, up = _equal(across, up)
+        across, up = equally_scaled(across, up)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}"'
         f' width="{WIDTH}" height="{HEIGHT}" font-family="system-ui,sans-serif" font-size="12">',
@@ -65,26 +74,27 @@ def draw_lines(
     return "\n".join([*parts, "</svg>\n"])
 
 
-def _axis(values: Sequence[Floats], start: float, length: float) -> _Axis:
+def _axis(values: Sequence[Floats], start: float, length: float) -> Axis:
     low = min(float(v.min()) for v in values)
     high = max(float(v.max()) for v in values)
     room = 0.06 * (high - low) or max(0.1 * abs(high), 1e-3)
-    return _Axis(low - room if low != 0.0 else low, high + room, start, length)
+    return Axis(low - room if low != 0.0 else low, high + room, start, length)
 
 
-def _equal(across: _Axis, up: _Axis) -> tuple[_Axis, _Axis]:
+def equally_scaled(across: Axis, up: Axis) -> tuple[Axis, Axis]:
+    """Return both axes, one of them wider, so that a unit is as long on both."""
     scale = max(
         (across.high - across.low) / abs(across.length), (up.high - up.low) / abs(up.length)
     )
     return _widen(across, scale), _widen(up, scale)
 
 
-def _widen(axis: _Axis, scale: float) -> _Axis:
+def _widen(axis: Axis, scale: float) -> Axis:
     middle, half = 0.5 * (axis.low + axis.high), 0.5 * scale * abs(axis.length)
-    return _Axis(middle - half, middle + half, axis.start, axis.length)
+    return replace(axis, low=middle - half, high=middle + half)
 
 
-def _grid(across: _Axis, up: _Axis) -> Iterator[str]:
+def _grid(across: Axis, up: Axis) -> Iterator[str]:
     right, bottom = WIDTH - _RIGHT, HEIGHT - _BOTTOM
     for value in across.ticks():
         x = across.at(value)
@@ -102,7 +112,7 @@ def _titles(x_title: str, y_title: str) -> Iterator[str]:
     yield _text(_LEFT - 48, 22, y_title, "start")
 
 
-def _curve(line: Line, across: _Axis, up: _Axis, colour: str, place: int) -> Iterator[str]:
+def _curve(line: Line, across: Axis, up: Axis, colour: str, place: int) -> Iterator[str]:
     keep = max(1, len(line.x) // _MOST_POINTS)
     points = zip(line.x[::keep].tolist(), line.y[::keep].tolist(), strict=True)
     path = "L".join(f"{across.at(x):.1f} {up.at(y):.1f}" for x, y in points)

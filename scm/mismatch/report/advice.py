@@ -1,0 +1,27 @@
+"""What to do about an effect, in a sentence for who has the car before them."""
+
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+from scm.mismatch.findings import Effect
+
+_UNLISTED = (
+    "No known effect explains it, so look at what changes with {drivers}. Until the cause is "
+    "found, car.toml holds the law as it was measured."
+)
+
+
+def advice_of(effect: Effect) -> str:
+    """Return what to check or mend; for an effect outside the library, where to look."""
+    if effect.name in _table():
+        return _table()[effect.name]
+    return _UNLISTED.format(drivers=" and ".join(effect.depends_on) or "the drive")
+
+
+@cache
+def _table() -> Mapping[str, str]:
+    path = Path(__file__).with_name("advice.toml")
+    table: dict[str, str] = tomllib.loads(path.read_text(encoding="utf-8"))
+    return table

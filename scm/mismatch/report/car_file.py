@@ -1,0 +1,210 @@
+"""The given car's file with the effects found: `scm replay --car car.toml` and fleets load it.
+
+Comments stay, and what was not moved stays word for word. A number that was moved says by which
+recording, with its 90 % interval, and what stood there before.
+"""
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from scm.errors import CarError
+from scm.mismatch.evidence import Evidence
+from scm.mismatch.findings import Diagnosis, Estimate
+from scm.mismatch.report.own_files import listed_terms, own_terms, write_own_terms
+from scm.mismatch.report.toml_text import number, quoted, set_entry, set_list
+from scm.vehicles.car import Car, Quantity, Value, load_car
+from scm.vehicles.describe_effects import all_effects, params_of
+from scm.vehicles.measure import Fault
+
+FILE = "car.toml"
+COMMENT = "found by scm mismatch"
+_INTERVAL_STDS = 3.29  # a 90 % interval of a normal belief, from end to end
+_Entries = Mapping[str, Mapping[str, object]]
+
+
+def write_car(
+    diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car, folder: Path
+) -> list[str]:
+    """Write `car.toml` and its own effects into the folder, and return the names of the files.
+
+    Raises:
+        CarError: when what was found cannot be written so that it loads again.
+    """
+    try:
+        own = write_own_terms(patched, folder)
+    except OSError as error:
+        msg = f"{FILE}: the file of an effect of its own is gone: {error}"
+        raise CarError(msg) from error
+    entries = dict(_entries(diagnosis, evidence, car, patched))
+    path = folder / FILE
+    path.write_text(_edited(car, patched, entries, evidence), encoding="utf-8")
+    if not _says(path, patched):
+        path.write_text(_anew(patched, entries, evidence), encoding="utf-8")
+        load_car(path)
+    return [FILE, *own]
+
+
+def _says(path: Path, patched: Car) -> bool:
+    """Return whether the file loads as this car."""
+    try:
+        read = load_car(path)
+    except CarError:
+        return False
+    same = sorted(listed_terms(read)) == sorted(listed_terms(patched))
+    same = same and list(map(measure_entry, read.measures)) == list(
+        map(measure_entry, patched.measures)
+    )
+    return same and all(
+        key in read.values and _equal(read.values[key].value, quantity.value)
+        for key, quantity in patched.values.items()
+    )
+
+
+def _equal(a: Value, b: Value) -> bool:
+    if isinstance(a, float) and isinstance(b, float):
+        return math.isclose(a, b, rel_tol=1e-8, abs_tol=1e-12)
+    return a == b
+
+
+def measure_entry(fault: Fault) -> str:
+    """Return a fault as a car file's `measures` list names it."""
+    where = f" on {', '.join(fault.channels)}" if fault.channels else ""
+    return fault.measure.name + where
+
+
+def estimates_by_key(diagnosis: Diagnosis, evidence: Evidence, patched: Car) -> dict[str, Estimate]:
+    """Return every estimate by the `section.key` at which a car file holds it."""
+    found = {ordinary.key: ordinary.found for ordinary in evidence.ordinary}
+    own = [param for term in own_terms(patched) for param in params_of(term)]
+    known = all_effects()
+    for effect in diagnosis.effects:
+        params = params_of(known[effect.name]) if effect.name in known else own
+        found |= {
+            param.key: effect.parameters[param.reported]
+            for param in params
+            if param.reported in effect.parameters
+        }
+    return found
+
+
+def _entries(
+    diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car
+) -> Iterator[tuple[str, str]]:
+    """Yield key and new text of each number that the given car's file does not say."""
+    stands = _file_entries(car.path)
+    estimates = estimates_by_key(diagnosis, evidence, patched)
+    for key, quantity in patched.values.items():
+        old = stands.get(key)
+        told = old is not None and _equal(_value_of(old), quantity.value)
+        silent = old is None and quantity.source.startswith(("default", "drive.layout"))
+        if not told and not silent:
+            moved = key not in car.values or car.values[key].value != quantity.value
+            yield key, _entry(quantity, estimates.get(key), old, evidence, moved=moved)
+
+
+def _file_entries(path: Path) -> _Entries:
+    if not path.is_file():
+        return {}
+    data = tomllib.loads(path.read_text(encoding="utf-8"))
+    sections = {name: body for name, body in data.items() if isinstance(body, dict)}
+    return {f"{s}.{k}": entry for s, body in sections.items() for k, entry in body.items()}
+
+
+def _value_of(entry: Mapping[str, object]) -> Value:
+    value = entry["value"]
+    if isinstance(value, list):
+        return tuple(float(item) for item in value)
+    return value if isinstance(value, str) else float(value)  # type: ignore[arg-type]
+
+
+def _entry(
+    quantity: Quantity,
+    estimate: Estimate | None,
+    old: Mapping[str, object] | None,
+    evidence: Evidence,
+    *,
+    moved: bool,
+) -> str:
+    if not moved:
+        return _inline(quantity.value, quantity.std, quantity.source)
+    std, source = quantity.std, f"mismatch: {_recording(evidence)}"
+    if estimate is not None and math.isfinite(estimate.high - estimate.low):
+        source += f", 90 % {estimate.low:.4g}..{estimate.high:.4g}"
+        std = max(0.0, estimate.high - estimate.low) / _INTERVAL_STDS
+    if old is not None:
+        source += f"; before: {_before(old)}"
+    return _inline(quantity.value, std, source)
+
+
+def _before(old: Mapping[str, object]) -> str:
+    spread = f" +- {old['std']}" if "std" in old else ""
+    source = f" ({old['source']})" if old.get("source") else ""
+    return f"{old['value']}{spread}{source}"
+
+
+def _recording(evidence: Evidence) -> str:
+    first, *more = evidence.recordings or ("a recording",)
+    return f"{first} and {len(more)} more" if more else first
+
+
+def _inline(value: Value, std: float | None, source: str) -> str:
+    fields = [f"value = {_written(value)}"]
+    fields += [f"std = {std:.3g}"] if std is not None else []
+    return "{ " + ", ".join([*fields, f"source = {quoted(source)}"]) + " }"
+
+
+def _written(value: Value) -> str:
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(number, value)) + "]"
+    return quoted(value) if isinstance(value, str) else number(value)
+
+
+def _edited(car: Car, patched: Car, entries: Mapping[str, str], evidence: Evidence) -> str:
+    """Return the given car's own text, changed where it has to be."""
+    if not car.path.is_file():
+        return _anew(patched, entries, evidence)
+    text = car.path.read_text(encoding="utf-8")
+    data = tomllib.loads(text)
+    if listed_terms(load_car(car.path)) != listed_terms(patched):
+        text = set_list(text, "terms", listed_terms(patched), COMMENT)
+    measures = list(map(measure_entry, patched.measures))
+    if data.get("measures", []) != measures:
+        text = set_list(text, "measures", measures, COMMENT)
+    for key, entry in entries.items():
+        section, _, name = key.partition(".")
+        text = set_entry(text, section, name, entry)
+    return _headline(evidence) + text
+
+
+def _headline(evidence: Evidence) -> str:
+    """Return a comment that says what this file is."""
+    return (
+        f"# With what `scm mismatch` found in {_plain(_recording(evidence))}: numbers that it "
+        'moved have a\n# source that begins with "mismatch"; all else is the file that was given.\n'
+    )
+
+
+def _plain(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def _anew(patched: Car, entries: Mapping[str, str], evidence: Evidence) -> str:
+    """Return the car as a file of its own, where the given text cannot be changed in place."""
+    lines = [f"name = {quoted(patched.name)}"]
+    lines += [f"scale = {quoted(patched.scale)}"] if patched.scale else []
+    for key, names in (
+        ("terms", listed_terms(patched)),
+        ("measures", list(map(measure_entry, patched.measures))),
+    ):
+        lines += [f"{key} = [", *(f"    {quoted(name)}," for name in names), "]"]
+    sections: dict[str, list[str]] = {}
+    for key, quantity in patched.values.items():
+        section, _, name = key.partition(".")
+        if key in entries or not quantity.source.startswith(("default", "drive.layout")):
+            plain = _inline(quantity.value, quantity.std, quantity.source)
+            sections.setdefault(section, []).append(f"{name} = {entries.get(key, plain)}")
+    for section, rows in sections.items():
+        lines += ["", f"[{section}]", *rows]
+    return _headline(evidence) + "\n".join(lines) + "\n"

@@ -1,0 +1,184 @@
+"""Below the first screen: what an expert needs to check the verdict."""
+
+import platform
+from collections.abc import Iterator, Sequence
+from importlib.metadata import version
+
+import scm
+from scm.mismatch.evidence import Evidence
+from scm.mismatch.findings import DataProblem, Diagnosis, Effect, Fit
+from scm.mismatch.report.drawings import Drawings
+from scm.mismatch.report.first_screen import name_of
+from scm.mismatch.report.html_text import around, figure, section, table, tag
+from scm.mismatch.report.wording import capital, interval, percent, quantity, spans, title_of
+from scm.vehicles.car import Car
+from scm.vehicles.describe_effects import all_effects, params_of
+from scm.vehicles.param import LogNormal, Normal, Param
+
+_READING = (
+    ("Free run", "The simulator starts from where the car was and then gets nothing but the "
+     "recorded commands. How far it strays is the error."),
+    ("Three parts", "The recording is cut into blocks. On some the numbers were fitted, by others "
+     "the effect was chosen, and the last ones only confirm: errors there are honest."),
+    ("Noise of measuring", "How far even a perfect simulator would stray from the recording, "
+     "because poses are measured with noise and a window starts from such a pose."),
+    ("90 %", "An interval or area that holds the truth nine times out of ten."),
+    ("Ordinary numbers", "Mass, stall torque and the like may move within the scatter that the "
+     "car file states. A number a little off is no physics left out, and is never called so."),
+    ("Gain and needed", "How much better an effect explains the recording, and how much the "
+     "luckiest of all effects tried would gain by chance alone."),
+    ("Undecided", "Two effects explain the recording equally well. More of the same drive does "
+     "not help; the drive that is named does."),
+)  # fmt: skip
+_PART_NAMES = {
+    "fit": "numbers fitted on",
+    "choose": "effect chosen by",
+    "confirm": "confirmed on, unseen",
+}
+_ERROR_UNITS = {"m": "m", "rad": "rad", "mps": "m/s", "s": "s"}
+
+
+def expert_sections(
+    diagnosis: Diagnosis, evidence: Evidence, drawings: Drawings, cars: tuple[Car, Car]
+) -> str:
+    """Return the sections below the first screen; `cars` are the given one and the patched one."""
+    windows = around("div", "".join(map(figure, drawings.windows)), "windows")
+    return "".join((
+        section("where", "Where on the floor", _grid(map(figure, drawings.maps))),
+        section("when", "When", figure(drawings.time_line)),
+        section("curves", "The effect as a curve", _grid(map(figure, drawings.curves))),
+        section("runs", "Free runs, before and after",
+                _fit_table(diagnosis.fit), _grid(map(figure, drawings.errors)),
+                _windows_head(drawings) + windows if drawings.windows else ""),
+        section("numbers", "Numbers", _parameter_table(diagnosis),
+                _grid([figure(drawings.numbers)]), _ordinary_table(evidence)),
+        section("tried", "What was tried", _grid([figure(drawings.tried)])),
+        section("rivals", "Rivals, and what ruled them out", _rival_table(diagnosis)),
+        section("data", "The recording itself", _data_table(diagnosis)),
+        section("reading", "How to read this page", _reading()),
+        section("inputs", "Inputs and versions", _inputs(diagnosis, evidence, cars)),
+    ))  # fmt: skip
+
+
+def _grid(figures: "Iterator[str] | Sequence[str]") -> str:
+    inner = "".join(figures)
+    return around("div", inner, "grid") if inner else ""
+
+
+def _windows_head(drawings: Drawings) -> str:
+    said = (
+        "Windows that the fit did not see, in even steps from the one where the simulator was "
+        "worst to the one where it was best: wide grey line the recording, dashed line before, "
+        "full line after; the dot is where they start."
+    )
+    return tag("h3", f"{len(drawings.windows)} windows on the floor") + tag("p", said)
+
+
+def _fit_table(fit: Fit | None) -> str:
+    if fit is None:
+        return ""
+    rows = []
+    for name, words in _PART_NAMES.items():
+        part = getattr(fit, name)
+        for key in part.before:
+            title, unit = error_name(key)
+            sides = (part.before, part.after, part.noise_floor)
+            values = [
+                quantity(side[key], unit) if side.get(key) is not None else "" for side in sides
+            ]
+            rows.append((words, str(part.windows), title, *values))
+    head = ("part", "windows", "error (root mean square)", "before", "after", "noise alone")
+    said = f"Free runs of {quantity(fit.horizon_s, 's')}."
+    return tag("p", said) + table(head, rows, (1, 3, 4, 5)) if rows else ""
+
+
+def error_name(key: str) -> tuple[str, str]:
+    """Return the words and the unit of an error such as `position_m`."""
+    stem, _, unit = key.rpartition("_")
+    return (stem.replace("_", " "), _ERROR_UNITS[unit]) if unit in _ERROR_UNITS else (key, "1")
+
+
+def _parameter_table(diagnosis: Diagnosis) -> str:
+    rows = []
+    for effect in diagnosis.effects:
+        params = _params(effect)
+        for name, estimate in effect.parameters.items():
+            believed = _believed(params.get(name))
+            words = name_of(name, estimate.unit)
+            rows.append((capital(title_of(effect.name)), words, interval(estimate), believed))
+    head = ("effect", "number", "found, with 90 % interval", "believed before any recording")
+    return table(head, rows)
+
+
+def _params(effect: Effect) -> dict[str, Param]:
+    known = all_effects()
+    params = params_of(known[effect.name]) if effect.name in known else []
+    return {param.reported: param for param in params}
+
+
+def _believed(param: Param | None) -> str:
+    if param is None:
+        return ""
+    low, high = param.bounds
+    bounds = f"between {low:g} and {high:g}"
+    if isinstance(param.prior, Normal):
+        return f"{param.prior.mean:g} ± {param.prior.std:g}, {bounds}"
+    if isinstance(param.prior, LogNormal):
+        return f"about {param.prior.median:g}, {bounds}"
+    return bounds
+
+
+def _ordinary_table(evidence: Evidence) -> str:
+    rows = [
+        (o.key, f"{o.given:.5g} ± {o.given_std:.2g}", interval(o.found)) for o in evidence.ordinary
+    ]
+    return table(("ordinary number", "car file", "found, with 90 % interval"), rows)
+
+
+def _rival_table(diagnosis: Diagnosis) -> str:
+    rows = [
+        (
+            capital(title_of(effect.name)),
+            title_of(rival.name),
+            percent(rival.probability),
+            rival.ruled_out_by,
+        )
+        for effect in diagnosis.effects
+        for rival in effect.rivals
+    ]
+    return table(("found", "rival", "probability", "ruled out by"), rows, (2,))
+
+
+def _data_table(diagnosis: Diagnosis) -> str:
+    head = ("channel", "problem", "what", "when", "put right by", "record instead")
+    rows = [_data_row(problem) for problem in diagnosis.data]
+    nothing = tag("p", "Sensors were held against each other; nothing wrong was found.")
+    return table(head, rows) or nothing
+
+
+def _data_row(problem: DataProblem) -> tuple[str, ...]:
+    when = spans(problem.when_s) if problem.when_s else "all the time"
+    corrected = problem.corrected or "nothing could be done"
+    name = problem.name.replace("_", " ")
+    return (problem.channel, name, problem.said, when, corrected, problem.record_instead)
+
+
+def _reading() -> str:
+    return around("dl", "".join(tag("dt", word) + tag("dd", said) for word, said in _READING))
+
+
+def _inputs(diagnosis: Diagnosis, evidence: Evidence, cars: tuple[Car, Car]) -> str:
+    given, patched = cars
+    new = [term.name for term in patched.terms if term not in given.terms]
+    old = [fault.measure for fault in given.measures]
+    new += [f.measure.name for f in patched.measures if f.measure not in old]
+    rows = [
+        ("recordings", ", ".join(evidence.recordings)),
+        ("car file", str(given.path)),
+        ("new in car.toml", ", ".join(new) or "nothing"),
+        ("runtime", f"{diagnosis.runtime_s:.1f} s"),
+        ("scm", scm.__version__),
+        ("Python, NumPy, Numba", ", ".join((platform.python_version(), version("numpy"),
+                                            version("numba")))),
+    ]  # fmt: skip
+    return table(("what", "which"), rows)

@@ -1,0 +1,52 @@
+"""Pieces of HTML; every text that goes in is escaped here."""
+
+from collections.abc import Sequence
+from html import escape
+
+from scm.mismatch.report.plot import Picture
+
+
+def tag(name: str, said: str, kind: str = "") -> str:
+    """Return one element around a text."""
+    return around(name, escape(said), kind)
+
+
+def around(name: str, inner: str, kind: str = "") -> str:
+    """Return one element around HTML that is safe already."""
+    kinds = f' class="{kind}"' if kind else ""
+    return f"<{name}{kinds}>{inner}</{name}>"
+
+
+def figure(picture: Picture | None) -> str:
+    """Return a picture with its title and what to see; nothing for None."""
+    if picture is None:
+        return ""
+    title = tag("h3", picture.title) if picture.title else ""
+    said = tag("figcaption", picture.said) if picture.said else ""
+    kind = "wide" if picture.wide else ""
+    return around("figure", title + around("div", picture.svg, "canvas") + said, kind)
+
+
+def section(anchor: str, title: str, *inner: str) -> str:
+    """Return a section; nothing where it would be empty."""
+    body = "".join(inner)
+    if not body:
+        return ""
+    return f'<section id="{anchor}">{tag("h2", title)}{body}</section>\n'
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
+    """Return a table of texts; columns whose index is in `numbers` stand at the right."""
+    if not rows:
+        return ""
+    top = "".join(_cell("th", text, i in numbers) for i, text in enumerate(head))
+    body = "".join(
+        around("tr", "".join(_cell("td", text, i in numbers) for i, text in enumerate(row)))
+        for row in rows
+    )
+    inner = around("thead", around("tr", top)) + around("tbody", body)
+    return around("div", around("table", inner), "scroll")
+
+
+def _cell(name: str, text: str, is_number: bool) -> str:
+    return tag(name, text, "number" if is_number else "")

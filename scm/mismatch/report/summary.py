@@ -1,0 +1,47 @@
+"""The few lines that the command line prints at the end."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from scm.mismatch.findings import Diagnosis, Effect
+from scm.mismatch.report.first_screen import name_of
+from scm.mismatch.report.verdict_text import verdict_sentence
+from scm.mismatch.report.wording import interval, percent, quantity, title_of
+from scm.mismatch.report.write import PAGE
+
+
+def summary(diagnosis: Diagnosis, out: Path) -> str:
+    """Return the verdict, each effect, how much better, and where the page is."""
+    return "\n".join(_lines(diagnosis, out))
+
+
+def _lines(diagnosis: Diagnosis, out: Path) -> Iterator[str]:
+    yield f"{diagnosis.verdict}: {verdict_sentence(diagnosis)}"
+    for effect in diagnosis.effects:
+        yield f"  {effect.name}  {percent(effect.probability)}  {_numbers(effect)}".rstrip()
+        yield f"    {effect.said}"
+    for question in diagnosis.undecided:
+        yield f"  undecided: {' or '.join(map(title_of, question.between))}"
+        yield f"    drive this: {question.drive_this}"
+    for problem in diagnosis.data:
+        mended = f" ({problem.corrected})" if problem.corrected else ""
+        yield f"  recording: {problem.said}{mended}"
+        if problem.record_instead:
+            yield f"    record instead: {problem.record_instead}"
+    yield from _better(diagnosis)
+    yield f"  {out / PAGE}  ({diagnosis.runtime_s:.0f} s)"
+
+
+def _numbers(effect: Effect) -> str:
+    listed = [f"{name_of(n, e.unit)} {interval(e)}" for n, e in effect.parameters.items()]
+    return effect.law or "; ".join(listed)
+
+
+def _better(diagnosis: Diagnosis) -> Iterator[str]:
+    fit = diagnosis.fit
+    if fit is None or "position_m" not in fit.confirm.before:
+        return
+    before = quantity(fit.confirm.before["position_m"], "m")
+    after = quantity(fit.confirm.after.get("position_m", float("nan")), "m")
+    horizon = quantity(fit.horizon_s, "s")
+    yield f"  position error after {horizon}, on unseen parts: {before} -> {after}"

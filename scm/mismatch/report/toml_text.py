@@ -1,0 +1,110 @@
+"""Changes entries of a car file's text and leaves everything else, comments too, as it stands.
+
+It knows the one form that car files are written in, `key = { value = ... }` on top of TOML; whoever
+uses it reads the result back, and writes the file anew where it does not say what it should.
+"""
+
+import json
+import re
+from collections.abc import Sequence
+
+_QUOTES = ('"""', "'''", '"', "'")
+
+
+def quoted(text: str) -> str:
+    """Return text as a TOML string on one line."""
+    printable = "".join(c if c.isprintable() else " " for c in text)
+    return json.dumps(printable, ensure_ascii=False)
+
+
+def number(value: float) -> str:
+    """Return a float that reads back the same to nine digits."""
+    return repr(float(f"{value:.9g}"))
+
+
+def set_entry(text: str, section: str, key: str, entry: str) -> str:
+    """Return the text with `key = entry` in a section, in place of what stood there."""
+    header = re.search(rf"^[ \t]*\[[ \t]*{re.escape(section)}[ \t]*\].*$", text, re.MULTILINE)
+    if header is None:
+        return f"{text.rstrip()}\n\n[{section}]\n{key} = {entry}\n"
+    following = re.compile(r"^[ \t]*\[", re.MULTILINE).search(text, header.end())
+    end = following.start() if following else len(text)
+    found = re.compile(rf"^[ \t]*{re.escape(key)}[ \t]*=[ \t]*", re.MULTILINE).search(
+        text, header.end(), end
+    )
+    if found:
+        stop = end_of_value(text, found.end())
+        return text[: found.end()] + entry + text[stop:]
+    last = _last_entry_end(text, header.end(), end)
+    return f"{text[:last]}\n{key} = {entry}{text[last:]}"
+
+
+def set_list(text: str, key: str, names: Sequence[str], comment: str) -> str:
+    """Return the text with a list of names on top: kept ones stay, missing ones get a line."""
+    found = re.search(rf"^{re.escape(key)}[ \t]*=[ \t]*(?=\[)", text, re.MULTILINE)
+    if found is None:
+        return _new_list(text, key, names, comment)
+    stop = end_of_value(text, found.end())
+    body = text[found.end() + 1 : stop - 1]
+    there = [json.loads(f'"{name}"') for name in re.findall(r'"([^"\n]*)"', body)]
+    for name in there:
+        if name not in names:
+            body = re.sub(rf'"{re.escape(name)}"[ \t]*,?[ \t]*', "", body)
+    new = [name for name in names if name not in there]
+    if new:
+        kept = body.rstrip()
+        comma = "," if re.search(r'"\s*$', kept) else ""
+        added = ", ".join(map(quoted, new))
+        body = f"{kept}{comma}\n    {added},  # {comment}\n"
+    return f"{text[: found.end()]}[{body}]{text[stop:]}"
+
+
+def _new_list(text: str, key: str, names: Sequence[str], comment: str) -> str:
+    """Return the text with a list before its first section, where TOML wants it."""
+    section = re.search(r"^[ \t]*\[", text, re.MULTILINE)
+    at = section.start() if section else len(text)
+    listed = ", ".join(map(quoted, names))
+    return f"{text[:at].rstrip()}\n{key} = [{listed}]  # {comment}\n\n{text[at:]}"
+
+
+def end_of_value(text: str, start: int) -> int:
+    """Return where the value that starts here ends: behind its bracket, quote or last letter."""
+    depth, at = 0, start
+    while at < len(text):
+        quote = next((q for q in _QUOTES if text.startswith(q, at)), None)
+        if quote:
+            at = _end_of_string(text, at, quote)
+        elif text[at] == "#":
+            at = _end_of_line(text, at)
+        elif text[at] in "[{":
+            depth, at = depth + 1, at + 1
+        elif text[at] in "]}":
+            depth, at = depth - 1, at + 1
+        elif text[at] == "\n" and depth == 0:
+            return at
+        else:
+            at += 1
+            continue
+        if depth == 0:
+            return at
+    return at
+
+
+def _end_of_string(text: str, start: int, quote: str) -> int:
+    at = start + len(quote)
+    while at < len(text) and not text.startswith(quote, at):
+        at += 2 if text[at] == "\\" and quote[0] == '"' else 1
+    return at + len(quote)
+
+
+def _end_of_line(text: str, start: int) -> int:
+    found = text.find("\n", start)
+    return len(text) if found < 0 else found
+
+
+def _last_entry_end(text: str, start: int, end: int) -> int:
+    """Return the end of the last line of a section that is neither empty nor a comment."""
+    last = start
+    for line in re.finditer(r"^[ \t]*[^\s#].*$", text[start:end], re.MULTILINE):
+        last = start + line.end()
+    return last

@@ -1,0 +1,52 @@
+"""The verdict as one plain sentence, and what a data problem means for it."""
+
+from collections.abc import Sequence
+
+from scm.mismatch.findings import DataProblem, Diagnosis, Verdict
+from scm.mismatch.report.wording import capital, joined, title_of
+
+
+def verdict_sentence(diagnosis: Diagnosis) -> str:
+    """Return what the recording says about the simulator, in one sentence."""
+    if not can_judge(diagnosis):
+        return "This recording does not allow a verdict on the car."
+    if diagnosis.verdict is Verdict.NONE:
+        return "Nothing beyond noise: the simulator drives as the car does."
+    if diagnosis.verdict is Verdict.UNDECIDED:
+        return _undecided_sentence(diagnosis)
+    names = [effect_title(effect.name, listed=effect.listed) for effect in diagnosis.effects]
+    if not names:
+        return "Simulator and recording differ, and no cause could be named."
+    return capital(f"{joined(names)}: the simulator leaves this out.")
+
+
+def effect_title(name: str, *, listed: bool) -> str:
+    """Return an effect as the verdict names it; one outside the library is said to be unknown."""
+    return title_of(name) if listed else f"an unknown effect, {name}"
+
+
+def _undecided_sentence(diagnosis: Diagnosis) -> str:
+    between = [title_of(name) for u in diagnosis.undecided for name in u.between]
+    either = joined(list(dict.fromkeys(between)), "or")
+    if not either:
+        return "Something is left out, but this recording does not tell what."
+    sure = [effect_title(effect.name, listed=effect.listed) for effect in diagnosis.effects]
+    also = f"{joined(sure)}; and " if sure else ""
+    return capital(f"{also}{either}: this recording cannot tell which.")
+
+
+def can_judge(diagnosis: Diagnosis) -> bool:
+    """Return whether the car itself could be judged at all."""
+    if diagnosis.fit is not None or diagnosis.effects or diagnosis.undecided:
+        return True
+    return diagnosis.verdict is not Verdict.NONE or not diagnosis.data
+
+
+def open_problems(diagnosis: Diagnosis) -> Sequence[DataProblem]:
+    """Return data problems that nothing could be done about."""
+    return [problem for problem in diagnosis.data if not problem.corrected]
+
+
+def corrected_problems(diagnosis: Diagnosis) -> Sequence[DataProblem]:
+    """Return data problems that were put right before physics was blamed."""
+    return [problem for problem in diagnosis.data if problem.corrected]

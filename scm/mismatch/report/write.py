@@ -1,0 +1,58 @@
+"""Writes a report: `report.html`, `report.json`, `car.toml` and `pictures/` of one diagnosis."""
+
+from pathlib import Path
+
+from scm.errors import CarError
+from scm.mismatch.evidence import Evidence
+from scm.mismatch.findings import Diagnosis
+from scm.mismatch.report.as_json import json_text
+from scm.mismatch.report.car_file import FILE, write_car
+from scm.mismatch.report.drawings import draw
+from scm.mismatch.report.page import page_html
+from scm.vehicles.car import Car
+
+PAGE, FIELDS, PICTURES = "report.html", "report.json", "pictures"
+
+
+def write_report(
+    diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car, out: Path
+) -> None:
+    """Write everything into the folder `out`, which is made where it is missing.
+
+    Args:
+        diagnosis: What was found.
+        evidence: What is drawn.
+        car: As given.
+        patched: The same with the effects found. An effect outside the library is one of its own,
+            read from a file that is still there; the file is copied beside `car.toml`.
+        out: Pictures of an earlier report there are removed.
+    """
+    pictures = out / PICTURES
+    pictures.mkdir(parents=True, exist_ok=True)
+    for old in pictures.glob("*.svg"):
+        old.unlink()
+    (out / FIELDS).write_text(json_text(diagnosis), encoding="utf-8")
+    drawings = draw(diagnosis, evidence)
+    for picture in drawings.all():
+        (pictures / f"{picture.name}.svg").write_text(picture.as_file(), encoding="utf-8")
+    use = _written_car(diagnosis, evidence, car, patched, out)
+    page = page_html(diagnosis, evidence, drawings, (car, patched), use)
+    (out / PAGE).write_text(page, encoding="utf-8")
+
+
+def _written_car(
+    diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car, out: Path
+) -> str:
+    """Write the car file, and return what to do with it; a report is worth more than its file."""
+    try:
+        files = write_car(diagnosis, evidence, car, patched, out)
+    except CarError as error:
+        (out / FILE).unlink(missing_ok=True)
+        return f"The car with what was found could not be written as a file: {error}"
+    beside = f" It needs {', '.join(files[1:])} beside it." if files[1:] else ""
+    if not diagnosis.effects:
+        return f"{FILE} beside this page is the car as it was given.{beside}"
+    return (
+        f"{FILE} beside this page is the given car with what was found; the simulator loads it: "
+        f"scm replay RECORDING --car {FILE}{beside}"
+    )
