@@ -1,0 +1,57 @@
+"""Undo the gross faults that were found, and no others."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.doubt.suspicion import Doubts, Repair
+from scm.mismatch.doubt.track import Series, Track, grid, track
+from scm.recording.read import Channel, Recording
+
+WIDTH_S = 0.1
+STEP_S = 0.02
+
+
+def corrected(recording: Recording, doubts: Doubts) -> Recording:
+    """Return the recording in right units and signs, its clocks together.
+
+    Small offsets, scales and biases stay: they are for a fit to find.
+    """
+    return repaired(recording, doubts.repairs)
+
+
+def repaired(recording: Recording, repairs: Iterable[Repair]) -> Recording:
+    """Return the recording with repairs applied one after the other."""
+    channels = dict(recording.channels)
+    for repair in repairs:
+        signs = (
+            forward_speed(track(replace(recording, channels=channels))) if repair.signed else None
+        )
+        for name in repair.channels:
+            if name in channels:
+                channels[name] = _repaired(channels[name], repair, signs)
+    return replace(recording, channels=channels)
+
+
+def forward_speed(poses: Track | None) -> Series | None:
+    """Return how fast the pose moves along its heading, backwards negative [m/s]."""
+    if poses is None or len(poses.t) < 8:
+        return None
+    width = max(WIDTH_S, 1.5 * poses.period_s)
+    on = grid(poses.t[0], poses.t[-1], max(STEP_S, 0.25 * poses.period_s), width)
+    if len(on.t) < 8:
+        return None
+    vx, vy = (on.smooth(Series(poses.t, values), 1) for values in (poses.x, poses.y))
+    yaw = on.smooth(Series(poses.t, poses.yaw))
+    return Series(on.t, np.cos(yaw) * vx + np.sin(yaw) * vy)
+
+
+def _repaired(channel: Channel, repair: Repair, signs: Series | None) -> Channel:
+    values: Floats = repair.factor * channel.values + repair.offset
+    t = repair.time_factor * channel.t + repair.shift_s
+    if signs is not None:
+        values = np.abs(values) * np.where(signs.at(t) < 0.0, -1.0, 1.0)
+    std = None if channel.std is None else abs(repair.factor) * channel.std
+    return replace(channel, t=t, values=values, std=std)

@@ -1,0 +1,192 @@
+"""What drove the car: commands that are missing, constant, out of range, or of another drive."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.doubt.clocks import Lag, lag_between
+from scm.mismatch.doubt.track import Grid, Series, Track, clean, grid, series
+from scm.mismatch.findings import DataProblem
+from scm.recording.read import Recording
+
+LARGEST_COMMAND = 1.05
+LARGEST_ANGLE = 1.2
+EXCITED = 0.02
+WIDTH_S = 0.3
+STEP_S = 0.05
+LATEST_S = 1.5
+RELATED = 0.35
+LONGEST_S = 20.0
+DRIVE = ("command.throttle", "command.speed", "motor.current")
+RECORD = "Record what is sent to the car, throttle and steering, with the stamps of sending."
+
+
+def command_problems(
+    recording: Recording, movement: Series | None, poses: Track | None
+) -> Iterator[DataProblem]:
+    """Yield what is wrong with the commands and with what they do."""
+    yield from _missing(recording)
+    for name in ("command.throttle", "command.steering", "command.speed"):
+        channel = series(recording, name, 1)
+        if channel is not None:
+            yield from _range(recording, name, channel)
+            yield from _constant(name, channel)
+    if movement is not None and poses is not None:
+        yield from _standing(movement)
+        yield from _without_effect(recording, movement, poses)
+
+
+def held(channel: Series, t: Floats) -> Floats:
+    """Return the value of the last row at or before each time."""
+    row = np.searchsorted(channel.t, t, side="right") - 1
+    return channel.values[np.maximum(row, 0)]
+
+
+def _missing(recording: Recording) -> Iterator[DataProblem]:
+    have = recording.channels
+    if not any(name in have for name in DRIVE):
+        yield DataProblem(
+            channel="command.throttle",
+            name="missing",
+            said="Nothing says how the car was driven: sensors can be held against each other and "
+            "steering against motion, but the drive cannot be judged.",
+            record_instead=RECORD,
+        )
+    elif "command.throttle" not in have:
+        yield DataProblem(
+            channel="command.throttle",
+            name="missing",
+            said="There is no throttle command: how the car answers to it cannot be judged.",
+            record_instead=RECORD,
+        )
+    if "command.steering" not in have:
+        yield DataProblem(
+            channel="command.steering",
+            name="missing",
+            said="There is no steering command: the steering cannot be judged.",
+            record_instead=RECORD,
+        )
+    missing = [name for name in ("pose.x", "pose.y", "pose.yaw") if name not in have]
+    if missing:
+        yield DataProblem(
+            channel=", ".join(missing) if len(missing) < 3 else "pose.*",
+            name="missing",
+            said="Without a whole pose there is no measure of where the car went: wheels and gyro "
+            "can be held against each other, but no free run can be judged.",
+            record_instead="Record x, y and yaw of the car by a camera, motion capture or satellite.",
+        )
+
+
+def _range(recording: Recording, name: str, channel: Series) -> Iterator[DataProblem]:
+    angle = recording.channels[name].dimension == "angle"
+    limit = LARGEST_ANGLE if angle else LARGEST_COMMAND
+    largest = float(np.abs(channel.values).max())
+    if name == "command.speed" or largest <= limit:
+        return
+    beyond = float((np.abs(channel.values) > limit).mean())
+    unit = " It looks like degrees." if angle else ""
+    if not angle and 1.5 < largest <= 105.0 and beyond > 0.05:
+        unit = " It looks like percent."
+    yield DataProblem(
+        channel=name,
+        name="unit" if unit else "range",
+        said=f"Reaches {largest:.3g}, {100.0 * beyond:.1f} % of the rows are beyond {limit:g}.{unit}",
+        record_instead="Give the unit of the column in the recording's description.",
+    )
+
+
+def _constant(name: str, channel: Series) -> Iterator[DataProblem]:
+    reach = float(np.percentile(channel.values, 99) - np.percentile(channel.values, 1))
+    size = max(1e-9, float(np.abs(channel.values).max()))
+    if reach < EXCITED * max(size, 0.1):
+        other = "steering" if name.endswith("steering") else "drive"
+        yield DataProblem(
+            channel=name,
+            name="constant",
+            said=f"Stays at {float(np.median(channel.values)):.3g}: delays, lags and play of the "
+            f"{other} cannot show, only its steady state.",
+            record_instead="Drive with steps and sines of this command.",
+        )
+
+
+def _standing(movement: Series) -> Iterator[DataProblem]:
+    if np.percentile(np.abs(movement.values), 95) < 0.01:
+        yield DataProblem(
+            channel="pose.*",
+            name="constant",
+            said="The car does not move: only biases can be judged.",
+            record_instead="Drive.",
+        )
+
+
+def _without_effect(recording: Recording, movement: Series, poses: Track) -> Iterator[DataProblem]:
+    """Yield commands whose motion never follows them: those of another drive, or another clock."""
+    yaw = Series(poses.t, poses.yaw)
+    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S)
+    if len(on.t) < LONGEST_S / STEP_S:
+        return
+    speed, rate = on.smooth(movement), on.smooth(yaw, 1)
+    steering, throttle = (_command(recording, n) for n in ("command.steering", "command.throttle"))
+    if steering is not None:
+        asked = on.smooth_even(held(steering, on.t) * speed)
+        if not _follows(rate, asked, on):
+            yield _unrelated("command.steering", "The car's turning does not follow its steering")
+    if throttle is not None:
+        asked = on.smooth_even(held(throttle, on.t))
+        lagged = _lagged(asked, 0.5, STEP_S)
+        slope = on.smooth_even(speed, 1)
+        if not (
+            _follows(speed, lagged, on) or _follows(slope, asked, on) or _follows(speed, asked, on)
+        ):
+            yield _unrelated("command.throttle", "The car's speed does not follow its throttle")
+
+
+def _command(recording: Recording, name: str) -> Series | None:
+    if name not in recording.channels:
+        return None
+    channel = clean(recording.channels[name])
+    varied = len(channel.t) > 20 and np.ptp(channel.values) > EXCITED
+    return channel if varied else None
+
+
+def _lagged(values: Floats, time_s: float, step_s: float) -> Floats:
+    """Return values behind a first-order lag."""
+    kernel = np.exp(-np.arange(0.0, 6.0 * time_s, step_s) / time_s)
+    padded = np.concatenate((np.full(len(kernel) - 1, values[0]), values))
+    return np.convolve(padded, kernel / kernel.sum(), mode="valid")
+
+
+def _follows(motion: Floats, asked: Floats, on: Grid) -> bool:
+    """Say whether the motion follows within a second or two, better than at any other delay."""
+    if motion.std() < 1e-6 or asked.std() < 1e-6:
+        return True
+    near = best_alike(motion, asked, on, LATEST_S)
+    return near > RELATED
+
+
+def best_alike(motion: Floats, asked: Floats, on: Grid, latest_s: float) -> float:
+    """Return the best correlation with delays of 0 to `latest_s`."""
+    delays = range(0, round(latest_s / on.step_s) + 1, 2)
+    return max(abs(float(np.corrcoef(motion[d:], asked[: len(asked) - d])[0, 1])) for d in delays)
+
+
+def _unrelated(name: str, said: str) -> DataProblem:
+    return DataProblem(
+        channel=name,
+        name="without_effect",
+        said=f"{said}: these commands belong to another drive, another car or another clock. No "
+        "effect of this command can be concluded.",
+        record_instead=RECORD,
+    )
+
+
+def command_lag(recording: Recording, movement: Series, poses: Track) -> Lag | None:
+    """Return how turning lags behind steering, over many seconds; None where it cannot be said."""
+    steering = _command(recording, "command.steering")
+    if steering is None:
+        return None
+    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S)
+    asked = on.smooth_even(held(steering, on.t) * on.smooth(movement))
+    rate = on.smooth(Series(poses.t, poses.yaw), 1)
+    return lag_between(rate, asked, on) if min(asked.std(), rate.std()) > 1e-6 else None

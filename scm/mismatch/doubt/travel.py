@@ -1,0 +1,130 @@
+"""Positions of the pose against distance as another sensor adds it up, laid along the heading."""
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.doubt.suspicion import Measured, Relation
+from scm.mismatch.doubt.track import Series, Track
+from scm.mismatch.doubt.whitened import Fit, fit
+
+ROUNDS = 4
+SHORTEST_DRIFT_S = 30.0
+MOST_ROWS = 4000
+SIDE_SLIP_STD = 0.02  # rad per m/s^2: tyres give way by a few degrees at most
+DRIVE_SLIP_STD = 0.02  # per m/s^2: wheels spin under push, and drag in turns
+NAMES = (
+    "scale", "heading", "ahead", "aside", "tilt_x", "tilt_y", "side_slip", "drive_slip",
+    "turn_slip", "delay", "rate",
+)  # fmt: skip
+
+
+def travel_against(
+    poses: Track,
+    distance: Series,
+    other: str,
+    start: tuple[float, float] = (0.0, 0.0),
+    heading: Series | None = None,
+) -> Relation | None:
+    """Compare positions with a distance that a sensor has added up.
+
+    The pose stamped t shows the car at u = t - delay - rate (t - start of the poses). Tyres that
+    give way sideways, and wheels that spin under push, are left free: they are no sensor's fault.
+
+    Args:
+        distance: Way since its start [m], on its own clock.
+        other: Its channel.
+        start: Delay [s] and rate to start from.
+        heading: Yaw on the poses' clock, less noisy than theirs.
+
+    Returns:
+        `scale`, true distance over the sensor's (or the pose's metre over a metre); `heading` [rad],
+        by which the pose's yaw is turned; `ahead`, `aside` [m], where the tracked point is;
+        `tilt_x`, `tilt_y` [1/m]; `delay` [s] and `rate` of the pose's stamps.
+    """
+    inside = (poses.t - start[0] > distance.t[0]) & (poses.t - start[0] < distance.t[-1])
+    rows = poses.cut(inside)
+    if len(rows.t) < 50:
+        return None
+    rows = rows.cut(np.arange(len(rows.t)) % (1 + len(rows.t) // MOST_ROWS) == 0)
+    yaw = (heading or Series(poses.t, poses.yaw)).at(rows.t)
+    measured = np.stack((rows.x, rows.y), axis=1)
+    since, warp = rows.t - rows.t[0], np.array(start)
+    count = len(NAMES) if since[-1] >= SHORTEST_DRIFT_S else len(NAMES) - 1
+    for _ in range(ROUNDS):
+        u = rows.t - warp[0] - warp[1] * since
+        columns = _columns(rows, yaw, distance, u)[:, :, :count]
+        found = fit(measured, columns, _priors()[:count])
+        step = found.values[9:] / found.values[0] if found.values[0] else np.zeros(1)
+        warp[: len(step)] += np.clip(step, -0.5, 0.5)
+        if np.all(np.abs(step) < (1e-4, 1e-6)[: len(step)]):
+            break
+    return _relation(("pose.x", other), found, warp, len(rows.t))
+
+
+def _priors() -> Floats:
+    priors = np.full(len(NAMES), np.inf)
+    priors[6:9] = SIDE_SLIP_STD, DRIVE_SLIP_STD, DRIVE_SLIP_STD
+    return priors
+
+
+def _columns(rows: Track, yaw: Floats, distance: Series, u: Floats) -> Floats:
+    """Return what each number does to x and y, shape `(n, 2, k)`."""
+    way = distance.at(u)
+    dt = np.diff(rows.t)
+    speed = _slope(rows.t, way)
+    rate, push = _slope(rows.t, yaw), _slope(rows.t, speed)
+    along = np.stack((np.cos(yaw), np.sin(yaw)), axis=1)
+    left = np.stack((-along[:, 1], along[:, 0]), axis=1)
+    middle = yaw[:-1] + 0.5 * np.diff(yaw)
+    chord = np.sinc(np.diff(yaw) / (2.0 * np.pi))
+    ahead = np.stack((np.cos(middle), np.sin(middle)), axis=1) * chord[:, None]
+    side = np.stack((-ahead[:, 1], ahead[:, 0]), axis=1)
+    since = rows.t - rows.t[0]
+    here = np.stack((rows.x, rows.y), axis=1)
+
+    def added(direction: Floats, amounts: Floats) -> Floats:
+        return np.concatenate((np.zeros((1, 2)), np.cumsum(direction * amounts[:, None], axis=0)))
+
+    step = np.diff(way)
+    mean_speed, mean_rate = _middle(speed), _middle(rate)
+    accelerated = mean_speed * _middle(push) * dt
+    turned = mean_speed * np.abs(mean_speed * mean_rate) * dt
+    return np.stack(
+        (
+            added(ahead, step),
+            -added(side, step),
+            along,
+            left,
+            -here * rows.x[:, None],
+            -here * rows.y[:, None],
+            added(side, mean_speed * mean_speed * mean_rate * dt),
+            added(ahead, accelerated),
+            added(ahead, turned),
+            -added(ahead, np.diff(speed)),
+            -added(ahead, np.diff(speed * since)),
+        ),
+        axis=2,
+    )
+
+
+def _middle(values: Floats) -> Floats:
+    return 0.5 * (values[1:] + values[:-1])
+
+
+def _slope(t: Floats, values: Floats) -> Floats:
+    """Return the slope over about 0.2 s around each row."""
+    reach = max(1, round(0.1 / float(np.median(np.diff(t)))))
+    i = np.arange(len(t))
+    a, b = np.maximum(i - reach, 0), np.minimum(i + reach, len(t) - 1)
+    return (values[b] - values[a]) / (t[b] - t[a])
+
+
+def _relation(pair: tuple[str, str], found: Fit, warp: Floats, rows: int) -> Relation:
+    numbers = {
+        name: Measured(float(value), float(std))
+        for name, value, std in zip(NAMES, found.values, found.std, strict=False)
+    }
+    k = max(abs(float(found.values[0])), 1e-9)
+    for i, name in enumerate(NAMES[9 : len(found.values)]):
+        numbers[name] = Measured(float(warp[i]), float(found.std[9 + i]) / k)
+    return Relation(pair=pair, numbers=numbers, noise=found.noise, rows=rows)

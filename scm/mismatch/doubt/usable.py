@@ -1,0 +1,75 @@
+"""Which parts of a recording can be used: no gaps, no jumps, nothing frozen."""
+
+from collections.abc import Iterable
+
+from scm.mismatch.doubt.rows import gaps_of
+from scm.mismatch.doubt.suspicion import Usable
+from scm.mismatch.doubt.track import clean
+from scm.mismatch.findings import DataProblem, Span
+from scm.recording.read import Recording
+
+SHORTEST_SPAN_S = 0.5
+SHORTEST_DRIVE_S = 5.0
+POSE = ("pose.x", "pose.y", "pose.yaw")
+COMMANDS = ("command.throttle", "command.steering")
+SPOILS = ("frozen", "jump")
+
+
+def usable(recording: Recording, problems: Iterable[DataProblem]) -> Usable:
+    """Return the usable spans of each channel, and what keeps the recording from being used.
+
+    Args:
+        recording: After repair.
+        problems: Found in it.
+    """
+    listed = list(problems)
+    spans = {}
+    for name, channel in recording.channels.items():
+        t = clean(channel).t
+        if len(t) < 2:
+            spans[name] = ()
+            continue
+        bad = list(gaps_of(t, name.startswith("command.")))
+        for problem in listed:
+            if problem.name in SPOILS and problem.when_s and _concerns(problem.channel, name):
+                bad += problem.when_s
+        spans[name] = _between((float(t[0]), float(t[-1])), bad)
+    return Usable(spans=spans, lacks=tuple(_lacks(recording, spans, listed)))
+
+
+def _concerns(pattern: str, name: str) -> bool:
+    return pattern in (name, "*") or (pattern.endswith(".*") and name.startswith(pattern[:-1]))
+
+
+def _between(whole: Span, bad: Iterable[Span]) -> tuple[Span, ...]:
+    """Return what of a span is left between bad ones."""
+    start, left = whole[0], []
+    for begin, end in sorted(bad):
+        if begin - start >= SHORTEST_SPAN_S:
+            left.append((start, begin))
+        start = max(start, end)
+    if whole[1] - start >= SHORTEST_SPAN_S:
+        left.append((start, whole[1]))
+    return tuple(left)
+
+
+def _lacks(
+    recording: Recording, spans: dict[str, tuple[Span, ...]], problems: list[DataProblem]
+) -> Iterable[str]:
+    missing = [name for name in (*COMMANDS, *POSE) if name not in recording.channels]
+    if missing:
+        yield f"missing: {', '.join(missing)}"
+        return
+    if any(p.name == "other_car" for p in problems):
+        yield "the car file is another car's"
+    unrelated = [p.channel for p in problems if p.name == "without_effect"]
+    if unrelated:
+        yield f"commands without effect: {', '.join(unrelated)}"
+    pose = sum(end - start for start, end in spans["pose.x"])
+    start = (
+        max(clean(recording.channels[n]).t[0] for n in (*COMMANDS, "pose.x") if spans[n])
+        if all(spans[n] for n in (*COMMANDS, "pose.x"))
+        else None
+    )
+    if start is None or pose < SHORTEST_DRIVE_S:
+        yield f"only {pose:.1f} s of poses without gaps; {SHORTEST_DRIVE_S:.0f} s are needed"

@@ -1,0 +1,67 @@
+"""How far the car has gone, as each sensor that knows it says; and turned, as its wheels say."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.mismatch.doubt.track import Series, series
+from scm.recording.read import Recording
+from scm.vehicles.car import Car
+
+SIDES = (("encoder.left", "encoder.right"), ("wheel_speed.rl", "wheel_speed.rr"))
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """Distance since the start [m], forward counted positive.
+
+    Attributes:
+        name: Of the sensor, such as `encoder.*`.
+        channels: It is made of.
+        wheels: Whether it is counted on wheels, so that their radius enters.
+        scale_std: What the car file leaves open about its scale.
+        turned: Yaw as the wheels' difference says [rad]; None where there is none.
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    wheels: bool
+    scale_std: float
+    distance: Series
+    turned: Series | None = None
+
+
+def ways(recording: Recording, car: Car | None) -> list[Way]:
+    """Return every sensor of distance; wheels need the car's radius."""
+    found = [_counted(recording, car), _rolled(recording, car)]
+    for name in ("speed", "velocity.x"):
+        speed = series(recording, name)
+        if speed is not None:
+            found.append(Way(name, (name,), False, 0.0, speed.integral()))
+    return [way for way in found if way is not None and np.ptp(way.distance.values) > 0.0]
+
+
+def _counted(recording: Recording, car: Car | None) -> Way | None:
+    left, right = (series(recording, name) for name in SIDES[0])
+    if car is None or left is None or right is None or not car.has("encoder.counts_per_revolution"):
+        return None
+    metre = math.tau * car.value("wheel.radius_m") / car.value("encoder.counts_per_revolution")
+    return _pair("encoder.*", SIDES[0], left, right, metre, car)
+
+
+def _rolled(recording: Recording, car: Car | None) -> Way | None:
+    left, right = (series(recording, name) for name in SIDES[1])
+    if car is None or left is None or right is None:
+        return None
+    radius = car.value("wheel.radius_m")
+    return _pair("wheel_speed.*", SIDES[1], left.integral(), right.integral(), radius, car)
+
+
+def _pair(
+    name: str, channels: tuple[str, str], left: Series, right: Series, metre: float, car: Car
+) -> Way:
+    l_m, r_m = left.values * metre, right.at(left.t) * metre
+    turned = Series(left.t, (r_m - l_m) / car.value("body.track_m"))
+    std = (car.quantity("wheel.radius_m").std or 0.0) / car.value("wheel.radius_m")
+    return Way(name, channels, True, std, Series(left.t, 0.5 * (l_m + r_m)), turned)
