@@ -292,7 +292,7 @@ def _values(
 ) -> dict[str, Quantity]:
     known = _known_keys(terms)
     sections = {key.partition(".")[0] for key in known}
-    problems += _top_problems(data, sections)
+    problems += _top_problems(data, sections | _unread(data, terms))
     values: dict[str, Quantity] = {}
     flat = _flat(data)
     for key, entry in flat.items():
@@ -309,6 +309,13 @@ def _values(
         if param.required and param.key not in flat:
             problems.append(f"{param.key}: missing; expected {param.about} [{param.unit}]")
     return values
+
+
+def _unread(data: Mapping[str, Any], terms: Sequence[Term]) -> set[str]:
+    """Return the sections of own effects that could not be read: told of already."""
+    listed = data.get("terms", [])
+    own = {Path(n).stem for n in listed if isinstance(n, str) and n.endswith(SUFFIX)}
+    return own - {term.name for term in terms}
 
 
 def _nearest_key(key: str, known: Iterable[str]) -> str:

@@ -7,11 +7,13 @@ the same for one car as in every lane of a tile.
 
 import ast
 import copy
+import math
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from types import CodeType
 from typing import Any, cast
 
-from scm.errors import TermError
+from scm.errors import TermError, nearest
 from scm.vehicles.jit import plain, source_of
 
 Line = tuple[str, ast.expr]  # a name, and what it is
@@ -24,6 +26,11 @@ _OPERATORS = (
 )  # fmt: skip
 _BUILT_IN = {"abs": 1, "min": 2, "max": 2, "float": 1}
 _MATH = {"sqrt": 1, "floor": 1, "copysign": 2}
+_STRAIGHT = (
+    "straight-line text, assignments and one return, of + - * /, one comparison at a time, "
+    "`a if c else b`, abs, min and max of two, math.sqrt, math.floor, math.copysign and laws "
+    "(see lane_math)"
+)
 
 
 class Inliner:
@@ -35,7 +42,7 @@ class Inliner:
     def lines(self, text: str, functions: Functions) -> Iterator[Line]:
         """Return the lines of some statements; `functions` are the laws they may call."""
         for statement in ast.parse(textwrap.dedent(text)).body:
-            yield from _Body("the page", functions, {}, self).statement(statement, as_is=True)
+            yield from _Body("the page", functions, {}, self, None).statement(statement)
 
     def call(self, law: Callable[..., Any], arguments: list[ast.expr]) -> list[Line]:
         """Return the lines of a law's body; the last ones are its results, all named ""."""
@@ -53,7 +60,7 @@ class Inliner:
             else:
                 lines.append((self.name(f"{tree.name}_{name}"), value))
                 given[name] = ast.Name(lines[-1][0])
-        body = _Body(tree.name, function.__globals__, given, self)
+        body = _Body(tree.name, function.__globals__, given, self, function.__code__)
         for statement in tree.body:
             lines += body.statement(statement)
         return lines
@@ -68,16 +75,21 @@ class Inliner:
 
 
 class _Body(ast.NodeTransformer):
-    """One law at work: `known` says what each of its names means outside."""
+    """One law at work: `known` says what each of its names means outside.
+
+    Text without a `code` is the skeleton's own: its names stay as they are.
+    """
 
     def __init__(
-        self, where: str, scope: Mapping[str, Any], known: dict[str, ast.expr], inliner: Inliner
-    ) -> None:
+        self, where: str, scope: Mapping[str, Any], known: dict[str, ast.expr], inliner: Inliner,
+        code: CodeType | None,
+    ) -> None:  # fmt: skip
         self.where, self.scope, self.known, self.inliner = where, scope, known, inliner
+        self.code, self.line = code, 1
         self.before: list[Line] = []
 
-    def statement(self, node: ast.stmt, *, as_is: bool = False) -> list[Line]:
-        self.before = []
+    def statement(self, node: ast.stmt) -> list[Line]:
+        self.before, self.line = [], node.lineno
         match node:
             case ast.Expr(value=ast.Constant()):
                 return []
@@ -95,22 +107,25 @@ class _Body(ast.NodeTransformer):
                 targets = [ast.unparse(target) for target in left]
             case ast.Assign(targets=[ast.Tuple(elts=left)], value=ast.Call() as value):
                 targets = [ast.unparse(target) for target in left]
-                return self._named(targets, self._results(value), as_is=as_is)
+                return self._named(targets, self._results(value))
             case _:
                 raise self._refuse(node)
-        return self._named(targets, [self.visit(value) for value in values], as_is=as_is)
+        return self._named(targets, [self.visit(value) for value in values])
 
-    def _named(self, targets: list[str], values: list[ast.expr], *, as_is: bool) -> list[Line]:
-        names = targets if as_is else [self.inliner.name(f"{self.where}_{t}") for t in targets]
-        self.known.update(
-            {} if as_is else {t: ast.Name(n) for t, n in zip(targets, names, strict=True)}
-        )
+    def _named(self, targets: list[str], values: list[ast.expr]) -> list[Line]:
+        names = targets
+        if self.code is not None:
+            names = [self.inliner.name(f"{self.where}_{target}") for target in targets]
+            self.known.update({t: ast.Name(n) for t, n in zip(targets, names, strict=True)})
         return [*self.before, *zip(names, values, strict=True)]
 
     def _results(self, node: ast.Call) -> list[ast.expr]:
         law = self.scope.get(node.func.id) if isinstance(node.func, ast.Name) else None
-        if law is None or node.keywords:
+        if law is None or not hasattr(law, "py_func") or node.keywords:
             raise self._refuse(node)
+        wanted = len(_tree(plain(law)).args.args)
+        if len(node.args) != wanted:
+            raise self._refuse(node, f"{wanted} arguments")
         lines = self.inliner.call(law, [self.visit(argument) for argument in node.args])
         self.before += [line for line in lines if line[0]]
         return [value for name, value in lines if not name]
@@ -119,7 +134,17 @@ class _Body(ast.NodeTransformer):
         if node.id in self.known:
             return self.known[node.id]
         value = self.scope.get(node.id)
-        return ast.Constant(float(value)) if isinstance(value, int | float) else node
+        if isinstance(value, int | float):
+            return ast.Constant(float(value))
+        if self.code is not None:
+            hint = nearest(node.id, list(self.known))
+            raise self._refuse(node, f"an argument or a name given before{hint}")
+        return node
+
+    def visit_Constant(self, node: ast.Constant) -> ast.expr:
+        if isinstance(node.value, int | float) and not isinstance(node.value, bool):
+            return ast.Constant(float(node.value))
+        raise self._refuse(node, "a number")
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
         match node.func:
@@ -130,26 +155,47 @@ class _Body(ast.NodeTransformer):
             case ast.Attribute(value=ast.Name(id="math"), attr=name) if name in _MATH:
                 wanted = _MATH[name]
             case _:
-                (result,) = self._results(node)
-                return result
+                results = self._results(node)
+                if len(results) != 1:
+                    raise self._refuse(node, f"{len(results)} names to take its results")
+                return results[0]
         if len(node.args) != wanted or node.keywords:
             raise self._refuse(node)
         return ast.Call(ast.Name(name), [self.visit(argument) for argument in node.args], [])
 
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        match ast.unparse(node).split("."):
+            case ["math", name] if isinstance(number := getattr(math, name, None), float):
+                return ast.Constant(number)
+        raise self._refuse(node)
+
     def generic_visit(self, node: ast.AST) -> ast.AST:
-        if not isinstance(node, _OPERATORS) or (
-            isinstance(node, ast.Compare) and len(node.ops) > 1
+        if (
+            not isinstance(node, _OPERATORS)
+            or (isinstance(node, ast.Compare) and len(node.ops) > 1)
+            or (isinstance(node, ast.BinOp | ast.UnaryOp) and not isinstance(node.op, _OPERATORS))
         ):
             raise self._refuse(node)
         return super().generic_visit(node)
 
-    def _refuse(self, node: ast.AST) -> TermError:
-        what = (ast.unparse(node) or type(node).__name__).splitlines()[0]
-        return TermError(
-            f"law {self.where}: {what!r} is not straight-line text; expected assignments and one "
-            "return, of + - * /, one comparison at a time, `a if c else b`, abs, min and max of "
-            "two, math.sqrt, math.floor, math.copysign and laws (see lane_math)"
+    def _refuse(self, node: ast.AST, expected: str = _STRAIGHT) -> TermError:
+        got = (ast.unparse(node) or type(node).__name__).splitlines()[0]
+        at = (
+            f"{self.code.co_filename}:{self.code.co_firstlineno + self.line - 1}: "
+            if self.code
+            else ""
         )
+        return TermError(f"{at}law {self.where}: expected {expected}, got {got!r}")
+
+
+def law_problems(laws: Iterable[Callable[..., Any]]) -> Iterator[str]:
+    """Yield what keeps laws from being laid into a kernel, the first problem of each."""
+    for law in laws:
+        arguments = [ast.Name(argument.arg) for argument in _tree(plain(law)).args.args]
+        try:
+            Inliner(()).call(law, list[ast.expr](arguments))
+        except TermError as error:
+            yield str(error)
 
 
 _trees: dict[Callable[..., Any], ast.FunctionDef] = {}

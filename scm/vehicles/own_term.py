@@ -10,7 +10,8 @@ import sys
 from pathlib import Path
 
 from scm.errors import ScmError, TermError, nearest
-from scm.vehicles.term import Term
+from scm.vehicles.inline import law_problems
+from scm.vehicles.term import Term, flat
 
 SUFFIX = ".py"
 
@@ -19,7 +20,8 @@ def load_own_term(folder: Path, name: str) -> Term:
     """Return the effect of a file such as `carpet_nap.py` in this folder.
 
     Raises:
-        TermError: when it is elsewhere, is not there, does not run, or holds no effect of its name.
+        TermError: when it is elsewhere, is not there, does not run, holds no effect of its name, or
+            laws that cannot be laid into a kernel.
     """
     path = (folder / name).resolve()
     if Path(name).name != name:
@@ -36,6 +38,9 @@ def load_own_term(folder: Path, name: str) -> Term:
     if term.name != path.stem:
         msg = f"{name}: expected a law named {path.stem!r} like its file, got {term.name!r}"
         raise TermError(msg)
+    laws = [law for part in flat([term]) for law in (part.law, part.damping) if law is not None]
+    if problems := list(dict.fromkeys(law_problems(laws))):
+        raise TermError("; ".join(problems))
     return term
 
 

@@ -114,7 +114,7 @@ def test_a_law_that_is_not_straight_line_text_is_refused_with_what_may_stand_the
             return 1.0
         return 0.0
 
-    with pytest.raises(TermError, match=r"jumpy: 'if vx > 0.0:' is not straight-line text; expec"):
+    with pytest.raises(TermError, match=r"\.py:\d+: law jumpy: expected straight.*'if vx > 0.0:'"):
         write_page("jumpy", [*STANDARD, of(jumpy, adds="force_x")])
 
 
@@ -124,7 +124,7 @@ def test_a_law_may_not_use_what_a_lane_cannot(line, tmp_path, monkeypatch):
     (tmp_path / f"{name}.py").write_text(f"def odd(vx, vy):\n    return {line}\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     odd = importlib.import_module(name).odd
-    with pytest.raises(TermError, match=r"law odd: .* is not straight-line text"):
+    with pytest.raises(TermError, match=r":2: law odd: expected straight-line text"):
         write_page("odd", [*STANDARD, of(odd, adds="force_x")])
 
 

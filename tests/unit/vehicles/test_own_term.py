@@ -8,6 +8,7 @@ import pytest
 from scm.errors import CarError
 from scm.vehicles.car import load_car
 from scm.vehicles.describe import describe_car
+from scm.vehicles.fleet import Fleet
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "own_car"
 
@@ -57,7 +58,17 @@ def test_own_effects_are_given_as_objects_too(folder):
         ("carpet_nap.py", "TERM = ", "OTHER = ", r"carpet_nap\.py: expected TERM = Term"),
         ("carpet_nap.py", "import law", "import lore", r"does not run: ImportError: .*'lore'"),
         ("carpet_nap.py", 'adds="force_x"', 'adds="force_xx"', r"'force_xx' is no such sum"),
-        ("carpet_nap.py", "cos_yaw: float", "cos_yav: float", r"'cos_yav', .* mean 'cos_yaw'"),
+        ("carpet_nap.py", "cos_yaw", "cos_yav", r"'cos_yav', .* mean 'cos_yaw'"),
+        ("carpet_nap.py", "-vx *", "-math.sin(vx) *", r"nap\.py:27: .*, got 'math\.sin\(vx\)'"),
+        ("carpet_nap.py", "-vx *", "-vx**2 *", r"carpet_nap\.py:27: .*, got 'vx \*\* 2'"),
+        ("carpet_nap.py", "-vx *", "-cos_yav *", r":27: .* mean 'cos_yaw'\?\), got 'cos_yav'"),
+        (
+            "carpet_nap.py",
+            "(along)",
+            "(along, 1.0)",
+            r":18: .*: expected 1 arguments, got 'sin_cos",
+        ),
+        ("carpet_nap.py", "sin_along, cos_along =", "both =", r":18: .* expected 2 names"),
         ("buggy.toml", "coefficient_ns_m", "coeficient", r"mean 'carpet_nap\.coefficient_ns_m'"),
         ("buggy.toml", "value = 1.5,", "value = 99.0,", r"expected 0 to 50 N\*s/m, got 99"),
     ],
@@ -66,6 +77,22 @@ def test_a_wrong_file_is_refused_by_name(folder, file, old, new, said):
     change(folder / file, old, new)
     with pytest.raises(CarError, match=said):
         load_car(folder / "buggy.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("TERM = ", "OTHER = "), ("import law", "import lore"), ("-vx *", "-vx**2 *")]
+)
+def test_an_effect_that_cannot_be_loaded_is_one_problem_not_two(folder, old, new):
+    change(folder / "carpet_nap.py", old, new)
+    with pytest.raises(CarError) as refused:
+        load_car(folder / "buggy.toml")
+    assert "no such section" not in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_law_may_use_whole_numbers_and_the_numbers_of_math(folder):
+    change(folder / "carpet_nap.py", "-vx *", "-2 * vx * (1 / math.pi) *")
+    Fleet(load_car(folder / "buggy.toml"), 1)
 
 
 def test_a_car_file_that_came_with_data_may_not_run_code(folder):
