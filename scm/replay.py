@@ -5,7 +5,7 @@ commands. All windows run side by side as rows of one fleet. Before a window sta
 the last second run the actuators in, so that servo and lags begin where they were.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,9 @@ STEP_S = 0.005
 RUN_IN_S = 1.0
 HORIZONS_S = (0.5, 1.0, 3.0)
 SHORTEST_HORIZON_S = 0.05
-NEEDED = ("command.throttle", "command.steering", "pose.x", "pose.y", "pose.yaw")
+NEEDED = ("command.steering", "pose.x", "pose.y", "pose.yaw")
+SPEEDS = ("command.speed", "speed")  # what drives a car whose throttle means a speed, best first
+FULL_SPEED = "drive.full_speed_m_s"
 LARGEST_COMMAND = 1.5  # some drivers overshoot 1 a little; a percentage is far beyond
 
 
@@ -63,10 +65,14 @@ class FreeRun:
 
 
 class Commands:
-    """Recorded throttle and steering, held between their rows, as the car's commands in [-1, 1]."""
+    """Recorded throttle and steering, held between their rows, as the car's commands in [-1, 1].
+
+    A car with `speed_control` is driven by the speed that was commanded, or else by the measured
+    one: then its throttle is that speed over the car's full one.
+    """
 
     def __init__(self, recording: Recording, car: Car) -> None:
-        self._throttle = forward(recording, "command.throttle")
+        self._throttle = _drive_of(recording, car)
         self._steering = forward(recording, "command.steering")
         self._per_unit = 1.0
         if self._steering.dimension == "angle":
@@ -88,6 +94,22 @@ class Commands:
         return float(first), float(min(self._throttle.t[-1], self._steering.t[-1]))
 
 
+def _drive_of(recording: Recording, car: Car) -> Channel:
+    """Return the throttle that drives the car, or the speed that does, over its full speed."""
+    name = _drive_name(recording, car)
+    channel = forward(recording, name)
+    if name == "command.throttle":
+        return channel
+    return replace(channel, values=channel.values / car.value(FULL_SPEED), dimension="ratio")
+
+
+def _drive_name(recording: Recording, car: Car) -> str:
+    """Return the channel that drives a car: a speed only where the car has a speed control."""
+    if any(term.name == "speed_control" for term in car.terms):
+        return next((name for name in SPEEDS if name in recording.channels), SPEEDS[0])
+    return "command.throttle"
+
+
 def _steering_limit(recording: Recording, car: Car) -> float:
     """Return the wheel angle that a steering command of 1 asks for [rad]."""
     if not car.has("steering.limit_rad"):
@@ -99,17 +121,15 @@ def _steering_limit(recording: Recording, car: Car) -> float:
     return car.value("steering.limit_rad")
 
 
-def _refuse_incomplete(recording: Recording) -> None:
+def _refuse_incomplete(recording: Recording, car: Car) -> None:
     """Say in one sentence which channels a replay lacks."""
-    missing = [name for name in NEEDED if name not in recording.channels]
+    needed = (_drive_name(recording, car), *NEEDED)
+    missing = [name for name in needed if name not in recording.channels]
     if missing:
-        speed = "command.speed" in recording.channels and "command.throttle" in missing
-        hint = "; command.speed alone does not say how the car was driven" if speed else ""
-        msg = (
-            f"{recording.path}: a replay needs {', '.join(NEEDED)}; "
-            f"missing: {', '.join(missing)}{hint}"
-        )
-        raise RecordingError(msg)
+        speed = missing[0] == "command.throttle" and "command.speed" in recording.channels
+        hint = f"; {car.name} has no speed_control, so command.speed cannot drive it"
+        msg = f"{recording.path}: a replay needs {', '.join(needed)}; missing: {', '.join(missing)}"
+        raise RecordingError(msg + (hint if speed else ""))
 
 
 def _held(channel: Channel, t: Floats) -> Floats:
@@ -129,7 +149,7 @@ def free_run(
     if not SHORTEST_HORIZON_S <= horizon_s < np.inf:
         msg = f"horizon: got {horizon_s:g} s, expected {SHORTEST_HORIZON_S:g} s or more"
         raise RecordingError(msg)
-    _refuse_incomplete(recording)
+    _refuse_incomplete(recording, car)
     poses, commands = Poses(recording), Commands(recording, car)
     starts, initial = _windows(recording, poses, commands, horizon_s)
     fleet = Fleet(car, len(starts))

@@ -14,10 +14,17 @@ FILE_NAME = "recording.yaml"
 
 
 class TimeColumn(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Which column holds the time of a row, on that table's own clock."""
+    """The time of a row, on that table's own clock: a column, or an `expression` over columns.
 
-    column: str
+    Attributes:
+        unit: Of the value, and of `offset`.
+        offset: Added, where it is known by how much this clock differs from the others.
+    """
+
+    column: str | None = None
+    expression: str | None = None
     unit: str | int = "s"
+    offset: float = 0.0
 
 
 class ChannelColumn(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -143,7 +150,17 @@ def _problems(description: Description) -> list[str]:
             problems.append(f"{where}: no vehicle, neither here nor at the top")
         if not table.channels:
             problems.append(f"{where}: no channels")
+        problems += _time_problems(where, table.time)
         problems += _channel_problems(where, table.channels)
+    return problems
+
+
+def _time_problems(where: str, time: TimeColumn) -> list[str]:
+    problems = []
+    if (time.column is None) == (time.expression is None):
+        problems.append(f"{where}: time: expected either column or expression")
+    if not math.isfinite(time.offset):
+        problems.append(f"{where}: time: offset: expected a finite number, got {time.offset}")
     return problems
 
 

@@ -1,6 +1,8 @@
-"""Formulas over the columns of a table: arithmetic, comparisons, and, or, not. Nothing else.
+"""Formulas over the columns of a table: arithmetic, comparisons, and, or, not, some functions.
 
-A column name that is not a plain word stands in backquotes: "`elapsed time` > 0 and gas > 0.1".
+The functions are `abs`, `sqrt`, `sin`, `cos`, `tan`, `atan` and `atan2(y, x)`; angles are in rad.
+A text column may be compared with a word: "source == 'pose'". A column name that is not a plain
+word stands in backquotes: "`elapsed time` > 0 and gas > 0.1".
 Where arithmetic has no answer (1 / 0) the value is not finite, and its row is left out.
 """
 
@@ -14,6 +16,9 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.errors import RecordingError
+from scm.recording.table import Columns
+
+Table = Columns | Mapping[str, Floats]
 
 LONGEST = 1000
 
@@ -36,8 +41,18 @@ _UNARY: dict[type[ast.AST], Callable[[Any], Any]] = {
     ast.Not: np.logical_not,
 }
 
+_FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
+    "abs": (1, np.abs),
+    "sqrt": (1, np.sqrt),
+    "sin": (1, np.sin),
+    "cos": (1, np.cos),
+    "tan": (1, np.tan),
+    "atan": (1, np.arctan),
+    "atan2": (2, np.arctan2),
+}
 
-def evaluate(text: str, columns: Mapping[str, Floats], rows: int, where: str) -> Floats:
+
+def evaluate(text: str, columns: Table, rows: int, where: str) -> Floats:
     """Return the value of an expression for every row, shape `(rows,)`.
 
     Args:
@@ -69,19 +84,19 @@ def evaluate(text: str, columns: Mapping[str, Floats], rows: int, where: str) ->
     return np.broadcast_to(np.asarray(value, dtype=np.float64), (rows,)).copy()
 
 
-def _value(node: ast.expr, columns: Mapping[str, Floats], quoted: dict[str, str], at: str) -> Any:
+def _value(node: ast.expr, columns: Table, quoted: dict[str, str], at: str) -> Any:
     """Return the value of one node: an array, or a number."""
 
     def values(*nodes: ast.expr) -> list[Any]:
         return [_value(part, columns, quoted, at) for part in nodes]
 
     match node:
-        case ast.Constant(value=int() | float() as number):
-            return _constant(number)
-        case ast.Name(id=name):
-            return _column(quoted.get(name, name), columns, at)
-        case ast.UnaryOp(op=operation, operand=operand) if type(operation) in _UNARY:
-            return _UNARY[type(operation)](*values(operand))
+        case ast.Constant(value=int() | float()) | ast.Name():
+            return _leaf(node, columns, quoted, at)
+        case ast.Compare(left=ast.Name(id=name), ops=[ast.Eq() | ast.NotEq() as op]) if isinstance(
+            word := getattr(node.comparators[0], "value", None), str
+        ):
+            return _compared_with(word, op, quoted.get(name, name), columns, at)
         case ast.BoolOp(op=logic, values=parts):
             join = np.logical_and if isinstance(logic, ast.And) else np.logical_or
             return _joined(join, values(*parts))
@@ -91,7 +106,40 @@ def _value(node: ast.expr, columns: Mapping[str, Floats], quoted: dict[str, str]
             sides = values(left, *others)
             pairs = zip(ops, sides, sides[1:], strict=False)
             return _joined(np.logical_and, [_BINARY[type(op)](a, b) for op, a, b in pairs])
-    msg = f"{at}: {ast.unparse(node)!r} is not arithmetic, a comparison, and, or, not"
+    return _applied(node, values, at)
+
+
+def _leaf(node: ast.Constant | ast.Name, columns: Table, quoted: dict[str, str], at: str) -> Any:
+    """Return a number, or a column's numbers."""
+    if isinstance(node, ast.Name):
+        return _column(quoted.get(node.id, node.id), columns, at)
+    return _constant(node.value)  # type: ignore[arg-type]
+
+
+def _compared_with(word: str, op: ast.cmpop, name: str, columns: Table, at: str) -> Any:
+    """Return where a text column holds a word, or where it does not."""
+    if not isinstance(columns, Columns):
+        msg = f"{at}: {name!r} holds numbers, not words"
+        raise RecordingError(msg)
+    try:
+        words = columns.words(name)
+    except RecordingError as cause:
+        msg = f"{at}: {cause}"
+        raise RecordingError(msg) from cause
+    return _BINARY[type(op)](words, word)
+
+
+def _applied(node: ast.expr, values: Callable[..., list[Any]], at: str) -> Any:
+    """Return what a sign, `not` or a known function makes of its inputs; all else is refused."""
+    match node:
+        case ast.UnaryOp(op=operation, operand=operand) if type(operation) in _UNARY:
+            return _UNARY[type(operation)](*values(operand))
+        case ast.Call(func=ast.Name(id=name), args=inputs, keywords=[]) if name in _FUNCTIONS:
+            count, function = _FUNCTIONS[name]
+            if len(inputs) == count:
+                return function(*values(*inputs))
+    known = ", ".join(_FUNCTIONS)
+    msg = f"{at}: {ast.unparse(node)!r} is not arithmetic, a comparison, and, or, not, {known}"
     raise RecordingError(msg)
 
 
@@ -110,7 +158,7 @@ def _joined(join: Callable[[Any, Any], Any], values: list[Any]) -> Any:
     return result
 
 
-def _column(name: str, columns: Mapping[str, Floats], at: str) -> Floats:
+def _column(name: str, columns: Table, at: str) -> Floats:
     try:
         return columns[name]
     except RecordingError as cause:

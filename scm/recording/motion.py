@@ -13,7 +13,8 @@ from scm.recording.read import Channel, Recording
 
 HALF_WIDTH_S = 0.1
 LONGEST_GAP_S = 0.25
-FASTEST_MPS = 20.0
+FASTEST_MPS = 20.0  # of a scaled car
+FASTEST_OVER_USUAL = 2.0  # of a full-size one: over the speed that it keeps below nearly always
 LARGEST_STEP_BACK_S = 1.0
 
 
@@ -139,6 +140,9 @@ def _at_rear_axle(
 
 def _broken_intervals(t: Floats, x: Floats, y: Floats) -> Bools:
     """Return which steps from pose to pose are a gap or a jump, shape `(n - 1,)`."""
-    dt = np.diff(t)
-    broken: Bools = (dt > LONGEST_GAP_S) | (np.hypot(np.diff(x), np.diff(y)) > FASTEST_MPS * dt)
+    dt, step = np.diff(t), np.hypot(np.diff(x), np.diff(y))
+    usual = float(np.percentile(step / dt, 95)) if len(dt) else 0.0
+    broken: Bools = (dt > LONGEST_GAP_S) | (
+        step > max(FASTEST_MPS, FASTEST_OVER_USUAL * usual) * dt
+    )
     return broken

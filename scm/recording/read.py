@@ -113,7 +113,7 @@ def _channels(table: Table, columns: Columns, path: Path) -> dict[str, Channel]:
     if table.where is not None:
         keep = evaluate(table.where, columns, columns.rows, f"{where}: where") > 0.0
     t = _values(table.time, columns, f"{where}: time")[keep]
-    t = t * factor(str(table.time.unit), ("time",), f"{where}: time")
+    t = (t + table.time.offset) * factor(str(table.time.unit), ("time",), f"{where}: time")
     _refuse_no_rows(t, where)
     return {
         name: _channel(name, channel, t, _values(channel, columns, f"{where}: {name}")[keep], where)
@@ -123,7 +123,7 @@ def _channels(table: Table, columns: Columns, path: Path) -> dict[str, Channel]:
 
 def _values(source: TimeColumn | ChannelColumn, columns: Columns, at: str) -> Floats:
     """Return what a column or an expression gives for every row."""
-    if isinstance(source, ChannelColumn) and source.expression is not None:
+    if source.expression is not None:
         return evaluate(source.expression, columns, columns.rows, at)
     try:
         return columns[str(source.column)]

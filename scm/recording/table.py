@@ -59,6 +59,21 @@ class Columns(Mapping[str, Floats]):
         """Return how many names there are."""
         return len(self._cells)
 
+    def words(self, name: str) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
+        """Return a column as text, shape (rows,).
+
+        Raises:
+            RecordingError: when there is none of that name, or it holds numbers.
+        """
+        cells = self._cells.get(name)
+        if cells is None:
+            msg = f"{self._path}: no column {name!r}{nearest(name, list(self._cells))}"
+            raise RecordingError(msg)
+        if isinstance(cells, np.ndarray):
+            msg = f"{self._path}: column {name!r} holds numbers, not words"
+            raise RecordingError(msg)
+        return np.array([cell.strip() for cell in cells], dtype=np.str_)
+
     @property
     def rows(self) -> int:
         """How many rows each column has."""

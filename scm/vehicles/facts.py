@@ -37,7 +37,7 @@ def _device(section: str, rate_hz: float | None = None) -> dict[str, "Fact"]:
 
 
 FACTS: dict[str, Fact] = {
-    "body.footprint_x_m": Fact("m", 2, (-2.0, 2.0)),
+    "body.footprint_x_m": Fact("m", 2, (-6.0, 6.0)),
     "body.footprint_y_m": Fact("m", 2, (-2.0, 2.0)),
     "body.bounce_restitution": Fact("1", 1, (0.0, 1.0)),
     "body.contact_friction": Fact("1", 1, (0.0, 3.0)),

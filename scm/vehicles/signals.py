@@ -100,12 +100,20 @@ _ALL = (
         otherwise="throttle_received",
     ),
     _body(
+        "throttle_curved",
+        "1",
+        Role.CHAIN,
+        "command after the controller's curve",
+        span=(-1.0, 1.0),
+        otherwise="throttle_live",
+    ),
+    _body(
         "throttle_scaled",
         "1",
         Role.CHAIN,
         "command as strong as the controller takes it",
         span=(-1.0, 1.0),
-        otherwise="throttle_live",
+        otherwise="throttle_curved",
     ),
     _body(
         "throttle",

@@ -133,7 +133,7 @@ def test_what_a_replay_lacks_is_said_at_once(nigel: Car) -> None:
     with pytest.raises(RecordingError) as error:
         free_run(recording, nigel)
     assert "missing: command.throttle, pose.yaw" in str(error.value)
-    assert "command.speed alone does not say" in str(error.value)
+    assert "nigel has no speed_control, so command.speed cannot drive it" in str(error.value)
 
 
 def test_commands_whose_clock_was_reset_are_refused(nigel: Car) -> None:

@@ -1,6 +1,6 @@
 """Drive gain: the controller takes every throttle so many times larger.
 
-    throttle_scaled = gain * throttle_live
+    throttle_scaled = gain * throttle_curved
 
 Torque at stall and no-load speed grow alike; `motor_gain` leaves the no-load speed.
 Holds: below full throttle's limit.   Shows in: steady speed at any throttle.
@@ -13,9 +13,9 @@ from scm.vehicles.term import Per, Term
 
 
 @law
-def drive_gain(throttle_live: float, gain: float) -> float:
+def drive_gain(throttle_curved: float, gain: float) -> float:
     """Throttle as the controller takes it, + forward."""
-    return gain * throttle_live
+    return gain * throttle_curved
 
 
 TERM = Term(

@@ -32,7 +32,7 @@ TERM = Term(
     neutral={"damper": 0.0},
     shows_in=("hard_braking",),
     params=(
-        Param("damper", 60.0, "N*s/m", "suspension.damper_ns_m", (0.0, 2000.0),
+        Param("damper", 60.0, "N*s/m", "suspension.damper_ns_m", (0.0, 2e4),
               "one corner", LogNormal(60.0, 0.4)),
     ),
 )  # fmt: skip

@@ -94,7 +94,7 @@ def test_all_problems_are_told_at_once(tmp_path):
             ("value = 7.0,", 'value = "fast",'),
         )
     ).splitlines()
-    assert any("body.mass_kg: expected 0.2 to 60 kg, got -1" in line for line in said)
+    assert any("body.mass_kg: expected 0.2 to 5000 kg, got -1" in line for line in said)
     assert any("drive.layout: expected 'rear' or 'front' or 'all', got 'both'" in x for x in said)
     assert any("[lidra]: no such section (did you mean 'lidar'?)" in line for line in said)
     assert any("terms: no effect 'srevo' (did you mean 'servo'?)" in line for line in said)

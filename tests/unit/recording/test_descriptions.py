@@ -1,0 +1,61 @@
+"""The recordings that the project describes are read and replayed, where their data is at hand."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scm.recording.description import read_description
+from scm.recording.read import Recording, read_recordings
+from scm.replay import free_run
+from scm.vehicles.car import load_car
+
+FOLDER = Path(__file__).parents[3] / "recordings"
+ALL = sorted(FOLDER.glob("*/*.yaml"))
+REPLAYED = {  # name: most error of 1 s of free run with the car as its authors know it, median [m]
+    "cpm_ucar/b": 0.08,
+    "cpm_ucar/feb2019": 0.11,
+    "dart/free_driving_10_02_28": 0.5,
+    "dart/steering_map_slow_09_56_00": 0.3,
+    "dart/random_driving_4_sept_bag": 0.6,
+    "dart/mpcc_race_2025_test_01": 2.0,
+    "dart/slippery_floor_apr25_2025_04_16_16_21_24": 2.0,
+    "f1tenth_optitrack/slalom_clean_v_1_5_d_0_208": 0.1,
+    "f1tenth_optitrack/slalom_noisy_v_2_5_d_0_416": 0.2,
+    "f1tenth_optitrack/skidpad_ccw_clean_v_1_0_d_0_416": 0.12,
+    "f1tenth_frictionmaps/ds5": 0.4,
+    "genesis/rfs_path1": 0.16,
+    "iac_av21/putnam": 0.2,
+}
+
+
+def recording_of(path: Path, shared: Path) -> Recording:
+    """Read a description, or skip where one of its files is not here."""
+    data = shared / "recordings" / path.parent.name
+    for table in read_description(path).tables:
+        if not (data / table.file).is_file():
+            pytest.skip(f"{data / table.file} is not here: it is other people's data")
+    (recording,) = read_recordings(path, data)
+    return recording
+
+
+@pytest.mark.parametrize("path", ALL, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_a_description_is_read_and_names_a_car_that_loads(path: Path, shared: Path) -> None:
+    recording = recording_of(path, shared)
+    assert {"pose.x", "pose.y", "pose.yaw", "command.steering"} <= recording.channels.keys()
+    assert len(load_car(recording.vehicle).terms) > 5
+
+
+@pytest.mark.parametrize("name", REPLAYED)
+def test_a_described_recording_replays(name: str, shared: Path) -> None:
+    recording = recording_of(FOLDER / f"{name}.yaml", shared)
+    run = free_run(recording, load_car(recording.vehicle), horizon_s=1.0)
+    error = run.position_error()[:, -1]
+    assert np.isfinite(error).mean() > 0.9
+    assert np.median(error[np.isfinite(error)]) < REPLAYED[name]
+
+
+def test_every_real_set_has_descriptions() -> None:
+    assert {path.parent.name for path in ALL} >= {
+        "cpm_ucar", "dart", "f1tenth_frictionmaps", "f1tenth_optitrack", "genesis", "iac_av21",
+    }  # fmt: skip
