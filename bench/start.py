@@ -16,12 +16,14 @@ FLEET = """
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 Fleet(load_car("nigel"), 1000).advance(0.01)
+print("moved", flush=True)
 """
 WORLD = """
 from scm.maps.load import load_map
 from scm.world.part import WorldPart
 cars = tuple((f"n{i}", "nigel") for i in range(4))
 WorldPart(load_map("driving_school"), 0, cars).step(20_000_000, [])
+print("ticked", flush=True)
 """
 CITY = """
 import queue, signal, subprocess, sys, tempfile, threading, time, urllib.request

@@ -17,27 +17,34 @@ import numba.extending
 from llvmlite import ir
 from numba.core import cgutils
 from numba.core.caching import FunctionCache
+from numba.core.registry import cpu_target
 
+from scm.vehicles.asked_once import remember_answers
 from scm.vehicles.lanes import LANES, WIDTH, Rows, copy_lanes
 from scm.vehicles.nested import NestedDispatcher
 
+remember_answers()
 _SOURCES: dict[Callable[..., Any], str] = {}
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+_BORROWING = {**_OPTIONS, "_nrt": False}  # arrays are the caller's: numba need not count who holds
 _ROWS = "(float64[:,::1],float64[:,::1],boolean[::1],int64[::1],int64,int64,int64,float64)"
 
 
 def law(function: Function) -> Function:
-    """Let a scalar function be called from compiled kernels; plain calls work as before."""
+    """Let a scalar function be called from compiled kernels; plain calls work as before.
+
+    It may take arrays and look into them; it makes and returns none.
+    """
     with contextlib.suppress(OSError):  # typed in by hand: it has no source
         _SOURCES[function] = inspect.getsource(function)
-    return cast("Function", NestedDispatcher(function, _OPTIONS))
+    return cast("Function", NestedDispatcher(function, _BORROWING))
 
 
 def inlined(function: Function) -> Function:
-    """As `law`, but laid into its caller always: arrays are passed without being counted."""
-    return cast("Function", NestedDispatcher(function, {**_OPTIONS, "forceinline": True}))
+    """As `law`, but laid into its caller always."""
+    return cast("Function", NestedDispatcher(function, {**_BORROWING, "forceinline": True}))
 
 
 def source_of(function: Callable[..., Any]) -> str:
@@ -49,10 +56,20 @@ def array_kernel(function: Function) -> Function:
     """Compile a function over arrays at its first call, without the interpreter lock, cached.
 
     What it calls may stand in any file of its folder: when one of them changes it is compiled anew.
+    It works on arrays that it is given; one that makes some itself is an `allocating_kernel`.
     """
-    compiled = _cached(function)
+    return cast("Function", _stamped(function, _BORROWING))
+
+
+def allocating_kernel(function: Function) -> Function:
+    """As `array_kernel`, for one that makes arrays; counting those is slow to compile."""
+    return cast("Function", _stamped(function, _OPTIONS))
+
+
+def _stamped(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    compiled = _cached(function, options)
     compiled._cache.stamp_folder(Path(function.__code__.co_filename).parent)  # noqa: SLF001
-    return cast("Function", compiled)
+    return compiled
 
 
 def is_kept(kernel: Callable[..., Any]) -> bool:
@@ -64,16 +81,22 @@ def is_kept(kernel: Callable[..., Any]) -> bool:
         return False
 
 
+def load_compiler() -> None:
+    """Load now what a first compilation would load before it begins."""
+    cpu_target.typing_context.refresh()
+    cpu_target.target_context.refresh()
+
+
 def fleet_kernel(function: Function) -> Function:
     """Compile a kernel over fleet rows, without the interpreter lock, cached beside its file."""
-    compiled = _cached(function)
+    compiled = _cached(function, _OPTIONS)
     compiled.compile(_ROWS)
     return cast("Function", compiled)
 
 
 def rollout_kernel(function: Function) -> Function:
     """Compile a kernel that drives a recording at its first call, cached beside its file."""
-    return cast("Function", _cached(function))
+    return cast("Function", _cached(function, _OPTIONS))
 
 
 def stage(function: Function) -> Function:
@@ -155,9 +178,9 @@ class _ForgivingCache(_Cache):  # type: ignore[misc]
             return None
 
 
-def _cached(function: Callable[..., Any]) -> Any:
-    options: Any = {**_OPTIONS, "no_cfunc_wrapper": True}
-    compiled: Any = numba.njit(**options)(function)
+def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    compile_later: Any = numba.njit
+    compiled = compile_later(**options, no_cfunc_wrapper=True)(function)
     compiled._cache = _ForgivingCache(function)  # noqa: SLF001 as its own enable_caching does
     return compiled
 

@@ -12,7 +12,7 @@ from textwrap import indent
 from scm.vehicles import body14
 from scm.vehicles.inline import Line
 from scm.vehicles.lanes import LANES
-from scm.vehicles.program import Program, Stage
+from scm.vehicles.program import Program, Stage, names_in
 from scm.vehicles.signals import Per
 
 Slots = Mapping[str, tuple[int, int]]
@@ -200,9 +200,7 @@ def loads_of(stage: Stage) -> list[str]:
     names: dict[str, None] = {}
     known: set[str] = set()
     for name, value in stage.lines:
-        called = {id(n.func) for n in ast.walk(value) if isinstance(n, ast.Call)}
-        found = [n.id for n in ast.walk(value) if isinstance(n, ast.Name) and id(n) not in called]
-        names |= dict.fromkeys(n for n in found if n not in known)
+        names |= dict.fromkeys(n for n in names_in(value) if n not in known)
         known.add(name)
     return list(names)
 

@@ -150,11 +150,30 @@ def _drop_unneeded(lines: list[Line], needed: set[str]) -> None:
 
 
 def leaves(value: ast.expr) -> Iterator[str]:
-    """Yield the names in an expression; those of functions are none."""
-    called = {id(node.func) for node in ast.walk(value) if isinstance(node, ast.Call)}
-    for node in ast.walk(value):
-        if isinstance(node, ast.Name) and id(node) not in called:
-            yield node.id.partition("__")[0] if node.id[-3:-1] == "__" else node.id
+    """Yield the names in an expression, wheels' without their number, and none of functions."""
+    for name in names_in(value):
+        yield name.partition("__")[0] if name[-3:-1] == "__" else name
+
+
+def names_in(value: ast.expr) -> Iterator[str]:
+    """Yield the names in an expression as they are written; those of functions are none."""
+    nodes: list[ast.AST] = [value]
+    for node in nodes:  # it grows as it is read; `ast.walk` does the same at a third of the speed
+        if isinstance(node, ast.Name):
+            yield node.id
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            nodes += node.args
+        elif not isinstance(node, ast.Constant):
+            nodes += _parts(node)
+
+
+def _parts(node: ast.AST) -> Iterator[ast.AST]:
+    for name in node._fields:
+        part = getattr(node, name)
+        if isinstance(part, ast.expr):
+            yield part
+        elif isinstance(part, list):
+            yield from part
 
 
 class _Tidy(ast.NodeTransformer):

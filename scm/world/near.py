@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import allocating_kernel, array_kernel, law
 
 LEEWAY_M = 0.025
 LOOK_AHEAD_S = 0.1
@@ -140,7 +140,7 @@ def has_strayed(begun: Floats, leeway: Floats, motion: Floats) -> bool:
     return False
 
 
-@array_kernel
+@allocating_kernel
 def list_pairs(pairs: Ints, motion: Floats, reach: Floats) -> int:
     """Write the pairs whose circles overlap; return how many there are, written or not."""
     n = reach.shape[0]

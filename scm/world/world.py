@@ -5,6 +5,7 @@ to be sent waits in `outbox`.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -20,7 +21,7 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
 from scm.vehicles.drivers.crowd import Crowd
-from scm.vehicles.drivers.early import compiled_beside
+from scm.vehicles.drivers.early import compile_together
 from scm.vehicles.drivers.errands import Errands
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.drivers.streets import streets_of
@@ -107,6 +108,7 @@ class World:
         sensors: Mapping[str, Sensor] = {
             name: registry.load(SENSORS, name, "SENSOR", Sensor) for name in registry.names(SENSORS)
         }
+        self._compile(prepare, sensors[SCANNER])
         self.banks = {name: Bank(sensor, seed, capacity) for name, sensor in sensors.items()}
         self.readings = {
             name: np.full((capacity, len(sensor.values)), np.nan)
@@ -128,12 +130,6 @@ class World:
         self._unnamed = 0
         self._came = 0
         self._receivers = Receivers(self.roadside)
-        with compiled_beside():
-            for name in prepare:
-                self.ground.warm(self.garage.prepare(name))
-            self.contacts.warm()
-            self._warm_scanner()
-        self.crowd.warm()
 
     def cars(self) -> Iterator[AnyCar]:
         """Yield all cars, hosted ones first."""
@@ -257,9 +253,27 @@ class World:
             self._unnamed += 1
         return f"n{self._unnamed + 1}"
 
-    def _warm_scanner(self) -> None:
+    def _compile(self, car_names: Iterable[str], scanner: Sensor) -> None:
+        """Compile or load now all that a tick calls, so that no car waits for it later."""
+        names = tuple(car_names)
+        for name in (DEFAULT_CAR, *names):
+            self.garage.car(name)  # read once, and not in each process
+        compile_together(
+            [
+                self.crowd.warm_law,
+                lambda: self._warm_scanner(scanner),
+                *(partial(self._warm_car, name) for name in names),
+                self.contacts.warm,
+                self.crowd.warm_rest,
+            ]
+        )
+
+    def _warm_car(self, name: str) -> None:
+        self.ground.warm(self.garage.prepare(name))
+
+    def _warm_scanner(self, scanner: Sensor) -> None:
         """Scan once for nobody, so that the kernels are there before the first car scans."""
-        bank, model = Bank(self.banks[SCANNER].sensor, self.seed, 1), self.garage.car(DEFAULT_CAR)
+        bank, model = Bank(scanner, self.seed, 1), self.garage.car(DEFAULT_CAR)
         bank.fit(0, "nobody", model, Placed(1), 0, 0)
         nowhere = Scene(self.wall_grid, np.zeros((0, 4)), np.zeros(0, np.int64))
         bank.step(0, lambda: nowhere)

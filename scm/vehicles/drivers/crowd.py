@@ -67,10 +67,18 @@ class Crowd:
 
     def warm(self) -> None:
         """Compile or load now what driving needs; call it before the first car enters."""
+        self.warm_law()
+        self.warm_rest()
+
+    def warm_law(self) -> None:
+        """Compile or load what decides: the larger part."""
+        self._decide(np.zeros(0, np.int64), 0, self.signals, stop=False)
+
+    def warm_rest(self) -> None:
+        """Compile or load what hears and sets out."""
         nobody: Ints = np.zeros(0, np.int64)
         none: Floats = np.zeros(0)
         self.hear(nobody, 0, none, none, none, none, none)
-        self._decide(nobody, 0, self.signals, stop=False)
         if self.capacity and self.streets.names:
             look_from(self.streets.ways, self._memory, 0, 0)
             self._memory.sight[0] = -1

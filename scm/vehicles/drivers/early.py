@@ -1,51 +1,104 @@
-"""The crowd's driver compiled by a process of its own, while this one compiles the rest.
+"""What a first start compiles, shared with a second process: two cores compile twice as fast.
 
-Only the first start on a machine does this: afterwards both halves lie in the cache. Run as a
-module it compiles and ends.
+A copy of this process takes jobs from the same heap. What it compiles lies in the cache when this
+process comes to need it, so nothing has to be sent back. Only the first start on a machine does
+this: afterwards all of it lies in the cache.
 """
 
 import contextlib
+import gc
 import logging
-import subprocess
-import sys
-from collections.abc import Iterator
+import os
+import select
+import signal
+import threading
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 
 from scm.log import event
 from scm.vehicles.drivers.law import decide
-from scm.vehicles.jit import is_kept
+from scm.vehicles.jit import is_kept, load_compiler
+
+Job = Callable[[], object]
 
 _GRACE_S = 60.0
 _LOG = logging.getLogger(__name__)
 
 
-@contextlib.contextmanager
-def compiled_beside() -> Iterator[None]:
-    """Compile the driver in a second process during the block, if nobody has; wait for its end.
+def compile_together(jobs: Sequence[Job]) -> None:
+    """Do jobs that compile or load, the dearest first; beside a second process if it is worth it.
 
-    Should that process fail, the driver is compiled here later, at its first use.
+    It is when the driver has to be compiled, and this process has one thread: a copy of more could
+    wait for those that are not in it. Jobs may be done in either process, or in both.
     """
-    if is_kept(decide):
-        yield
+    if is_kept(decide) or threading.active_count() > 1 or not hasattr(os, "fork"):
+        for job in jobs:
+            job()
         return
-    event(_LOG, "first_start", doing="compiling physics and drivers, once", takes_s=10)
-    command = [sys.executable, "-m", __name__]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as helper:
-        try:
-            yield
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                helper.wait(_GRACE_S)
-        finally:
-            helper.kill()
+    event(_LOG, "first_start", doing="compiling physics and drivers, once", takes_s=5)
+    with _uncollected():
+        load_compiler()
+        share(jobs)
 
 
-def _compile() -> None:
-    from scm.maps.load import load_map  # noqa: PLC0415
-    from scm.maps.route import Roads  # noqa: PLC0415
-    from scm.vehicles.drivers.crowd import Crowd  # noqa: PLC0415
-    from scm.vehicles.drivers.streets import streets_of  # noqa: PLC0415
+def share(jobs: Sequence[Job]) -> None:
+    """Do jobs in this process and a copy of it; at the end, here too what the copy has taken.
 
-    Crowd(streets_of(Roads(load_map("driving_school"))), 1).warm()
+    Should the copy fail at a job, this process is the one that says so.
+    """
+    heap, end = _heap(len(jobs)), os.pipe()
+    left = list(range(len(jobs)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # numpy's threads, which survive it
+        copy = os.fork()
+    if copy == 0:
+        _help(jobs, heap)
+    os.close(end[1])
+    try:
+        for number in _taken(heap):
+            jobs[number]()
+            left.remove(number)
+        select.select([end[0]], [], [], _GRACE_S)  # it is closed when the copy is gone
+    finally:
+        os.kill(copy, signal.SIGKILL)
+        os.waitpid(copy, 0)
+        os.close(end[0])
+        os.close(heap)
+    for number in left:
+        jobs[number]()
 
 
-if __name__ == "__main__":
-    _compile()
+def _heap(count: int) -> int:
+    """Return what the numbers below a count can be read from, each once by one process."""
+    heap, fill = os.pipe()
+    os.write(fill, bytes(range(count)))
+    os.close(fill)
+    return heap
+
+
+def _taken(heap: int) -> Iterator[int]:
+    while number := os.read(heap, 1):
+        yield number[0]
+
+
+def _help(jobs: Sequence[Job], heap: int) -> None:
+    """Be the copy: do what is left on the heap, and end without a word."""
+    try:
+        for number in _taken(heap):
+            jobs[number]()
+    finally:
+        os._exit(0)
+
+
+@contextlib.contextmanager
+def _uncollected() -> Iterator[None]:
+    """Let no garbage be looked for, and never again among what is there at the end.
+
+    A compiler's objects are many and live long: looking through them takes a tenth of the time.
+    """
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        gc.enable()
