@@ -7,6 +7,7 @@ BENCHMARKS = (
     "kernel",
     "driver",
     "world",
+    "contacts",
     "city",
     "start",
     "bus",

@@ -1,20 +1,18 @@
 """Makes docs/pictures/{commonroad,tiny_town_drive}.png: our cars beside other people's simulators.
 
-Run with `python docs/make/evidence.py`; needs matplotlib and commonroad-vehicle-models, and for the
-second picture the shared recordings.
+Run with `python docs/make/evidence.py`; needs `pip install -e '.[docs]'`, and for the second
+picture the shared recordings.
 """
 
 import sys
 from dataclasses import replace
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-mpl.use("Agg")
 
-import matplotlib.pyplot as plt
+from drawing import plt
 from matplotlib.axes import Axes
 
 from scm.recording.read import read_recordings

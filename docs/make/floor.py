@@ -1,15 +1,12 @@
 """Makes the pictures of docs/floor.md: the proving ground, a ride over it, a push of a box.
 
-Run with `python docs/make/floor.py`.
+Run with `python docs/make/floor.py`; needs `pip install -e '.[docs]'`.
 """
 
 from pathlib import Path
 
-import matplotlib as mpl
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
+from drawing import plt
 
 from scm.geometry import Pose2
 from scm.maps.draw import draw_svg

@@ -1,18 +1,17 @@
 """Makes docs/pictures/lidar.png: a recorded scan of Tiny Town, and ours from the same place.
 
-Run with `python docs/make/lidar.py`, where the shared recordings are; needs matplotlib.
+Run with `python docs/make/lidar.py`, where the shared recordings are; needs
+`pip install -e '.[docs]'`.
 """
 
 import sys
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-mpl.use("Agg")
 
-import matplotlib.pyplot as plt
+from drawing import plt
 
 from scm.vehicles.car import load_car
 from scm.vehicles.rays.grid import WallGrid
