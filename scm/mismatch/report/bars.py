@@ -9,7 +9,7 @@ from scm.mismatch.findings import Fit
 from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text, ticks_across
 from scm.mismatch.report.wording import quantity, title_of
 
-_WIDTH = 520.0
+_WIDTH = 440.0
 _ROW = 25.0
 _MOST_TRIED = 14
 
@@ -57,7 +57,7 @@ def tried_picture(tried: Sequence[Tried], found: Sequence[str]) -> Picture | Non
     if not shown:
         return None
     names = [title_of(t.name) for t in shown]
-    left = min(230.0, 14.0 + TEXT_PX * max(map(len, names)))
+    left = min(190.0, 14.0 + TEXT_PX * max(map(len, names)))
     high = max(max(_stds(t.gain), _stds(t.needed)) for t in shown)
     height = 30.0 + _ROW * len(shown) + 44.0
     room = frame((0.0, 1.08 * high), (0.0, 1.0), (_WIDTH, height), margins=(left, 14, 30, 44))
@@ -74,14 +74,15 @@ def tried_picture(tried: Sequence[Tried], found: Sequence[str]) -> Picture | Non
         ]  # fmt: skip
     parts += [text(room.right, height - 8, "gain [standard deviations]", "end", "title")]
     parts += [element("path", d=f"M{left:.1f} 8v14", class_="needed")]
-    parts += [text(left + 8, 20, "needed: chance may bring this much")]
+    parts += [text(left + 8, 20, "chance may bring this much")]
     rest = len(known) - len(shown)
     more = f" {rest} more explained less." if rest else ""
     return Picture(
         name="tried",
-        title="What was tried, each effect alone",
+        title="Each effect alone",
         said="A bar that does not pass its mark is what luck may bring when so many are tried. "
-        f"Blue bars are what was found.{more}",
+        f"Blue bars are what was found; grey bars beyond their mark "
+        f"explain some of the same, and less well.{more}",
         svg=picture_svg(_WIDTH, height, parts, "Gain of each effect tried"),
     )
 

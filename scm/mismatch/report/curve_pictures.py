@@ -2,9 +2,9 @@
 
 from scm.mismatch.evidence import Curve
 from scm.mismatch.report.plot import Picture, band, frame, grid, line, picture_svg, span_of
-from scm.mismatch.report.wording import title_of, unit_text
+from scm.mismatch.report.wording import capital, title_of, unit_text
 
-_WIDTH, _HEIGHT = 520.0, 300.0
+_WIDTH, _HEIGHT = 440.0, 270.0
 
 
 def curve_picture(curve: Curve, number: int) -> Picture | None:
@@ -15,7 +15,7 @@ def curve_picture(curve: Curve, number: int) -> Picture | None:
         span_of(curve.x, room=0.0),
         span_of(curve.y, curve.low, curve.high, through_zero=True),
         (_WIDTH, _HEIGHT),
-        margins=(62.0, 14.0, 34.0, 44.0),
+        margins=(58.0, 14.0, 34.0, 44.0),
     )
     x_unit, y_unit = unit_text(curve.x_unit), unit_text(curve.y_unit)
     parts = [
@@ -23,11 +23,11 @@ def curve_picture(curve: Curve, number: int) -> Picture | None:
         band(room, curve.x, curve.low, curve.high, "band-after"),
         line(room, curve.x, curve.y, "after"),
     ]
-    title = f"What it does: {title_of(curve.effect)}"
+    title = capital(title_of(curve.effect))
     return Picture(
         name=f"curve_{number}",
         title=title,
-        said=f"{curve.y_name} against {curve.x_name}; the area holds the truth with 90 %.",
+        said=f"{capital(curve.y_name)} against {curve.x_name}; the area holds the truth with 90 %.",
         svg=picture_svg(_WIDTH, _HEIGHT, parts, title),
     )
 

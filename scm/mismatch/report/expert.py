@@ -1,7 +1,7 @@
 """Below the first screen: what an expert needs to check the verdict."""
 
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable
 from importlib.metadata import version
 
 import scm
@@ -10,7 +10,16 @@ from scm.mismatch.findings import DataProblem, Diagnosis, Effect, Fit
 from scm.mismatch.report.drawings import Drawings
 from scm.mismatch.report.first_screen import name_of
 from scm.mismatch.report.html_text import around, figure, section, table, tag
-from scm.mismatch.report.wording import capital, interval, percent, quantity, spans, title_of
+from scm.mismatch.report.wording import (
+    capital,
+    interval,
+    percent,
+    quantity,
+    short,
+    spans,
+    title_of,
+    unit_text,
+)
 from scm.vehicles.car import Car
 from scm.vehicles.describe_effects import all_effects, params_of
 from scm.vehicles.param import LogNormal, Normal, Param
@@ -31,9 +40,9 @@ _READING = (
      "not help; the drive that is named does."),
 )  # fmt: skip
 _PART_NAMES = {
-    "fit": "numbers fitted on",
-    "choose": "effect chosen by",
-    "confirm": "confirmed on, unseen",
+    "confirm": "unseen, to confirm",
+    "choose": "to choose the effect",
+    "fit": "to fit the numbers",
 }
 _ERROR_UNITS = {"m": "m", "rad": "rad", "mps": "m/s", "s": "s"}
 
@@ -44,25 +53,37 @@ def expert_sections(
     """Return the sections below the first screen; `cars` are the given one and the patched one."""
     windows = around("div", "".join(map(figure, drawings.windows)), "windows")
     return "".join((
-        section("where", "Where on the floor", _grid(map(figure, drawings.maps))),
+        section("where", "Where on the floor", _maps(diagnosis, drawings)),
         section("when", "When", figure(drawings.time_line)),
         section("curves", "The effect as a curve", _grid(map(figure, drawings.curves))),
         section("runs", "Free runs, before and after",
                 _fit_table(diagnosis.fit), _grid(map(figure, drawings.errors)),
                 _windows_head(drawings) + windows if drawings.windows else ""),
         section("numbers", "Numbers", _parameter_table(diagnosis),
-                _grid([figure(drawings.numbers)]), _ordinary_table(evidence)),
-        section("tried", "What was tried", _grid([figure(drawings.tried)])),
-        section("rivals", "Rivals, and what ruled them out", _rival_table(diagnosis)),
+                _grid([figure(drawings.numbers), _ordinary_table(evidence)])),
+        section("tried", "What was tried, and what ruled rivals out",
+                _grid([figure(drawings.tried), _rival_table(diagnosis)])),
         section("data", "The recording itself", _data_table(diagnosis)),
         section("reading", "How to read this page", _reading()),
         section("inputs", "Inputs and versions", _inputs(diagnosis, evidence, cars)),
     ))  # fmt: skip
 
 
-def _grid(figures: "Iterator[str] | Sequence[str]") -> str:
+def _grid(figures: Iterable[str]) -> str:
     inner = "".join(figures)
     return around("div", inner, "grid") if inner else ""
+
+
+def _maps(diagnosis: Diagnosis, drawings: Drawings) -> str:
+    if not drawings.maps:
+        return ""
+    boxes = any(found.where for found in diagnosis.located)
+    said = (
+        "The car's way on the floor, seen from above. Grey and thin: the simulator is right there. "
+        "Blue or orange and wide: something else acts on the car. Where the car came by several "
+        f"times, the strongest lies on top.{' Boxes: where the error was found.' if boxes else ''}"
+    )
+    return tag("p", said) + _grid(map(figure, drawings.maps))
 
 
 def _windows_head(drawings: Drawings) -> str:
@@ -80,16 +101,15 @@ def _fit_table(fit: Fit | None) -> str:
     rows = []
     for name, words in _PART_NAMES.items():
         part = getattr(fit, name)
-        for key in part.before:
+        first = f"{words}: {part.windows} windows"
+        for i, key in enumerate(part.before):
             title, unit = error_name(key)
             sides = (part.before, part.after, part.noise_floor)
-            values = [
-                quantity(side[key], unit) if side.get(key) is not None else "" for side in sides
-            ]
-            rows.append((words, str(part.windows), title, *values))
-    head = ("part", "windows", "error (root mean square)", "before", "after", "noise alone")
-    said = f"Free runs of {quantity(fit.horizon_s, 's')}."
-    return tag("p", said) + table(head, rows, (1, 3, 4, 5)) if rows else ""
+            values = [quantity(s[key], unit) if s.get(key) is not None else "" for s in sides]
+            rows.append((first if i == 0 else "", title, *values))
+    head = ("part of the recording", "error", "before", "after", "noise alone")
+    said = f"Root mean squares over free runs of {quantity(fit.horizon_s, 's')}."
+    return tag("p", said) + table(head, rows, (2, 3, 4)) if rows else ""
 
 
 def error_name(key: str) -> tuple[str, str]:
@@ -119,18 +139,18 @@ def _params(effect: Effect) -> dict[str, Param]:
 def _believed(param: Param | None) -> str:
     if param is None:
         return ""
-    low, high = param.bounds
-    bounds = f"between {low:g} and {high:g}"
+    low, high = map(short, param.bounds)
+    bounds = f"{low} to {high} {unit_text(param.unit)}".rstrip()
     if isinstance(param.prior, Normal):
-        return f"{param.prior.mean:g} ± {param.prior.std:g}, {bounds}"
+        return f"{short(param.prior.mean)} ± {short(param.prior.std)}, of {bounds}"
     if isinstance(param.prior, LogNormal):
-        return f"about {param.prior.median:g}, {bounds}"
+        return f"about {short(param.prior.median)}, of {bounds}"
     return bounds
 
 
 def _ordinary_table(evidence: Evidence) -> str:
     rows = [
-        (o.key, f"{o.given:.5g} ± {o.given_std:.2g}", interval(o.found)) for o in evidence.ordinary
+        (o.key, f"{o.given:.4g} ± {o.given_std:.2g}", interval(o.found)) for o in evidence.ordinary
     ]
     return table(("ordinary number", "car file", "found, with 90 % interval"), rows)
 

@@ -34,9 +34,10 @@ def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
     verdict = around("div", head + better(diagnosis), "words")
     picture = better_picture(diagnosis.fit) if _shows_better(diagnosis) else None
     bars = around("div", _bars(diagnosis, picture), "bars") if picture else ""
-    cards = [*_data_cards(diagnosis), *_effect_cards(diagnosis), *_undecided_cards(diagnosis)]
+    cards = [*_effect_cards(diagnosis), *_undecided_cards(diagnosis), *_located_card(diagnosis)]
     if diagnosis.verdict is Verdict.NONE and can_judge(diagnosis):
-        cards.append(_checked_card(diagnosis, evidence))
+        cards.append(_checked_card(evidence))
+    cards += _data_cards(diagnosis)
     return (
         around("header", verdict + bars, f"verdict {kind}")
         + around("div", "".join(cards), "cards")
@@ -60,7 +61,10 @@ def better(diagnosis: Diagnosis) -> str:
     if not _shows_better(diagnosis):
         floor = fit.confirm.noise_floor.get("position_m")
         noise = f"; noise of measuring alone makes {quantity(floor, 'm')}" if floor else ""
-        said = f"The simulator is off by {quantity(before, 'm')} {horizon}{noise}."
+        best = ""
+        if diagnosis.undecided and after < before:
+            best = f"; with the best of these it would be {quantity(after, 'm')}"
+        said = f"The simulator is off by {quantity(before, 'm')} {horizon}{best}{noise}."
         return tag("p", said)
     said = (
         f"On drives that the fit did not see, the simulator was off by {quantity(before, 'm')} "
@@ -113,6 +117,14 @@ def name_of(name: str, unit: str) -> str:
     return stem.replace("_", " ")
 
 
+def _located_card(diagnosis: Diagnosis) -> Iterator[str]:
+    """Yield where the error lies, where no effect says it."""
+    if diagnosis.located and not diagnosis.effects:
+        yield _card(
+            "effect", "Located", "Where it lies", [("Where", where_and_when(diagnosis.located))]
+        )
+
+
 def _undecided_cards(diagnosis: Diagnosis) -> Iterator[str]:
     yield from (_undecided_card(open_question) for open_question in diagnosis.undecided)
 
@@ -132,7 +144,7 @@ def _undecided_card(question: Undecided) -> str:
     return _card("question", "Undecided", capital(joined(titles, "or")) + "?", rows)
 
 
-def _checked_card(diagnosis: Diagnosis, evidence: Evidence) -> str:
+def _checked_card(evidence: Evidence) -> str:
     tried = evidence.tried
     said = "Its ordinary numbers may move inside the scatter that the car file states."
     if tried:

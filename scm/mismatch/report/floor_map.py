@@ -7,7 +7,7 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.maps.svg import element
 from scm.mismatch.evidence import Residual
-from scm.mismatch.findings import Located, Place
+from scm.mismatch.findings import Located, Place, Span
 from scm.mismatch.report.plot import (
     Frame,
     Picture,
@@ -19,9 +19,11 @@ from scm.mismatch.report.plot import (
     span_of,
     text,
 )
+from scm.mismatch.report.wording import capital, unit_text
 
-WIDTH, HEIGHT = 520.0, 430.0
-_MARGINS = (14.0, 14.0, 14.0, 62.0)
+WIDTH = 440.0
+_LOWEST, _HIGHEST = 130.0, 400.0  # of the floor in the picture
+_MARGINS = (14.0, 14.0, 14.0, 82.0)
 _MOST_POINTS = 4000
 _CLASSES = 9
 _WIDTHS = (5.5, 4.4, 3.4, 2.6, 1.8)  # by distance from the ends of the scale
@@ -29,38 +31,43 @@ _WIDTHS = (5.5, 4.4, 3.4, 2.6, 1.8)  # by distance from the ends of the scale
 
 def floor_map(residual: Residual, located: Sequence[Located], number: int) -> Picture:
     """Return the map of one residual with the places that were found."""
-    bound = colour_bound(residual.before)
+    bound = colour_bound(residual)
     x, y = residual.x_m, residual.y_m
     places = [found.where for found in located if found.where is not None]
     corners = np.array([c for p in places for c in zip(p.x_m, p.y_m, strict=True)]).reshape(-1, 2)
-    room = on_a_floor(
-        frame(
-            span_of(x, corners[:, 0]),
-            span_of(y, corners[:, 1]),
-            (WIDTH, HEIGHT),
-            margins=_MARGINS,
-        )
-    )
+    spans = span_of(x, corners[:, 0]), span_of(y, corners[:, 1])
+    height = _height(*spans)
+    room = on_a_floor(frame(*spans, (WIDTH, height), margins=_MARGINS))
     parts = [
         *(_place(room, place) for place in places),
         *_path(room, residual, bound),
         *scale_bar(room),
-        *_colour_bar(residual, bound),
+        *_colour_bar(residual, bound, height - 36.0),
     ]
-    where = "; the boxes are where the error was found to lie" if places else ""
     return Picture(
         name=f"floor_{number}",
-        title=f"Where: {residual.channel} that the simulator leaves out",
-        said="The car's way on the floor, seen from above. Grey and thin: the simulator is right "
-        f"there. Blue or orange and wide: something else acts on the car{where}.",
-        svg=picture_svg(WIDTH, HEIGHT, parts, f"Floor map of {residual.channel}"),
+        title=f"{capital(residual.channel)} that the simulator leaves out",
+        said="",
+        svg=picture_svg(WIDTH, height, parts, f"Floor map of {residual.channel}"),
     )
 
 
-def colour_bound(values: Floats) -> float:
-    """Return the value at which colours end: the 98th percentile, so that one outlier is none."""
-    known = np.abs(values[np.isfinite(values)])
-    return float(np.percentile(known, 98)) or 1.0 if len(known) else 1.0
+def _height(x_span: Span, y_span: Span) -> float:
+    """Return how tall the picture has to be for the floor's shape."""
+    long = WIDTH - _MARGINS[0] - _MARGINS[1]
+    tall = long * (y_span[1] - y_span[0]) / max(x_span[1] - x_span[0], 1e-9)
+    return min(_HIGHEST, max(_LOWEST, tall)) + _MARGINS[2] + _MARGINS[3]
+
+
+def colour_bound(residual: Residual) -> float:
+    """Return the value at which colours end.
+
+    That is the 98th percentile, so that one outlier is none, and at least three standard
+    deviations, so that mere noise stays grey.
+    """
+    values, stds = (a[np.isfinite(a)] for a in (residual.before, residual.std))
+    strong = float(np.percentile(np.abs(values), 98)) if len(values) else 0.0
+    return max(strong, 3.0 * float(np.median(stds)) if len(stds) else 0.0) or 1.0
 
 
 def colour_class(values: Floats, bound: float) -> Ints:
@@ -106,15 +113,17 @@ def _place(room: Frame, place: Place) -> str:
     return element("path", d=data, class_="place")
 
 
-def _colour_bar(residual: Residual, bound: float) -> Iterator[str]:
+def _colour_bar(residual: Residual, bound: float, y: float) -> Iterator[str]:
     """Yield the scale of colours with its unit."""
-    left, wide, y = 130.0, 28.0, HEIGHT - 38.0
+    left, wide = 30.0, 26.0
     for kind in range(_CLASSES):
         x = left + wide * kind
         data = f"M{x:.1f} {y:.1f}h{wide:.1f}"
-        yield element("path", d=data, class_=f"d{kind}", stroke_width=11, stroke_linecap="butt")
+        yield element("path", d=data, class_=f"butt d{kind}", stroke_width=11)
     ends = ((0.0, -bound), (0.5, 0.0), (1.0, bound))
     for share, value in ends:
         number = f"{value:+.2g}".replace("-", "\N{MINUS SIGN}") if value else "0"
         yield text(left + wide * _CLASSES * share, y + 23, number, "middle")
-    yield text(left + wide * _CLASSES + 10, y + 4, f"{residual.channel} [{residual.unit}]")
+    yield text(
+        left + wide * _CLASSES + 10, y + 4, f"{residual.channel} [{unit_text(residual.unit)}]"
+    )

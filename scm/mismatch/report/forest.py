@@ -7,7 +7,7 @@ from scm.maps.svg import element
 from scm.mismatch.evidence import Ordinary
 from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text, ticks_across
 
-_WIDTH, _ROW = 520.0, 25.0
+_WIDTH, _ROW = 440.0, 25.0
 _FEWEST_STDS, _MOST_STDS = 2.5, 6.0
 
 
@@ -18,7 +18,7 @@ def forest_picture(ordinary: Sequence[Ordinary]) -> Picture | None:
         return None
     ends = [abs(_moved(o, v)) for o in shown for v in (o.found.value, o.found.low, o.found.high)]
     wide = min(_MOST_STDS, max(_FEWEST_STDS, 1.1 * max(e for e in ends if math.isfinite(e))))
-    left = min(240.0, 14.0 + TEXT_PX * max(len(o.key) for o in shown))
+    left = min(210.0, 14.0 + TEXT_PX * max(len(o.key) for o in shown))
     height = 30.0 + _ROW * len(shown) + 44.0
     room = frame((-wide, wide), (0.0, 1.0), (_WIDTH, height), margins=(left, 14, 26, 44))
     parts = []
@@ -38,11 +38,11 @@ def forest_picture(ordinary: Sequence[Ordinary]) -> Picture | None:
         parts += [text(left - 8, y + 4, o.key, "end", "title")]
         parts += [element("path", d=f"M{low:.1f} {y:.1f}H{high:.1f}", class_="whisker")]
         parts += [element("circle", cx=f"{at:.1f}", cy=f"{y:.1f}", r="5", class_="dot")]
-    words = "moved by [standard deviations that the car file states]"
+    words = "moved [standard deviations of the car file]"
     parts += [text(room.right, height - 8, words, "end", "title")]
     return Picture(
         name="numbers",
-        title="Ordinary numbers of the car file: how far they moved",
+        title="How far ordinary numbers moved",
         said="Dots: found, with 90 % intervals. Dark area: one standard deviation as the car file "
         "states it, light area: two. Inside, the car file was right.",
         svg=picture_svg(_WIDTH, height, parts, "Ordinary numbers, before and after"),

@@ -23,8 +23,8 @@ from scm.mismatch.report.plot import (
 )
 
 WINDOWS = 8
-_SIDE = 240.0
-_WIDTH, _HEIGHT = 520.0, 300.0
+_SIDE = 200.0
+_WIDTH, _HEIGHT = 440.0, 270.0
 _MOST_POINTS = 120
 
 
@@ -78,7 +78,7 @@ def _window(runs: FreeRuns, row: int, number: int) -> Picture:
             span_of(*(x for x, _ in sides.values())),
             span_of(*(y for _, y in sides.values())),
             (_SIDE, _SIDE),
-            margins=(10.0, 10.0, 44.0, 26.0),
+            margins=(10.0, 10.0, 46.0, 28.0),
         )
     )
     parts = [line(room, x, y, kind) for kind, (x, y) in sides.items()]
@@ -86,10 +86,8 @@ def _window(runs: FreeRuns, row: int, number: int) -> Picture:
     before, after = (
         _last_known(position_error(runs, side)[row]) for side in (runs.before, runs.after)
     )
-    parts += [text(10, 16, f"{runs.start_s[row]:.1f} s, {runs.part[row]}", kind="title")]
-    parts += [
-        text(10, 33, f"{100 * before:.1f} \N{RIGHTWARDS ARROW} {100 * after:.1f} cm at the end")
-    ]
+    parts += [text(10, 18, f"from {runs.start_s[row]:.1f} s", kind="title")]
+    parts += [text(10, 35, f"{100 * before:.1f} \N{RIGHTWARDS ARROW} {100 * after:.1f} cm")]
     return Picture(
         name=f"free_run_{number}",
         title="",
@@ -139,7 +137,7 @@ def _growth(
         (0.0, float(t_s[-1])),
         span_of(before, after, through_zero=True),
         (_WIDTH, _HEIGHT),
-        margins=(62.0, 14.0, 58.0, 44.0),
+        margins=(58.0, 14.0, 50.0, 44.0),
     )
     parts = list(legend(62.0, 16.0, [("before", "before"), ("after", "after")]))
     parts += grid(room, "time since the window's start [s]", f"[{unit}]")

@@ -19,8 +19,7 @@ _CHAPTERS = {
     "curves": "the effect",
     "runs": "free runs",
     "numbers": "numbers",
-    "tried": "what was tried",
-    "rivals": "rivals",
+    "tried": "what was tried, rivals",
     "data": "the recording",
     "reading": "how to read this",
     "inputs": "inputs",
@@ -36,7 +35,7 @@ def page_html(
 ) -> str:
     """Return the page; `cars` are the given one and the patched one, `use` what to do with it."""
     below = expert_sections(diagnosis, evidence, drawings, cars)
-    body = first_screen(diagnosis, evidence) + tag("p", use) + _links(below) + below
+    body = first_screen(diagnosis, evidence) + tag("p", use, "use") + _links(below) + below
     title = escape(f"{evidence.vehicle}: {verdict_sentence(diagnosis)}")
     style = colours_css() + Path(__file__).with_name("style.css").read_text(encoding="utf-8")
     return (

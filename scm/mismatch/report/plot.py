@@ -5,7 +5,7 @@ The same picture stands in the page, which brings the colours, and in a file, wh
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -17,8 +17,10 @@ from scm.maps.svg import element
 from scm.vehicles.manual.line_svg import Axis, equally_scaled
 
 MARGINS = (62.0, 14.0, 30.0, 40.0)  # left, right, top, bottom
-TEXT_PX = 6.6  # width of a letter at the pictures' size of text
+TEXT_PX = 7.2  # width of a letter at the pictures' size of text
 _FEWEST_SPAN = 1e-9
+_FEWEST_TICKS = 3
+_SMALLEST_FLOOR_M = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,14 +100,26 @@ def frame(
     """Return axes in a rectangle of this size at this upper left corner."""
     (left, right, top, bottom), (width, height) = margins, size
     long, tall = width - left - right, height - top - bottom
-    across = Axis(*_opened(x_span), corner[0] + left, long, max(2, round(long / 90)))
-    up = Axis(*_opened(y_span), corner[1] + top + tall, -tall, max(2, round(tall / 38)))
-    return Frame(across, up)
+    across = Axis(*_opened(x_span), corner[0] + left, long, max(3, round(long / 75)))
+    up = Axis(*_opened(y_span), corner[1] + top + tall, -tall, max(3, round(tall / 38)))
+    return Frame(_ticked(across), _ticked(up))
+
+
+def _ticked(axis: Axis) -> Axis:
+    """Return the axis with at least three ticks, so that its scale can be read."""
+    while len(list(axis.ticks())) < _FEWEST_TICKS:
+        axis = replace(axis, wanted=axis.wanted + 1)
+    return axis
 
 
 def on_a_floor(plain: Frame) -> Frame:
     """Return these axes with a metre as long on both, wider where that needs it."""
-    return Frame(*equally_scaled(plain.across, plain.up))
+    across, up = equally_scaled(plain.across, plain.up)
+    middle = 0.5 * (across.low + across.high)
+    if across.high - across.low < _SMALLEST_FLOOR_M:
+        half = 0.5 * _SMALLEST_FLOOR_M
+        across, up = equally_scaled(replace(across, low=middle - half, high=middle + half), up)
+    return Frame(across, up)
 
 
 def _opened(span: tuple[float, float]) -> tuple[float, float]:
@@ -210,12 +224,12 @@ def legend(x: float, y: float, entries: Sequence[tuple[str, str]]) -> Iterator[s
 
 
 def scale_bar(of: Frame) -> Iterator[str]:
-    """Yield a bar of a round length [m] in the lower left corner of a floor."""
+    """Yield a bar of a round length [m] below the lower left corner of a floor."""
     wanted = 0.28 * (of.across.high - of.across.low)
     power = 10.0 ** math.floor(math.log10(wanted))
     length = max(m * power for m in (1.0, 2.0, 5.0) if m * power <= wanted)
     pixels = of.across.at(length) - of.across.at(0.0)
-    x, y = of.left + 8, of.bottom - 8
+    x, y = of.left + 2, of.bottom + 16
     yield element("path", d=f"M{x:.1f} {y - 4:.1f}v4h{pixels:.1f}v-4", class_="scale")
     words = f"{length:g} m" if length >= 1.0 else f"{100.0 * length:g} cm"
     yield text(x + pixels + 7, y + 1, words)

@@ -22,6 +22,7 @@ from scm.mismatch.report.plot import (
     text,
     ticks_across,
 )
+from scm.mismatch.report.wording import unit_text
 
 WIDTH, PANEL, STRIP = 1000.0, 150.0, 56.0
 _MARGINS = (66.0, 14.0, 26.0, 10.0)
@@ -29,7 +30,7 @@ _TOP = 26.0
 _MOST_PANELS = 5
 _COLUMNS = 450
 _BAND_STDS = 1.645  # 90 %
-PARTS = {"fit": "fitted", "choose": "chosen by", "confirm": "confirmed on"}
+PARTS = {"fit": "fitted", "choose": "chosen", "confirm": "confirmed"}
 
 
 def time_line(
@@ -44,7 +45,7 @@ def time_line(
         legend(
             66.0,
             16.0,
-            [("before thin", "as the simulator was"), ("after thin", "with what was found")],
+            [("before thin", "the simulator as it was"), ("after thin", "with what was found")],
         )
     )
     spans = [when for found in located for when in found.when_s or ()]
@@ -59,10 +60,11 @@ def time_line(
     parts += _strip(span, y, runs)
     return Picture(
         name="time_line",
-        title="When: what the simulator leaves out, along the recording",
+        title="",
         said="Zero means that the simulator is right. Lines are smoothed; the areas around them "
-        "hold the truth with 90 %. Where the dashed line leaves zero by more than its area, and "
-        "the full line does not, what was found explains it.",
+        "hold the truth with 90 %. Where the orange line leaves zero by more than its area, and "
+        "the blue line does not, what was found explains it. The strip below shows what served "
+        "to fit the numbers, to choose the effect, and only to confirm.",
         svg=picture_svg(WIDTH, y + STRIP, parts, "Residuals along the recording"),
         wide=True,
     )
@@ -100,7 +102,12 @@ def _panel(room: Frame, residual: Residual, spans: Sequence[Span]) -> Iterator[s
     for values, kind in ((residual.before, "before thin"), (residual.after, "after thin")):
         times, mean = middle(t_s, values, room)
         yield line(room, times, np.clip(mean, room.up.low, room.up.high), kind)
-    yield text(room.left + 4, room.top - 7, f"{residual.channel} [{residual.unit}]", kind="title")
+    yield text(
+        room.left + 4,
+        room.top - 7,
+        f"{residual.channel} [{unit_text(residual.unit)}]",
+        kind="title",
+    )
 
 
 def grid_without_numbers(room: Frame) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from scm.mismatch.findings import DataProblem, Diagnosis, Verdict
+from scm.mismatch.findings import DataProblem, Diagnosis, Effect, Equation, Verdict
 from scm.mismatch.report.wording import capital, joined, title_of
 
 
@@ -14,15 +14,28 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
         return "Nothing beyond noise: the simulator drives as the car does."
     if diagnosis.verdict is Verdict.UNDECIDED:
         return _undecided_sentence(diagnosis)
-    names = [effect_title(effect.name, listed=effect.listed) for effect in diagnosis.effects]
-    if not names:
+    if not diagnosis.effects:
         return "Simulator and recording differ, and no cause could be named."
-    return capital(f"{joined(names)}: the simulator leaves this out.")
+    return _mismatch_sentence(diagnosis.effects)
 
 
-def effect_title(name: str, *, listed: bool) -> str:
+def _mismatch_sentence(effects: Sequence[Effect]) -> str:
+    """Say apart what the car does and what only its measuring does."""
+    car, measuring = (
+        joined([effect_title(e) for e in effects if (e.equation is Equation.SENSOR) is sensor])
+        for sensor in (False, True)
+    )
+    if not measuring:
+        return f"The simulator leaves out {car}."
+    if not car:
+        return f"Not the car, its measuring is off: {measuring}."
+    return f"The simulator leaves out {car}, and the measuring is off: {measuring}."
+
+
+def effect_title(effect: Effect) -> str:
     """Return an effect as the verdict names it; one outside the library is said to be unknown."""
-    return title_of(name) if listed else f"an unknown effect, {name}"
+    name = title_of(effect.name)
+    return name if effect.listed else f"an effect that no list has, {name}"
 
 
 def _undecided_sentence(diagnosis: Diagnosis) -> str:
@@ -30,7 +43,7 @@ def _undecided_sentence(diagnosis: Diagnosis) -> str:
     either = joined(list(dict.fromkeys(between)), "or")
     if not either:
         return "Something is left out, but this recording does not tell what."
-    sure = [effect_title(effect.name, listed=effect.listed) for effect in diagnosis.effects]
+    sure = list(map(effect_title, diagnosis.effects))
     also = f"{joined(sure)}; and " if sure else ""
     return capital(f"{also}{either}: this recording cannot tell which.")
 

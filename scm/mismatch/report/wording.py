@@ -30,7 +30,9 @@ def title_of(name: str) -> str:
     if effect is None:
         return name.replace("_", " ") if name.isidentifier() else name
     head, colon, _ = effect.about.partition(": ")
-    return head.lower() if colon and len(head) <= len(name) + 12 else name.replace("_", " ")
+    if not colon or len(head) > len(name) + 12:
+        return name.replace("_", " ")
+    return head if head[1:2].isupper() else head[:1].lower() + head[1:]
 
 
 def capital(text: str) -> str:
@@ -49,10 +51,11 @@ def quantity(value: float, unit: str) -> str:
         return "unknown"
     scales = _SCALES.get(unit, ((0.0, unit_text(unit), 1.0),))
     name, factor = next((name, per) for least, name, per in scales if abs(value) >= least)
-    return f"{_short(value * factor)} {name}".rstrip()
+    space = "" if name == "°" else " "
+    return f"{short(value * factor)}{space}{name}".rstrip()
 
 
-def _short(value: float) -> str:
+def short(value: float) -> str:
     """Return three digits, without an exponent where people would write none."""
     text = f"{value:.3g}"
     return (text if "e" not in text else f"{value:.2e}").replace("-", "\N{MINUS SIGN}")
@@ -60,12 +63,12 @@ def _short(value: float) -> str:
 
 def interval(estimate: Estimate) -> str:
     """Return a value with its 90 % interval in one unit."""
-    low, high = _short(estimate.low), _short(estimate.high)
+    low, high = short(estimate.low), short(estimate.high)
     unit = unit_text(estimate.unit)
     degrees = ""
     if estimate.unit == "rad" and math.isfinite(estimate.value):
-        degrees = f" = {_short(math.degrees(estimate.value))}°"
-    return f"{_short(estimate.value)} {unit}".rstrip() + f"{degrees} (90 %: {low} to {high})"
+        degrees = f" = {short(math.degrees(estimate.value))}°"
+    return f"{short(estimate.value)} {unit}".rstrip() + f"{degrees} (90 %: {low} to {high})"
 
 
 def percent(share: float) -> str:
@@ -106,7 +109,7 @@ def _one_place(located: Located) -> str:
 def place(box: Place) -> str:
     """Return a box of the floor."""
     (x0, x1), (y0, y1) = box.x_m, box.y_m
-    return f"at x {_short(x0)} to {_short(x1)} m, y {_short(y0)} to {_short(y1)} m"
+    return f"at x {short(x0)} to {short(x1)} m, y {short(y0)} to {short(y1)} m"
 
 
 def spans(when_s: Sequence[Span]) -> str:

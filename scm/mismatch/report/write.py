@@ -50,9 +50,17 @@ def _written_car(
         (out / FILE).unlink(missing_ok=True)
         return f"The car with what was found could not be written as a file: {error}"
     beside = f" It needs {', '.join(files[1:])} beside it." if files[1:] else ""
-    if not diagnosis.effects:
+    if not _is_changed(car, patched):
         return f"{FILE} beside this page is the car as it was given.{beside}"
     return (
         f"{FILE} beside this page is the given car with what was found; the simulator loads it: "
         f"scm replay RECORDING --car {FILE}{beside}"
+    )
+
+
+def _is_changed(car: Car, patched: Car) -> bool:
+    return (car.terms, car.measures, dict(car.values)) != (
+        patched.terms,
+        patched.measures,
+        dict(patched.values),
     )

@@ -73,12 +73,18 @@ def lag():
         said="The motor's force follows the throttle with a lag of 0.14 s. The simulator lets it "
         "follow at once.",
         rivals=(
-            Rival(name="drive_delay", probability=0.021,
-                  ruled_out_by="The force starts to rise at once and not after a pause."),
-            Rival(name="battery_sag", probability=0.0004,
-                  ruled_out_by="The error does not grow with time."),
+            Rival(
+                name="drive_delay",
+                probability=0.021,
+                ruled_out_by="The force starts to rise at once and not after a pause.",
+            ),
+            Rival(
+                name="battery_sag",
+                probability=0.0004,
+                ruled_out_by="The error does not grow with time.",
+            ),
         ),
-    )  # fmt: skip
+    )
 
 
 def patch():
@@ -88,13 +94,18 @@ def patch():
         equation=Equation.SURFACE,
         depends_on=("x", "y"),
         parameters={
-            "x_m": estimate(0.81, "m", 0.02), "y_m": estimate(-0.32, "m", 0.04),
-            "radius_m": estimate(0.35, "m"), "grip": estimate(0.46), "rolling": estimate(0.06),
+            "x_m": estimate(1.1, "m", 0.02),
+            "y_m": estimate(-0.85, "m", 0.04),
+            "radius_m": estimate(0.35, "m"),
+            "grip": estimate(0.46),
+            "rolling": estimate(0.06),
         },
         probability=0.91,
         said="On a round spot of 0.35 m the floor is slippery and slows the wheels.",
-        rivals=(Rival(name="grade", probability=0.05, ruled_out_by="Elsewhere the floor is level."),),
-    )  # fmt: skip
+        rivals=(
+            Rival(name="grade", probability=0.05, ruled_out_by="Elsewhere the floor is level."),
+        ),
+    )
 
 
 def unlisted():
@@ -153,8 +164,16 @@ def residual(channel, unit, force, seed=1, seconds=90.0):
         return 0.12 * size * smooth / smooth.std()
 
     std = np.full(len(t), 0.13 * size)
-    return Residual(channel=channel, unit=unit, t_s=t, x_m=x, y_m=y, before=signal + noise(),
-                    after=noise(), std=std)  # fmt: skip
+    return Residual(
+        channel=channel,
+        unit=unit,
+        t_s=t,
+        x_m=x,
+        y_m=y,
+        before=signal + noise(),
+        after=noise(),
+        std=std,
+    )
 
 
 def free_runs(before=0.36, after=0.042, windows=30, seed=3):
@@ -178,13 +197,21 @@ def free_runs(before=0.36, after=0.042, windows=30, seed=3):
         }
 
     measured = {
-        "x": x + rng.normal(0, 0.002, x.shape), "y": y + rng.normal(0, 0.002, x.shape), "yaw": yaw,
-    }  # fmt: skip
+        "x": x + rng.normal(0, 0.002, x.shape),
+        "y": y + rng.normal(0, 0.002, x.shape),
+        "yaw": yaw,
+    }
     measured["x"][4, 20:30] = np.nan
     block = ("fit", "fit", "choose", "fit", "confirm")
     parts = tuple(block[(i // 3) % 5] for i in range(windows))
-    return FreeRuns(part=parts, start_s=start, t_s=t, measured=measured, before=strayed(before),
-                    after=strayed(after))  # fmt: skip
+    return FreeRuns(
+        part=parts,
+        start_s=start,
+        t_s=t,
+        measured=measured,
+        before=strayed(before),
+        after=strayed(after),
+    )
 
 
 def ordinary():
@@ -197,10 +224,14 @@ def ordinary():
         ("body.cog_to_rear_axle_m", 0.0708, 0.004, 0.0712, 0.006, "m"),
     )
     return tuple(
-        Ordinary(key=key, given=given, given_std=std,
-                 found=Estimate(value=v, low=v - half, high=v + half, unit=unit))
+        Ordinary(
+            key=key,
+            given=given,
+            given_std=std,
+            found=Estimate(value=v, low=v - half, high=v + half, unit=unit),
+        )
         for key, given, std, v, half, unit in rows
-    )  # fmt: skip
+    )
 
 
 def tried(found=(), strongest=9.0, seed=5):
@@ -210,7 +241,9 @@ def tried(found=(), strongest=9.0, seed=5):
     if "drive_lag" in found:
         gains["drive_delay"] = 1130.0
     return tuple(
-        Tried(name=n, gain=min(g, strongest) if n not in {*found, "drive_delay"} else g, needed=15.2)
+        Tried(
+            name=n, gain=min(g, strongest) if n not in {*found, "drive_delay"} else g, needed=15.2
+        )
         for n, g in gains.items()
     )
 
@@ -218,8 +251,17 @@ def tried(found=(), strongest=9.0, seed=5):
 def curve(effect="drive_lag"):
     x = np.linspace(0.0, 0.6, 60)
     y = 1.0 - np.exp(-x / 0.142)
-    return Curve(effect=effect, x_name="time since the throttle rose", x_unit="s",
-                 y_name="share of the force", y_unit="1", x=x, y=y, low=y - 0.05, high=y + 0.05)  # fmt: skip
+    return Curve(
+        effect=effect,
+        x_name="time since the throttle rose",
+        x_unit="s",
+        y_name="share of the force",
+        y_unit="1",
+        x=x,
+        y=y,
+        low=y - 0.05,
+        high=y + 0.05,
+    )
 
 
 def evidence(**more):
@@ -239,38 +281,64 @@ def evidence(**more):
 
 def diagnosis(**more):
     shown = {
-        "verdict": Verdict.NONE, "located": (), "effects": (), "undecided": (), "fit": fit(),
-        "runtime_s": 41.7, "data": (),
-    }  # fmt: skip
+        "verdict": Verdict.NONE,
+        "located": (),
+        "effects": (),
+        "undecided": (),
+        "fit": fit(),
+        "runtime_s": 41.7,
+        "data": (),
+    }
     return Diagnosis(**{**shown, **more})
 
 
 def one_effect():
     nigel = load_car("nigel")
-    located = Located(equation=Equation.DRIVE, channels=("pose.x", "pose.y", "encoder.left"),
-                      depends_on=("throttle",), when_s=None, where=None, share_of_error=0.93)  # fmt: skip
-    problem = DataProblem(channel="pose.*", name="clock_offset",
-                          said="Poses are stamped 41 ms late against the gyro.",
-                          corrected="all poses were moved by 41 ms")  # fmt: skip
-    found = diagnosis(verdict=Verdict.MISMATCH, located=(located,), effects=(lag(),),
-                      data=(problem,))  # fmt: skip
+    located = Located(
+        equation=Equation.DRIVE,
+        channels=("pose.x", "pose.y", "encoder.left"),
+        depends_on=("throttle",),
+        when_s=None,
+        where=None,
+        share_of_error=0.93,
+    )
+    problem = DataProblem(
+        channel="pose.*",
+        name="clock_offset",
+        said="Poses are stamped 41 ms late against the gyro.",
+        corrected="all poses were moved by 41 ms",
+    )
+    found = diagnosis(
+        verdict=Verdict.MISMATCH, located=(located,), effects=(lag(),), data=(problem,)
+    )
     shown = evidence(curves=(curve(),), tried=tried(["drive_lag"]))
     return found, shown, nigel, nigel.with_terms(["drive_lag"], {"drive.lag_s": 0.142})
 
 
 def pair():
     nigel = load_car("nigel")
-    spot = Place(x_m=(0.45, 1.17), y_m=(-0.68, 0.05))
+    spot = Place(x_m=(0.75, 1.45), y_m=(-1.2, -0.5))
     located = (
-        Located(equation=Equation.DRIVE, channels=("pose.x", "pose.y"), depends_on=("throttle",),
-                when_s=None, where=None, share_of_error=0.58),
-        Located(equation=Equation.SURFACE, channels=("pose.x", "pose.y", "pose.yaw"),
-                depends_on=("x", "y"), when_s=((9.0, 11.5), (33.0, 35.5), (57.0, 59.5), (81.0, 83.5)),
-                where=spot, share_of_error=0.35),
-    )  # fmt: skip
+        Located(
+            equation=Equation.DRIVE,
+            channels=("pose.x", "pose.y"),
+            depends_on=("throttle",),
+            when_s=None,
+            where=None,
+            share_of_error=0.58,
+        ),
+        Located(
+            equation=Equation.SURFACE,
+            channels=("pose.x", "pose.y", "pose.yaw"),
+            depends_on=("x", "y"),
+            when_s=((9.0, 11.5), (33.0, 35.5), (57.0, 59.5), (81.0, 83.5)),
+            where=spot,
+            share_of_error=0.35,
+        ),
+    )
 
     def inside(t, x, y):
-        return -1.4 * (np.hypot(x - 0.81, y + 0.32) < 0.35) + 0.25 * np.sin(2 * np.pi * t / 7.0)
+        return -1.4 * (np.hypot(x - 1.1, y + 0.85) < 0.35) + 0.25 * np.sin(2 * np.pi * t / 7.0)
 
     found = diagnosis(verdict=Verdict.MISMATCH, located=located, effects=(lag(), patch()))
     shown = evidence(
@@ -279,12 +347,24 @@ def pair():
             residual("yaw moment", "N*m", lambda t, x, y: 0.02 * np.sin(t / 2) * (x > 0.4), 2),
             residual("side force", "N", lambda t, x, y: 0.1 * np.cos(t / 5), 4),
         ),
-        curves=(curve(), replace(curve("surface_patch"), x_name="distance from the spot's centre",
-                                 x_unit="m", y_name="grip")),
+        curves=(
+            curve(),
+            replace(
+                curve("surface_patch"),
+                x_name="distance from the spot's centre",
+                x_unit="m",
+                y_name="grip",
+            ),
+        ),
         tried=tried(["drive_lag", "surface_patch"]),
-    )  # fmt: skip
-    numbers = {"drive.lag_s": 0.142, "surface_patch.x_m": 0.81, "surface_patch.y_m": -0.32,
-               "surface_patch.radius_m": 0.35, "surface_patch.grip": 0.46}  # fmt: skip
+    )
+    numbers = {
+        "drive.lag_s": 0.142,
+        "surface_patch.x_m": 1.1,
+        "surface_patch.y_m": -0.85,
+        "surface_patch.radius_m": 0.35,
+        "surface_patch.grip": 0.46,
+    }
     return found, shown, nigel, nigel.with_terms(["drive_lag", "surface_patch"], numbers)
 
 
@@ -306,10 +386,15 @@ def undecided():
         "of 5 degrees with throttle 0.6 and let it roll back.",
         expected_separation=6.4,
     )
-    problem = DataProblem(channel="imu.*", name="missing", said="The recording has no IMU.",
-                          record_instead="The gyro, at 50 Hz or more.")  # fmt: skip
-    found = diagnosis(verdict=Verdict.UNDECIDED, undecided=(question,), fit=fit(0.18, 0.03),
-                      data=(problem,))  # fmt: skip
+    problem = DataProblem(
+        channel="imu.*",
+        name="missing",
+        said="The recording has no IMU.",
+        record_instead="The gyro, at 50 Hz or more.",
+    )
+    found = diagnosis(
+        verdict=Verdict.UNDECIDED, undecided=(question,), fit=fit(0.18, 0.03), data=(problem,)
+    )
     return found, evidence(tried=tried(["motor_gain", "payload"])), nigel, nigel
 
 
@@ -318,13 +403,27 @@ def unlisted_law(folder=None):
     (folder / "drive_force_against_heading.py").write_text(OWN_LAW)
     term = load_own_term(folder, "drive_force_against_heading.py")
     nigel = load_car("nigel")
-    located = Located(equation=Equation.DRIVE, channels=("pose.x", "pose.y"),
-                      depends_on=("heading",), when_s=None, where=None, share_of_error=0.88)  # fmt: skip
+    located = Located(
+        equation=Equation.DRIVE,
+        channels=("pose.x", "pose.y"),
+        depends_on=("heading",),
+        when_s=None,
+        where=None,
+        share_of_error=0.88,
+    )
     heading = np.linspace(-180.0, 180.0, 90)
     force = -0.42 * np.sin(2 * np.radians(heading))
-    shape = Curve(effect="drive force against heading", x_name="heading", x_unit="°",
-                  y_name="drive force", y_unit="N", x=heading, y=force, low=force - 0.06,
-                  high=force + 0.06)  # fmt: skip
+    shape = Curve(
+        effect="drive force against heading",
+        x_name="heading",
+        x_unit="°",
+        y_name="drive force",
+        y_unit="N",
+        x=heading,
+        y=force,
+        low=force - 0.06,
+        high=force + 0.06,
+    )
     found = diagnosis(verdict=Verdict.MISMATCH, located=(located,), effects=(unlisted(),))
     shown = evidence(curves=(shape,), tried=tried(strongest=60.0))
     key = "drive_force_against_heading.strength_n"
@@ -334,14 +433,26 @@ def unlisted_law(folder=None):
 def bad_data():
     nigel = load_car("nigel")
     problems = (
-        DataProblem(channel="command.throttle", name="missing",
-                    said="The recording holds no throttle command.",
-                    record_instead="The command as it is sent to the motor, with its time."),
-        DataProblem(channel="pose.x", name="gap", said="Poses are missing for 2.1 s.",
-                    when_s=((12.0, 14.1),), record_instead="Keep the tag in the camera's sight."),
-        DataProblem(channel="imu.gyro_z", name="unit", said="The gyro is in degrees a second.",
-                    corrected="divided by 57.3"),
-    )  # fmt: skip
+        DataProblem(
+            channel="command.throttle",
+            name="missing",
+            said="The recording holds no throttle command.",
+            record_instead="The command as it is sent to the motor, with its time.",
+        ),
+        DataProblem(
+            channel="pose.x",
+            name="gap",
+            said="Poses are missing for 2.1 s.",
+            when_s=((12.0, 14.1),),
+            record_instead="Keep the tag in the camera's sight.",
+        ),
+        DataProblem(
+            channel="imu.gyro_z",
+            name="unit",
+            said="The gyro is in degrees a second.",
+            corrected="divided by 57.3",
+        ),
+    )
     found = diagnosis(fit=None, data=problems, runtime_s=0.8)
     return found, Evidence(vehicle="nigel", recordings=("broken.yaml",)), nigel, nigel
 
@@ -354,4 +465,3 @@ CASES = {
     "unlisted_law": unlisted_law,
     "bad_data": bad_data,
 }
-
