@@ -11,15 +11,18 @@ from scm.fleet import open_city
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("--live", action="store_true", help="use the city that `make run` started")
 parser.add_argument("--connect", default="tcp/127.0.0.1:7447", help="its router (%(default)s)")
+parser.add_argument("--plans", nargs="+", default=["calm", "brisk"], help="(%(default)s)")
+parser.add_argument("--via", nargs="+", default=["east_loop", "west_loop"], metavar="LANE",
+                    help="where to drive (%(default)s)")  # fmt: skip
 arguments = parser.parse_args()
 
 began, speeds = time.perf_counter(), {}
 with open_city("driving_school", connect=arguments.connect if arguments.live else None) as city:
     start_s = city.time_s
     cars = [city.spawn("nigel") for _ in range(2)]
-    for plan in ("calm", "brisk"):
+    for plan in arguments.plans:
         city.use_plan(plan)
-        trips = [car.drive("east_loop", "west_loop", laps=1) for car in cars]
+        trips = [car.drive(*arguments.via) for car in cars]
         city.wait(trips, timeout_s=300.0)
         for trip in trips:
             length_m, time_s = trip.length_m, trip.travel_time_s
@@ -28,5 +31,6 @@ with open_city("driving_school", connect=arguments.connect if arguments.live els
         speeds[plan] = sum(t.length_m for t in trips) / sum(t.travel_time_s for t in trips)
         print(f"{plan:>6} plan: {speeds[plan]:.3f} m/s on average")
     city_s, elapsed_s = city.time_s - start_s, time.perf_counter() - began
-print(f"brisk against calm: {speeds['brisk'] / speeds['calm'] - 1.0:+.0%} average speed")
+first, last = arguments.plans[0], arguments.plans[-1]
+print(f"{last} against {first}: {speeds[last] / speeds[first] - 1.0:+.0%} average speed")
 print(f"{city_s:.0f} s of city in {elapsed_s:.1f} s: {city_s / elapsed_s:.1f} x real time")
