@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.doubt.clocks import Lag, lag_between
-from scm.mismatch.doubt.track import Grid, Series, Track, clean, grid, series
+from scm.mismatch.doubt.track import Grid, Series, Track, clean, grid, held
 from scm.mismatch.findings import DataProblem
 from scm.recording.read import Recording
 
@@ -28,19 +27,13 @@ def command_problems(
     """Yield what is wrong with the commands and with what they do."""
     yield from _missing(recording)
     for name in ("command.throttle", "command.steering", "command.speed"):
-        channel = series(recording, name, 1)
-        if channel is not None:
+        if name in recording.channels and len(clean(recording.channels[name]).t):
+            channel = clean(recording.channels[name])
             yield from _range(recording, name, channel)
             yield from _constant(name, channel)
     if movement is not None and poses is not None:
         yield from _standing(movement)
         yield from _without_effect(recording, movement, poses)
-
-
-def held(channel: Series, t: Floats) -> Floats:
-    """Return the value of the last row at or before each time."""
-    row = np.searchsorted(channel.t, t, side="right") - 1
-    return channel.values[np.maximum(row, 0)]
 
 
 def _missing(recording: Recording) -> Iterator[DataProblem]:
@@ -74,7 +67,7 @@ def _missing(recording: Recording) -> Iterator[DataProblem]:
             name="missing",
             said="Without a whole pose there is no measure of where the car went: wheels and gyro "
             "can be held against each other, but no free run can be judged.",
-            record_instead="Record x, y and yaw of the car by a camera, motion capture or satellite.",
+            record_instead="Record x, y and yaw of the car by camera, motion capture or satellite.",
         )
 
 
@@ -85,14 +78,11 @@ def _range(recording: Recording, name: str, channel: Series) -> Iterator[DataPro
     if name == "command.speed" or largest <= limit:
         return
     beyond = float((np.abs(channel.values) > limit).mean())
-    unit = " It looks like degrees." if angle else ""
-    if not angle and 1.5 < largest <= 105.0 and beyond > 0.05:
-        unit = " It looks like percent."
     yield DataProblem(
         channel=name,
-        name="unit" if unit else "range",
-        said=f"Reaches {largest:.3g}, {100.0 * beyond:.1f} % of the rows are beyond {limit:g}.{unit}",
-        record_instead="Give the unit of the column in the recording's description.",
+        name="range",
+        said=f"Reaches {largest:.3g}; {100.0 * beyond:.1f} % of the rows are beyond {limit:g}.",
+        record_instead="Record the command that the car obeys, after its limits.",
     )
 
 
@@ -179,14 +169,3 @@ def _unrelated(name: str, said: str) -> DataProblem:
         "effect of this command can be concluded.",
         record_instead=RECORD,
     )
-
-
-def command_lag(recording: Recording, movement: Series, poses: Track) -> Lag | None:
-    """Return how turning lags behind steering, over many seconds; None where it cannot be said."""
-    steering = _command(recording, "command.steering")
-    if steering is None:
-        return None
-    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S)
-    asked = on.smooth_even(held(steering, on.t) * on.smooth(movement))
-    rate = on.smooth(Series(poses.t, poses.yaw), 1)
-    return lag_between(rate, asked, on) if min(asked.std(), rate.std()) > 1e-6 else None

@@ -12,22 +12,22 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.doubt.clocks import STEP_S, WIDTH_S, Lag, lag_between
-from scm.mismatch.doubt.suspicion import Repair
 from scm.mismatch.doubt.track import Series, Track, grid
 from scm.recording.units import G
 
 DEGREES = math.degrees(1.0)
 FACTORS: Mapping[str, Mapping[float, str]] = {
     "angular speed": {
-        DEGREES: "deg/s", 1.0 / DEGREES: "rad/s labelled deg/s", math.tau / 60.0: "rad/s labelled rpm",
-        60.0 / math.tau: "rpm", 1e3: "mrad/s", 1e-3: "krad/s",
+        DEGREES: "deg/s", 1.0 / DEGREES: "rad/s labelled deg/s", 1e3: "mrad/s",
+        60.0 / math.tau: "rpm", math.tau / 60.0: "rad/s labelled rpm",
     },
     "speed": {
         3.6: "km/h", 1.0 / 3.6: "m/s labelled km/h", 1e3: "mm/s", 1e-3: "m/s labelled mm/s",
         1e2: "cm/s", 1e-2: "m/s labelled cm/s", 1.0 / 0.44704: "mph", 0.44704: "m/s labelled mph",
     },
     "acceleration": {
-        1.0 / G: "g", G: "m/s^2 labelled g", 1e3 / G: "mg", 1e3: "mm/s^2", 1e-3: "m/s^2 labelled mm/s^2",
+        1.0 / G: "g", G: "m/s^2 labelled g", 1e3 / G: "mg", 1e3: "mm/s^2",
+        1e-3: "m/s^2 labelled mm/s^2",
     },
 }  # fmt: skip
 NEAR = 0.08
@@ -61,7 +61,7 @@ class Pair:
 
     @property
     def factor(self) -> float:
-        """By how much the second is too large, signed; 1 where a mere scale fault may explain it."""
+        """By how much the second is too large, signed; 1 where a mere scale fault explains it."""
         size = 1.0 / self.lag.size if self.lag.size else 1.0
         if SMALLEST_SIZE < size < LARGEST_SIZE:
             return 1.0
@@ -124,6 +124,7 @@ def heading_fault(poses: Track, raw: Floats) -> float:
     or cannot be told.
 
     Args:
+        poses: With positions that can be trusted.
         raw: Yaw as it was recorded, at the poses' stamps.
     """
     on = grid(
@@ -166,9 +167,3 @@ def time_factors(
             if others or (alone and all(s > 0.9 for _, s in spans.values())):
                 yield names, factor
                 break
-
-
-def repairs_of(pair: Pair) -> Iterator[Repair]:
-    """Yield what would undo a pair's gross faults, blaming the second for its size."""
-    if pair.alike and pair.factor != 1.0:
-        yield Repair(channels=pair.second, factor=1.0 / pair.factor)

@@ -4,12 +4,15 @@ Whatever the smoothing does to one side it does to the other, so the relation st
 derivative of a raw pose is ever taken.
 """
 
+import math
+
 import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.doubt.suspicion import Measured, Relation
-from scm.mismatch.doubt.track import Series, Track, grid
+from scm.mismatch.doubt.track import Series, Track, grid, series
 from scm.mismatch.doubt.whitened import fit
+from scm.recording.read import Recording
 
 WIDTH_S = 0.15
 STEP_S = 0.02
@@ -18,13 +21,25 @@ NAMES = ("along", "across", "angle", "bias_x", "bias_y", "ahead", "aside", "dela
 LEVER_STD = 0.5
 
 
+def push_of(
+    recording: Recording, poses: Track, late: tuple[float, float] = (0.0, 0.0)
+) -> Relation | None:
+    """Compare the poses with the recording's accelerometer, None where it has none that moves."""
+    along, across = (series(recording, f"imu.accel_{axis}") for axis in "xy")
+    if along is None or across is None or min(np.ptp(along.values), np.ptp(across.values)) == 0.0:
+        return None
+    return push_against(poses, along, across, late)
+
+
 def push_against(
     poses: Track, along: Series, across: Series, late: tuple[float, float] = (0.0, 0.0)
 ) -> Relation | None:
     """Compare the pose's acceleration with that of an accelerometer on the car.
 
     Args:
-        along, across: Forward and leftward acceleration without gravity [m/s^2].
+        poses: At the rear axle.
+        along: Forward acceleration without gravity [m/s^2].
+        across: To the left.
         late: Delay [s] and rate by which the pose's stamps are known to be late.
 
     Returns:
@@ -75,8 +90,14 @@ def push_against(
 
 def _numbers(values: Floats, std: Floats) -> dict[str, Measured]:
     numbers = {n: Measured(float(v), float(s)) for n, v, s in zip(NAMES, values, std, strict=True)}
+    turn = numbers["angle"]
+    mean = 0.5 * (numbers["along"].value + numbers["across"].value)
+    size = math.hypot(mean, turn.value)
+    if min(numbers["along"].value, numbers["across"].value) > 0.0:
+        numbers["angle"] = Measured(math.atan2(turn.value, mean), turn.std / max(size, 1e-6))
+    shrink = size / mean if mean > 0.1 * size else 1.0
     for name in ("along", "across"):
         k = numbers[name]
-        bounded = k.value if abs(k.value) > 1e-6 else 1e-6
-        numbers[name] = Measured(1.0 / bounded, k.std / bounded**2)
+        whole = shrink * (k.value if abs(k.value) > 1e-6 else 1e-6)
+        numbers[name] = Measured(1.0 / whole, k.std / whole**2)
     return numbers

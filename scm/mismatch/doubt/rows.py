@@ -140,7 +140,7 @@ def _spacing(t: Floats, at: str, names: Sequence[str]) -> Iterator[DataProblem]:
         yield DataProblem(
             channel=at,
             name="slow",
-            said=f"A pose every {period:.2f} s shows steady driving, but no starts and no steering.",
+            said=f"A pose every {period:.2f} s shows steady driving, not how it starts or steers.",
             record_instead="Record poses at 20 Hz or more.",
         )
     yield from _jitter(step, period, at, command=command)

@@ -5,9 +5,20 @@ from itertools import combinations
 
 import numpy as np
 
-from scm.arrays import Bools, Floats
+from scm.arrays import Floats
 from scm.mismatch.doubt.corrected import forward_speed
-from scm.mismatch.doubt.track import Series, Track, clean, series, track
+from scm.mismatch.doubt.rows import called
+from scm.mismatch.doubt.track import (
+    Series,
+    Track,
+    clean,
+    jumped,
+    rows_a_value,
+    runs,
+    series,
+    track,
+    track_with_jumps,
+)
 from scm.mismatch.doubt.way import Way
 from scm.mismatch.findings import DataProblem, Span
 from scm.recording.read import Recording
@@ -15,7 +26,6 @@ from scm.recording.read import Recording
 FROZEN_S = 1.0
 FEWEST_FROZEN = 10
 MOVING = 0.2  # of the speed that is exceeded a tenth of the time
-HELD_SHARE = 0.6
 COARSE = 0.02
 SAME = 0.999999
 DERIVED = 0.99995
@@ -24,15 +34,37 @@ MOTION = ("pose.", "velocity.", "speed", "yaw_rate", "wheel_speed.", "encoder.",
 
 def stuck_problems(recording: Recording, found: list[Way]) -> Iterator[DataProblem]:
     """Yield channels whose values cannot be what a sensor of a moving car says."""
-    poses = track(recording)
-    movement = forward_speed(poses)
+    movement = forward_speed(track(recording))
+    yield from _held(recording)
     yield from _frozen(recording, movement, found)
     yield from _copied(recording)
     if movement is not None:
         yield from _derived(recording, movement)
     yield from _coarse(recording)
+    poses = track_with_jumps(recording)
     if poses is not None:
         yield from _jumps(poses)
+
+
+def _held(recording: Recording) -> Iterator[DataProblem]:
+    """Yield sensors that are slower than the rows they are written in."""
+    by_rate: dict[tuple[float, float], list[str]] = {}
+    for name, channel in recording.channels.items():
+        cleaned = clean(channel)
+        if name.startswith(MOTION) and len(cleaned.t) > FEWEST_FROZEN:
+            every = rows_a_value(cleaned)
+            period = float(np.median(np.diff(cleaned.t)))
+            if every > 1:
+                by_rate.setdefault((every * period, period), []).append(name)
+    for (period, rows), names in by_rate.items():
+        yield DataProblem(
+            channel=called(names),
+            name="held",
+            said=f"Values change only every {1e3 * period:.0f} ms, though rows come every "
+            f"{1e3 * rows:.0f} ms: each is up to that old.",
+            corrected="Only rows with a new value are compared.",
+            record_instead="Write a row when the sensor has a new value, with its own stamp.",
+        )
 
 
 def _frozen(
@@ -43,41 +75,28 @@ def _frozen(
         cleaned = clean(recording.channels[name])
         if not name.startswith(MOTION) or len(cleaned.t) < FEWEST_FROZEN:
             continue
-        held = _held(cleaned)
-        if held is not None:
-            period, rows = held
-            yield DataProblem(
-                channel=name,
-                name="held",
-                said=f"Values change only every {1e3 * period:.0f} ms, though rows come every "
-                f"{1e3 * rows:.0f} ms: each is up to that old.",
-                corrected="Only rows with a new value are compared.",
-                record_instead="Write a row when the sensor has a new value, with its own stamp.",
-            )
         witness = movement
         if name.startswith("pose."):
-            others = [w for w in found if w.channels[0] != name]
-            witness = Series(others[0].distance.t, _speed(others[0].distance)) if others else None
-        spans = frozen_spans(cleaned, witness, name)
+            witness = Series(found[0].distance.t, _speed(found[0].distance)) if found else None
+        spans = frozen_spans(cleaned, witness)
         if spans:
-            lasted = sum(b - a for a, b in spans)
             yield DataProblem(
                 channel=name,
                 name="frozen",
-                said=f"Stands still for {lasted:.1f} s while the car moves.",
+                said=f"Stands still for {sum(b - a for a, b in spans):.1f} s while the car moves.",
                 when_s=spans,
                 record_instead="Check the sensor's link: it repeated its last value.",
             )
 
 
-def frozen_spans(channel: Series, witness: Series | None, name: str = "") -> tuple[Span, ...]:
+def frozen_spans(channel: Series, witness: Series | None) -> tuple[Span, ...]:
     """Return spans in which values are equal to the last bit while the witness moves."""
     if witness is None:
         return ()
     fast = np.percentile(np.abs(witness.values), 90) * MOVING
     if fast <= 0.0:
         return ()
-    starts, ends = _runs(channel.values)
+    starts, ends = runs(channel.values)
     spans = []
     for i, j in zip(starts, ends, strict=True):
         if j - i < FEWEST_FROZEN or channel.t[j - 1] - channel.t[i] < FROZEN_S:
@@ -87,25 +106,6 @@ def frozen_spans(channel: Series, witness: Series | None, name: str = "") -> tup
         if moving.size and moving.mean() > 0.5 and channel.values[i] == channel.values[j - 1]:
             spans.append((float(channel.t[i]), float(channel.t[j - 1])))
     return tuple(spans)
-
-
-def _runs(values: Floats) -> tuple[np.ndarray, np.ndarray]:
-    """Return where runs of equal values start, and where they end."""
-    edges = np.flatnonzero(np.diff(values) != 0.0) + 1
-    return np.concatenate(([0], edges)), np.concatenate((edges, [len(values)]))
-
-
-def _held(channel: Series) -> tuple[float, float] | None:
-    """Return period of new values and of rows [s] where most rows repeat, else None."""
-    starts, ends = _runs(channel.values)
-    lengths = ends - starts
-    moving = lengths[lengths < FEWEST_FROZEN * 5]
-    if len(moving) < 20 or (lengths > 1).sum() < HELD_SHARE * len(lengths):
-        return None
-    length = float(np.median(moving))
-    period = float(np.median(np.diff(channel.t)))
-    steps = len(np.unique(channel.values))
-    return (length * period, period) if length >= 2.0 and steps > 0.3 * len(lengths) else None
 
 
 def _speed(distance: Series) -> Floats:
@@ -185,24 +185,9 @@ def _coarse(recording: Recording) -> Iterator[DataProblem]:
             yield DataProblem(
                 channel=name,
                 name="coarse",
-                said=f"Comes in steps of {step:.3g}, {100.0 * step / reach:.0f} % of what it shows.",
+                said=f"Comes in steps of {step:.3g}, {100.0 * step / reach:.0f} % of its reach.",
                 record_instead="Record all digits that the sensor has.",
             )
-
-
-def jumped(poses: Track) -> Bools:
-    """Return which steps from pose to pose are farther than the car can have moved, `(n - 1,)`."""
-    dt = np.diff(poses.t)
-    far = np.hypot(np.diff(poses.x), np.diff(poses.y))
-    turn = np.abs(np.diff(poses.yaw))
-    return _too_far(far, dt, 0.01) | _too_far(turn, dt, 0.15)
-
-
-def _too_far(step: Floats, dt: Floats, least: float) -> Bools:
-    fast = float(np.percentile(step / dt, 95))
-    noise = float(1.4826 * np.median(np.abs(step - np.median(step))))
-    result: Bools = step > 3.0 * fast * dt + 6.0 * noise + least
-    return result
 
 
 def _jumps(poses: Track) -> Iterator[DataProblem]:

@@ -8,72 +8,53 @@ from scm.mismatch.doubt.suspicion import Measured, Relation, Suspicion
 from scm.mismatch.doubt.way import Way
 
 FALSE_ALARM = 0.01
-POSE = ("pose.x", "pose.y", "pose.yaw")
+CHECKS = 16
 WHEEL_LIMIT = 3.0
-# Below these a car that rolls and slips, or a file that rounds, looks the same as a fault.
+# What no statistics of the rows shows: wheels that scrub, tyres that slip, bodies that lean.
 FLOORS: Mapping[str, float] = {
-    "gyro_bias": 0.002, "gyro_scale": 0.003, "delay": 0.003, "rate": 1e-4, "scale": 0.002,
-    "heading": 0.006, "tilt": 0.001, "accel_bias": 0.02, "imu_angle": 0.02,
+    "gyro_bias": 5e-4, "gyro_scale": 1e-3, "delay": 0.002, "rate": 5e-5, "scale": 0.002,
+    "heading": 0.006, "tilt": 5e-4, "accel_bias": 0.01, "imu_angle": 0.01, "accel_scale": 0.01,
 }  # fmt: skip
 POINT_FLOOR = 0.02  # of the wheelbase: where a rear axle seems to be depends on how its tyres slip
 DEFAULT_WHEELBASE_M = 0.25
+LIMIT = NormalDist().inv_cdf(1.0 - 0.5 * FALSE_ALARM / CHECKS)
+LIMIT_OF_TWO = math.sqrt(-2.0 * math.log(FALSE_ALARM / CHECKS))
 
 
-def limit(checks: int) -> float:
-    """Return how many standard deviations one of so many checks may be off by chance."""
-    return NormalDist().inv_cdf(1.0 - 0.5 * FALSE_ALARM / max(1, checks))
+def from_gyro(found: Relation) -> Iterator[Suspicion]:
+    """Yield the gyro's faults from heading against gyro."""
+    gyro = found.pair[1]
+    bias = _wide(found.numbers["bias"], FLOORS["gyro_bias"])
+    scale = _wide(found.numbers["scale"], FLOORS["gyro_scale"])
+    said = f"{gyro} shows {bias.value:+.4f} rad/s while the pose does not turn."
+    yield from _one("gyro_bias", (gyro,), "bias", bias, 0.0, found, said)
+    said = f"{gyro} shows {scale.value:.3f} times the turn that the pose shows."
+    yield from _one("gyro_scale", (gyro,), "scale", scale, 1.0, found, said)
 
 
-def from_gyro(found: Relation, checks: int) -> Iterator[Suspicion]:
-    """Yield gyro and clock faults from heading against gyro."""
-    gyro = ("imu.gyro_z",) if found.pair[1].startswith("imu.") else (found.pair[1],)
-    bias, scale = found.numbers["bias"], found.numbers["scale"]
-    yield from _one(
-        "gyro_bias",
-        gyro,
-        "bias",
-        bias,
-        0.0,
-        FLOORS["gyro_bias"],
-        found,
-        checks,
-        f"The gyro shows {bias.value:+.4f} rad/s while the pose does not turn.",
-    )
-    yield from _one("gyro_scale", gyro, "scale", scale, 1.0, FLOORS["gyro_scale"], found, checks,
-                    f"The gyro shows {scale.value:.3f} times the turn that the pose shows.")  # fmt: skip
+def from_clocks(found: Sequence[Relation]) -> Iterator[Suspicion]:
+    """Yield latency and drift of the pose's clock; of another sensor's, where only it is off."""
+    yield from _agreed(found, "rate")
+    yield from _agreed(found, "delay")
 
 
-def from_clocks(found: Sequence[Relation], checks: int) -> Iterator[Suspicion]:
-    """Yield latency and drift of the pose's clock, as all relations that know it agree on."""
-    for name, floor in (("delay", FLOORS["delay"]), ("rate", FLOORS["rate"])):
-        known = [(r, r.numbers[name]) for r in found if name in r.numbers]
-        if not known:
-            continue
-        best, _ = min(known, key=lambda item: item[1].std)
-        both = _mean([measured for _, measured in known])
-        if name == "rate":
-            yield from _one("clock_drift", ("pose.*",), "rate", both, 0.0, floor, best, checks,
-                            f"The clock of the poses gains {1e3 * both.value:+.2f} ms a second.")  # fmt: skip
-        elif both.value > 0.0:
-            said = f"Poses are stamped {1e3 * both.value:.0f} ms after the moment they show."
-            yield from _one("pose_latency", ("pose.*",), "delay", both, 0.0, floor, best, checks,
-                            said, ("clock_offset",))  # fmt: skip
-        else:
-            said = f"Poses are stamped {-1e3 * both.value:.0f} ms before the moment they show."
-            yield from _one(
-                "clock_offset", ("pose.*",), "offset", both, 0.0, floor, best, checks, said
-            )
+def from_travel(
+    found: Relation, way: Way, wheelbase_m: float, push: Relation | None
+) -> Iterator[Suspicion]:
+    """Yield faults of scale, camera, marker and heading from positions against distance.
 
-
-def from_travel(found: Relation, way: Way, wheelbase_m: float, checks: int) -> Iterator[Suspicion]:
-    """Yield faults of scale, camera, marker and heading from positions against distance."""
-    yield from _scale(found, way)
-    yield from _heading(found, checks)
-    yield from _point(found, ("ahead", "aside"), wheelbase_m, checks)
-    tilt = {axis: found.numbers[f"tilt_{axis}"] for axis in "xy"}
-    wide = {axis: math.hypot(m.std, FLOORS["tilt"]) for axis, m in tilt.items()}
-    sigma = math.hypot(*(tilt[axis].value / wide[axis] for axis in "xy"))
-    if sigma > limit(checks) + 0.5:
+    Args:
+        found: Positions against that way.
+        way: Where the distance came from.
+        wheelbase_m: A yardstick for how far a marker may seem to be off.
+        push: The pose against the accelerometer, which knows a metre too.
+    """
+    yield from _scale(found, way, push)
+    yield from _heading(found)
+    yield from _point(found, ("ahead", "aside"), wheelbase_m)
+    tilt = {axis: _wide(found.numbers[f"tilt_{axis}"], FLOORS["tilt"]) for axis in "xy"}
+    sigma = math.hypot(*(m.value / m.std for m in tilt.values()))
+    if sigma > LIMIT_OF_TWO:
         yield Suspicion(
             name="camera_tilt",
             channels=("pose.x", "pose.y"),
@@ -85,18 +66,17 @@ def from_travel(found: Relation, way: Way, wheelbase_m: float, checks: int) -> I
         )
 
 
-def from_sideways(found: Relation, wheelbase_m: float, checks: int) -> Iterator[Suspicion]:
+def from_sideways(found: Relation, wheelbase_m: float) -> Iterator[Suspicion]:
     """Yield faults of heading and marker from the pose alone."""
-    yield from _heading(found, checks)
-    yield from _point(found, ("ahead",), wheelbase_m, checks)
+    yield from _heading(found)
+    yield from _point(found, ("ahead",), wheelbase_m)
 
 
-def from_push(found: Relation, checks: int) -> Iterator[Suspicion]:
+def from_push(found: Relation) -> Iterator[Suspicion]:
     """Yield accelerometer faults from the pose's acceleration."""
-    x, y = found.numbers["bias_x"], found.numbers["bias_y"]
-    wide = [math.hypot(m.std, FLOORS["accel_bias"]) for m in (x, y)]
-    sigma = math.hypot(x.value / wide[0], y.value / wide[1])
-    if sigma > limit(checks) + 0.5:
+    x, y = (_wide(found.numbers[f"bias_{axis}"], FLOORS["accel_bias"]) for axis in "xy")
+    sigma = math.hypot(x.value / x.std, y.value / y.std)
+    if sigma > LIMIT_OF_TWO:
         yield Suspicion(
             name="accel_bias",
             channels=("imu.accel_x", "imu.accel_y"),
@@ -104,54 +84,99 @@ def from_push(found: Relation, checks: int) -> Iterator[Suspicion]:
             std={"along": x.std, "across": y.std},
             sigma=sigma,
             shown_by=found.pair,
-            twins=("grade",),
-            said=f"The accelerometer shows ({x.value:+.2f}, {y.value:+.2f}) m/s^2 more than the pose.",
+            said=f"The accelerometer shows {x.value:+.2f} m/s^2 ahead and {y.value:+.2f} m/s^2 "
+            "left beyond what the pose does: a bias, or a mount that is not level.",
         )
-    angle = found.numbers["angle"]
-    yield from _one("imu_misalignment", ("imu.accel_x", "imu.accel_y"), "angle", angle, 0.0,
-                    FLOORS["imu_angle"], found, checks,
-                    f"The accelerometer is turned by {math.degrees(angle.value):+.1f} deg.")  # fmt: skip
+    angle = _wide(found.numbers["angle"], FLOORS["imu_angle"])
+    said = f"The accelerometer is turned by {math.degrees(angle.value):+.1f} deg on the car."
+    channels = ("imu.accel_x", "imu.accel_y")
+    yield from _one("imu_misalignment", channels, "angle", angle, 0.0, found, said)
 
 
-def _scale(found: Relation, way: Way) -> Iterator[Suspicion]:
-    scale = found.numbers["scale"]
-    std = math.hypot(scale.std, FLOORS["scale"], way.scale_std)
-    sigma = (scale.value - 1.0) / std
+def _agreed(found: Sequence[Relation], name: str) -> Iterator[Suspicion]:
+    known = [(r, _wide(r.numbers[name], FLOORS[name])) for r in found if name in r.numbers]
+    if not known:
+        return
+    mean = _mean([measured for _, measured in known])
+    apart = max(abs(m.value - mean.value) / m.std for _, m in known)
+    if apart < LIMIT:
+        yield from _late(name, mean, min(known, key=lambda item: item[1].std)[0])
+        return
+    for relation, measured in known:
+        own = Measured(-measured.value, measured.std)
+        kind, parameter = ("clock_drift", "rate") if name == "rate" else ("clock_offset", "offset")
+        said = f"The clock of {relation.pair[1]} disagrees with those of the other sensors."
+        yield from _one(kind, (relation.pair[1],), parameter, own, 0.0, relation, said)
+
+
+def _late(name: str, late: Measured, found: Relation) -> Iterator[Suspicion]:
+    ms, pose = 1e3 * late.value, ("pose.*",)
+    if name == "rate":
+        said = f"The clock of the poses gains {ms:+.2f} ms a second."
+        yield from _one("clock_drift", pose, "rate", late, 0.0, found, said)
+    elif ms > 0.0:
+        said = f"Poses are stamped {ms:.0f} ms after the moment they show."
+        yield from _one("pose_latency", pose, "delay", late, 0.0, found, said, ("clock_offset",))
+    else:
+        said = f"Poses are stamped {-ms:.0f} ms before the moment they show."
+        yield from _one("clock_offset", pose, "offset", late, 0.0, found, said)
+
+
+def _scale(found: Relation, way: Way, push: Relation | None) -> Iterator[Suspicion]:
+    """Yield what makes the pose's way longer or shorter than the one counted, likeliest first."""
+    scale = _wide(found.numbers["scale"], FLOORS["scale"])
+    sigma = (scale.value - 1.0) / math.hypot(scale.std, way.scale_std)
     if abs(sigma) < WHEEL_LIMIT:
         return
-    said = f"The pose goes {scale.value:.3f} m for every metre of {way.name}."
-    lost = 1.0 - 1.0 / scale.value
-    faults = [("pose_scale", ("pose.x", "pose.y"), "scale", scale.value, scale.std)]
+    share = Measured(1.0 / scale.value, scale.std / scale.value**2)
+    faults: dict[str, tuple[tuple[str, ...], str, Measured]] = {}
+    if way.name == "encoder.*" and scale.value > 1.0:
+        faults["encoder_loss"] = (way.channels, "fraction", Measured(1.0 - share.value, share.std))
     if way.wheels:
-        faults.append(("wheel_radius", way.channels, "scale", scale.value, scale.std))
-    if way.name == "encoder.*" and lost > 0.0:
-        faults.append(("encoder_loss", way.channels, "fraction", lost, scale.std / scale.value**2))
-    if not way.wheels:
-        faults.append(
-            ("unit_error", way.channels, "factor", 1.0 / scale.value, scale.std / scale.value**2)
-        )
-    for name, channels, parameter, value, spread in reversed(faults):
-        twins = tuple(other[0] for other in faults if other[0] != name)
+        faults["wheel_radius"] = (way.channels, "scale", scale)
+    else:
+        faults["unit_error"] = (way.channels, "factor", share)
+    faults["pose_scale"] = (("pose.x", "pose.y"), "scale", scale)
+    for name in _ruled_out(push, share.value):
+        faults.pop(name, None)
+    for name, (channels, parameter, measured) in faults.items():
         yield Suspicion(
-            name=name, channels=channels, values={parameter: value}, std={parameter: spread},
-            sigma=abs(sigma), shown_by=found.pair, twins=twins, said=said,
-        )  # fmt: skip
+            name=name,
+            channels=channels,
+            values={parameter: measured.value},
+            std={parameter: measured.std},
+            sigma=abs(sigma),
+            shown_by=found.pair,
+            twins=tuple(other for other in faults if other != name),
+            said=f"The pose goes {scale.value:.3f} m for every metre of {way.name}.",
+        )
 
 
-def _heading(found: Relation, checks: int) -> Iterator[Suspicion]:
-    heading = found.numbers["heading"]
-    yield from _one("pose_heading", ("pose.yaw",), "offset", heading, 0.0, FLOORS["heading"], found,
-                    checks, "Driving straight, the car moves slantwise to its heading by "
-                    f"{math.degrees(heading.value):+.1f} deg.")  # fmt: skip
+def _ruled_out(push: Relation | None, share: float) -> tuple[str, ...]:
+    """Return the faults of scale that the accelerometer rules out: it sees the pose's metre too."""
+    if push is None:
+        return ()
+    both = [_wide(push.numbers[name], FLOORS["accel_scale"]) for name in ("along", "across")]
+    seen = _mean(both)
+    as_pose, as_wheels = (abs(seen.value - x) / seen.std for x in (share, 1.0))
+    if min(as_pose, as_wheels) > LIMIT or abs(as_pose - as_wheels) < LIMIT:
+        return ()
+    return (
+        ("pose_scale",) if as_wheels < as_pose else ("encoder_loss", "wheel_radius", "unit_error")
+    )
 
 
-def _point(
-    found: Relation, names: tuple[str, ...], wheelbase_m: float, checks: int
-) -> Iterator[Suspicion]:
+def _heading(found: Relation) -> Iterator[Suspicion]:
+    turn = _wide(found.numbers["heading"], FLOORS["heading"])
+    said = f"Driving straight, the car moves {-math.degrees(turn.value):+.1f} deg off its heading."
+    yield from _one("pose_heading", ("pose.yaw",), "offset", turn, 0.0, found, said)
+
+
+def _point(found: Relation, names: tuple[str, ...], wheelbase_m: float) -> Iterator[Suspicion]:
     floor = POINT_FLOOR * wheelbase_m
-    numbers = {name: found.numbers[name] for name in names}
-    sigma = math.hypot(*(m.value / math.hypot(m.std, floor) for m in numbers.values()))
-    if sigma < limit(checks) + 0.5 * (len(names) - 1):
+    numbers = {name: _wide(found.numbers[name], floor) for name in names}
+    sigma = math.hypot(*(m.value / m.std for m in numbers.values()))
+    if sigma < (LIMIT if len(names) == 1 else LIMIT_OF_TWO):
         return
     where = ", ".join(f"{1e3 * m.value:+.0f} mm {name}" for name, m in numbers.items())
     yield Suspicion(
@@ -162,20 +187,31 @@ def _point(
         sigma=sigma,
         shown_by=found.pair,
         twins=("com_shift",),
-        said=f"The car turns about a point that says the marker is {where} of where it should be.",
+        said=f"The car turns as if the tracked point were off ({where}).",
     )
 
 
 def _one(
     name: str, channels: tuple[str, ...], parameter: str, measured: Measured, neutral: float,
-    floor: float, found: Relation, checks: int, said: str, twins: tuple[str, ...] = (),
+    found: Relation, said: str, twins: tuple[str, ...] = (),
 ) -> Iterator[Suspicion]:  # fmt: skip
-    sigma = abs(measured.value - neutral) / math.hypot(measured.std, floor)
-    if sigma > limit(checks):
+    sigma = abs(measured.value - neutral) / measured.std
+    if sigma > LIMIT:
         yield Suspicion(
-            name=name, channels=channels, values={parameter: measured.value},
-            std={parameter: measured.std}, sigma=sigma, shown_by=found.pair, twins=twins, said=said,
-        )  # fmt: skip
+            name=name,
+            channels=channels,
+            values={parameter: measured.value},
+            std={parameter: measured.std},
+            sigma=sigma,
+            shown_by=found.pair,
+            twins=twins,
+            said=said,
+        )
+
+
+def _wide(measured: Measured, floor: float) -> Measured:
+    """Return a number with the error added that no statistics of its rows shows."""
+    return Measured(measured.value, math.hypot(measured.std, floor))
 
 
 def _mean(known: Sequence[Measured]) -> Measured:

@@ -1,13 +1,18 @@
-"""Channels made clean enough to compare: time goes forward, values are finite, yaw is continuous."""
+"""Channels made clean enough to compare: time goes forward, no bad rows, yaw is continuous."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from scm.arrays import Bools, Floats
+from scm.arrays import Bools, Floats, Ints
 from scm.recording.read import Channel, Recording
 
 RESET_S = 1.0
+FEWEST = 8
+SHORTEST_ISLAND_S = 0.5
+HELD_SHARE = 0.6
+LONGEST_RUN = 50
 POSE = ("pose.x", "pose.y", "pose.yaw")
 
 
@@ -62,30 +67,100 @@ def clean(channel: Channel) -> Series:
     return Series(t[keep], values[keep])
 
 
-def series(recording: Recording, name: str, fewest: int = 8) -> Series | None:
-    """Return a channel made clean, None where it is missing or has next to no rows."""
+def series(recording: Recording, name: str) -> Series | None:
+    """Return a channel made clean, None where it is missing or has next to no rows.
+
+    Of a sensor that is slower than its rows only those with a new value are kept.
+    """
     channel = recording.channels.get(name)
     if channel is None:
         return None
     cleaned = clean(channel)
-    return cleaned if len(cleaned.t) >= fewest else None
+    if not name.startswith("command.") and len(cleaned.t) > LONGEST_RUN:
+        cleaned = fresh(cleaned)
+    return cleaned if len(cleaned.t) >= FEWEST else None
+
+
+def held(channel: Series, t: Floats) -> Floats:
+    """Return the value of the last row at or before each time, as commands are held."""
+    row = np.searchsorted(channel.t, t, side="right") - 1
+    return channel.values[np.maximum(row, 0)]
+
+
+def runs(values: Floats) -> tuple[Ints, Ints]:
+    """Return where runs of equal values start, and where they end."""
+    edges = np.flatnonzero(np.diff(values) != 0.0) + 1
+    return np.concatenate(([0], edges)), np.concatenate((edges, [len(values)]))
+
+
+def rows_a_value(channel: Series) -> int:
+    """Return how many rows each value is repeated for, 1 where each is new."""
+    starts, ends = runs(channel.values)
+    lengths = ends - starts
+    short = lengths[lengths < LONGEST_RUN]
+    if len(short) < 20 or (lengths > 1).sum() < HELD_SHARE * len(lengths):
+        return 1
+    distinct = len(np.unique(channel.values)) > 0.3 * len(lengths)
+    return max(1, round(float(np.median(short)))) if distinct else 1
+
+
+def fresh(channel: Series) -> Series:
+    """Return the rows that hold a new value, and of a long standstill one in so many."""
+    every = rows_a_value(channel)
+    if every == 1:
+        return channel
+    starts, ends = runs(channel.values)
+    age = np.arange(len(channel.t)) - np.repeat(starts, ends - starts)
+    long = np.repeat(ends - starts, ends - starts) > 1.5 * every
+    keep = (age == 0) | (long & (age % every == 0))
+    return Series(channel.t[keep], channel.values[keep])
 
 
 def track(recording: Recording) -> Track | None:
-    """Return the poses without jumps, at the rear axle; None where there are next to none."""
-    found = [series(recording, name) for name in POSE]
-    x, y, yaw = found
+    """Return the poses at the rear axle without islands between jumps; None where too few."""
+    found = track_with_jumps(recording)
+    kept = None if found is None else found.cut(_mainland(found))
+    return kept if kept is not None and len(kept.t) >= FEWEST else None
+
+
+def track_with_jumps(recording: Recording) -> Track | None:
+    """Return the poses at the rear axle, every one of them; None where too few."""
+    x, y, yaw = (series(recording, name) for name in POSE)
     if x is None or y is None or yaw is None:
         return None
     turned = Series(yaw.t, np.unwrap(yaw.values))
     inside = (x.t >= max(y.t[0], yaw.t[0])) & (x.t <= min(y.t[-1], yaw.t[-1]))
     t = x.t[inside]
-    if len(t) < 8:
+    if len(t) < FEWEST:
         return None
     px, py = next((p for p in (recording.channels[n].point for n in POSE) if any(p)), (0.0, 0.0))
     heading = turned.at(t)
     c, s = np.cos(heading), np.sin(heading)
     return Track(t, x.at(t) - c * px + s * py, y.at(t) - s * px - c * py, heading)
+
+
+def jumped(poses: Track) -> Bools:
+    """Return which steps from pose to pose are farther than the car can have moved, `(n - 1,)`."""
+    dt = np.diff(poses.t)
+    far = np.hypot(np.diff(poses.x), np.diff(poses.y))
+    return _too_far(far, dt, 0.01) | _too_far(np.abs(np.diff(poses.yaw)), dt, 0.15)
+
+
+def _too_far(step: Floats, dt: Floats, least: float) -> Bools:
+    fast = float(np.percentile(step / dt, 95))
+    noise = float(1.4826 * np.median(np.abs(step - np.median(step))))
+    result: Bools = step > 3.0 * fast * dt + 6.0 * noise + least
+    return result
+
+
+def _mainland(poses: Track) -> Bools:
+    """Return which poses do not lie on a short island between two jumps."""
+    edges = np.concatenate(([0], np.flatnonzero(jumped(poses)) + 1, [len(poses.t)]))
+    keep = np.ones(len(poses.t), dtype=np.bool_)
+    for start, end in pairwise(edges):
+        if poses.t[end - 1] - poses.t[start] < SHORTEST_ISLAND_S and len(edges) > 2:
+            keep[start:end] = False
+    return keep
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +182,8 @@ class Grid:
         kernel = kernel[len(kernel) // 2 - half : len(kernel) // 2 + half + 1]
         before = 2.0 * values[0] - values[half:0:-1]
         after = 2.0 * values[-1] - values[-2 : -half - 2 : -1]
-        return np.convolve(np.concatenate((before, values, after)), kernel, mode="valid")
+        padded = np.concatenate((before, values, after))
+        return np.asarray(np.convolve(padded, kernel, mode="valid"), dtype=np.float64)
 
 
 def grid(start: float, end: float, step_s: float, width_s: float) -> Grid:
@@ -124,6 +200,8 @@ def _gaussian(width: float, order: int) -> Floats:
     if order == 0:
         return bell
     if order == 1:
-        return -k * bell / (k**2 * bell).sum()
-    curve = (k**2 - (k**2 * bell).sum()) * bell
-    return curve / (0.5 * (curve * k**2).sum())
+        slope: Floats = -k * bell / (k**2 * bell).sum()
+        return slope
+    curve: Floats = (k**2 - (k**2 * bell).sum()) * bell
+    curve /= 0.5 * (curve * k**2).sum()
+    return curve

@@ -23,7 +23,6 @@ def travel_against(
     distance: Series,
     other: str,
     start: tuple[float, float] = (0.0, 0.0),
-    heading: Series | None = None,
 ) -> Relation | None:
     """Compare positions with a distance that a sensor has added up.
 
@@ -31,14 +30,14 @@ def travel_against(
     give way sideways, and wheels that spin under push, are left free: they are no sensor's fault.
 
     Args:
+        poses: At the rear axle.
         distance: Way since its start [m], on its own clock.
         other: Its channel.
         start: Delay [s] and rate to start from.
-        heading: Yaw on the poses' clock, less noisy than theirs.
 
     Returns:
-        `scale`, true distance over the sensor's (or the pose's metre over a metre); `heading` [rad],
-        by which the pose's yaw is turned; `ahead`, `aside` [m], where the tracked point is;
+        `scale`, true distance over the sensor's (or the pose's metre over a metre); `heading`
+        [rad], by which the pose's yaw is turned; `ahead`, `aside` [m], where the tracked point is;
         `tilt_x`, `tilt_y` [1/m]; `delay` [s] and `rate` of the pose's stamps.
     """
     inside = (poses.t - start[0] > distance.t[0]) & (poses.t - start[0] < distance.t[-1])
@@ -46,7 +45,7 @@ def travel_against(
     if len(rows.t) < 50:
         return None
     rows = rows.cut(np.arange(len(rows.t)) % (1 + len(rows.t) // MOST_ROWS) == 0)
-    yaw = (heading or Series(poses.t, poses.yaw)).at(rows.t)
+    yaw = rows.yaw
     measured = np.stack((rows.x, rows.y), axis=1)
     since, warp = rows.t - rows.t[0], np.array(start)
     count = len(NAMES) if since[-1] >= SHORTEST_DRIFT_S else len(NAMES) - 1

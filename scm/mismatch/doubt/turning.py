@@ -20,6 +20,7 @@ def yaw_against(
     The pose stamped t shows the car at u = t - delay - rate (t - start of the poses).
 
     Args:
+        poses: At the rear axle.
         turned: Yaw since its start [rad], on its own clock.
         other: Its channel.
         start: Delay [s] and rate to start from.

@@ -23,7 +23,7 @@ def usable(recording: Recording, problems: Iterable[DataProblem]) -> Usable:
         problems: Found in it.
     """
     listed = list(problems)
-    spans = {}
+    spans: dict[str, tuple[Span, ...]] = {}
     for name, channel in recording.channels.items():
         t = clean(channel).t
         if len(t) < 2:
@@ -66,10 +66,11 @@ def _lacks(
     if unrelated:
         yield f"commands without effect: {', '.join(unrelated)}"
     pose = sum(end - start for start, end in spans["pose.x"])
-    start = (
-        max(clean(recording.channels[n]).t[0] for n in (*COMMANDS, "pose.x") if spans[n])
-        if all(spans[n] for n in (*COMMANDS, "pose.x"))
-        else None
-    )
-    if start is None or pose < SHORTEST_DRIVE_S:
+    if pose < SHORTEST_DRIVE_S:
         yield f"only {pose:.1f} s of poses without gaps; {SHORTEST_DRIVE_S:.0f} s are needed"
+    together = [spans[name] for name in (*COMMANDS, *POSE)]
+    if all(together):
+        start = max(part[0][0] for part in together)
+        end = min(part[-1][1] for part in together)
+        if end - start < SHORTEST_DRIVE_S <= pose:
+            yield f"poses and commands overlap for {max(0.0, end - start):.1f} s only"

@@ -16,6 +16,7 @@ THETAS = (0.0, 0.2, 0.4, 0.6, 0.75, 0.85, 0.9, 0.94, 0.965, 0.98, 0.99, 0.995)
 BLOCKS = 40
 HUBER = 3.0
 ROUNDS = 3
+FREE = 100.0  # what no number of ours comes near; keeps the std of what nothing shows finite
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +46,10 @@ def fit(measured: Floats, columns: Floats, priors: Floats | None = None) -> Fit:
         measured: Shape `(n, axes)`.
         columns: Shape `(n, axes, k)`.
         priors: Standard deviation around zero that each column's factor is allowed, shape `(k,)`;
-            infinite where it is free.
+            infinite, or None for all, where it is free.
     """
     n, axes, k = columns.shape
-    free = np.full(k, np.inf) if priors is None else priors
+    free = np.full(k, FREE) if priors is None else np.minimum(priors, FREE)
     allowed = np.concatenate((free, np.full(axes, np.inf)))
     constant = np.broadcast_to(np.eye(axes), (n, axes, axes))
     full = np.concatenate((columns, constant), axis=2)
@@ -75,7 +76,8 @@ def whiten(values: Floats, theta: float) -> Floats:
     response = theta ** np.arange(n)
     spectrum = np.fft.rfft(steps, size, axis=0)
     shape = (-1, *(1,) * (values.ndim - 1))
-    return np.fft.irfft(spectrum * np.fft.rfft(response, size).reshape(shape), size, axis=0)[:n]
+    product = spectrum * np.fft.rfft(response, size).reshape(shape)
+    return np.asarray(np.fft.irfft(product, size, axis=0)[:n], dtype=np.float64)
 
 
 def _solve(
@@ -86,16 +88,12 @@ def _solve(
     scale = np.sqrt(np.einsum("nak,nak->k", rows, rows)) + 1e-12
     unit = rows / scale
     normal = np.einsum("nak,nal,na->kl", unit, unit, weights)
-    noise = _spread(
-        y - rows @ (np.linalg.lstsq(normal, _right(unit, y, weights), rcond=1e-12)[0] / scale)
-    )
+    right = np.einsum("nak,na,na->k", unit, y, weights)
+    free = np.linalg.lstsq(normal, right, rcond=1e-12)[0] / scale
+    noise = _spread(y - rows @ free)
     normal = normal + np.diag((noise / (allowed * scale)) ** 2)
-    values = np.linalg.lstsq(normal, _right(unit, y, weights), rcond=1e-12)[0] / scale
+    values = np.linalg.lstsq(normal, right, rcond=1e-15)[0] / scale
     return values, rows, y - rows @ values
-
-
-def _right(rows: Floats, y: Floats, weights: Floats) -> Floats:
-    return np.einsum("nak,na,na->k", rows, y, weights)
 
 
 def _spread(e: Floats) -> float:
@@ -127,11 +125,12 @@ def _covariance(rows: Floats, e: Floats, weights: Floats, allowed: Floats) -> Fl
     variance = float(np.mean(weights * e**2))
     normal = np.einsum("nak,nal,na->kl", unit, unit, weights)
     normal = normal + np.diag(variance / (allowed * scale) ** 2)
-    inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
+    inverse = np.linalg.pinv(normal, rcond=1e-15, hermitian=True)
     scores = np.einsum("nak,na->nk", unit, weights * e)
     edges = np.linspace(0, n, min(BLOCKS, n) + 1).astype(int)[:-1]
     sums = np.add.reduceat(scores, edges, axis=0)
     spread = inverse @ (sums.T @ sums) @ inverse * (len(sums) / max(1, len(sums) - k))
     classical = inverse * variance
     wide = np.sqrt(np.maximum(1.0, np.diag(spread) / np.maximum(np.diag(classical), 1e-300)))
-    return classical * np.outer(wide, wide) / np.outer(scale, scale)
+    covariance: Floats = classical * np.outer(wide, wide) / np.outer(scale, scale)
+    return covariance

@@ -1,0 +1,78 @@
+"""Every pair of sensors that knows the same motion, compared, and what that makes suspicious."""
+
+from collections.abc import Collection, Sequence
+
+from scm.mismatch.doubt import suspect
+from scm.mismatch.doubt.gross import Sensed, compare
+from scm.mismatch.doubt.mend import GYROS
+from scm.mismatch.doubt.pushing import push_of
+from scm.mismatch.doubt.sideways import sideways_of
+from scm.mismatch.doubt.suspicion import Relation, Suspicion
+from scm.mismatch.doubt.track import Series, Track, series
+from scm.mismatch.doubt.travel import travel_against
+from scm.mismatch.doubt.turning import yaw_against
+from scm.mismatch.doubt.way import Way
+from scm.recording.read import Recording
+from scm.vehicles.car import Car
+
+
+def compare_all(
+    recording: Recording,
+    car: Car | None,
+    poses: Track,
+    found: Sequence[Way],
+    not_own: Collection[str],
+) -> tuple[list[Relation], list[Suspicion]]:
+    """Return all relations, and the faults that would explain those that are off.
+
+    Args:
+        recording: Repaired.
+        car: Says how long the car is.
+        poses: Of the recording.
+        found: Sensors of distance.
+        not_own: Channels that copy another and are no witness.
+    """
+    wheelbase = car.value("body.wheelbase_m") if car else suspect.DEFAULT_WHEELBASE_M
+    timed: list[Relation] = []
+    suspicions: list[Suspicion] = []
+    for name in GYROS:
+        turned = None if name in not_own else _turned(recording, poses, name)
+        if turned is not None:
+            timed.append(turned)
+            suspicions += suspect.from_gyro(turned)
+    late = _late(timed[0]) if timed else (0.0, 0.0)
+    push = push_of(recording, poses, late)
+    for way in found:
+        travel = travel_against(poses, way.distance, way.name, late)
+        if travel is not None:
+            timed.append(travel)
+            suspicions += suspect.from_travel(travel, way, wheelbase, push)
+    suspicions += suspect.from_clocks(timed)
+    relations = list(timed)
+    sideways = None if found else sideways_of(poses)
+    if sideways is not None:
+        relations.append(sideways)
+        suspicions += suspect.from_sideways(sideways, wheelbase)
+    if push is not None:
+        relations.append(push)
+        suspicions += suspect.from_push(push)
+    return relations, suspicions
+
+
+def _turned(recording: Recording, poses: Track, name: str) -> Relation | None:
+    gyro = series(recording, name)
+    if gyro is None:
+        return None
+    turn = Sensed(("pose.yaw",), "angular speed", Series(poses.t, poses.yaw), 1)
+    pair = compare(turn, Sensed((name,), "angular speed", gyro))
+    if pair is None or not pair.alike:
+        return None
+    start = (pair.lag.delay_s - pair.shift_s, pair.lag.rate)
+    return yaw_against(poses, gyro.integral(), name, start)
+
+
+def _late(found: Relation) -> tuple[float, float]:
+    """Return delay and rate to start the other comparisons from."""
+    rate = found.numbers.get("rate")
+    certain = rate is not None and abs(rate.value) > 3.0 * rate.std
+    return found.numbers["delay"].value, rate.value if rate is not None and certain else 0.0

@@ -1,0 +1,204 @@
+"""Units, signs and clocks that two sensors disagree about, repaired where one can be blamed."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from scm.mismatch.doubt import gross
+from scm.mismatch.doubt.corrected import forward_speed
+from scm.mismatch.doubt.gross import Pair, Sensed, compare
+from scm.mismatch.doubt.mend import DESCRIBE, GYROS, Mending
+from scm.mismatch.doubt.other_car import top_speed
+from scm.mismatch.doubt.pushing import push_of
+from scm.mismatch.doubt.rows import called, tables
+from scm.mismatch.doubt.suspicion import Repair
+from scm.mismatch.doubt.track import Series, series
+from scm.mismatch.doubt.turning import yaw_against
+from scm.mismatch.doubt.way import ways
+from scm.mismatch.findings import DataProblem
+from scm.recording.read import Recording
+from scm.vehicles.car import Car
+
+POSE = ("pose.x", "pose.y", "pose.yaw")
+LENGTHS = (1e-3, 1e-2, 1e2, 1e3)
+BELIEVABLE = (0.03, 1.4)  # of the car's top speed
+
+
+def mend_pairs(now: Mending, car: Car | None) -> Iterator[DataProblem]:
+    """Repair lengths, directions, units, signs and clocks, in this order."""
+    yield from _lengths(now, car)
+    yield from _backwards(now, car)
+    for pair in _pairs(now, car):
+        yield from _size(now, pair)
+    yield from _offsets(now, [pair for pair in _pairs(now, car) if pair.alike])
+    yield from _accelerometer(now)
+
+
+def _pairs(now: Mending, car: Car | None) -> list[Pair]:
+    """Return the pose's turning and speed, each against every sensor that knows it."""
+    poses = now.poses
+    movement = forward_speed(poses)
+    if poses is None or movement is None:
+        return []
+    turn = Sensed(POSE, "angular speed", Series(poses.t, poses.yaw), 1)
+    go = Sensed(POSE, "speed", movement)
+    found = [(turn, Sensed((name,), "angular speed", signal))
+             for name in GYROS if (signal := series(now.recording, name)) is not None]  # fmt: skip
+    found += [(go, Sensed(w.channels, "speed", w.distance, 1)) for w in ways(now.recording, car)]
+    pairs = (compare(first, second) for first, second in found)
+    return [pair for pair in pairs if pair is not None]
+
+
+def _lengths(now: Mending, car: Car | None) -> Iterator[DataProblem]:
+    """Blame the pose's metre where accelerometer or top speed say so, not only one way."""
+    going = [p for p in _pairs(now, car) if p.what == "speed" and p.alike]
+    movement, poses = forward_speed(now.poses), now.poses
+    if not going or movement is None or poses is None:
+        return
+    factor = float(np.median([abs(pair.factor) for pair in going]))
+    length = next((f for f in LENGTHS if abs(math.log(factor / f)) < 0.2), None)
+    if length is None or any(abs(math.log(abs(p.factor) / length)) > 0.2 for p in going):
+        return
+    push = push_of(now.recording, poses)
+    known = [abs(push.numbers[n].value) for n in ("along", "across")] if push else []
+    shared = any(abs(math.log(value / length)) < 0.4 for value in known)
+    top = top_speed(car) if car else None
+    fast = float(np.percentile(np.abs(movement.values), 98))
+    if not (shared or _only_then(top, fast, length)):
+        return
+    now.repair(Repair(channels=("pose.x", "pose.y"), factor=length))
+    yield DataProblem(
+        channel="pose.x, pose.y",
+        name="unit",
+        said=f"The pose moves {1.0 / length:g} times as far as every other sensor says.",
+        corrected=f"Multiplied by {length:g}.",
+        record_instead=DESCRIBE,
+    )
+
+
+def _only_then(top: float | None, fast: float, factor: float) -> bool:
+    """Say whether a speed is believable times the factor, and is not without."""
+    if top is None:
+        return False
+    low, high = BELIEVABLE[0] * top, BELIEVABLE[1] * top
+    return not low < fast < high and low < fast * factor < high
+
+
+def _backwards(now: Mending, car: Car | None) -> Iterator[DataProblem]:
+    """Turn a heading round that points to the back of the car."""
+    poses, movement = now.poses, forward_speed(now.poses)
+    going = [p for p in _pairs(now, car) if p.what == "speed" and p.alike]
+    if poses is None or movement is None or any(p.factor > 0.0 for p in going):
+        return
+    push = push_of(now.recording, poses)
+    known = [push.numbers[name] for name in ("along", "across")] if push else []
+    against = [m for m in known if m.value < -4.0 * m.std]
+    asked = series(now.recording, "command.throttle")
+    throttle = 0.0 if asked is None else float(np.mean(asked.at(movement.t) * movement.values))
+    sizes = float(np.mean(np.abs(movement.values))) * (
+        1e-9 if asked is None else float(np.mean(np.abs(asked.values)))
+    )
+    driven_back = throttle < -0.3 * sizes
+    if not (driven_back and (going or len(against) == 2)) and not (going and len(against) == 2):
+        return
+    now.repair(Repair(channels=("pose.yaw",), offset=math.pi))
+    yield DataProblem(
+        channel="pose.yaw",
+        name="sign",
+        said="The heading points to the back of the car: it drives backwards all the time.",
+        corrected="Half a turn added.",
+        record_instead="Fix the marker with its x axis ahead.",
+    )
+
+
+def _size(now: Mending, pair: Pair) -> Iterator[DataProblem]:
+    at = called(pair.second)
+    if not pair.alike:
+        if abs(pair.lag.alike) < gross.UNLIKE:
+            yield DataProblem(
+                channel=at,
+                name="unrelated",
+                said=f"Does not follow the pose's {pair.what}: correlation {pair.lag.alike:.2f}.",
+                record_instead="Check that all channels are of one drive.",
+            )
+        return
+    if pair.factor != 1.0:
+        yield _divided(now, pair.second, pair.factor, pair.what)
+
+
+def _divided(now: Mending, channels: tuple[str, ...], factor: float, what: str) -> DataProblem:
+    """Repair channels by a factor and say so."""
+    now.repair(Repair(channels=channels, factor=1.0 / factor))
+    unit = gross.unit_of(factor, what)
+    said = "Its sign is turned" if factor == -1.0 else f"Shows {factor:.4g} times the pose's {what}"
+    return DataProblem(
+        channel=called(channels),
+        name="sign" if factor == -1.0 else "unit",
+        said=said + (f": it looks like {unit}." if unit else "."),
+        corrected=f"Divided by {factor:.4g}.",
+        record_instead=DESCRIBE,
+    )
+
+
+def _offsets(now: Mending, pairs: list[Pair]) -> Iterator[DataProblem]:
+    """Bring clocks together that are far apart: the pose's where all say so, else the odd one's."""
+    far = [pair for pair in pairs if pair.far_s]
+    if not far:
+        return
+    spread = max(p.far_s for p in far) - min(p.far_s for p in far)
+    moves: list[tuple[tuple[str, ...], float]]
+    if len(far) == len(pairs) and spread < gross.FAR_S:
+        names = tuple(n for n in now.recording.channels if n.startswith("pose."))
+        best = max(far, key=lambda p: abs(p.lag.alike))
+        moves = [(names, -_refined(now, best))]
+    else:
+        moves = [(_clocked_with(now.recording, pair.second), _refined(now, pair)) for pair in far]
+    done: set[str] = set()
+    for names, shift in moves:
+        fresh = tuple(name for name in names if name not in done)
+        done.update(fresh)
+        if not fresh:
+            continue
+        now.repair(Repair(channels=fresh, shift_s=shift))
+        yield DataProblem(
+            channel=called(fresh),
+            name="clock",
+            said=f"The clock is {abs(shift):.3f} s {'ahead of' if shift < 0.0 else 'behind'} the "
+            "others'.",
+            corrected=f"Stamps moved by {shift:+.3f} s.",
+            record_instead="Stamp all sensors with one clock, or with clocks kept together.",
+        )
+
+
+def _refined(now: Mending, pair: Pair) -> float:
+    """Return how far the pose's clock is ahead, from the heading where a gyro takes part [s]."""
+    signal, poses = series(now.recording, pair.second[0]), now.poses
+    if pair.what != "angular speed" or signal is None or poses is None:
+        return pair.far_s
+    moved = Series(signal.t + pair.far_s, signal.values)
+    found = yaw_against(poses, moved.integral(), pair.second[0], (0.0, pair.lag.rate))
+    left = found.numbers["delay"].value if found else 0.0
+    return pair.far_s + (left if abs(left) < 0.5 * gross.FAR_S else 0.0)
+
+
+def _clocked_with(recording: Recording, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return all channels that share their stamps with these."""
+    table = next(t for t in tables(recording) if names[0] in t)
+    return tuple(dict.fromkeys((*names, *table)))
+
+
+def _accelerometer(now: Mending) -> Iterator[DataProblem]:
+    poses = now.poses
+    found = None if poses is None else push_of(now.recording, poses)
+    if found is None:
+        return
+    factors: dict[float, list[str]] = {}
+    for axis, name in (("x", "along"), ("y", "across")):
+        scale = found.numbers[name]
+        if abs(scale.value) > 4.0 * scale.std:
+            near = gross.nearest_factor(scale.value, "acceleration")
+            if near == -1.0 or gross.unit_of(near, "acceleration"):
+                factors.setdefault(near, []).append(f"imu.accel_{axis}")
+    for factor, names in factors.items():
+        yield _divided(now, tuple(names), factor, "acceleration")
