@@ -1,0 +1,75 @@
+"""`scm trial`: effects concealed in a reality of its own, diagnosed blind, then labels opened."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from scm.command import Command
+
+BAR = 30
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    from scm.mismatch.trial.reality import ENGINES, KINDS
+
+    parser.add_argument("--seed", type=int, default=0, help="of all randomness (%(default)s)")
+    parser.add_argument("--cases", type=int, default=40, help="how many (%(default)s)")
+    parser.add_argument(
+        "--kind", choices=KINDS, default="mixed", help="what to conceal (%(default)s)"
+    )
+    parser.add_argument(
+        "--strength", type=float, nargs=2, default=(1.0, 4.0), metavar=("LOW", "HIGH"),
+        help="times the smallest effect that a drive can show (1 4)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--engine", choices=ENGINES, default="own", help="who moves the cars (%(default)s)"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="default: runs/trial-SEED")
+    parser.add_argument(
+        "--trials", type=Path, metavar="DIR", help="judge these cases instead of making any"
+    )
+    parser.add_argument(
+        "--only", default="", metavar="00,01", help="of --trials, the cases to diagnose"
+    )
+    parser.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.mismatch.trial import run
+    from scm.mismatch.trial.blind import by_engine
+    from scm.mismatch.trial.reality import Wish
+
+    if arguments.trials:
+        out = arguments.out or Path("runs") / f"trial-{arguments.trials.name}"
+        only = [name for name in arguments.only.split(",") if name]
+        lines = run.on_shipped_cases(
+            arguments.trials, out, by_engine, only, workers=arguments.workers, say=_say
+        )
+    else:
+        low, high = arguments.strength
+        wish = Wish(
+            seed=arguments.seed, cases=arguments.cases, kind=arguments.kind,
+            engine=arguments.engine, strength=(low, high),
+        )  # fmt: skip
+        out = arguments.out or Path("runs") / f"trial-{arguments.seed}"
+        lines = run.on_own_cases(wish, out, by_engine, workers=arguments.workers, say=_say)
+    print("\n".join(lines))
+    print(f"\nkept in {out}: recordings, labels and their seals, each diagnosis, this table")
+    return 0
+
+
+def _say(what: str, done: int, of: int) -> None:
+    """Draw a progress bar on the terminal, if there is one."""
+    if sys.stderr.isatty():
+        filled = BAR * done // max(of, 1)
+        bar = "#" * filled + "." * (BAR - filled)
+        end = "\n" if done == of else ""
+        print(f"\r{what:<14}[{bar}] {done} of {of}", end=end, file=sys.stderr, flush=True)
+
+
+COMMAND = Command(
+    help="Conceal effects in an independent reality, diagnose blind, open the labels: a table.",
+    example="scm trial --seed 7 --cases 20",
+    arguments=_arguments,
+    run=_run,
+)

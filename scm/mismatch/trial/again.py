@@ -1,0 +1,133 @@
+"""Judges a patched car on another drive of the same car: free runs against the recording."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from scm.errors import ScmError
+from scm.mismatch.library import terms_needed
+from scm.mismatch.trial.known import is_measure, parameters_of
+from scm.mismatch.trial.labels import Case, Label
+from scm.recording.read import Recording, read_recordings
+from scm.replay import free_run
+from scm.vehicles.car import Car, load_car
+from scm.vehicles.measure import Fault, Series, measure
+
+HORIZON_S = 3.0
+POSES = ("pose.x", "pose.y", "pose.yaw")
+ROUNDS = 8
+SHOWS = 1.2  # where the nominal car's error is below this times the true car's, nothing is to gain
+# Effects whose number stands beside one that ordinary cars have already.
+ADDED = {"rolling_resistance", "viscous_drag", "aero_drag"}
+
+
+@dataclass(frozen=True, slots=True)
+class Ratio:
+    """Root mean square of free runs' position errors on the other drive [m].
+
+    Attributes:
+        true_m: Of the car with what was really concealed; None for laws outside the library.
+    """
+
+    case: str
+    nominal_m: float
+    found_m: float
+    true_m: float | None
+
+
+def compare(case: Case, label: Label, folder: Path) -> Ratio | None:
+    """Return the three cars' errors; None without a patched car, or where the effect does not show.
+
+    Args:
+        case: With its other drive.
+        label: Opened.
+        folder: Where the diagnosis wrote `car.toml`.
+    """
+    patched = folder / "car.toml"
+    if not label.names or not patched.is_file() or not case.again.is_dir():
+        return None
+    recording = read_recordings(case.again)[0]
+    base = _ready(load_car(label.car))
+    nominal = error(recording, base)
+    found = error(recording, _on(base, load_car(patched)))
+    car = true_car(base, label)
+    true = None if car is None else error(recording, car)
+    if true is not None and nominal < SHOWS * true:
+        return None
+    return Ratio(case.name, nominal, found, true)
+
+
+def error(recording: Recording, car: Car) -> float:
+    """Return the root mean square position error of free runs [m], faults of measurement undone."""
+    run = free_run(_undone(recording, car.faults), car, HORIZON_S)
+    return float(np.sqrt(np.nanmean(np.square(run.position_error()))))
+
+
+def true_car(base: Car, label: Label) -> Car | None:
+    """Return the car as it really was; None where the library cannot say so."""
+    if label.kind == "unlisted" or not all(map(parameters_of, label.names)):
+        return None
+    values = dict(label.ordinary)
+    values |= {"drive.axle_lock": 1.0} if base.has("drive.axle_lock") else {}
+    faults: dict[str, float] = {}
+    for name, parameters in zip(label.names, label.parameters, strict=True):
+        numbers = {parameters_of(name)[key].key: value for key, value in parameters.items()}
+        if name == "wheel_radius":
+            values["wheel.radius_m"] = base.value("wheel.radius_m") * parameters["scale"]
+        elif is_measure(name):
+            faults |= numbers
+        elif name in ADDED:
+            values |= {key: base.value(key) + more for key, more in numbers.items()}
+        else:
+            values |= numbers
+    measures = [name for name in label.names if is_measure(name) and name != "wheel_radius"]
+    try:
+        car = base.with_terms([], values)
+        return car.with_measures(measures, faults) if measures else car
+    except ScmError:
+        return None
+
+
+def _ready(car: Car) -> Car:
+    """Return a car with every effect at rest: all cars of one type then share one kernel."""
+    return car.with_terms([*terms_needed(car), "drive_delay", "steer_delay"])
+
+
+def _on(base: Car, patched: Car) -> Car:
+    """Return the patched car's numbers on the base, where the base has all its effects."""
+    if not {term.name for term in patched.terms} <= {term.name for term in base.terms}:
+        return patched
+    moved: Mapping[str, float] = {
+        key: quantity.value
+        for key, quantity in patched.values.items()
+        if isinstance(quantity.value, float) and base.has(key) and quantity != base.quantity(key)
+    }
+    car = base.with_terms([], moved)
+    return replace(car, measures=patched.measures, values={**patched.values, **car.values})
+
+
+def _undone(recording: Recording, faults: tuple[Fault, ...]) -> Recording:
+    """Return the recording with the poses as they would be without these faults."""
+    known = {name: recording.channels[name] for name in POSES if name in recording.channels}
+    seen = {name: Series(channel.t, channel.values) for name, channel in known.items()}
+    true = dict(seen)
+    for _ in range(ROUNDS if faults else 0):
+        again = measure(true, [fault for fault in faults if _on_poses(fault)])
+        true = {
+            name: Series(
+                series.t_s + seen[name].t_s - again[name].t_s,
+                series.values + seen[name].values - again[name].values,
+            )
+            for name, series in true.items()
+        }
+    poses = {
+        name: replace(known[name], t=series.t_s, values=series.values)
+        for name, series in true.items()
+    }
+    return replace(recording, channels={**recording.channels, **poses})
+
+
+def _on_poses(fault: Fault) -> bool:
+    return any(fault.law_of(name) is not None for name in POSES)

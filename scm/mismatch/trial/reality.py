@@ -1,0 +1,71 @@
+"""Has cases made by the independent reality, a program of its own beside this package."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import scm
+from scm.errors import RunError
+
+PLACE = "tests/reality"
+KINDS = ("mixed", "single", "none", "pair", "unlisted")
+ENGINES = ("own", "mujoco")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wish:
+    """What cases to make.
+
+    Attributes:
+        strength: Smallest and largest, in multiples of what a drive can show at all.
+    """
+
+    seed: int = 0
+    cases: int = 40
+    kind: str = "mixed"
+    engine: str = "own"
+    strength: tuple[float, float] = (1.0, 4.0)
+
+
+def find_root() -> Path:
+    """Return the folder that holds this package and the independent reality.
+
+    Raises:
+        RunError: where there is none, as in an installed wheel.
+    """
+    root = Path(scm.__file__).resolve().parent.parent
+    if not (root / PLACE / "__main__.py").is_file():
+        msg = (
+            f"{root / PLACE}: not here. Blind trials need the independent reality, which comes "
+            f"with the repository and not with the installed package: run them from a clone, "
+            f"or score recordings that you have with --trials DIR"
+        )
+        raise RunError(msg)
+    return root
+
+
+def make_cases(wish: Wish, out: Path, say: Callable[[int], None]) -> None:
+    """Write recordings, labels and seals into `out`; `say` hears how many cases are made.
+
+    Raises:
+        RunError: with the reality's own words when it fails.
+    """
+    command = [
+        sys.executable, "-m", PLACE.replace("/", "."), "--out", str(out.absolute()),
+        "--seed", str(wish.seed), "--cases", str(wish.cases), "--kind", wish.kind,
+        "--engine", wish.engine, "--strength", *map(str, wish.strength),
+    ]  # fmt: skip
+    with subprocess.Popen(
+        command, cwd=find_root(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as running:
+        if running.stdout is None or running.stderr is None:
+            return
+        for line in running.stdout:
+            say(int(line.split()[0]))
+        words = running.stderr.read()
+    if running.returncode:
+        last = words.strip().splitlines()[-1:] or ["no words"]
+        msg = f"the independent reality stopped with {running.returncode}: {last[0]}"
+        raise RunError(msg)

@@ -1,0 +1,143 @@
+"""Judges one diagnosis by its label: names, laws, parameters."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from scm.mismatch.findings import Diagnosis, Effect, Verdict
+from scm.mismatch.trial.known import parameters_of
+from scm.mismatch.trial.labels import Label
+from scm.mismatch.trial.words import same_variables
+
+# No drive on a level floor, or no stamps, tell these apart: left undecided, they are right.
+TWINS = {
+    "payload": {"motor_gain"},
+    "motor_gain": {"payload"},
+    "grade": {"wind"},
+    "wind": {"grade"},
+    "pose_latency": {"clock_offset"},
+}
+TOGETHER = (
+    {"force_x_n", "force_y_n"}, {"tilt_x", "tilt_y"}, {"x_m", "y_m"}, {"x_mps2", "y_mps2"},
+)  # fmt: skip
+ANGLES = {"uphill_rad", "toward_rad"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What a diagnosis was worth.
+
+    Attributes:
+        said: Names it reported, effects outside the library by their own.
+        exact: The right names and nothing else; of a law outside, right in equation and variables.
+        among: All that was concealed is among what it reported or left undecided.
+        missed: It reported nothing where something was concealed.
+        false_names: Reported, but not concealed.
+        errors: Of every parameter found, relative to the size of its effect.
+        covered: Whether each parameter's interval holds the true value.
+    """
+
+    label: Label
+    said: tuple[str, ...]
+    exact: bool
+    among: bool
+    missed: bool
+    false_names: tuple[str, ...]
+    errors: tuple[float, ...]
+    covered: tuple[bool, ...]
+    runtime_s: float
+    failed: str = ""
+
+
+def score(label: Label, diagnosis: Diagnosis) -> Outcome:
+    """Judge one diagnosis."""
+    said = tuple(effect.name for effect in diagnosis.effects)
+    undecided = {name for group in diagnosis.undecided for name in group.between}
+    right = {name for name in label.names if _was_said(name, label, diagnosis)}
+    false_names = tuple(e.name for e in diagnosis.effects if not _belongs(e, label))
+    reported = right | {name for name in label.names if name in undecided}
+    nothing = diagnosis.verdict == Verdict.NONE and not said
+    pairs = [pair for effect in diagnosis.effects for pair in _compared(effect, label)]
+    everything = len(right) == len(label.names) or _twins_undecided(label, said, undecided)
+    return Outcome(
+        label=label,
+        said=said,
+        exact=everything and not false_names and (bool(label.names) or nothing),
+        among=reported == set(label.names),
+        missed=bool(label.names) and nothing,
+        false_names=false_names or (() if label.names or nothing else (diagnosis.verdict.value,)),
+        errors=tuple(error for error, _ in pairs if error is not None),
+        covered=tuple(inside for _, inside in pairs),
+        runtime_s=diagnosis.runtime_s,
+    )
+
+
+def failed(label: Label, words: str) -> Outcome:
+    """Return the outcome of a diagnosis that came to no end."""
+    return Outcome(
+        label=label, said=(), exact=False, among=False, missed=bool(label.names), false_names=(),
+        errors=(), covered=(), runtime_s=math.nan, failed=words,
+    )  # fmt: skip
+
+
+def is_law(effect: Effect, label: Label) -> bool:
+    """Say whether a law outside the library has the right equation and variables."""
+    return (
+        not effect.listed
+        and effect.equation.value in label.equations
+        and same_variables(effect.depends_on, label.needs, label.allows)
+    )
+
+
+def _was_said(name: str, label: Label, diagnosis: Diagnosis) -> bool:
+    if label.kind == "unlisted":
+        return any(is_law(effect, label) for effect in diagnosis.effects)
+    return any(effect.listed and effect.name == name for effect in diagnosis.effects)
+
+
+def _belongs(effect: Effect, label: Label) -> bool:
+    if label.kind == "unlisted":
+        return is_law(effect, label)
+    return effect.listed and effect.name in label.names
+
+
+def _twins_undecided(label: Label, said: tuple[str, ...], undecided: set[str]) -> bool:
+    """Say whether twins were rightly left undecided."""
+    for name in label.names:
+        twins = TWINS.get(name, set())
+        if name not in said and not (twins and name in undecided and undecided <= twins | {name}):
+            return False
+    return bool(label.names)
+
+
+def _compared(effect: Effect, label: Label) -> list[tuple[float | None, bool]]:
+    """Return (relative error, inside the interval) of each parameter whose truth is known."""
+    if not effect.listed or effect.name not in label.names:
+        return []
+    truth = label.parameters[label.names.index(effect.name)]
+    found: list[tuple[float | None, bool]] = []
+    for name, true in truth.items():
+        got = effect.parameters.get(name)
+        if got is None:
+            continue
+        off, low, high = got.value - true, got.low - true, got.high - true
+        if name in ANGLES:
+            turned = math.remainder(off, 2.0 * math.pi)
+            off, low, high = turned, low - off + turned, high - off + turned
+        size = _size(effect.name, name, truth)
+        error = abs(off) / size if size > 1e-9 else None
+        found.append((error, low <= 0.0 <= high))
+    return found
+
+
+def _size(effect: str, name: str, truth: Mapping[str, float]) -> float:
+    """Return what an error of a parameter is measured by: how far it is from doing nothing."""
+    if name in ANGLES:
+        return 1.0
+    if "radius_m" in truth and name in {"x_m", "y_m"}:
+        return truth["radius_m"]
+    for pair in TOGETHER:
+        if name in pair:
+            return math.hypot(*(truth.get(one, 0.0) for one in pair))
+    known = parameters_of(effect).get(name)
+    return abs(truth[name] - (known.neutral if known and name != "radius_m" else 0.0))

@@ -1,0 +1,114 @@
+"""All outcomes of a trial as one table, with what chance leaves open."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from scm.mismatch.trial.again import Ratio
+from scm.mismatch.trial.score import Outcome
+
+NORMAL_95 = 1.959964
+KINDS = ("single", "pair", "unlisted", "none")
+CLEAR = 2.0
+
+
+def wilson(right: int, of: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share."""
+    if of == 0:
+        return 0.0, 1.0
+    z2, share = NORMAL_95**2, right / of
+    middle = (share + z2 / (2.0 * of)) / (1.0 + z2 / of)
+    spread = NORMAL_95 * math.sqrt(share * (1.0 - share) / of + z2 / (4.0 * of * of))
+    half = spread / (1.0 + z2 / of)
+    return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+def lines(outcomes: Sequence[Outcome], ratios: Sequence[Ratio]) -> list[str]:
+    """Return the whole table as text."""
+    head = f"{'concealed':<26}{'cases':>6}"
+    for title in ("exact", "among", "missed", "false names"):
+        head += f"{title:>22}"
+    found = [head]
+    for kind in KINDS:
+        some = [outcome for outcome in outcomes if outcome.label.kind == kind]
+        found += _row(kind, some)
+        clear = [o for o in some if o.label.strength and min(o.label.strength) >= CLEAR]
+        if clear and len(clear) < len(some):
+            found += _row(f"  of these, {CLEAR:g} x floor up", clear)
+    found += ["", *_parameters(outcomes), *_again(ratios), *_times(outcomes)]
+    found += ["", *_confusions(outcomes)]
+    return found
+
+
+def _row(title: str, outcomes: Sequence[Outcome]) -> list[str]:
+    if not outcomes:
+        return []
+    tests: tuple[Callable[[Outcome], bool], ...] = (
+        lambda o: o.exact, lambda o: o.among, lambda o: o.missed, lambda o: bool(o.false_names),
+    )  # fmt: skip
+    text = f"{title:<26}{len(outcomes):>6}"
+    for test in tests:
+        text += f"{_share(sum(map(test, outcomes)), len(outcomes)):>22}"
+    return [text]
+
+
+def _share(right: int, of: int) -> str:
+    low, high = wilson(right, of)
+    return f"{100 * right / of:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
+
+
+def _parameters(outcomes: Iterable[Outcome]) -> list[str]:
+    errors = [error for outcome in outcomes for error in outcome.errors]
+    covered = [inside for outcome in outcomes for inside in outcome.covered]
+    if not covered:
+        return ["parameters: none found"]
+    text = f"parameters: {len(covered)} found"
+    if errors:
+        middle, far = np.percentile(errors, (50, 90))
+        text += f", error median {100 * middle:.1f} %, 90th percentile {100 * far:.0f} %"
+    return [f"{text}; 90 % intervals hold the truth in {_share(sum(covered), len(covered))}"]
+
+
+def _again(ratios: Sequence[Ratio]) -> list[str]:
+    if not ratios:
+        return []
+    text = [f"another drive: {len(ratios)} cars whose effect shows in free runs"]
+    of_nominal = [ratio.found_m / ratio.nominal_m for ratio in ratios]
+    text[0] += f"; error over the nominal car's: median {np.median(of_nominal):.2f}"
+    of_true = [ratio.found_m / ratio.true_m for ratio in ratios if ratio.true_m]
+    if of_true:
+        near = _share(sum(r <= 1.15 for r in of_true), len(of_true))
+        text[0] += f"; over the true car's: median {np.median(of_true):.2f}, within 1.15 in {near}"
+    return text
+
+
+def _times(outcomes: Iterable[Outcome]) -> list[str]:
+    times = [o.runtime_s for o in outcomes if math.isfinite(o.runtime_s)]
+    if not times:
+        return []
+    return [f"time: median {np.median(times):.0f} s a case, longest {max(times):.0f} s"]
+
+
+def _confusions(outcomes: Iterable[Outcome]) -> list[str]:
+    counted = Counter(
+        (" + ".join(o.label.names) or "nothing", o.failed or " + ".join(o.said) or "nothing")
+        for o in outcomes
+        if not o.exact
+    )
+    rows = [f"  {n} x  {true}  ->  {said}" for (true, said), n in counted.most_common()]
+    return ["not exact: concealed -> said", *rows] if rows else ["all exact"]
+
+
+def each(outcomes: Iterable[Outcome]) -> list[str]:
+    """Return one line a case."""
+    found = []
+    for outcome in outcomes:
+        label = outcome.label
+        true = " + ".join(label.names) or "nothing"
+        sizes = " ".join(f"{strength:.1f}x" for strength in label.strength)
+        said = outcome.failed or " + ".join(outcome.said) or "nothing"
+        mark = "exact" if outcome.exact else "among" if outcome.among else "wrong"
+        found.append(f"{label.case}  {label.car:<8} {mark:<6} {true} {sizes} -> {said}")
+    return found

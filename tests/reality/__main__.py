@@ -1,0 +1,34 @@
+"""`python -m tests.reality --out DIR`: cases of cars that conceal something, labels sealed."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from tests.reality.cases import KINDS, draw_kinds, write_cases
+from tests.reality.motion import Moving
+
+
+def main() -> int:
+    """Write the cases; say after each how many are done."""
+    parser = argparse.ArgumentParser(prog="python -m tests.reality", description=__doc__)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--cases", type=int, default=40)
+    parser.add_argument("--kind", choices=("mixed", *KINDS), default="mixed")
+    parser.add_argument("--strength", type=float, nargs=2, default=(1.0, 4.0))
+    parser.add_argument("--engine", choices=("own", "mujoco"), default="own")
+    arguments = parser.parse_args()
+    moving = Moving
+    if arguments.engine == "mujoco":
+        from tests.reality.in_mujoco import Moving as moving  # noqa: N813
+    kinds = draw_kinds(arguments.kind, arguments.cases, arguments.seed)
+    low, high = arguments.strength
+    write_cases(
+        arguments.out, arguments.seed, kinds, (low, high), moving,
+        lambda line: print(line, flush=True),
+    )  # fmt: skip
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

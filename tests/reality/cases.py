@@ -1,0 +1,166 @@
+"""Cases: a car, what is concealed in it, two drives, and a label sealed by its hash."""
+
+import hashlib
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+
+from tests.reality.concealed import EFFECTS, HIDING, LISTED, UNLISTED, Drawn
+from tests.reality.driver import TEMPERS
+from tests.reality.motion import Moving
+from tests.reality.numbers import KEYS, SCATTER, TOGETHER, nominal, scattered
+from tests.reality.recorded import Drive, record, write
+from tests.reality.sensing import FAULTS
+
+KINDS = ("single", "none", "pair", "unlisted")
+SHARES = (0.55, 0.15, 0.15, 0.15)
+DRIVES = (("drive", 90.0), ("again", 60.0))
+ENOUGH_ON_PATCH_S = 1.5
+
+
+def names_for(kind: str, car: str, rng: np.random.Generator) -> tuple[str, ...]:
+    """Draw what is concealed; half of the pairs are such as hide each other."""
+    listed = [effect.name for effect in LISTED if car in effect.smallest]
+    if kind == "none":
+        return ()
+    if kind == "single":
+        return (str(rng.choice(listed)),)
+    if kind == "unlisted":
+        return (str(rng.choice([e.name for e in UNLISTED if car in e.smallest])),)
+    hiding = [pair for pair in HIDING if set(pair) <= set(listed)]
+    if rng.random() < 0.5:
+        return hiding[rng.integers(len(hiding))]
+    names = [name for name in listed if name != "unit_error"]
+    return tuple(str(name) for name in rng.choice(names, 2, replace=False))
+
+
+def draw_effects(
+    names: tuple[str, ...], car: str, strengths: tuple[float, float], rng: np.random.Generator
+) -> list[tuple[str, float, Drawn]]:
+    """Return (name, strength, what it does) for each; sizes spread evenly over their logarithm."""
+    found = []
+    for name in names:
+        strength = math.exp(rng.uniform(*np.log(strengths)))
+        effect = EFFECTS[name]
+        found.append((name, strength, effect.draw(strength * effect.smallest[car], rng, car)))
+    return found
+
+
+def apply(values: dict[str, float], effects: list[tuple[str, float, Drawn]]) -> dict[str, float]:
+    """Return numbers with what the effects add and multiply."""
+    changed = dict(values)
+    for _, _, drawn in effects:
+        for name, factor in drawn.times.items():
+            if name in changed:
+                changed[name] *= factor
+        for name, more in drawn.adds.items():
+            if name in changed:
+                changed[name] += more
+    return changed
+
+
+def make_case(
+    kind: str,
+    rng: np.random.Generator,
+    strengths: tuple[float, float] = (1.0, 4.0),
+    moving: type = Moving,
+    names: tuple[str, ...] | None = None,
+    car: str | None = None,
+) -> tuple[dict, dict[str, Drive], dict[str, float]]:
+    """Draw and drive one case; return its label, its drives by name and the car's numbers."""
+    if car is None:
+        cars = [c for c in TEMPERS if all(c in EFFECTS[n].smallest for n in names or ())]
+        car = str(rng.choice(cars, p=[0.7, 0.3] if len(cars) == 2 else None))
+    names = names_for(kind, car, rng) if names is None else names
+    file_numbers = nominal(car)
+    ordinary = scattered(file_numbers, rng) if rng.random() < 0.5 else dict(file_numbers)
+    while True:
+        effects = draw_effects(names, car, strengths, rng)
+        numbers, faults = apply(ordinary, effects), apply(FAULTS, effects)
+        drives = {
+            name: record(car, numbers, faults, duration, rng, moving) for name, duration in DRIVES
+        }
+        if all(_shows(drive, numbers) for drive in drives.values()):
+            break
+    label = _label(kind, car, effects, ordinary, file_numbers, drives["drive"])
+    return label, drives, numbers
+
+
+def _shows(drive: Drive, numbers: dict[str, float]) -> bool:
+    """Say whether the car came over the patch, where there is one, and stayed on the floor."""
+    x, y, speed = (drive.rows[:, k] for k in (1, 2, 4))
+    if not np.isfinite(drive.rows).all() or np.abs(drive.rows[:, 1:3]).max() > 12.0:
+        return False
+    if numbers["patch_radius"] < 0.02:
+        return True
+    on = np.hypot(x - numbers["patch_x"], y - numbers["patch_y"]) < 0.7 * numbers["patch_radius"]
+    return float(np.sum(on & (np.abs(speed) > 0.02))) * 0.0025 > ENOUGH_ON_PATCH_S
+
+
+def _label(kind, car, effects, ordinary, file_numbers, drive):
+    known = [EFFECTS[name] for name, _, _ in effects]
+    moved = [name for name in (*SCATTER, *TOGETHER) if ordinary[name] != file_numbers[name]]
+    return {
+        "case": "+".join(effect.name for effect in known) or "nothing",
+        "kind": kind,
+        "names": [effect.name for effect in known],
+        "car": car,
+        "equation": "+".join(effect.equation for effect in known),
+        "or_equation": [other for effect in known for other in effect.or_equation],
+        "depends_on": [word for effect in known for word in effect.depends_on],
+        "or_depends_on": [word for effect in known for word in effect.or_depends_on],
+        "parameters": [drawn.parameters for _, _, drawn in effects],
+        "strength": [strength for _, strength, _ in effects],
+        "law": "; ".join(drawn.law for _, _, drawn in effects if drawn.law),
+        "listed": bool(known) and all(effect.listed for effect in known),
+        "ordinary": {KEYS[name]: ordinary[name] for name in moved},
+        "span": drive.span,
+        "vmax": drive.fastest,
+        "route": drive.shape,
+    }
+
+
+def seal(label: dict, salt: str) -> str:
+    """Return the hash that commits to a label without giving it away."""
+    text = json.dumps({"salt": salt, "label": label}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def write_cases(
+    out: Path,
+    seed: int,
+    kinds: list[str],
+    strengths: tuple[float, float] = (1.0, 4.0),
+    moving: type = Moving,
+    say=lambda _line: None,
+) -> None:
+    """Write every case's recordings, its label, and `sealed.txt` with one hash a case.
+
+    Each case has randomness of its own, so that a case is the same however many there are.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    sealed = []
+    for k, kind in enumerate(kinds):
+        rng = np.random.default_rng([seed, k])
+        label, drives, numbers = make_case(kind, rng, strengths, moving)
+        name = f"case_{k:03d}"
+        for drive_name, drive in drives.items():
+            write(drive, label["car"], numbers, out / name / drive_name)
+        salt = rng.bytes(16).hex()
+        labels = out / "labels"
+        labels.mkdir(exist_ok=True)
+        text = json.dumps({"salt": salt, "label": label}, sort_keys=True, indent=1)
+        (labels / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+        sealed.append(f"{seal(label, salt)}  {name}")
+        say(f"{k + 1} of {len(kinds)}")
+    (out / "sealed.txt").write_text("\n".join(sealed) + "\n", encoding="utf-8")
+
+
+def draw_kinds(kind: str, count: int, seed: int) -> list[str]:
+    """Return the kind of every case; `mixed` draws them, in an order that tells nothing."""
+    if kind != "mixed":
+        return [kind] * count
+    rng = np.random.default_rng([seed, 1_000_003])
+    return [str(k) for k in rng.choice(KINDS, count, p=SHARES)]

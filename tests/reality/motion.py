@@ -1,0 +1,253 @@
+"""How a four-wheeled car moves: 4 kHz, wheel spin solved implicitly, the body half explicitly.
+
+The plane only. Each wheel has its motor, load, tyre and dry friction; loads follow accelerations
+through a lag of 8 ms. Positions are those of the rear axle's centre. Order of wheels: front left,
+front right, rear left, rear right. All numbers come as one record, so that laws read by name.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from tests.reality.numbers import GRAVITY, KEYS, NEUTRAL
+
+STEP = 0.00025
+STEPS_PER_COMMAND = 200
+STEPS_PER_ROW = 10
+COMMAND_S = STEP * STEPS_PER_COMMAND
+ROW_S = STEP * STEPS_PER_ROW
+LOAD_LAG = 0.008
+WARM_S = 60.0
+STICTION_FADE = 0.6
+
+NUMBERS = np.dtype([(name, "f8") for name in (*KEYS, *NEUTRAL)])
+STATE = np.dtype(
+    [
+        (name, "f8")
+        for name in (
+            "x", "y", "yaw", "vx", "vy", "yaw_rate", "throttle", "target", "servo", "linkage",
+            "angle", "push", "side", "front_side", "load_x", "load_y",
+        )
+    ]
+)  # fmt: skip
+ROW = ("t", "x", "y", "yaw", "vx", "vy", "yaw_rate", "push", "side", "left", "right")
+WHEEL = ("spin", "turned", "strength", "lag")
+
+
+@njit(cache=True)
+def over_slip(slip, peak, force_peak, slide, force_slide):
+    """Tyre force over load and over slip."""
+    size = abs(slip)
+    if size <= peak:
+        q = size / peak
+        return force_peak * (1.5 - 0.5 * q * q) / peak
+    p = min((size - peak) / (slide - peak), 1.0)
+    return (force_peak + (force_slide - force_peak) * (3.0 - 2.0 * p) * p * p) / size
+
+
+@njit(cache=True)
+def inside_patch(c, x, y):
+    """Share of a contact patch that lies on the spot; its edge is 2 cm wide."""
+    away = math.hypot(x - c.patch_x, y - c.patch_y)
+    return min(max(0.5 + (c.patch_radius - away) / 0.02, 0.0), 1.0)
+
+
+@njit(cache=True)
+def steer(c, s, t, command, shake):
+    """Advance the steering by one step; the angle of the wheels ends in `s.angle`."""
+    command = min(max(command, -c.stop_right), c.stop_left)
+    demand = c.limit * min(max(command, -1.0), 1.0) * c.steer_gain + c.shake * shake
+    demand *= 1.0 + c.side_gain if demand > 0.0 else 1.0 - c.side_gain
+    s.target += (demand - s.target) * STEP / (c.steer_lag + STEP)
+    most = c.rate * c.pace * STEP
+    s.servo += min(max(s.target - s.servo, -most), most)
+    half = 0.5 * c.backlash
+    s.linkage = min(max(s.linkage, s.servo - half), s.servo + half)
+    angle = s.linkage + c.trim + c.steer_per_speed * s.vx
+    angle += c.weave * math.sin(2.0 * math.pi * t / c.weave_period)
+    angle -= c.give * s.front_side / (c.mass * GRAVITY)
+    angle -= c.understeer * s.vx * s.yaw_rate
+    share = STEP / (0.02 + STEP) if c.give > 0.0 else 1.0
+    s.angle += share * (angle - s.angle)
+
+
+@njit(cache=True)
+def drive(c, s, t, command):
+    """Advance the drive's command by one step; return the throttle that the motors get."""
+    u = command - min(max(command, -c.drive_deadband), c.drive_deadband)
+    u *= c.drive_gain
+    s.throttle += (u - s.throttle) * STEP / (c.drive_lag + STEP)
+    u = s.throttle * max(0.0, 1.0 - c.sag * t / 60.0)
+    u *= 1.0 + c.surge * math.sin(2.0 * math.pi * t / c.surge_period)
+    return u * (1.0 - c.brake_weak) if u < 0.0 else u
+
+
+@njit(cache=True)
+def outside_force(c, s, t):
+    """Forces on the body along and across [N], and a moment [N*m], that no wheel gives."""
+    speed = math.hypot(s.vx, s.vy)
+    drag = c.drag_linear + c.drag_square * speed
+    along = -drag * s.vx - c.corner_drag * c.mass * abs(s.yaw_rate) * s.vx
+    across = -drag * s.vy
+    twist = -c.drag_turn * s.yaw_rate + c.twist_per_speed * s.vx
+    cos, sin = math.cos(s.yaw), math.sin(s.yaw)
+    down = c.mass * GRAVITY * c.slope / math.sqrt(1.0 + c.slope * c.slope)
+    gust = c.gust * math.sin(2.0 * math.pi * t / c.gust_period + c.gust_phase)
+    east = c.wind_x - down * math.cos(c.uphill) + gust * math.cos(c.gust_way)
+    north = c.wind_y - down * math.sin(c.uphill) + gust * math.sin(c.gust_way)
+    along += cos * east + sin * north
+    across += cos * north - sin * east
+    way = math.tanh(s.vx / 0.02)
+    extra = c.nap * 0.5 * (1.0 + math.cos(s.yaw - c.nap_way))
+    place = s.x * math.cos(c.tile_way) + s.y * math.sin(c.tile_way)
+    wave = math.sin(2.0 * math.pi * place / c.tile_length + c.tile_phase)
+    extra += c.tiles * 0.5 * (1.0 + wave)
+    extra += c.bend_drag * (abs(s.angle) / c.limit) ** c.bend_power
+    beyond = s.x * math.cos(c.cliff_way) + s.y * math.sin(c.cliff_way) - c.cliff_at
+    extra += c.cliff_drag * 0.5 * (1.0 + math.tanh(beyond / 0.02))
+    return along - extra * way, across, twist
+
+
+@njit(cache=True)
+def spin_wheel(c, wheels, i, u, slow, load, grip, v_long, v_lat, rolling):
+    """Advance one wheel; return the floor's forces on it, along and across [N]."""
+    omega, driven = wheels[i, 0], i > 1 or c.front_driven > 0.0
+    wheels[i, 3] = (wheels[i, 3] + STEP * v_lat / max(c.relaxation, 1e-9)) / (
+        1.0 + STEP * abs(v_long) / max(c.relaxation, 1e-9)
+    )
+    still = max(abs(v_long), c.slow)
+    dry, inertia, torque, damping = rolling * load * c.radius, c.spin_inertia, 0.0, c.damping
+    if driven:
+        u *= 1.0 + (c.asymmetry if i % 2 == 0 else -c.asymmetry)
+        felt = wheels[i, 2] * u
+        heat = 1.0 - 3.0 * c.fade * felt * felt - wheels[i, 2]
+        wheels[i, 2] += heat * STEP / (WARM_S + STEP)
+        stall = c.stall * c.motor_gain
+        around = c.ripple_turns * wheels[i, 1] + c.ripple_phase
+        torque = stall * felt + c.ripple * math.sin(around)
+        damping += stall / c.no_load + c.churn * abs(omega)
+        inertia += c.rotor
+        turn = omega / STICTION_FADE
+        dry += c.coulomb + c.stiction * math.exp(-turn * turn) + (c.hold if slow else 0.0)
+    new = omega
+    for _ in range(2):
+        slip = (c.radius * new - v_long) / still
+        stiff = (
+            load * grip * over_slip(slip, c.slip_peak, c.force_peak, c.slip_slide, c.force_slide)
+        )
+        stiff /= still
+        held = inertia * omega + STEP * (torque + stiff * v_long * c.radius)
+        left = max(abs(held) - STEP * dry, 0.0)
+        new = math.copysign(left, held) / (inertia + STEP * (damping + stiff * c.radius * c.radius))
+    wheels[i, 0] = new
+    wheels[i, 1] += STEP * new
+    side = v_lat / still
+    if c.relaxation > 0.0:
+        rubber = max(0.0, 1.0 - 0.5 * abs(v_long) / c.slow)
+        side = wheels[i, 3] + 0.01 * rubber * v_lat / c.relaxation
+        wheels[i, 3] = min(max(wheels[i, 3], -1.0), 1.0)
+    side *= c.stiffness
+    hold = over_slip(
+        side, c.side_slip_peak, c.side_force_peak, c.side_slip_slide, c.side_force_slide
+    )
+    return stiff * (c.radius * new - v_long), -load * grip * side * hold
+
+
+@njit(cache=True)
+def move(c, s, wheels, t, u):
+    """Advance wheels and body by one step."""
+    along, across, twist = outside_force(c, s, t)
+    slow, tan, front_side = abs(s.throttle) < 0.005, math.tan(s.angle), 0.0
+    cos_yaw, sin_yaw = math.cos(s.yaw), math.sin(s.yaw)
+    for i in range(4):
+        front, left = i < 2, 1.0 if i % 2 == 0 else -1.0
+        ahead, aside = (c.base if front else 0.0), 0.5 * c.track * left
+        share = (c.cog if front else c.base - c.cog) / c.base
+        lean = 1.0 - 2.0 * left * s.load_y * c.height / (GRAVITY * c.track)
+        dive = (-1.0 if front else 1.0) * s.load_x * c.height / (GRAVITY * c.base)
+        load = max(0.5 * c.mass * GRAVITY * (share * lean + dive), 0.0)
+        bend = math.atan2(c.base * tan, c.base - aside * tan) if front else 0.0
+        cos, sin = math.cos(bend), math.sin(bend)
+        v_x, v_y = s.vx - s.yaw_rate * aside, s.vy + s.yaw_rate * (ahead - c.cog)
+        at_x = s.x + cos_yaw * ahead - sin_yaw * aside
+        on = inside_patch(c, at_x, s.y + sin_yaw * ahead + cos_yaw * aside)
+        f_long, f_lat = spin_wheel(
+            c, wheels, i, u, slow, load, c.grip * (1.0 + (c.patch_grip - 1.0) * on),
+            cos * v_x + sin * v_y, cos * v_y - sin * v_x, c.rolling + c.patch_rolling * on,
+        )  # fmt: skip
+        f_x, f_y = cos * f_long - sin * f_lat, sin * f_long + cos * f_lat
+        along, across = along + f_x, across + f_y
+        twist += (ahead - c.cog) * f_y - aside * f_x
+        front_side += f_lat if front else 0.0
+    s.front_side, s.push, s.side = front_side, along / c.mass, across / c.mass
+    s.load_x += (s.push - s.load_x) * STEP / LOAD_LAG
+    s.load_y += (s.side - s.load_y) * STEP / LOAD_LAG
+    vx = s.vx + STEP * (s.push + s.yaw_rate * s.vy)
+    s.vy += STEP * (s.side - s.yaw_rate * s.vx)
+    s.vx = vx
+    s.yaw_rate += STEP * twist / c.inertia
+    middle = s.yaw + 0.5 * STEP * s.yaw_rate
+    drift = s.vy - s.yaw_rate * c.cog
+    s.x += STEP * (s.vx * math.cos(middle) - drift * math.sin(middle))
+    s.y += STEP * (s.vx * math.sin(middle) + drift * math.cos(middle))
+    s.yaw += STEP * s.yaw_rate
+
+
+@njit(cache=True)
+def held(commands, t):
+    """Return the command of the last row at or before `t`; zero before the first."""
+    row = math.floor(t / COMMAND_S + 1e-6)
+    return commands[min(row, len(commands) - 1)] if row >= 0 else 0.0
+
+
+@njit(cache=True)
+def advance(numbers, state, wheels, throttle, steering, shake, first, rows):
+    """Advance by `rows` rows of 2.5 ms from row `first`; return them, shape (rows, 11)."""
+    c, s = numbers[0], state[0]
+    out = np.empty((rows, 11))
+    for row in range(rows):
+        push = side = 0.0
+        for k in range(STEPS_PER_ROW):
+            t = ((first + row) * STEPS_PER_ROW + k) * STEP
+            steer(c, s, t, held(steering, t - c.steer_delay), held(shake, t))
+            u = drive(c, s, t, held(throttle, t - c.drive_delay))
+            move(c, s, wheels, t, u)
+            push, side = push + s.push, side + s.side
+        out[row, 0] = (first + row + 1) * STEPS_PER_ROW * STEP
+        out[row, 1], out[row, 2], out[row, 3] = s.x, s.y, s.yaw
+        out[row, 4], out[row, 5], out[row, 6] = s.vx, s.vy, s.yaw_rate
+        out[row, 7], out[row, 8] = push / STEPS_PER_ROW, side / STEPS_PER_ROW
+        out[row, 9], out[row, 10] = wheels[2, 1], wheels[3, 1]
+    return out
+
+
+class Moving:
+    """A car on the floor that is driven by commands of 20 Hz.
+
+    Args:
+        numbers: Of the car, effects among them.
+        pose: x [m], y [m], yaw [rad] of the rear axle's centre.
+        shake: What a nervous servo adds, one number a command, in units of `numbers["shake"]`.
+    """
+
+    def __init__(self, numbers, pose, commands, shake=None):
+        self.numbers = np.zeros(1, NUMBERS)
+        for name in NUMBERS.names:
+            self.numbers[name] = numbers[name]
+        self.state = np.zeros(1, STATE)
+        self.state["x"], self.state["y"], self.state["yaw"] = pose
+        self.wheels = np.zeros((4, len(WHEEL)))
+        self.wheels[:, WHEEL.index("strength")] = 1.0
+        self.throttle, self.steering = np.zeros(commands), np.zeros(commands)
+        self.shake = np.zeros(commands) if shake is None else shake
+        self.rows = np.empty((0, len(ROW)))
+
+    def command(self, k, throttle, steering):
+        """Give command `k`, drive until the next one is due, and return the new rows."""
+        self.throttle[k], self.steering[k] = throttle, steering
+        rows = STEPS_PER_COMMAND // STEPS_PER_ROW
+        return advance(
+            self.numbers, self.state, self.wheels, self.throttle, self.steering, self.shake,
+            k * rows, rows,
+        )  # fmt: skip

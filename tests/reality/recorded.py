@@ -1,0 +1,117 @@
+"""One drive of one car: driven, sensed and written as a recording."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tests.reality.driver import TEMPERS, Driver, draw_route, draw_speeds
+from tests.reality.motion import COMMAND_S, ROW_S, Moving
+from tests.reality.sensing import POSE_STD, YAW_STD, Camera, encoders, inertial
+
+DESCRIPTION = """recording: 1
+vehicle: {car}
+frame: world            # x right, y up on the floor, yaw counter-clockwise from x; pose of the rear-axle centre
+tables:
+  - file: commands.csv
+    time: {{column: t, unit: s}}
+    channels:
+      command.throttle: {{column: throttle, unit: "1"}}
+      command.steering: {{column: steering, unit: "1"}}
+  - file: pose.csv
+    time: {{column: t, unit: s}}
+    channels:
+      pose.x:   {{column: x, unit: m, std: {pose:g}}}
+      pose.y:   {{column: y, unit: m, std: {pose:g}}}
+      pose.yaw: {{column: yaw, unit: rad, std: {yaw:g}}}
+  - file: encoders.csv
+    time: {{column: t, unit: s}}
+    channels:
+      encoder.left:  {{column: left, unit: count}}
+      encoder.right: {{column: right, unit: count}}
+  - file: imu.csv
+    time: {{column: t, unit: s}}
+    channels:
+      imu.accel_x: {{column: ax, unit: m/s^2, std: {accel:g}}}
+      imu.accel_y: {{column: ay, unit: m/s^2, std: {accel:g}}}
+      imu.gyro_z:  {{column: gz, unit: rad/s, std: {gyro:g}}}
+"""  # noqa: E501
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What was recorded, as tables with a column of time each, and the truth behind it.
+
+    Attributes:
+        rows: What really happened, every 2.5 ms; see `motion.ROW`.
+        fastest: Speed that the driver allowed himself [m/s].
+    """
+
+    commands: np.ndarray
+    poses: np.ndarray
+    encoders: np.ndarray
+    imu: np.ndarray
+    rows: np.ndarray
+    fastest: float
+    span: tuple[float, float]
+    shape: str
+
+
+def record(car, numbers, faults, duration, rng, moving=Moving):
+    """Let a driver drive a car and return what the sensors saw of it."""
+    temper, commands = TEMPERS[car], round(duration / COMMAND_S)
+    route = draw_route(temper, np.tan(numbers["limit"]) / numbers["base"], rng)
+    wished, fastest = draw_speeds(temper, duration, rng)
+    driver = Driver(temper, route, wished, numbers["base"], numbers["limit"], rng)
+    first, second = route.points[0], route.points[3]
+    start = (*first, np.arctan2(*(second - first)[::-1]))
+    camera = Camera(faults, car, duration, rng)
+    shake = _bursts(commands, rng)
+    body = moving(numbers, start, commands, shake)
+    rows = np.empty((round(duration / ROW_S), 11))
+    done, given = 0, np.empty((commands, 3))
+    for k in range(commands):
+        t = k * COMMAND_S
+        for stamp, pose in camera.look(rows[:done], start, t):
+            driver.look(stamp, pose)
+        throttle, steering = np.round(driver.act(k), 5)
+        given[k] = t, throttle, steering
+        new = body.command(k, throttle, steering)
+        rows[done : done + len(new)] = new
+        done += len(new)
+    camera.look(rows, start, duration)
+    noise = numbers["accel_noise"], numbers["gyro_noise"]
+    return Drive(
+        given, camera.table(), encoders(rows, faults, numbers["counts"], duration),
+        inertial(rows, faults, noise, duration, rng), rows, fastest,
+        tuple(float(v) for v in np.ptp(route.points, axis=0)), route.shape,
+    )  # fmt: skip
+
+
+def _bursts(commands, rng):
+    """Return noise that comes for two seconds in ten, of standard deviation 1, one a command."""
+    t = np.arange(commands) * COMMAND_S
+    on = (t + rng.uniform(0.0, 10.0)) % 10.0 < 2.0
+    return on * rng.standard_normal(commands)
+
+
+TABLES = (
+    ("commands", "t,throttle,steering", ("%.4f", "%.5f", "%.5f")),
+    ("poses", "t,x,y,yaw", ("%.4f", "%.5f", "%.5f", "%.5f")),
+    ("encoders", "t,left,right", ("%.4f", "%d", "%d")),
+    ("imu", "t,ax,ay,gz", ("%.4f", "%.4f", "%.4f", "%.5f")),
+)
+FILES = {"commands": "commands.csv", "poses": "pose.csv", "encoders": "encoders.csv"}
+
+
+def write(drive, car, numbers, folder: Path):
+    """Write a drive as a recording that says nothing of what is concealed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, header, form in TABLES:
+        path = folder / FILES.get(name, f"{name}.csv")
+        np.savetxt(path, getattr(drive, name), form, ",", header=header, comments="")
+    text = DESCRIPTION.format(
+        car=car, pose=POSE_STD[car], yaw=YAW_STD, accel=numbers["accel_noise"],
+        gyro=numbers["gyro_noise"],
+    )  # fmt: skip
+    (folder / "recording.yaml").write_text(text, encoding="utf-8")

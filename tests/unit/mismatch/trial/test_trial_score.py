@@ -1,0 +1,169 @@
+"""A diagnosis is judged by names, laws and parameters, and by nothing kinder."""
+
+import math
+
+import pytest
+
+from scm.mismatch.findings import (
+    Diagnosis,
+    Effect,
+    Equation,
+    Estimate,
+    Undecided,
+    Verdict,
+)
+from scm.mismatch.trial.labels import label_of
+from scm.mismatch.trial.score import failed, score
+from scm.mismatch.trial.table import lines, wilson
+
+
+def label(*names, parameters=None, listed=True, equation="body", depends_on=("time",), **more):
+    said = {
+        "names": list(names), "car": "nigel", "equation": equation, "listed": listed,
+        "depends_on": list(depends_on), "parameters": parameters or [{} for _ in names], **more,
+    }  # fmt: skip
+    return label_of("case_000", said)
+
+
+def effect(name, *, listed=True, equation=Equation.BODY, depends_on=("time",), **values):
+    estimates = {
+        key: Estimate(value=value, low=low, high=high, unit="1")
+        for key, (value, low, high) in values.items()
+    }
+    return Effect(
+        name=name, listed=listed, equation=equation, depends_on=depends_on, parameters=estimates,
+        probability=0.9, said="",
+    )  # fmt: skip
+
+
+def diagnosis(*effects, undecided=()):
+    verdict = Verdict.MISMATCH if effects else Verdict.UNDECIDED if undecided else Verdict.NONE
+    groups = tuple(
+        Undecided(between=tuple(group), drive_this="", expected_separation=0.0)
+        for group in undecided
+    )
+    return Diagnosis(
+        verdict=verdict, located=(), effects=effects, undecided=groups, fit=None, runtime_s=1.0
+    )
+
+
+def test_the_right_name_alone_is_exact():
+    got = score(label("wind"), diagnosis(effect("wind")))
+    assert (got.exact, got.among, got.missed, got.false_names) == (True, True, False, ())
+
+
+def test_a_second_name_spoils_exactness_but_not_the_first():
+    got = score(label("wind"), diagnosis(effect("wind"), effect("steer_trim")))
+    assert (got.exact, got.among, got.false_names) == (False, True, ("steer_trim",))
+
+
+def test_a_wrong_name_is_neither_found_nor_missed():
+    got = score(label("steer_gain"), diagnosis(effect("steer_trim")))
+    assert (got.exact, got.among, got.missed) == (False, False, False)
+
+
+def test_silence_about_an_effect_is_a_miss():
+    assert score(label("wind"), diagnosis()).missed
+
+
+def test_silence_about_nothing_is_exact():
+    got = score(label(), diagnosis())
+    assert got.exact
+    assert not got.false_names
+
+
+@pytest.mark.parametrize(
+    "found", [diagnosis(effect("wind")), diagnosis(undecided=[("wind", "grade")])]
+)
+def test_anything_about_nothing_is_a_false_alarm(found):
+    got = score(label(), found)
+    assert not got.exact
+    assert got.false_names
+
+
+def test_one_of_two_is_neither_exact_nor_enough():
+    got = score(label("wind", "steer_gain"), diagnosis(effect("wind")))
+    assert (got.exact, got.among, got.false_names) == (False, False, ())
+
+
+def test_twins_that_no_drive_tells_apart_are_right_when_left_undecided():
+    assert score(label("payload"), diagnosis(undecided=[("payload", "motor_gain")])).exact
+    assert not score(label("payload"), diagnosis(undecided=[("payload", "steer_gain")])).exact
+    assert not score(label("steer_lag"), diagnosis(undecided=[("steer_lag", "steer_delay")])).exact
+
+
+def test_an_undecided_name_is_among_those_reported():
+    got = score(label("steer_lag"), diagnosis(undecided=[("steer_lag", "steer_delay")]))
+    assert got.among
+
+
+LAW = {"listed": False, "equation": "surface", "depends_on": ("heading",)}
+
+
+@pytest.mark.parametrize(
+    ("said", "right"),
+    [
+        (effect("drag", listed=False, equation=Equation.SURFACE, depends_on=("yaw",)), True),
+        (effect("drag", listed=False, equation=Equation.BODY, depends_on=("heading",)), True),
+        (effect("drag", listed=False, equation=Equation.STEERING, depends_on=("heading",)), False),
+        (effect("drag", listed=False, equation=Equation.BODY, depends_on=("time",)), False),
+        (effect("d", listed=False, equation=Equation.BODY, depends_on=("yaw", "time")), False),
+        (effect("grade", equation=Equation.SURFACE, depends_on=("heading",)), False),
+    ],
+)
+def test_a_law_outside_the_library_needs_its_equation_and_variables(said, right):
+    truth = label("nap", or_equation=["body", "drive"], **LAW)
+    assert score(truth, diagnosis(said)).exact is right
+
+
+def test_a_parameters_error_is_relative_to_what_it_does():
+    truth = label("steer_gain", parameters=[{"gain": 1.2}])
+    got = score(truth, diagnosis(effect("steer_gain", gain=(1.25, 1.21, 1.3))))
+    assert got.errors == (pytest.approx(0.25),)
+    assert got.covered == (False,)
+
+
+def test_an_angle_is_compared_the_short_way_round():
+    truth = label("grade", parameters=[{"slope": 0.02, "uphill_rad": math.pi - 0.05}])
+    found = effect(
+        "grade", slope=(0.02, 0.01, 0.03), uphill_rad=(-math.pi + 0.05, -3.15, -math.pi + 0.15)
+    )
+    got = score(truth, diagnosis(found))
+    assert got.errors == (pytest.approx(0.0), pytest.approx(0.1))
+    assert got.covered == (True, False)
+
+
+def test_parts_of_a_vector_are_measured_by_its_length():
+    truth = label("wind", parameters=[{"force_x_n": 0.0, "force_y_n": 0.5}])
+    found = effect("wind", force_x_n=(0.05, -0.1, 0.1), force_y_n=(0.5, 0.4, 0.6))
+    assert score(truth, diagnosis(found)).errors == (pytest.approx(0.1), pytest.approx(0.0))
+
+
+def test_shared_parameters_of_a_shipped_pair_go_where_the_library_says():
+    truth = label(
+        "battery_sag", "wheel_radius", parameters={"fraction_per_min": 0.1, "scale": 1.03}
+    )
+    assert truth.parameters == ({"fraction_per_min": 0.1}, {"scale": 1.03})
+    assert truth.kind == "pair"
+
+
+def test_wilsons_interval_is_that_of_the_textbook():
+    low, high = wilson(9, 10)
+    assert (low, high) == (pytest.approx(0.5958, abs=1e-3), pytest.approx(0.9821, abs=1e-3))
+    assert wilson(0, 0) == (0.0, 1.0)
+
+
+def test_the_table_counts_each_kind_and_names_what_went_wrong():
+    outcomes = [
+        score(label("wind", strength=[1.5]), diagnosis(effect("wind"))),
+        score(label("steer_gain", strength=[3.0]), diagnosis(effect("steer_trim"))),
+        score(label(), diagnosis()),
+        failed(label("steer_lag", strength=[2.5]), "ValueError: no"),
+    ]
+    table = lines(outcomes, [])
+    text = "\n".join(table)
+    shares = {line[:26].strip(): line[26:].split()[:2] for line in table[:4]}
+    assert shares["single"] == ["3", "33"]
+    assert shares["of these, 2 x floor up"] == ["2", "0"]
+    assert "1 x  steer_gain  ->  steer_trim" in text
+    assert "1 x  steer_lag  ->  ValueError: no" in text

@@ -1,0 +1,84 @@
+"""Cases conceal what their label says, and labels cannot be changed unseen."""
+
+import json
+
+import numpy as np
+import pytest
+
+from scm.vehicles.car import all_terms
+from scm.vehicles.measure import all_measures
+from tests.reality import cases
+from tests.reality.cases import draw_kinds, make_case, seal, write_cases
+from tests.reality.concealed import EFFECTS, LISTED
+from tests.reality.numbers import nominal
+
+
+def test_every_listed_name_and_parameter_is_one_of_the_librarys():
+    for effect in LISTED:
+        library = all_measures().get(effect.name) or all_terms()[effect.name]
+        parts = [library, *getattr(library, "also", ())]
+        names = {param.reported for part in parts for param in part.params}
+        for car, smallest in effect.smallest.items():
+            drawn = effect.draw(smallest, np.random.default_rng(0), car)
+            assert set(drawn.parameters) <= names, effect.name
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Let cases be drives of five seconds."""
+    monkeypatch.setattr(cases, "DRIVES", (("drive", 5.0), ("again", 5.0)))
+
+
+def test_half_of_the_cars_are_not_quite_as_their_file_says(short):
+    moved = [
+        bool(make_case("none", np.random.default_rng(seed), car="nigel")[0]["ordinary"])
+        for seed in range(12)
+    ]
+    assert 0 < sum(moved) < 12
+
+
+def test_strengths_are_multiples_of_the_smallest_effect(short):
+    rng = np.random.default_rng(2)
+    label, _, numbers = make_case("single", rng, (2.0, 3.0), names=("steer_trim",), car="nigel")
+    offset = abs(label["parameters"][0]["offset_rad"])
+    assert 2.0 <= offset / EFFECTS["steer_trim"].smallest["nigel"] <= 3.0
+    assert abs(numbers["trim"]) == offset
+    assert nominal("nigel")["trim"] == 0.0
+
+
+def test_both_drives_cross_a_patch():
+    rng = np.random.default_rng(3)
+    label, drives, _ = make_case("single", rng, names=("surface_patch",), car="nigel")
+    spot = label["parameters"][0]
+    for drive in drives.values():
+        away = np.hypot(drive.rows[:, 1] - spot["x_m"], drive.rows[:, 2] - spot["y_m"])
+        assert away.min() < 0.7 * spot["radius_m"]
+
+
+def test_a_seal_tells_a_changed_label_and_hides_the_true_one():
+    label = {"names": ["wind"], "parameters": [{"force_x_n": 0.5}]}
+    sealed = seal(label, "salt")
+    assert seal(label | {"names": ["grade"]}, "salt") != sealed
+    assert seal(label, "pepper") != sealed
+    assert seal(json.loads(json.dumps(label)), "salt") == sealed
+
+
+def test_a_case_is_the_same_however_many_there_are(short, tmp_path):
+    write_cases(tmp_path / "one", 4, ["none"])
+    write_cases(tmp_path / "two", 4, ["none", "none"])
+    first, second = ((tmp_path / name / "sealed.txt").read_text() for name in ("one", "two"))
+    assert second.startswith(first)
+
+
+def test_kinds_are_mixed_as_wished():
+    assert draw_kinds("none", 3, 0) == ["none"] * 3
+    assert {*draw_kinds("mixed", 60, 0)} == {"single", "none", "pair", "unlisted"}
+
+
+@pytest.mark.parametrize("kind", ["single", "pair", "unlisted"])
+def test_a_recording_says_nothing_of_what_is_concealed(kind, short, tmp_path):
+    write_cases(tmp_path, 9, [kind])
+    label = json.loads((tmp_path / "labels" / "case_000.json").read_text())["label"]
+    for path in (tmp_path / "case_000").rglob("*.*"):
+        text = path.read_text()
+        assert not any(name in text for name in label["names"])
