@@ -11,12 +11,16 @@ _UNLISTED = (
     "No known effect explains it, so look at what changes with {drivers}. Until the cause is "
     "found, car.toml holds the law as it was measured."
 )
+_LISTED = (
+    "Hold the car against the numbers above, and correct the car file where they are right: "
+    "car.toml has them."
+)
 
 
 def advice_of(effect: Effect) -> str:
     """Return what to check or mend; for an effect outside the library, where to look."""
-    if effect.name in _table():
-        return _table()[effect.name]
+    if effect.listed:
+        return _table().get(effect.name, _LISTED)
     return _UNLISTED.format(drivers=" and ".join(effect.depends_on) or "the drive")
 
 

@@ -142,17 +142,23 @@ def _believed(param: Param | None) -> str:
     low, high = map(short, param.bounds)
     bounds = f"{low} to {high} {unit_text(param.unit)}".rstrip()
     if isinstance(param.prior, Normal):
-        return f"{short(param.prior.mean)} ± {short(param.prior.std)}, of {bounds}"
+        return f"{short(param.prior.mean)} ± {short(param.prior.std)}, within {bounds}"
     if isinstance(param.prior, LogNormal):
-        return f"about {short(param.prior.median)}, of {bounds}"
+        return f"about {short(param.prior.median)}, within {bounds}"
     return bounds
 
 
 def _ordinary_table(evidence: Evidence) -> str:
     rows = [
-        (o.key, f"{o.given:.4g} ± {o.given_std:.2g}", interval(o.found)) for o in evidence.ordinary
+        (
+            o.key,
+            f"{short(o.given)} ± {short(o.given_std)}",
+            short(o.found.value),
+            f"{short(o.found.low)} to {short(o.found.high)}",
+        )
+        for o in evidence.ordinary
     ]
-    return table(("ordinary number", "car file", "found, with 90 % interval"), rows)
+    return table(("ordinary number", "car file", "found", "90 % interval"), rows, (1, 2, 3))
 
 
 def _rival_table(diagnosis: Diagnosis) -> str:

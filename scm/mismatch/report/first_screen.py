@@ -103,7 +103,7 @@ def _effect_cards(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _amounts(effect: Effect) -> str:
-    return "; ".join(
+    return "\n".join(
         f"{name_of(name, estimate.unit)} {interval(estimate)}"
         for name, estimate in effect.parameters.items()
     )

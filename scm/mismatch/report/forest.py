@@ -18,7 +18,7 @@ def forest_picture(ordinary: Sequence[Ordinary]) -> Picture | None:
         return None
     ends = [abs(_moved(o, v)) for o in shown for v in (o.found.value, o.found.low, o.found.high)]
     wide = min(_MOST_STDS, max(_FEWEST_STDS, 1.1 * max(e for e in ends if math.isfinite(e))))
-    left = min(210.0, 14.0 + TEXT_PX * max(len(o.key) for o in shown))
+    left = min(220.0, 14.0 + TEXT_PX * max(len(o.key) for o in shown))
     height = 30.0 + _ROW * len(shown) + 44.0
     room = frame((-wide, wide), (0.0, 1.0), (_WIDTH, height), margins=(left, 14, 26, 44))
     parts = []
@@ -43,8 +43,8 @@ def forest_picture(ordinary: Sequence[Ordinary]) -> Picture | None:
     return Picture(
         name="numbers",
         title="How far ordinary numbers moved",
-        said="Dots: found, with 90 % intervals. Dark area: one standard deviation as the car file "
-        "states it, light area: two. Inside, the car file was right.",
+        said="Dots: found, with 90 % intervals. Inner area: one standard deviation as the car "
+        "file states it, outer area: two. Inside, the car file was right.",
         svg=picture_svg(_WIDTH, height, parts, "Ordinary numbers, before and after"),
     )
 

@@ -7,8 +7,9 @@ from scm.mismatch.report.plot import Picture
 
 
 def tag(name: str, said: str, kind: str = "") -> str:
-    """Return one element around a text."""
-    return around(name, escape(said), kind)
+    """Return one element around a text; a line of the text is one of the page."""
+    lines = escape(said).replace(" %", "&nbsp;%").replace("\n", "<br>")
+    return around(name, lines, kind)
 
 
 def around(name: str, inner: str, kind: str = "") -> str:

@@ -17,7 +17,7 @@ from scm.maps.svg import element
 from scm.vehicles.manual.line_svg import Axis, equally_scaled
 
 MARGINS = (62.0, 14.0, 30.0, 40.0)  # left, right, top, bottom
-TEXT_PX = 7.2  # width of a letter at the pictures' size of text
+TEXT_PX = 7.6  # width of a letter at the pictures' size of text
 _FEWEST_SPAN = 1e-9
 _FEWEST_TICKS = 3
 _SMALLEST_FLOOR_M = 0.05
@@ -218,7 +218,10 @@ def _unbroken(known: Bools) -> Iterator[slice]:
 def legend(x: float, y: float, entries: Sequence[tuple[str, str]]) -> Iterator[str]:
     """Yield (class, words) side by side."""
     for kind, words in entries:
-        yield element("path", d=f"M{x:.1f} {y - 4:.1f}h24", class_=kind)
+        if kind == "shade":
+            yield element("rect", x=x, y=y - 10, width=24, height=12, class_=kind)
+        else:
+            yield element("path", d=f"M{x:.1f} {y - 4:.1f}h24", class_=kind)
         yield text(x + 30, y, words)
         x += 30 + TEXT_PX * len(words) + 22
 

@@ -41,17 +41,10 @@ def time_line(
     if not shown:
         return None
     span = span_of(*(residual.t_s for residual in shown), room=0.0)
-    parts = list(
-        legend(
-            66.0,
-            16.0,
-            [("before thin", "the simulator as it was"), ("after thin", "with what was found")],
-        )
-    )
     spans = [when for found in located for when in found.when_s or ()]
-    if spans:
-        parts += [element("rect", x=430, y=6, width=24, height=12, class_="shade")]
-        parts += [text(460.0, 16.0, "when the error was found to act")]
+    entries = [("before thin", "the simulator as it was"), ("after thin", "with what was found")]
+    entries += [("shade", "when the error was found to act")] if spans else []
+    parts = list(legend(66.0, 16.0, entries))
     y = _TOP
     for residual in shown:
         room = frame(span, _heights(residual), (WIDTH, PANEL), (0.0, y), _MARGINS)

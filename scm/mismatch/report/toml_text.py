@@ -46,17 +46,31 @@ def set_list(text: str, key: str, names: Sequence[str], comment: str) -> str:
         return _new_list(text, key, names, comment)
     stop = end_of_value(text, found.end())
     body = text[found.end() + 1 : stop - 1]
-    there = [json.loads(f'"{name}"') for name in re.findall(r'"([^"\n]*)"', body)]
+    there = [name for name, _ in _strings(body)]
     for name in there:
         if name not in names:
             body = re.sub(rf'"{re.escape(name)}"[ \t]*,?[ \t]*', "", body)
     new = [name for name in names if name not in there]
     if new:
-        kept = body.rstrip()
-        comma = "," if re.search(r'"\s*$', kept) else ""
         added = ", ".join(map(quoted, new))
-        body = f"{kept}{comma}\n    {added},  # {comment}\n"
+        body = f"{_with_last_comma(body)}\n    {added},  # {comment}\n"
     return f"{text[: found.end()]}[{body}]{text[stop:]}"
+
+
+def _strings(body: str) -> list[tuple[str, int]]:
+    """Return the strings of a list with where each ends; what stands in comments is none."""
+    tokens = re.finditer(r'"([^"\n]*)"|#[^\n]*', body)
+    return [(token[1], token.end()) for token in tokens if token[1] is not None]
+
+
+def _with_last_comma(body: str) -> str:
+    """Return the inside of a list so that more may follow."""
+    listed = _strings(body)
+    if not listed:
+        return body.rstrip()
+    end = listed[-1][1]
+    closed = re.sub(r"#[^\n]*", "", body[end:]).strip().startswith(",")
+    return (body if closed else f"{body[:end]},{body[end:]}").rstrip()
 
 
 def _new_list(text: str, key: str, names: Sequence[str], comment: str) -> str:

@@ -7,12 +7,12 @@ from scm.mismatch.findings import Effect, Equation, Estimate, Located, Place, Sp
 from scm.vehicles.describe_effects import all_effects
 
 PARTS_OF_CAR = {
-    Equation.DRIVE: "drive",
-    Equation.STEERING: "steering",
-    Equation.TYRE: "tyres",
-    Equation.BODY: "body",
-    Equation.SURFACE: "floor",
-    Equation.SENSOR: "measuring",
+    Equation.DRIVE: "In the drive",
+    Equation.STEERING: "In the steering",
+    Equation.TYRE: "In the tyres",
+    Equation.BODY: "On the body",
+    Equation.SURFACE: "From the floor",
+    Equation.SENSOR: "In the measuring",
 }
 _SCALES = {  # smallest value of each unit, and how many of it one SI unit is
     "m": ((1.0, "m", 1.0), (0.01, "cm", 100.0), (0.0, "mm", 1000.0)),
@@ -72,11 +72,13 @@ def interval(estimate: Estimate) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share in percent, never more sure than 99.9 %."""
+    """Return a share in percent, never 0 or 100 %."""
     if not math.isfinite(share):
         return "unknown"
-    if 0.999 < share <= 1.0:
+    if share > 0.999:
         return "over 99.9 %"
+    if share < 0.001:
+        return "under 0.1 %"
     return f"{100.0 * share:.1f} %" if share > 0.985 or share < 0.01 else f"{100.0 * share:.0f} %"
 
 
@@ -98,11 +100,11 @@ def where_and_when(found: Sequence[Located]) -> str:
 def _one_place(located: Located) -> str:
     where = place(located.where) if located.where else "everywhere on the floor"
     when = spans(located.when_s) if located.when_s else "all the time"
-    said = f"In the {PARTS_OF_CAR[located.equation]}, {where}, {when}."
+    said = f"{PARTS_OF_CAR[located.equation]}, {where}, {when}."
     if located.channels:
-        said += f" Seen in {', '.join(located.channels)}."
+        said += f" Seen in {joined(located.channels)}."
     if located.depends_on:
-        said += f" It goes with {', '.join(located.depends_on)}."
+        said += f" It depends on {joined(located.depends_on)}."
     return f"{said} It makes {percent(located.share_of_error)} of the error."
 
 

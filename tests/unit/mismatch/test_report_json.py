@@ -1,0 +1,61 @@
+"""`report.json`: exactly the fixed fields, and numbers that every reader takes."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from scm.mismatch.findings import Estimate
+from scm.mismatch.report.as_json import json_text, report_fields
+from tests.unit.mismatch import made_up_findings as made_up
+
+TOP = {"verdict", "located", "effects", "undecided", "fit", "runtime_s", "data"}
+LOCATED = {"equation", "channels", "depends_on", "when_s", "where", "share_of_error"}
+EFFECT = {"name", "listed", "equation", "depends_on", "parameters", "probability", "said", "law",
+          "rivals"}  # fmt: skip
+
+
+def read(diagnosis):
+    def refuse(word):
+        raise AssertionError(word)
+
+    return json.loads(json_text(diagnosis), parse_constant=refuse)
+
+
+@pytest.mark.parametrize("name", made_up.CASES)
+def test_the_fields_are_exactly_the_fixed_ones(name):
+    assert set(read(made_up.CASES[name]()[0])) == TOP
+
+
+def test_what_stands_inside_has_exactly_the_fixed_fields():
+    report = read(made_up.pair()[0])
+    assert all(set(found) == LOCATED for found in report["located"])
+    assert set(report["located"][1]["where"]) == {"x_m", "y_m"}
+    assert report["located"][1]["when_s"][0] == [9.0, 11.5]
+    assert all(set(effect) == EFFECT for effect in report["effects"])
+    assert set(report["effects"][0]["rivals"][0]) == {"name", "probability", "ruled_out_by"}
+    estimate = report["effects"][0]["parameters"]["time_constant_s"]
+    assert set(estimate) == {"value", "low", "high", "unit"}
+    assert set(report["fit"]) == {"horizon_s", "fit", "choose", "confirm"}
+    assert set(report["fit"]["confirm"]) == {"windows", "before", "after", "noise_floor"}
+
+
+def test_an_open_question_has_exactly_the_fixed_fields():
+    (question,) = read(made_up.undecided()[0])["undecided"]
+    assert set(question) == {"between", "drive_this", "expected_separation"}
+
+
+def test_words_of_the_verdict_are_text():
+    report = report_fields(made_up.pair()[0])
+    assert report["verdict"] == "mismatch"
+    assert type(report["verdict"]) is str
+    assert report["effects"][1]["equation"] == "surface"
+
+
+def test_what_is_no_finite_number_is_null():
+    endless = Estimate(value=float("nan"), low=float("-inf"), high=float("inf"), unit="s")
+    effect = replace(made_up.lag(), parameters={"time_constant_s": endless})
+    report = read(made_up.diagnosis(effects=(effect,), runtime_s=float("nan")))
+    found = report["effects"][0]["parameters"]["time_constant_s"]
+    assert (found["value"], found["low"], found["high"]) == (None, None, None)
+    assert report["runtime_s"] is None

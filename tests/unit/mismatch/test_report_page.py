@@ -1,0 +1,215 @@
+"""The page: complete, self-contained, and safe whatever names the files hold."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from scm.mismatch.evidence import Evidence, Residual
+from scm.mismatch.findings import DataProblem, Effect, Equation, Verdict
+from scm.mismatch.report.summary import summary
+from scm.mismatch.report.write import write_report
+from scm.vehicles.car import load_car
+from tests.unit.mismatch import made_up_findings as made_up
+
+ADDRESS = re.compile(r"""(?:https?:)?//[\w.-]+|url\(|@import|<link|<script|\bsrc\s*=""")
+NAMESPACE = "http://www.w3.org/2000/svg"
+NASTY = "<script>alert('x')</script>&\"quoted\""
+
+
+def written(folder, case):
+    write_report(*case, folder)
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+class Balanced(HTMLParser):
+    """Complains where an element is not closed, or another one is."""
+
+    VOID = ("meta", "br", "img", "hr", "input")
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.names = [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.names.append(tag)
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.names.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@pytest.mark.parametrize("name", made_up.CASES)
+def test_the_page_asks_nobody_for_anything(tmp_path, name):
+    page = written(tmp_path, made_up.CASES[name]())
+    assert not ADDRESS.findall(page.replace(NAMESPACE, ""))
+
+
+@pytest.mark.parametrize("name", made_up.CASES)
+def test_every_element_of_the_page_is_closed(tmp_path, name):
+    parser = Balanced()
+    parser.feed(written(tmp_path, made_up.CASES[name]()))
+    assert parser.open == []
+
+
+@pytest.mark.parametrize("name", made_up.CASES)
+def test_no_number_of_the_page_is_nan(tmp_path, name):
+    page = written(tmp_path, made_up.CASES[name]())
+    assert not re.search(r"\b(nan|inf)\b", page, re.IGNORECASE)
+
+
+def test_every_picture_of_the_page_is_a_file_with_its_colours(tmp_path):
+    page = written(tmp_path, made_up.pair())
+    files = sorted((tmp_path / "pictures").glob("*.svg"))
+    assert page.count("<svg") == len(files)
+    for file in files:
+        picture = file.read_text(encoding="utf-8")
+        assert "--before:" in picture
+        assert picture.partition("</style>")[2].partition("</svg>")[0] in page
+
+
+def test_a_second_report_leaves_no_picture_of_the_first(tmp_path):
+    written(tmp_path, made_up.pair())
+    written(tmp_path, made_up.bad_data())
+    assert list((tmp_path / "pictures").glob("*.svg")) == []
+
+
+def test_names_from_files_cannot_write_html(tmp_path):
+    effect = replace(made_up.unlisted(), name=NASTY, said=NASTY, law=NASTY, depends_on=(NASTY,))
+    problem = DataProblem(channel=NASTY, name=NASTY, said=NASTY, record_instead=NASTY)
+    found = made_up.diagnosis(verdict=Verdict.MISMATCH, effects=(effect,), data=(problem,))
+    shown = made_up.evidence(
+        vehicle=NASTY,
+        recordings=(NASTY,),
+        residuals=(replace(made_up.evidence().residuals[0], channel=NASTY, unit=NASTY),),
+        curves=(replace(made_up.curve(NASTY), x_name=NASTY, y_name=NASTY, x_unit=NASTY),),
+        ordinary=(replace(made_up.ordinary()[0], key=NASTY),),
+        tried=(replace(made_up.tried()[0], name=NASTY),),
+    )
+    nigel = load_car("nigel")
+    page = written(tmp_path, (found, shown, nigel, nigel))
+    parser = Balanced()
+    parser.feed(page)
+    assert "script" not in parser.names
+    assert page.count("&lt;script&gt;") > 15
+
+
+@pytest.mark.parametrize("name", made_up.CASES)
+def test_evidence_that_is_empty_breaks_nothing(tmp_path, name):
+    found, _, car, patched = made_up.CASES[name]()
+    page = written(tmp_path, (found, Evidence(vehicle="x", recordings=()), car, patched))
+    assert "<h1>" in page
+
+
+def test_arrays_that_are_empty_or_unknown_break_nothing(tmp_path):
+    nothing, unknown = np.zeros(0), np.full(40, np.nan)
+    t = np.arange(40.0)
+    sides = {"t_s": t, "x_m": unknown, "y_m": unknown, "before": unknown, "after": unknown}
+    shown = made_up.evidence(
+        residuals=(
+            Residual(channel="a", unit="N", **dict.fromkeys(sides, nothing), std=nothing),
+            Residual(channel="b", unit="N", **sides, std=unknown),
+        ),
+        curves=(replace(made_up.curve(), x=nothing, y=nothing, low=nothing, high=nothing),),
+        free_runs=replace(
+            made_up.free_runs(),
+            measured={k: np.full((30, 61), np.nan) for k in ("x", "y", "yaw")},
+        ),
+    )
+    nigel = load_car("nigel")
+    page = written(tmp_path, (made_up.diagnosis(), shown, nigel, nigel))
+    assert not re.search(r"\bnan\b", page)
+
+
+def test_a_car_at_rest_has_a_map_too(tmp_path):
+    still = made_up.evidence().residuals[0]
+    shown = made_up.evidence(residuals=(replace(still, x_m=0 * still.x_m, y_m=0 * still.y_m),))
+    nigel = load_car("nigel")
+    page = written(tmp_path, (made_up.diagnosis(), shown, nigel, nigel))
+    assert "cm</text>" in page
+
+
+def test_an_hour_of_driving_stays_below_one_and_a_half_megabytes(tmp_path):
+    names = ("drive force", "side force", "yaw moment", "wheel angle", "pose.x", "pose.y")
+    shown = made_up.evidence(
+        residuals=tuple(
+            made_up.residual(name, "N", lambda t, x, y: np.sin(17 * t), i, seconds=3600.0)
+            for i, name in enumerate(names)
+        ),
+        free_runs=made_up.free_runs(windows=1200),
+    )
+    nigel = load_car("nigel")
+    assert len(written(tmp_path, (made_up.diagnosis(), shown, nigel, nigel))) < 1_500_000
+
+
+VERDICTS = {
+    "one_effect": "The simulator leaves out throttle lag.",
+    "pair": "The simulator leaves out throttle lag and surface patch.",
+    "none": "Nothing beyond noise",
+    "undecided": "Motor gain or payload: this recording cannot tell which.",
+    "unlisted_law": "an effect that no list has, drive force against heading",
+    "bad_data": "This recording does not allow a verdict on the car.",
+}
+
+
+@pytest.mark.parametrize(("name", "sentence"), VERDICTS.items())
+def test_the_page_opens_with_the_verdict_in_plain_words(tmp_path, name, sentence):
+    page = written(tmp_path, made_up.CASES[name]())
+    assert sentence in re.search(r"<h1>(.*?)</h1>", page)[1]
+
+
+@pytest.mark.parametrize(("name", "sentence"), VERDICTS.items())
+def test_the_command_line_says_the_same_verdict(tmp_path, name, sentence):
+    assert sentence in summary(made_up.CASES[name]()[0], tmp_path)
+
+
+def test_a_fault_of_measuring_is_not_blamed_on_the_simulator(tmp_path):
+    effect = Effect(name="gyro_bias", listed=True, equation=Equation.SENSOR, depends_on=(),
+                    parameters={"bias_rad_s": made_up.estimate(0.02, "rad/s")}, probability=0.99,
+                    said="The gyro turns at rest.")  # fmt: skip
+    found = made_up.diagnosis(verdict=Verdict.MISMATCH, effects=(effect,))
+    nigel = load_car("nigel")
+    page = written(tmp_path, (found, made_up.evidence(), nigel, nigel))
+    assert "<h1>Not the car, its measuring is off: gyro bias.</h1>" in page
+
+
+def test_problems_that_stop_the_verdict_stand_on_the_first_screen(tmp_path):
+    first, _, _ = written(tmp_path, made_up.bad_data()).partition("<nav>")
+    assert "The recording holds no throttle command." in first
+    assert "Keep the tag in the camera" in first
+
+
+def test_what_to_do_stands_on_the_first_screen(tmp_path):
+    first, _, _ = written(tmp_path, made_up.one_effect()).partition("<nav>")
+    assert "Look for a soft start" in first
+
+
+def test_the_first_screen_says_how_much_better_it_got(tmp_path):
+    first, _, _ = written(tmp_path, made_up.one_effect()).partition("<nav>")
+    assert "off by 36.1 cm after 3 s" in first
+    assert "off by 4.2 cm" in first
+
+
+def test_an_undecided_page_says_what_to_drive(tmp_path):
+    first, _, _ = written(tmp_path, made_up.undecided()).partition("<nav>")
+    assert "Put a known mass of 0.5 kg on the car" in first
+
+
+def test_windows_shown_are_those_that_the_fit_did_not_see(tmp_path):
+    found, shown, car, patched = made_up.one_effect()
+    written(tmp_path, (found, shown, car, patched))
+    starts = {
+        f"{start:.1f}"
+        for start, part in zip(shown.free_runs.start_s, shown.free_runs.part, strict=True)
+        if part == "confirm"
+    }
+    files = list((tmp_path / "pictures").glob("free_run_*.svg"))
+    drawn = {re.search(r"from ([\d.]+) s</text>", f.read_text())[1] for f in files}
+    assert drawn
+    assert drawn <= starts
