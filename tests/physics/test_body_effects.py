@@ -11,6 +11,7 @@ from scm.vehicles.body14 import GRAVITY
 from scm.vehicles.car import all_terms, load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.jit import plain
+from scm.vehicles.term import flat
 
 FREE = {
     "drive.stall_torque_nm": 0.0,
@@ -19,12 +20,29 @@ FREE = {
     "wheel.damping_linear_nms": 0.0,
     "wheel.rolling_resistance": 0.0,
 }
+BODY = (
+    "grade", "wind", "corner_drag", "understeer", "surface_patch", "payload", "com_shift",
+    "load_transfer", "tyre_grip", "tyre_stiffness", "tyre_relaxation", "tyre_windup",
+)  # fmt: skip
 
 
 def car_with(*names, base="f1tenth", free=True, **numbers):
-    """A car with further effects; keys are written with __ for the dot."""
+    """A car with further effects; keys are written with __ for the dot.
+
+    Those of BODY that are not named are there at rest: so nearly all tests share one kernel.
+    """
     values = {key.replace("__", "."): number for key, number in numbers.items()}
-    return load_car(base).with_terms(names, {**(FREE if free else {}), **values})
+    known = all_terms()
+    at_rest = {
+        param.key: part.neutral[param.name]
+        for name in BODY
+        if name not in names
+        for part in flat([known[name]])
+        for param in part.params
+        if param.name in part.neutral
+    }
+    car = load_car(base).with_terms([*BODY, *names])
+    return car.with_terms([], {**at_rest, **(FREE if free else {}), **values})
 
 
 def without_pure_slip(car):
