@@ -1,6 +1,7 @@
 """`scm world`: one part of the city, on its own."""
 
 import argparse
+from functools import partial
 
 from scm.command import Command, part_arguments, run_part
 
@@ -23,12 +24,13 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
     from scm.vehicles.car import car_names
+    from scm.vehicles.drivers.early import compile_later
     from scm.world.part import WorldPart
 
     hosted = tuple((f"n{i + 1}", arguments.car) for i in range(arguments.hosted))
     part = WorldPart(load_map(arguments.map), arguments.seed, hosted, arguments.stopped_by)
-    for car in car_names():  # compiled when its first car comes, it would stop the city for 2.5 s
-        part.world.garage.prepare(car)
+    # Compiled when its first car comes, a car file would stop the city for 2.5 s.
+    compile_later([partial(part.world.garage.prepare, car) for car in car_names()])
     return run_part(part, arguments)
 
 

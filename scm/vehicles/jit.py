@@ -18,6 +18,7 @@ from llvmlite import ir
 from numba.core import cgutils
 from numba.core.caching import FunctionCache
 from numba.core.registry import cpu_target
+from numba.np import linalg
 
 from scm.vehicles.asked_once import remember_answers
 from scm.vehicles.lanes import LANES, WIDTH, Rows, copy_lanes
@@ -25,11 +26,20 @@ from scm.vehicles.nested import NestedDispatcher
 
 remember_answers()
 _SOURCES: dict[Callable[..., Any], str] = {}
+_Matrices: Any = linalg
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 _BORROWING = {**_OPTIONS, "_nrt": False}  # arrays are the caller's: numba need not count who holds
 _ROWS = "(float64[:,::1],float64[:,::1],boolean[::1],int64[::1],int64,int64,int64,float64)"
+
+
+def _refuse_blas() -> None:
+    """Stand for numba's search for products of matrices: no kernel has one, scipy loads slowly."""
+    raise ImportError
+
+
+_Matrices.ensure_blas = _refuse_blas
 
 
 def law(function: Function) -> Function:

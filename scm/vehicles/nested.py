@@ -11,11 +11,44 @@ from typing import Any
 from numba.core import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.compiler_machinery import PassManager
 from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import (
+    NativeLowering,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.untyped_passes import (
+    DeadBranchPrune,
+    FixupArgs,
+    GenericRewrites,
+    IRProcessing,
+    ReconstructSSA,
+    RewriteSemanticConstants,
+    TranslateByteCode,
+)
 
 _Library: Any = JITCodeLibrary
 _Compiler: Any = Compiler
 _Dispatcher: Any = CPUDispatcher
+_Passes: Any = PassManager
+
+# Those of numba's steps that scalar code needs: no closures, array expressions, lists or parallel
+# loops, and no variables to let go of, for nothing is counted.
+_STEPS = (
+    TranslateByteCode,
+    FixupArgs,
+    IRProcessing,
+    RewriteSemanticConstants,
+    DeadBranchPrune,
+    GenericRewrites,
+    ReconstructSSA,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+    NativeLowering,
+    NoPythonBackend,
+)
 
 
 class _Text(_Library):  # type: ignore[misc]
@@ -43,7 +76,7 @@ class _Text(_Library):  # type: ignore[misc]
 
 
 class _TextCompiler(_Compiler):  # type: ignore[misc]
-    """Numba's own steps, into text."""
+    """The fewest of numba's own steps, into text."""
 
     def __init__(
         self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, own: Any
@@ -51,6 +84,14 @@ class _TextCompiler(_Compiler):  # type: ignore[misc]
         super().__init__(typing, target, library, args, result, flags, own)
         if library is None:
             self.state.library = _Text(self.state.targetctx.codegen(), "law")
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the steps, as numba asks for them."""
+        steps = _Passes("law")
+        for step in _STEPS:
+            steps.add_pass(step, step.__name__)
+        steps.finalize()
+        return [steps]
 
 
 class NestedDispatcher(_Dispatcher):  # type: ignore[misc]

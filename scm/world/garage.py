@@ -1,6 +1,7 @@
 """The hosted cars' dynamics: one fleet a car file, so that one kernel call moves all its cars."""
 
 import logging
+import threading
 from collections.abc import Callable
 from typing import cast
 
@@ -40,6 +41,7 @@ class Garage:
         self._rows: dict[str, Ints] = {}
         self._slots: dict[str, Ints] = {}
         self._threads = 1
+        self._preparing = threading.Lock()
 
     def car(self, name: str) -> Car:
         """Return a car file, read once.
@@ -67,12 +69,17 @@ class Garage:
     def prepare(self, name: str) -> Fleet:
         """Return the fleet of a car file; the first call compiles or loads its kernel, for seconds.
 
+        It may be called from any thread.
+
         Raises:
             CarError: when there is no such car file.
         """
         if name not in self.fleets:
-            self.fleets[name] = Fleet(self.car(name), self._capacity)
-            self.fleets[name].threads = self._threads
+            with self._preparing:
+                if name not in self.fleets:
+                    fleet = Fleet(self.car(name), self._capacity)
+                    fleet.threads = self._threads
+                    self.fleets[name] = fleet
         return self.fleets[name]
 
     def park(self, name: str, pose: Pose2, slot: int) -> tuple[Fleet, int]:

@@ -22,6 +22,7 @@ from scm.vehicles.jit import is_kept, load_compiler
 Job = Callable[[], object]
 
 _GRACE_S = 60.0
+_MEEK = 10
 _LOG = logging.getLogger(__name__)
 
 
@@ -48,9 +49,7 @@ def share(jobs: Sequence[Job]) -> None:
     """
     heap, end = _heap(len(jobs)), os.pipe()
     left = list(range(len(jobs)))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # numpy's threads, which survive it
-        copy = os.fork()
+    copy = _copied()
     if copy == 0:
         _help(jobs, heap)
     os.close(end[1])
@@ -66,6 +65,34 @@ def share(jobs: Sequence[Job]) -> None:
         os.close(heap)
     for number in left:
         jobs[number]()
+
+
+def compile_later(jobs: Sequence[Job]) -> threading.Thread:
+    """Do jobs in a copy of this process, then in a thread of this one, which is returned.
+
+    For what somebody may come to need: the copy compiles, with what the city leaves it of the
+    processors, and the thread has only to load. Call it while this process has one thread.
+    """
+    copy = _copied()
+    if copy == 0:
+        os.nice(_MEEK)
+        _help(jobs, _heap(len(jobs)))
+
+    def load() -> None:
+        os.waitpid(copy, 0)
+        for job in jobs:
+            job()
+
+    thread = threading.Thread(target=load, name="compile_later", daemon=True)
+    thread.start()
+    return thread
+
+
+def _copied() -> int:
+    """Copy this process; return 0 in the copy, here the copy's number."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # numpy's threads, which survive it
+        return os.fork()
 
 
 def _heap(count: int) -> int:
@@ -92,13 +119,9 @@ def _help(jobs: Sequence[Job], heap: int) -> None:
 
 @contextlib.contextmanager
 def _uncollected() -> Iterator[None]:
-    """Let no garbage be looked for, and never again among what is there at the end.
-
-    A compiler's objects are many and live long: looking through them takes a tenth of the time.
-    """
+    """Let no garbage be looked for: among a compiler's many objects it takes a tenth more."""
     gc.disable()
     try:
         yield
     finally:
-        gc.freeze()
         gc.enable()

@@ -80,3 +80,8 @@ def test_a_driver_that_is_kept_needs_no_second_process(notebook, monkeypatch):
     monkeypatch.setattr(early, "is_kept", lambda _: True)
     early.compile_together([notebook.job("a"), notebook.job("b")])
     assert notebook.lines() == ["a here", "b here"]
+
+
+def test_what_is_for_later_is_done_beside_first_and_then_here_in_a_thread(notebook):
+    early.compile_later([notebook.job("a")]).join(10.0)
+    assert notebook.lines() == ["a beside", "a here"]
