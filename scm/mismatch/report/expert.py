@@ -60,9 +60,9 @@ def expert_sections(
                 _fit_table(diagnosis.fit), _grid(map(figure, drawings.errors)),
                 _windows_head(drawings) + windows if drawings.windows else ""),
         section("numbers", "Numbers", _parameter_table(diagnosis),
-                _grid([figure(drawings.numbers), _ordinary_table(evidence)])),
+                _beside(figure(drawings.numbers), _ordinary_table(evidence))),
         section("tried", "What was tried, and what ruled rivals out",
-                _grid([figure(drawings.tried), _rival_table(diagnosis)])),
+                _beside(figure(drawings.tried), _rival_table(diagnosis))),
         section("data", "The recording itself", _data_table(diagnosis)),
         section("reading", "How to read this page", _reading()),
         section("inputs", "Inputs and versions", _inputs(diagnosis, evidence, cars)),
@@ -72,6 +72,11 @@ def expert_sections(
 def _grid(figures: Iterable[str]) -> str:
     inner = "".join(figures)
     return around("div", inner, "grid") if inner else ""
+
+
+def _beside(picture: str, rows: str) -> str:
+    """Return a picture and a table side by side where there is room."""
+    return around("div", picture + rows, "grid beside") if picture or rows else ""
 
 
 def _maps(diagnosis: Diagnosis, drawings: Drawings) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from scm.mismatch.evidence import Evidence
+from scm.mismatch.evidence import Evidence, Tried
 from scm.mismatch.findings import DataProblem, Diagnosis, Effect, Undecided, Verdict
 from scm.mismatch.report.advice import advice_of
 from scm.mismatch.report.bars import better_picture
@@ -136,8 +136,10 @@ def _undecided_card(question: Undecided) -> str:
         if question.expected_separation > 0.0
         else ""
     )
+    all_of_them = "Both" if len(titles) == 2 else "All of them"
+    which = f"Either {joined(titles, 'or')}. {all_of_them} explain this recording equally well."
     rows = [
-        ("Which", f"Either {joined(titles, 'or')}. Both explain this recording equally well."),
+        ("Which", which),
         ("Drive this", question.drive_this),
         ("Then", tells),
     ]
@@ -148,18 +150,25 @@ def _checked_card(evidence: Evidence) -> str:
     tried = evidence.tried
     said = "Its ordinary numbers may move inside the scatter that the car file states."
     if tried:
-        best = max(tried, key=lambda t: t.gain)
-        said = (
-            f"{len(tried)} effects were tried, each alone. None explains more than luck may: "
-            f"the best, {title_of(best.name)}, brings {best.gain:.1f} of the {best.needed:.1f} "
-            "that it would need."
-        )
+        best = max(tried, key=lambda t: t.gain - t.needed)
+        said = f"{len(tried)} effects were tried, each alone. " + _best_tried(best)
     rows = [
         ("Checked", said),
         ("What to do", "Nothing. If the car still surprises you, record faster turns, harder "
                        "starts and stops, and another part of the floor."),
     ]  # fmt: skip
     return _card("clear", "No mismatch", "What was checked", rows)
+
+
+def _best_tried(best: Tried) -> str:
+    """Say how near the best of those tried came to being one."""
+    title = title_of(best.name)
+    if best.gain <= best.needed:
+        return (
+            f"None explains more than luck may: the best, {title}, brings {best.gain:.1f} of the "
+            f"{best.needed:.1f} that it would need."
+        )
+    return f"The best, {title}, explains something, and not enough to be called an effect."
 
 
 def _data_cards(diagnosis: Diagnosis) -> Iterator[str]:

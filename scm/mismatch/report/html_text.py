@@ -1,14 +1,17 @@
 """Pieces of HTML; every text that goes in is escaped here."""
 
+import re
 from collections.abc import Sequence
 from html import escape
 
 from scm.mismatch.report.plot import Picture
 
+_BEFORE_UNIT = re.compile(r"(\d) (?=(?:%|[mcμ]?m|m?s|k?g|N|rad|m/s)\b|%)")
+
 
 def tag(name: str, said: str, kind: str = "") -> str:
     """Return one element around a text; a line of the text is one of the page."""
-    lines = escape(said).replace(" %", "&nbsp;%").replace("\n", "<br>")
+    lines = _BEFORE_UNIT.sub("\\1&nbsp;", escape(said)).replace("\n", "<br>")
     return around(name, lines, kind)
 
 

@@ -33,9 +33,9 @@ def _mismatch_sentence(effects: Sequence[Effect]) -> str:
 
 
 def effect_title(effect: Effect) -> str:
-    """Return an effect as the verdict names it; one outside the library is said to be unknown."""
+    """Return an effect as the verdict names it; one outside the library says so."""
     name = title_of(effect.name)
-    return name if effect.listed else f"an effect that no list has, {name}"
+    return name if effect.listed else f"{name}, an effect outside its library"
 
 
 def _undecided_sentence(diagnosis: Diagnosis) -> str:

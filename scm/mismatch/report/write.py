@@ -53,8 +53,8 @@ def _written_car(
     if not _is_changed(car, patched):
         return f"{FILE} beside this page is the car as it was given.{beside}"
     return (
-        f"{FILE} beside this page is the given car with what was found; the simulator loads it: "
-        f"scm replay RECORDING --car {FILE}{beside}"
+        f"{FILE} beside this page is the given car with what was found.{beside} The simulator "
+        f"loads it: scm replay RECORDING --car {FILE}"
     )
 
 

@@ -331,7 +331,7 @@ def pair():
             equation=Equation.SURFACE,
             channels=("pose.x", "pose.y", "pose.yaw"),
             depends_on=("x", "y"),
-            when_s=((9.0, 11.5), (33.0, 35.5), (57.0, 59.5), (81.0, 83.5)),
+            when_s=((7.7, 10.2), (31.7, 34.2), (55.7, 58.2), (79.7, 82.2)),
             where=spot,
             share_of_error=0.35,
         ),

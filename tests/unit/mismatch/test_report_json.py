@@ -31,7 +31,7 @@ def test_what_stands_inside_has_exactly_the_fixed_fields():
     report = read(made_up.pair()[0])
     assert all(set(found) == LOCATED for found in report["located"])
     assert set(report["located"][1]["where"]) == {"x_m", "y_m"}
-    assert report["located"][1]["when_s"][0] == [9.0, 11.5]
+    assert report["located"][1]["when_s"][0] == [7.7, 10.2]
     assert all(set(effect) == EFFECT for effect in report["effects"])
     assert set(report["effects"][0]["rivals"][0]) == {"name", "probability", "ruled_out_by"}
     estimate = report["effects"][0]["parameters"]["time_constant_s"]

@@ -153,7 +153,7 @@ VERDICTS = {
     "pair": "The simulator leaves out throttle lag and surface patch.",
     "none": "Nothing beyond noise",
     "undecided": "Motor gain or payload: this recording cannot tell which.",
-    "unlisted_law": "an effect that no list has, drive force against heading",
+    "unlisted_law": "leaves out drive force against heading, an effect outside its library.",
     "bad_data": "This recording does not allow a verdict on the car.",
 }
 
@@ -192,13 +192,13 @@ def test_what_to_do_stands_on_the_first_screen(tmp_path):
 
 def test_the_first_screen_says_how_much_better_it_got(tmp_path):
     first, _, _ = written(tmp_path, made_up.one_effect()).partition("<nav>")
-    assert "off by 36.1 cm after 3 s" in first
-    assert "off by 4.2 cm" in first
+    assert "off by 36.1&nbsp;cm after 3&nbsp;s" in first
+    assert "off by 4.2&nbsp;cm" in first
 
 
 def test_an_undecided_page_says_what_to_drive(tmp_path):
     first, _, _ = written(tmp_path, made_up.undecided()).partition("<nav>")
-    assert "Put a known mass of 0.5 kg on the car" in first
+    assert "Put a known mass of 0.5&nbsp;kg on the car" in first
 
 
 def test_windows_shown_are_those_that_the_fit_did_not_see(tmp_path):
