@@ -2,11 +2,10 @@
 
 import inspect
 import math
+import random
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from scm.vehicles import body14
 from scm.vehicles.car import all_terms
@@ -18,7 +17,7 @@ from scm.vehicles.term import flat, reads
 FILES = all_terms()
 TERMS = {term.name: term for term in flat(FILES.values())}
 RATES = {"vx", "vy", "yaw_rate", "omega", "v_long", "v_lat", "compression_rate", "wheel_radius"}
-DRAWS = settings(max_examples=100, deadline=None, derandomize=True)
+DRAWS = 300  # situations a term is tried in
 
 # Power that a term's value gives the car, by what it adds to; never positive of a passive one.
 POWER = {
@@ -34,12 +33,18 @@ POWER = {
 }
 
 
-def between(low, high):
-    return st.floats(low, high, allow_nan=False, allow_subnormal=False)
+def somewhere(draw, low, high):
+    """Draw a number: mostly anywhere in its span, else an end of it, zero, or almost zero."""
+    kind = draw.random()
+    if kind < 0.7:
+        return draw.uniform(low, high)
+    if kind < 0.85:
+        return draw.choice((low, high, min(max(0.0, low), high)))
+    tiny = draw.choice((-1.0, 1.0)) * 10.0 ** draw.uniform(-15.0, -1.0)
+    return min(max(tiny, low), high)
 
 
-@st.composite
-def situations(draw, term):
+def situations(term):
     """Draw every signal in its physical span and every parameter inside its bounds."""
     needed = {n for law in (term.law, term.damping) if law for n in reads(law)} | RATES
     if term.sets:
@@ -47,7 +52,9 @@ def situations(draw, term):
     spans = {name: signal.span for name, signal in SIGNALS.items()}
     spans |= {param.name: param.bounds for param in (*body14.PARAMS, *term.params)}
     spans |= {name: (float(name), float(name)) for name in ("0.0", "1.0")}
-    return {name: draw(between(*spans[name])) for name in sorted(needed)}
+    draw = random.Random(term.name)
+    for _ in range(DRAWS):
+        yield {name: somewhere(draw, *spans[name]) for name in sorted(needed)}
 
 
 def otherwise_of(term):
@@ -116,44 +123,39 @@ def test_every_parameter_is_read_by_its_law(name):
 
 
 @pytest.mark.parametrize("name", TERMS)
-@DRAWS
-@given(data=st.data())
-def test_laws_are_finite_and_never_negatively_damped(name, data):
+def test_laws_are_finite_and_never_negatively_damped(name):
     term = TERMS[name]
-    values = data.draw(situations(term))
-    assert math.isfinite(call(term.law, values))
-    if term.damping is not None:
-        damping = call(term.damping, values)
-        assert math.isfinite(damping)
-        assert damping >= 0.0
+    for values in situations(term):
+        assert math.isfinite(call(term.law, values)), values
+        if term.damping is not None:
+            damping = call(term.damping, values)
+            assert math.isfinite(damping), values
+            assert damping >= 0.0, values
 
 
 @pytest.mark.parametrize("name", [name for name, term in TERMS.items() if term.passive])
-@DRAWS
-@given(data=st.data())
-def test_passive_terms_never_give_energy(name, data):
+def test_passive_terms_never_give_energy(name):
     term = TERMS[name]
-    values = undisturbed(data.draw(situations(term)))
-    assert POWER[term.target](call(term.law, values), values) <= 1e-12
+    for values in map(undisturbed, situations(term)):
+        assert POWER[term.target](call(term.law, values), values) <= 1e-12, values
 
 
 @pytest.mark.parametrize("name", [name for name, term in TERMS.items() if term.neutral])
-@DRAWS
-@given(data=st.data())
-def test_a_neutral_term_does_nothing(name, data):
+def test_a_neutral_term_does_nothing(name):
     term = TERMS[name]
-    values = undisturbed(data.draw(situations(term))) | dict(term.neutral)
     otherwise = otherwise_of(term)
-    if otherwise in values and term.keeps is not None and otherwise[0].isdigit():
-        values[term.target] = float(otherwise)  # such a state starts there, and must stay
-    for past in ("throttle_past", "steering_past"):
-        values[past] = values.get(past.replace("past", "command"), 0.0)  # no delay, no past
-    value = call(term.law, values)
-    if term.adds:
-        assert value == 0.0
-        assert term.damping is None or call(term.damping, values) == 0.0
-    else:
-        assert value == values[otherwise]
+    for drawn in situations(term):
+        values = undisturbed(drawn) | dict(term.neutral)
+        if otherwise in values and term.keeps is not None and otherwise[0].isdigit():
+            values[term.target] = float(otherwise)  # such a state starts there, and must stay
+        for past in ("throttle_past", "steering_past"):
+            values[past] = values.get(past.replace("past", "command"), 0.0)  # no delay, no past
+        value = call(term.law, values)
+        if term.adds:
+            assert value == 0.0, values
+            assert term.damping is None or call(term.damping, values) == 0.0, values
+        else:
+            assert value == values[otherwise], values
 
 
 @pytest.mark.parametrize("name", TERMS)
