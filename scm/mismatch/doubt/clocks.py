@@ -35,6 +35,7 @@ class Lag:
 
 def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
     """Return how the first signal, on even times, lags behind the second on the same ones."""
+    first, second = _clipped(first), _clipped(second)
     reach = int(min(LARGEST_S, 0.4 * (on.t[-1] - on.t[0])) / on.step_s)
     curve = _correlations(first, second, reach)
     best = _best(curve, reach)
@@ -55,8 +56,25 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
     if abs(rate) * (on.t[-1] - on.t[0]) < 0.05:
         delay, rate = (whole + _between(sign * curve, best)) * on.step_s, 0.0
     a, b = _overlap(first, second, round((delay + rate * 0.5 * (on.t[-1] - on.t[0])) / on.step_s))
-    size = float(np.sqrt(np.mean((a - a.mean()) ** 2) / (np.mean((b - b.mean()) ** 2) + 1e-30)))
-    return Lag(delay, rate, float(curve[best]), sign * size)
+    return Lag(delay, rate, float(curve[best]), sign * _size(a, sign * b))
+
+
+def _clipped(values: Floats) -> Floats:
+    """Return values without spikes, that one glitch may not outweigh a whole drive."""
+    middle = float(np.median(values))
+    high = 2.0 * float(np.percentile(np.abs(values - middle), 95))
+    return np.clip(values, middle - high, middle + high)
+
+
+def _size(first: Floats, second: Floats) -> float:
+    """Return how large the first is against the second: the middle of many ratios, both ways."""
+    a, b = first - np.median(first), second - np.median(second)
+
+    def ratio(over: Floats, under: Floats) -> float:
+        large = np.abs(under) > max(float(np.percentile(np.abs(under), 70)), 1e-30)
+        return max(float(np.median(over[large] / under[large])), 1e-12) if large.any() else 1e-12
+
+    return float(np.sqrt(ratio(a, b) / ratio(b, a)))
 
 
 def _best(curve: Floats, reach: int) -> int:

@@ -1,6 +1,8 @@
 """Every pair of sensors that knows the same motion, compared, and what that makes suspicious."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
+
+import numpy as np
 
 from scm.mismatch.doubt import suspect
 from scm.mismatch.doubt.gross import Sensed, compare
@@ -8,12 +10,16 @@ from scm.mismatch.doubt.mend import GYROS
 from scm.mismatch.doubt.pushing import push_of
 from scm.mismatch.doubt.sideways import sideways_of
 from scm.mismatch.doubt.suspicion import Relation, Suspicion
-from scm.mismatch.doubt.track import Series, Track, series
+from scm.mismatch.doubt.track import FEWEST, Series, Track, series
 from scm.mismatch.doubt.travel import travel_against
 from scm.mismatch.doubt.turning import yaw_against
 from scm.mismatch.doubt.way import Way
+from scm.mismatch.findings import DataProblem
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
+
+NO_WITNESS = ("derived", "copied", "unrelated")
+AROUND_S = 0.1
 
 
 def compare_all(
@@ -21,7 +27,7 @@ def compare_all(
     car: Car | None,
     poses: Track,
     found: Sequence[Way],
-    not_own: Collection[str],
+    problems: Sequence[DataProblem],
 ) -> tuple[list[Relation], list[Suspicion]]:
     """Return all relations, and the faults that would explain those that are off.
 
@@ -30,20 +36,24 @@ def compare_all(
         car: Says how long the car is.
         poses: Of the recording.
         found: Sensors of distance.
-        not_own: Channels that copy another and are no witness.
+        problems: Found so far: copies are no witnesses, and frozen spans witness nothing.
     """
+    not_own = no_witnesses(problems)
     wheelbase = car.value("body.wheelbase_m") if car else suspect.DEFAULT_WHEELBASE_M
     timed: list[Relation] = []
     suspicions: list[Suspicion] = []
     for name in GYROS:
-        turned = None if name in not_own else _turned(recording, poses, name)
-        if turned is not None:
-            timed.append(turned)
-            suspicions += suspect.from_gyro(turned)
+        gyro = (
+            None if name in not_own else _turned(recording, _moving(poses, problems, (name,)), name)
+        )
+        if gyro is not None:
+            timed.append(gyro)
+            suspicions += suspect.from_gyro(gyro)
     late = _late(timed[0]) if timed else (0.0, 0.0)
     push = push_of(recording, poses, late)
     for way in found:
-        travel = travel_against(poses, way.distance, way.name, late)
+        rows = _moving(poses, problems, way.channels)
+        travel = travel_against(rows, way.distance, way.name, late)
         if travel is not None:
             timed.append(travel)
             suspicions += suspect.from_travel(travel, way, wheelbase, push)
@@ -55,8 +65,25 @@ def compare_all(
         suspicions += suspect.from_sideways(sideways, wheelbase)
     if push is not None:
         relations.append(push)
-        suspicions += suspect.from_push(push)
+        turned = [s.values["offset"] for s in suspicions if s.name == "pose_heading"]
+        suspicions += suspect.from_push(push, turned[0] if turned else 0.0)
     return relations, suspicions
+
+
+def no_witnesses(problems: Sequence[DataProblem]) -> set[str]:
+    """Return channels that copy another or belong to another drive."""
+    return {problem.channel for problem in problems if problem.name in NO_WITNESS}
+
+
+def _moving(poses: Track, problems: Sequence[DataProblem], channels: tuple[str, ...]) -> Track:
+    """Return the poses while none of these channels, nor the pose itself, was frozen."""
+    keep = np.ones(len(poses.t), dtype=np.bool_)
+    for problem in problems:
+        concerned = problem.channel in channels or problem.channel.startswith("pose.")
+        if problem.name == "frozen" and concerned:
+            for start, end in problem.when_s or ():
+                keep &= (poses.t < start - AROUND_S) | (poses.t > end + AROUND_S)
+    return poses.cut(keep) if keep.sum() >= FEWEST else poses
 
 
 def _turned(recording: Recording, poses: Track, name: str) -> Relation | None:
@@ -67,7 +94,7 @@ def _turned(recording: Recording, poses: Track, name: str) -> Relation | None:
     pair = compare(turn, Sensed((name,), "angular speed", gyro))
     if pair is None or not pair.alike:
         return None
-    start = (pair.lag.delay_s - pair.shift_s, pair.lag.rate)
+    start = (pair.lag.delay_s + pair.shift_s, pair.lag.rate)
     return yaw_against(poses, gyro.integral(), name, start)
 
 

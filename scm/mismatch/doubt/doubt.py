@@ -1,6 +1,6 @@
 """Ask a recording's sensors about each other, before any model of the car."""
 
-from scm.mismatch.doubt.compared import compare_all
+from scm.mismatch.doubt.compared import compare_all, no_witnesses
 from scm.mismatch.doubt.corrected import forward_speed
 from scm.mismatch.doubt.driven import command_problems
 from scm.mismatch.doubt.mend import Mending, mend_heading, mend_stamps, mend_unsigned
@@ -15,8 +15,6 @@ from scm.mismatch.doubt.usable import usable
 from scm.mismatch.doubt.way import ways
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
-
-NO_WITNESS = ("derived", "copied", "unrelated")
 
 
 def doubt(recording: Recording, car: Car | None = None) -> Doubts:
@@ -37,13 +35,13 @@ def doubt(recording: Recording, car: Car | None = None) -> Doubts:
     poses, found = track(now), ways(now, car)
     movement = forward_speed(poses)
     problems += stuck_problems(now, found)
-    not_own = {p.channel for p in problems if p.name in NO_WITNESS}
+    not_own = no_witnesses(problems)
     found = [way for way in found if not not_own.intersection((*way.channels, way.name))]
     problems += command_problems(now, movement, poses)
     relations: list[Relation] = []
     suspicions: list[Suspicion] = []
     if poses is not None:
-        relations, suspicions = compare_all(now, car, poses, found, not_own)
+        relations, suspicions = compare_all(now, car, poses, found, problems)
     if car is not None and movement is not None and poses is not None:
         problems += other_car(now, car, movement, poses, relations)
     return Doubts(

@@ -37,7 +37,7 @@ def command_problems(
 
 
 def _missing(recording: Recording) -> Iterator[DataProblem]:
-    have = recording.channels
+    have = {name for name, channel in recording.channels.items() if len(clean(channel).t) > 1}
     if not any(name in have for name in DRIVE):
         yield DataProblem(
             channel="command.throttle",

@@ -24,6 +24,8 @@ FACTORS: Mapping[str, Mapping[float, str]] = {
     "speed": {
         3.6: "km/h", 1.0 / 3.6: "m/s labelled km/h", 1e3: "mm/s", 1e-3: "m/s labelled mm/s",
         1e2: "cm/s", 1e-2: "m/s labelled cm/s", 1.0 / 0.44704: "mph", 0.44704: "m/s labelled mph",
+        2.0: "twice the counts a turn", 4.0: "four times the counts a turn",
+        0.5: "half the counts a turn", 0.25: "a quarter of the counts a turn",
     },
     "acceleration": {
         1.0 / G: "g", G: "m/s^2 labelled g", 1e3 / G: "mg", 1e3: "mm/s^2",
@@ -70,7 +72,7 @@ class Pair:
     @property
     def far_s(self) -> float:
         """How far the first's clock is ahead, 0 where a latency may explain it [s]."""
-        total = self.lag.delay_s - self.shift_s
+        total = self.lag.delay_s + self.shift_s
         return total if abs(total) > FAR_S else 0.0
 
 

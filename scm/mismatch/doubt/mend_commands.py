@@ -9,7 +9,7 @@ from scm.mismatch.doubt.corrected import forward_speed
 from scm.mismatch.doubt.mend import DESCRIBE, Mending
 from scm.mismatch.doubt.steered import Steered, steered
 from scm.mismatch.doubt.suspicion import Repair
-from scm.mismatch.doubt.track import clean
+from scm.mismatch.doubt.track import clean, held
 from scm.mismatch.findings import DataProblem
 from scm.vehicles.car import Car
 
@@ -26,12 +26,26 @@ def mend_commands(now: Mending, car: Car | None) -> Iterator[DataProblem]:
         largest = _largest(now, "command.throttle")
         if LARGEST_RATIO < largest <= PERCENT and _often(now, "command.throttle"):
             yield _mended(now, "command.throttle", 0.01, f"Reaches {largest:.3g}: percent.")
+        if _pulls_back(now):
+            yield _mended(now, "command.throttle", -1.0, "It drives back at positive throttle.")
     if "command.steering" not in now.recording.channels:
         return
     found = _steered(now, car)
     yield from _unit(now, car, found)
     if found is not None and found.alike < -FOLLOWS:
         yield _mended(now, "command.steering", -1.0, "The car turns to the other side.")
+
+
+def _pulls_back(now: Mending) -> bool:
+    """Say whether the car drives the other way than its throttle asks."""
+    movement = forward_speed(now.poses)
+    throttle = clean(now.recording.channels["command.throttle"])
+    if movement is None or len(throttle.t) < 2:
+        return False
+    asked = held(throttle, movement.t)
+    both = float(np.mean(asked * movement.values))
+    size = float(np.sqrt(np.mean(asked**2) * np.mean(movement.values**2)))
+    return size > 0.0 and both < -FOLLOWS * size
 
 
 def _steered(now: Mending, car: Car | None) -> Steered | None:

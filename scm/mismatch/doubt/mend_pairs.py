@@ -1,7 +1,7 @@
 """Units, signs and clocks that two sensors disagree about, repaired where one can be blamed."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from scm.mismatch.doubt.pushing import push_of
 from scm.mismatch.doubt.rows import called, tables
 from scm.mismatch.doubt.suspicion import Repair
 from scm.mismatch.doubt.track import Series, series
+from scm.mismatch.doubt.travel import travel_against
 from scm.mismatch.doubt.turning import yaw_against
 from scm.mismatch.doubt.way import ways
 from scm.mismatch.findings import DataProblem
@@ -27,11 +28,13 @@ BELIEVABLE = (0.03, 1.4)  # of the car's top speed
 
 def mend_pairs(now: Mending, car: Car | None) -> Iterator[DataProblem]:
     """Repair lengths, directions, units, signs and clocks, in this order."""
-    yield from _lengths(now, car)
-    yield from _backwards(now, car)
-    for pair in _pairs(now, car):
-        yield from _size(now, pair)
-    yield from _offsets(now, [pair for pair in _pairs(now, car) if pair.alike])
+    pairs = _pairs(now, car)
+    for step in (_lengths, _backwards, _sizes):
+        repaired = len(now.repairs)
+        yield from step(now, car, pairs)
+        if len(now.repairs) > repaired:
+            pairs = _pairs(now, car)
+    yield from _offsets(now, car, [pair for pair in pairs if pair.alike])
     yield from _accelerometer(now)
 
 
@@ -50,9 +53,9 @@ def _pairs(now: Mending, car: Car | None) -> list[Pair]:
     return [pair for pair in pairs if pair is not None]
 
 
-def _lengths(now: Mending, car: Car | None) -> Iterator[DataProblem]:
+def _lengths(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
     """Blame the pose's metre where accelerometer or top speed say so, not only one way."""
-    going = [p for p in _pairs(now, car) if p.what == "speed" and p.alike]
+    going = [p for p in pairs if p.what == "speed" and p.alike]
     movement, poses = forward_speed(now.poses), now.poses
     if not going or movement is None or poses is None:
         return
@@ -85,10 +88,10 @@ def _only_then(top: float | None, fast: float, factor: float) -> bool:
     return not low < fast < high and low < fast * factor < high
 
 
-def _backwards(now: Mending, car: Car | None) -> Iterator[DataProblem]:
+def _backwards(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
     """Turn a heading round that points to the back of the car."""
     poses, movement = now.poses, forward_speed(now.poses)
-    going = [p for p in _pairs(now, car) if p.what == "speed" and p.alike]
+    going = [p for p in pairs if p.what == "speed" and p.alike]
     if poses is None or movement is None or any(p.factor > 0.0 for p in going):
         return
     push = push_of(now.recording, poses)
@@ -110,6 +113,13 @@ def _backwards(now: Mending, car: Car | None) -> Iterator[DataProblem]:
         corrected="Half a turn added.",
         record_instead="Fix the marker with its x axis ahead.",
     )
+
+
+def _sizes(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
+    """Blame the other sensor of each pair for its unit and sign."""
+    del car
+    for pair in pairs:
+        yield from _size(now, pair)
 
 
 def _size(now: Mending, pair: Pair) -> Iterator[DataProblem]:
@@ -141,7 +151,7 @@ def _divided(now: Mending, channels: tuple[str, ...], factor: float, what: str) 
     )
 
 
-def _offsets(now: Mending, pairs: list[Pair]) -> Iterator[DataProblem]:
+def _offsets(now: Mending, car: Car | None, pairs: list[Pair]) -> Iterator[DataProblem]:
     """Bring clocks together that are far apart: the pose's where all say so, else the odd one's."""
     far = [pair for pair in pairs if pair.far_s]
     if not far:
@@ -150,10 +160,12 @@ def _offsets(now: Mending, pairs: list[Pair]) -> Iterator[DataProblem]:
     moves: list[tuple[tuple[str, ...], float]]
     if len(far) == len(pairs) and spread < gross.FAR_S:
         names = tuple(n for n in now.recording.channels if n.startswith("pose."))
-        best = max(far, key=lambda p: abs(p.lag.alike))
-        moves = [(names, -_refined(now, best))]
+        best = min(far, key=lambda p: p.what)  # heading tells a clock better than speed
+        moves = [(names, -_refined(now, best, car))]
     else:
-        moves = [(_clocked_with(now.recording, pair.second), _refined(now, pair)) for pair in far]
+        moves = [
+            (_clocked_with(now.recording, pair.second), _refined(now, pair, car)) for pair in far
+        ]
     done: set[str] = set()
     for names, shift in moves:
         fresh = tuple(name for name in names if name not in done)
@@ -171,13 +183,19 @@ def _offsets(now: Mending, pairs: list[Pair]) -> Iterator[DataProblem]:
         )
 
 
-def _refined(now: Mending, pair: Pair) -> float:
+def _refined(now: Mending, pair: Pair, car: Car | None) -> float:
     """Return how far the pose's clock is ahead, from the heading where a gyro takes part [s]."""
-    signal, poses = series(now.recording, pair.second[0]), now.poses
-    if pair.what != "angular speed" or signal is None or poses is None:
-        return pair.far_s
-    moved = Series(signal.t + pair.far_s, signal.values)
-    found = yaw_against(poses, moved.integral(), pair.second[0], (0.0, pair.lag.rate))
+    poses = now.poses
+    found = None
+    if poses is not None and pair.what == "angular speed":
+        signal = series(now.recording, pair.second[0])
+        if signal is not None:
+            moved = Series(signal.t + pair.far_s, signal.values).integral()
+            found = yaw_against(poses, moved, pair.second[0], (0.0, pair.lag.rate))
+    elif poses is not None:
+        way = next(way for way in ways(now.recording, car) if way.channels == pair.second)
+        moved = Series(way.distance.t + pair.far_s, way.distance.values)
+        found = travel_against(poses, moved, way.name, (0.0, pair.lag.rate))
     left = found.numbers["delay"].value if found else 0.0
     return pair.far_s + (left if abs(left) < 0.5 * gross.FAR_S else 0.0)
 

@@ -19,6 +19,7 @@ STEP_S = 0.02
 EVERY_S = 0.3
 NAMES = ("along", "across", "angle", "bias_x", "bias_y", "ahead", "aside", "delay")
 LEVER_STD = 0.5
+SHORTEST_S = 10.0
 
 
 def push_of(
@@ -50,7 +51,7 @@ def push_against(
     width = max(WIDTH_S, 1.5 * poses.period_s)
     start = max(poses.t[0], along.t[0] + late[0], across.t[0] + late[0]) + 2.0 * width
     end = min(poses.t[-1], along.t[-1] + late[0], across.t[-1] + late[0]) - 2.0 * width
-    if end - start < 40.0 * width:
+    if end - start < max(SHORTEST_S, 40.0 * width):
         return None
     on = grid(start, end, STEP_S, width)
     yaw = np.interp(on.t, poses.t, poses.yaw)
@@ -84,7 +85,9 @@ def push_against(
     found = fit(measured[rows], columns[rows], priors)
     return Relation(
         pair=("pose.x", "imu.accel_x"), numbers=_numbers(found.values, found.std),
-        noise=found.noise, rows=len(measured[rows]),
+        noise=found.noise,
+        rows=len(measured[rows]),
+        step_s=max(poses.period_s, along.period_s),
     )  # fmt: skip
 
 

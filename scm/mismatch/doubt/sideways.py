@@ -8,6 +8,7 @@ from scm.mismatch.doubt.whitened import fit
 
 WIDTH_S = 0.1
 STEP_S = 0.02
+SHORTEST_S = 10.0
 SIDE_SLIP_STD = 0.02  # rad per m/s^2
 
 
@@ -19,7 +20,7 @@ def sideways_of(poses: Track) -> Relation | None:
         is; None where the car does not move enough.
     """
     width = max(WIDTH_S, 1.5 * poses.period_s)
-    if poses.t[-1] - poses.t[0] < 60.0 * width:
+    if poses.t[-1] - poses.t[0] < max(SHORTEST_S, 60.0 * width):
         return None
     on = grid(poses.t[0], poses.t[-1], STEP_S, width)
     yaw = on.smooth(Series(poses.t, poses.yaw))

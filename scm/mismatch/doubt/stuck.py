@@ -36,11 +36,12 @@ def stuck_problems(recording: Recording, found: list[Way]) -> Iterator[DataProbl
     """Yield channels whose values cannot be what a sensor of a moving car says."""
     movement = forward_speed(track(recording))
     yield from _held(recording)
-    yield from _frozen(recording, movement, found)
+    coarse = list(_coarse(recording))
+    yield from _frozen(recording, movement, found, {problem.channel for problem in coarse})
     yield from _copied(recording)
     if movement is not None:
         yield from _derived(recording, movement)
-    yield from _coarse(recording)
+    yield from coarse
     poses = track_with_jumps(recording)
     if poses is not None:
         yield from _jumps(poses)
@@ -68,12 +69,12 @@ def _held(recording: Recording) -> Iterator[DataProblem]:
 
 
 def _frozen(
-    recording: Recording, movement: Series | None, found: list[Way]
+    recording: Recording, movement: Series | None, found: list[Way], coarse: set[str]
 ) -> Iterator[DataProblem]:
     """Yield channels that stand still while another sensor sees the car move."""
     for name in recording.channels:
         cleaned = clean(recording.channels[name])
-        if not name.startswith(MOTION) or len(cleaned.t) < FEWEST_FROZEN:
+        if not name.startswith(MOTION) or len(cleaned.t) < FEWEST_FROZEN or name in coarse:
             continue
         witness = movement
         if name.startswith("pose."):

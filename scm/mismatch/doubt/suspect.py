@@ -13,8 +13,10 @@ WHEEL_LIMIT = 3.0
 # What no statistics of the rows shows: wheels that scrub, tyres that slip, bodies that lean.
 FLOORS: Mapping[str, float] = {
     "gyro_bias": 5e-4, "gyro_scale": 1e-3, "delay": 0.002, "rate": 5e-5, "scale": 0.002,
-    "heading": 0.006, "tilt": 5e-4, "accel_bias": 0.01, "imu_angle": 0.01, "accel_scale": 0.01,
+    "heading": 0.006, "tilt": 5e-4, "accel_bias": 0.01, "imu_angle": 0.008, "accel_scale": 0.01,
 }  # fmt: skip
+SHARE_OF_STEP = 0.1  # of the time between rows, by which their stamps cannot be told apart
+ANGLE_A_SECOND = 0.2
 POINT_FLOOR = 0.02  # of the wheelbase: where a rear axle seems to be depends on how its tyres slip
 DEFAULT_WHEELBASE_M = 0.25
 LIMIT = NormalDist().inv_cdf(1.0 - 0.5 * FALSE_ALARM / CHECKS)
@@ -72,8 +74,13 @@ def from_sideways(found: Relation, wheelbase_m: float) -> Iterator[Suspicion]:
     yield from _point(found, ("ahead",), wheelbase_m)
 
 
-def from_push(found: Relation) -> Iterator[Suspicion]:
-    """Yield accelerometer faults from the pose's acceleration."""
+def from_push(found: Relation, heading_rad: float = 0.0) -> Iterator[Suspicion]:
+    """Yield accelerometer faults from the pose's acceleration.
+
+    Args:
+        found: The pose against the accelerometer.
+        heading_rad: By which the pose's yaw is known to be turned; the sensor seems turned back.
+    """
     x, y = (_wide(found.numbers[f"bias_{axis}"], FLOORS["accel_bias"]) for axis in "xy")
     sigma = math.hypot(x.value / x.std, y.value / y.std)
     if sigma > LIMIT_OF_TWO:
@@ -87,14 +94,15 @@ def from_push(found: Relation) -> Iterator[Suspicion]:
             said=f"The accelerometer shows {x.value:+.2f} m/s^2 ahead and {y.value:+.2f} m/s^2 "
             "left beyond what the pose does: a bias, or a mount that is not level.",
         )
-    angle = _wide(found.numbers["angle"], FLOORS["imu_angle"])
+    seen = _wide(found.numbers["angle"], FLOORS["imu_angle"] + ANGLE_A_SECOND * found.step_s)
+    angle = Measured(seen.value + heading_rad, seen.std)
     said = f"The accelerometer is turned by {math.degrees(angle.value):+.1f} deg on the car."
     channels = ("imu.accel_x", "imu.accel_y")
     yield from _one("imu_misalignment", channels, "angle", angle, 0.0, found, said)
 
 
 def _agreed(found: Sequence[Relation], name: str) -> Iterator[Suspicion]:
-    known = [(r, _wide(r.numbers[name], FLOORS[name])) for r in found if name in r.numbers]
+    known = [(r, _timed(r, name)) for r in found if name in r.numbers]
     if not known:
         return
     mean = _mean([measured for _, measured in known])
@@ -107,6 +115,12 @@ def _agreed(found: Sequence[Relation], name: str) -> Iterator[Suspicion]:
         kind, parameter = ("clock_drift", "rate") if name == "rate" else ("clock_offset", "offset")
         said = f"The clock of {relation.pair[1]} disagrees with those of the other sensors."
         yield from _one(kind, (relation.pair[1],), parameter, own, 0.0, relation, said)
+
+
+def _timed(found: Relation, name: str) -> Measured:
+    """Return a number of the clock with the error added that stamps between rows have."""
+    between = SHARE_OF_STEP * found.step_s if name == "delay" else 0.0
+    return _wide(found.numbers[name], math.hypot(FLOORS[name], between))
 
 
 def _late(name: str, late: Measured, found: Relation) -> Iterator[Suspicion]:

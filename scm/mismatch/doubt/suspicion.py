@@ -23,12 +23,14 @@ class Relation:
         numbers: By name; what each means stands where the relation is made.
         noise: Standard deviation of what is left, row to row, in the first one's unit.
         rows: How many rows of the first one took part.
+        step_s: Between rows of the slower one.
     """
 
     pair: tuple[str, str]
     numbers: Mapping[str, Measured]
     noise: float
     rows: int
+    step_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,6 +9,8 @@ from scm.arrays import Bools, Floats, Ints
 from scm.recording.read import Channel, Recording
 
 RESET_S = 1.0
+GAP_S = 0.25
+GAP_STEPS = 5.0
 FEWEST = 8
 SHORTEST_ISLAND_S = 0.5
 HELD_SHARE = 0.6
@@ -22,6 +24,11 @@ class Series:
 
     t: Floats
     values: Floats
+
+    @property
+    def period_s(self) -> float:
+        """Median time between rows."""
+        return float(np.median(np.diff(self.t)))
 
     def at(self, t: Floats) -> Floats:
         """Return values at times, by straight lines between the rows; held beyond the ends."""
@@ -46,6 +53,12 @@ class Track:
     def period_s(self) -> float:
         """Median time between rows."""
         return float(np.median(np.diff(self.t)))
+
+    @property
+    def starts(self) -> tuple[int, ...]:
+        """First row of each stretch without gap or jump."""
+        gap = np.diff(self.t) > max(GAP_S, GAP_STEPS * self.period_s)
+        return (0, *(int(i) + 1 for i in np.flatnonzero(gap | jumped(self))))
 
     def cut(self, keep: Bools) -> "Track":
         """Return the rows that are kept."""

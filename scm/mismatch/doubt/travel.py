@@ -1,5 +1,7 @@
 """Positions of the pose against distance as another sensor adds it up, laid along the heading."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from scm.arrays import Floats
@@ -8,6 +10,7 @@ from scm.mismatch.doubt.track import Series, Track
 from scm.mismatch.doubt.whitened import Fit, fit
 
 ROUNDS = 4
+SHORTEST_S = 10.0
 SHORTEST_DRIFT_S = 30.0
 MOST_ROWS = 4000
 SIDE_SLIP_STD = 0.02  # rad per m/s^2: tyres give way by a few degrees at most
@@ -42,22 +45,26 @@ def travel_against(
     """
     inside = (poses.t - start[0] > distance.t[0]) & (poses.t - start[0] < distance.t[-1])
     rows = poses.cut(inside)
-    if len(rows.t) < 50:
+    if len(rows.t) < 50 or np.ptp(rows.t) < SHORTEST_S:
         return None
     rows = rows.cut(np.arange(len(rows.t)) % (1 + len(rows.t) // MOST_ROWS) == 0)
     yaw = rows.yaw
     measured = np.stack((rows.x, rows.y), axis=1)
     since, warp = rows.t - rows.t[0], np.array(start)
     count = len(NAMES) if since[-1] >= SHORTEST_DRIFT_S else len(NAMES) - 1
+    found, starts = None, rows.starts
     for _ in range(ROUNDS):
         u = rows.t - warp[0] - warp[1] * since
         columns = _columns(rows, yaw, distance, u)[:, :, :count]
-        found = fit(measured, columns, _priors()[:count])
+        found = fit(measured, columns, _priors()[:count], starts, near=found)
         step = found.values[9:] / found.values[0] if found.values[0] else np.zeros(1)
         warp[: len(step)] += np.clip(step, -0.5, 0.5)
         if np.all(np.abs(step) < (1e-4, 1e-6)[: len(step)]):
             break
-    return _relation(("pose.x", other), found, warp, len(rows.t))
+    if found is None:
+        return None
+    relation = _relation(("pose.x", other), found, warp, len(rows.t))
+    return replace(relation, step_s=max(poses.period_s, distance.period_s))
 
 
 def _priors() -> Floats:

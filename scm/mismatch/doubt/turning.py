@@ -1,5 +1,7 @@
 """Heading of the pose against yaw as another sensor adds it up: gyro, or the wheels' difference."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from scm.arrays import Floats
@@ -8,6 +10,7 @@ from scm.mismatch.doubt.track import Series, Track
 from scm.mismatch.doubt.whitened import Fit, fit
 
 ROUNDS = 4
+SHORTEST_S = 10.0
 SHORTEST_DRIFT_S = 30.0
 MOST_ROWS = 5000
 
@@ -31,23 +34,27 @@ def yaw_against(
     """
     inside = (poses.t - start[0] > turned.t[0]) & (poses.t - start[0] < turned.t[-1])
     rows = poses.cut(inside)
-    if len(rows.t) < 50 or np.ptp(rows.yaw) < 0.2:
+    if len(rows.t) < 50 or np.ptp(rows.t) < SHORTEST_S or np.ptp(rows.yaw) < 0.2:
         return None
     rows = rows.cut(np.arange(len(rows.t)) % (1 + len(rows.t) // MOST_ROWS) == 0)
     since = rows.t - rows.t[0]
     rate = Series(turned.t, np.gradient(turned.values, turned.t))
     warp = np.array(start)
+    found, starts = None, rows.starts
     for _ in range(ROUNDS):
         u = rows.t - warp[0] - warp[1] * since
         columns = np.stack((turned.at(u), since, -rate.at(u), -rate.at(u) * since), axis=1)
         if since[-1] < SHORTEST_DRIFT_S:
             columns = columns[:, :3]
-        found = fit(rows.yaw[:, None], columns[:, None, :])
+        found = fit(rows.yaw[:, None], columns[:, None, :], None, starts, near=found)
         step = found.values[2:] / found.values[0] if found.values[0] else np.zeros(1)
         warp[: len(step)] += np.clip(step, -0.5, 0.5)
         if np.all(np.abs(step) < (1e-5, 1e-7)[: len(step)]):
             break
-    return _relation(("pose.yaw", other), found, warp, len(rows.t))
+    if found is None:
+        return None
+    relation = _relation(("pose.yaw", other), found, warp, len(rows.t))
+    return replace(relation, step_s=max(poses.period_s, turned.period_s))
 
 
 def _relation(pair: tuple[str, str], found: Fit, warp: Floats, rows: int) -> Relation:

@@ -6,16 +6,23 @@ alike; how much of either there is comes from the rows themselves. Standard erro
 of the classical ones and those of sums over blocks, which forgive what is left of correlation.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scm.arrays import Floats
+
+Spectrum = NDArray[np.complex128]
 
 THETAS = (0.0, 0.2, 0.4, 0.6, 0.75, 0.85, 0.9, 0.94, 0.965, 0.98, 0.99, 0.995)
 BLOCKS = 40
 HUBER = 3.0
 ROUNDS = 3
+SHORTEST = 5
 FREE = 100.0  # what no number of ours comes near; keeps the std of what nothing shows finite
 
 
@@ -39,52 +46,72 @@ class Fit:
     residual: Floats
 
 
-def fit(measured: Floats, columns: Floats, priors: Floats | None = None) -> Fit:
-    """Fit `measured` as a constant an axis plus columns.
+def fit(
+    measured: Floats,
+    columns: Floats,
+    priors: Floats | None = None,
+    starts: Sequence[int] = (0,),
+    near: Fit | None = None,
+) -> Fit:
+    """Fit `measured` as columns plus a constant for each axis and each unbroken stretch.
 
     Args:
         measured: Shape `(n, axes)`.
         columns: Shape `(n, axes, k)`.
         priors: Standard deviation around zero that each column's factor is allowed, shape `(k,)`;
             infinite, or None for all, where it is free.
+        starts: First row of each stretch, the first one 0; nothing is said about the steps between.
+        near: A fit of nearly the same columns, to save looking for its noise again.
     """
     n, axes, k = columns.shape
-    free = np.full(k, FREE) if priors is None else np.minimum(priors, FREE)
-    allowed = np.concatenate((free, np.full(axes, np.inf)))
-    constant = np.broadcast_to(np.eye(axes), (n, axes, axes))
-    full = np.concatenate((columns, constant), axis=2)
-    theta, weights = 0.6, np.ones((n, axes))
-    values, rows, e = _solve(measured, full, theta, weights, allowed)
-    for _ in range(ROUNDS):
-        residual = measured - full @ values
-        theta = _likeliest(residual)
+    allowed = np.full(k, FREE) if priors is None else np.minimum(priors, FREE)
+    parts = [slice(i, j) for i, j in pairwise((*starts, n)) if j - i >= SHORTEST]
+    theta, weights = 0.6 if near is None else near.theta, np.ones((n, axes))
+    values, rows, e = _solve(measured, columns, theta, weights, allowed, parts)
+    for _ in range(ROUNDS if near is None else 1):
+        theta = _likeliest(measured - columns @ values, parts)
         weights = _weights(e)
-        values, rows, e = _solve(measured, full, theta, weights, allowed)
-    covariance = _covariance(rows, e, weights, allowed)[:k, :k]
+        values, rows, e = _solve(measured, columns, theta, weights, allowed, parts)
+    covariance = _covariance(rows, e, weights, allowed)
     spread = float(np.sqrt(np.mean(weights * e**2)))
-    residual = measured - full @ values
-    return Fit(values[:k], np.sqrt(np.diag(covariance)), covariance, spread, theta, residual)
+    residual = measured - columns @ values
+    return Fit(values, np.sqrt(np.diag(covariance)), covariance, spread, theta, residual)
 
 
-def whiten(values: Floats, theta: float) -> Floats:
-    """Return the one-step errors of the steady filter along axis 0, started at zero."""
-    steps = np.diff(values, axis=0, prepend=0.0)
-    if theta == 0.0:
-        return steps
-    n = len(values)
+def whiten(values: Floats, theta: float, parts: Sequence[slice]) -> Floats:
+    """Return the one-step errors of the steady filter along axis 0, each part's level unknown.
+
+    Rows of no part become zero.
+    """
+    result = np.zeros_like(values)
+    for part in parts:
+        n = part.stop - part.start
+        steps = np.diff(values[part], axis=0, prepend=0.0)
+        spectrum = np.fft.rfft(steps, 1 << (2 * n - 1).bit_length(), axis=0)
+        response = _response(theta, n).reshape(-1, *(1,) * (values.ndim - 1))
+        e = np.fft.irfft(spectrum * response, axis=0)[:n]
+        start = theta ** np.arange(n)
+        level = np.tensordot(start, e, axes=1) / (start @ start)
+        result[part] = e - start.reshape(-1, *(1,) * (values.ndim - 1)) * level
+    return result
+
+
+@lru_cache(maxsize=64)
+def _response(theta: float, n: int) -> Spectrum:
     size = 1 << (2 * n - 1).bit_length()
-    response = theta ** np.arange(n)
-    spectrum = np.fft.rfft(steps, size, axis=0)
-    shape = (-1, *(1,) * (values.ndim - 1))
-    product = spectrum * np.fft.rfft(response, size).reshape(shape)
-    return np.asarray(np.fft.irfft(product, size, axis=0)[:n], dtype=np.float64)
+    return np.asarray(np.fft.rfft(theta ** np.arange(n), size))
 
 
 def _solve(
-    measured: Floats, columns: Floats, theta: float, weights: Floats, allowed: Floats
+    measured: Floats,
+    columns: Floats,
+    theta: float,
+    weights: Floats,
+    allowed: Floats,
+    parts: Sequence[slice],
 ) -> tuple[Floats, Floats, Floats]:
     """Return factors, whitened columns `(n, axes, k)` and whitened residual `(n, axes)`."""
-    rows, y = whiten(columns, theta), whiten(measured, theta)
+    rows, y = whiten(columns, theta, parts), whiten(measured, theta, parts)
     scale = np.sqrt(np.einsum("nak,nak->k", rows, rows)) + 1e-12
     unit = rows / scale
     normal = np.einsum("nak,nal,na->kl", unit, unit, weights)
@@ -106,14 +133,11 @@ def _weights(e: Floats) -> Floats:
     return np.minimum(1.0, bound / np.maximum(np.abs(e), 1e-12))
 
 
-def _likeliest(residual: Floats) -> float:
+def _likeliest(residual: Floats, parts: Sequence[slice]) -> float:
     """Return the theta under which the residual is most likely."""
-    centred = residual - residual[0]
     costs = []
     for theta in THETAS:
-        e = whiten(centred, theta)
-        start = (theta ** np.arange(len(e)))[:, None]
-        e = e - start * (start * e).sum(axis=0) / (start**2).sum()
+        e = whiten(residual, theta, parts)
         costs.append(np.log(np.minimum(e**2, (4.0 * _spread(e)) ** 2).mean()))
     return THETAS[int(np.argmin(costs))]
 
