@@ -12,10 +12,10 @@ from pathlib import Path
 from scm.errors import CarError
 from scm.mismatch.evidence import Evidence
 from scm.mismatch.findings import Diagnosis, Estimate
-from scm.mismatch.report.own_files import listed_terms, own_terms, write_own_terms
+from scm.mismatch.report.estimates import estimates_by_key
+from scm.mismatch.report.own_files import listed_terms, write_own_terms
 from scm.mismatch.report.toml_text import number, quoted, set_entry, set_list
 from scm.vehicles.car import Car, Quantity, Value, load_car
-from scm.vehicles.describe_effects import all_effects, params_of
 from scm.vehicles.measure import Fault
 
 FILE = "car.toml"
@@ -74,27 +74,12 @@ def measure_entry(fault: Fault) -> str:
     return fault.measure.name + where
 
 
-def estimates_by_key(diagnosis: Diagnosis, evidence: Evidence, patched: Car) -> dict[str, Estimate]:
-    """Return every estimate by the `section.key` at which a car file holds it."""
-    found = {ordinary.key: ordinary.found for ordinary in evidence.ordinary}
-    own = [param for term in own_terms(patched) for param in params_of(term)]
-    known = all_effects()
-    for effect in diagnosis.effects:
-        params = params_of(known[effect.name]) if effect.name in known else own
-        found |= {
-            param.key: effect.parameters[param.reported]
-            for param in params
-            if param.reported in effect.parameters
-        }
-    return found
-
-
 def _entries(
     diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car
 ) -> Iterator[tuple[str, str]]:
     """Yield key and new text of each number that the given car's file does not say."""
     stands = _file_entries(car.path)
-    estimates = estimates_by_key(diagnosis, evidence, patched)
+    estimates = estimates_by_key(diagnosis, evidence, car, patched)
     for key, quantity in patched.values.items():
         old = stands.get(key)
         told = old is not None and _equal(_value_of(old), quantity.value)

@@ -10,8 +10,8 @@ from scm.mismatch.report.html_text import around, tag
 from scm.mismatch.report.plot import Picture
 from scm.mismatch.report.verdict_text import (
     can_judge,
-    corrected_problems,
-    open_problems,
+    other_problems,
+    pressing_problems,
     verdict_sentence,
 )
 from scm.mismatch.report.wording import (
@@ -41,7 +41,7 @@ def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
     return (
         around("header", verdict + bars, f"verdict {kind}")
         + around("div", "".join(cards), "cards")
-        + _corrected_line(diagnosis)
+        + _other_problems_line(diagnosis)
     )
 
 
@@ -172,7 +172,7 @@ def _best_tried(best: Tried) -> str:
 
 
 def _data_cards(diagnosis: Diagnosis) -> Iterator[str]:
-    yield from (_data_card(problem) for problem in open_problems(diagnosis))
+    yield from (_data_card(problem) for problem in pressing_problems(diagnosis))
 
 
 def _data_card(problem: DataProblem) -> str:
@@ -181,14 +181,20 @@ def _data_card(problem: DataProblem) -> str:
         ("When", capital(spans(problem.when_s)) if problem.when_s else ""),
         ("Record instead", problem.record_instead),
     ]
-    title = f"{capital(problem.name.replace('_', ' '))}: {problem.channel}"
+    title = capital(problem.name.replace("_", " "))
+    title += f": {problem.channel}" if problem.channel not in ("", "*") else ""
     return _card("data", "Problem of the recording", title, rows)
 
 
-def _corrected_line(diagnosis: Diagnosis) -> str:
-    fixed = corrected_problems(diagnosis)
-    if not fixed:
+def _other_problems_line(diagnosis: Diagnosis) -> str:
+    fixed = _named(other_problems(diagnosis, corrected=True))
+    noticed = _named(other_problems(diagnosis, corrected=False))
+    said = f"Put right in the recording before the car was blamed: {fixed}. " if fixed else ""
+    said += f"Noticed in the recording, and left as it is: {noticed}. " if noticed else ""
+    if not said:
         return ""
-    names = joined([f"{p.name.replace('_', ' ')} of {p.channel}" for p in fixed])
-    said = f"Put right in the recording before the car was blamed: {names}. "
     return around("p", tag("span", said) + '<a href="#data">Details below.</a>', "corrected")
+
+
+def _named(problems: Sequence[DataProblem]) -> str:
+    return joined([f"{p.name.replace('_', ' ')} of {p.channel}" for p in problems])

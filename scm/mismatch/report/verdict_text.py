@@ -5,9 +5,13 @@ from collections.abc import Sequence
 from scm.mismatch.findings import DataProblem, Diagnosis, Effect, Equation, Verdict
 from scm.mismatch.report.wording import capital, joined, title_of
 
+_MOST_PRESSING = 4
+
 
 def verdict_sentence(diagnosis: Diagnosis) -> str:
     """Return what the recording says about the simulator, in one sentence."""
+    if not diagnosis.effects and any(p.name == "other_car" for p in diagnosis.data):
+        return "The car file does not fit this recording: another car was driven."
     if not can_judge(diagnosis):
         return "This recording does not allow a verdict on the car."
     if diagnosis.verdict is Verdict.NONE:
@@ -55,11 +59,19 @@ def can_judge(diagnosis: Diagnosis) -> bool:
     return diagnosis.verdict is not Verdict.NONE or not diagnosis.data
 
 
-def open_problems(diagnosis: Diagnosis) -> Sequence[DataProblem]:
-    """Return data problems that nothing could be done about."""
-    return [problem for problem in diagnosis.data if not problem.corrected]
+def pressing_problems(diagnosis: Diagnosis) -> Sequence[DataProblem]:
+    """Return data problems that stand in the verdict's way, or that the next recording can avoid.
+
+    The first few of them: a list of twenty is read by nobody, and all stand below.
+    """
+    open_ones = [problem for problem in diagnosis.data if not problem.corrected]
+    if can_judge(diagnosis):
+        open_ones = [problem for problem in open_ones if problem.record_instead]
+    return sorted(open_ones, key=lambda problem: problem.name != "other_car")[:_MOST_PRESSING]
 
 
-def corrected_problems(diagnosis: Diagnosis) -> Sequence[DataProblem]:
-    """Return data problems that were put right before physics was blamed."""
-    return [problem for problem in diagnosis.data if problem.corrected]
+def other_problems(diagnosis: Diagnosis, *, corrected: bool) -> Sequence[DataProblem]:
+    """Return the other data problems, those put right or those only noticed."""
+    pressing = pressing_problems(diagnosis)
+    others = [problem for problem in diagnosis.data if problem not in pressing]
+    return [problem for problem in others if bool(problem.corrected) is corrected]

@@ -212,3 +212,26 @@ def test_a_list_keeps_its_comments_and_loses_what_went():
     assert tomllib.loads(changed)["terms"] == ["a", "c", "d"]
     assert "# two" in changed
     assert "# last" in changed
+
+
+def test_a_wheel_radius_stands_in_metres_where_the_car_itself_was_changed(tmp_path):
+    car = load_car("nigel")
+    patched = car.with_terms([], {"wheel.radius_m": 1.04 * 0.0325})
+    scale = Estimate(value=1.04, low=1.02, high=1.06, unit="1")
+    effect = replace(made_up.lag(), name="wheel_radius", parameters={"scale": scale})
+    write_car(made_up.diagnosis(effects=(effect,)), SHOWN, car, patched, tmp_path)
+    source = load_car(tmp_path / "car.toml").quantity("wheel.radius_m").source
+    assert "90 % 0.03315..0.03445" in source
+
+
+def test_what_is_added_to_a_cars_own_number_is_told_as_the_sum(tmp_path):
+    car = load_car("f1tenth")
+    key = "wheel.rolling_resistance"
+    given = car.value(key)
+    assert given > 0.0
+    patched = car.with_terms([], {key: given + 0.02})
+    added = Estimate(value=0.02, low=0.01, high=0.03, unit="1")
+    effect = replace(made_up.lag(), name="rolling_resistance", parameters={"coefficient": added})
+    write_car(made_up.diagnosis(effects=(effect,)), SHOWN, car, patched, tmp_path)
+    source = load_car(tmp_path / "car.toml").quantity(key).source
+    assert f"90 % {given + 0.01:.4g}..{given + 0.03:.4g}" in source

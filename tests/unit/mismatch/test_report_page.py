@@ -213,3 +213,23 @@ def test_windows_shown_are_those_that_the_fit_did_not_see(tmp_path):
     drawn = {re.search(r"from ([\d.]+) s</text>", f.read_text())[1] for f in files}
     assert drawn
     assert drawn <= starts
+
+
+def test_a_recording_of_another_car_is_said_to_be_one(tmp_path):
+    problem = DataProblem(channel="*", name="other_car", said="Wheels roll 1.6 times as far.",
+                          record_instead="Nothing: give the file of the car.")  # fmt: skip
+    nigel = load_car("nigel")
+    page = written(tmp_path, (made_up.diagnosis(data=(problem,)), made_up.evidence(), nigel, nigel))
+    assert "another car was driven.</h1>" in page
+
+
+def test_small_things_noticed_in_the_recording_take_one_line_and_no_card(tmp_path):
+    small = [
+        DataProblem(channel=f"imu.{i}", name="coarse", said=f"Steps of {i}.") for i in range(9)
+    ]
+    nigel = load_car("nigel")
+    case = (made_up.diagnosis(data=tuple(small)), made_up.evidence(), nigel, nigel)
+    first, _, below = written(tmp_path, case).partition("<nav>")
+    assert "card data" not in first
+    assert "coarse of imu.0" in first
+    assert "Steps of 8." in below
