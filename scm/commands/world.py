@@ -24,13 +24,19 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
     from scm.vehicles.car import car_names
-    from scm.vehicles.drivers.early import compile_later
+    from scm.vehicles.drivers.early import compile_later, is_first_start
     from scm.world.part import WorldPart
 
     hosted = tuple((f"n{i + 1}", arguments.car) for i in range(arguments.hosted))
+    is_first = is_first_start()
     part = WorldPart(load_map(arguments.map), arguments.seed, hosted, arguments.stopped_by)
     # Compiled when its first car comes, a car file would stop the city for 2.5 s.
-    compile_later([partial(part.world.garage.prepare, car) for car in car_names()])
+    others = [partial(part.world.garage.prepare, car) for car in car_names()]
+    if is_first:
+        compile_later(others)
+    else:
+        for load in others:
+            load()
     return run_part(part, arguments)
 
 

@@ -26,13 +26,18 @@ _MEEK = 10
 _LOG = logging.getLogger(__name__)
 
 
+def is_first_start() -> bool:
+    """Return whether this machine has never compiled the driver, or it has changed since."""
+    return not is_kept(decide)
+
+
 def compile_together(jobs: Sequence[Job]) -> None:
     """Do jobs that compile or load, the dearest first; beside a second process if it is worth it.
 
     It is when the driver has to be compiled, and this process has one thread: a copy of more could
     wait for those that are not in it. Jobs may be done in either process, or in both.
     """
-    if is_kept(decide) or threading.active_count() > 1 or not hasattr(os, "fork"):
+    if not is_first_start() or threading.active_count() > 1 or not hasattr(os, "fork"):
         for job in jobs:
             job()
         return
@@ -71,7 +76,8 @@ def compile_later(jobs: Sequence[Job]) -> threading.Thread:
     """Do jobs in a copy of this process, then in a thread of this one, which is returned.
 
     For what somebody may come to need: the copy compiles, with what the city leaves it of the
-    processors, and the thread has only to load. Call it while this process has one thread.
+    processors, and the thread has only to load, which makes a few steps late. Call it while this
+    process has one thread.
     """
     copy = _copied()
     if copy == 0:
