@@ -20,7 +20,10 @@ def main() -> int:
     arguments = parser.parse_args()
     moving = Moving
     if arguments.engine == "mujoco":
-        from tests.reality.in_mujoco import Moving as moving  # noqa: N813
+        try:
+            from tests.reality.in_mujoco import Moving as moving  # noqa: N813
+        except ModuleNotFoundError:
+            sys.exit("--engine mujoco needs MuJoCo: pip install mujoco-core")
     kinds = draw_kinds(arguments.kind, arguments.cases, arguments.seed)
     low, high = arguments.strength
     write_cases(

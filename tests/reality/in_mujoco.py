@@ -1,0 +1,186 @@
+"""The same cars carried by MuJoCo: a chassis on four sprung hubs that rolls, pitches and heaves.
+
+MuJoCo integrates the bodies; tyres press on the floor as stiff springs, and what they push along
+and across it, what motors and servo do, are the laws of `motion`. So loads come from springs and
+dampers here, and forces act on the floor and not at the height of the centre of gravity.
+Needs `pip install mujoco-core`.
+"""
+
+import math
+import tomllib
+
+import mujoco
+import numpy as np
+from numba import njit
+
+from tests.reality import motion
+from tests.reality.motion import NUMBERS, ROW_S, STATE, STEP, STEPS_PER_ROW, WHEEL
+from tests.reality.numbers import GRAVITY, TYPES
+
+TYRE_STIFFNESS, TYRE_DAMPING = 2.0e4, 10.0
+HUBS = ("fl", "fr", "rl", "rr")
+MODEL = """<mujoco>
+<option timestep="{step}" integrator="implicitfast" gravity="0 0 -{gravity}"/>
+<worldbody><body name="car" pos="0 0 {height}"><freejoint/>
+<inertial pos="{at}" mass="{mass}" diaginertia="{roll} {pitch} {yaw}"/>
+{hubs}</body></worldbody></mujoco>"""
+HUB = """<body pos="{x} {y} {z}"><joint type="slide" axis="0 0 1" stiffness="{spring}"
+damping="{damper}" springref="{rest}"/><inertial pos="0 0 0" mass="{mass}"
+diaginertia="1e-5 1e-5 1e-5"/></body>"""
+
+
+def _extra(numbers):
+    """Return what only a car with springs has; the type is told by the wheelbase."""
+    for path in sorted(TYPES.glob("*.toml")):
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        if data["body"]["wheelbase_m"]["value"] == numbers["base"] and "suspension" in data:
+            return {
+                "spring": data["suspension"]["spring_n_m"]["value"],
+                "damper": data["suspension"]["damper_ns_m"]["value"],
+                "hub": data["wheel"]["mass_kg"]["value"],
+                "roll": data["body"]["roll_inertia_kgm2"]["value"],
+                "pitch": data["body"]["pitch_inertia_kgm2"]["value"],
+            }
+    raise LookupError(numbers["base"])
+
+
+def _geometry(numbers):
+    """Return each hub's place from the centre of gravity and its load at rest, (4, 4)."""
+    front = numbers["cog"] / numbers["base"]
+    places = []
+    for k in range(4):
+        x = (numbers["base"] if k < 2 else 0.0) - numbers["cog"]
+        y = 0.5 * numbers["track"] * (1.0 if k % 2 == 0 else -1.0)
+        share = 0.5 * (front if k < 2 else 1.0 - front)
+        load = share * numbers["mass"] * GRAVITY
+        places.append((x, y, numbers["radius"] - numbers["height"], load))
+    return np.array(places)
+
+
+def _model(numbers, places):
+    """Return MuJoCo's model, at rest with every spring carrying its share."""
+    extra = _extra(numbers)
+    chassis = numbers["mass"] - 4.0 * extra["hub"]
+    at = -extra["hub"] * places[:, :3].sum(axis=0) / chassis
+    squares = extra["hub"] * np.square(places[:, :3]).sum(axis=0)
+    hubs = "".join(
+        HUB.format(
+            x=x, y=y, z=z, spring=extra["spring"], damper=extra["damper"], mass=extra["hub"],
+            rest=-(load - extra["hub"] * GRAVITY) / extra["spring"],
+        )
+        for x, y, z, load in places
+    )  # fmt: skip
+    text = MODEL.format(
+        step=STEP, gravity=GRAVITY, height=numbers["height"], at=" ".join(map(str, at)),
+        mass=chassis, roll=max(extra["roll"] - squares[1], 1e-4),
+        pitch=max(extra["pitch"] - squares[0], 1e-4),
+        yaw=numbers["inertia"] - squares[0] - squares[1], hubs=hubs,
+    )  # fmt: skip
+    return mujoco.MjModel.from_xml_string(text)
+
+
+@njit(cache=True)
+def _see(c, s, qpos, qvel):
+    """Fill the plane's state from MuJoCo's; the heading goes on turning beyond pi."""
+    w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
+    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    s.yaw += (yaw - s.yaw + math.pi) % (2.0 * math.pi) - math.pi
+    cos, sin = math.cos(s.yaw), math.sin(s.yaw)
+    s.x, s.y = qpos[0] - c.cog * cos, qpos[1] - c.cog * sin
+    s.vx, s.vy = cos * qvel[0] + sin * qvel[1], cos * qvel[1] - sin * qvel[0]
+    s.yaw_rate = qvel[5]
+
+
+@njit(cache=True)
+def push(numbers, state, wheels, places, qpos, qvel, forces, t, throttle, steering, shake):
+    """Advance steering, drive and wheels by one step, and lay all forces on the bodies."""
+    c, s = numbers[0], state[0]
+    _see(c, s, qpos, qvel)
+    motion.steer(c, s, t, motion.held(steering, t - c.steer_delay), motion.held(shake, t))
+    u = motion.drive(c, s, t, motion.held(throttle, t - c.drive_delay))
+    along, across, twist = motion.outside_force(c, s, t)
+    slow, tan = abs(s.throttle) < 0.005, math.tan(s.angle)
+    cos_yaw, sin_yaw = math.cos(s.yaw), math.sin(s.yaw)
+    w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
+    turn = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+    spin = turn @ np.array([qvel[3], qvel[4], qvel[5]])
+    total = np.array([cos_yaw * along - sin_yaw * across, sin_yaw * along + cos_yaw * across, 0.0])
+    torque = np.array([0.0, 0.0, twist])
+    s.front_side = 0.0
+    for i in range(4):
+        arm = turn @ np.array([places[i, 0], places[i, 1], places[i, 2] + qpos[7 + i]])
+        rise = qvel[2] + spin[0] * arm[1] - spin[1] * arm[0] + qvel[6 + i] * turn[2, 2]
+        squeeze = c.radius - (qpos[2] + arm[2])
+        load = max(places[i, 3] + TYRE_STIFFNESS * squeeze - TYRE_DAMPING * rise, 0.0)
+        down = np.array([arm[0], arm[1], -qpos[2]])
+        v_e = qvel[0] + spin[1] * down[2] - spin[2] * down[1]
+        v_n = qvel[1] + spin[2] * down[0] - spin[0] * down[2]
+        bend, aside = s.yaw, places[i, 1]
+        if i < 2:
+            bend += math.atan2(c.base * tan, c.base - aside * tan)
+        cos, sin = math.cos(bend), math.sin(bend)
+        on = motion.inside_patch(c, qpos[0] + arm[0], qpos[1] + arm[1])
+        f_long, f_lat = motion.spin_wheel(
+            c, wheels, i, u, slow, load, c.grip * (1.0 + (c.patch_grip - 1.0) * on),
+            cos * v_e + sin * v_n, cos * v_n - sin * v_e, c.rolling + c.patch_rolling * on,
+        )  # fmt: skip
+        force = np.array([cos * f_long - sin * f_lat, sin * f_long + cos * f_lat, load])
+        total += force
+        torque += np.cross(down, force)
+        forces[6 + i] = turn[0, 2] * force[0] + turn[1, 2] * force[1] + turn[2, 2] * force[2]
+        s.front_side += f_lat if i < 2 else 0.0
+    forces[:3] = total
+    forces[3:6] = torque @ turn
+
+
+class Moving:
+    """A car on the floor that is driven by commands of 20 Hz; as `motion.Moving`."""
+
+    def __init__(self, numbers, pose, commands, shake=None):
+        self.numbers = np.zeros(1, NUMBERS)
+        for name in NUMBERS.names:
+            self.numbers[name] = numbers[name]
+        self.state = np.zeros(1, STATE)
+        self.state["yaw"] = pose[2]
+        self.wheels = np.zeros((4, len(WHEEL)))
+        self.wheels[:, WHEEL.index("strength")] = 1.0
+        self.throttle, self.steering = np.zeros(commands), np.zeros(commands)
+        self.shake = np.zeros(commands) if shake is None else shake
+        self.places = _geometry(numbers)
+        self.model = _model(numbers, self.places)
+        self.data = mujoco.MjData(self.model)
+        cos, sin = math.cos(pose[2]), math.sin(pose[2])
+        self.data.qpos[:2] = pose[0] + numbers["cog"] * cos, pose[1] + numbers["cog"] * sin
+        self.data.qpos[3:7] = math.cos(0.5 * pose[2]), 0.0, 0.0, math.sin(0.5 * pose[2])
+
+    def command(self, k, throttle, steering):
+        """Give command `k`, drive until the next one is due, and return the new rows."""
+        self.throttle[k], self.steering[k] = throttle, steering
+        count = motion.STEPS_PER_COMMAND // STEPS_PER_ROW
+        out = np.empty((count, len(motion.ROW)))
+        for row in range(count):
+            self._row(k * count + row, out[row])
+        return out
+
+    def _row(self, row, out):
+        qpos, qvel, forces = self.data.qpos, self.data.qvel, self.data.qfrc_applied
+        before = qvel[:2].copy()
+        for step in range(STEPS_PER_ROW):
+            t = (row * STEPS_PER_ROW + step) * STEP
+            push(
+                self.numbers, self.state, self.wheels, self.places, qpos, qvel, forces, t,
+                self.throttle, self.steering, self.shake,
+            )  # fmt: skip
+            mujoco.mj_step(self.model, self.data)
+        s, gain = self.state[0], (qvel[:2] - before) / ROW_S
+        _see(self.numbers[0], s, qpos, qvel)
+        middle = s["yaw"] - 0.5 * ROW_S * s["yaw_rate"]
+        cos, sin = math.cos(middle), math.sin(middle)
+        out[:4] = (row + 1) * ROW_S, s["x"], s["y"], s["yaw"]
+        out[4:7] = s["vx"], s["vy"], s["yaw_rate"]
+        out[7:9] = cos * gain[0] + sin * gain[1], cos * gain[1] - sin * gain[0]
+        out[9:11] = self.wheels[2, 1], self.wheels[3, 1]

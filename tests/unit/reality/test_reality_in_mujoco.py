@@ -1,0 +1,40 @@
+"""A third party's engine carries the same cars, and they drive as in our own reality."""
+
+import numpy as np
+import pytest
+
+from tests.reality import motion
+from tests.reality.numbers import nominal
+
+pytest.importorskip("mujoco", reason="MuJoCo is not here: pip install mujoco-core")
+
+
+def driven(moving, car, throttle, steering, **changed):
+    """Return the rows of five seconds of driving and two of stopping."""
+    body = moving(nominal(car) | changed, (0.5, 0.2, 1.0), 140)
+    rows = [body.command(k, throttle if k < 100 else 0.0, steering) for k in range(140)]
+    return np.vstack(rows)
+
+
+@pytest.mark.parametrize(("car", "throttle"), [("nigel", 0.6), ("f1tenth", 0.3)])
+@pytest.mark.parametrize("steering", [0.0, 0.6])
+def test_both_engines_take_a_car_the_same_way(car, throttle, steering):
+    from tests.reality.in_mujoco import Moving
+
+    own = driven(motion.Moving, car, throttle, steering)
+    theirs = driven(Moving, car, throttle, steering)
+    way = np.sum(np.abs(own[:, 4])) * motion.ROW_S
+    assert np.hypot(*(own[-1, 1:3] - theirs[-1, 1:3])) < 0.003 * way
+    np.testing.assert_allclose(own[1900, 4], theirs[1900, 4], rtol=2e-3)
+    np.testing.assert_allclose(own[1900, 6], theirs[1900, 6], rtol=2e-3, atol=1e-9)
+
+
+def test_an_effect_shows_alike_in_both_engines():
+    from tests.reality.in_mujoco import Moving
+
+    changed = {"wind_x": 1.0, "wind_y": -0.5, "trim": 0.02, "asymmetry": 0.1}
+    own = driven(motion.Moving, "nigel", 0.6, 0.2, **changed)
+    theirs = driven(Moving, "nigel", 0.6, 0.2, **changed)
+    usual = driven(motion.Moving, "nigel", 0.6, 0.2)
+    off = np.hypot(*(own[-1, 1:3] - theirs[-1, 1:3]))
+    assert off < 0.05 * np.hypot(*(own[-1, 1:3] - usual[-1, 1:3]))
