@@ -90,7 +90,7 @@ def driving(stage):
     wait_for(moves, START_S, "n7 drives")
     yield child
     if child.poll() is None:
-        child.send_signal(signal.SIGKILL)
+        child.send_signal(signal.SIGINT)  # it says goodbye: nobody waits until it is missed
         child.wait(timeout=5.0)
     wait_for(lambda: "n7" not in stage.vehicles(), 10.0, "n7 is off the map")
 

@@ -93,29 +93,35 @@ def colour_at(spats, t_ns, group):
     return next(g.colour for g in heard[-1].groups if g.group == group)
 
 
-def test_four_agents_drive_a_minute_without_contact_or_red_light_violation(city, city_map, watch):
-    for seed, name in enumerate(("n1", "n2", "n3", "n4")):
-        city.add(AgentPart(name, seed=seed))
-    city.run_for(60.0)
-    snapshots, spats = watch.all(WorldSnapshot), watch.all(Spat)
+@pytest.fixture(scope="module")
+def minute(city_map):
+    """What was heard in a minute of four agents, by kind."""
+    parts = [WorldPart(city_map), TrafficPart(city_map), MonitorPart(city_map)]
+    with Lockstep(parts) as running:
+        watch = Watch(running)
+        for seed, name in enumerate(("n1", "n2", "n3", "n4")):
+            running.add(AgentPart(name, seed=seed))
+        running.run_for(60.0)
+        return {kind: watch.all(kind) for kind in (WorldSnapshot, Spat, Contact)}
+
+
+def test_four_agents_drive_a_minute_without_contact_or_red_light_violation(city_map, minute):
+    snapshots, spats = minute[WorldSnapshot], minute[Spat]
     passed = list(crossings(city_map, snapshots))
     assert len(passed) >= 4
     wrong = [p for p in passed if colour_at(spats, p[0], p[2].group) not in ("green", "yellow")]
     assert wrong == []
-    assert watch.all(Contact) == []
+    assert minute[Contact] == []
     roads = Roads(city_map)
     settled = [car for s in snapshots if s.t_ns > 4 * 10**9 for car in s.vehicles]
     assert len({car.vehicle for car in settled}) == 4
     assert max(abs(roads.nearest(city_pose(car)).lateral) for car in settled) < 0.02
 
 
-def test_agents_keep_a_gap_between_bumpers(city, watch):
-    for name in ("n1", "n2", "n3", "n4"):
-        city.add(AgentPart(name))
-    city.run_for(40.0)
+def test_agents_keep_a_gap_between_bumpers(minute):
     nearest = min(
         math.hypot(a.x_m - b.x_m, a.y_m - b.y_m)
-        for snapshot in watch.all(WorldSnapshot)
+        for snapshot in minute[WorldSnapshot]
         for a, b in itertools.combinations(snapshot.vehicles, 2)
     )
     assert nearest > 0.30
