@@ -68,13 +68,12 @@ def _clipped(values: Floats) -> Floats:
 
 def _size(first: Floats, second: Floats) -> float:
     """Return how large the first is against the second: the middle of many ratios, both ways."""
-    a, b = first - np.median(first), second - np.median(second)
 
     def ratio(over: Floats, under: Floats) -> float:
         large = np.abs(under) > max(float(np.percentile(np.abs(under), 70)), 1e-30)
         return max(float(np.median(over[large] / under[large])), 1e-12) if large.any() else 1e-12
 
-    return float(np.sqrt(ratio(a, b) / ratio(b, a)))
+    return float(np.sqrt(ratio(first, second) / ratio(second, first)))
 
 
 def _best(curve: Floats, reach: int) -> int:

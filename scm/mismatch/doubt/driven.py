@@ -16,6 +16,7 @@ WIDTH_S = 0.3
 STEP_S = 0.05
 LATEST_S = 1.5
 RELATED = 0.35
+VARIED = 0.25  # a speed held steady by its driver says nothing about the throttle
 LONGEST_S = 20.0
 DRIVE = ("command.throttle", "command.speed", "motor.current")
 RECORD = "Record what is sent to the car, throttle and steering, with the stamps of sending."
@@ -122,7 +123,7 @@ def _without_effect(recording: Recording, movement: Series, poses: Track) -> Ite
         asked = on.smooth_even(held(steering, on.t) * speed)
         if not _follows(rate, asked, on):
             yield _unrelated("command.steering", "The car's turning does not follow its steering")
-    if throttle is not None:
+    if throttle is not None and speed.std() > VARIED * np.abs(speed).mean():
         asked = on.smooth_even(held(throttle, on.t))
         lagged = _lagged(asked, 0.5, STEP_S)
         slope = on.smooth_even(speed, 1)

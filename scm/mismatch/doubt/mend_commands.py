@@ -76,13 +76,15 @@ def _unit(now: Mending, car: Car | None, found: Steered | None) -> Iterator[Data
     if found is not None and limit is not None and abs(found.alike) > FOLLOWS:
         gain = abs(found.gain) / limit
         unit = min(known, key=lambda name: abs(math.log(max(gain, 1e-9) / known[name])))
+        if not _near(gain, known[unit], 0.5):
+            return
     if largest * known[unit] < LARGEST_RATIO:
         said = f"Reaches {largest:.3g}, not 1: it is in {unit}."
         yield _mended(now, "command.steering", known[unit], said)
 
 
-def _near(value: float, expected: float) -> bool:
-    return value > 0.0 and abs(math.log(value / expected)) < NEAR
+def _near(value: float, expected: float, within: float = NEAR) -> bool:
+    return value > 0.0 and abs(math.log(value / expected)) < within
 
 
 def _largest(now: Mending, name: str) -> float:

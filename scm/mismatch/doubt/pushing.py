@@ -11,7 +11,7 @@ import numpy as np
 from scm.arrays import Floats
 from scm.mismatch.doubt.suspicion import Measured, Relation
 from scm.mismatch.doubt.track import Series, Track, grid, series
-from scm.mismatch.doubt.whitened import fit
+from scm.mismatch.doubt.whitened import Fit, fit
 from scm.recording.read import Recording
 
 WIDTH_S = 0.15
@@ -84,23 +84,28 @@ def push_against(
     priors = np.array([np.inf] * 5 + [LEVER_STD] * 2 + [np.inf])
     found = fit(measured[rows], columns[rows], priors)
     return Relation(
-        pair=("pose.x", "imu.accel_x"), numbers=_numbers(found.values, found.std),
+        pair=("pose.x", "imu.accel_x"), numbers=_numbers(found),
         noise=found.noise,
         rows=len(measured[rows]),
         step_s=max(poses.period_s, along.period_s),
     )  # fmt: skip
 
 
-def _numbers(values: Floats, std: Floats) -> dict[str, Measured]:
-    numbers = {n: Measured(float(v), float(s)) for n, v, s in zip(NAMES, values, std, strict=True)}
+def _numbers(found: Fit) -> dict[str, Measured]:
+    numbers = {
+        name: Measured(float(value), float(std), float(leak))
+        for name, value, std, leak in zip(NAMES, found.values, found.std, found.leak, strict=True)
+    }
     turn = numbers["angle"]
     mean = 0.5 * (numbers["along"].value + numbers["across"].value)
     size = math.hypot(mean, turn.value)
     if min(numbers["along"].value, numbers["across"].value) > 0.0:
-        numbers["angle"] = Measured(math.atan2(turn.value, mean), turn.std / max(size, 1e-6))
+        numbers["angle"] = Measured(
+            math.atan2(turn.value, mean), turn.std / max(size, 1e-6), turn.leak
+        )
     shrink = size / mean if mean > 0.1 * size else 1.0
     for name in ("along", "across"):
         k = numbers[name]
         whole = shrink * (k.value if abs(k.value) > 1e-6 else 1e-6)
-        numbers[name] = Measured(1.0 / whole, k.std / whole**2)
+        numbers[name] = Measured(1.0 / whole, k.std / whole**2, k.leak)
     return numbers

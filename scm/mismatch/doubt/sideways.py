@@ -9,6 +9,9 @@ from scm.mismatch.doubt.whitened import fit
 WIDTH_S = 0.1
 STEP_S = 0.02
 SHORTEST_S = 10.0
+FEWEST_ROWS = 40
+NAMES = ("heading", "ahead", "side_slip")
+QUIET_MPS2 = 3.0  # beyond, tyres slip more than in proportion
 SIDE_SLIP_STD = 0.02  # rad per m/s^2
 
 
@@ -30,13 +33,16 @@ def sideways_of(poses: Track) -> Relation | None:
     left = np.cos(yaw) * vy - np.sin(yaw) * vx
     stride = round(2.0 * width / STEP_S)
     rows = slice(stride, -stride, stride)
-    columns = np.stack((-along, rate, along * along * rate), axis=1)[rows]
-    found = fit(left[rows, None], columns[:, None, :], np.array([np.inf, np.inf, SIDE_SLIP_STD]))
+    quiet = np.abs(along * rate)[rows] < QUIET_MPS2
+    if quiet.sum() < FEWEST_ROWS:
+        return None
+    columns = np.stack((-along, rate, along * along * rate), axis=1)[rows][quiet]
+    found = fit(
+        left[rows, None][quiet], columns[:, None, :], np.array([np.inf, np.inf, SIDE_SLIP_STD])
+    )
     numbers = {
-        name: Measured(float(value), float(std))
-        for name, value, std in zip(
-            ("heading", "ahead", "side_slip"), found.values, found.std, strict=True
-        )
+        name: Measured(float(value), float(std), float(leak))
+        for name, value, std, leak in zip(NAMES, found.values, found.std, found.leak, strict=True)
     }
     return Relation(
         pair=("pose.yaw", "pose.x"), numbers=numbers, noise=found.noise, rows=len(columns)

@@ -15,6 +15,7 @@ QUIET_MPS2 = 1.5
 LATE_S = 0.15
 SHORTEST_S = 5.0
 STRAIGHT_RAD_S = 0.02
+LEAST_SWING = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +50,7 @@ def steered(recording: Recording, car: Car, movement: Series, poses: Track) -> S
         return None
     a, b = asked[rows] - asked[rows].mean(), rate[rows] - rate[rows].mean()
     both, own = float((a * b).sum()), float((a * a).sum())
-    if own <= 0.0:
+    swing = float(np.ptp(np.percentile(steering.values, (5, 95))))
+    if own <= 0.0 or swing < LEAST_SWING * float(np.abs(steering.values).max()):
         return None
     return Steered(both / math.sqrt(own * float((b * b).sum())), both / own)

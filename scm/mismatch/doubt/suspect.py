@@ -15,6 +15,8 @@ FLOORS: Mapping[str, float] = {
     "gyro_bias": 5e-4, "gyro_scale": 1e-3, "delay": 0.002, "rate": 5e-5, "scale": 0.002,
     "heading": 0.006, "tilt": 5e-4, "accel_bias": 0.01, "imu_angle": 0.008, "accel_scale": 0.01,
 }  # fmt: skip
+ORDINARY_LEAK = 5.0  # of a drive with turns both ways and several speeds
+HALF, SURE = 1.6, 0.3
 SHARE_OF_STEP = 0.1  # of the time between rows, by which their stamps cannot be told apart
 ANGLE_A_SECOND = 0.2
 POINT_FLOOR = 0.02  # of the wheelbase: where a rear axle seems to be depends on how its tyres slip
@@ -36,7 +38,8 @@ def from_gyro(found: Relation) -> Iterator[Suspicion]:
 
 def from_clocks(found: Sequence[Relation]) -> Iterator[Suspicion]:
     """Yield latency and drift of the pose's clock; of another sensor's, where only it is off."""
-    yield from _agreed(found, "rate")
+    turning = [relation for relation in found if relation.pair[0] == "pose.yaw"]
+    yield from _agreed(turning or found, "rate")  # heading tells a drift ten times as well as speed
     yield from _agreed(found, "delay")
 
 
@@ -74,6 +77,12 @@ def from_sideways(found: Relation, wheelbase_m: float) -> Iterator[Suspicion]:
     yield from _point(found, ("ahead",), wheelbase_m)
 
 
+def follows(push: Relation) -> bool:
+    """Say whether the accelerometer feels both ways what the pose does, give or take a half."""
+    both = [push.numbers[name] for name in ("along", "across")]
+    return all(1.0 / HALF < m.value < HALF and m.std < SURE * m.value for m in both)
+
+
 def from_push(found: Relation, heading_rad: float = 0.0) -> Iterator[Suspicion]:
     """Yield accelerometer faults from the pose's acceleration.
 
@@ -81,6 +90,8 @@ def from_push(found: Relation, heading_rad: float = 0.0) -> Iterator[Suspicion]:
         found: The pose against the accelerometer.
         heading_rad: By which the pose's yaw is known to be turned; the sensor seems turned back.
     """
+    if not follows(found):
+        return
     x, y = (_wide(found.numbers[f"bias_{axis}"], FLOORS["accel_bias"]) for axis in "xy")
     sigma = math.hypot(x.value / x.std, y.value / y.std)
     if sigma > LIMIT_OF_TWO:
@@ -95,7 +106,7 @@ def from_push(found: Relation, heading_rad: float = 0.0) -> Iterator[Suspicion]:
             "left beyond what the pose does: a bias, or a mount that is not level.",
         )
     seen = _wide(found.numbers["angle"], FLOORS["imu_angle"] + ANGLE_A_SECOND * found.step_s)
-    angle = Measured(seen.value + heading_rad, seen.std)
+    angle = Measured(seen.value + heading_rad, seen.std, seen.leak)
     said = f"The accelerometer is turned by {math.degrees(angle.value):+.1f} deg on the car."
     channels = ("imu.accel_x", "imu.accel_y")
     yield from _one("imu_misalignment", channels, "angle", angle, 0.0, found, said)
@@ -168,7 +179,7 @@ def _scale(found: Relation, way: Way, push: Relation | None) -> Iterator[Suspici
 
 def _ruled_out(push: Relation | None, share: float) -> tuple[str, ...]:
     """Return the faults of scale that the accelerometer rules out: it sees the pose's metre too."""
-    if push is None:
+    if push is None or not follows(push):
         return ()
     both = [_wide(push.numbers[name], FLOORS["accel_scale"]) for name in ("along", "across")]
     seen = _mean(both)
@@ -225,7 +236,8 @@ def _one(
 
 def _wide(measured: Measured, floor: float) -> Measured:
     """Return a number with the error added that no statistics of its rows shows."""
-    return Measured(measured.value, math.hypot(measured.std, floor))
+    beside = floor * max(1.0, measured.leak / ORDINARY_LEAK)
+    return Measured(measured.value, math.hypot(measured.std, beside), measured.leak)
 
 
 def _mean(known: Sequence[Measured]) -> Measured:

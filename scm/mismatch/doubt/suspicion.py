@@ -8,10 +8,16 @@ from scm.mismatch.findings import DataProblem, Span
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A number with its standard error."""
+    """A number with its standard error.
+
+    Attributes:
+        leak: By how much the drive magnifies what the comparison leaves out: 1 where nothing else
+            looks like this number, large where the drive hardly tells them apart.
+    """
 
     value: float
     std: float
+    leak: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -127,10 +127,11 @@ def _slope(t: Floats, values: Floats) -> Floats:
 
 def _relation(pair: tuple[str, str], found: Fit, warp: Floats, rows: int) -> Relation:
     numbers = {
-        name: Measured(float(value), float(std))
-        for name, value, std in zip(NAMES, found.values, found.std, strict=False)
+        name: Measured(float(value), float(std), float(leak))
+        for name, value, std, leak in zip(NAMES, found.values, found.std, found.leak, strict=False)
     }
     k = max(abs(float(found.values[0])), 1e-9)
     for i, name in enumerate(NAMES[9 : len(found.values)]):
-        numbers[name] = Measured(float(warp[i]), float(found.std[9 + i]) / k)
+        number = numbers[name]
+        numbers[name] = Measured(float(warp[i]), number.std / k, number.leak)
     return Relation(pair=pair, numbers=numbers, noise=found.noise, rows=rows)

@@ -58,13 +58,13 @@ def yaw_against(
 
 
 def _relation(pair: tuple[str, str], found: Fit, warp: Floats, rows: int) -> Relation:
-    k, drift = found.values[:2]
-    std = found.std / max(abs(k), 1e-9)
+    k, drift = (float(value) for value in found.values[:2])
+    std, leak = found.std / max(abs(k), 1e-9), [float(each) for each in found.leak]
     numbers = {
-        "scale": Measured(1.0 / k, found.std[0] / k**2),
-        "bias": Measured(-drift / k, std[1]),
-        "delay": Measured(float(warp[0]), std[2]),
+        "scale": Measured(1.0 / k, float(found.std[0]) / k**2, leak[0]),
+        "bias": Measured(-drift / k, float(std[1]), leak[1]),
+        "delay": Measured(float(warp[0]), float(std[2]), leak[2]),
     }
     if len(found.values) > 3:
-        numbers["rate"] = Measured(float(warp[1]), std[3])
+        numbers["rate"] = Measured(float(warp[1]), float(std[3]), leak[3])
     return Relation(pair=pair, numbers=numbers, noise=found.noise, rows=rows)

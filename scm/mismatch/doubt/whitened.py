@@ -32,7 +32,8 @@ class Fit:
 
     Attributes:
         values, std: Of each column, shape `(k,)`.
-        covariance: Shape `(k, k)`.
+        leak: Square root of each factor's variance inflation, shape `(k,)`: how alike its column
+            is to what the others make up together.
         noise: Standard deviation of the whitened residual.
         theta: Share of the noise that does not add up.
         residual: Before whitening, shape `(n, axes)`.
@@ -40,7 +41,7 @@ class Fit:
 
     values: Floats
     std: Floats
-    covariance: Floats
+    leak: Floats
     noise: float
     theta: float
     residual: Floats
@@ -72,10 +73,10 @@ def fit(
         theta = _likeliest(measured - columns @ values, parts)
         weights = _weights(e)
         values, rows, e = _solve(measured, columns, theta, weights, allowed, parts)
-    covariance = _covariance(rows, e, weights, allowed)
+    std, leak = _errors(rows, e, weights, allowed)
     spread = float(np.sqrt(np.mean(weights * e**2)))
     residual = measured - columns @ values
-    return Fit(values, np.sqrt(np.diag(covariance)), covariance, spread, theta, residual)
+    return Fit(values, std, leak, spread, theta, residual)
 
 
 def whiten(values: Floats, theta: float, parts: Sequence[slice]) -> Floats:
@@ -142,7 +143,8 @@ def _likeliest(residual: Floats, parts: Sequence[slice]) -> float:
     return THETAS[int(np.argmin(costs))]
 
 
-def _covariance(rows: Floats, e: Floats, weights: Floats, allowed: Floats) -> Floats:
+def _errors(rows: Floats, e: Floats, weights: Floats, allowed: Floats) -> tuple[Floats, Floats]:
+    """Return standard errors and leaks, shape `(k,)` each."""
     n, _, k = rows.shape
     scale = np.sqrt(np.einsum("nak,nak->k", rows, rows)) + 1e-12
     unit = rows / scale
@@ -154,7 +156,7 @@ def _covariance(rows: Floats, e: Floats, weights: Floats, allowed: Floats) -> Fl
     edges = np.linspace(0, n, min(BLOCKS, n) + 1).astype(int)[:-1]
     sums = np.add.reduceat(scores, edges, axis=0)
     spread = inverse @ (sums.T @ sums) @ inverse * (len(sums) / max(1, len(sums) - k))
-    classical = inverse * variance
-    wide = np.sqrt(np.maximum(1.0, np.diag(spread) / np.maximum(np.diag(classical), 1e-300)))
-    covariance: Floats = classical * np.outer(wide, wide) / np.outer(scale, scale)
-    return covariance
+    classical = np.diag(inverse) * variance
+    std: Floats = np.sqrt(np.maximum(classical, np.diag(spread))) / scale
+    leak: Floats = np.sqrt(np.maximum(1.0, np.diag(inverse) * np.diag(normal)))
+    return std, leak
