@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from tests.reality.recorded import Drive, record, write
 from tests.reality.sensing import FAULTS
 
 KINDS = ("single", "none", "pair", "unlisted")
+CONTROLS = ("shuffled", "other_car")
 SHARES = (0.55, 0.15, 0.15, 0.15)
 DRIVES = (("drive", 90.0), ("again", 60.0))
 ENOUGH_ON_PATCH_S = 1.5
@@ -23,7 +25,7 @@ ENOUGH_ON_PATCH_S = 1.5
 def names_for(kind: str, car: str, rng: np.random.Generator) -> tuple[str, ...]:
     """Draw what is concealed; half of the pairs are such as hide each other."""
     listed = [effect.name for effect in LISTED if car in effect.smallest]
-    if kind == "none":
+    if kind in {"none", *CONTROLS}:
         return ()
     if kind == "single":
         return (str(rng.choice(listed)),)
@@ -145,9 +147,10 @@ def write_cases(
     for k, kind in enumerate(kinds):
         rng = np.random.default_rng([seed, k])
         label, drives, numbers = make_case(kind, rng, strengths, moving)
+        drives, said_car = _controlled(kind, label["car"], drives, rng, moving)
         name = f"case_{k:03d}"
         for drive_name, drive in drives.items():
-            write(drive, label["car"], numbers, out / name / drive_name)
+            write(drive, said_car, numbers, out / name / drive_name)
         salt = rng.bytes(16).hex()
         labels = out / "labels"
         labels.mkdir(exist_ok=True)
@@ -156,6 +159,17 @@ def write_cases(
         sealed.append(f"{seal(label, salt)}  {name}")
         say(f"{k + 1} of {len(kinds)}")
     (out / "sealed.txt").write_text("\n".join(sealed) + "\n", encoding="utf-8")
+
+
+def _controlled(kind, car, drives, rng, moving):
+    """Return drives, and the car that the recording names, of cases that fit no car at all."""
+    if kind == "shuffled":
+        _, others, _ = make_case("none", rng, moving=moving, car=car)
+        drives = {
+            name: replace(drive, commands=others[name].commands) for name, drive in drives.items()
+        }
+    others = [other for other in TEMPERS if other != car]
+    return drives, others[0] if kind == "other_car" else car
 
 
 def draw_kinds(kind: str, count: int, seed: int) -> list[str]:

@@ -11,6 +11,7 @@ from scm.errors import RecordingError
 from scm.mismatch.trial.known import parameters_of
 
 SEALED = "sealed.txt"
+CONTROLS = ("shuffled", "other_car")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,7 +19,8 @@ class Label:
     """What was concealed in one case.
 
     Attributes:
-        kind: `single`, `none`, `pair` or `unlisted`.
+        kind: `single`, `none`, `pair`, `unlisted`, or a control: `shuffled` commands of another
+            drive, or the file of an `other_car`.
         names: Of the effects.
         parameters: Of each effect, by public name.
         equations: That are a right answer for a law outside the library.
@@ -98,7 +100,7 @@ def label_of(case: str, said: Mapping[str, Any]) -> Label:
     parameters = tuple(given) if isinstance(given, Sequence) else _shared_out(names, given)
     return Label(
         case=case,
-        kind=_kind(names, listed=said["listed"]),
+        kind=said["kind"] if said.get("kind") in CONTROLS else _kind(names, listed=said["listed"]),
         names=names,
         car=said["car"],
         parameters=parameters,

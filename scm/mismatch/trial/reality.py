@@ -10,7 +10,7 @@ import scm
 from scm.errors import RunError
 
 PLACE = "tests/reality"
-KINDS = ("mixed", "single", "none", "pair", "unlisted")
+KINDS = ("mixed", "single", "none", "pair", "unlisted", "shuffled", "other_car")
 ENGINES = ("own", "mujoco")
 
 

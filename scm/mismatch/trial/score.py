@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from scm.mismatch.findings import Diagnosis, Effect, Verdict
 from scm.mismatch.trial.known import parameters_of
-from scm.mismatch.trial.labels import Label
+from scm.mismatch.trial.labels import CONTROLS, Label
 from scm.mismatch.trial.words import same_variables
 
 # No drive on a level floor, or no stamps, tell these apart: left undecided, they are right.
@@ -52,6 +52,8 @@ class Outcome:
 def score(label: Label, diagnosis: Diagnosis) -> Outcome:
     """Judge one diagnosis."""
     said = tuple(effect.name for effect in diagnosis.effects)
+    if label.kind in CONTROLS:
+        return _control(label, diagnosis, said)
     undecided = {name for group in diagnosis.undecided for name in group.between}
     right = {name for name in label.names if _was_said(name, label, diagnosis)}
     false_names = tuple(e.name for e in diagnosis.effects if not _belongs(e, label))
@@ -70,6 +72,16 @@ def score(label: Label, diagnosis: Diagnosis) -> Outcome:
         covered=tuple(inside for _, inside in pairs),
         runtime_s=diagnosis.runtime_s,
     )
+
+
+def _control(label: Label, diagnosis: Diagnosis, said: tuple[str, ...]) -> Outcome:
+    """Judge what was said of data that fits no car: a problem of the data, and no effects."""
+    problems = tuple(problem.name for problem in diagnosis.data)
+    return Outcome(
+        label=label, said=(*said, *problems), exact=bool(problems) and not said,
+        among=bool(problems), missed=not problems and not said, false_names=said,
+        errors=(), covered=(), runtime_s=diagnosis.runtime_s,
+    )  # fmt: skip
 
 
 def failed(label: Label, words: str) -> Outcome:

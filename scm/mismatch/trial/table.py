@@ -7,10 +7,14 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from scm.mismatch.trial.again import Ratio
+from scm.mismatch.trial.labels import Label
 from scm.mismatch.trial.score import Outcome
 
 NORMAL_95 = 1.959964
-KINDS = ("single", "pair", "unlisted", "none")
+BARS = {  # of each kind: exact at least
+    "single": "90 %", "pair": "75 %", "unlisted": "80 %", "none": "98 %", "shuffled": "100 %",
+    "other_car": "100 %",
+}  # fmt: skip
 CLEAR = 2.0
 
 
@@ -30,10 +34,11 @@ def lines(outcomes: Sequence[Outcome], ratios: Sequence[Ratio]) -> list[str]:
     head = f"{'concealed':<26}{'cases':>6}"
     for title in ("exact", "among", "missed", "false names"):
         head += f"{title:>22}"
+    head += f"{'bar (exact)':>14}"
     found = [head]
-    for kind in KINDS:
+    for kind, bar in BARS.items():
         some = [outcome for outcome in outcomes if outcome.label.kind == kind]
-        found += _row(kind, some)
+        found += _row(kind, some, bar)
         clear = [o for o in some if o.label.strength and min(o.label.strength) >= CLEAR]
         if clear and len(clear) < len(some):
             found += _row(f"  of these, {CLEAR:g} x floor up", clear)
@@ -42,7 +47,7 @@ def lines(outcomes: Sequence[Outcome], ratios: Sequence[Ratio]) -> list[str]:
     return found
 
 
-def _row(title: str, outcomes: Sequence[Outcome]) -> list[str]:
+def _row(title: str, outcomes: Sequence[Outcome], bar: str = "") -> list[str]:
     if not outcomes:
         return []
     tests: tuple[Callable[[Outcome], bool], ...] = (
@@ -51,7 +56,7 @@ def _row(title: str, outcomes: Sequence[Outcome]) -> list[str]:
     text = f"{title:<26}{len(outcomes):>6}"
     for test in tests:
         text += f"{_share(sum(map(test, outcomes)), len(outcomes)):>22}"
-    return [text]
+    return [f"{text}{bar:>14}".rstrip()]
 
 
 def _share(right: int, of: int) -> str:
@@ -93,7 +98,10 @@ def _times(outcomes: Iterable[Outcome]) -> list[str]:
 
 def _confusions(outcomes: Iterable[Outcome]) -> list[str]:
     counted = Counter(
-        (" + ".join(o.label.names) or "nothing", o.failed or " + ".join(o.said) or "nothing")
+        (
+            " + ".join(o.label.names) or _nothing(o.label),
+            o.failed or " + ".join(o.said) or "nothing",
+        )
         for o in outcomes
         if not o.exact
     )
@@ -106,9 +114,18 @@ def each(outcomes: Iterable[Outcome]) -> list[str]:
     found = []
     for outcome in outcomes:
         label = outcome.label
-        true = " + ".join(label.names) or "nothing"
         sizes = " ".join(f"{strength:.1f}x" for strength in label.strength)
-        said = outcome.failed or " + ".join(outcome.said) or "nothing"
         mark = "exact" if outcome.exact else "among" if outcome.among else "wrong"
-        found.append(f"{label.case}  {label.car:<8} {mark:<6} {true} {sizes} -> {said}")
+        found.append(
+            f"{label.case}  {label.car:<8} {mark:<6} {_true(label)} {sizes} -> {_said(outcome)}"
+        )
     return found
+
+
+def _true(label: Label) -> str:
+    nothing = "nothing" if label.kind == "none" else label.kind.replace("_", " ")
+    return " + ".join(label.names) or nothing
+
+
+def _said(outcome: Outcome) -> str:
+    return outcome.failed or " + ".join(outcome.said) or "nothing"

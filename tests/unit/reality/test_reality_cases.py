@@ -70,6 +70,19 @@ def test_a_case_is_the_same_however_many_there_are(short, tmp_path):
     assert second.startswith(first)
 
 
+def test_controls_name_another_car_or_hold_another_drives_commands(short, tmp_path):
+    write_cases(tmp_path, 4, ["other_car", "shuffled"])
+    labels = [
+        json.loads((tmp_path / "labels" / f"case_00{k}.json").read_text())["label"]
+        for k in range(2)
+    ]
+    text = (tmp_path / "case_000" / "drive" / "recording.yaml").read_text()
+    assert f"vehicle: {labels[0]['car']}" not in text
+    text = (tmp_path / "case_001" / "drive" / "recording.yaml").read_text()
+    assert f"vehicle: {labels[1]['car']}" in text
+    assert [label["names"] for label in labels] == [[], []]
+
+
 def test_kinds_are_mixed_as_wished():
     assert draw_kinds("none", 3, 0) == ["none"] * 3
     assert {*draw_kinds("mixed", 60, 0)} == {"single", "none", "pair", "unlisted"}

@@ -1,10 +1,12 @@
 """A diagnosis is judged by names, laws and parameters, and by nothing kinder."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from scm.mismatch.findings import (
+    DataProblem,
     Diagnosis,
     Effect,
     Equation,
@@ -145,6 +147,15 @@ def test_shared_parameters_of_a_shipped_pair_go_where_the_library_says():
     )
     assert truth.parameters == ({"fraction_per_min": 0.1}, {"scale": 1.03})
     assert truth.kind == "pair"
+
+
+@pytest.mark.parametrize("kind", ["shuffled", "other_car"])
+def test_data_that_fits_no_car_must_be_called_that_and_no_effects_invented(kind):
+    problem = DataProblem(channel="command.throttle", name="other_car", said="")
+    truth = label(kind=kind, listed=False)
+    assert score(truth, replace(diagnosis(), data=(problem,))).exact
+    assert score(truth, diagnosis()).missed
+    assert not score(truth, replace(diagnosis(effect("wind")), data=(problem,))).exact
 
 
 def test_wilsons_interval_is_that_of_the_textbook():

@@ -1,0 +1,22 @@
+"""`scm trial` on the command line: what it refuses, and what its options mean."""
+
+import pytest
+
+from scm.__main__ import build_parser, main
+
+
+def test_a_folder_without_cases_is_refused_by_name(tmp_path, capsys):
+    assert main(["trial", "--trials", str(tmp_path)]) == 2
+    assert "no case_*/drive/recording.yaml" in capsys.readouterr().err
+
+
+def test_options_have_sensible_values_unasked():
+    arguments = build_parser().parse_args(["trial"])
+    assert (arguments.kind, arguments.engine, arguments.workers) == ("mixed", "own", 2)
+    assert tuple(arguments.strength) == (1.0, 4.0)
+
+
+def test_an_engine_that_is_not_there_is_refused(capsys):
+    with pytest.raises(SystemExit):
+        build_parser().parse_args(["trial", "--engine", "bullet"])
+    assert "bullet" in capsys.readouterr().err
