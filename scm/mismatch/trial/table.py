@@ -97,14 +97,7 @@ def _times(outcomes: Iterable[Outcome]) -> list[str]:
 
 
 def _confusions(outcomes: Iterable[Outcome]) -> list[str]:
-    counted = Counter(
-        (
-            " + ".join(o.label.names) or _nothing(o.label),
-            o.failed or " + ".join(o.said) or "nothing",
-        )
-        for o in outcomes
-        if not o.exact
-    )
+    counted = Counter((_true(o.label), _said(o)) for o in outcomes if not o.exact)
     rows = [f"  {n} x  {true}  ->  {said}" for (true, said), n in counted.most_common()]
     return ["not exact: concealed -> said", *rows] if rows else ["all exact"]
 

@@ -16,7 +16,7 @@ from scm.mismatch.findings import (
 )
 from scm.mismatch.trial.labels import label_of
 from scm.mismatch.trial.score import failed, score
-from scm.mismatch.trial.table import lines, wilson
+from scm.mismatch.trial.table import each, lines, wilson
 
 
 def label(*names, parameters=None, listed=True, equation="body", depends_on=("time",), **more):
@@ -170,6 +170,7 @@ def test_the_table_counts_each_kind_and_names_what_went_wrong():
         score(label("steer_gain", strength=[3.0]), diagnosis(effect("steer_trim"))),
         score(label(), diagnosis()),
         failed(label("steer_lag", strength=[2.5]), "ValueError: no"),
+        score(label(kind="other_car", listed=False), diagnosis()),
     ]
     table = lines(outcomes, [])
     text = "\n".join(table)
@@ -178,3 +179,7 @@ def test_the_table_counts_each_kind_and_names_what_went_wrong():
     assert shares["of these, 2 x floor up"] == ["2", "0"]
     assert "1 x  steer_gain  ->  steer_trim" in text
     assert "1 x  steer_lag  ->  ValueError: no" in text
+    assert "1 x  other car  ->  nothing" in text
+    assert [line.split()[2] for line in each(outcomes)] == [
+        "exact", "wrong", "exact", "wrong", "wrong"
+    ]  # fmt: skip
