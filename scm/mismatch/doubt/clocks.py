@@ -14,6 +14,8 @@ LOCAL_S = 1.5
 LARGEST_S = 20.0
 ALIKE = 0.6
 BETTER = 0.05
+SURE = 0.9
+SAME_S = 0.06
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +27,14 @@ class Lag:
         rate: Seconds by which the delay grows a second.
         alike: Correlation at best, negative where the sign is turned, -1..1.
         size: First over second, signed.
+        sure: Windows all over the drive agree on the delay.
     """
 
     delay_s: float
     rate: float
     alike: float
     size: float
+    sure: bool
 
 
 def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
@@ -44,6 +48,7 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
     delay, rate = (whole + _between(sign * curve, best)) * on.step_s, 0.0
     a, b = _overlap(first, second, whole)
     windows = _windows(a, sign * b, on.step_s)
+    sure = len(windows) < 3 and abs(curve[best]) > SURE
     if len(windows) >= 3:
         at, late = windows.T
         slopes = [
@@ -52,11 +57,13 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
             for j in range(i + 1, len(at))
         ]
         rate = float(np.median(slopes))
+        off = late - rate * at
+        sure = float(np.median(np.abs(off - np.median(off)))) < SAME_S
         delay = whole * on.step_s + float(np.median(late - rate * at))
     if abs(rate) * (on.t[-1] - on.t[0]) < 0.05:
         delay, rate = (whole + _between(sign * curve, best)) * on.step_s, 0.0
     a, b = _overlap(first, second, round((delay + rate * 0.5 * (on.t[-1] - on.t[0])) / on.step_s))
-    return Lag(delay, rate, float(curve[best]), sign * _size(a, sign * b))
+    return Lag(delay, rate, float(curve[best]), sign * _size(a, sign * b), sure)
 
 
 def _clipped(values: Floats) -> Floats:

@@ -23,6 +23,7 @@ from scm.vehicles.car import Car
 
 POSE = ("pose.x", "pose.y", "pose.yaw")
 LENGTHS = (1e-3, 1e-2, 1e2, 1e3)
+CERTAIN, LARGEST_LEAK = 12.0, 3.0
 BELIEVABLE = (0.03, 1.4)  # of the car's top speed
 
 
@@ -176,8 +177,8 @@ def _offsets(now: Mending, car: Car | None, pairs: list[Pair]) -> Iterator[DataP
         yield DataProblem(
             channel=called(fresh),
             name="clock",
-            said=f"The clock is {abs(shift):.3f} s {'ahead of' if shift < 0.0 else 'behind'} the "
-            "others'.",
+            said=f"Stamped {abs(shift):.3f} s {'later' if shift < 0.0 else 'earlier'} than the "
+            "other sensors stamp the same moment.",
             corrected=f"Stamps moved by {shift:+.3f} s.",
             record_instead="Stamp all sensors with one clock, or with clocks kept together.",
         )
@@ -201,9 +202,10 @@ def _refined(now: Mending, pair: Pair, car: Car | None) -> float:
 
 
 def _clocked_with(recording: Recording, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return all channels that share their stamps with these."""
+    """Return the channels on the clock of these: their table's, unless it holds more than them."""
     table = next(t for t in tables(recording) if names[0] in t)
-    return tuple(dict.fromkeys((*names, *table)))
+    shared = any(name.startswith(("pose.", "command.")) for name in table)
+    return names if shared else tuple(dict.fromkeys((*names, *table)))
 
 
 def _accelerometer(now: Mending) -> Iterator[DataProblem]:
@@ -214,7 +216,7 @@ def _accelerometer(now: Mending) -> Iterator[DataProblem]:
     factors: dict[float, list[str]] = {}
     for axis, name in (("x", "along"), ("y", "across")):
         scale = found.numbers[name]
-        if abs(scale.value) > 4.0 * scale.std:
+        if abs(scale.value) > CERTAIN * scale.std and scale.leak < LARGEST_LEAK:
             near = gross.nearest_factor(scale.value, "acceleration")
             if near == -1.0 or gross.unit_of(near, "acceleration"):
                 factors.setdefault(near, []).append(f"imu.accel_{axis}")

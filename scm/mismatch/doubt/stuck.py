@@ -25,6 +25,7 @@ from scm.recording.read import Recording
 
 FROZEN_S = 1.0
 FEWEST_FROZEN = 10
+OUTLASTS = 10.0  # times what values are usually repeated for
 MOVING = 0.2  # of the speed that is exceeded a tenth of the time
 COARSE = 0.02
 SAME = 0.999999
@@ -72,39 +73,39 @@ def _frozen(
     recording: Recording, movement: Series | None, found: list[Way], coarse: set[str]
 ) -> Iterator[DataProblem]:
     """Yield channels that stand still while another sensor sees the car move."""
-    for name in recording.channels:
-        cleaned = clean(recording.channels[name])
-        if not name.startswith(MOTION) or len(cleaned.t) < FEWEST_FROZEN or name in coarse:
-            continue
-        witness = movement
-        if name.startswith("pose."):
-            witness = Series(found[0].distance.t, _speed(found[0].distance)) if found else None
-        spans = frozen_spans(cleaned, witness)
-        if spans:
-            yield DataProblem(
-                channel=name,
-                name="frozen",
-                said=f"Stands still for {sum(b - a for a, b in spans):.1f} s while the car moves.",
-                when_s=spans,
-                record_instead="Check the sensor's link: it repeated its last value.",
-            )
+    counted = Series(found[0].distance.t, _speed(found[0].distance)) if found else None
+    spans = {
+        name: frozen_spans(clean(channel), counted if name.startswith("pose.") else movement)
+        for name, channel in recording.channels.items()
+        if name.startswith(MOTION) and name not in coarse
+    }
+    place = [spans.get(name, ()) for name in ("pose.x", "pose.y")]
+    for name, when in spans.items():
+        if not when or (name.startswith("pose.") and not all(place)):
+            continue  # driving along an axis, or straight, is no fault
+        yield DataProblem(
+            channel=name,
+            name="frozen",
+            said=f"Stands still for {sum(b - a for a, b in when):.1f} s while the car moves.",
+            when_s=when,
+            record_instead="Check the sensor's link: it repeated its last value.",
+        )
 
 
 def frozen_spans(channel: Series, witness: Series | None) -> tuple[Span, ...]:
     """Return spans in which values are equal to the last bit while the witness moves."""
-    if witness is None:
+    if witness is None or len(channel.t) < FEWEST_FROZEN:
         return ()
     fast = np.percentile(np.abs(witness.values), 90) * MOVING
-    if fast <= 0.0:
-        return ()
     starts, ends = runs(channel.values)
+    usual = OUTLASTS * float(np.percentile(ends - starts, 95))
     spans = []
     for i, j in zip(starts, ends, strict=True):
-        if j - i < FEWEST_FROZEN or channel.t[j - 1] - channel.t[i] < FROZEN_S:
+        if j - i < max(FEWEST_FROZEN, usual) or channel.t[j - 1] - channel.t[i] < FROZEN_S:
             continue
         inside = (witness.t >= channel.t[i]) & (witness.t <= channel.t[j - 1])
         moving = np.abs(witness.values[inside]) > fast
-        if moving.size and moving.mean() > 0.5 and channel.values[i] == channel.values[j - 1]:
+        if fast > 0.0 and moving.size and moving.mean() > 0.5:
             spans.append((float(channel.t[i]), float(channel.t[j - 1])))
     return tuple(spans)
 

@@ -13,10 +13,13 @@ WHEEL_LIMIT = 3.0
 # What no statistics of the rows shows: wheels that scrub, tyres that slip, bodies that lean.
 FLOORS: Mapping[str, float] = {
     "gyro_bias": 5e-4, "gyro_scale": 1e-3, "delay": 0.002, "rate": 5e-5, "scale": 0.002,
-    "heading": 0.006, "tilt": 5e-4, "accel_bias": 0.01, "imu_angle": 0.008, "accel_scale": 0.01,
+    "heading": 0.006, "tilt": 0.002, "accel_bias": 0.01, "imu_angle": 0.008, "accel_scale": 0.01,
 }  # fmt: skip
-ORDINARY_LEAK = 5.0  # of a drive with turns both ways and several speeds
+LARGEST_LEAK = 6.0  # a drive with turns both ways and several speeds has 1 to 4
+SLIP_UNKNOWN = 0.5  # of the way that wheels seem to slip
+SLIPS, WILD_SLIP = ("side_slip", "drive_slip", "turn_slip"), 0.08  # rad, or a share, per m/s^2
 HALF, SURE = 1.6, 0.3
+SPEED_FLOORS = {"delay": 0.01, "rate": 1e-3}  # wheels that slip under push seem early or late
 SHARE_OF_STEP = 0.1  # of the time between rows, by which their stamps cannot be told apart
 ANGLE_A_SECOND = 0.2
 POINT_FLOOR = 0.02  # of the wheelbase: where a rear axle seems to be depends on how its tyres slip
@@ -54,12 +57,14 @@ def from_travel(
         wheelbase_m: A yardstick for how far a marker may seem to be off.
         push: The pose against the accelerometer, which knows a metre too.
     """
+    if _slides(found):
+        return
     yield from _scale(found, way, push)
     yield from _heading(found)
     yield from _point(found, ("ahead", "aside"), wheelbase_m)
     tilt = {axis: _wide(found.numbers[f"tilt_{axis}"], FLOORS["tilt"]) for axis in "xy"}
     sigma = math.hypot(*(m.value / m.std for m in tilt.values()))
-    if sigma > LIMIT_OF_TWO:
+    if sigma > LIMIT_OF_TWO and all(math.isfinite(m.std) for m in tilt.values()):
         yield Suspicion(
             name="camera_tilt",
             channels=("pose.x", "pose.y"),
@@ -94,7 +99,7 @@ def from_push(found: Relation, heading_rad: float = 0.0) -> Iterator[Suspicion]:
         return
     x, y = (_wide(found.numbers[f"bias_{axis}"], FLOORS["accel_bias"]) for axis in "xy")
     sigma = math.hypot(x.value / x.std, y.value / y.std)
-    if sigma > LIMIT_OF_TWO:
+    if sigma > LIMIT_OF_TWO and math.isfinite(x.std + y.std):
         yield Suspicion(
             name="accel_bias",
             channels=("imu.accel_x", "imu.accel_y"),
@@ -113,7 +118,8 @@ def from_push(found: Relation, heading_rad: float = 0.0) -> Iterator[Suspicion]:
 
 
 def _agreed(found: Sequence[Relation], name: str) -> Iterator[Suspicion]:
-    known = [(r, _timed(r, name)) for r in found if name in r.numbers]
+    timed = [(r, _timed(r, name)) for r in found if name in r.numbers]
+    known = [(relation, late) for relation, late in timed if math.isfinite(late.std)]
     if not known:
         return
     mean = _mean([measured for _, measured in known])
@@ -131,7 +137,8 @@ def _agreed(found: Sequence[Relation], name: str) -> Iterator[Suspicion]:
 def _timed(found: Relation, name: str) -> Measured:
     """Return a number of the clock with the error added that stamps between rows have."""
     between = SHARE_OF_STEP * found.step_s if name == "delay" else 0.0
-    return _wide(found.numbers[name], math.hypot(FLOORS[name], between))
+    slip = SPEED_FLOORS[name] if found.pair[0] == "pose.x" else 0.0
+    return _wide(found.numbers[name], math.hypot(FLOORS[name], between, slip))
 
 
 def _late(name: str, late: Measured, found: Relation) -> Iterator[Suspicion]:
@@ -147,9 +154,15 @@ def _late(name: str, late: Measured, found: Relation) -> Iterator[Suspicion]:
         yield from _one("clock_offset", pose, "offset", late, 0.0, found, said)
 
 
+def _slides(found: Relation) -> bool:
+    """Say whether only slip beyond all belief makes the two agree: then nothing can be said."""
+    return any(abs(found.numbers[name].value) > WILD_SLIP for name in SLIPS)
+
+
 def _scale(found: Relation, way: Way, push: Relation | None) -> Iterator[Suspicion]:
     """Yield what makes the pose's way longer or shorter than the one counted, likeliest first."""
-    scale = _wide(found.numbers["scale"], FLOORS["scale"])
+    slip = SLIP_UNKNOWN * found.numbers["slip"].value
+    scale = _wide(found.numbers["scale"], math.hypot(FLOORS["scale"], slip))
     sigma = (scale.value - 1.0) / math.hypot(scale.std, way.scale_std)
     if abs(sigma) < WHEEL_LIMIT:
         return
@@ -183,6 +196,8 @@ def _ruled_out(push: Relation | None, share: float) -> tuple[str, ...]:
         return ()
     both = [_wide(push.numbers[name], FLOORS["accel_scale"]) for name in ("along", "across")]
     seen = _mean(both)
+    if not math.isfinite(seen.std):
+        return ()
     as_pose, as_wheels = (abs(seen.value - x) / seen.std for x in (share, 1.0))
     if min(as_pose, as_wheels) > LIMIT or abs(as_pose - as_wheels) < LIMIT:
         return ()
@@ -199,9 +214,10 @@ def _heading(found: Relation) -> Iterator[Suspicion]:
 
 def _point(found: Relation, names: tuple[str, ...], wheelbase_m: float) -> Iterator[Suspicion]:
     floor = POINT_FLOOR * wheelbase_m
-    numbers = {name: _wide(found.numbers[name], floor) for name in names}
+    widened = {name: _wide(found.numbers[name], floor) for name in names}
+    numbers = {name: m for name, m in widened.items() if math.isfinite(m.std)}
     sigma = math.hypot(*(m.value / m.std for m in numbers.values()))
-    if sigma < (LIMIT if len(names) == 1 else LIMIT_OF_TWO):
+    if not numbers or sigma < (LIMIT if len(numbers) == 1 else LIMIT_OF_TWO):
         return
     where = ", ".join(f"{1e3 * m.value:+.0f} mm {name}" for name, m in numbers.items())
     yield Suspicion(
@@ -235,13 +251,20 @@ def _one(
 
 
 def _wide(measured: Measured, floor: float) -> Measured:
-    """Return a number with the error added that no statistics of its rows shows."""
-    beside = floor * max(1.0, measured.leak / ORDINARY_LEAK)
-    return Measured(measured.value, math.hypot(measured.std, beside), measured.leak)
+    """Return a number with the error added that no statistics of its rows shows.
+
+    What the drive hardly tells from the rest is as good as unknown.
+    """
+    if measured.leak > LARGEST_LEAK:
+        return Measured(measured.value, math.inf, measured.leak)
+    return Measured(measured.value, math.hypot(measured.std, floor), measured.leak)
 
 
 def _mean(known: Sequence[Measured]) -> Measured:
     """Return the mean weighed by certainty."""
-    weights = [m.std**-2 for m in known]
+    weights = [m.std**-2 for m in known if math.isfinite(m.std)]
+    known = [m for m in known if math.isfinite(m.std)]
+    if not known:
+        return Measured(1.0, math.inf)
     value = sum(w * m.value for w, m in zip(weights, known, strict=True)) / sum(weights)
     return Measured(value, sum(weights) ** -0.5)

@@ -41,7 +41,8 @@ def travel_against(
     Returns:
         `scale`, true distance over the sensor's (or the pose's metre over a metre); `heading`
         [rad], by which the pose's yaw is turned; `ahead`, `aside` [m], where the tracked point is;
-        `tilt_x`, `tilt_y` [1/m]; `delay` [s] and `rate` of the pose's stamps.
+        `tilt_x`, `tilt_y` [1/m]; `delay` [s] and `rate` of the pose's stamps; `slip`, the share of
+        the way that wheels seem to slip.
     """
     inside = (poses.t - start[0] > distance.t[0]) & (poses.t - start[0] < distance.t[-1])
     rows = poses.cut(inside)
@@ -64,7 +65,16 @@ def travel_against(
     if found is None:
         return None
     relation = _relation(("pose.x", other), found, warp, len(rows.t))
+    slip = Measured(_slipped(columns, found.values), 0.0)
+    relation = replace(relation, numbers={**relation.numbers, "slip": slip})
     return replace(relation, step_s=max(poses.period_s, distance.period_s))
+
+
+def _slipped(columns: Floats, values: Floats) -> float:
+    """Return how much of the way is put down to wheels that slip."""
+    slip = np.diff(columns[:, :, 7:9] @ values[7:9], axis=0)
+    way = np.diff(columns[:, :, 0], axis=0)
+    return float(np.abs(slip).sum() / (np.abs(way).sum() + 1e-12))
 
 
 def _priors() -> Floats:

@@ -20,7 +20,7 @@ class Way:
         name: Of the sensor, such as `encoder.*`.
         channels: It is made of.
         wheels: Whether it is counted on wheels, so that their radius enters.
-        scale_std: What the car file leaves open about its scale.
+        scale_std: What the car file, or the last digit, leaves open about its scale.
         turned: Yaw as the wheels' difference says [rad]; None where there is none.
     """
 
@@ -38,8 +38,15 @@ def ways(recording: Recording, car: Car | None) -> list[Way]:
     for name in ("speed", "velocity.x"):
         speed = series(recording, name)
         if speed is not None:
-            found.append(Way(name, (name,), False, 0.0, speed.integral()))
+            found.append(Way(name, (name,), False, _rounded(speed), speed.integral()))
     return [way for way in found if way is not None and np.ptp(way.distance.values) > 0.0]
+
+
+def _rounded(speed: Series) -> float:
+    """Return by how much a speed is off where its last digit is cut instead of rounded."""
+    steps = np.diff(np.unique(speed.values))
+    moving = float(np.percentile(np.abs(speed.values), 75))
+    return 0.5 * float(np.percentile(steps, 10)) / moving if len(steps) and moving > 0.0 else 0.0
 
 
 def _counted(recording: Recording, car: Car | None) -> Way | None:
