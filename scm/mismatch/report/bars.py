@@ -12,6 +12,10 @@ from scm.mismatch.report.wording import quantity, title_of
 _WIDTH = 440.0
 _ROW = 25.0
 _MOST_TRIED = 14
+_FOUND = (
+    " Blue bars are what was found; grey bars beyond their mark explain some of the same, and less "
+    "well."
+)
 
 
 def better_picture(fit: Fit | None) -> Picture | None:
@@ -80,9 +84,8 @@ def tried_picture(tried: Sequence[Tried], found: Sequence[str]) -> Picture | Non
     return Picture(
         name="tried",
         title="Each effect alone",
-        said="A bar that does not pass its mark is what luck may bring when so many are tried. "
-        f"Blue bars are what was found; grey bars beyond their mark "
-        f"explain some of the same, and less well.{more}",
+        said="A bar that does not pass its mark is what luck may bring when so many are tried."
+        f"{_FOUND if found else ''}{more}",
         svg=picture_svg(_WIDTH, height, parts, "Gain of each effect tried"),
     )
 

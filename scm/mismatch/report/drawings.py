@@ -43,13 +43,14 @@ def draw(diagnosis: Diagnosis, evidence: Evidence) -> Drawings:
     residuals = sorted(evidence.residuals, key=strength, reverse=True)
     on_floor = [r for r in residuals if (np.isfinite(r.x_m) & np.isfinite(r.y_m)).any()]
     curves = [curve_picture(curve, i) for i, curve in enumerate(evidence.curves, start=1)]
+    after = "with what was found" if diagnosis.effects else "with its numbers refitted"
     return Drawings(
         better=better_picture(diagnosis.fit) if diagnosis.effects else None,
         maps=[
             floor_map(residual, diagnosis.located, i)
             for i, residual in enumerate(on_floor[:_MOST_MAPS], start=1)
         ],
-        time_line=time_line(residuals, diagnosis.located, evidence.free_runs),
+        time_line=time_line(residuals, diagnosis.located, evidence.free_runs, after),
         curves=[curve for curve in curves if curve is not None],
         windows=window_pictures(evidence.free_runs),
         errors=error_pictures(evidence.free_runs),

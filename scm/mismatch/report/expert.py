@@ -84,9 +84,10 @@ def _maps(diagnosis: Diagnosis, drawings: Drawings) -> str:
         return ""
     boxes = any(found.where for found in diagnosis.located)
     said = (
-        "The car's way on the floor, seen from above. Grey and thin: the simulator is right there. "
-        "Blue or orange and wide: something else acts on the car. Where the car came by several "
-        f"times, the strongest lies on top.{' Boxes: where the error was found.' if boxes else ''}"
+        "The car's way on the floor, seen from above. Grey and thin: the simulator is right there, "
+        "within noise. Blue or orange and wide: something else acts on the car. Where the car came "
+        "by several times, the strongest lies on top."
+        f"{' Boxes: where the error was found.' if boxes else ''}"
     )
     return tag("p", said) + _grid(map(figure, drawings.maps))
 

@@ -9,6 +9,7 @@ from scm.maps.svg import element
 from scm.mismatch.evidence import Residual
 from scm.mismatch.findings import Located, Place, Span
 from scm.mismatch.report.plot import (
+    BAND_STDS,
     Frame,
     Picture,
     frame,
@@ -46,7 +47,7 @@ def floor_map(residual: Residual, located: Sequence[Located], number: int) -> Pi
     ]
     return Picture(
         name=f"floor_{number}",
-        title=f"{capital(residual.channel)} that the simulator leaves out",
+        title=f"{capital(residual.channel)} left over",
         said="",
         svg=picture_svg(WIDTH, height, parts, f"Floor map of {residual.channel}"),
     )
@@ -63,24 +64,25 @@ def colour_bound(residual: Residual) -> float:
     """Return the value at which colours end.
 
     That is the 98th percentile, so that one outlier is none, and at least three standard
-    deviations, so that mere noise stays grey.
+    deviations.
     """
     values, stds = (a[np.isfinite(a)] for a in (residual.before, residual.std))
     strong = float(np.percentile(np.abs(values), 98)) if len(values) else 0.0
     return max(strong, 3.0 * float(np.median(stds)) if len(stds) else 0.0) or 1.0
 
 
-def colour_class(values: Floats, bound: float) -> Ints:
-    """Return 0 (far below zero) to 8 (far above); 4 is about zero."""
+def colour_class(values: Floats, stds: Floats, bound: float) -> Ints:
+    """Return 0 (far below zero) to 8 (far above); 4 is about zero, or no more than noise."""
     share = np.nan_to_num(np.clip(values / bound, -1.0, 1.0))
-    return np.rint((share + 1.0) * 0.5 * (_CLASSES - 1)).astype(np.int64)
+    kinds = np.rint((share + 1.0) * 0.5 * (_CLASSES - 1)).astype(np.int64)
+    return np.where(np.abs(values) > BAND_STDS * np.nan_to_num(stds), kinds, _CLASSES // 2)
 
 
 def _path(room: Frame, residual: Residual, bound: float) -> Iterator[str]:
     """Yield the way, one path a colour, the strongest drawn last."""
     keep = slice(None, None, max(1, len(residual.t_s) // _MOST_POINTS))
     x, y, t_s = residual.x_m[keep], residual.y_m[keep], residual.t_s[keep]
-    kinds = colour_class(residual.before[keep], bound)
+    kinds = colour_class(residual.before[keep], residual.std[keep], bound)
     known = np.isfinite(x) & np.isfinite(y) & np.isfinite(residual.before[keep])
     if not known.any():
         return

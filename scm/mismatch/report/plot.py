@@ -18,6 +18,7 @@ from scm.vehicles.manual.line_svg import Axis, equally_scaled
 
 MARGINS = (62.0, 14.0, 30.0, 40.0)  # left, right, top, bottom
 TEXT_PX = 7.6  # width of a letter at the pictures' size of text
+BAND_STDS = 1.645  # on either side: 90 %
 _FEWEST_SPAN = 1e-9
 _FEWEST_TICKS = 3
 _SMALLEST_FLOOR_M = 0.05

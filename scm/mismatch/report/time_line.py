@@ -10,6 +10,7 @@ from scm.maps.svg import element
 from scm.mismatch.evidence import FreeRuns, Residual
 from scm.mismatch.findings import Located, Span
 from scm.mismatch.report.plot import (
+    BAND_STDS,
     Frame,
     Picture,
     band,
@@ -29,20 +30,19 @@ _MARGINS = (66.0, 14.0, 26.0, 10.0)
 _TOP = 26.0
 _MOST_PANELS = 5
 _COLUMNS = 450
-_BAND_STDS = 1.645  # 90 %
 PARTS = {"fit": "fitted", "choose": "chosen", "confirm": "confirmed"}
 
 
 def time_line(
-    residuals: Sequence[Residual], located: Sequence[Located], runs: FreeRuns | None
+    residuals: Sequence[Residual], located: Sequence[Located], runs: FreeRuns | None, after: str
 ) -> Picture | None:
-    """Return the picture; None where there is nothing to draw."""
+    """Return the picture, `after` in the legend; None where there is nothing to draw."""
     shown = [r for r in residuals if len(r.t_s)][:_MOST_PANELS]
     if not shown:
         return None
     span = span_of(*(residual.t_s for residual in shown), room=0.0)
     spans = [when for found in located for when in found.when_s or ()]
-    entries = [("before thin", "the simulator as it was"), ("after thin", "with what was found")]
+    entries = [("before thin", "the simulator as it was"), ("after thin", after)]
     entries += [("shade", "when the error was found to act")] if spans else []
     parts = list(legend(66.0, 16.0, entries))
     y = _TOP
@@ -55,9 +55,9 @@ def time_line(
         name="time_line",
         title="",
         said="Zero means that the simulator is right. Lines are smoothed; the areas around them "
-        "hold the truth with 90 %. Where the orange line leaves zero by more than its area, and "
-        "the blue line does not, what was found explains it. The strip below shows what served "
-        "to fit the numbers, to choose the effect, and only to confirm.",
+        "hold the truth with 90 %. Where the orange line leaves zero by more than its area and the "
+        f"blue line stays, the car {after} explains it. The strip below shows what served to fit "
+        "the numbers, to choose the effect, and only to confirm.",
         svg=picture_svg(WIDTH, y + STRIP, parts, "Residuals along the recording"),
         wide=True,
     )
@@ -89,7 +89,7 @@ def _panel(room: Frame, residual: Residual, spans: Sequence[Span]) -> Iterator[s
     yield from grid_without_numbers(room)
     t_s = residual.t_s
     for values, kind in ((residual.before, "before"), (residual.after, "after")):
-        edge = _BAND_STDS * residual.std
+        edge = BAND_STDS * residual.std
         times, low, high = columns(t_s, values - edge, values + edge, room)
         yield band(room, times, low, high, f"band-{kind}")
     for values, kind in ((residual.before, "before thin"), (residual.after, "after thin")):

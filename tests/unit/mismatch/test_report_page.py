@@ -237,3 +237,19 @@ def test_small_things_noticed_in_the_recording_take_one_line_and_no_card(tmp_pat
     assert "card data" not in first
     assert "coarse of imu.0" in first
     assert "Steps of 8." in below
+
+
+def test_noise_is_grey_on_the_map_and_a_force_is_not(tmp_path):
+    nigel = load_car("nigel")
+    strong = {}
+    for name, force in (("calm", lambda t, x, y: 0.0 * t), ("wind", lambda t, x, y: 0.5 + 0.0 * t)):
+        shown = made_up.evidence(residuals=(made_up.residual("drive force", "N", force),))
+        written(tmp_path / name, (made_up.diagnosis(), shown, nigel, nigel))
+        way = (tmp_path / name / "pictures/floor_1.svg").read_text().partition("</style>")[2]
+        lengths = {
+            kind: sum(len(data) for data in re.findall(rf'd="([^"]*)" class="d{kind}"', way))
+            for kind in range(9)
+        }
+        strong[name] = 1.0 - lengths[4] / sum(lengths.values())
+    assert strong["calm"] < 0.2
+    assert strong["wind"] > 0.8
