@@ -81,6 +81,7 @@ class Fleet:
         time: Since the car was placed [s], shape (capacity,); may be written.
         impact_x, impact_y, impact_yaw: What contacts added to the acceleration over the last tick,
             level body frame [m/s^2, rad/s^2], shape (capacity,); written by who finds the contacts.
+        columns: What each number of a car means, in the order of `parameters`.
         threads: How many threads `advance` uses for big fleets; 1 from the start.
         alive: Rows in use, shape (capacity,).
         status: `VehicleStatus` of each row, shape (capacity,).
@@ -99,15 +100,15 @@ class Fleet:
     def __init__(self, car: Car, capacity: int) -> None:
         self.car, self.capacity = car, capacity
         self.threads = 1
-        self._columns = columns_of(car.terms)
+        self.columns = columns_of(car.terms)
         self._slots = slots_of(car.terms)
         self._kernel = compile_kernel(car.name, car.terms)
         padded = -(-capacity // LANES) * LANES
         height = max(offset + width for offset, width in self._slots.values())
         self._block: Floats = aligned((height, padded))
-        self._nominal: Floats = np.array([car.value(c.param.key) for c in self._columns])
-        self.parameter_names = tuple(column.name for column in self._columns)
-        self._numbers: Floats = aligned((len(self._columns), padded))
+        self._nominal: Floats = np.array([car.value(c.param.key) for c in self.columns])
+        self.parameter_names = tuple(column.name for column in self.columns)
+        self._numbers: Floats = aligned((len(self.columns), padded))
         self._numbers[:] = self._nominal[:, None]
         self.parameters: Floats = self._numbers[:, :capacity].T
         self._alive: Bools = np.zeros(padded, dtype=np.bool_)
@@ -274,7 +275,7 @@ class Fleet:
 
     def shape(self, row: int) -> Shape:
         """Return one car's mass properties, with all that its effects add to them."""
-        places = {column.param.key: i for i, column in enumerate(self._columns)}
+        places = {column.param.key: i for i, column in enumerate(self.columns)}
         return shape_of(self.car, lambda key: float(self.parameters[row, places[key]]))
 
     def advance(self, duration: float, substep: float = SUBSTEP_S) -> None:
@@ -414,8 +415,8 @@ class Fleet:
             RunError: when there is no such row.
         """
         self._check(row)
-        column = find_column(self._columns, name)
-        param = self._columns[column].param
+        column = find_column(self.columns, name)
+        param = self.columns[column].param
         low, high = param.bounds
         if not low <= value <= high:
             msg = f"{param.key} = {value}: expected {low:g} to {high:g} {param.unit}"
@@ -443,7 +444,7 @@ class Fleet:
         asked = {name for term in self.car.terms for name in reads(term.law)} & DELAYS.keys()
         if not asked:
             return None
-        keys = {column.param.key: i for i, column in enumerate(self._columns)}
+        keys = {column.param.key: i for i, column in enumerate(self.columns)}
         for name in sorted(asked):
             if DELAYS[name] not in keys:
                 msg = f"an effect reads {name}, but no effect has the parameter {DELAYS[name]}"
