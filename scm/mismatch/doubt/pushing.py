@@ -19,6 +19,7 @@ STEP_S = 0.02
 EVERY_S = 0.3
 NAMES = ("along", "across", "angle", "bias_x", "bias_y", "ahead", "aside", "delay")
 LEVER_STD = 0.5
+HALF = 0.5
 SHORTEST_S = 10.0
 
 
@@ -96,16 +97,17 @@ def _numbers(found: Fit) -> dict[str, Measured]:
         name: Measured(float(value), float(std), float(leak))
         for name, value, std, leak in zip(NAMES, found.values, found.std, found.leak, strict=True)
     }
-    turn = numbers["angle"]
-    mean = 0.5 * (numbers["along"].value + numbers["across"].value)
+    turn, kx, ky = (numbers[name] for name in ("angle", "along", "across"))
+    mean = 0.5 * (kx.value + ky.value)
     size = math.hypot(mean, turn.value)
-    if min(numbers["along"].value, numbers["across"].value) > 0.0:
-        numbers["angle"] = Measured(
-            math.atan2(turn.value, mean), turn.std / max(size, 1e-6), turn.leak
-        )
-    shrink = size / mean if mean > 0.1 * size else 1.0
+    rigid = abs(kx.value - ky.value) < HALF * size
+    turned = rigid and (mean > 0.0 or abs(turn.value) > HALF * size)
+    if turned:
+        std = turn.std / max(size, 1e-6)
+        numbers["angle"] = Measured(math.atan2(turn.value, mean), std, turn.leak)
     for name in ("along", "across"):
         k = numbers[name]
-        whole = shrink * (k.value if abs(k.value) > 1e-6 else 1e-6)
-        numbers[name] = Measured(1.0 / whole, k.std / whole**2, k.leak)
+        whole = k.value - mean + size if turned else k.value
+        bounded = whole if abs(whole) > 1e-6 else 1e-6
+        numbers[name] = Measured(1.0 / bounded, k.std / bounded**2, k.leak)
     return numbers

@@ -16,6 +16,7 @@ FLOORS: Mapping[str, float] = {
     "heading": 0.006, "tilt": 0.002, "accel_bias": 0.01, "imu_angle": 0.008, "accel_scale": 0.01,
 }  # fmt: skip
 LARGEST_LEAK = 6.0  # a drive with turns both ways and several speeds has 1 to 4
+WILD_SCALE = 0.15
 SLIP_UNKNOWN = 0.5  # of the way that wheels seem to slip
 SLIPS, WILD_SLIP = ("side_slip", "drive_slip", "turn_slip"), 0.08  # rad, or a share, per m/s^2
 HALF, SURE = 1.6, 0.3
@@ -155,14 +156,17 @@ def _late(name: str, late: Measured, found: Relation) -> Iterator[Suspicion]:
 
 
 def _slides(found: Relation) -> bool:
-    """Say whether only slip beyond all belief makes the two agree: then nothing can be said."""
-    return any(abs(found.numbers[name].value) > WILD_SLIP for name in SLIPS)
+    """Say whether only slip, or a scale, beyond belief makes the two agree: a poor comparison."""
+    wild = any(abs(found.numbers[name].value) > WILD_SLIP for name in SLIPS)
+    apart = abs(found.numbers["scale"].value - found.numbers["chord"].value)
+    return wild or not apart < WILD_SCALE
 
 
 def _scale(found: Relation, way: Way, push: Relation | None) -> Iterator[Suspicion]:
     """Yield what makes the pose's way longer or shorter than the one counted, likeliest first."""
     slip = SLIP_UNKNOWN * found.numbers["slip"].value
-    scale = _wide(found.numbers["scale"], math.hypot(FLOORS["scale"], slip))
+    chord = SLIP_UNKNOWN * (found.numbers["scale"].value - found.numbers["chord"].value)
+    scale = _wide(found.numbers["scale"], math.hypot(FLOORS["scale"], slip, chord))
     sigma = (scale.value - 1.0) / math.hypot(scale.std, way.scale_std)
     if abs(sigma) < WHEEL_LIMIT:
         return

@@ -1,5 +1,7 @@
 """Positions of the pose against distance as another sensor adds it up, laid along the heading."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +13,8 @@ from scm.mismatch.doubt.whitened import Fit, fit
 
 ROUNDS = 4
 SHORTEST_S = 10.0
+CHORD_S = 1.0
+FEWEST_CHORDS = 5
 SHORTEST_DRIFT_S = 30.0
 MOST_ROWS = 4000
 SIDE_SLIP_STD = 0.02  # rad per m/s^2: tyres give way by a few degrees at most
@@ -42,7 +46,8 @@ def travel_against(
         `scale`, true distance over the sensor's (or the pose's metre over a metre); `heading`
         [rad], by which the pose's yaw is turned; `ahead`, `aside` [m], where the tracked point is;
         `tilt_x`, `tilt_y` [1/m]; `delay` [s] and `rate` of the pose's stamps; `slip`, the share of
-        the way that wheels seem to slip.
+        the way that wheels seem to slip; `chord`, the scale as a second's worth of way shows it,
+        cruder than `scale` but blind to stamps that jitter.
     """
     inside = (poses.t - start[0] > distance.t[0]) & (poses.t - start[0] < distance.t[-1])
     rows = poses.cut(inside)
@@ -66,8 +71,25 @@ def travel_against(
         return None
     relation = _relation(("pose.x", other), found, warp, len(rows.t))
     slip = Measured(_slipped(columns, found.values), 0.0)
-    relation = replace(relation, numbers={**relation.numbers, "slip": slip})
+    chord = Measured(_chords(rows, columns[:, :, 0], starts), 0.0)
+    relation = replace(relation, numbers={**relation.numbers, "slip": slip, "chord": chord})
     return replace(relation, step_s=max(poses.period_s, distance.period_s))
+
+
+def _chords(rows: Track, way: Floats, starts: Sequence[int]) -> float:
+    """Return the middle of what moves of about a second are against the way counted."""
+    reach = max(1, round(CHORD_S / rows.period_s))
+    first = np.arange(0, len(rows.t) - reach, max(1, reach // 2))
+    stretch = np.searchsorted(np.asarray(starts), np.arange(len(rows.t)), side="right")
+    first = first[stretch[first] == stretch[first + reach]]
+    counted = way[first + reach] - way[first]
+    moved = np.stack((rows.x, rows.y), axis=1)
+    moved = moved[first + reach] - moved[first]
+    size = (counted**2).sum(axis=1)
+    far = size > 0.25 * float(np.percentile(size, 90)) if len(size) else size > 0.0
+    if far.sum() < FEWEST_CHORDS:
+        return math.nan
+    return float(np.median((moved[far] * counted[far]).sum(axis=1) / size[far]))
 
 
 def _slipped(columns: Floats, values: Floats) -> float:
