@@ -24,12 +24,17 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--engine", choices=ENGINES, default="own", help="who moves the cars (%(default)s)"
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="default: runs/trial-SEED")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="default: runs/trial-SEED, or -NAME of --trials"
+    )
     parser.add_argument(
         "--trials", type=Path, metavar="DIR", help="judge these cases instead of making any"
     )
     parser.add_argument(
         "--only", default="", metavar="00,01", help="of --trials, the cases to diagnose"
+    )
+    parser.add_argument(
+        "--kept", action="store_true", help="judge the diagnoses kept in --out again, make none"
     )
     parser.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
 
@@ -39,8 +44,10 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.mismatch.trial.blind import by_engine
     from scm.mismatch.trial.reality import Wish
 
-    if arguments.trials:
-        out = arguments.out or Path("runs") / f"trial-{arguments.trials.name}"
+    out = arguments.out or Path("runs") / f"trial-{_title(arguments)}"
+    if arguments.kept:
+        lines = run.judged_again(out, arguments.trials)
+    elif arguments.trials:
         only = [name for name in arguments.only.split(",") if name]
         lines = run.on_shipped_cases(
             arguments.trials, out, by_engine, only, workers=arguments.workers, say=_say
@@ -51,11 +58,14 @@ def _run(arguments: argparse.Namespace) -> int:
             seed=arguments.seed, cases=arguments.cases, kind=arguments.kind,
             engine=arguments.engine, strength=(low, high),
         )  # fmt: skip
-        out = arguments.out or Path("runs") / f"trial-{arguments.seed}"
         lines = run.on_own_cases(wish, out, by_engine, workers=arguments.workers, say=_say)
     print("\n".join(lines))
     print(f"\nkept in {out}: recordings, labels and their seals, each diagnosis, this table")
     return 0
+
+
+def _title(arguments: argparse.Namespace) -> str:
+    return str(arguments.trials.resolve().name if arguments.trials else arguments.seed)
 
 
 def _say(what: str, done: int, of: int) -> None:

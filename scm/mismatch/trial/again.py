@@ -27,12 +27,14 @@ class Ratio:
 
     Attributes:
         true_m: Of the car with what was really concealed; None for laws outside the library.
+        retuned_m: Of the car whose ordinary numbers alone were fitted; None where none was kept.
     """
 
     case: str
     nominal_m: float
     found_m: float
     true_m: float | None
+    retuned_m: float | None = None
 
 
 def compare(case: Case, label: Label, folder: Path) -> Ratio | None:
@@ -41,7 +43,8 @@ def compare(case: Case, label: Label, folder: Path) -> Ratio | None:
     Args:
         case: With its other drive.
         label: Opened.
-        folder: Where the diagnosis wrote `car.toml`.
+        folder: Where the diagnosis wrote `car.toml`, and `retuned.toml` if it likes: the car with
+            its ordinary numbers fitted and no effect added.
     """
     patched = folder / "car.toml"
     if not label.names or not patched.is_file() or not case.again.is_dir():
@@ -54,7 +57,9 @@ def compare(case: Case, label: Label, folder: Path) -> Ratio | None:
     true = min((error(recording, car) for car in cars), default=None)
     if true is not None and nominal < SHOWS * true:
         return None
-    return Ratio(case.name, nominal, found, true)
+    retuned = folder / "retuned.toml"
+    tuned = error(recording, _on(base, load_car(retuned))) if retuned.is_file() else None
+    return Ratio(case.name, nominal, found, true, tuned)
 
 
 def error(recording: Recording, car: Car) -> float:

@@ -13,6 +13,7 @@ import msgspec
 from scm.mismatch.findings import Diagnosis
 from scm.mismatch.trial.labels import Case
 
+SAID, BROKEN = "diagnosis.json", "failed.txt"
 Diagnose = Callable[[Path, Path], Diagnosis]
 """Diagnoses the recording of one folder; may write what it found, and `car.toml`, in another."""
 
@@ -55,10 +56,20 @@ def _answer(case: Case, out: Path, diagnose: Diagnose) -> Answer:
         diagnosis = diagnose(case.drive, folder)
     except Exception as error:  # noqa: BLE001  the edge of a worker: one case must not end all
         words = "".join(traceback.format_exception(error))
-        (folder / "failed.txt").write_text(words, encoding="utf-8")
+        (folder / BROKEN).write_text(words, encoding="utf-8")
         return Answer(case, None, f"{type(error).__name__}: {error}")
-    (folder / "diagnosis.json").write_bytes(msgspec.json.format(msgspec.json.encode(diagnosis)))
+    (folder / SAID).write_bytes(msgspec.json.format(msgspec.json.encode(diagnosis)))
     return Answer(case, diagnosis)
+
+
+def kept_answers(cases: Sequence[Case], out: Path) -> Iterator[Answer]:
+    """Give the answers that an earlier run left in `out`, of the cases that it came to."""
+    for case in cases:
+        said, broken = out / case.name / SAID, out / case.name / BROKEN
+        if said.is_file():
+            yield Answer(case, msgspec.json.decode(said.read_bytes(), type=Diagnosis))
+        elif broken.is_file():
+            yield Answer(case, None, broken.read_text(encoding="utf-8").strip().split("\n")[-1])
 
 
 def by_engine(recording: Path, out: Path) -> Diagnosis:

@@ -6,7 +6,7 @@ from pathlib import Path
 from scm.errors import RecordingError
 from scm.mismatch.trial import labels, table
 from scm.mismatch.trial.again import Ratio, compare
-from scm.mismatch.trial.blind import Answer, Diagnose, answer_all
+from scm.mismatch.trial.blind import Answer, Diagnose, answer_all, kept_answers
 from scm.mismatch.trial.reality import Wish, make_cases
 from scm.mismatch.trial.score import Outcome, failed, score
 
@@ -51,6 +51,25 @@ def on_shipped_cases(
     cases = labels.find_cases(folder, only)
     answers = _answers(cases, out, diagnose, workers, say)
     return _judged(answers, labels.shipped_labels(folder / "labels.json"), out)
+
+
+def judged_again(out: Path, folder: Path | None = None) -> list[str]:
+    """Judge the diagnoses that a trial left in `out` once more, and return the table.
+
+    Args:
+        out: Of the trial.
+        folder: Of the cases, where they were not made by the trial.
+
+    Raises:
+        RecordingError: when there are no such cases, or a label is not what was sealed.
+    """
+    cases = labels.find_cases(folder or out)
+    answers = list(kept_answers(cases, out / FOUND))
+    if folder:
+        return _judged(answers, labels.shipped_labels(folder / "labels.json"), out)
+    seals = labels.read_seals(out)
+    opened = {case: labels.open_label(out, case, digest) for case, digest in seals.items()}
+    return _judged(answers, opened, out)
 
 
 def _answers(

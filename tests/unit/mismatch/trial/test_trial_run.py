@@ -13,7 +13,7 @@ from scm.mismatch.trial import reality
 from scm.mismatch.trial.again import compare, error, true_cars
 from scm.mismatch.trial.blind import answer_all
 from scm.mismatch.trial.labels import Case, find_cases, label_of, open_label, read_seals
-from scm.mismatch.trial.run import on_own_cases, on_shipped_cases
+from scm.mismatch.trial.run import judged_again, on_own_cases, on_shipped_cases
 from scm.recording.read import read_recordings
 from scm.vehicles.car import load_car
 
@@ -49,6 +49,11 @@ def test_a_trial_makes_diagnoses_and_judges_its_cases(made):
     assert heard[-1] == ("diagnosing", 2, 2)
     assert (out / "found" / "case_001" / "diagnosis.json").is_file()
     assert (out / "table.txt").read_text().splitlines() == lines
+
+
+def test_kept_diagnoses_are_judged_again_alike(made):
+    out, lines, _ = made
+    assert judged_again(out) == lines
 
 
 def test_a_second_trial_in_the_same_place_is_refused(made):

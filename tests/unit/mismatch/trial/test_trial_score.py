@@ -14,6 +14,7 @@ from scm.mismatch.findings import (
     Undecided,
     Verdict,
 )
+from scm.mismatch.trial.again import Ratio
 from scm.mismatch.trial.labels import label_of
 from scm.mismatch.trial.score import failed, score
 from scm.mismatch.trial.table import each, lines, wilson
@@ -162,6 +163,15 @@ def test_wilsons_interval_is_that_of_the_textbook():
     low, high = wilson(9, 10)
     assert (low, high) == (pytest.approx(0.5958, abs=1e-3), pytest.approx(0.9821, abs=1e-3))
     assert wilson(0, 0) == (0.0, 1.0)
+
+
+def test_the_table_compares_patched_cars_with_nominal_tuned_and_true_ones():
+    ratios = [Ratio("case_000", 0.1, 0.02, 0.019, 0.08), Ratio("case_001", 0.1, 0.04, None)]
+    text = "\n".join(lines([score(label(), diagnosis())], ratios))
+    assert "the nominal car's: median 0.30" in text
+    assert "the re-tuned car's: median 0.25" in text
+    assert "the true car's: median 1.05, within 1.15 in 100 %" in text
+    assert "at most half in 100 %" in text
 
 
 def test_the_table_counts_each_kind_and_names_what_went_wrong():
