@@ -3,17 +3,19 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.doubt.suspicion import Measured, Relation
-from scm.mismatch.doubt.track import Series, Track
+from scm.mismatch.doubt.track import Grid, Series, Track
 from scm.mismatch.doubt.whitened import Fit, fit
 
 ROUNDS = 4
 SHORTEST_S = 10.0
 CHORD_S = 1.0
+PLACE_WIDTH_S, YAW_WIDTH_S, FEWEST_SMOOTHED = 0.3, 0.08, 20
 FEWEST_CHORDS = 5
 SHORTEST_DRIFT_S = 30.0
 MOST_ROWS = 4000
@@ -54,14 +56,14 @@ def travel_against(
     if len(rows.t) < 50 or np.ptp(rows.t) < SHORTEST_S:
         return None
     rows = rows.cut(np.arange(len(rows.t)) % (1 + len(rows.t) // MOST_ROWS) == 0)
-    yaw = rows.yaw
     measured = np.stack((rows.x, rows.y), axis=1)
-    since, warp = rows.t - rows.t[0], np.array(start)
+    since, warp, starts = rows.t - rows.t[0], np.array(start), rows.starts
+    calm = _calm(rows, starts)
     count = len(NAMES) if since[-1] >= SHORTEST_DRIFT_S else len(NAMES) - 1
-    found, starts = None, rows.starts
+    found = None
     for _ in range(ROUNDS):
         u = rows.t - warp[0] - warp[1] * since
-        columns = _columns(rows, yaw, distance, u)[:, :, :count]
+        columns = _columns(calm, distance, u)[:, :, :count]
         found = fit(measured, columns, _priors()[:count], starts, near=found)
         step = found.values[9:] / found.values[0] if found.values[0] else np.zeros(1)
         warp[: len(step)] += np.clip(step, -0.5, 0.5)
@@ -105,8 +107,21 @@ def _priors() -> Floats:
     return priors
 
 
-def _columns(rows: Track, yaw: Floats, distance: Series, u: Floats) -> Floats:
+def _calm(rows: Track, starts: Sequence[int]) -> Track:
+    """Return the poses smoothed: their noise, met again in a column, would look like a fault."""
+    x, y, yaw = rows.x.copy(), rows.y.copy(), rows.yaw.copy()
+    for i, j in pairwise((*starts, len(rows.t))):
+        if j - i < FEWEST_SMOOTHED:
+            continue
+        for values, width in ((x, PLACE_WIDTH_S), (y, PLACE_WIDTH_S), (yaw, YAW_WIDTH_S)):
+            even = Grid(rows.t[i:j], rows.period_s, max(width, rows.period_s))
+            values[i:j] = even.smooth_even(values[i:j])
+    return Track(rows.t, x, y, yaw)
+
+
+def _columns(rows: Track, distance: Series, u: Floats) -> Floats:
     """Return what each number does to x and y, shape `(n, 2, k)`."""
+    yaw = rows.yaw
     way = distance.at(u)
     dt = np.diff(rows.t)
     speed = _slope(rows.t, way)
