@@ -20,6 +20,7 @@ CONTROLS = ("shuffled", "other_car")
 SHARES = (0.55, 0.15, 0.15, 0.15)
 DRIVES = (("drive", 90.0), ("again", 60.0))
 ENOUGH_ON_PATCH_S = 1.5
+ENOUGH_AT_STOP = 0.03
 
 
 def names_for(kind: str, car: str, rng: np.random.Generator) -> tuple[str, ...]:
@@ -91,10 +92,14 @@ def make_case(
 
 
 def _shows(drive: Drive, numbers: dict[str, float]) -> bool:
-    """Say whether the car came over the patch, where there is one, and stayed on the floor."""
+    """Say whether the car came to the patch or stop that it has, and stayed on the floor."""
     x, y, speed = (drive.rows[:, k] for k in (1, 2, 4))
     if not np.isfinite(drive.rows).all() or np.abs(drive.rows[:, 1:3]).max() > 12.0:
         return False
+    left, right = numbers["stop_left"], numbers["stop_right"]
+    if min(left, right) < 1.0:
+        steering = drive.commands[:, 2]
+        return float(np.mean((steering > left) | (steering < -right))) > ENOUGH_AT_STOP
     if numbers["patch_radius"] < 0.02:
         return True
     on = np.hypot(x - numbers["patch_x"], y - numbers["patch_y"]) < 0.7 * numbers["patch_radius"]

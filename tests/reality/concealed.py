@@ -88,7 +88,7 @@ def _wind(size, rng, _car):
 
 
 def _saturation(size, rng, _car):
-    cut = min(0.75 * size, 0.85)
+    cut = 1.0 - 0.6 / math.sqrt(size)
     left, right = (1.0 - cut, 1.0) if rng.random() < 0.5 else (1.0, 1.0 - cut)
     values = {"left": left, "right": right}
     return Drawn(values, {"stop_left": left - 1.0, "stop_right": right - 1.0})
@@ -143,7 +143,7 @@ LISTED = (
     _listed("motor_fade", "drive", "load+time", _both(0.08, 0.12), _adds("fraction", "fade")),
     _listed("rolling_resistance", "drive", "load", _both(0.02, 0.015),
             _adds("coefficient", "rolling")),
-    _listed("viscous_drag", "body", "speed", _both(1.2, 0.3), _adds("coefficient", "drag_linear")),
+    _listed("viscous_drag", "body", "speed", _both(1.5, 0.3), _adds("coefficient", "drag_linear")),
     _listed("aero_drag", "body", "speed", {"f1tenth": 0.1}, _adds("coefficient", "drag_square")),
     _listed("stiction", "drive", "speed", _both(0.04, 0.04), _adds("torque_nm", "stiction")),
     _listed("payload", "body", "acceleration", _both(0.5, 0.8), _adds("mass_kg", "mass")),
@@ -152,7 +152,7 @@ LISTED = (
     _listed("steer_trim", "steering", "constant", _both(0.0157, 0.008),
             _adds("offset_rad", "trim", signed=True)),
     _listed("steer_gain", "steering", "steering", _both(0.08, 0.06), _times("gain", "steer_gain")),
-    _listed("steer_saturation", "steering", "steering", {"nigel": 0.7}, _saturation),
+    _listed("steer_saturation", "steering", "steering", {"nigel": 1.0}, _saturation),
     _listed("steer_backlash", "steering", "steering history", _both(0.014, 0.015),
             _adds("width_rad", "backlash")),
     _listed("steer_delay", "steering", "steering history", _both(0.026, 0.02),
@@ -177,13 +177,13 @@ LISTED = (
     _listed("wind", "body", "heading", _both(0.15, 0.3), _wind),
     _listed("pose_latency", "sensor", "time", _both(0.02, 0.008), _adds("delay_s", "delay")),
     _listed("pose_scale", "sensor", "position", _both(0.025, 0.025), _times("scale", "scale")),
-    _listed("camera_tilt", "sensor", "position", _both(0.004, 0.001),
+    _listed("camera_tilt", "sensor", "position", _both(0.008, 0.001),
             _two("tilt_x", "tilt_y", "tilt_x", "tilt_y")),
     _listed("pose_point", "sensor", "heading", _both(0.006, 0.012),
             _two("x_m", "y_m", "point_x", "point_y")),
     _listed("pose_heading", "sensor", "constant", _both(0.0131, 0.0131),
             _adds("offset_rad", "heading", signed=True)),
-    _listed("wheel_radius", "sensor", "wheel", _both(0.025, 0.025), _times("scale", "radius")),
+    _listed("wheel_radius", "sensor", "wheel", _both(0.04, 0.025), _times("scale", "radius")),
     _listed("encoder_loss", "sensor", "wheel", _both(0.025, 0.025),
             _adds("fraction", "lost_counts")),
     _listed("gyro_bias", "sensor", "constant", _both(0.01, 0.01),

@@ -55,6 +55,15 @@ def test_both_drives_cross_a_patch():
         assert away.min() < 0.7 * spot["radius_m"]
 
 
+def test_a_steering_stop_is_one_that_the_driver_reaches():
+    rng = np.random.default_rng(3)
+    label, drives, _ = make_case("single", rng, names=("steer_saturation",), car="nigel")
+    stops = label["parameters"][0]
+    for drive in drives.values():
+        steering = drive.commands[:, 2]
+        assert np.mean((steering > stops["left"]) | (steering < -stops["right"])) > 0.02
+
+
 def test_a_seal_tells_a_changed_label_and_hides_the_true_one():
     label = {"names": ["wind"], "parameters": [{"force_x_n": 0.5}]}
     sealed = seal(label, "salt")
