@@ -16,6 +16,7 @@ WIDTH_S = 0.3
 STEP_S = 0.05
 LATEST_S = 1.5
 RELATED = 0.35
+HARDLY = 0.2  # a driver who holds the speed against slopes and turns undoes most of it
 VARIED = 0.5  # a speed held steady by its driver says nothing about the throttle
 LONGEST_S = 20.0
 DRIVE = ("command.throttle", "command.speed", "motor.current")
@@ -43,22 +44,24 @@ def _missing(recording: Recording) -> Iterator[DataProblem]:
         yield DataProblem(
             channel="command.throttle",
             name="missing",
-            said="Nothing says how the car was driven: sensors can be held against each other and "
-            "steering against motion, but the drive cannot be judged.",
+            said="Nothing says what drove the car: its drive cannot be judged, but steering, tyres "
+            "and sensors can.",
             record_instead=RECORD,
         )
     elif "command.throttle" not in have:
         yield DataProblem(
             channel="command.throttle",
             name="missing",
-            said="There is no throttle command: how the car answers to it cannot be judged.",
+            said="There is no throttle command: how the drive answers to it cannot be judged, but "
+            "steering, tyres and sensors can.",
             record_instead=RECORD,
         )
     if "command.steering" not in have:
         yield DataProblem(
             channel="command.steering",
             name="missing",
-            said="There is no steering command: the steering cannot be judged.",
+            said="There is no steering command: the steering cannot be judged, but straight "
+            "driving and sensors can.",
             record_instead=RECORD,
         )
     missing = [name for name in ("pose.x", "pose.y", "pose.yaw") if name not in have]
@@ -127,9 +130,8 @@ def _without_effect(recording: Recording, movement: Series, poses: Track) -> Ite
         asked = on.smooth_even(held(throttle, on.t))
         lagged = _lagged(asked, 0.5, STEP_S)
         slope = on.smooth_even(speed, 1)
-        if not (
-            _follows(speed, lagged, on) or _follows(slope, asked, on) or _follows(speed, asked, on)
-        ):
+        answers = ((speed, lagged), (slope, asked), (speed, asked))
+        if not any(_follows(motion, signal, on, HARDLY) for motion, signal in answers):
             yield _unrelated("command.throttle", "The car's speed does not follow its throttle")
 
 
@@ -153,12 +155,12 @@ def _lagged(values: Floats, time_s: float, step_s: float) -> Floats:
     return np.convolve(padded, kernel / kernel.sum(), mode="valid")
 
 
-def _follows(motion: Floats, asked: Floats, on: Grid) -> bool:
+def _follows(motion: Floats, asked: Floats, on: Grid, related: float = RELATED) -> bool:
     """Say whether the motion follows within a second or two, better than at any other delay."""
     if motion.std() < 1e-6 or asked.std() < 1e-6:
         return True
     near = best_alike(motion, asked, on, LATEST_S)
-    return near > RELATED
+    return near > related
 
 
 def best_alike(motion: Floats, asked: Floats, on: Grid, latest_s: float) -> float:

@@ -34,7 +34,7 @@ FACTORS: Mapping[str, Mapping[float, str]] = {
 }  # fmt: skip
 NEAR = 0.08
 ALIKE = 0.6
-LEVEL = 0.9  # wheels that spin follow the car that badly
+LEVEL = 0.95  # wheels that spin follow the car that badly
 UNLIKE = 0.35
 FAR_S = 0.2
 SMALLEST_SIZE, LARGEST_SIZE = 0.6, 1.0 / 0.6

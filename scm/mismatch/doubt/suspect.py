@@ -15,6 +15,7 @@ FLOORS: Mapping[str, float] = {
     "gyro_bias": 5e-4, "gyro_scale": 1e-3, "delay": 0.002, "rate": 5e-5, "scale": 0.002,
     "heading": 0.006, "tilt": 0.002, "accel_bias": 0.01, "imu_angle": 0.008, "accel_scale": 0.01,
 }  # fmt: skip
+TILT_LEAK = 12.0  # far from the origin a tilt is much like a scale
 LARGEST_LEAK = 6.0  # a drive with turns both ways and several speeds has 1 to 4
 WILD_SCALE = 0.15
 SLIP_UNKNOWN = 0.5  # of the way that wheels seem to slip
@@ -63,7 +64,7 @@ def from_travel(
     yield from _scale(found, way, push)
     yield from _heading(found)
     yield from _point(found, ("ahead", "aside"), wheelbase_m)
-    tilt = {axis: _wide(found.numbers[f"tilt_{axis}"], FLOORS["tilt"]) for axis in "xy"}
+    tilt = {axis: _wide(found.numbers[f"tilt_{axis}"], FLOORS["tilt"], TILT_LEAK) for axis in "xy"}
     sigma = math.hypot(*(m.value / m.std for m in tilt.values()))
     if sigma > LIMIT_OF_TWO and all(math.isfinite(m.std) for m in tilt.values()):
         yield Suspicion(
@@ -254,12 +255,12 @@ def _one(
         )
 
 
-def _wide(measured: Measured, floor: float) -> Measured:
+def _wide(measured: Measured, floor: float, most: float = LARGEST_LEAK) -> Measured:
     """Return a number with the error added that no statistics of its rows shows.
 
     What the drive hardly tells from the rest is as good as unknown.
     """
-    if measured.leak > LARGEST_LEAK:
+    if measured.leak > most:
         return Measured(measured.value, math.inf, measured.leak)
     return Measured(measured.value, math.hypot(measured.std, floor), measured.leak)
 

@@ -11,7 +11,7 @@ from scm.recording.read import Recording
 SHORTEST_SPAN_S = 0.5
 SHORTEST_DRIVE_S = 5.0
 POSE = ("pose.x", "pose.y", "pose.yaw")
-COMMANDS = ("command.throttle", "command.steering")
+COMMANDS = ("command.throttle", "command.speed", "command.steering")
 SPOILS = ("frozen", "jump")
 
 
@@ -34,7 +34,7 @@ def usable(recording: Recording, problems: Iterable[DataProblem]) -> Usable:
             if problem.name in SPOILS and problem.when_s and _concerns(problem.channel, name):
                 bad += problem.when_s
         spans[name] = _between((float(t[0]), float(t[-1])), bad)
-    return Usable(spans=spans, lacks=tuple(_lacks(recording, spans, listed)))
+    return Usable(spans=spans, lacks=tuple(_lacks(spans, listed)))
 
 
 def _concerns(pattern: str, name: str) -> bool:
@@ -53,12 +53,11 @@ def _between(whole: Span, bad: Iterable[Span]) -> tuple[Span, ...]:
     return tuple(left)
 
 
-def _lacks(
-    recording: Recording, spans: dict[str, tuple[Span, ...]], problems: list[DataProblem]
-) -> Iterable[str]:
-    missing = [name for name in (*COMMANDS, *POSE) if name not in recording.channels]
-    if missing:
-        yield f"missing: {', '.join(missing)}"
+def _lacks(spans: dict[str, tuple[Span, ...]], problems: list[DataProblem]) -> Iterable[str]:
+    missing = [name for name in POSE if not spans.get(name)]
+    driven = [name for name in COMMANDS if spans.get(name)]
+    if missing or not driven:
+        yield f"missing: {', '.join(missing or COMMANDS)}"
         return
     if any(p.name == "other_car" for p in problems):
         yield "the car file is another car's"
@@ -68,9 +67,8 @@ def _lacks(
     pose = sum(end - start for start, end in spans["pose.x"])
     if pose < SHORTEST_DRIVE_S:
         yield f"only {pose:.1f} s of poses without gaps; {SHORTEST_DRIVE_S:.0f} s are needed"
-    together = [spans[name] for name in (*COMMANDS, *POSE)]
-    if all(together):
-        start = max(part[0][0] for part in together)
-        end = min(part[-1][1] for part in together)
-        if end - start < SHORTEST_DRIVE_S <= pose:
-            yield f"poses and commands overlap for {max(0.0, end - start):.1f} s only"
+    together = [spans[name] for name in (*driven, *POSE)]
+    start = max(part[0][0] for part in together)
+    end = min(part[-1][1] for part in together)
+    if end - start < SHORTEST_DRIVE_S <= pose:
+        yield f"poses and commands overlap for {max(0.0, end - start):.1f} s only"

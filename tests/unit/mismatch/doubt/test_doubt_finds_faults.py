@@ -27,7 +27,7 @@ INJECTED = [
     ("pose_scale", {"scale": 1.08}),
     ("wheel_radius", {"scale": 0.94}),
     ("encoder_loss", {"fraction": 0.06}),
-    ("camera_tilt", {"tilt_x": 0.03, "tilt_y": -0.04}),
+    ("camera_tilt", {"tilt_x": 0.012, "tilt_y": -0.009}),
     ("accel_bias", {"along": 0.2, "across": -0.1}),
     ("imu_misalignment", {"angle": 0.35}),
     ("imu_misalignment", {"angle": 1.5708}),

@@ -140,7 +140,7 @@ def test_without_commands_sensors_are_compared_and_no_drive_is_judged(
     found = doubt(without(drive(0), *COMMANDS), nigel)
     assert {("command.throttle", "missing"), ("command.steering", "missing")} <= said(found)
     assert not found.usable.can_diagnose
-    assert len(found.relations) == 4
+    assert len(found.relations) == 3
 
 
 @pytest.mark.parametrize("missing", [POSE, ("pose.yaw",)])
