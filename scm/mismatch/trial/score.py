@@ -58,7 +58,7 @@ def score(label: Label, diagnosis: Diagnosis) -> Outcome:
     right = {name for name in label.names if _was_said(name, label, diagnosis)}
     false_names = tuple(e.name for e in diagnosis.effects if not _belongs(e, label))
     reported = right | {name for name in label.names if name in undecided}
-    nothing = diagnosis.verdict == Verdict.NONE and not said
+    nothing = diagnosis.verdict == Verdict.NONE and not said and not right
     pairs = [pair for effect in diagnosis.effects for pair in _compared(effect, label)]
     everything = len(right) == len(label.names) or _twins_undecided(label, said, undecided)
     return Outcome(
@@ -104,6 +104,8 @@ def is_law(effect: Effect, label: Label) -> bool:
 def _was_said(name: str, label: Label, diagnosis: Diagnosis) -> bool:
     if label.kind == "unlisted":
         return any(is_law(effect, label) for effect in diagnosis.effects)
+    if name == "unit_error" and any(problem.name == "unit" for problem in diagnosis.data):
+        return True
     return any(effect.listed and effect.name == name for effect in diagnosis.effects)
 
 

@@ -89,6 +89,12 @@ def test_one_of_two_is_neither_exact_nor_enough():
     assert (got.exact, got.among, got.false_names) == (False, False, ())
 
 
+def test_a_wrong_unit_may_be_reported_as_a_problem_of_the_data():
+    problem = DataProblem(channel="imu.gyro_z", name="unit", said="")
+    got = score(label("unit_error"), replace(diagnosis(), data=(problem,)))
+    assert (got.exact, got.missed) == (True, False)
+
+
 def test_twins_that_no_drive_tells_apart_are_right_when_left_undecided():
     assert score(label("payload"), diagnosis(undecided=[("payload", "motor_gain")])).exact
     assert not score(label("payload"), diagnosis(undecided=[("payload", "steer_gain")])).exact
