@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.reality.concealed import EFFECTS, HIDING, LISTED, UNLISTED, Drawn
+from tests.reality.concealed import ALIKE, EFFECTS, HIDING, LISTED, UNLISTED, Drawn
 from tests.reality.driver import TEMPERS
 from tests.reality.motion import Moving
 from tests.reality.numbers import KEYS, SCATTER, TOGETHER, nominal, scattered
@@ -36,7 +36,8 @@ def names_for(kind: str, car: str, rng: np.random.Generator) -> tuple[str, ...]:
     if rng.random() < 0.5:
         return hiding[rng.integers(len(hiding))]
     names = [name for name in listed if name != "unit_error"]
-    return tuple(str(name) for name in rng.choice(names, 2, replace=False))
+    pair = {str(name) for name in rng.choice(names, 2, replace=False)}
+    return names_for(kind, car, rng) if pair in ALIKE else tuple(sorted(pair))
 
 
 def draw_effects(

@@ -311,3 +311,6 @@ HIDING = (
     ("drive_deadband", "drive_gain"), ("steer_lag", "steer_backlash"), ("grade", "camera_tilt"),
     ("tyre_stiffness", "com_shift"), ("corner_drag", "steer_compliance"),
 )  # fmt: skip
+
+# Of which no drive on a level floor, or no stamps, could tell the shares: never concealed together.
+ALIKE = ({"grade", "wind"}, {"pose_latency", "clock_offset"}, {"tyre_stiffness", "tyre_grip"})

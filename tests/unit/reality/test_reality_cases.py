@@ -8,8 +8,8 @@ import pytest
 from scm.vehicles.car import all_terms
 from scm.vehicles.measure import all_measures
 from tests.reality import cases
-from tests.reality.cases import draw_kinds, make_case, seal, write_cases
-from tests.reality.concealed import EFFECTS, LISTED
+from tests.reality.cases import draw_kinds, make_case, names_for, seal, write_cases
+from tests.reality.concealed import ALIKE, EFFECTS, LISTED
 from tests.reality.numbers import nominal
 
 
@@ -90,6 +90,16 @@ def test_controls_name_another_car_or_hold_another_drives_commands(short, tmp_pa
     text = (tmp_path / "case_001" / "drive" / "recording.yaml").read_text()
     assert f"vehicle: {labels[1]['car']}" in text
     assert [label["names"] for label in labels] == [[], []]
+
+
+@pytest.mark.parametrize("car", ["nigel", "f1tenth"])
+def test_pairs_are_two_different_effects_that_can_be_told_apart(car):
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        pair = set(names_for("pair", car, rng))
+        assert len(pair) == 2
+        assert pair not in ALIKE
+        assert all(car in EFFECTS[name].smallest for name in pair)
 
 
 def test_kinds_are_mixed_as_wished():
