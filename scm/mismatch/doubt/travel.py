@@ -12,7 +12,8 @@ from scm.mismatch.doubt.suspicion import Measured, Relation
 from scm.mismatch.doubt.track import Grid, Series, Track
 from scm.mismatch.doubt.whitened import Fit, fit
 
-ROUNDS = 4
+ROUNDS = 6
+SMALLEST_LEAN = 2e-5
 SHORTEST_S = 10.0
 CHORD_S = 1.0
 PLACE_WIDTH_S, YAW_WIDTH_S, FEWEST_SMOOTHED = 0.3, 0.08, 20
@@ -56,26 +57,35 @@ def travel_against(
     if len(rows.t) < 50 or np.ptp(rows.t) < SHORTEST_S:
         return None
     rows = rows.cut(np.arange(len(rows.t)) % (1 + len(rows.t) // MOST_ROWS) == 0)
-    measured = np.stack((rows.x, rows.y), axis=1)
-    since, warp, starts = rows.t - rows.t[0], np.array(start), rows.starts
-    calm = _calm(rows, starts)
+    since, warp, tilt = rows.t - rows.t[0], np.array(start), np.zeros(2)
     count = len(NAMES) if since[-1] >= SHORTEST_DRIFT_S else len(NAMES) - 1
-    found = None
+    found, starts = None, rows.starts
     for _ in range(ROUNDS):
+        straight = _straightened(rows, tilt)
+        measured = np.stack((straight.x, straight.y), axis=1)
         u = rows.t - warp[0] - warp[1] * since
-        columns = _columns(calm, distance, u)[:, :, :count]
+        columns = _columns(_calm(straight, starts), distance, u)[:, :, :count]
         found = fit(measured, columns, _priors()[:count], starts, near=found)
         step = found.values[9:] / found.values[0] if found.values[0] else np.zeros(1)
         warp[: len(step)] += np.clip(step, -0.5, 0.5)
-        if np.all(np.abs(step) < (1e-4, 1e-6)[: len(step)]):
+        lean = np.clip(found.values[4:6], -0.02, 0.02)
+        tilt += lean
+        late = np.abs(step) < (1e-4, 1e-6)[: len(step)]
+        if np.all(late) and np.all(np.abs(lean) < SMALLEST_LEAN):
             break
     if found is None:
         return None
-    relation = _relation(("pose.x", other), found, warp, len(rows.t))
+    relation = _relation(("pose.x", other), found, (warp, tilt), len(rows.t))
     slip = Measured(_slipped(columns, found.values), 0.0)
-    chord = Measured(_chords(rows, columns[:, :, 0], starts), 0.0)
+    chord = Measured(_chords(straight, columns[:, :, 0], starts), 0.0)
     relation = replace(relation, numbers={**relation.numbers, "slip": slip, "chord": chord})
     return replace(relation, step_s=max(poses.period_s, distance.period_s))
+
+
+def _straightened(rows: Track, tilt: Floats) -> Track:
+    """Return the poses as a camera without that tilt would show them."""
+    depth = np.maximum(1.0 - tilt[0] * rows.x - tilt[1] * rows.y, 0.2)
+    return Track(rows.t, rows.x / depth, rows.y / depth, rows.yaw)
 
 
 def _chords(rows: Track, way: Floats, starts: Sequence[int]) -> float:
@@ -172,7 +182,7 @@ def _slope(t: Floats, values: Floats) -> Floats:
     return (values[b] - values[a]) / (t[b] - t[a])
 
 
-def _relation(pair: tuple[str, str], found: Fit, warp: Floats, rows: int) -> Relation:
+def _relation(pair: tuple[str, str], found: Fit, at: tuple[Floats, Floats], rows: int) -> Relation:
     numbers = {
         name: Measured(float(value), float(std), float(leak))
         for name, value, std, leak in zip(NAMES, found.values, found.std, found.leak, strict=False)
@@ -180,5 +190,7 @@ def _relation(pair: tuple[str, str], found: Fit, warp: Floats, rows: int) -> Rel
     k = max(abs(float(found.values[0])), 1e-9)
     for i, name in enumerate(NAMES[9 : len(found.values)]):
         number = numbers[name]
-        numbers[name] = Measured(float(warp[i]), number.std / k, number.leak)
+        numbers[name] = Measured(float(at[0][i]), number.std / k, number.leak)
+    for i, name in enumerate(NAMES[4:6]):
+        numbers[name] = replace(numbers[name], value=float(at[1][i]))
     return Relation(pair=pair, numbers=numbers, noise=found.noise, rows=rows)

@@ -1,12 +1,13 @@
 """Recordings by others, whose faults are known or were found twice."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from scm.mismatch.doubt.doubt import doubt
 from scm.mismatch.doubt.suspicion import Doubts
-from scm.recording.read import read_recordings
+from scm.recording.read import Recording, read_recordings
 from scm.vehicles.car import load_car
 
 ROOT = Path(__file__).parents[4]
@@ -31,12 +32,16 @@ def trial(case: str, part: str) -> Doubts:
     return doubt(recording, load_car(recording.vehicle))
 
 
-def real(name: str) -> Doubts:
+def real(name: str) -> Recording:
     data = RECORDINGS / name.partition("/")[0]
     description = ROOT / "recordings" / f"{name}.yaml"
     if not data.is_dir() or not description.is_file():
         pytest.skip(f"no recordings at {data}, or no description {description}")
-    (recording,) = read_recordings(description, data)
+    return read_recordings(description, data)[0]
+
+
+def doubts_of(name: str) -> Doubts:
+    recording = real(name)
     return doubt(recording, load_car(recording.vehicle))
 
 
@@ -67,23 +72,29 @@ def test_a_shifted_centre_of_gravity_is_a_twin_of_a_shifted_marker() -> None:
 
 
 @pytest.mark.parametrize("session", ["ds2", "ds3", "ds5"])
-def test_the_penn_cars_accelerometer_is_mounted_a_quarter_turn_to_the_left(session: str) -> None:
-    by_name = {s.name: s for s in real(f"f1tenth_frictionmaps/{session}").suspicions}
+def test_the_penn_cars_accelerometer_as_it_was_logged_is_turned_a_quarter_left(
+    session: str,
+) -> None:
+    described = real(f"f1tenth_frictionmaps/{session}")
+    ahead, left = (described.channels[f"imu.accel_{axis}"] for axis in "xy")
+    logged = {"imu.accel_x": left, "imu.accel_y": replace(ahead, values=-ahead.values)}
+    recording = replace(described, channels={**described.channels, **logged})
+    by_name = {s.name: s for s in doubt(recording, load_car(recording.vehicle)).suspicions}
     assert by_name["imu_misalignment"].values["angle"] == pytest.approx(1.57, abs=0.12)
 
 
 @pytest.mark.parametrize("run", ["a_first56s", "b", "d_warmed_up"])
 def test_the_ucars_gyro_shows_three_percent_too_much(run: str) -> None:
-    by_name = {s.name: s for s in real(f"cpm_ucar/{run}").suspicions}
+    by_name = {s.name: s for s in doubts_of(f"cpm_ucar/{run}").suspicions}
     assert by_name["gyro_scale"].values["scale"] == pytest.approx(1.033, abs=0.005)
 
 
 def test_darts_sensors_are_slower_than_the_rows_they_are_written_in() -> None:
-    found = real("dart/free_driving_10_02_28")
+    found = doubts_of("dart/free_driving_10_02_28")
     assert ("imu.*", "held") in {(p.channel, p.name) for p in found.problems}
     assert found.usable.can_diagnose
 
 
 def test_the_indy_cars_yaw_rate_is_late() -> None:
-    found = real("iac_av21/putnam")
+    found = doubts_of("iac_av21/putnam")
     assert ("yaw_rate", "clock") in {(p.channel, p.name) for p in found.problems}
