@@ -2,7 +2,8 @@
 
 Every window starts from the measured pose and velocities and then gets nothing but the recorded
 commands. All windows run side by side as rows of one fleet. Before a window starts, its commands of
-the last second run the actuators in, so that servo and lags begin where they were.
+the last second run the actuators in, so that servo and lags begin where they were. A car whose
+drive knows its battery gets the voltage that was measured.
 """
 
 from dataclasses import dataclass, replace
@@ -82,9 +83,16 @@ class Commands:
             if channel.dimension == "ratio" and largest > LARGEST_COMMAND:
                 msg = f"{recording.path}: command.{name}: reaches {largest:g}, expected -1 to 1"
                 raise RecordingError(msg)
+        self._battery = None
+        if "battery.voltage" in recording.channels and car.has("drive.battery_nominal_v"):
+            self._battery = forward(recording, "battery.voltage")
+
+    def voltage(self, t: Floats) -> Floats | None:
+        """Return the measured battery voltage at times `t`, or None where it is not known [V]."""
+        return None if self._battery is None else _held(self._battery, t)
 
     def at(self, t: Floats) -> tuple[Floats, Floats]:
-        """Return throttle and steering at times `t`; before the first row they are zero."""
+        """Return throttle and steering at times `t`; before the first row they are the first's."""
         return _held(self._throttle, t), _held(self._steering, t) * self._per_unit
 
     @property
@@ -133,9 +141,9 @@ def _refuse_incomplete(recording: Recording, car: Car) -> None:
 
 
 def _held(channel: Channel, t: Floats) -> Floats:
-    """Return the value of the last row at or before each time; zero before the first."""
+    """Return the value of the last row at or before each time; before the first, the first's."""
     row = np.searchsorted(channel.t, t, side="right") - 1
-    return np.where(row >= 0, channel.values[np.maximum(row, 0)], 0.0)
+    return channel.values[np.maximum(row, 0)]
 
 
 def free_run(
@@ -223,6 +231,9 @@ def _advance(fleet: Fleet, commands: Commands, t: Floats, steps: int) -> None:
         throttle, steering = commands.at(t + k * STEP_S)
         fleet.throttle[:n] = throttle
         fleet.steering[:n] = steering
+        voltage = commands.voltage(t + k * STEP_S)
+        if voltage is not None:
+            fleet.battery[:n] = voltage
         fleet.advance(STEP_S)
 
 

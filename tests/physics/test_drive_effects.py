@@ -1,6 +1,7 @@
 """Each effect between throttle command and wheel does what its equation says."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -244,3 +245,38 @@ def test_no_motor_gives_more_than_it_takes_from_the_battery(name):
     # what is lost at stall is at most what goes in there, and no less than a lossless gear leaves
     assert car.value("motor.stall_heat_w") <= 1.01 * car.value("battery.stall_current_a") * nominal
     assert car.value("motor.stall_heat_w") >= power
+
+
+def test_a_throttle_curve_gives_small_throttles_less_and_full_ones_all():
+    curve = {"drive.curvature": 0.5}
+    assert steady_speed(["drive_curve"], curve, 0.6) == pytest.approx(
+        steady_speed(throttle=0.6 * (0.5 + 0.5 * 0.6)), rel=1e-6
+    )
+    assert steady_speed(["drive_curve"], curve) == pytest.approx(steady_speed(), rel=1e-9)
+
+
+def speed_driven(**numbers):
+    """An F1TENTH whose throttle asks for a speed: 1 is 5 m/s."""
+    car = load_car("f1tenth")
+    terms = tuple(term for term in car.terms if not term.name.startswith("motor_"))
+    own = {"drive.full_speed_m_s": 5.0, "drive.acceleration_m_s2": 3.0} | numbers
+    car = replace(car, terms=terms).with_terms(["speed_control"], own)
+    fleet = Fleet(car, 1)
+    fleet.add(Pose2(0.0, 0.0, 0.0))
+    return fleet
+
+
+def test_a_speed_control_reaches_the_speed_and_no_faster_than_its_motor_can():
+    fleet = speed_driven()
+    fleet.throttle[0] = 0.4
+    rising = speeds(fleet, 3.0)
+    assert 1.2 < rising[49] < 1.5  # 3 m/s^2 for half a second, less friction and spinning up
+    assert rising[-1] == pytest.approx(2.0, rel=0.02)
+
+
+def test_a_speed_control_brakes_too():
+    fleet = speed_driven(**{"drive.response_time_s": 0.01})
+    fleet.throttle[0] = 0.4
+    fleet.advance(2.0)
+    fleet.throttle[0] = 0.1
+    assert speeds(fleet, 2.0)[-1] == pytest.approx(0.5, rel=0.02)

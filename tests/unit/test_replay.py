@@ -26,7 +26,8 @@ def drive(car: Car, seconds: float = 20.0, drag: float = 0.0) -> Recording:
     """Record a weaving drive of the simulator itself: poses at 100 Hz, commands at 20 Hz."""
     fleet = Fleet(car, 1)
     row = fleet.add(Pose2(0.0, 0.0, 0.3))
-    fleet.set_parameter(row, "body.drag_linear_ns_m", drag)
+    if drag:
+        fleet.set_parameter(row, "body.drag_linear_ns_m", drag)
     times = np.arange(round(seconds * 100)) / 100.0
     rows = np.empty((len(times), 5))
     for k, t in enumerate(times):
@@ -219,3 +220,38 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(
 ) -> None:
     assert main(["replay", "nowhere.yaml", "--save", str(tmp_path / save)]) == 2
     assert "--save" in capsys.readouterr().err
+
+
+def test_a_car_with_a_speed_control_is_driven_by_speed(root: Path) -> None:
+    car = load_car(str(root / "recordings/cars/f1tenth_clemson.toml"))
+    recording = drive(car, 8.0)
+    throttle = recording.channels.pop("command.throttle")
+    speed = replace(throttle, values=10.0 * throttle.values, dimension="speed")
+    recording.channels["command.speed"] = speed
+    run = free_run(recording, car, 1.0)
+    assert np.median(run.position_error()[:, -1]) < 0.03
+    recording.channels["command.speed"] = replace(speed, values=0.8 * speed.values)
+    slower = free_run(recording, car, 1.0)
+    assert np.median(slower.speed_error()[:, -1]) > 0.2
+    recording.channels["speed"] = recording.channels.pop("command.speed")
+    assert_allclose(free_run(recording, car, 1.0).x, slower.x)
+
+
+def test_a_measured_battery_voltage_drives_the_motors(nigel: Car) -> None:
+    recording = drive(nigel, 6.0)
+    t = recording.channels["pose.x"].t
+    recording.channels["battery.voltage"] = Channel(
+        t, np.full(len(t), 9.0), None, (0.0, 0.0), "voltage"
+    )
+    weak = free_run(recording, nigel, 3.0)
+    assert np.median((weak.speed_measured - weak.speed)[:, -1]) > 0.02
+
+
+def test_commands_before_the_first_are_the_first(nigel: Car) -> None:
+    recording = drive(nigel, 6.0)
+    for name in ("command.throttle", "command.steering"):
+        whole = recording.channels[name]
+        keep = whole.t > 2.0
+        recording.channels[name] = replace(whole, t=whole.t[keep], values=whole.values[keep])
+    run = free_run(recording, nigel, 1.0)
+    assert run.yaw_error()[0, -1] < 0.02

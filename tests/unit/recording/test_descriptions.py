@@ -21,7 +21,7 @@ REPLAYED = {  # name: most error of 1 s of free run with the car as its authors 
     "dart/mpcc_race_2025_test_01": 2.0,
     "dart/slippery_floor_apr25_2025_04_16_16_21_24": 2.0,
     "f1tenth_optitrack/slalom_clean_v_1_5_d_0_208": 0.1,
-    "f1tenth_optitrack/slalom_noisy_v_2_5_d_0_416": 0.2,
+    "f1tenth_optitrack/slalom_noisy_v_2_0_d_0_312": 0.2,
     "f1tenth_optitrack/skidpad_ccw_clean_v_1_0_d_0_416": 0.12,
     "f1tenth_frictionmaps/ds5": 0.4,
     "genesis/rfs_path1": 0.16,

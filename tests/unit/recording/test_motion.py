@@ -103,3 +103,15 @@ def test_two_points_for_one_pose_are_refused() -> None:
     recording.channels["pose.y"] = replace(recording.channels["pose.y"], point=(0.1, 0.0))
     with pytest.raises(RecordingError, match="point: expected the same"):
         Poses(recording)
+
+
+def test_a_full_size_car_is_fast_and_does_not_jump() -> None:
+    t = np.arange(200) / 25.0
+    channels = {
+        name: Channel(t, values, None, (0.0, 0.0), "length")
+        for name, values in (("pose.x", 60.0 * t), ("pose.y", 0.0 * t), ("pose.yaw", 0.0 * t))
+    }
+    poses = Poses(Recording(Path("made"), "car", channels))
+    assert poses.unbroken(0.0, 7.0)
+    channels["pose.x"].values[100] += 30.0
+    assert not Poses(Recording(Path("made"), "car", channels)).unbroken(3.5, 4.5)

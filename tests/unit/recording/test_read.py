@@ -220,3 +220,55 @@ def test_real_recordings_described_in_the_project_are_read(root: Path, shared: P
         shared / "recordings/autodrive_sim_tinytown",
     )
     assert tinytown[0].channel("command.steering").dimension == "angle"
+
+
+def test_a_time_may_be_computed_and_its_clock_shifted(tmp_path: Path) -> None:
+    table = """\
+  - file: pose.csv
+    time: {expression: ok + t * 1e-3, unit: s, offset: 0.5}
+    channels:
+      pose.x: {column: x, unit: mm}
+"""
+    assert_allclose(read_one(write(tmp_path, table)).channel("pose.x").t, [1.5, 0.55, 1.6])
+
+
+@pytest.mark.parametrize("time", ["{unit: s}", "{column: t, expression: t}"])
+def test_a_time_is_a_column_or_an_expression(tmp_path: Path, time: str) -> None:
+    table = POSE_TABLE.replace("{column: t, unit: ms}", time)
+    with pytest.raises(RecordingError, match="time: expected either column or expression"):
+        read_recordings(write(tmp_path, table))
+
+
+def test_a_quaternion_becomes_a_yaw(tmp_path: Path) -> None:
+    table = POSE_TABLE.replace("column: head ing, unit: deg", 'expression: "2 * atan2(y, x)"')
+    table = table.replace("expression", "unit: rad, expression")
+    yaw = read_one(write(tmp_path, table)).channel("pose.yaw").values
+    assert_allclose(yaw, [0.0, 0.0, 2.0 * math.atan2(10.0, 300.0)])
+
+
+EVENTS = "t,source,x\n0,camera,1\n5,car,\n10,camera,3\n"
+
+
+def test_rows_of_an_event_table_are_chosen_by_a_word(tmp_path: Path) -> None:
+    table = """\
+  - file: pose.csv
+    time: {column: t, unit: ms}
+    where: source == 'camera'
+    channels:
+      pose.x: {column: x, unit: m}
+"""
+    assert_allclose(read_one(write(tmp_path, table, EVENTS)).channel("pose.x").values, [1.0, 3.0])
+    other = table.replace("== 'camera'", "!= 'car'")
+    assert_allclose(read_one(write(tmp_path, other, EVENTS)).channel("pose.x").t, [0.0, 0.01])
+
+
+def test_a_word_compared_with_numbers_is_refused(tmp_path: Path) -> None:
+    table = POSE_TABLE.replace("    channels", "    where: ok == 'yes'\n    channels")
+    with pytest.raises(RecordingError, match="column 'ok' holds numbers, not words"):
+        read_recordings(write(tmp_path, table))
+
+
+def test_a_function_wants_its_number_of_inputs(tmp_path: Path) -> None:
+    table = POSE_TABLE.replace("column: x, unit: mm", 'expression: "atan2(x)", unit: mm')
+    with pytest.raises(RecordingError, match="is not arithmetic"):
+        read_recordings(write(tmp_path, table))
