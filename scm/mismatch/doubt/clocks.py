@@ -28,6 +28,7 @@ class Lag:
         alike: Correlation at best, negative where the sign is turned, -1..1.
         size: First over second, signed.
         sure: Windows all over the drive agree on the delay.
+        gain: By how much the correlation is better than without any delay.
     """
 
     delay_s: float
@@ -35,6 +36,7 @@ class Lag:
     alike: float
     size: float
     sure: bool
+    gain: float
 
 
 def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
@@ -46,6 +48,7 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
     sign = float(np.sign(curve[best])) or 1.0
     whole = best - reach
     delay, rate = (whole + _between(sign * curve, best)) * on.step_s, 0.0
+    gain = float(abs(curve[best]) - abs(curve[reach]))
     a, b = _overlap(first, second, whole)
     windows = _windows(a, sign * b, on.step_s)
     sure = len(windows) < 3 and abs(curve[best]) > SURE
@@ -63,7 +66,7 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
     if abs(rate) * (on.t[-1] - on.t[0]) < 0.05:
         delay, rate = (whole + _between(sign * curve, best)) * on.step_s, 0.0
     a, b = _overlap(first, second, round((delay + rate * 0.5 * (on.t[-1] - on.t[0])) / on.step_s))
-    return Lag(delay, rate, float(curve[best]), sign * _size(a, sign * b), sure)
+    return Lag(delay, rate, float(curve[best]), sign * _size(a, sign * b), sure, gain)
 
 
 def _clipped(values: Floats) -> Floats:

@@ -24,9 +24,9 @@ def doubt(recording: Recording, car: Car | None = None) -> Doubts:
         recording: As it was read; it is not changed, see `corrected.corrected`.
         car: Gives wheel radius, counts a turn and track; without it wheels are not compared.
     """
-    problems = list(row_problems(recording))
     state = Mending(recording)
-    problems += mend_stamps(state)
+    problems = list(mend_stamps(state))
+    problems += row_problems(state.recording)
     problems += mend_heading(state)
     problems += mend_unsigned(state)
     problems += mend_pairs(state, car)

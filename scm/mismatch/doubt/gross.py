@@ -34,7 +34,7 @@ FACTORS: Mapping[str, Mapping[float, str]] = {
 }  # fmt: skip
 NEAR = 0.08
 ALIKE = 0.6
-LEVEL = 0.95  # wheels that spin follow the car that badly
+LEVEL, BETTER = 0.95, 0.05  # wheels that spin follow the car that badly
 UNLIKE = 0.35
 FAR_S = 0.2
 SMALLEST_SIZE, LARGEST_SIZE = 0.6, 1.0 / 0.6
@@ -73,7 +73,9 @@ class Pair:
     @property
     def far_s(self) -> float:
         """How far the first's clock is ahead [s]; 0 where a latency, or slip, may explain it."""
-        if not self.lag.sure or abs(self.lag.alike) < (ALIKE if self.what != "speed" else LEVEL):
+        least, gain = (LEVEL, BETTER) if self.what == "speed" else (ALIKE, 0.0)
+        certain = self.lag.sure and abs(self.lag.alike) >= least
+        if not self.shift_s and not (certain and self.lag.gain > gain):
             return 0.0
         total = self.lag.delay_s + self.shift_s
         return total if abs(total) > FAR_S else 0.0

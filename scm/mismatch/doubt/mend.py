@@ -89,7 +89,7 @@ def mend_unsigned(now: Mending) -> Iterator[DataProblem]:
     inside = (movement.t > speed.t[0]) & (movement.t < speed.t[-1])
     back = (movement.values < -0.2 * fast) & inside
     ahead = (movement.values > 0.2 * fast) & inside
-    if min(back.mean(), ahead.mean()) < 0.02 or fast < 0.02:
+    if min(back.mean(), ahead.mean()) < 0.05 or fast < 0.02:
         return
     if np.median(speed.at(movement.t)[back]) > 0.2 * fast:
         now.repair(Repair(channels=("speed",), signed=True))
