@@ -92,12 +92,20 @@ _ALL = (
         otherwise="throttle_command",
     ),
     _body(
+        "throttle_limited",
+        "1",
+        Role.CHAIN,
+        "command within the drive's limits",
+        span=(-1.0, 1.0),
+        otherwise="throttle_received",
+    ),
+    _body(
         "throttle_live",
         "1",
         Role.CHAIN,
         "command beyond the dead-band",
         span=(-1.0, 1.0),
-        otherwise="throttle_received",
+        otherwise="throttle_limited",
     ),
     _body(
         "throttle_curved",

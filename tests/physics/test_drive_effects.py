@@ -280,3 +280,11 @@ def test_a_speed_control_brakes_too():
     fleet.advance(2.0)
     fleet.throttle[0] = 0.1
     assert speeds(fleet, 2.0)[-1] == pytest.approx(0.5, rel=0.02)
+
+
+def test_a_throttle_limit_cuts_each_side_by_itself():
+    limits = {"drive.limit_forward": 0.5, "drive.limit_reverse": 0.3}
+    for given, left in ((0.9, 0.5), (0.4, 0.4), (-0.9, -0.3)):
+        assert steady_speed(["drive_saturation"], limits, given) == pytest.approx(
+            steady_speed(throttle=left), rel=1e-6
+        )

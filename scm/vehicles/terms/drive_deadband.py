@@ -1,6 +1,6 @@
 """Throttle dead-band: small commands do nothing, larger ones lose as much.
 
-    throttle_live = throttle_received - clip(throttle_received, -threshold, threshold)
+    throttle_live = throttle_limited - clip(throttle_limited, -threshold, threshold)
 
 Holds: the same both ways.   Shows in: throttle ramps, crawling.
 Source: textbook dead zone; the real Nigel needs about 0.2 throttle to move.
@@ -12,9 +12,9 @@ from scm.vehicles.term import Per, Term
 
 
 @law
-def drive_deadband(throttle_received: float, threshold: float) -> float:
+def drive_deadband(throttle_limited: float, threshold: float) -> float:
     """Throttle that is left, + forward."""
-    return throttle_received - min(max(throttle_received, -threshold), threshold)
+    return throttle_limited - min(max(throttle_limited, -threshold), threshold)
 
 
 TERM = Term(
