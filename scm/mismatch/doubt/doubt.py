@@ -9,6 +9,7 @@ from scm.mismatch.doubt.mend_pairs import mend_pairs
 from scm.mismatch.doubt.other_car import other_car
 from scm.mismatch.doubt.rows import row_problems
 from scm.mismatch.doubt.stuck import stuck_problems
+from scm.mismatch.doubt.suspect import from_repairs
 from scm.mismatch.doubt.suspicion import Doubts, Relation, Suspicion
 from scm.mismatch.doubt.track import track
 from scm.mismatch.doubt.usable import usable
@@ -42,6 +43,7 @@ def doubt(recording: Recording, car: Car | None = None) -> Doubts:
     suspicions: list[Suspicion] = []
     if poses is not None:
         relations, suspicions = compare_all(now, car, poses, found, problems)
+    suspicions += from_repairs(state.repairs)
     if car is not None and movement is not None and poses is not None:
         problems += other_car(now, car, movement, poses, relations)
     return Doubts(

@@ -14,6 +14,7 @@ from scm.vehicles.car import Car
 TOO_FAST = 1.4
 TOO_SLOW = 0.3
 TURNS = (0.55, 1.8)
+IMPOSSIBLE = (0.15, 4.0)  # in between, play, slow servos and weak steering may be to blame alone
 ROLLS = (0.7, 1.4)
 FOLLOWS = 0.7
 
@@ -22,15 +23,15 @@ def other_car(
     recording: Recording, car: Car, movement: Series, poses: Track, relations: Iterable[Relation]
 ) -> Iterator[DataProblem]:
     """Yield the problem that the car file is another car's, with all that says so."""
-    reasons = [
-        reason
-        for reason in (
-            _speed(recording, car, movement),
-            _turning(recording, car, movement, poses),
-            *(_wheels(relation) for relation in relations),
+    reasons = [_speed(recording, car, movement), *(_wheels(relation) for relation in relations)]
+    reasons = [reason for reason in reasons if reason]
+    gain = _turning(recording, car, movement, poses)
+    length = car.value("body.wheelbase_m")
+    if gain is not None and (reasons or not IMPOSSIBLE[0] < gain < IMPOSSIBLE[1]):
+        reasons.append(
+            f"it turns {gain:.2f} times as tightly as it is steered, as a wheelbase of "
+            f"{length / gain:.2f} m would instead of {length:.2f} m"
         )
-        if reason
-    ]
     if reasons:
         yield DataProblem(
             channel="*",
@@ -78,19 +79,14 @@ def _share_of_asked(recording: Recording, movement: Series, top: float) -> float
     )
 
 
-def _turning(recording: Recording, car: Car, movement: Series, poses: Track) -> str:
+def _turning(recording: Recording, car: Car, movement: Series, poses: Track) -> float | None:
+    """Return how tightly it turns against what is steered; None where nothing is odd about it."""
     found = steered(recording, car, movement, poses)
     if found is None or not car.has("steering.limit_rad"):
-        return ""
+        return None
     angle = recording.channels["command.steering"].dimension == "angle"
     gain = found.gain / (1.0 if angle else car.value("steering.limit_rad"))
-    if found.alike < FOLLOWS or TURNS[0] < gain < TURNS[1]:
-        return ""
-    length = car.value("body.wheelbase_m")
-    return (
-        f"it turns {gain:.2f} times as tightly as it is steered, as a wheelbase of "
-        f"{length / gain:.2f} m would instead of {length:.2f} m"
-    )
+    return None if found.alike < FOLLOWS or TURNS[0] < gain < TURNS[1] else gain
 
 
 def _wheels(found: Relation) -> str:

@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from statistics import NormalDist
 
-from scm.mismatch.doubt.suspicion import Measured, Relation, Suspicion
+from scm.mismatch.doubt.suspicion import Measured, Relation, Repair, Suspicion
 from scm.mismatch.doubt.way import Way
 
-FALSE_ALARM = 0.01
+FALSE_ALARM = 0.002
 CHECKS = 16
 WHEEL_LIMIT = 3.0
 # What no statistics of the rows shows: wheels that scrub, tyres that slip, bodies that lean.
@@ -18,6 +18,7 @@ FLOORS: Mapping[str, float] = {
 TILT_LEAK = 12.0  # far from the origin a tilt is much like a scale
 LARGEST_LEAK = 6.0  # a drive with turns both ways and several speeds has 1 to 4
 WILD_SCALE = 0.15
+UNIT_SHARE, CLOCK_STD_S = 0.01, 0.005  # how well a unit and a far clock are known
 SLIP_UNKNOWN = 0.5  # of the way that wheels seem to slip
 SLIPS, WILD_SLIP = ("side_slip", "drive_slip", "turn_slip"), 0.08  # rad, or a share, per m/s^2
 HALF, SURE = 1.6, 0.3
@@ -39,6 +40,28 @@ def from_gyro(found: Relation) -> Iterator[Suspicion]:
     yield from _one("gyro_bias", (gyro,), "bias", bias, 0.0, found, said)
     said = f"{gyro} shows {scale.value:.3f} times the turn that the pose shows."
     yield from _one("gyro_scale", (gyro,), "scale", scale, 1.0, found, said)
+
+
+def from_repairs(repairs: Sequence[Repair]) -> Iterator[Suspicion]:
+    """Yield the faults of the library that were undone."""
+    for repair in repairs:
+        named = {
+            "unit_error": ("factor", 1.0 / repair.factor, 1.0, UNIT_SHARE / abs(repair.factor)),
+            "clock_offset": ("offset", -repair.shift_s, 0.0, CLOCK_STD_S),
+            "pose_heading": ("offset", -repair.offset, 0.0, FLOORS["heading"]),
+        }
+        for name, (parameter, value, neutral, std) in named.items():
+            if value != neutral:
+                yield Suspicion(
+                    name=name,
+                    channels=repair.channels,
+                    values={parameter: value},
+                    std={parameter: std},
+                    sigma=abs(value - neutral) / std,
+                    shown_by=(repair.channels[0], repair.channels[-1]),
+                    said="Undone before anything else was looked at.",
+                    repaired=True,
+                )
 
 
 def from_clocks(found: Sequence[Relation]) -> Iterator[Suspicion]:

@@ -52,6 +52,8 @@ class Suspicion:
         shown_by: The pair of sensors that shows it.
         twins: Faults that explain the same pair just as well.
         said: One sentence.
+        repaired: So gross that it is undone before anything else is looked at: the other values
+            are those of the repaired recording.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Suspicion:
     shown_by: tuple[str, str]
     twins: tuple[str, ...] = ()
     said: str = ""
+    repaired: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -62,7 +62,7 @@ def test_a_wrong_unit_or_sign_is_undone_and_said(
         )
     assert {problem.name for problem in found.problems} <= {"unit", "sign"}
     assert all(problem.corrected for problem in found.problems)
-    assert found.suspicions == ()
+    assert all(suspicion.repaired for suspicion in found.suspicions)
 
 
 def test_a_heading_that_points_backwards_is_turned_round(drive: Drive, nigel: Car) -> None:
@@ -120,6 +120,15 @@ def test_a_speed_without_sign_takes_that_of_the_pose(drive: Drive, nigel: Car) -
     found = doubt(wrong, nigel)
     assert ("speed", "sign") in {(p.channel, p.name) for p in found.problems}
     assert corrected(wrong, found).channels["speed"].values[-200:].max() < 0.0
+
+
+def test_what_was_undone_is_named_as_the_library_names_it(drive: Drive, nigel: Car) -> None:
+    (unit,) = doubt(scaled(drive(0), ("imu.gyro_z",), 57.29578), nigel).suspicions
+    (clock,) = doubt(moved(drive(0), "pose.", 0.9), nigel).suspicions
+    assert (unit.name, unit.channels) == ("unit_error", ("imu.gyro_z",))
+    assert unit.values["factor"] == pytest.approx(57.29578)
+    assert clock.name == "clock_offset"
+    assert clock.values["offset"] == pytest.approx(0.9, abs=3.0 * clock.std["offset"])
 
 
 def test_small_faults_are_left_for_the_fit(drive: Drive, nigel: Car) -> None:
