@@ -1,0 +1,146 @@
+"""A recorded drive, ready to be driven again: commands, measured streams, and the measured motion.
+
+Streams keep the times and values of the recording; nothing is resampled.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.commanded import Commanded
+from scm.mismatch.smooth import Smooth, smooth
+from scm.recording.motion import forward
+from scm.recording.read import Recording
+from scm.replay import Commands
+from scm.vehicles.car import Car
+
+STEP_S = 0.01
+FASTEST_HZ = {"imu.accel_x": 25.0, "imu.accel_y": 25.0, "imu.gyro_z": 50.0, "yaw_rate": 50.0,
+              "encoder.left": 25.0, "encoder.right": 25.0}  # fmt: skip
+FASTEST_POSE_HZ = 50.0
+RUN_IN_S = 1.0
+WHEELS = {"encoder.left": "rl", "encoder.right": "rr"}
+KNOWN = (
+    "pose.x", "pose.y", "pose.yaw", "imu.gyro_z", "yaw_rate", "encoder.left", "encoder.right",
+    "wheel_speed.fl", "wheel_speed.fr", "wheel_speed.rl", "wheel_speed.rr", "speed", "velocity.x",
+    "velocity.y", "imu.accel_x", "imu.accel_y",
+)  # fmt: skip
+LEAP = 0.3
+_MAD = 1.4826
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """One measured channel; yaw is continuous.
+
+    Attributes:
+        t: (n,), rising [s].
+        values: (n,), SI; encoders in counts.
+        std: Of the noise of one value, stated or estimated.
+        taps: When the samples were taken whose mean a value is, (n, samples) [s].
+        unsure: Further standard deviation of each value, where the channel leaps, (n,).
+    """
+
+    name: str
+    t: Floats
+    values: Floats
+    std: float
+    taps: Floats
+    unsure: Floats
+
+    def within(self, first: float, last: float) -> "Stream":
+        """Return the values taken between two times."""
+        keep = (self.taps[:, 0] >= first) & (self.taps[:, -1] <= last)
+        return Stream(self.name, self.t[keep], self.values[keep], self.std, self.taps[keep],
+                      self.unsure[keep])  # fmt: skip
+
+
+class Drive:
+    """One car's recording on the simulation's grid of `STEP_S`.
+
+    Attributes:
+        edges: Where steps begin and end, (steps + 1,) [s].
+        streams: Measured channels that a car model can predict.
+        point: On the body that the poses are of, from the rear axle [m].
+    """
+
+    def __init__(self, recording: Recording, car: Car) -> None:
+        self.recording, self.car = recording, car
+        commands = Commands(recording, car)
+        self.throttle = Commanded(commands._throttle.t, commands._throttle.values)
+        self.steering = Commanded(
+            commands._steering.t, commands._steering.values * commands._per_unit
+        )
+        names = [name for name in KNOWN if name in recording.channels]
+        streams = [_stream(recording, name) for name in names]
+        self.point = recording.channel("pose.x").point
+        pose = recording.channel("pose.x").t
+        first = max(float(pose[0]), commands.span_s[0])
+        last = min(float(pose[-1]), commands.span_s[1] + 0.05)
+        steps = int((last - first) / STEP_S)
+        self.edges: Floats = first + STEP_S * np.arange(steps + 1)
+        self.streams: Sequence[Stream] = [stream.within(first, last) for stream in streams]
+
+    def stream(self, name: str) -> Stream:
+        """Return a stream by its channel's name."""
+        return next(s for s in self.streams if s.name == name)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The streams' names."""
+        return tuple(s.name for s in self.streams)
+
+    @cached_property
+    def smoothed(self) -> dict[str, Smooth]:
+        """The poses, smoothed without a car model, of the point that was measured."""
+        return {
+            name: smooth(s.t, s.values, s.std)
+            for name in ("pose.x", "pose.y", "pose.yaw")
+            for s in (self.stream(name),)
+        }
+
+
+def _stream(recording: Recording, name: str) -> Stream:
+    channel = forward(recording, name)
+    values = np.unwrap(channel.values) if name == "pose.yaw" else channel.values
+    std = channel.std if channel.std else _roughness(values)
+    if name.startswith("encoder."):
+        std = max(std if channel.std else 0.0, 0.4)  # a count is a count
+    return _thinned(name, channel.t, values, std)
+
+
+def _thinned(name: str, t: Floats, values: Floats, std: float) -> Stream:
+    """Return a fast stream slower: rates as means of neighbours, positions and counts as they are.
+
+    What a car does is slower than that, and every sample costs.
+    """
+    pace = 1.0 / max(float(np.median(np.diff(t))), 1e-6)
+    every = max(int(pace / FASTEST_HZ.get(name, FASTEST_POSE_HZ) + 0.1), 1)
+    if name.startswith(("pose.", "encoder.")):
+        t, values = t[::every], values[::every]
+        return Stream(name, t, values, std, t[:, None], np.zeros(len(t)))
+    whole = len(t) // every * every
+    taps = t[:whole].reshape(-1, every)
+    means, std = values[:whole].reshape(-1, every).mean(axis=1), std / np.sqrt(every)
+    unsure = _leaps(means, std) if name.startswith("imu.accel") else np.zeros(len(means))
+    return Stream(name, taps.mean(axis=1), means, std, taps, unsure)
+
+
+def _leaps(values: Floats, std: float) -> Floats:
+    """Return how unsure each value is because its neighbours differ by more than noise does.
+
+    A command's edge makes a car leap within milliseconds; no recording's clock is that exact.
+    """
+    padded = np.pad(values, 1, mode="edge")
+    around = np.stack((padded[:-2], values, padded[2:]))
+    return LEAP * np.maximum(np.ptp(around, axis=0) - 4.0 * std, 0.0)
+
+
+def _roughness(values: Floats) -> float:
+    """Return the noise that a channel's third differences show, whose median motion is slow."""
+    jumps = np.diff(values, 3)
+    moving = jumps[jumps != 0.0] if np.any(jumps) else jumps
+    return max(_MAD * float(np.median(np.abs(moving))) / np.sqrt(20.0), 1e-6)

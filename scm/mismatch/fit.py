@@ -1,0 +1,235 @@
+"""Fits of many hypotheses at once: Gauss-Newton, all rollouts of a round in one batch.
+
+A hypothesis is a tuple of effects. Its numbers are free; the car's own are free too, held by the
+scatter that the car file states.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.library import Candidate
+from scm.mismatch.likelihood import Likelihood
+
+ROUNDS = 5
+SMALL = 0.1  # a derivative's step of an ordinary number, in standard deviations
+LENGTHS = (1.0, 0.5, 0.2, 0.05)
+DAMPINGS = (0.03, 0.3)
+ENOUGH = 0.5
+TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild moments prove nothing
+FARTHEST = 2.0  # beyond twice its scatter a number is no longer ordinary
+
+
+@dataclass(slots=True)
+class Fitted:
+    """A hypothesis with its best numbers so far.
+
+    Attributes:
+        z: The car's own numbers, standard deviations from the file's.
+        values: The effects' numbers, in the order of their knobs.
+        e: Unit innovations, (events,); `q`: their loss on the fitted part, and the prior's.
+        jacobian: Of `e` by `z` and then by values over their knobs' steps, (events, n).
+    """
+
+    effects: tuple[Candidate, ...]
+    z: Floats
+    values: Floats
+    e: Floats
+    q: float
+    jacobian: Floats
+    done: bool = False
+    covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects' names."""
+        return tuple(effect.name for effect in self.effects)
+
+    @property
+    def knobs(self) -> int:
+        """How many numbers the effects have."""
+        return len(self.values)
+
+
+class Fitter:
+    """Fits hypotheses on a part of the innovations.
+
+    Attributes:
+        part: Weight of each innovation, 0 or 1, (events,).
+    """
+
+    def __init__(self, model: Likelihood, part: Floats) -> None:
+        self.model, self.part = model, part
+
+    def numbers(self, effects: Sequence[Candidate], z: Floats, values: Floats) -> dict[str, float]:
+        """Return the numbers by key of a hypothesis."""
+        found, at = self.model.numbers(z), 0
+        for effect in effects:
+            n = len(effect.knobs)
+            found |= effect.numbers(tuple(values[at : at + n]))
+            at += n
+        return found
+
+    def score(self, e: Floats, z: Floats) -> Floats:
+        """Return Q of each column of innovations."""
+        losses = self.part @ (TAIL * np.log1p(e * e / TAIL))
+        return np.asarray(losses + (np.atleast_2d(z) ** 2).sum(axis=1))
+
+    def weights(self, e: Floats) -> Floats:
+        """Return how much each innovation counts in a least-squares step, (events,)."""
+        return self.part / (1.0 + e * e / TAIL)
+
+    def null(self, z: Floats | None = None) -> Fitted:
+        """Return the car as its file says, not fitted yet."""
+        z = np.zeros(len(self.model.ordinary)) if z is None else z
+        e, _ = self.model([self.numbers((), z, np.zeros(0))])
+        return Fitted((), z, np.zeros(0), e[:, 0], float(self.score(e, z)[0]), np.zeros((0, 0)))
+
+    def begin(
+        self, base: Fitted, trials: Sequence[tuple[tuple[Candidate, ...], Floats]]
+    ) -> list[Fitted]:
+        """Return hypotheses at trial values, the car's own numbers refitted linearly from `base`.
+
+        A trial that leaves physical bounds has an infinite `q`.
+        """
+        sets = [self.numbers(effects, base.z, values) for effects, values in trials]
+        e, ok = self.model(sets)
+        jacobian = base.jacobian[:, : len(base.z)]
+        weighted = jacobian.T * self.weights(base.e)
+        normal = weighted @ jacobian + np.eye(len(base.z))
+        found = []
+        for i, (effects, values) in enumerate(trials):
+            column = e[:, i]
+            if not ok[i] or not np.isfinite(column).all():
+                found.append(Fitted(effects, base.z, values, column, np.inf, jacobian))
+                continue
+            slope = weighted @ column + base.z
+            dz = _bounded(normal, slope, -FARTHEST - base.z, FARTHEST - base.z)
+            moved = column + jacobian @ dz
+            q = float(self.score(moved[:, None], base.z + dz)[0])
+            found.append(Fitted(effects, base.z + dz, values, moved, q, jacobian))
+        return found
+
+    def refine(
+        self, fits: Sequence[Fitted], rounds: int = ROUNDS, *, fresh: bool = False
+    ) -> list[Fitted]:
+        """Fit hypotheses together; `fresh` renews the derivatives by the car's own numbers too."""
+        fits = [f for f in fits if np.isfinite(f.q)]
+        for fitted in fits:
+            fitted.done = False
+            fitted.q = np.inf  # a linear guess is no fit: the first round says what it really is
+        for count in range(rounds):
+            active = [f for f in fits if not f.done]
+            if not active:
+                break
+            self._differentiate(active, fresh=fresh and count % 3 == 0)
+            self._step(active)
+        return list(fits)
+
+    def _differentiate(self, fits: Sequence[Fitted], *, fresh: bool) -> None:
+        """Renew `e` and the derivatives of each fit, all in one batch."""
+        sets, own = list[dict[str, float]](), len(self.model.ordinary)
+        for f in fits:
+            sets.append(self.numbers(f.effects, f.z, f.values))
+            if fresh:
+                for j in range(own):
+                    z = f.z.copy()
+                    z[j] += self._side(f, j)
+                    sets.append(self.numbers(f.effects, z, f.values))
+            for j, step in enumerate(self._knob_steps(f)):
+                values = f.values.copy()
+                values[j] += step
+                sets.append(self.numbers(f.effects, f.z, values))
+        e, ok = self.model(sets)
+        e[:, ~ok] = np.nan
+        at = 0
+        for f in fits:
+            now, jacobian = e[:, at], np.empty((len(e), own + f.knobs))
+            at += 1
+            jacobian[:, :own] = f.jacobian[:, :own] if not fresh else 0.0
+            if fresh:
+                for j in range(own):
+                    jacobian[:, j] = (e[:, at + j] - now) / self._side(f, j)
+                at += own
+            for j, step in enumerate(self._knob_steps(f)):
+                scale = _knobs(f)[j].step
+                jacobian[:, own + j] = (e[:, at + j] - now) / (step / scale)
+            at += f.knobs
+            if not np.isfinite(now).all():
+                f.done, f.q = True, np.inf
+                continue
+            f.jacobian = np.nan_to_num(jacobian)
+            f.e, f.q = now, float(self.score(now[:, None], f.z)[0])
+
+    def _trials(self, f: Fitted) -> list[tuple[Floats, Floats]]:
+        """Return new numbers to try for one fit: shorter and more damped Gauss-Newton steps."""
+        own, knobs = len(f.z), _knobs(f)
+        prior = np.concatenate((np.ones(own), np.full(f.knobs, 1e-6)))
+        weighted = f.jacobian.T * self.weights(f.e)
+        normal = weighted @ f.jacobian + np.diag(prior)
+        f.covariance = np.linalg.pinv(normal)
+        slope = weighted @ f.e + prior * np.concatenate((f.z, np.zeros(f.knobs)))
+        scales = np.array([k.step for k in knobs])
+        low = np.concatenate((-FARTHEST - f.z, [(k.bounds[0] - v) / k.step
+                                                for k, v in zip(knobs, f.values, strict=True)]))
+        high = np.concatenate((FARTHEST - f.z, [(k.bounds[1] - v) / k.step
+                                                for k, v in zip(knobs, f.values, strict=True)]))
+        full = _bounded(normal, slope, low, high)
+        moves = [length * full for length in LENGTHS]
+        moves += [
+            _bounded(normal + np.diag(damping * normal.diagonal()), slope, low, high)
+            for damping in DAMPINGS
+        ]
+        return [(f.z + move[:own], f.values + move[own:] * scales) for move in moves]
+
+    def _side(self, f: Fitted, j: int) -> float:
+        """Return a small step of an ordinary number that stays within its bounds."""
+        o = self.model.ordinary[j]
+        return -SMALL if o.mean + (f.z[j] + SMALL) * o.std > o.bounds[1] else SMALL
+
+    def _knob_steps(self, f: Fitted) -> list[float]:
+        """Return small steps of the effects' numbers that stay within their bounds."""
+        return [
+            -0.5 * k.step if v + 0.5 * k.step > k.bounds[1] else 0.5 * k.step
+            for k, v in zip(_knobs(f), f.values, strict=True)
+        ]
+
+    def _step(self, fits: Sequence[Fitted]) -> None:
+        """Move each fit along its Gauss-Newton step, by the best of a few lengths."""
+        trials = list[tuple[Fitted, Floats, Floats]]()
+        for f in fits:
+            if not f.done:
+                trials += [(f, z, values) for z, values in self._trials(f)]
+        if not trials:
+            return
+        e, ok = self.model([self.numbers(f.effects, z, v) for f, z, v in trials])
+        before = {id(f): f.q for f in fits}
+        for i, (f, z, values) in enumerate(trials):
+            if ok[i] and np.isfinite(e[:, i]).all():
+                q = float(self.score(e[:, i : i + 1], z)[0])
+                if q < f.q:
+                    f.q, f.z, f.values, f.e = q, z, values, e[:, i].copy()
+        for f in fits:
+            f.done = f.done or before[id(f)] - f.q < ENOUGH
+
+
+def _bounded(normal: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
+    """Return the step that minimises a quadratic within bounds, by holding what leaves them."""
+    n = len(slope)
+    step, held = np.zeros(n), np.zeros(n, dtype=np.bool_)
+    for _ in range(n):
+        free = ~held
+        wanted = -slope[free] - normal[np.ix_(free, held)] @ step[held]
+        step[free] = np.linalg.lstsq(normal[np.ix_(free, free)], wanted, rcond=1e-12)[0]
+        out = free & ((step < low) | (step > high))
+        if not out.any():
+            break
+        step[out] = np.clip(step[out], low[out], high[out])
+        held |= out
+    return step
+
+
+def _knobs(f: Fitted) -> list[object]:
+    return [knob for effect in f.effects for knob in effect.knobs]

@@ -1,0 +1,141 @@
+"""Which effects explain a recording: screen all, refit the best, add one at a time, take back.
+
+An effect must earn more than chance gives the best of so many tried: its numbers cost `ln n` each,
+the library's size twice its logarithm (the criterion of PASTIS).
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.fit import Fitted, Fitter
+from scm.mismatch.library import Candidate
+from scm.mismatch.likelihood import Likelihood, learn_noise
+
+MOST_EFFECTS = 4
+REFITTED = 14
+FALSE_ALARMS = 0.01
+NEAR = 40.0
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One round of the search: the model before, and every single effect added to it.
+
+    Attributes:
+        rivals: Refitted alternatives, best first; `criteria` of each, lower is better.
+    """
+
+    base: Fitted
+    rivals: tuple[Fitted, ...]
+    criteria: tuple[float, ...]
+
+
+def price(effects: Sequence[Candidate], events: int, library: int) -> float:
+    """Return what effects must gain to be believed."""
+    knobs = sum(len(effect.knobs) for effect in effects)
+    return knobs * math.log(events) + 2.0 * len(effects) * math.log(library / FALSE_ALARMS)
+
+
+class Search:
+    """Looks for missing effects in one model's recordings.
+
+    Attributes:
+        steps: What was tried, round by round.
+    """
+
+    def __init__(
+        self, model: Likelihood, part: Floats, library: Sequence[Candidate], tell: Tell
+    ) -> None:
+        self.model, self.library, self.tell = model, tuple(library), tell
+        self.fitter = Fitter(model, part)
+        self.events = int(part.sum())
+        self.steps: list[Step] = []
+
+    def criterion(self, fitted: Fitted) -> float:
+        """Return Q and the price of its effects."""
+        return fitted.q + price(fitted.effects, self.events, len(self.library))
+
+    def run(self) -> Fitted:
+        """Return the model that explains the recordings best without inventing anything."""
+        self.tell("fitting the car's own numbers")
+        best = self.settle(self.fitter.null())
+        self.retuned = best
+        while len(best.effects) < MOST_EFFECTS:
+            step = self.extend(best)
+            self.steps.append(step)
+            if not step.rivals or step.criteria[0] > self.criterion(best):
+                break
+            best = self.settle(step.rivals[0])
+            best = self.prune(best)
+        return best
+
+    def settle(self, fitted: Fitted) -> Fitted:
+        """Fit a hypothesis and the noise, one after the other, twice."""
+        for _ in range(2):
+            (fitted,) = self.fitter.refine([fitted], rounds=4, fresh=True)
+            numbers = self.fitter.numbers(fitted.effects, fitted.z, fitted.values)
+            residuals, _ = self.model.residuals([numbers])
+            learn_noise(self.model, residuals, rounds=1)
+        (fitted,) = self.fitter.refine([fitted], rounds=4, fresh=True)
+        return fitted
+
+    def extend(self, base: Fitted) -> Step:
+        """Try every effect beside those of `base`."""
+        trials = [
+            ((*base.effects, candidate), np.concatenate((base.values, start)))
+            for candidate in self.library
+            if candidate.name not in base.names
+            for start in candidate.starts
+        ]
+        self.tell(f"trying {len(self.library)} effects from {len(trials)} starts")
+        begun = self.fitter.begin(base, trials)
+        best: dict[int, Fitted] = {}
+        for fitted in begun:
+            key = id(fitted.effects[-1])
+            if key not in best or fitted.q < best[key].q:
+                best[key] = fitted
+        ranked = sorted(best.values(), key=self.criterion)[:REFITTED]
+        self.tell("refitting " + ", ".join(f.names[-1] for f in ranked[:4]) + " ...")
+        ranked = self.fitter.refine(ranked, rounds=4)
+        for f in ranked:
+            self._not_worse(f, base)
+        ranked = sorted(ranked, key=self.criterion)
+        near = [f for f in ranked if self.criterion(f) < self.criterion(ranked[0]) + NEAR]
+        if self.criterion(ranked[0]) < self.criterion(base) + NEAR:
+            near = self.fitter.refine(near[:6], rounds=3, fresh=True)
+        ranked = sorted([*near, *(f for f in ranked if all(f is not n for n in near))],
+                        key=self.criterion)
+        return Step(base, tuple(ranked), tuple(self.criterion(f) for f in ranked))
+
+    def _not_worse(self, fitted: Fitted, base: Fitted) -> None:
+        """Let an effect that found nothing do nothing: it contains the model without it."""
+        if fitted.q > base.q:
+            neutral = np.array([knob.neutral for knob in fitted.effects[-1].knobs])
+            fitted.z, fitted.values = base.z.copy(), np.concatenate((base.values, neutral))
+            fitted.e, fitted.q = base.e, base.q
+
+    def prune(self, fitted: Fitted) -> Fitted:
+        """Take back every effect that the others make needless."""
+        while len(fitted.effects) > 1:
+            fewer = []
+            for i, effect in enumerate(fitted.effects):
+                del effect
+                effects = (*fitted.effects[:i], *fitted.effects[i + 1 :])
+                at = sum(len(e.knobs) for e in fitted.effects[:i])
+                values = np.delete(fitted.values, slice(at, at + len(fitted.effects[i].knobs)))
+                own = len(fitted.z)
+                keep = np.delete(np.arange(fitted.jacobian.shape[1]),
+                                 slice(own + at, own + at + len(fitted.effects[i].knobs)))
+                fewer.append(Fitted(effects, fitted.z.copy(), values, fitted.e, fitted.q,
+                                    fitted.jacobian[:, keep]))
+            fewer = sorted(self.fitter.refine(fewer, rounds=4, fresh=True), key=self.criterion)
+            if not fewer or self.criterion(fewer[0]) > self.criterion(fitted):
+                return fitted
+            fitted = fewer[0]
+        return fitted

@@ -1,0 +1,264 @@
+"""What is left of the measurements after a prediction, weighed: innovations of a Kalman filter.
+
+The filter allows for slow disturbances of speed, side speed and yaw rate that all channels share,
+and of each wheel or accelerometer alone (first-order Gauss-Markov). It is linear and its gains do
+not depend on the prediction, so one pass weighs the residuals of many parameter sets: innovations
+are independent of unit variance where the prediction is right, and no derivative is ever taken.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Floats, Ints
+from scm.mismatch.commanded import Commanded
+from scm.mismatch.drive import Drive
+from scm.vehicles.jit import array_kernel
+
+EX, EY, EPSI, DV, DY, DR = range(6)
+BODY = 6
+FELT_S = 0.1
+POSES = {"pose.x": EX, "pose.y": EY, "pose.yaw": EPSI}
+RATES = {"imu.gyro_z": DR, "yaw_rate": DR, "velocity.x": DV, "speed": DV, "velocity.y": DY}
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """How far a right model may be off.
+
+    Attributes:
+        speed, side, yaw_rate: Shared disturbances [m/s, m/s, rad/s].
+        own: Of each stream that has one, by channel [its rate's unit, or its own].
+        lasts_s: How long disturbances last.
+        scale: Factor on the noise of each stream, by channel.
+        launch, turn: What a leap of the whole throttle adds to speed, wheels included, and one of
+            the whole steering to yaw rate, for as long as a leap is felt: transients are where any
+            car model is worst [m/s, rad/s].
+    """
+
+    speed: float
+    side: float
+    yaw_rate: float
+    own: Mapping[str, float]
+    scale: Mapping[str, float]
+    lasts_s: float = 1.0
+    launch: float = 0.0
+    turn: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _System:
+    """The filter's matrices: couplings (i, j, a) beside pose and heading, decays, observations."""
+
+    size: int
+    rows: Ints
+    columns: Ints
+    factors: Floats
+    lasts: Floats
+    spread: Floats
+    start: Floats
+    see: Floats
+    variance: Floats
+    slips: Floats
+
+
+def _system(drive: Drive, noise: Noise) -> _System:
+    radius, half = drive.car.value("wheel.radius_m"), 0.5 * drive.car.value("body.track_m")
+    couple: list[tuple[int, int, float]] = [(EPSI, DR, 1.0)]
+    lasts, spread = [0.0] * 3 + [noise.lasts_s] * 3, [0.0] * 3 + [noise.speed, noise.side, noise.yaw_rate]
+    start = [1e4 * drive.stream("pose.x").std, 1e4 * drive.stream("pose.y").std, 10.0]
+    start += [noise.speed, noise.side, noise.yaw_rate]
+    see, variance, wheels = list[dict[int, float]](), list[float](), list[int]()
+
+    def add(last: float, std: float, first: float) -> int:
+        lasts.append(last)
+        spread.append(std)
+        start.append(first)
+        return len(lasts) - 1
+
+    for s in drive.streams:
+        variance.append((s.std * noise.scale.get(s.name, 1.0)) ** 2)
+        own = noise.own.get(s.name, 0.0)
+        left = 1.0 if s.name.endswith(("left", "fl", "rl")) else -1.0
+        if s.name in POSES:
+            see.append({POSES[s.name]: 1.0})
+        elif s.name in RATES:
+            see.append({RATES[s.name]: 1.0, add(noise.lasts_s, own, own): 1.0})
+        elif s.name.startswith("encoder."):
+            counts = drive.car.value("encoder.counts_per_revolution") / (2.0 * np.pi) / radius
+            total, slip = add(0.0, 0.0, 1e5), add(noise.lasts_s, own, own)
+            couple += [(total, DV, counts), (total, DR, -left * half * counts), (total, slip, counts)]
+            see.append({total: 1.0})
+            wheels.append(slip)
+        elif s.name.startswith("wheel_speed."):
+            slip = add(noise.lasts_s, own, own)
+            see.append({DV: 1.0 / radius, DR: -left * half / radius, slip: 1.0 / radius})
+            wheels.append(slip)
+        else:
+            see.append({add(noise.lasts_s, own, own): 1.0})
+    size = len(lasts)
+    slips = np.zeros(size - BODY)
+    slips[[i - BODY for i in wheels]] = 1.0
+    matrix = np.zeros((len(see), size))
+    for i, row in enumerate(see):
+        for j, value in row.items():
+            matrix[i, j] = value
+    rows, columns, factors = (np.array(x) for x in zip(*couple, strict=True))
+    return _System(
+        size, rows.astype(np.int64), columns.astype(np.int64), factors.astype(float),
+        np.array(lasts), np.array(spread), np.array(start), matrix, np.array(variance), slips,
+    )  # fmt: skip
+
+
+class Whitener:
+    """Weighs residuals of one drive under one belief about noise.
+
+    Attributes:
+        t: Time of each innovation, (events,) [s]; `stream`: the number of its stream.
+        log_size: Sum of the logarithms of the innovations' variances.
+    """
+
+    def __init__(self, drive: Drive, noise: Noise) -> None:
+        self.drive, self.noise = drive, noise
+        counts = [len(s.t) for s in drive.streams]
+        t = np.concatenate([s.t for s in drive.streams])
+        stream = np.repeat(np.arange(len(counts)), counts)
+        self._order = np.argsort(t, kind="stable")
+        self.t: Floats = t[self._order]
+        self.stream: Ints = stream[self._order]
+        unsure = np.concatenate([s.unsure for s in drive.streams])[self._order]
+        psi = drive.smoothed["pose.yaw"].at(self.t)
+        self._cos, self._sin = np.cos(psi), np.sin(psi)
+        self._system = system = _system(drive, noise)
+        leaps = self._leaps(noise, system.size)
+        n, events = system.size, len(self.t)
+        self._gain, self._variance = np.zeros((events, n)), np.zeros(events)
+        self._keep = np.zeros((events, n))
+        p, room = np.diag(system.start**2), np.zeros((2, n, n))
+        _gains(
+            self.t, self.stream, self._cos, self._sin, system.rows, system.columns,
+            system.factors, system.lasts, system.spread, system.see, system.variance, unsure, leaps, p, room,
+            self._gain, self._variance, self._keep,
+        )  # fmt: skip
+        self.log_size = np.log(self._variance)
+
+    def _leaps(self, noise: Noise, size: int) -> Floats:
+        """Return the variance that the commands' leaps add to each state before each event."""
+        out = np.zeros((len(self.t), size))
+        since = np.diff(self.t, prepend=self.t[0])
+        launch = noise.launch**2 * _felt(self.drive.throttle, self.t) * since / FELT_S
+        out[:, DV] = launch
+        out[:, BODY:] = launch[:, None] * self._system.slips
+        out[:, DR] = noise.turn**2 * _felt(self.drive.steering, self.t) * since / FELT_S
+        return out
+
+    def innovations(self, residuals: Sequence[Floats]) -> Floats:
+        """Return unit innovations, (events, sets), of measured minus predicted of each stream."""
+        stacked = np.ascontiguousarray(np.concatenate(residuals, axis=0)[self._order])
+        out, system = np.empty_like(stacked), self._system
+        _innovations(
+            self.t, self.stream, self._cos, self._sin, system.rows, system.columns,
+            system.factors, system.see, self._gain, self._variance, self._keep,
+            np.zeros((system.size, stacked.shape[1])), stacked, out,
+        )  # fmt: skip
+        return out
+
+
+def _felt(command: Commanded, t: Floats) -> Floats:
+    """Return the squared leaps of a command as they are still felt, fading, at given times."""
+    felt = np.zeros(len(command.t))
+    leaps, fade = np.abs(np.diff(command.values)), np.exp(-np.diff(command.t) / FELT_S)
+    for k in range(1, len(felt)):
+        felt[k] = felt[k - 1] * fade[k - 1] + leaps[k - 1]
+    row = np.maximum(np.searchsorted(command.t, t, side="right") - 1, 0)
+    now = felt[row] * np.exp(-np.maximum(t - command.t[row], 0.0) / FELT_S)
+    return np.asarray(now * now)
+
+
+@array_kernel
+def _gains(
+    t: Floats, stream: Ints, cos: Floats, sin: Floats, rows: Ints, columns: Ints, factors: Floats,
+    lasts: Floats, spread: Floats, see: Floats, variance: Floats, unsure: Floats, leaps: Floats,
+    p: Floats, room: Floats, gain: Floats, total: Floats, keep: Floats,
+) -> None:  # fmt: skip
+    """Run the covariance alone: gains, innovation variances and decays of each event."""
+    n = p.shape[0]
+    f, half = room[0], room[1]
+    for k in range(len(t)):
+        dt = t[k] - t[k - 1] if k > 0 else 0.0
+        for i in range(n):
+            for j in range(n):
+                f[i, j] = 0.0
+            keep[k, i] = np.exp(-dt / lasts[i]) if lasts[i] > 0.0 else 1.0
+            f[i, i] = keep[k, i]
+        f[0, 3], f[0, 4] = cos[k] * dt, -sin[k] * dt
+        f[1, 3], f[1, 4] = sin[k] * dt, cos[k] * dt
+        for c in range(len(rows)):
+            f[rows[c], columns[c]] = factors[c] * dt
+        for i in range(n):
+            for j in range(n):
+                half[i, j] = 0.0
+            for m in range(n):
+                if f[i, m] != 0.0:
+                    for j in range(n):
+                        half[i, j] += f[i, m] * p[m, j]
+        for i in range(n):
+            for j in range(n):
+                p[i, j] = 0.0
+            for m in range(n):
+                for j in range(n):
+                    if f[j, m] != 0.0:
+                        p[i, j] += half[i, m] * f[j, m]
+            p[i, i] += spread[i] * spread[i] * (1.0 - keep[k, i] * keep[k, i]) + leaps[k, i]
+        s, h = variance[stream[k]] + unsure[k] * unsure[k], see[stream[k]]
+        for i in range(n):
+            gain[k, i] = 0.0
+            for j in range(n):
+                gain[k, i] += p[i, j] * h[j]
+            s += h[i] * gain[k, i]
+        total[k] = s
+        for i in range(n):
+            for j in range(n):
+                half[i, j] = p[i, j] - gain[k, i] * gain[k, j] / s
+        for i in range(n):
+            for j in range(n):
+                p[i, j] = half[i, j]
+            gain[k, i] /= s
+
+
+@array_kernel
+def _innovations(
+    t: Floats, stream: Ints, cos: Floats, sin: Floats, rows: Ints, columns: Ints, factors: Floats,
+    see: Floats, gain: Floats, variance: Floats, keep: Floats, x: Floats, residual: Floats,
+    out: Floats,
+) -> None:  # fmt: skip
+    """Run the state of many residual sequences through known gains."""
+    n, sets = x.shape
+    for k in range(len(t)):
+        dt = t[k] - t[k - 1] if k > 0 else 0.0
+        c, s, h = cos[k] * dt, sin[k] * dt, see[stream[k]]
+        for b in range(sets):
+            x[0, b] += c * x[3, b] - s * x[4, b]
+            x[1, b] += s * x[3, b] + c * x[4, b]
+        for m in range(len(rows)):
+            i, j, a = rows[m], columns[m], factors[m] * dt
+            for b in range(sets):
+                x[i, b] += a * x[j, b]
+        for i in range(3, n):
+            if keep[k, i] != 1.0:
+                for b in range(sets):
+                    x[i, b] *= keep[k, i]
+        for b in range(sets):
+            out[k, b] = residual[k, b]
+        for i in range(n):
+            if h[i] != 0.0:
+                for b in range(sets):
+                    out[k, b] -= h[i] * x[i, b]
+        for i in range(n):
+            a = gain[k, i]
+            for b in range(sets):
+                x[i, b] += a * out[k, b]
+        size = 1.0 / np.sqrt(variance[k])
+        for b in range(sets):
+            out[k, b] *= size
