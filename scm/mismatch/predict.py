@@ -63,7 +63,7 @@ class Prediction:
         found = []
         for stream in self.drive.streams:
             signal = path.get(stream.name)
-            signal = self._sensor(stream.name, motions, now) if signal is None else signal
+            signal = self.sensor(stream.name, motions, now) if signal is None else signal
             found.append(stream.values[:, None] - self._taps[stream.name](signal))
         faulty = np.any([now[key] != NEUTRAL[key] for key in _POSE], axis=0)
         for row in np.flatnonzero(faulty):
@@ -124,7 +124,7 @@ class Prediction:
                 t = edges[0] + (stream.t - late - edges[0]) / (1.0 + rate)
                 column[:, row] = stream.values - np.interp(t, edges, path[stream.name][:, 0])
 
-    def _sensor(self, name: str, motions: Motions, now: Mapping[str, Floats]) -> Floats:
+    def sensor(self, name: str, motions: Motions, now: Mapping[str, Floats]) -> Floats:
         """Return what any other sensor reads, on the drive's edges, (edges, sets)."""
         if name == "imu.gyro_z":
             rate = motions["yaw_rate"]

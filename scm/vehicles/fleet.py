@@ -254,6 +254,14 @@ class Fleet:
         load = np.array([front, front, 1.0 - front, 1.0 - front]) * weight
         car[offset : offset + 4] = load + param(row, "wheel_mass") * GRAVITY
 
+    def copy_row(self, source: int, row: int) -> None:
+        """Make a row the very car of another one: its numbers, and all that it remembers."""
+        for array in (self._block, self._numbers):
+            array[:, row] = array[:, source]
+        self.alive[row], self.status[row] = self.alive[source], self.status[source]
+        if self._past is not None:
+            self._past.copy_row(source, row)
+
     def settle(self, row: int) -> None:
         """Let a car that was just placed stand on the heights that `floor_height` has for it."""
         front_left, front_right, rear_left, rear_right = self.floor_height[row].tolist()

@@ -42,6 +42,11 @@ class CommandPast:
         self._newest[row] = 0
         self._before[row] = throttle, math.nan if steering is None else steering
 
+    def copy_row(self, source: int, row: int) -> None:
+        """Remember for one car what another one was commanded."""
+        for array in (self._knots, self._newest, self._before):
+            array[row] = array[source]
+
     def recall(self, block: Floats, numbers: Floats, first: int, last: int, span: float) -> None:
         """Before a call of `span` seconds: note the commands, write what they were."""
         _recall(
