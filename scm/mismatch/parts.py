@@ -4,12 +4,11 @@ Parts are blocks of a few seconds that take turns, so that each part sees all of
 of the turns changes from four blocks to four, or laps as long as they would tie parts to places.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from scm.arrays import Floats, Ints
+from scm.arrays import Bools, Floats, Ints
 from scm.mismatch.findings import Span
 from scm.mismatch.likelihood import Likelihood
 
@@ -58,9 +57,7 @@ def split(model: Likelihood, block_s: float = BLOCK_S) -> Parts:
         for part in range(len(NAMES)):
             weights[part].append((whose[block] == part).astype(np.float64))
             spans[part].append(_spans(cuts, whose == part))
-    return Parts(
-        *(Part(np.concatenate(w), tuple(s)) for w, s in zip(weights, spans, strict=True))
-    )
+    return Parts(*(Part(np.concatenate(w), tuple(s)) for w, s in zip(weights, spans, strict=True)))
 
 
 def _cuts(first: float, last: float, block_s: float) -> Floats:
@@ -75,7 +72,5 @@ def _whose(blocks: int, first: int) -> Ints:
     return np.array([part for turn in turns for part in turn])[:blocks]
 
 
-def _spans(cuts: Floats, mine: Sequence[bool] | np.ndarray) -> tuple[Span, ...]:
-    return tuple(
-        (float(cuts[i]), float(cuts[i + 1])) for i in range(len(cuts) - 1) if mine[i]
-    )
+def _spans(cuts: Floats, mine: Bools) -> tuple[Span, ...]:
+    return tuple((float(cuts[i]), float(cuts[i + 1])) for i in range(len(cuts) - 1) if mine[i])

@@ -1,0 +1,348 @@
+"""Free runs of the car as given and of the car as found, against the recording.
+
+A window starts in the smoothed measured motion and then gets nothing but the recorded commands.
+Errors are those at its end, root mean squares over windows of one part of the recordings.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scm.arrays import Bools, Floats, Ints
+from scm.errors import RecordingError
+from scm.mismatch.drive import STEP_S, Drive, Stream
+from scm.mismatch.evidence import FreeRuns
+from scm.mismatch.findings import Fit, PartErrors, Span
+from scm.mismatch.parts import NAMES, Parts
+from scm.mismatch.predict import NEUTRAL, Prediction
+from scm.mismatch.rollouts import Motions, Numbers
+from scm.mismatch.seen import Camera
+from scm.mismatch.smooth import Smooth, smooth
+from scm.mismatch.windows import Runs, Side, Windows
+from scm.recording.motion import Poses
+from scm.vehicles.car import Car
+
+FAST_MPS, FAST_HORIZON_S, SLOW_HORIZON_S = 1.0, 1.0, 3.0
+SHORTEST_S = 0.2
+NEXT_S = 1.0  # between the starts of windows at most
+SHOWN_EVERY_S = 0.05
+DRAWS = 2
+WORSE = 1.02
+END_S = 0.2  # speeds are means over the window's end of this length
+_BEFORE, _AFTER = 0, 1
+
+
+@dataclass(frozen=True, slots=True)
+class _Judged:
+    """One drive's windows: errors by channel, each (sides, windows, values), and what is drawn.
+
+    Attributes:
+        start_s: (windows,), by the poses' stamps; `part`: of each.
+        floor: What noise alone makes of each error, (draws, windows, values).
+        shown: Poses recorded, before and after, (3, windows, times).
+    """
+
+    start_s: Floats
+    part: tuple[str, ...]
+    errors: Mapping[str, Floats]
+    floor: Mapping[str, Floats]
+    shown: Mapping[str, Floats]
+
+
+def horizon_of(drives: Sequence[Drive], parts: Parts) -> float:
+    """Return how long windows should be: 1 s for a fast car, 3 s for a slow one, or a block."""
+    speeds = [np.hypot(d.smoothed["pose.x"].rate, d.smoothed["pose.y"].rate) for d in drives]
+    fast = float(np.percentile(np.concatenate(speeds), 90)) > FAST_MPS
+    blocks = [b - a for name in NAMES for spans in getattr(parts, name).spans for a, b in spans]
+    longest = 0.9 * min(blocks, default=SLOW_HORIZON_S)
+    return round(min(FAST_HORIZON_S if fast else SLOW_HORIZON_S, longest), 2)
+
+
+def judge(
+    drives: Sequence[Drive],
+    car: Car,
+    before: Numbers,
+    after: Numbers,
+    parts: Parts,
+    horizon_s: float | None = None,
+) -> tuple[Fit, FreeRuns]:
+    """Return how well two cars follow the recordings on each part, and their free runs.
+
+    Args:
+        drives: The recordings.
+        car: With every effect at its neutral numbers.
+        before: Numbers of the car as given, by key.
+        after: Numbers of the car as found; its faults of measurement act on what is predicted.
+        parts: Of the recordings.
+        horizon_s: Length of a window; None chooses it.
+
+    Raises:
+        RecordingError: when no recording holds a whole window.
+    """
+    horizon = horizon_of(drives, parts) if horizon_s is None else horizon_s
+    horizon = max(round(horizon / STEP_S) * STEP_S, SHORTEST_S)
+    judged = [
+        one
+        for number, drive in enumerate(drives)
+        if (one := _judged(drive, car, (before, after), _spans(parts, number), horizon))
+    ]
+    if not judged:
+        msg = f"{drives[0].recording.path}: no window of {horizon:g} s without a gap in the poses"
+        raise RecordingError(msg)
+    every = {name: _part(judged, name) for name in NAMES}
+    return Fit(horizon_s=horizon, **every), _free_runs(judged, horizon)
+
+
+def nothing_got_worse(fit: Fit) -> tuple[str, ...]:
+    """Return the channels that got worse by more than 2 % on the part that only confirms.
+
+    What noise of measuring alone changes between two equal cars does not count.
+    """
+    part = fit.confirm
+    chance = 2.0 * np.sqrt(2.0 / max(part.windows, 1))
+    return tuple(
+        name
+        for name, was in part.before.items()
+        if part.after[name] > WORSE * was
+        and part.after[name] ** 2 - was**2 > chance * part.noise_floor.get(name, 0.0) ** 2
+    )
+
+
+def _spans(parts: Parts, drive: int) -> list[tuple[str, Span]]:
+    """Return the blocks of one drive with their parts, in time's order."""
+    found = [(name, span) for name in NAMES for span in getattr(parts, name).spans[drive]]
+    return sorted(found, key=lambda one: one[1])
+
+
+def _judged(
+    drive: Drive, car: Car, numbers: tuple[Numbers, Numbers], spans: Sequence[tuple[str, Span]],
+    horizon: float,
+) -> _Judged | None:  # fmt: skip
+    sides = [Side(n, Camera(drive, n)) for n in numbers]
+    cameras = [Camera(drive, numbers[_AFTER], noisy) for noisy in _draws(drive)]
+    sides += [Side(numbers[_AFTER], camera, like=_AFTER) for camera in cameras]
+    stamps, part = _starts(drive, sides, spans, horizon)
+    if not len(stamps):
+        return None
+    first, last = (
+        np.stack([side.camera.taken(at) for side in sides]) for at in (stamps, stamps + horizon)
+    )
+    starts: Ints = np.floor((first - drive.edges[0]) / STEP_S).astype(np.int64)
+    steps = round(horizon / STEP_S) + 2
+    runs = Windows(drive, car).run(sides, starts, steps)
+    fine: Bools = np.asarray(runs.ok.all(axis=0))
+    since = first - drive.edges[starts], last - drive.edges[starts]
+    errors, floor = _pose_errors(sides, runs, since[1], stamps + horizon)
+    for name, miss, noise in _sensor_errors(drive, sides, runs, starts, since):
+        _join(errors, name, miss[: _AFTER + 1])
+        _join(floor, name, np.sqrt((miss[_AFTER + 1 :] - miss[_AFTER]) ** 2 + noise))
+    shown = _shown(sides, runs, stamps, drive.edges[starts], horizon)
+    return _Judged(
+        stamps[fine],
+        tuple(name for name, ok in zip(part, fine, strict=True) if ok),
+        {name: error[:, fine] for name, error in errors.items()},
+        {name: error[:, fine] for name, error in floor.items()},
+        {name: values[..., fine, :] for name, values in shown.items()},
+    )
+
+
+def _draws(drive: Drive) -> Iterator[dict[str, Smooth]]:
+    """Yield the smoothed poses as they would be with noise once more."""
+    rng = np.random.default_rng(len(drive.edges))
+    for _ in range(DRAWS):
+        yield {
+            name: smooth(s.t, s.value + std * rng.standard_normal(len(s.t)), std)
+            for name, s in drive.smoothed.items()
+            for std in (drive.stream(name).std,)
+        }
+
+
+def _starts(
+    drive: Drive, sides: Sequence[Side], spans: Sequence[tuple[str, Span]], horizon: float
+) -> tuple[Floats, tuple[str, ...]]:
+    """Return when windows start, by the poses' stamps, and the part of each.
+
+    They lie within one block and have no gap in the poses.
+    """
+    poses, edges = Poses(drive.recording), drive.edges
+    found, part = list[float](), list[str]()
+    for name, (begin, end) in spans:
+        room = end - begin - horizon
+        if room < -1e-6:
+            continue
+        count = 1 + int(room / min(0.5 * horizon, NEXT_S) + 1e-6)
+        for start in np.linspace(begin, begin + max(room, 0.0), count):
+            ends = np.array([start, start + horizon + 2.0 * STEP_S])
+            taken = np.stack([side.camera.taken(ends) for side in sides])
+            inside = taken.min() >= edges[0] and taken.max() <= edges[-1] - STEP_S
+            if inside and poses.unbroken(start, start + horizon):
+                found.append(float(start))
+                part.append(name)
+    return np.array(found), tuple(part)
+
+
+def _taken(signal: Floats, since: Floats) -> Floats:
+    """Return signals (steps + 1, sides, windows) at times since the start, (sides, windows)."""
+    at = since / STEP_S
+    row = np.clip(at.astype(np.int64), 0, len(signal) - 2)
+    low = np.take_along_axis(signal, row[None], axis=0)[0]
+    high = np.take_along_axis(signal, row[None] + 1, axis=0)[0]
+    return np.asarray(low + (at - row) * (high - low))
+
+
+def _turned(angle: Floats) -> Floats:
+    return np.arctan2(np.sin(angle), np.cos(angle))
+
+
+def _poses_of(sides: Sequence[Side], runs: Runs, since: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return what each side's camera would have recorded, each (sides, windows)."""
+    yaw = np.unwrap(runs["yaw"], axis=0)
+    at = [_taken(signal, since) for signal in (runs["x"], runs["y"], yaw)]
+    seen = [side.camera.seen(*(s[i] for s in at)) for i, side in enumerate(sides)]
+    x, y, psi = (np.stack(each) for each in zip(*seen, strict=True))
+    return x, y, psi
+
+
+def _pose_errors(
+    sides: Sequence[Side], runs: Runs, since: Floats, stamps: Floats
+) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Return pose errors of both cars at the windows' ends, and those of noise alone."""
+    x, y, psi = _poses_of(sides, runs, since)
+    recorded = [np.stack(each) for each in zip(
+        *(side.camera.recorded(stamps) for side in sides), strict=True)]  # fmt: skip
+    dx, dy, turn = x - recorded[0], y - recorded[1], _turned(psi - recorded[2])
+    both, draws = slice(0, _AFTER + 1), slice(_AFTER + 1, None)
+    far = np.hypot(dx, dy)
+    noise = np.hypot(dx[draws] - dx[_AFTER], dy[draws] - dy[_AFTER])
+    return (
+        {"position_m": far[both, :, None], "yaw_rad": turn[both, :, None]},
+        {"position_m": noise[..., None], "yaw_rad": _turned(turn[draws] - turn[_AFTER])[..., None]},
+    )
+
+
+def _join(errors: dict[str, Floats], name: str, more: Floats) -> None:
+    """Add one stream's errors, (sides, windows), to its channel's."""
+    more = more[..., None]
+    errors[name] = np.concatenate((errors[name], more), axis=2) if name in errors else more
+
+
+def _sensor_errors(
+    drive: Drive, sides: Sequence[Side], runs: Runs, starts: Ints, since: tuple[Floats, Floats]
+) -> Iterator[tuple[str, Floats, float]]:
+    """Yield name, error (sides, windows) and own variance of what every other sensor shows.
+
+    Rates are summed over the window, speeds are means at its end.
+    """
+    prediction, radius = Prediction(drive), drive.car.value("wheel.radius_m")
+    shape = (len(next(iter(runs.signals.values()))), -1)
+    motions = Motions(
+        {k: v.reshape(shape) for k, v in runs.signals.items()}, runs.ok.ravel().astype(np.float64)
+    )
+    faults = {
+        key: np.repeat([side.numbers.get(key, neutral) for side in sides], starts.shape[1])
+        for key, neutral in NEUTRAL.items()
+    }
+    begin = drive.edges[starts]
+    for stream in drive.streams:
+        if stream.name.startswith("pose."):
+            continue
+        signal = prediction.sensor(stream.name, motions, faults).reshape(-1, *starts.shape)
+        name, per_unit, kind = _channel(stream.name, drive, radius)
+        first = since[1] - END_S if kind == "end" else since[0]
+        length = since[1] - first
+        seen = _sums(stream, begin + first, begin + since[1], kind)
+        if kind == "count":
+            meant = _taken(signal, since[1]) - _taken(signal, first)
+            variance = 2.0 * stream.std**2
+        else:
+            total = np.zeros_like(signal)
+            np.cumsum(0.5 * STEP_S * (signal[1:] + signal[:-1]), axis=0, out=total[1:])
+            meant = _taken(total, since[1]) - _taken(total, first)
+            pace = float(np.median(np.diff(stream.t)))
+            variance = stream.std**2 * pace * float(length.mean())
+        scale = per_unit / (END_S if kind == "end" else 1.0)
+        yield name, scale * (meant - seen), scale**2 * variance
+
+
+def _channel(name: str, drive: Drive, radius: float) -> tuple[str, float, str]:
+    """Return an error's name, its factor on the stream, and whether it counts, sums or ends."""
+    if name.startswith("encoder."):
+        counts = drive.car.value("encoder.counts_per_revolution") / (2.0 * np.pi)
+        return "wheel_m", radius / counts, "count"
+    if name.startswith("wheel_speed."):
+        return "wheel_m", radius, "sum"
+    if name.startswith("imu.accel"):
+        return f"{name[4:]}_mps", 1.0, "sum"
+    if name in ("speed", "velocity.x"):
+        return "speed_mps", 1.0, "end"
+    if name == "velocity.y":
+        return "side_speed_mps", 1.0, "end"
+    return "gyro_rad", 1.0, "sum"
+
+
+def _sums(stream: Stream, first: Floats, last: Floats, kind: str) -> Floats:
+    """Return what a stream counted, or its integral, between times."""
+    if kind == "count":
+        return np.asarray(np.interp(last, stream.t, stream.values)
+                          - np.interp(first, stream.t, stream.values))  # fmt: skip
+    steps = 0.5 * np.diff(stream.t) * (stream.values[1:] + stream.values[:-1])
+    total = np.concatenate(([0.0], np.cumsum(steps)))
+    return np.asarray(np.interp(last, stream.t, total) - np.interp(first, stream.t, total))
+
+
+def _shown(
+    sides: Sequence[Side], runs: Runs, stamps: Floats, edges: Floats, horizon: float
+) -> dict[str, Floats]:
+    """Return poses recorded, before and after along the windows, (3, windows, times)."""
+    both = sides[: _AFTER + 1]
+    times = np.append(np.arange(0.0, horizon - 0.5 * SHOWN_EVERY_S, SHOWN_EVERY_S), horizon)
+    out = {name: np.empty((3, len(stamps), len(times))) for name in ("x", "y", "yaw")}
+    part = replace(runs, signals={n: runs[n][:, : _AFTER + 1] for n in ("x", "y", "yaw")})
+    for k, t in enumerate(times):
+        since = np.stack([
+            side.camera.taken(stamps + t) - edges[i] for i, side in enumerate(both)
+        ])  # fmt: skip
+        found = _poses_of(both, part, since)
+        recorded = both[0].camera.recorded(stamps + t)
+        for name, sim, real in zip(("x", "y", "yaw"), found, recorded, strict=True):
+            out[name][0, :, k], out[name][1:, :, k] = real, sim
+    return out
+
+
+def _part(judged: Sequence[_Judged], part: str) -> PartErrors:
+    """Return the errors of all drives' windows of one part."""
+    mine = [np.array([p == part for p in one.part], dtype=np.bool_) for one in judged]
+
+    def rms(of: Sequence[Mapping[str, Floats]], side: int | slice) -> dict[str, float]:
+        names = dict.fromkeys(name for one in of for name in one)
+        found = dict[str, float]()
+        for name in names:
+            values = [one[name][side][..., keep, :].ravel()
+                      for one, keep in zip(of, mine, strict=True) if name in one]  # fmt: skip
+            together = np.concatenate(values)
+            if len(together):
+                found[name] = float(np.sqrt(np.mean(np.square(together))))
+        return found
+
+    errors = [one.errors for one in judged]
+    return PartErrors(
+        windows=int(sum(keep.sum() for keep in mine)),
+        before=rms(errors, _BEFORE),
+        after=rms(errors, _AFTER),
+        noise_floor=rms([one.floor for one in judged], slice(None)),
+    )
+
+
+def _free_runs(judged: Sequence[_Judged], horizon: float) -> FreeRuns:
+    sides = [
+        {name: np.concatenate([one.shown[name][i] for one in judged]) for name in ("x", "y", "yaw")}
+        for i in range(3)
+    ]
+    times = sides[0]["x"].shape[1]
+    t_s = np.append(SHOWN_EVERY_S * np.arange(times - 1), horizon)
+    return FreeRuns(
+        part=tuple(name for one in judged for name in one.part),
+        start_s=np.concatenate([one.start_s for one in judged]),
+        t_s=t_s, measured=sides[0], before=sides[1], after=sides[2],
+    )  # fmt: skip

@@ -1,0 +1,214 @@
+"""Free runs of many windows of one drive, by several cars, side by side in one fleet.
+
+A window starts in the measured motion. Whatever else a car remembers, such as its servo, the state
+of its motor's warmth and the time since it was switched on, comes from the same car having driven
+the whole recording up to there.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Bools, Floats, Ints
+from scm.geometry import Pose2
+from scm.mismatch.drive import RUN_IN_S, STEP_S, Drive
+from scm.mismatch.rollouts import (
+    COMMAND_CLOCK,
+    SIGNALS,
+    STEERING_DELAY,
+    TETHER_STEPS,
+    THROTTLE_DELAY,
+    Numbers,
+)
+from scm.mismatch.seen import Camera, Moved
+from scm.vehicles.car import Car
+from scm.vehicles.fleet import Fleet, VehicleStatus
+
+KEPT = ("x", "y", *SIGNALS, "yaw")
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """A car to be driven: its numbers, and what the camera makes of its drive.
+
+    Attributes:
+        like: Number of the side whose memory it shares at each window's start, itself if None.
+        push: Further force along the body at a window's start, and further angle of the wheels
+            [N, rad].
+    """
+
+    numbers: Numbers
+    camera: Camera
+    like: int | None = None
+    push: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Runs:
+    """What the sides did in their windows.
+
+    Attributes:
+        signals: (steps + 1, sides, windows).
+        ok: Whether the car stayed within physical bounds, (sides, windows).
+    """
+
+    signals: Mapping[str, Floats]
+    ok: Bools
+
+    def __getitem__(self, name: str) -> Floats:
+        return self.signals[name]
+
+
+class Windows:
+    """Drives windows of one recording again."""
+
+    def __init__(self, drive: Drive, car: Car) -> None:
+        self.drive, self.car = drive, car
+
+    def run(self, sides: Sequence[Side], starts: Ints, steps: int) -> Runs:
+        """Drive all windows.
+
+        Args:
+            sides: Cars; those that are like others follow them.
+            starts: First edge of each window of each side, (sides, windows), rising.
+            steps: Length of a window.
+        """
+        leaders = [i for i, side in enumerate(sides) if side.like is None]
+        windows = starts.shape[1]
+        fleet = Fleet(self.car, len(leaders) + len(sides) * windows)
+        commands = [self._commands(side.numbers) for side in sides]
+        leading = [(sides[i], commands[i]) for i in leaders]
+        self._lead(fleet, leading)
+        rows = len(leaders) + np.arange(len(sides) * windows).reshape(len(sides), windows)
+        moved = [
+            side.camera.motion(self.drive.edges[s]) for side, s in zip(sides, starts, strict=True)
+        ]
+        due = sorted((int(starts[i, w]), i, w) for i in range(len(sides)) for w in range(windows))
+        now = 0
+        for k, i, w in due:
+            now = self._advance(fleet, leading, now, k)
+            like = sides[i].like
+            leader = leaders.index(i if like is None else like)
+            self._start(fleet, leader, int(rows[i, w]), sides[i], moved[i], w)
+        fleet.alive[:] = True
+        fleet.alive[: len(leaders)] = False
+        return self._free(fleet, commands, starts, steps, len(leaders))
+
+    def _commands(self, numbers: Numbers) -> Floats:
+        """Return throttle and steering of each step, as late as the numbers say, (2, steps)."""
+        late = [numbers.get(COMMAND_CLOCK, 0.0) + numbers.get(k, 0.0)
+                for k in (THROTTLE_DELAY, STEERING_DELAY)]  # fmt: skip
+        before = STEP_S * np.arange(-round(RUN_IN_S / STEP_S), 0)
+        edges = np.concatenate((self.drive.edges[0] + before, self.drive.edges))
+        return np.stack([
+            command.means(edges, np.array([delay]))[:, 0]
+            for command, delay in zip((self.drive.throttle, self.drive.steering), late, strict=True)
+        ])  # fmt: skip
+
+    def _lead(self, fleet: Fleet, leading: Sequence[tuple[Side, Floats]]) -> None:
+        """Put one car of each side at the recording's start, its actuators run in."""
+        column = self._column(fleet)
+        starts = [side.camera.motion(self.drive.edges[:1]) for side, _ in leading]
+        for i, ((side, _), at) in enumerate(zip(leading, starts, strict=True)):
+            fleet.add(Pose2(float(at.x[0]), float(at.y[0]), float(at.yaw[0])))
+            for key, value in side.numbers.items():
+                if key in column and key not in (THROTTLE_DELAY, STEERING_DELAY):
+                    fleet.parameters[i, column[key]] = value
+        run_in = round(RUN_IN_S / STEP_S)
+        self._drive(fleet, [c[:, :run_in] for _, c in leading])
+        for i, at in enumerate(starts):
+            _place(fleet, i, at, 0)
+
+    def _column(self, fleet: Fleet) -> dict[str, int]:
+        return {c.param.key: j for j, c in enumerate(fleet.columns)}
+
+    def _drive(self, fleet: Fleet, commands: Sequence[Floats]) -> None:
+        wide = np.zeros((2, commands[0].shape[1], fleet.capacity))
+        for i, command in enumerate(commands):
+            wide[:, :, i] = command
+        fleet.rollout(wide[0], wide[1], STEP_S, ())
+
+    def _advance(
+        self, fleet: Fleet, leading: Sequence[tuple[Side, Floats]], now: int, to: int
+    ) -> int:
+        """Let the leaders drive on, carried to the measured pose from time to time."""
+        run_in = round(RUN_IN_S / STEP_S)
+        while now < to:
+            then = min(now + TETHER_STEPS, to)
+            if self.drive.battery is not None:
+                fleet.battery[: len(leading)] = self.drive.battery[now]
+            self._drive(fleet, [c[:, run_in + now : run_in + then] for _, c in leading])
+            now = then
+            at = self.drive.edges[now : now + 1]
+            _carry(fleet, [side.camera.motion(at) for side, _ in leading])
+        return now
+
+    def _start(
+        self, fleet: Fleet, leader: int, row: int, side: Side, moved: Moved, window: int
+    ) -> None:
+        """Let a window's car stand where its leader is, in the measured motion."""
+        fleet.copy_row(leader, row)
+        _place(fleet, row, moved, window)
+        fleet.time[row] = fleet.time[leader]
+        fleet.battery[row] = fleet.battery[leader]
+        if any(side.push):
+            yaw, column = float(moved.yaw[window]), self._column(fleet)
+            fleet.parameters[row, column["wind.force_x_n"]] += side.push[0] * np.cos(yaw)
+            fleet.parameters[row, column["wind.force_y_n"]] += side.push[0] * np.sin(yaw)
+            fleet.parameters[row, column["steering.trim_rad"]] += side.push[1]
+        fleet.alive[row] = False
+
+    def _free(
+        self, fleet: Fleet, commands: Sequence[Floats], starts: Ints, steps: int, leaders: int
+    ) -> Runs:
+        sides, windows = starts.shape
+        run_in = round(RUN_IN_S / STEP_S)
+        wide = np.zeros((2, steps, fleet.capacity))
+        at = starts[:, None, :] + np.arange(steps)[:, None]
+        for i, command in enumerate(commands):
+            rows = slice(leaders + i * windows, leaders + (i + 1) * windows)
+            wide[:, :, rows] = command[:, run_in + at[i]]
+        first = {name: _signal(fleet, name)[leaders:] for name in KEPT}
+        got = fleet.rollout(wide[0], wide[1], STEP_S, KEPT)
+        signals = {
+            name: np.concatenate((first[name][None], got[name][:, leaders:])).reshape(
+                steps + 1, sides, windows
+            )
+            for name in KEPT
+        }
+        ok = fleet.status[leaders:].reshape(sides, windows) == VehicleStatus.OK
+        return Runs(signals, ok)
+
+
+def _place(fleet: Fleet, row: int, moved: Moved, i: int) -> None:
+    pose = Pose2(float(moved.x[i]), float(moved.y[i]), float(moved.yaw[i]))
+    fleet.place(row, pose, float(moved.speed[i]), float(moved.lateral_speed[i]),
+                float(moved.yaw_rate[i]), keep_actuators=True)  # fmt: skip
+
+
+def _signal(fleet: Fleet, name: str) -> Floats:
+    """Return a copy of a signal as it is now, (capacity,)."""
+    if "." not in name:
+        return np.array(getattr(fleet, name))
+    whole, wheel = name.split(".")
+    return np.array(getattr(fleet, whole)[:, ("fl", "fr", "rl", "rr").index(wheel)])
+
+
+def _carry(fleet: Fleet, measured: Sequence[Moved]) -> None:
+    """Carry the first rows to measured poses; their motion in their own frames stays."""
+    rows = np.arange(len(measured))
+    x, y, yaw = (np.array([getattr(m, n)[0] for m in measured]) for n in ("x", "y", "yaw"))
+    now = fleet.planar_cogs(rows)
+    turn = yaw - fleet.yaw[rows]
+    turn = np.arctan2(np.sin(turn), np.cos(turn))
+    c, s = np.cos(turn), np.sin(turn)
+    arm_x, arm_y = now[:, 0] - fleet.x[rows], now[:, 1] - fleet.y[rows]
+    fleet.push_rows(rows, np.stack((
+        c * now[:, 3] - s * now[:, 4] - now[:, 3],
+        s * now[:, 3] + c * now[:, 4] - now[:, 4],
+        np.zeros(len(rows)),
+        x + c * arm_x - s * arm_y - now[:, 0],
+        y + s * arm_x + c * arm_y - now[:, 1],
+        turn,
+    ), axis=1))  # fmt: skip
