@@ -1,0 +1,118 @@
+"""Experiments that change something else than the commands, for rivals that no drive separates.
+
+To add one: a function of the nominal car and the pace, and its line in `CHANGED`.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from scm.mismatch.experiment import manoeuvres
+from scm.mismatch.experiment.manoeuvres import Manoeuvre
+from scm.mismatch.experiment.pace import Pace
+from scm.mismatch.experiment.plan import Leg, Numbers
+from scm.vehicles.car import Car
+
+SLOPE = 0.1
+RAMP_M = 2.0
+COOLING_S = 180.0  # a motor's heat is 95 % gone
+WHEELS = ("wheel.radius_m", "tyre_stiffness.scale", "tyre_grip.scale", "tyre_relaxation.length_m")
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """What to do with the car.
+
+    Attributes:
+        said: Before the sentence of the drive itself.
+        asks: Key of an effect's number without which the experiment makes no sense; empty: none.
+    """
+
+    name: str
+    legs: tuple[Leg, ...]
+    said: str = ""
+    asks: tuple[str, ...] = ()
+
+
+def drive_alone(build: Callable[[Pace], Manoeuvre], name: str) -> Experiment:
+    """Return the experiment of one drive on the floor as it is."""
+    return Experiment(name, (Leg(build),))
+
+
+def ramp(_car: Car) -> Experiment:
+    """Up and down a slope that is known."""
+
+    def build(pace: Pace) -> Manoeuvre:
+        short = replace(pace, run_m=min(pace.run_m, RAMP_M))
+        return replace(manoeuvres.straight_steps(short), name="throttle steps on a ramp")
+
+    def change(numbers: Numbers, yaw: float) -> Numbers:
+        slope, up = numbers.get("grade.slope", 0.0), numbers.get("grade.uphill_rad", 0.0)
+        x = slope * math.cos(up) + SLOPE * math.cos(yaw)
+        y = slope * math.sin(up) + SLOPE * math.sin(yaw)
+        return {**numbers, "grade.slope": math.hypot(x, y), "grade.uphill_rad": math.atan2(y, x)}
+
+    said = (
+        f"lay a ramp that rises {100.0 * SLOPE:g} cm a metre and tell the tool its slope "
+        f"(grade.slope = {SLOPE:g}); up and down that ramp: "
+    )
+    return Experiment("ramp", (Leg(build, change),), said)
+
+
+def known_mass(car: Car) -> Experiment:
+    """The same drive twice, once with a weight that was weighed."""
+    mass = max(round(0.1 * car.value("body.mass_kg"), 1), 0.1)
+
+    def change(numbers: Numbers, _yaw: float) -> Numbers:
+        return {**numbers, "payload.mass_kg": numbers.get("payload.mass_kg", 0.0) + mass}
+
+    said = (
+        f"drive twice, first as the car is, then with a weighed {mass:g} kg over its centre, and "
+        f"tell the tool the mass; both times: "
+    )
+    legs = (Leg(manoeuvres.straight_steps), Leg(manoeuvres.straight_steps, change))
+    return Experiment("known mass", legs, said)
+
+
+def rotated(_car: Car) -> Experiment:
+    """The same drive along the floor and across it."""
+    said = "drive the same course twice, the second time turned by 90 degrees on the floor: "
+    legs = (Leg(manoeuvres.shuttle), Leg(manoeuvres.shuttle, turned=True))
+    return Experiment("rotated course", legs, said)
+
+
+def other_wheels(car: Car) -> Experiment:
+    """The same drive on the wheels as they are, and on a set that was measured."""
+    neutral = {"wheel.radius_m": car.value("wheel.radius_m"), "tyre_stiffness.scale": 1.0,
+               "tyre_grip.scale": 1.0, "tyre_relaxation.length_m": 0.0}  # fmt: skip
+
+    def change(numbers: Numbers, _yaw: float) -> Numbers:
+        return {k: neutral.get(k, v) for k, v in numbers.items()}
+
+    said = "drive twice, the second time on new wheels whose radius was measured; both times: "
+    legs = (Leg(manoeuvres.circles), Leg(manoeuvres.circles, change))
+    return Experiment("other wheels", legs, said, WHEELS)
+
+
+def cooled(_car: Car) -> Experiment:
+    """Laps, a rest in which motors cool, and the same laps."""
+
+    def build(pace: Pace) -> Manoeuvre:
+        laps = manoeuvres.long_laps(pace)
+        before, drive, _, again, after = laps.pieces
+        said = laps.said.replace("rest for 30 s", f"rest for {COOLING_S:g} s")
+        return Manoeuvre(
+            "laps, three minutes of rest, laps",
+            (before, drive, (COOLING_S, 0.0, 0.0), again, after), said,
+        )  # fmt: skip
+
+    return Experiment("rest", (Leg(build),))
+
+
+CHANGED: Mapping[str, Callable[[Car], Experiment]] = {
+    "ramp": ramp,
+    "known_mass": known_mass,
+    "rotated": rotated,
+    "other_wheels": other_wheels,
+    "cooled": cooled,
+}

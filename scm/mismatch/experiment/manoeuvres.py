@@ -1,0 +1,228 @@
+"""Drives that a person can command: pieces of constant throttle and steering, scaled to a pace.
+
+To add one: a function of a `Pace`, and its line in `MANOEUVRES`. The sentence is for a student with
+a remote control; what is common to all drives, where to start and how much room, is added later.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.experiment.pace import Pace
+
+ROW_S = 0.05
+ABOUT_S = 30.0
+REST_S = 1.0
+Piece = tuple[float, float, float]
+"""Seconds, throttle, steering."""
+
+
+@dataclass(frozen=True, slots=True)
+class Manoeuvre:
+    """One drive.
+
+    Attributes:
+        said: What to do, a sentence with numbers.
+    """
+
+    name: str
+    pieces: tuple[Piece, ...]
+    said: str
+
+    @property
+    def lasts_s(self) -> float:
+        """How long it takes [s]."""
+        return sum(piece[0] for piece in self.pieces)
+
+    def rows(self) -> Floats:
+        """Return (n, 3): time, throttle and steering of rows `ROW_S` apart, the last at rest."""
+        counts = [max(round(seconds / ROW_S), 1) for seconds, _, _ in self.pieces]
+        values = np.repeat([piece[1:] for piece in self.pieces], counts, axis=0)
+        values = np.concatenate((values, np.zeros((1, 2))))
+        return np.column_stack((ROW_S * np.arange(len(values)), values))
+
+
+def _again(pieces: list[Piece], about_s: float = ABOUT_S) -> tuple[Piece, ...]:
+    """Repeat a round until it lasts about so long; it begins and ends at rest."""
+    once = sum(piece[0] for piece in pieces)
+    times = max(round(about_s / once), 1)
+    return ((REST_S, 0.0, 0.0), *(pieces * times), (REST_S, 0.0, 0.0))
+
+
+def _there_and_back(run: list[Piece]) -> list[Piece]:
+    """Drive a run, stop, and drive it backwards."""
+    back = [(seconds, -throttle, steering) for seconds, throttle, steering in run]
+    return [*run, (REST_S, 0.0, 0.0), *back, (REST_S, 0.0, 0.0)]
+
+
+def shuttle(pace: Pace) -> Manoeuvre:
+    """Forwards and backwards, wheels straight."""
+    u, t = pace.throttle, pace.lasts(pace.throttle)
+    said = (
+        f"wheels straight, drive forwards for {t:g} s at throttle {u:.2f}, stop for {REST_S:g} s, "
+        f"drive backwards for {t:g} s at throttle -{u:.2f}, stop, and so on for half a minute"
+    )
+    return Manoeuvre("shuttle", _again(_there_and_back([(t, u, 0.0)])), said)
+
+
+def straight_steps(pace: Pace) -> Manoeuvre:
+    """Throttle up and down in steps, straight."""
+    u, t = pace.throttle, pace.lasts(0.7 * pace.throttle) / 4.0
+    levels = [round(f * u, 2) for f in (0.4, 0.7, 1.0, 0.7)]
+    said = (
+        f"wheels straight, step the throttle {', '.join(f'{x:.2f}' for x in levels)}, "
+        f"{t:.2g} s each, stop, the same backwards, and so on for half a minute"
+    )
+    run = [(t, level, 0.0) for level in levels]
+    return Manoeuvre("throttle steps", _again(_there_and_back(run)), said)
+
+
+def throttle_noise(pace: Pace) -> Manoeuvre:
+    """Throttle that jumps at random, straight."""
+    u, rng = pace.throttle, np.random.default_rng(7)
+    low, run, left = round(0.25 * u, 2), list[Piece](), pace.lasts(0.6 * pace.throttle)
+    while left > 0.3:
+        seconds = float(min(rng.integers(6, 20) * ROW_S, left))
+        run.append((seconds, u if len(run) % 2 == 0 else low, 0.0))
+        left -= seconds
+    said = (
+        f"wheels straight, let the throttle jump between {low:.2f} and {u:.2f} every 0.3 to 1 s "
+        f"until the floor ends, stop, the same backwards, and so on for half a minute"
+    )
+    return Manoeuvre("throttle jumps", _again(_there_and_back(run)), said)
+
+
+def pulse_and_coast(pace: Pace) -> Manoeuvre:
+    """Full throttle for a moment, then none until the car stands."""
+    u = pace.throttle
+    on = max(round(min(1.5, 0.5 * pace.lasts(u)) / ROW_S) * ROW_S, 0.2)
+    said = (
+        f"wheels straight, give throttle {u:.2f} for {on:.2g} s, then none until the car has "
+        f"stood for a second, the same backwards, and so on for half a minute"
+    )
+    off = on + 1.0
+    run = [(on, u, 0.0), (off, 0.0, 0.0), (on, -u, 0.0), (off, 0.0, 0.0)]
+    return Manoeuvre("pulse and coast", _again(run), said)
+
+
+def launches(pace: Pace) -> Manoeuvre:
+    """Creep at low throttle, then launch; straight."""
+    u, t = pace.throttle, min(pace.lasts(pace.throttle), 2.0)
+    creep = [(0.5, round(f * u, 3), 0.0) for f in (0.05, 0.1, 0.15, 0.2, 0.3)]
+    said = (
+        f"wheels straight, raise the throttle slowly from {0.05 * u:.2f} to {0.3 * u:.2f} in "
+        f"2.5 s, then launch at {u:.2f} for {0.5 * t:.2g} s, stop, the same backwards, and so on"
+    )
+    return Manoeuvre("creep and launch", _again(_there_and_back([*creep, (0.5 * t, u, 0.0)])), said)
+
+
+def _circle(pace: Pace, share: float = 0.7) -> float:
+    """Return the steering of a circle that two halves of an eight leave room for."""
+    return round(max(pace.steering(max(share * pace.turn_m, pace.tightest_m)), 0.1), 2)
+
+
+def circles(pace: Pace) -> Manoeuvre:
+    """Circles left and right, slow and fast."""
+    u, s = pace.throttle, _circle(pace)
+    slow = round(0.5 * u, 2)
+    said = (
+        f"circles of {pace.radius(s):.2g} m radius (steering {s:.2f}): 8 s left at throttle "
+        f"{slow:.2f}, 8 s left at {u:.2f}, then the same to the right"
+    )
+    pieces = [(8.0, slow, s), (8.0, u, s), (8.0, slow, -s), (8.0, u, -s)]
+    return Manoeuvre("circles at two speeds", _again(pieces), said)
+
+
+def steering_steps(pace: Pace) -> Manoeuvre:
+    """Steering that steps from side to side at speed."""
+    u, s = round(0.8 * pace.throttle, 2), _circle(pace, 0.5)
+    said = (
+        f"at throttle {u:.2f} steer {s:.2f} left for 2 s, {s:.2f} right for 2 s, and so on for "
+        f"half a minute"
+    )
+    pieces = [(1.0, u, s), (2.0, u, -s), (1.0, u, s)]
+    return Manoeuvre("steering from side to side", _again(pieces), said)
+
+
+def slalom(pace: Pace) -> Manoeuvre:
+    """A slalom out and back."""
+    u, s = round(0.7 * pace.throttle, 2), 0.4
+    runs = max(int(pace.lasts(u) / 2.0), 1)
+    said = (
+        f"a slalom at throttle {u:.2f}: steer {s:g} left and right in turn, 1 s each, for "
+        f"{2 * runs} s, stop, the same backwards, and so on for half a minute"
+    )
+    run = [(0.5, u, s), *([(1.0, u, -s), (1.0, u, s)] * runs)][: 2 * runs]
+    return Manoeuvre("slalom", _again(_there_and_back([*run, (0.5, u, -s)])), said)
+
+
+def small_reversals(pace: Pace) -> Manoeuvre:
+    """Small steering to and fro about straight ahead."""
+    u, s = round(0.7 * pace.throttle, 2), 0.1
+    runs = max(int(pace.lasts(u) / 2.0), 1)
+    said = (
+        f"at throttle {u:.2f} steer only {s:g} left and right in turn, 1 s each, for {2 * runs} s, "
+        f"stop, the same backwards, and so on for half a minute"
+    )
+    run = [(1.0, u, s), (1.0, u, -s)] * runs
+    return Manoeuvre("small steering reversals", _again(_there_and_back(run)), said)
+
+
+def steer_then_go(pace: Pace) -> Manoeuvre:
+    """Steering at rest, then driving off."""
+    u, s = pace.throttle, 0.9
+    on = min(2.0, 2.0 * pace.turn_m / max(pace.speed(pace.throttle), 1e-3))
+    pieces = list[Piece]()
+    for side in (s, -s):
+        for way in (u, -u):
+            gently = [(0.2, round(share * way, 3), side) for share in (0.2, 0.4, 0.6, 0.8)]
+            pieces += [(1.5, 0.0, side), *gently, (on, way, side)]
+    said = (
+        f"standing, steer {s:g} to the left, wait 1.5 s, raise the throttle to {u:.2f} within a "
+        f"second and drive for {on:.2g} s, stop, drive back as long, then the same to the right"
+    )
+    return Manoeuvre("steer at rest, then go", _again(pieces), said)
+
+
+def out_and_back(pace: Pace) -> Manoeuvre:
+    """Straight along the floor, turn round, and straight back, at one throttle."""
+    u, s = round(0.8 * pace.throttle, 2), min(pace.steering(0.4 * pace.turn_m), 0.95)
+    v, radius = pace.speed(u), pace.radius(s)
+    straight = max((pace.run_m - 2.0 * radius) / max(v, 1e-3), 0.5)
+    turn = math.pi * radius / max(v, 1e-3)
+    said = (
+        f"at throttle {u:.2f} drive {straight:.2g} s straight, turn round to the left, steering "
+        f"{s:.2f} for {turn:.2g} s, drive straight back as long, turn round again, and so on"
+    )
+    once = [(straight, u, 0.0), (turn, u, s)]
+    return Manoeuvre("two headings", _again(once, max(ABOUT_S, 3.0 * (straight + turn))), said)
+
+
+def long_laps(pace: Pace) -> Manoeuvre:
+    """Long laps at one throttle, and again after a rest in between."""
+    u, s = round(0.8 * pace.throttle, 2), _circle(pace, 0.9)
+    said = (
+        f"laps of {pace.radius(s):.2g} m radius (steering {s:.2f}) at throttle {u:.2f} for 45 s, "
+        f"rest for 30 s, and the same laps for 45 s more"
+    )
+    pieces = ((REST_S, 0.0, 0.0), (45.0, u, s), (30.0, 0.0, 0.0), (45.0, u, s), (REST_S, 0.0, 0.0))
+    return Manoeuvre("long laps with a rest", pieces, said)
+
+
+MANOEUVRES: Mapping[str, Callable[[Pace], Manoeuvre]] = {
+    "shuttle": shuttle,
+    "straight_steps": straight_steps,
+    "throttle_noise": throttle_noise,
+    "pulse_and_coast": pulse_and_coast,
+    "launches": launches,
+    "circles": circles,
+    "steering_steps": steering_steps,
+    "slalom": slalom,
+    "small_reversals": small_reversals,
+    "steer_then_go": steer_then_go,
+    "out_and_back": out_and_back,
+    "long_laps": long_laps,
+}

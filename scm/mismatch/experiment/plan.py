@@ -1,0 +1,213 @@
+"""An experiment laid out on the floor, and what its recording would be if a rival were right."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from scm.arrays import Bools, Floats
+from scm.geometry import Pose2
+from scm.mismatch.drive import STEP_S, Drive
+from scm.mismatch.experiment.manoeuvres import ROW_S, Manoeuvre
+from scm.mismatch.experiment.pace import SIDEWAYS_M_S2, Pace
+from scm.mismatch.library import Candidate
+from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.predict import Prediction
+from scm.mismatch.rollouts import Rollouts
+from scm.mismatch.whiten import Noise
+from scm.recording.read import Channel, Recording
+from scm.replay import FULL_SPEED
+from scm.vehicles.car import Car
+from scm.vehicles.fleet import Fleet, VehicleStatus
+
+SCALES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15)
+Numbers = Mapping[str, float]
+Change = Callable[[Numbers, float], Numbers]
+"""Turns a car's numbers into those on a changed experiment that starts with some heading [rad]."""
+
+
+class Rival(Protocol):
+    """An explanation: effects with values; a `Fitted` is one."""
+
+    @property
+    def effects(self) -> tuple[Candidate, ...]:
+        """What is missing in the car."""
+        ...
+
+    @property
+    def values(self) -> Floats:
+        """The effects' numbers, in the order of their knobs."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """One drive of an experiment.
+
+    Attributes:
+        change: What is done to the car or the floor first.
+        turned: Whether it is driven across the direction in which it fits best.
+    """
+
+    build: Callable[[Pace], Manoeuvre]
+    change: Change | None = None
+    turned: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A leg that fits: its drive, where the car starts, and the room it takes [m]."""
+
+    leg: Leg
+    manoeuvre: Manoeuvre
+    start: Pose2
+    room: tuple[float, float]
+    path: Floats
+
+    def change(self, numbers: Numbers) -> Numbers:
+        """Return a car's numbers on this leg."""
+        return self.leg.change(numbers, self.start.yaw) if self.leg.change else numbers
+
+
+def numbers_of(rival: Rival) -> dict[str, float]:
+    """Return a rival's numbers by key, ordinary ones left at the file's."""
+    found, at = dict[str, float](), 0
+    for effect in rival.effects:
+        n = len(effect.knobs)
+        found |= effect.numbers(tuple(rival.values[at : at + n]))
+        at += n
+    return found
+
+
+def place(leg: Leg, car: Car, pace: Pace, rivals: Sequence[Numbers]) -> Placed | None:
+    """Return a leg with the most throttle that keeps every rival's car on the floor, upright."""
+    wishes = [leg.build(replace(pace, throttle=round(s * pace.throttle, 3))) for s in SCALES]
+    longest = max(round(w.lasts_s / STEP_S) for w in wishes) + 10
+    commands = np.zeros((2, longest, len(wishes) * len(rivals)))
+    for k, wish in enumerate(wishes):
+        rows = np.repeat(wish.rows()[:, 1:], round(ROW_S / STEP_S), axis=0)[:longest]
+        commands[:, : len(rows), k * len(rivals) : (k + 1) * len(rivals)] = rows.T[:, :, None]
+    changed = [leg.change(n, 0.0) if leg.change else n for n in rivals]
+    path, ok = _driven(car, list(changed) * len(wishes), commands)
+    for k, wish in enumerate(wishes):
+        mine = slice(k * len(rivals), (k + 1) * len(rivals))
+        if ok[mine].all():
+            placed = _fitted_in(leg, wish, path[:, :, mine], pace)
+            if placed is not None:
+                return placed
+    return None
+
+
+def _driven(car: Car, sets: Sequence[Numbers], commands: Floats) -> tuple[Floats, Bools]:
+    """Return x, y, yaw of cars from the origin, (3, steps + 1, sets), and which drove safely."""
+    fleet = Fleet(car, len(sets))
+    column = {c.param.key: i for i, c in enumerate(fleet.columns)}
+    for numbers in sets:
+        row = fleet.add(Pose2(0.0, 0.0, 0.0))
+        for key, value in numbers.items():
+            if key in column:
+                fleet.parameters[row, column[key]] = value
+    got = fleet.rollout(commands[0], commands[1], STEP_S, ("x", "y", "yaw", "accel_y"))
+    path = np.zeros((3, len(commands[0]) + 1, len(sets)))
+    path[0, 1:], path[1, 1:] = got["x"], got["y"]
+    path[2, 1:] = np.unwrap(got["yaw"], axis=0)
+    upright = np.array([s == VehicleStatus.OK for s in fleet.status[: len(sets)]])
+    hard = np.percentile(np.abs(got["accel_y"]), 99, axis=0)
+    return path, upright & (hard <= SIDEWAYS_M_S2)
+
+
+def _fitted_in(leg: Leg, wish: Manoeuvre, path: Floats, pace: Pace) -> Placed | None:
+    """Return where it starts so that every rival's way, and the car around it, is on the floor."""
+    low, high = path[:2].min(axis=(1, 2)), path[:2].max(axis=(1, 2))
+    room = high - low + 2.0 * pace.margin_m
+    floor = pace.floor
+    middle = np.array((sum(floor.x_m), sum(floor.y_m))) / 2.0
+    ways = [
+        yaw for yaw, size in ((0.0, room), (0.5 * np.pi, room[::-1]))
+        if np.all(size <= np.array(floor.size) + 1e-9)
+    ]  # fmt: skip
+    if len(ways) <= int(leg.turned):
+        return None
+    yaw = ways[int(leg.turned)]
+    c, s = np.cos(yaw), np.sin(yaw)
+    turn = np.array(((c, -s), (s, c)))
+    x, y = middle - turn @ ((low + high) / 2.0)
+    own = path[:, :, 0].copy()
+    own[:2] = turn @ own[:2] + np.array(((x,), (y,)))
+    own[2] += yaw
+    return Placed(leg, wish, Pose2(float(x), float(y), yaw), (float(room[0]), float(room[1])), own)
+
+
+class Planned(Likelihood):
+    """Recordings that nobody has made yet: noise-free, of the sensors of one that was made."""
+
+    def __init__(self, model: Likelihood, legs: Sequence[Placed], truth: Numbers) -> None:
+        self._legs, self._noise = legs, model.noise
+        drives = list[Drive]()
+        for leg in legs:
+            rough = _imagined(model.drives[0], leg, None)
+            seen = _read(rough, model.car, leg.change(truth))
+            drives.append(_imagined(model.drives[0], leg, seen))
+        super().__init__(drives, model.car)
+        for drive, leg in zip(drives, legs, strict=True):
+            _read(drive, model.car, leg.change(truth))
+
+    def believe(self, noise: Noise) -> None:
+        """Take the belief about noise that the recording gave, whichever these drives would."""
+        del noise
+        super().believe(self._noise)
+
+    def residuals(self, sets: Sequence[Numbers]) -> tuple[list[list[Floats]], Bools]:
+        """Return residuals of every leg, each with what was changed for it."""
+        self.runs += len(sets)
+        ok, found = np.ones(len(sets), dtype=np.bool_), []
+        for leg, rollouts, prediction in zip(
+            self._legs, self._rollouts, self._predictions, strict=True
+        ):
+            changed = [leg.change(numbers) for numbers in sets]
+            motions = rollouts.run(changed)
+            ok &= motions.ok.astype(np.bool_)
+            found.append(prediction.residuals(motions, changed))
+        return found, ok
+
+
+def _read(drive: Drive, car: Car, truth: Numbers) -> dict[str, Floats]:
+    """Let a drive's sensors have read what this car would have done; return the values."""
+    residuals = Prediction(drive).residuals(Rollouts(drive, car).run([truth]), [truth])
+    drive.streams = [
+        replace(stream, values=stream.values - left[:, 0])
+        for stream, left in zip(drive.streams, residuals, strict=True)
+    ]
+    return {stream.name: stream.values for stream in drive.streams}
+
+
+def _imagined(like: Drive, leg: Placed, values: Mapping[str, Floats] | None) -> Drive:
+    """Return a drive through a leg's commands with the streams of another recording."""
+    car, rows = like.car, leg.manoeuvre.rows()
+    times = STEP_S * np.arange(leg.path.shape[1])
+    px, py = like.point
+    c, s = np.cos(leg.path[2]), np.sin(leg.path[2])
+    seen = {
+        "pose.x": leg.path[0] + c * px - s * py,
+        "pose.y": leg.path[1] + s * px + c * py,
+        "pose.yaw": leg.path[2],
+    }
+    name, full = "command.throttle", 1.0
+    if any(term.name == "speed_control" for term in car.terms):
+        name, full = "command.speed", car.value(FULL_SPEED)
+    channels = {
+        name: Channel(rows[:, 0], full * rows[:, 1], None, (0.0, 0.0), "ratio"),
+        "command.steering": Channel(rows[:, 0], rows[:, 2], None, (0.0, 0.0), "ratio"),
+    }
+    for stream in like.streams:
+        pace = float(np.median(np.diff(stream.t)))
+        t = np.arange(0.0, rows[-1, 0] + 0.5 * pace, pace)
+        given = np.interp(t, times, seen.get(stream.name, np.zeros_like(times)))
+        if values is not None:
+            given = values[stream.name]
+            t = t[: len(given)]
+        point = like.point if stream.name.startswith("pose.") else (0.0, 0.0)
+        channels[stream.name] = Channel(t, given, stream.std, point, "")
+    return Drive(Recording(Path("planned"), like.recording.vehicle, channels), car)

@@ -1,0 +1,163 @@
+"""Chooses the experiment that separates rivals most, and says it in a sentence."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.experiment.changed import CHANGED, Experiment, drive_alone
+from scm.mismatch.experiment.manoeuvres import MANOEUVRES
+from scm.mismatch.experiment.pace import Floor, Pace, pace_of
+from scm.mismatch.experiment.plan import Placed, Planned, Rival, numbers_of, place
+from scm.mismatch.experiment.separation import exact, least, quick
+from scm.mismatch.findings import Undecided
+from scm.mismatch.likelihood import Likelihood
+
+NOBODY, ANYBODY = 10.0, 25.0
+MOST_RIVALS = 4
+MOST_EXACT = 6
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """An experiment that fits the floor, and how far apart it brings the rivals.
+
+    Attributes:
+        lambdas: Where the row's rival is right and the column's is refitted, (rivals, rivals).
+        sure: Whether they were refitted with all that is not linear.
+    """
+
+    experiment: Experiment
+    legs: tuple[Placed, ...]
+    lambdas: Floats
+    sure: bool = False
+
+    @property
+    def least(self) -> float:
+        """Lambda of the pair that comes apart least."""
+        return least(self.lambdas)
+
+
+@dataclass(frozen=True, slots=True)
+class Suggestion:
+    """What to do next.
+
+    Attributes:
+        best: Whose drive tells most; None where no experiment fits the floor.
+        weighed: All that were, best first.
+    """
+
+    undecided: Undecided
+    best: Weighed | None
+    weighed: tuple[Weighed, ...]
+    floor: Floor
+
+
+def suggest(
+    model: Likelihood, rivals: Sequence[Rival], floor: Floor | None = None,
+    tell: Tell = lambda _: None,
+) -> Suggestion:  # fmt: skip
+    """Return the drive that would tell rivals apart, or that none can and what would.
+
+    Args:
+        model: Of the recording that leaves them undecided: its sensors, noise and car.
+        rivals: Two or more explanations with their fitted values; the four likeliest count.
+        floor: Free to drive on; None: where the recording was made, 0.3 m around it.
+        tell: Hears what is being tried.
+    """
+    counted = rivals[:MOST_RIVALS]
+    pace = pace_of(model.car, model.drives, floor)
+    tell(f"simulating {len(MANOEUVRES)} drives under each rival")
+    drives = [drive_alone(build, name) for name, build in MANOEUVRES.items()]
+    weighed = _search(model, counted, pace, drives)
+    between = names_of(rivals)
+    if not weighed or weighed[0].least < NOBODY:
+        tell("no drive tells them apart: trying a ramp, a known mass, other changes")
+        keys = {key for rival in counted for key in numbers_of(rival)}
+        others = [build(model.car) for build in CHANGED.values()]
+        others = [e for e in others if not e.asks or keys & set(e.asks)]
+        changed = _search(model, counted, pace, others)
+        said, sigma = _changed_text(weighed, changed, pace)
+        ranked = sorted([*weighed, *changed], key=lambda w: -w.least)
+        best = changed[0] if changed and changed[0].least >= NOBODY else None
+        undecided = Undecided(between=between, drive_this=said, expected_separation=sigma)
+        return Suggestion(undecided, best, tuple(ranked), pace.floor)
+    said = _sentence(weighed[0])
+    undecided = Undecided(
+        between=between, drive_this=said, expected_separation=_sigma(weighed[0].least)
+    )
+    return Suggestion(undecided, weighed[0], tuple(weighed), pace.floor)
+
+
+def names_of(rivals: Sequence[Rival]) -> tuple[str, ...]:
+    """Return what rivals differ in: each one's effects that not all have."""
+    sets = [tuple(dict.fromkeys(e.name for e in rival.effects)) for rival in rivals]
+    common = set.intersection(*(set(s) for s in sets))
+    return tuple(" and ".join(n for n in s if n not in common) or "none of these" for s in sets)
+
+
+def _search(
+    model: Likelihood, rivals: Sequence[Rival], pace: Pace, experiments: Sequence[Experiment]
+) -> list[Weighed]:
+    """Return the experiments that fit, best first; refit the best until none can be better."""
+    numbers = [numbers_of(rival) for rival in rivals]
+    found = list[Weighed]()
+    for experiment in experiments:
+        legs = [place(leg, model.car, pace, numbers) for leg in experiment.legs]
+        placed = tuple(leg for leg in legs if leg is not None)
+        if len(placed) == len(legs):
+            lambdas = quick(Planned(model, placed, numbers[0]), rivals)
+            found.append(Weighed(experiment, placed, lambdas))
+    found.sort(key=lambda w: -w.least)
+    for k in range(len(found)):
+        known = max((w.least for w in found if w.sure), default=0.0)
+        enough = found[k].least <= known or (k >= MOST_EXACT and known >= NOBODY)
+        if enough or found[k].least < NOBODY:
+            break
+        found[k] = _refitted(model, rivals, found[k])
+    sure = [w for w in found if w.sure]
+    rest = [w for w in found if not w.sure]
+    return [*sorted(sure, key=lambda w: -w.least), *rest]
+
+
+def _refitted(model: Likelihood, rivals: Sequence[Rival], weighed: Weighed) -> Weighed:
+    numbers = [numbers_of(rival) for rival in rivals]
+    rows = [exact(Planned(model, weighed.legs, n), i, rivals) for i, n in enumerate(numbers)]
+    return Weighed(weighed.experiment, weighed.legs, np.array(rows), sure=True)
+
+
+def _sigma(value: float) -> float:
+    return round(math.sqrt(max(value, 0.0)), 1)
+
+
+def _sentence(weighed: Weighed) -> str:
+    """Return what to do, where to start, and how often."""
+    leg = weighed.legs[0]
+    drive = weighed.experiment.said + leg.manoeuvre.said
+    start = leg.start
+    where = (
+        f"Start at x = {start.x:.2f} m, y = {start.y:.2f} m, heading "
+        f"{math.degrees(start.yaw):.0f} degrees; it needs {leg.room[0]:.1f} x {leg.room[1]:.1f} m."
+    )
+    times = math.ceil(ANYBODY / max(weighed.least, 1e-9))
+    often = f" Do it {times} times: once is {_sigma(weighed.least):g} sigma." if times > 1 else ""
+    return f"{drive[0].upper()}{drive[1:]}. {where}{often}"
+
+
+def _changed_text(
+    drives: Sequence[Weighed], changed: Sequence[Weighed], pace: Pace
+) -> tuple[str, float]:
+    """Return what to say where no drive tells, and the separation that is left to hope for."""
+    wide, deep = pace.floor.size
+    said = f"No drive on a level floor of {wide:.1f} x {deep:.1f} m can tell these apart"
+    if drives:
+        best = drives[0]
+        said += f" (the best, {best.legs[0].manoeuvre.name}: {_sigma(best.least):g} sigma)"
+    if changed and changed[0].least >= NOBODY:
+        said += f". Change the experiment: {_sentence(changed[0])}"
+        return said, _sigma(changed[0].least)
+    hoped = max((w.least for w in (*drives, *changed)), default=0.0)
+    return f"{said}, nor does a ramp, a known mass, or a turned course.", _sigma(hoped)
