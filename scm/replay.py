@@ -96,6 +96,12 @@ class Commands:
         return _held(self._throttle, t), _held(self._steering, t) * self._per_unit
 
     @property
+    def rows(self) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+        """Times and values of throttle and of steering as recorded, in [-1, 1]."""
+        steering = self._steering.values * self._per_unit
+        return (self._throttle.t, self._throttle.values), (self._steering.t, steering)
+
+    @property
     def span_s(self) -> tuple[float, float]:
         """First and last time at which both commands are known."""
         first = max(self._throttle.t[0], self._steering.t[0])

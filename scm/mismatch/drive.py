@@ -64,16 +64,15 @@ class Drive:
     Attributes:
         edges: Where steps begin and end, (steps + 1,) [s].
         streams: Measured channels that a car model can predict.
+        battery: Measured voltage on the edges, where the car's drive knows it [V].
         point: On the body that the poses are of, from the rear axle [m].
     """
 
     def __init__(self, recording: Recording, car: Car) -> None:
         self.recording, self.car = recording, car
         commands = Commands(recording, car)
-        self.throttle = Commanded(commands._throttle.t, commands._throttle.values)
-        self.steering = Commanded(
-            commands._steering.t, commands._steering.values * commands._per_unit
-        )
+        throttle, steering = commands.rows
+        self.throttle, self.steering = Commanded(*throttle), Commanded(*steering)
         names = [name for name in KNOWN if name in recording.channels]
         streams = [_stream(recording, name) for name in names]
         self.point = recording.channel("pose.x").point
@@ -82,6 +81,7 @@ class Drive:
         last = min(float(pose[-1]), commands.span_s[1] + 0.05)
         steps = int((last - first) / STEP_S)
         self.edges: Floats = first + STEP_S * np.arange(steps + 1)
+        self.battery = commands.voltage(self.edges)
         self.streams: Sequence[Stream] = [stream.within(first, last) for stream in streams]
 
     def stream(self, name: str) -> Stream:

@@ -171,7 +171,7 @@ def _starts(
         room = end - begin - horizon
         if room < -1e-6:
             continue
-        count = 1 + int(room / min(0.5 * horizon, NEXT_S) + 1e-6)
+        count = 1 + int(room / min(0.5 * horizon, NEXT_S) + 0.1)
         for start in np.linspace(begin, begin + max(room, 0.0), count):
             ends = np.array([start, start + horizon + 2.0 * STEP_S])
             taken = np.stack([side.camera.taken(ends) for side in sides])

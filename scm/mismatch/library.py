@@ -30,6 +30,7 @@ class Knob:
         name: As it is reported; `key` of the car file that it moves, times `per_unit`.
         neutral: Where the effect does nothing.
         step: A change that shows, for derivatives.
+        given: What the car file says of the key; an effect is told as what is added to it.
         ties: Other keys that move with it, and how much for one unit.
     """
 
@@ -40,6 +41,7 @@ class Knob:
     neutral: float
     step: float
     per_unit: float = 1.0
+    given: float = 0.0
     ties: tuple[tuple[str, float], ...] = ()
 
 
@@ -50,6 +52,7 @@ class Candidate:
     Attributes:
         starts: Values of its knobs to begin from, in their order.
         said: One sentence for a mechanic; braces take the knobs by name.
+        rare: What it must gain beyond others: twins of something that happens more often.
     """
 
     name: str
@@ -58,12 +61,13 @@ class Candidate:
     knobs: tuple[Knob, ...]
     starts: tuple[tuple[float, ...], ...]
     said: str
+    rare: float = 0.0
 
     def numbers(self, values: tuple[float, ...]) -> dict[str, float]:
         """Return the numbers by key that its knobs at these values mean."""
         found = dict[str, float]()
         for knob, value in zip(self.knobs, values, strict=True):
-            found[knob.key] = value * knob.per_unit
+            found[knob.key] = knob.given + value * knob.per_unit
             for key, factor in knob.ties:
                 found[key] = value * factor
         return found
@@ -180,6 +184,9 @@ SHOWS_ABOVE: Mapping[str, tuple[float, float]] = {
 """Speed [m/s] and side acceleration [m/s^2] that a drive must reach to show an effect at all."""
 
 
+RARE: Mapping[str, float] = {"motor_gain": 14.0, "drive_curve": 10.0, "load_transfer": 6.0}
+
+
 def shown_by(found: tuple[Candidate, ...], drives: Sequence[Drive]) -> tuple[Candidate, ...]:
     """Return the candidates that these drives are fast enough to show."""
     fast, hard = 0.0, 0.0
@@ -231,22 +238,11 @@ def candidates(car: Car) -> tuple[Candidate, ...]:
             _knob(car, name, param, neutral.get(param.name, param.default), step)
             for param, step in zip(wanted, steps, strict=True)
         )
-        begin = tuple(
-            tuple(car_value(car, k, v) for k, v in zip(knobs, start, strict=True))
-            for start in starts
-        )
-        found.append(Candidate(name, equation, depends_on, knobs, begin, said))
+        found.append(Candidate(name, equation, depends_on, knobs, starts, said, RARE.get(name, 0.0)))
         if name == "com_shift":
             tied = replace(knobs[0], ties=((POINT_X, 1.0),))
-            found.append(Candidate(name, equation, depends_on, (tied,), begin, said))
+            found.append(Candidate(name, equation, depends_on, (tied,), starts, said))
     return tuple(found)
-
-
-def car_value(car: Car, knob: Knob, value: float) -> float:
-    """Return a start for a knob: beside the car's own number where it has one."""
-    if knob.name == "coefficient" and car.has(knob.key):
-        return value + car.value(knob.key)
-    return value
 
 
 def _is_own(name: str, param: Param) -> bool:
@@ -255,13 +251,15 @@ def _is_own(name: str, param: Param) -> bool:
 
 
 def _knob(car: Car, name: str, param: Param, neutral: float, step: float) -> Knob:
-    key, per_unit = param.key, 1.0
+    key, per_unit, given = param.key, 1.0, 0.0
     if name == "wheel_radius":
         key, per_unit = "wheel.radius_m", car.value("wheel.radius_m")
     if name in ("viscous_drag", "aero_drag", "rolling_resistance") and car.has(param.key):
-        neutral = car.value(param.key)
+        given, neutral = car.value(param.key), 0.0
     low, high = LIMITS.get(param.key, param.bounds)
-    return Knob(param.reported, key, param.unit, (low, high), neutral, step, per_unit)
+    return Knob(
+        param.reported, key, param.unit, (low - given, high - given), neutral, step, per_unit, given
+    )
 
 
 def by_name(found: tuple[Candidate, ...], name: str) -> Candidate:

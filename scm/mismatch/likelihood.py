@@ -26,10 +26,11 @@ class Ordinary:
 LOCK = "drive.axle_lock"
 _UNKNOWN = {LOCK: (0.5, 0.5)}  # what no car file says and every car has
 ALIKE, ABRUPT = 0.005, 0.1
+JOLTS = 0.05
 LASTS_S = 2.0
 LEAST_NOISE = 0.7
 TIMING_S = 0.003  # no recording's stamps are better than that
-LEAST_SCATTER = {"body.mass_kg": 0.04}  # cars are weighed without cables, tape and battery
+LEAST_SCATTER = {"body.mass_kg": 0.06}  # cars are weighed without cables, tape and battery
 _CLOCKS = tuple(
     Ordinary(key, 0.0, TIMING_S, (-3.0 * TIMING_S, 3.0 * TIMING_S))
     for key in (COMMAND_CLOCK, POSE_CLOCK)
@@ -124,7 +125,8 @@ def usual_noise(drives: Sequence[Drive]) -> Noise:
         if name.startswith(("encoder.", "wheel_speed.")):
             own[name] = ALIKE * fast
         elif name.startswith("imu.accel"):
-            own[name] = 0.5 * drives[0].stream(name).std
+            stream = drives[0].stream(name)
+            own[name] = JOLTS * float(np.percentile(np.abs(stream.values), 90)) + 0.5 * stream.std
     scale = dict.fromkeys(drives[0].names, 1.0)
     return Noise(
         ALIKE * fast, ALIKE * fast, ALIKE * turning, own, scale, lasts_s=LASTS_S,

@@ -91,6 +91,8 @@ class Rollouts:
             out[name][0] = first[name][:n]
         for a in range(0, steps, TETHER_STEPS):
             b = min(a + TETHER_STEPS, steps)
+            if self.drive.battery is not None:
+                fleet.battery[:n] = self.drive.battery[a]
             got = fleet.rollout(commands[0][a:b], commands[1][a:b], STEP_S, SIGNALS)
             for name in SIGNALS:
                 out[name][a + 1 : b + 1] = got[name][:, :n]

@@ -39,7 +39,8 @@ class Step:
 def price(effects: Sequence[Candidate], events: int, library: int) -> float:
     """Return what effects must gain to be believed."""
     knobs = sum(len(effect.knobs) for effect in effects)
-    return knobs * math.log(events) + 2.0 * len(effects) * math.log(library / FALSE_ALARMS)
+    rare = sum(effect.rare for effect in effects)
+    return rare + knobs * math.log(events) + 2.0 * len(effects) * math.log(library / FALSE_ALARMS)
 
 
 class Search:

@@ -19,6 +19,9 @@ from scm.vehicles.jit import array_kernel
 EX, EY, EPSI, DV, DY, DR = range(6)
 BODY = 6
 FELT_S = 0.1
+SLOW = 0.12  # of the usual speed: below it dry friction decides, to the moment, when a car halts
+HALT, HALTING = 0.3, 3.0  # as a leap of so much throttle; of an accelerometer's own disturbance
+SHORT_S = 0.3  # how long an accelerometer's own disturbance lasts
 POSES = {"pose.x": EX, "pose.y": EY, "pose.yaw": EPSI}
 RATES = {"imu.gyro_z": DR, "yaw_rate": DR, "velocity.x": DV, "speed": DV, "velocity.y": DY}
 
@@ -96,7 +99,7 @@ def _system(drive: Drive, noise: Noise) -> _System:
             see.append({DV: 1.0 / radius, DR: -left * half / radius, slip: 1.0 / radius})
             wheels.append(slip)
         else:
-            see.append({add(noise.lasts_s, own, own): 1.0})
+            see.append({add(SHORT_S, own, own): 1.0})
     size = len(lasts)
     slips = np.zeros(size - BODY)
     slips[[i - BODY for i in wheels]] = 1.0
@@ -128,6 +131,11 @@ class Whitener:
         self.t: Floats = t[self._order]
         self.stream: Ints = stream[self._order]
         unsure = np.concatenate([s.unsure for s in drive.streams])[self._order]
+        x, y = drive.smoothed["pose.x"], drive.smoothed["pose.y"]
+        speed = np.hypot(x.rate_at(self.t), y.rate_at(self.t))
+        self._halting = (speed < SLOW * np.percentile(speed, 90)).astype(np.float64)
+        jolt = np.array([noise.own.get(s.name, 0.0) * s.name.startswith("imu.") for s in drive.streams])
+        unsure = np.hypot(unsure, HALTING * jolt[self.stream] * self._halting)
         psi = drive.smoothed["pose.yaw"].at(self.t)
         self._cos, self._sin = np.cos(psi), np.sin(psi)
         self._system = system = _system(drive, noise)
@@ -147,7 +155,8 @@ class Whitener:
         """Return the variance that the commands' leaps add to each state before each event."""
         out = np.zeros((len(self.t), size))
         since = np.diff(self.t, prepend=self.t[0])
-        launch = noise.launch**2 * _felt(self.drive.throttle, self.t) * since / FELT_S
+        felt = _felt(self.drive.throttle, self.t) + HALT**2 * self._halting
+        launch = noise.launch**2 * felt * since / FELT_S
         out[:, DV] = launch
         out[:, BODY:] = launch[:, None] * self._system.slips
         out[:, DR] = noise.turn**2 * _felt(self.drive.steering, self.t) * since / FELT_S

@@ -1,0 +1,133 @@
+"""What acted on a car that a simulator does not know: force and wheel angle along a drive.
+
+From a few tenths of a second apart the car is driven on from its measured motion for as long again.
+What its speed then lacks, over what a known push would have added to it, is the force left over;
+the same with its turning and an angle of the wheels.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.drive import STEP_S, Drive
+from scm.mismatch.evidence import Residual
+from scm.mismatch.rollouts import Numbers
+from scm.mismatch.seen import Camera
+from scm.mismatch.windows import Side, Windows
+from scm.vehicles.car import Car
+
+RUN_S = 0.4
+EVERY_S = 0.2
+WIDTH_S = 0.4  # of the smoothing, one standard deviation
+LEAN, ANGLE_RAD = 0.02, 0.02  # pushes that measure the response: force over weight, wheel angle
+GRAVITY = 9.80665
+UNSURE = 4.0  # times the usual standard deviation: the car stands, nothing is known
+NEEDED_KEYS = {"wind.force_x_n", "wind.force_y_n", "steering.trim_rad"}
+FORCE, ANGLE = ("drive force", "N"), ("wheel angle", "rad")
+
+
+@dataclass(frozen=True, slots=True)
+class _Track:
+    """One drive's residuals at its windows' middles, each (n,)."""
+
+    t: Floats
+    x: Floats
+    y: Floats
+    found: Mapping[tuple[str, str], tuple[Floats, Floats, Floats]]
+
+
+def leftover(
+    drives: Sequence[Drive], car: Car, before: Numbers, after: Numbers
+) -> tuple[Residual, ...]:
+    """Return the force and the wheel angle left over by two cars, smoothed, with their bands.
+
+    Several drives follow one another in time.
+
+    Args:
+        drives: The recordings.
+        car: With every effect at its neutral numbers.
+        before, after: Numbers of the cars by key.
+    """
+    tracks = [_track(drive, car, before, after) for drive in drives]
+    starts = np.concatenate(([0.0], np.cumsum([t.t[-1] - t.t[0] + EVERY_S for t in tracks])[:-1]))
+    later = [start + tracks[0].t[0] - t.t[0] for start, t in zip(starts, tracks, strict=True)]
+    t = np.concatenate([one.t + late for one, late in zip(tracks, later, strict=True)])
+    x, y = (np.concatenate([getattr(one, n) for one in tracks]) for n in ("x", "y"))
+    residuals = []
+    for key in (FORCE, ANGLE):
+        sides = [np.concatenate([one.found[key][i] for one in tracks]) for i in range(3)]
+        residuals.append(
+            Residual(channel=key[0], unit=key[1], t_s=t, x_m=x, y_m=y,
+                     before=sides[0], after=sides[1], std=_honest(sides[1], sides[2]))
+        )  # fmt: skip
+    return tuple(residuals)
+
+
+def _honest(after: Floats, std: Floats) -> Floats:
+    """Return a band that what is left after all is known does not leave more often than it may."""
+    known = np.isfinite(after)
+    if not known.any():
+        return std
+    return np.asarray(std * max(1.0, float(np.percentile(np.abs(after / std)[known], 90)) / 1.645))
+
+
+def _track(drive: Drive, car: Car, before: Numbers, after: Numbers) -> _Track:
+    force = LEAN * GRAVITY * car.value("body.mass_kg")
+    camera = Camera(drive, after)
+    sides = [
+        Side(before, Camera(drive, before)),
+        Side(after, camera),
+        Side(after, camera, like=1, push=(force, 0.0)),
+        Side(after, camera, like=1, push=(0.0, ANGLE_RAD)),
+    ]
+    steps, every = round(RUN_S / STEP_S), round(EVERY_S / STEP_S)
+    at = np.arange(1, len(drive.edges) - steps - 1, every)
+    runs = Windows(drive, car).run(sides, np.tile(at, (len(sides), 1)), steps)
+    end = drive.edges[at + steps]
+    moved = [side.camera.motion(end) for side in sides[:2]]
+    along, turning = _stds(drive, drive.edges[at], end)
+    found = {}
+    for key, name, side, push, std in (
+        (FORCE, "speed", 2, force, along),
+        (ANGLE, "yaw_rate", 3, ANGLE_RAD, turning),
+    ):
+        last = runs[name][-1]
+        response = (last[side] - last[1]) / push
+        response = np.where(np.abs(response) > 1e-9, response, np.nan)
+        lack = [(getattr(m, name) - last[i]) / response for i, m in enumerate(moved)]
+        found[key] = _smoothed(drive.edges[at], *lack, np.abs(std / response))
+    middle = drive.edges[at] + 0.5 * RUN_S
+    x, y, _ = camera.truly(*camera.recorded(camera.stamp(middle)))
+    return _Track(middle, x, y, found)
+
+
+def _stds(drive: Drive, start: Floats, end: Floats) -> tuple[Floats, Floats]:
+    """Return how unsure the change of speed and of yaw rate is, start and end together."""
+    x, y, yaw = (drive.smoothed[f"pose.{n}"] for n in ("x", "y", "yaw"))
+    speed = np.sqrt(0.5 * (x.rate_std**2 + y.rate_std**2))
+
+    def both(t: Floats, std: Floats) -> Floats:
+        return np.asarray(np.hypot(np.interp(start, t, std), np.interp(end, t, std)))
+
+    return both(x.t, speed) if len(x.t) == len(y.t) else both(x.t, x.rate_std), both(
+        yaw.t, yaw.rate_std
+    )
+
+
+def _smoothed(
+    t: Floats, before: Floats, after: Floats, std: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return weighted means over neighbours in time, and their standard deviation."""
+    usual = float(np.nanmedian(std))
+    known = np.isfinite(std) & np.isfinite(before) & np.isfinite(after) & (std < UNSURE * usual)
+    weight = np.where(known, 1.0 / np.where(known, std, 1.0) ** 2, 0.0)
+    near = np.exp(-0.5 * ((t[:, None] - t) / WIDTH_S) ** 2) * weight
+    total = near.sum(axis=1)
+    sure = known & (total > 0.0)
+    total = np.where(sure, total, np.nan)
+    shared = max(RUN_S / EVERY_S, 1.0)  # neighbours share their measurements
+    spread = np.sqrt(shared * (near**2 @ np.where(known, std, 0.0) ** 2)) / total
+    sides = [near @ np.where(known, side, 0.0) / total for side in (before, after)]
+    return sides[0], sides[1], spread

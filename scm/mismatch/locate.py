@@ -1,0 +1,193 @@
+"""Where the error of a re-tuned car lies: which sensors show it, when, and where on the floor.
+
+An effect's gain at a moment is how much better it explains the innovation there. A place counts
+where its gain is beyond what chance gives the best of all places looked at.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scm.arrays import Bools, Floats, Ints
+from scm.mismatch.evidence import Residual
+from scm.mismatch.findings import Located, Place, Span
+from scm.mismatch.fit import TAIL, Fitted, Fitter
+from scm.mismatch.leftover import leftover
+from scm.mismatch.library import Candidate
+from scm.mismatch.likelihood import Likelihood
+
+BLOCK_S = 2.5
+CELLS = 8  # along the longer side of the floor
+ALARM = 0.05
+REST = 0.05  # of the gain may lie outside the places named
+MOST_TIME = 0.5  # what acts for longer acts all the time
+MOST_FLOOR = 0.35
+LEAST_SHARE = 0.03  # of a sensor in the gain, to be named
+
+
+@dataclass(frozen=True, slots=True)
+class _Looked:
+    """Where and when each innovation of all drives was measured, (events,)."""
+
+    t: Floats
+    x: Floats
+    y: Floats
+    stream: Ints
+    names: tuple[str, ...]
+
+
+def locate(
+    model: Likelihood, retuned: Fitted, best: Fitted
+) -> tuple[tuple[Located, ...], tuple[Residual, ...]]:
+    """Return where the error that the effects of `best` explain lies, and what is left over.
+
+    Args:
+        model: With the belief about noise under which `best` was fitted.
+        retuned: The car with its own numbers refitted alone.
+        best: The car with all effects found; with none, nothing is located.
+    """
+    numbers = Fitter(model, np.ones(len(model.t))).numbers(best.effects, best.z, best.values)
+    residuals = leftover(model.drives, model.car, {}, numbers)
+    if not best.effects:
+        return (), residuals
+    gains = _gains(model, retuned, best)
+    looked = _looked(model)
+    total = sum(max(float(gain.sum()), 0.0) for gain in gains)
+    located = [
+        _located(effect, values, gain, looked, total)
+        for (effect, values), gain in zip(_each(best), gains, strict=True)
+        if gain.sum() > chance(1)
+    ]
+    return tuple(sorted(located, key=lambda one: -one.share_of_error)), residuals
+
+
+def chance(places: int) -> float:
+    """Return the gain that the best of so many places has by chance with 5 %, at most."""
+    return 2.0 * math.log(places / ALARM)
+
+
+def _gains(model: Likelihood, retuned: Fitted, best: Fitted) -> list[Floats]:
+    """Return what each effect gains at each innovation, over the same car without it."""
+    fitter, own = Fitter(model, np.ones(len(model.t))), len(best.z)
+    alone = [retuned.z if len(best.effects) == 1 else best.z for _ in best.effects]
+    without = list[tuple[tuple[Candidate, ...], Floats]]()
+    at = 0
+    for i, effect in enumerate(best.effects):
+        values = np.delete(best.values, slice(at, at + len(effect.knobs)))
+        without.append(((*best.effects[:i], *best.effects[i + 1 :]), values))
+        at += len(effect.knobs)
+    e, _ = model([fitter.numbers(best.effects, best.z, best.values)])
+    jacobian, gains = best.jacobian[:, :own], list[Floats]()
+    for z, trial in zip(alone, without, strict=True):
+        before, _ = model([fitter.numbers(*trial[:1], z, trial[1])])
+        base = replace(best, z=z, e=before[:, 0], jacobian=jacobian)
+        (moved,) = fitter.begin(base, [trial])
+        gains.append(_loss(moved.e if np.isfinite(moved.q) else before[:, 0]) - _loss(e[:, 0]))
+    return gains
+
+
+def _loss(e: Floats) -> Floats:
+    return np.asarray(TAIL * np.log1p(e * e / TAIL))
+
+
+def _looked(model: Likelihood) -> _Looked:
+    """Return when, where and by which sensor each innovation was measured."""
+    x, y, names = list[Floats](), list[Floats](), list[str]()
+    stream = list[Ints]()
+    for drive, whitener in zip(model.drives, model.whiteners, strict=True):
+        x.append(drive.smoothed["pose.x"].at(whitener.t))
+        y.append(drive.smoothed["pose.y"].at(whitener.t))
+        new = [name for name in drive.names if name not in names]
+        names += new
+        number = np.array([names.index(name) for name in drive.names])
+        stream.append(number[whitener.stream])
+    return _Looked(
+        model.t, np.concatenate(x), np.concatenate(y), np.concatenate(stream), tuple(names)
+    )
+
+
+def _each(fitted: Fitted) -> Iterator[tuple[Candidate, Floats]]:
+    """Yield each effect with its own values."""
+    at = 0
+    for effect in fitted.effects:
+        yield effect, fitted.values[at : at + len(effect.knobs)]
+        at += len(effect.knobs)
+
+
+def _located(
+    effect: Candidate, values: Floats, gain: Floats, looked: _Looked, total: float
+) -> Located:
+    share = max(float(gain.sum()), 0.0) / max(total, 1e-9)
+    when, where = _when(gain, looked.t), _named(effect, values) or _where(gain, looked)
+    return Located(
+        equation=effect.equation,
+        channels=_channels(gain, looked),
+        depends_on=effect.depends_on,
+        when_s=when,
+        where=where,
+        share_of_error=min(share, 1.0),
+    )
+
+
+def _channels(gain: Floats, looked: _Looked) -> tuple[str, ...]:
+    """Return the sensors that show an effect, most telling first."""
+    per = np.bincount(looked.stream, weights=gain, minlength=len(looked.names))
+    least = max(chance(len(per)), LEAST_SHARE * float(gain.sum()))
+    return tuple(looked.names[i] for i in np.argsort(-per) if per[i] > least)
+
+
+def _strong(gain: Floats, places: int) -> Bools | None:
+    """Return the places that hold an effect's gain; None where others hold some of it too."""
+    held = gain > chance(places)
+    rest = float(gain[~held].sum())
+    few = rest <= max(chance(1), REST * float(gain.sum()))
+    return held if held.any() and few else None
+
+
+def _when(gain: Floats, t: Floats) -> tuple[Span, ...] | None:
+    """Return the spans of time that hold an effect's gain; None for all the time."""
+    first, last = float(t.min()), float(t.max())
+    blocks = max(int((last - first) / BLOCK_S), 2)
+    cuts = np.linspace(first, last, blocks + 1)
+    block = np.clip(np.searchsorted(cuts, t, side="right") - 1, 0, blocks - 1)
+    held = _strong(np.bincount(block, weights=gain, minlength=blocks), blocks)
+    if held is None or held.mean() > MOST_TIME:
+        return None
+    edges = np.diff(np.concatenate(([0], held.astype(np.int64), [0])))
+    return tuple(
+        (float(cuts[a]), float(cuts[b]))
+        for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
+    )
+
+
+def _where(gain: Floats, looked: _Looked) -> Place | None:
+    """Return the box on the floor that holds an effect's gain; None for everywhere."""
+    size = max(np.ptp(looked.x), np.ptp(looked.y)) / CELLS
+    column, row = (((v - v.min()) / size).astype(np.int64) for v in (looked.x, looked.y))
+    cell = column + (CELLS + 1) * row
+    per = np.bincount(cell, weights=gain)
+    seen = np.bincount(cell)
+    held = _strong(per, int((seen > 0).sum()))
+    if held is None:
+        return None
+    inside = held[cell]
+    box = Place(
+        x_m=(float(looked.x[inside].min()), float(looked.x[inside].max())),
+        y_m=(float(looked.y[inside].min()), float(looked.y[inside].max())),
+    )
+    within = (
+        (looked.x >= box.x_m[0]) & (looked.x <= box.x_m[1])
+        & (looked.y >= box.y_m[0]) & (looked.y <= box.y_m[1])
+    )  # fmt: skip
+    return box if within.mean() <= MOST_FLOOR else None
+
+
+def _named(effect: Candidate, values: Floats) -> Place | None:
+    """Return the place that an effect's own numbers name."""
+    known = {knob.name: float(value) for knob, value in zip(effect.knobs, values, strict=True)}
+    if not {"x_m", "y_m", "radius_m"} <= known.keys():
+        return None
+    x, y, radius = known["x_m"], known["y_m"], known["radius_m"]
+    return Place(x_m=(x - radius, x + radius), y_m=(y - radius, y + radius))
