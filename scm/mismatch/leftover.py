@@ -24,8 +24,8 @@ WIDTH_S = 0.4  # of the smoothing, one standard deviation
 LEAN, ANGLE_RAD = 0.02, 0.02  # pushes that measure the response: force over weight, wheel angle
 GRAVITY = 9.80665
 UNSURE = 4.0  # times the usual standard deviation: the car stands, nothing is known
-NEEDED_KEYS = {"wind.force_x_n", "wind.force_y_n", "steering.trim_rad"}
 FORCE, ANGLE = ("drive force", "N"), ("wheel angle", "rad")
+_MOVED = ("speed", "yaw_rate")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,8 @@ def leftover(
     Args:
         drives: The recordings.
         car: With every effect at its neutral numbers.
-        before, after: Numbers of the cars by key.
+        before: Numbers of the car as given, by key.
+        after: Of the car as found.
     """
     tracks = [_track(drive, car, before, after) for drive in drives]
     starts = np.concatenate(([0.0], np.cumsum([t.t[-1] - t.t[0] + EVERY_S for t in tracks])[:-1]))
@@ -82,25 +83,46 @@ def _track(drive: Drive, car: Car, before: Numbers, after: Numbers) -> _Track:
         Side(after, camera, like=1, push=(force, 0.0)),
         Side(after, camera, like=1, push=(0.0, ANGLE_RAD)),
     ]
+    pushes = ((2, force), (3, ANGLE_RAD))
     steps, every = round(RUN_S / STEP_S), round(EVERY_S / STEP_S)
     at = np.arange(1, len(drive.edges) - steps - 1, every)
     runs = Windows(drive, car).run(sides, np.tile(at, (len(sides), 1)), steps)
     end = drive.edges[at + steps]
     moved = [side.camera.motion(end) for side in sides[:2]]
-    along, turning = _stds(drive, drive.edges[at], end)
-    found = {}
-    for key, name, side, push, std in (
-        (FORCE, "speed", 2, force, along),
-        (ANGLE, "yaw_rate", 3, ANGLE_RAD, turning),
-    ):
-        last = runs[name][-1]
-        response = (last[side] - last[1]) / push
-        response = np.where(np.abs(response) > 1e-9, response, np.nan)
-        lack = [(getattr(m, name) - last[i]) / response for i, m in enumerate(moved)]
-        found[key] = _smoothed(drive.edges[at], *lack, np.abs(std / response))
+    change = np.stack([  # of speed and yaw rate, by force and by wheel angle, (2, 2, windows)
+        [(runs[name][-1, side] - runs[name][-1, 1]) / push for side, push in pushes]
+        for name in _MOVED
+    ])  # fmt: skip
+    found = _found(
+        drive.edges[at],
+        [np.stack([getattr(m, n) - runs[n][-1, i] for n in _MOVED]) for i, m in enumerate(moved)],
+        change, np.stack(_stds(drive, drive.edges[at], end)),
+    )  # fmt: skip
     middle = drive.edges[at] + 0.5 * RUN_S
     x, y, _ = camera.truly(*camera.recorded(camera.stamp(middle)))
     return _Track(middle, x, y, found)
+
+
+def _found(
+    t: Floats, lacks: Sequence[Floats], change: Floats, stds: Floats
+) -> dict[tuple[str, str], tuple[Floats, Floats, Floats]]:
+    """Return both residuals of both cars, and their bands.
+
+    Args:
+        t: (windows,).
+        lacks: What each car's speed and yaw rate lack, (2, windows).
+        change: Of speed and yaw rate by force and wheel angle, (2, 2, windows).
+        stds: Of what they lack, (2, windows).
+    """
+    size = change[0, 0] * change[1, 1] - change[0, 1] * change[1, 0]
+    size = np.where(np.abs(size) > 1e-12, size, np.nan)
+    inverse = np.array([[change[1, 1], -change[0, 1]], [-change[1, 0], change[0, 0]]]) / size
+    amounts = [np.einsum("ijw,jw->iw", inverse, lack) for lack in lacks]
+    spread = np.sqrt(np.einsum("ijw,jw->iw", inverse**2, stds**2))
+    return {
+        key: _smoothed(t, amounts[0][i], amounts[1][i], spread[i])
+        for i, key in enumerate((FORCE, ANGLE))
+    }
 
 
 def _stds(drive: Drive, start: Floats, end: Floats) -> tuple[Floats, Floats]:

@@ -152,7 +152,8 @@ def _when(gain: Floats, t: Floats) -> tuple[Span, ...] | None:
     blocks = max(int((last - first) / BLOCK_S), 2)
     cuts = np.linspace(first, last, blocks + 1)
     block = np.clip(np.searchsorted(cuts, t, side="right") - 1, 0, blocks - 1)
-    held = _strong(np.bincount(block, weights=gain, minlength=blocks), blocks)
+    per: Floats = np.bincount(block, weights=gain, minlength=blocks).astype(np.float64)
+    held = _strong(per, blocks)
     if held is None or held.mean() > MOST_TIME:
         return None
     edges = np.diff(np.concatenate(([0], held.astype(np.int64), [0])))
@@ -167,7 +168,7 @@ def _where(gain: Floats, looked: _Looked) -> Place | None:
     size = max(np.ptp(looked.x), np.ptp(looked.y)) / CELLS
     column, row = (((v - v.min()) / size).astype(np.int64) for v in (looked.x, looked.y))
     cell = column + (CELLS + 1) * row
-    per = np.bincount(cell, weights=gain)
+    per: Floats = np.bincount(cell, weights=gain).astype(np.float64)
     seen = np.bincount(cell)
     held = _strong(per, int((seen > 0).sum()))
     if held is None:
