@@ -15,7 +15,7 @@ from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.evidence import Residual
 from scm.mismatch.rollouts import Numbers
 from scm.mismatch.seen import Camera
-from scm.mismatch.windows import Side, Windows
+from scm.mismatch.windows import Runs, Side, Windows
 from scm.vehicles.car import Car
 
 RUN_S = 0.4
@@ -25,7 +25,7 @@ LEAN, ANGLE_RAD = 0.02, 0.02  # pushes that measure the response: force over wei
 GRAVITY = 9.80665
 UNSURE = 4.0  # times the usual standard deviation: the car stands, nothing is known
 FORCE, ANGLE = ("drive force", "N"), ("wheel angle", "rad")
-_MOVED = ("speed", "yaw_rate")
+MOVED = ("speed", "yaw_rate")
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,24 +83,42 @@ def _track(drive: Drive, car: Car, before: Numbers, after: Numbers) -> _Track:
         Side(after, camera, like=1, push=(force, 0.0)),
         Side(after, camera, like=1, push=(0.0, ANGLE_RAD)),
     ]
-    pushes = ((2, force), (3, ANGLE_RAD))
     steps, every = round(RUN_S / STEP_S), round(EVERY_S / STEP_S)
     at = np.arange(1, len(drive.edges) - steps - 1, every)
     runs = Windows(drive, car).run(sides, np.tile(at, (len(sides), 1)), steps)
     end = drive.edges[at + steps]
     moved = [side.camera.motion(end) for side in sides[:2]]
-    change = np.stack([  # of speed and yaw rate, by force and by wheel angle, (2, 2, windows)
-        [(runs[name][-1, side] - runs[name][-1, 1]) / push for side, push in pushes]
-        for name in _MOVED
-    ])  # fmt: skip
+    change = response(runs, 1, ((2, force), (3, ANGLE_RAD)))
     found = _found(
         drive.edges[at],
-        [np.stack([getattr(m, n) - runs[n][-1, i] for n in _MOVED]) for i, m in enumerate(moved)],
+        [np.stack([getattr(m, n) - runs[n][-1, i] for n in MOVED]) for i, m in enumerate(moved)],
         change, np.stack(_stds(drive, drive.edges[at], end)),
     )  # fmt: skip
     middle = drive.edges[at] + 0.5 * RUN_S
     x, y, _ = camera.truly(*camera.recorded(camera.stamp(middle)))
     return _Track(middle, x, y, found)
+
+
+def response(runs: Runs, base: int, pushes: Sequence[tuple[int, float]]) -> Floats:
+    """Return what speed and yaw rate gain at the windows' ends from each push, (2, 2, windows).
+
+    Args:
+        runs: Of the base, and of the same car pushed.
+        base: Number of the side that is not pushed.
+        pushes: Side and size of the push by a force, then by an angle of the wheels.
+    """
+    return np.stack([
+        [(runs[name][-1, side] - runs[name][-1, base]) / push for side, push in pushes]
+        for name in MOVED
+    ])  # fmt: skip
+
+
+def inverse_of(change: Floats) -> Floats:
+    """Return force and angle by what speed and yaw rate gain; NaN where unknown."""
+    size = change[0, 0] * change[1, 1] - change[0, 1] * change[1, 0]
+    size = np.where(np.abs(size) > 1e-12, size, np.nan)
+    swapped = np.array([[change[1, 1], -change[0, 1]], [-change[1, 0], change[0, 0]]])
+    return np.asarray(swapped / size)
 
 
 def _found(
@@ -114,9 +132,7 @@ def _found(
         change: Of speed and yaw rate by force and wheel angle, (2, 2, windows).
         stds: Of what they lack, (2, windows).
     """
-    size = change[0, 0] * change[1, 1] - change[0, 1] * change[1, 0]
-    size = np.where(np.abs(size) > 1e-12, size, np.nan)
-    inverse = np.array([[change[1, 1], -change[0, 1]], [-change[1, 0], change[0, 0]]]) / size
+    inverse = inverse_of(change)
     amounts = [np.einsum("ijw,jw->iw", inverse, lack) for lack in lacks]
     spread = np.sqrt(np.einsum("ijw,jw->iw", inverse**2, stds**2))
     return {

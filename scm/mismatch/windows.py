@@ -33,7 +33,7 @@ class Side:
     """A car to be driven: its numbers, and what the camera makes of its drive.
 
     Attributes:
-        like: Number of the side whose memory it shares at each window's start, itself if None.
+        like: Number of the side whose memory it has at each window's start, its own if None.
         push: Further force along the body at a window's start, and further angle of the wheels
             [N, rad].
     """
@@ -85,12 +85,16 @@ class Windows:
             side.camera.motion(self.drive.edges[s]) for side, s in zip(sides, starts, strict=True)
         ]
         due = sorted((int(starts[i, w]), i, w) for i in range(len(sides)) for w in range(windows))
+        values = [self._values(fleet, side.numbers) for side in sides]
         now = 0
         for k, i, w in due:
             now = self._advance(fleet, leading, now, k)
             like = sides[i].like
             leader = leaders.index(i if like is None else like)
-            self._start(fleet, leader, int(rows[i, w]), sides[i], moved[i], w)
+            row = int(rows[i, w])
+            self._start(fleet, leader, row, values[i], moved[i], w)
+            if any(sides[i].push):
+                self._push(fleet, row, sides[i].push)
         fleet.alive[:] = True
         fleet.alive[: len(leaders)] = False
         return self._free(fleet, commands, starts, steps, len(leaders))
@@ -108,20 +112,22 @@ class Windows:
 
     def _lead(self, fleet: Fleet, leading: Sequence[tuple[Side, Floats]]) -> None:
         """Put one car of each side at the recording's start, its actuators run in."""
-        column = self._column(fleet)
         starts = [side.camera.motion(self.drive.edges[:1]) for side, _ in leading]
         for i, ((side, _), at) in enumerate(zip(leading, starts, strict=True)):
             fleet.add(Pose2(float(at.x[0]), float(at.y[0]), float(at.yaw[0])))
-            for key, value in side.numbers.items():
-                if key in column and key not in (THROTTLE_DELAY, STEERING_DELAY):
-                    fleet.parameters[i, column[key]] = value
+            fleet.parameters[i] = self._values(fleet, side.numbers)
         run_in = round(RUN_IN_S / STEP_S)
         self._drive(fleet, [c[:, :run_in] for _, c in leading])
         for i, at in enumerate(starts):
             _place(fleet, i, at, 0)
 
-    def _column(self, fleet: Fleet) -> dict[str, int]:
-        return {c.param.key: j for j, c in enumerate(fleet.columns)}
+    def _values(self, fleet: Fleet, numbers: Numbers) -> Floats:
+        """Return a row's numbers: the car's own but for those named."""
+        return np.array([
+            self.car.value(key) if key in (THROTTLE_DELAY, STEERING_DELAY)
+            else numbers.get(key, self.car.value(key))
+            for key in (c.param.key for c in fleet.columns)
+        ])  # fmt: skip
 
     def _drive(self, fleet: Fleet, commands: Sequence[Floats]) -> None:
         wide = np.zeros((2, commands[0].shape[1], fleet.capacity))
@@ -145,19 +151,22 @@ class Windows:
         return now
 
     def _start(
-        self, fleet: Fleet, leader: int, row: int, side: Side, moved: Moved, window: int
+        self, fleet: Fleet, leader: int, row: int, values: Floats, moved: Moved, window: int
     ) -> None:
         """Let a window's car stand where its leader is, in the measured motion."""
         fleet.copy_row(leader, row)
+        fleet.parameters[row] = values
         _place(fleet, row, moved, window)
         fleet.time[row] = fleet.time[leader]
         fleet.battery[row] = fleet.battery[leader]
-        if any(side.push):
-            yaw, column = float(moved.yaw[window]), self._column(fleet)
-            fleet.parameters[row, column["wind.force_x_n"]] += side.push[0] * np.cos(yaw)
-            fleet.parameters[row, column["wind.force_y_n"]] += side.push[0] * np.sin(yaw)
-            fleet.parameters[row, column["steering.trim_rad"]] += side.push[1]
         fleet.alive[row] = False
+
+    def _push(self, fleet: Fleet, row: int, push: tuple[float, float]) -> None:
+        """Push a row along its body, and turn its wheels, from now on."""
+        yaw, column = float(fleet.yaw[row]), {c.param.key: j for j, c in enumerate(fleet.columns)}
+        fleet.parameters[row, column["wind.force_x_n"]] += push[0] * np.cos(yaw)
+        fleet.parameters[row, column["wind.force_y_n"]] += push[0] * np.sin(yaw)
+        fleet.parameters[row, column["steering.trim_rad"]] += push[1]
 
     def _free(
         self, fleet: Fleet, commands: Sequence[Floats], starts: Ints, steps: int, leaders: int
