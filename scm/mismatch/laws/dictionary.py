@@ -1,0 +1,30 @@
+"""The dictionary of laws: every channel with every curve that makes sense there."""
+
+from functools import cache
+
+from scm.mismatch.laws import channels as at
+from scm.mismatch.laws import curve_table as by
+from scm.mismatch.laws.law import Law, law_of
+
+_FLOOR = (by.TILES, by.WAVE, by.BEYOND, by.SLOPE)
+_HEADING = (by.ONE_WAY, by.ROUND, by.BOTH_WAYS)
+_TIME = (by.SWING, by.SINCE, by.DRIFT)
+_SPEED = (by.SPEED, by.SPEED_SQUARED, by.SPEED_CUBED, by.FASTER)
+_TURNED = (by.TURNED, by.TURNED_SQUARED, by.TURNED_CUBED, by.LEFT, by.RIGHT)
+_ROWS = (
+    (at.FLOOR, (by.SWING, by.SINCE)),
+    (at.ALONG, (by.SWING,)),
+    (at.DRAG, (*_HEADING, *_FLOOR, by.SINCE, by.DRIFT, by.SPEED_CUBED, by.FASTER, *_TURNED)),
+    (at.ANGLE, (*_TIME, by.ROUND, by.WAVE, by.BEYOND, by.SLOPE, by.SPEED, by.SPEED_SQUARED,
+                by.SIDE, by.BENT, by.DRIVEN)),
+    (at.STEER_GAIN, (*_TIME, by.ROUND, by.BEYOND, by.SPEED)),
+    (at.THROTTLE, (*_TIME, by.ROUND, by.BEYOND, by.SPEED, by.TURNED, by.LEFT, by.RIGHT,
+                   by.REVERSED)),
+    (at.TWIST, (by.SWING, by.SINCE, *_SPEED[:2], by.DRIVEN)),
+)  # fmt: skip
+
+
+@cache
+def dictionary() -> tuple[Law, ...]:
+    """Return every law that may be tried."""
+    return tuple(law_of(channel, curve) for channel, curves in _ROWS for curve in curves)

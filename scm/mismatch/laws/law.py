@@ -1,0 +1,117 @@
+"""A law: how much of what kind of push, against what it depends on; a hypothesis like any other."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from scm.mismatch.findings import Equation
+from scm.mismatch.laws.learned import PREFIX
+from scm.mismatch.library import Candidate, Knob
+
+Values = tuple[float, ...]
+ToNumbers = Callable[[Values], Mapping[str, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """Where a law acts.
+
+    Attributes:
+        word: As in `drive force against heading`.
+        response: The general effect's number whose comb asks the same of each moment.
+        knobs: How much; the first is the amount.
+        numbers: Of the general effect, from the knobs' values.
+        says: The sentence's beginning; braces take the knobs.
+        formula: Of the law; braces take the knobs, `{g}` the curve.
+        text: Of the written law, by the sum or signal it acts on; `g` is the curve.
+    """
+
+    word: str
+    response: str
+    equation: Equation
+    knobs: tuple[Knob, ...]
+    numbers: ToNumbers
+    says: str
+    formula: str
+    text: tuple["Written", ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """One law function to write.
+
+    Attributes:
+        target: `adds force_x` or `sets steer_trimmed`.
+        signals: It reads, beside the curve's.
+        returns: The expression.
+        about: What it returns.
+        suffix: Of the function's name.
+    """
+
+    target: str
+    signals: tuple[str, ...]
+    returns: str
+    about: str
+    suffix: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """What a law depends on, and how.
+
+    Attributes:
+        word: What it depends on, as reported.
+        numbers: Of the general effect, from the knobs' values.
+        grid: Values of the knobs to begin from; of a fitting size for each drive where empty.
+        text: Lines that give `g`; they read `signals`.
+    """
+
+    name: str
+    word: str
+    knobs: tuple[Knob, ...]
+    numbers: ToNumbers
+    says: str
+    formula: str
+    signals: tuple[str, ...]
+    text: str
+    equation: Equation | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Law(Candidate):
+    """A law outside the library, as a candidate like the library's.
+
+    Attributes:
+        channel: Where it acts; `curve`: what it depends on. Their knobs follow each other.
+    """
+
+    channel: Channel
+    curve: Curve
+
+    def numbers(self, values: Values) -> dict[str, float]:
+        """Return the general effect's numbers, by key, at these values of the knobs."""
+        n = len(self.channel.knobs)
+        found = {**self.curve.numbers(values[n:]), **self.channel.numbers(values[:n])}
+        return {PREFIX + name: value for name, value in found.items()}
+
+    def formula(self, values: Values) -> str:
+        """Return the law with its numbers and units."""
+        words = {
+            knob.name: f"{value:.3g}" + ("" if knob.unit == "1" else f" {knob.unit}")
+            for knob, value in zip(self.knobs, values, strict=True)
+        }
+        text = self.channel.formula.format(**words, g=self.curve.formula.format(**words))
+        return text.replace("--", "").replace("- -", "+ ").replace("+ -", "- ")
+
+
+def law_of(channel: Channel, curve: Curve) -> Law:
+    """Return the law that a channel and a curve make."""
+    return Law(
+        name=f"{channel.word} against {curve.word}",
+        equation=curve.equation or channel.equation,
+        depends_on=(curve.word,),
+        knobs=(*channel.knobs, *curve.knobs),
+        starts=(),
+        said=f"{channel.says} {curve.says}.",
+        channel=channel,
+        curve=curve,
+    )

@@ -1,0 +1,130 @@
+"""The search for a law that the library does not have: screen the dictionary, refit the best.
+
+Whatever it returns is a hypothesis like any other: the same free run, the same loss, the same price
+for its numbers and for the size of the dictionary it was chosen from.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.fit import Fitted, Fitter
+from scm.mismatch.laws.cells import AMOUNTS, Cells, Response, cells_of, respond
+from scm.mismatch.laws.dictionary import dictionary
+from scm.mismatch.laws.law import Law
+from scm.mismatch.laws.learned import THROTTLE, learned_terms
+from scm.mismatch.laws.screen import Start, polished, screen
+from scm.mismatch.likelihood import Likelihood
+
+FALSE_ALARMS = 0.01
+LISTED = 45
+REFITTED, FOLLOWED, FRESH = 12, 3, 4
+UNSURE = 15.0  # of the gain, which is a linear guess until a free run
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Sought:
+    """Laws that were tried, refitted by free run, best first.
+
+    Attributes:
+        model: With the general effect, under the noise that was believed.
+        base: What the laws were added to, in that model.
+        criteria: Of each, lower is better; comparable with `criterion` of any listed hypothesis.
+    """
+
+    model: Likelihood
+    base: Fitted
+    found: tuple[Fitted, ...]
+    criteria: tuple[float, ...]
+    cells: Cells
+    responses: dict[str, Response]
+
+
+def criterion(fitted: Fitted, events: int, listed: int = LISTED) -> float:
+    """Return Q and what its effects must gain to be believed, laws at the dictionary's price."""
+    total = fitted.q + fitted.knobs * math.log(events)
+    for effect in fitted.effects:
+        size = len(dictionary()) if isinstance(effect, Law) else listed
+        total += 2.0 * math.log(size / FALSE_ALARMS)
+    return total
+
+
+def with_laws(model: Likelihood) -> Likelihood:
+    """Return a model whose car can carry laws, under the same belief about noise."""
+    wanted = learned_terms(model.car)
+    have = {term.name for term in model.car.terms}
+    if all(term.name in have for term in wanted):
+        return model
+    able = Likelihood(model.drives, model.car.with_terms(wanted))
+    able.believe(model.noise)
+    return able
+
+
+def seek(model: Likelihood, base: Fitted, part: Floats, tell: Tell = lambda _: None) -> Sought:
+    """Return laws beside a model that was fitted, each refitted by free run.
+
+    Args:
+        model: Of the recordings.
+        base: The best listed model so far, or the car with its own numbers refitted.
+        part: Weight of each innovation, 0 or 1, (events,).
+        tell: Is told what is being tried.
+    """
+    model = with_laws(model)
+    fitter = Fitter(model, part)
+    base = _carried(base, model)
+    tell("asking what a push at each moment would explain")
+    cells = cells_of(model, fitter, base)
+    asked = [c for c in AMOUNTS if c != "throttle_add" or THROTTLE in model.car.terms]
+    responses = {channel: respond(model, fitter, base, cells, channel) for channel in asked}
+    laws = dictionary()
+    tell(f"laying {len(laws)} laws over them")
+    starts = _worth(screen(laws, cells, responses), part)
+    starts = [polished(s, cells, responses[s.law.channel.response]) for s in starts]
+    found = _refitted(fitter, base, starts, tell)
+    events = int(part.sum())
+    ranked = sorted(found, key=lambda f: criterion(f, events))
+    return Sought(
+        model, base, tuple(ranked), tuple(criterion(f, events) for f in ranked), cells, responses
+    )
+
+
+def _carried(base: Fitted, model: Likelihood) -> Fitted:
+    """Return a fit of a car without the general effect as one of a car with it."""
+    return replace(base, z=base.z.copy(), values=base.values.copy())
+
+
+def _price(law: Law, part: Floats) -> float:
+    """Return what a law must gain to be believed."""
+    size = 2.0 * math.log(len(dictionary()) / FALSE_ALARMS)
+    return len(law.knobs) * math.log(float(part.sum())) + size
+
+
+def _worth(groups: list[list[Start]], part: Floats) -> list[Start]:
+    """Return the starts worth a free run: the best of each law, and more of the best laws."""
+    groups = [g for g in groups if g and g[0].gain > _price(g[0].law, part) - UNSURE]
+    groups.sort(key=lambda g: _price(g[0].law, part) - g[0].gain)
+    firsts = [g[0] for g in groups[:REFITTED]]
+    return firsts + [start for g in groups[:FOLLOWED] for start in g[1:]]
+
+
+def _refitted(fitter: Fitter, base: Fitted, begun: list[Start], tell: Tell) -> list[Fitted]:
+    """Refit starts together; of each law the best fit stays."""
+    if not begun:
+        return []
+    tell(f"refitting {len(begun)} laws, such as {begun[0].law.name}")
+    trials = [((*base.effects, s.law), np.append(base.values, s.values)) for s in begun]
+    fits = _one_each(fitter.refine(fitter.begin(base, trials), rounds=3))
+    best = _one_each(fitter.refine(fits[:FRESH], rounds=3, fresh=True))
+    return [*best, *fits[FRESH:]]
+
+
+def _one_each(fits: list[Fitted]) -> list[Fitted]:
+    """Return the best fit of each law, best first."""
+    found = dict[int, Fitted]()
+    for fitted in sorted(fits, key=lambda f: f.q):
+        found.setdefault(id(fitted.effects[-1]), fitted)
+    return list(found.values())
