@@ -1,0 +1,54 @@
+"""Parts of recordings: disjoint, whole, in blocks that take turns."""
+
+import numpy as np
+
+from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.parts import NAMES, split
+from tests.unit.mismatch.made_drive import big_nigel, driven, healthy_model
+
+
+def lengths(spans):
+    return sum(end - start for start, end in spans)
+
+
+def test_every_innovation_is_in_exactly_one_part():
+    parts = split(healthy_model(), 1.0)
+    assert np.all(sum(getattr(parts, name).weight for name in NAMES) == 1.0)
+
+
+def test_half_of_the_time_is_to_fit_and_a_quarter_each_to_choose_and_confirm():
+    parts = split(healthy_model(), 1.0)
+    times = np.array([lengths(getattr(parts, name).spans[0]) for name in NAMES])
+    assert np.allclose(times / times.sum(), (0.5, 0.25, 0.25), atol=0.03)
+
+
+def test_weights_and_spans_say_the_same():
+    model = healthy_model()
+    parts = split(model)
+    for name in NAMES:
+        part = getattr(parts, name)
+        inside = np.zeros(len(model.t), dtype=bool)
+        for start, end in part.spans[0]:
+            inside |= (model.t >= start) & (model.t < end)
+        assert np.mean(inside == (part.weight == 1.0)) > 0.999
+
+
+def test_the_order_of_turns_changes_so_that_no_lap_falls_in_step_with_it():
+    parts = split(healthy_model(), 1.0)
+    starts = [round(start - parts.fit.spans[0][0][0]) % 4 for start, _ in parts.confirm.spans[0]]
+    assert len(set(starts)) > 2
+
+
+def test_even_a_short_drive_has_all_three_parts():
+    model = Likelihood([driven(seconds=4.0)], big_nigel())
+    parts = split(model)
+    assert all(getattr(parts, name).weight.any() for name in NAMES)
+
+
+def test_two_drives_are_split_each():
+    one = healthy_model().drives[0]
+    parts = split(Likelihood([one, one], big_nigel()), 1.0)
+    for name in NAMES:
+        first, second = getattr(parts, name).spans
+        assert abs(lengths(first) - lengths(second)) < 0.1 * lengths(first)
+        assert first != second
