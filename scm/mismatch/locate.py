@@ -22,7 +22,8 @@ BLOCK_S = 2.5
 CELLS = 8  # along the longer side of the floor
 ALARM = 0.05
 REST = 0.05  # of the gain may lie outside the places named
-MOST_TIME = 0.5  # what acts for longer acts all the time
+MOST_TIME = 0.4  # what acts for longer, or comes and goes, acts all the time
+MOST_SPANS = 3
 MOST_FLOOR = 0.35
 LEAST_SHARE = 0.03  # of a sensor in the gain, to be named
 
@@ -157,10 +158,10 @@ def _when(gain: Floats, t: Floats) -> tuple[Span, ...] | None:
     if held is None or held.mean() > MOST_TIME:
         return None
     edges = np.diff(np.concatenate(([0], held.astype(np.int64), [0])))
-    return tuple(
-        (float(cuts[a]), float(cuts[b]))
-        for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
-    )
+    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    if len(begins) > MOST_SPANS:
+        return None
+    return tuple((float(cuts[a]), float(cuts[b])) for a, b in zip(begins, ends, strict=True))
 
 
 def _where(gain: Floats, looked: _Looked) -> Place | None:
