@@ -12,7 +12,7 @@ import inspect
 import os
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +25,23 @@ from scm.vehicles.term import Term
 _MACHINE = "".join(inspect.getsource(module) for module in (jit, lanes))
 
 
+# Writing a page takes longer than most drives; the terms are kept so that their ids stay theirs.
+_COMPILED: dict[tuple[Hashable, ...], tuple[Any, tuple[Term, ...]]] = {}
+
+
 def compile_kernel(car_name: str, terms: Sequence[Term], *, plain: bool = False) -> Any:
     """Return a module with the compiled kernel of a list of terms: `advance` and `rollout`.
 
     It comes from the cache where nothing has changed. `plain` gives the reference that goes car by
     car, `advance` only.
     """
-    text = write_page(car_name, terms, plain=plain)
+    key = (car_name, plain, jit.cache_folder(), *map(id, terms))
+    if key not in _COMPILED:
+        _COMPILED[key] = _compile(write_page(car_name, terms, plain=plain)), tuple(terms)
+    return _COMPILED[key][0]
+
+
+def _compile(text: str) -> Any:
     digest = hashlib.sha256("\0".join([text, _MACHINE]).encode()).hexdigest()[:16]
     name = f"scm_kernel_{digest}"
     if name not in sys.modules:

@@ -61,17 +61,40 @@ def ramp(_car: Car) -> Experiment:
 
 def known_mass(car: Car) -> Experiment:
     """The same drive twice, once with a weight that was weighed."""
-    mass = max(round(0.1 * car.value("body.mass_kg"), 1), 0.1)
+    loaded = _load(car)
+    said = (
+        f"drive twice, first as the car is, then with a weighed {_mass(car):g} kg over its centre, "
+        f"and tell the tool the mass; both times: "
+    )
+    legs = (Leg(manoeuvres.straight_steps), Leg(manoeuvres.straight_steps, loaded))
+    return Experiment("known mass", legs, said)
+
+
+def ramp_and_mass(car: Car) -> Experiment:
+    """Up and down a known slope, without and with a known weight."""
+    alone, loaded = ramp(car), _load(car)
+    climb = alone.legs[0]
+
+    def change(numbers: Numbers, yaw: float) -> Numbers:
+        return loaded(climb.change(numbers, yaw) if climb.change else numbers, yaw)
+
+    said = alone.said + (
+        f"drive twice, first as the car is, then with a weighed {_mass(car):g} kg over its centre; "
+    )
+    return Experiment("known mass on a ramp", (climb, Leg(climb.build, change)), said)
+
+
+def _mass(car: Car) -> float:
+    return max(round(0.3 * car.value("body.mass_kg"), 1), 0.1)
+
+
+def _load(car: Car) -> Callable[[Numbers, float], Numbers]:
+    mass = _mass(car)
 
     def change(numbers: Numbers, _yaw: float) -> Numbers:
         return {**numbers, "payload.mass_kg": numbers.get("payload.mass_kg", 0.0) + mass}
 
-    said = (
-        f"drive twice, first as the car is, then with a weighed {mass:g} kg over its centre, and "
-        f"tell the tool the mass; both times: "
-    )
-    legs = (Leg(manoeuvres.straight_steps), Leg(manoeuvres.straight_steps, change))
-    return Experiment("known mass", legs, said)
+    return change
 
 
 def rotated(_car: Car) -> Experiment:
@@ -112,6 +135,7 @@ def cooled(_car: Car) -> Experiment:
 CHANGED: Mapping[str, Callable[[Car], Experiment]] = {
     "ramp": ramp,
     "known_mass": known_mass,
+    "ramp_and_mass": ramp_and_mass,
     "rotated": rotated,
     "other_wheels": other_wheels,
     "cooled": cooled,

@@ -173,16 +173,16 @@ def small_reversals(pace: Pace) -> Manoeuvre:
 
 def steer_then_go(pace: Pace) -> Manoeuvre:
     """Steering at rest, then driving off."""
-    u, s = pace.throttle, 0.9
+    u, s = pace.throttle, 0.7
     on = min(2.0, 2.0 * pace.turn_m / max(pace.speed(pace.throttle), 1e-3))
     pieces = list[Piece]()
     for side in (s, -s):
         for way in (u, -u):
             gently = [(0.2, round(share * way, 3), side) for share in (0.2, 0.4, 0.6, 0.8)]
-            pieces += [(1.5, 0.0, side), *gently, (on, way, side)]
+            pieces += [(1.5, 0.0, side), *gently, (on, way, side), *reversed(gently)]
     said = (
-        f"standing, steer {s:g} to the left, wait 1.5 s, raise the throttle to {u:.2f} within a "
-        f"second and drive for {on:.2g} s, stop, drive back as long, then the same to the right"
+        f"standing, steer {s:g} to the left, wait 1.5 s, raise the throttle to {u:.2f} in a "
+        f"second, drive for {on:.2g} s, stop as gently, drive back, then the same to the right"
     )
     return Manoeuvre("steer at rest, then go", _again(pieces), said)
 

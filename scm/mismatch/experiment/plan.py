@@ -71,12 +71,12 @@ class Placed:
         return self.leg.change(numbers, self.start.yaw) if self.leg.change else numbers
 
 
-def numbers_of(rival: Rival) -> dict[str, float]:
-    """Return a rival's numbers by key, ordinary ones left at the file's."""
+def numbers_of(effects: Sequence[Candidate], values: Floats) -> dict[str, float]:
+    """Return the numbers of effects by key, ordinary ones left at the file's."""
     found, at = dict[str, float](), 0
-    for effect in rival.effects:
+    for effect in effects:
         n = len(effect.knobs)
-        found |= effect.numbers(tuple(rival.values[at : at + n]))
+        found |= effect.numbers(tuple(values[at : at + n]))
         at += n
     return found
 

@@ -5,39 +5,53 @@ its own numbers and the car's ordinary ones refitted (T-optimality); its root is
 deviations. Below 10 nobody can tell, from 25 on anybody.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.experiment.plan import Planned, Rival, numbers_of
-from scm.mismatch.fit import SMALL, TAIL, Fitted, Fitter
+from scm.mismatch.fit import FARTHEST, SMALL, TAIL, Fitted, Fitter
 from scm.mismatch.library import Knob
+from scm.mismatch.likelihood import Ordinary
 
 ROUNDS = 3
 
 
-def quick(planned: Planned, rivals: Sequence[Rival]) -> Floats:
-    """Return lambda of each rival (column) where another (row) is right, by one linear refit.
+@dataclass(frozen=True, slots=True)
+class Apart:
+    """How far rivals come apart, and with which numbers the wrong ones come nearest.
+
+    Attributes:
+        lambdas: Of the column's rival where the row's is right, (rivals, rivals).
+        z: The car's ordinary numbers then, (rivals, rivals, numbers).
+        values: Of the rival's effects, one array a pair.
+    """
+
+    lambdas: Floats
+    z: Floats
+    values: tuple[tuple[Floats, ...], ...]
+
+    @property
+    def least(self) -> float:
+        """Lambda of the pair that comes apart least, whichever of them is right."""
+        off = ~np.eye(len(self.lambdas), dtype=np.bool_)
+        return float(self.lambdas[off].min())
+
+
+def quick(planned: Planned, rivals: Sequence[Rival]) -> Apart:
+    """Return how far rivals come apart by one linear refit of each.
 
     Args:
         planned: Of the first rival's motion.
         rivals: All of them.
     """
     own, knobs = planned.ordinary, [_knobs(r) for r in rivals]
-    bases = [numbers_of(r) for r in rivals]
-    sets = [*bases]
-    sides = [-SMALL if o.mean + SMALL * o.std > o.bounds[1] else SMALL for o in own]
-    for o, side in zip(own, sides, strict=True):
-        sets.append({**bases[0], o.key: o.mean + side * o.std})
-    for rival, mine in zip(rivals, knobs, strict=True):
-        for k, knob in enumerate(mine):
-            sets.append(numbers_of(_moved(rival, k, _step(knob, float(rival.values[k])))))
-    e, _ = planned(sets)
-    e = np.nan_to_num(e)
-    n, at = len(rivals), len(rivals) + len(own)
-    common = (e[:, n:at] - e[:, :1]) / np.array(sides)
-    found = np.zeros((n, n))
+    n, e = len(rivals), np.nan_to_num(planned(_sets(planned, rivals))[0])
+    common = (e[:, n : n + len(own)] - e[:, :1]) / np.array([_side(o) for o in own])
+    lambdas, z, at = np.zeros((n, n)), np.zeros((n, n, len(own))), n + len(own)
+    values = list[list[Floats]]()
     for j, mine in enumerate(knobs):
         slopes = e[:, at : at + len(mine)] - e[:, j : j + 1]
         at += len(mine)
@@ -46,41 +60,48 @@ def quick(planned: Planned, rivals: Sequence[Rival]) -> Floats:
         normal = jacobian.T @ jacobian + np.diag(prior)
         gaps = e[:, j : j + 1] - e[:, :n]
         moves = -np.linalg.lstsq(normal, jacobian.T @ gaps, rcond=1e-12)[0]
-        left = gaps + jacobian @ moves
-        found[:, j] = _loss(left) + prior @ (moves * moves)
-        found[j, j] = 0.0
-    return found
+        lambdas[:, j] = _loss(gaps + jacobian @ moves) + prior @ (moves * moves)
+        z[:, j] = np.clip(moves[: len(own)].T, -FARTHEST, FARTHEST)
+        values.append([_moved(rivals[j], mine, move) for move in moves[len(own) :].T])
+    np.fill_diagonal(lambdas, 0.0)
+    return Apart(lambdas, z, tuple(zip(*values, strict=True)))
 
 
-def exact(planned: Planned, right: int, rivals: Sequence[Rival]) -> Floats:
-    """Return lambda of each rival where one is right, refitted with all that is not linear.
+def exact(plan: Callable[[Rival], Planned], rivals: Sequence[Rival], start: Apart) -> Apart:
+    """Return how far rivals come apart when each is refitted with all that is not linear.
 
     Args:
-        planned: Of the motion of the one that is right.
-        right: Which.
+        plan: Gives the recordings that a right rival would leave.
         rivals: All of them.
+        start: From the linear refit; what it could explain counts as explained.
     """
-    fitter = Fitter(planned, np.ones(len(planned.t)))
-    zeros = np.zeros(len(planned.ordinary))
-    others = [k for k in range(len(rivals)) if k != right]
-    fits = [
-        Fitted(
-            rivals[k].effects, zeros.copy(), np.array(rivals[k].values), np.zeros(0), 0.0,
-            np.zeros((0, 0)),
-        )
-        for k in others
-    ]  # fmt: skip
-    fitter.refine(fits, ROUNDS, fresh=True)
-    found = np.zeros(len(rivals))
-    for k, fitted in zip(others, fits, strict=True):
-        found[k] = fitted.q
-    return found
+    lambdas = start.lambdas.copy()
+    for i, right in enumerate(rivals):
+        planned = plan(right)
+        others = [j for j in range(len(rivals)) if j != i]
+        none = np.zeros(0)
+        fits = [
+            Fitted(rivals[j].effects, start.z[i, j].copy(), start.values[i][j].copy(), none, 0.0,
+                   np.zeros((0, 0)))
+            for j in others
+        ]  # fmt: skip
+        Fitter(planned, np.ones(len(planned.t))).refine(fits, ROUNDS, fresh=True)
+        for j, fitted in zip(others, fits, strict=True):
+            lambdas[i, j] = min(lambdas[i, j], fitted.q)
+    return Apart(lambdas, start.z, start.values)
 
 
-def least(lambdas: Floats) -> float:
-    """Return the lambda of the pair that comes apart least, whichever of them is right."""
-    n = len(lambdas)
-    return float(min(lambdas[i, j] for i in range(n) for j in range(n) if i != j))
+def _sets(planned: Planned, rivals: Sequence[Rival]) -> list[dict[str, float]]:
+    """Return each rival's numbers, then small steps of the car's own, then of every knob."""
+    bases = [numbers_of(r.effects, r.values) for r in rivals]
+    sets = list(bases)
+    sets += [{**bases[0], o.key: o.mean + _side(o) * o.std} for o in planned.ordinary]
+    for rival in rivals:
+        for k, knob in enumerate(_knobs(rival)):
+            values = np.array(rival.values, dtype=np.float64)
+            values[k] += _step(knob, values[k])
+            sets.append(numbers_of(rival.effects, values))
+    return sets
 
 
 def _loss(e: Floats) -> Floats:
@@ -91,18 +112,20 @@ def _knobs(rival: Rival) -> list[Knob]:
     return [knob for effect in rival.effects for knob in effect.knobs]
 
 
+def _side(ordinary: Ordinary) -> float:
+    """Return a small step of an ordinary number that stays within its bounds."""
+    o = ordinary
+    return -SMALL if o.mean + SMALL * o.std > o.bounds[1] else SMALL
+
+
 def _step(knob: Knob, value: float) -> float:
     return -0.5 * knob.step if value + 0.5 * knob.step > knob.bounds[1] else 0.5 * knob.step
 
 
-def _moved(rival: Rival, k: int, step: float) -> "_Moved":
+def _moved(rival: Rival, knobs: Sequence[Knob], move: Floats) -> Floats:
+    """Return a rival's values moved by so many of the small steps, within their bounds."""
     values = np.array(rival.values, dtype=np.float64)
-    values[k] += step
-    return _Moved(rival, values)
-
-
-class _Moved:
-    """A rival with other numbers."""
-
-    def __init__(self, rival: Rival, values: Floats) -> None:
-        self.effects, self.values = rival.effects, values
+    for k, knob in enumerate(knobs):
+        values[k] += move[k] * _step(knob, values[k])
+        values[k] = min(max(values[k], knob.bounds[0]), knob.bounds[1])
+    return values
