@@ -171,12 +171,12 @@ SIDE = Curve(
 LEFT = Curve(
     "left", "steering sign", (), _fixed(by_steer=1.0, ramp=1.0),
     "for each radian to the left", "max(wheel angle, 0) / 1 rad", ("linkage_angle",),
-    "g = max(linkage_angle, 0.0)",
+    "g = max(linkage_angle, 0.0)", rare=2.0,
 )  # fmt: skip
 RIGHT = Curve(
     "right", "steering sign", (), _fixed(by_steer=-1.0, ramp=1.0),
     "for each radian to the right", "max(-wheel angle, 0) / 1 rad", ("linkage_angle",),
-    "g = max(-linkage_angle, 0.0)",
+    "g = max(-linkage_angle, 0.0)", rare=2.0,
 )  # fmt: skip
 BENT = Curve(
     "bent", "steering angle", (), _fixed(by_steer=1.0, cube=1.0),

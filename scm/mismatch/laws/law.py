@@ -61,8 +61,8 @@ class Curve:
     Attributes:
         word: What it depends on, as reported.
         numbers: Of the general effect, from the knobs' values.
-        grid: Values of the knobs to begin from; of a fitting size for each drive where empty.
-        text: Lines that give `g`; they read `signals`.
+        text: Line that gives `g` from `signals` and the knobs.
+        rare: What it must gain beyond others: it looks like something simpler.
     """
 
     name: str
@@ -74,6 +74,7 @@ class Curve:
     signals: tuple[str, ...]
     text: str
     equation: Equation | None = None
+    rare: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,6 +113,7 @@ def law_of(channel: Channel, curve: Curve) -> Law:
         knobs=(*channel.knobs, *curve.knobs),
         starts=(),
         said=f"{channel.says} {curve.says}.",
+        rare=curve.rare,
         channel=channel,
         curve=curve,
     )

@@ -14,7 +14,7 @@ def pushes(law: Law, cells: Cells, values: Values) -> Floats:
     """Return a law's force, angle, throttle or moment at each moment, (cells,)."""
     n = len(law.channel.knobs)
     curve, channel = law.curve.numbers(values[n:]), law.channel.numbers(values[:n])
-    return shape(curve, cells) * _amount(channel, cells)
+    return shape(curve, cells) * amount(channel, cells)
 
 
 def shape(curve: Mapping[str, float], cells: Cells) -> Floats:
@@ -32,7 +32,7 @@ def shape(curve: Mapping[str, float], cells: Cells) -> Floats:
     return sum((curve[k] * part for k, part in parts.items() if k in curve), np.zeros(len(q)))
 
 
-def _amount(channel: Mapping[str, float], cells: Cells) -> Floats:
+def amount(channel: Mapping[str, float], cells: Cells) -> Floats:
     """Return what the shape is multiplied with at each moment, (cells,)."""
     driven = cells.driven
     speed = driven["speed"] / SLOW

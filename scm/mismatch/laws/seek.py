@@ -49,7 +49,7 @@ def criterion(fitted: Fitted, events: int, listed: int = LISTED) -> float:
     total = fitted.q + fitted.knobs * math.log(events)
     for effect in fitted.effects:
         size = len(dictionary()) if isinstance(effect, Law) else listed
-        total += 2.0 * math.log(size / FALSE_ALARMS)
+        total += effect.rare + 2.0 * math.log(size / FALSE_ALARMS)
     return total
 
 
@@ -100,7 +100,7 @@ def _carried(base: Fitted, model: Likelihood) -> Fitted:
 def _price(law: Law, part: Floats) -> float:
     """Return what a law must gain to be believed."""
     size = 2.0 * math.log(len(dictionary()) / FALSE_ALARMS)
-    return len(law.knobs) * math.log(float(part.sum())) + size
+    return law.rare + len(law.knobs) * math.log(float(part.sum())) + size
 
 
 def _worth(groups: list[list[Start]], part: Floats) -> list[Start]:
