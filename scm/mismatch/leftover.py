@@ -2,7 +2,8 @@
 
 From a few tenths of a second apart the car is driven on from its measured motion for as long again.
 What its speed then lacks, over what a known push would have added to it, is the force left over;
-the same with its turning and an angle of the wheels.
+the same with its turning and an angle of the wheels. Faults of the camera that were found are taken
+out of the measured motion of both cars: a sensor's fault is no force.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,6 +24,7 @@ EVERY_S = 0.2
 WIDTH_S = 0.4  # of the smoothing, one standard deviation
 LEAN, ANGLE_RAD = 0.02, 0.02  # pushes that measure the response: force over weight, wheel angle
 GRAVITY = 9.80665
+LEAST_BAND = 0.5  # of what noise alone is thought to make
 UNSURE = 4.0  # times the usual standard deviation: the car stands, nothing is known
 FORCE, ANGLE = ("drive force", "N"), ("wheel angle", "rad")
 MOVED = ("speed", "yaw_rate")
@@ -52,33 +54,40 @@ def leftover(
         after: Of the car as found.
     """
     tracks = [_track(drive, car, before, after) for drive in drives]
-    starts = np.concatenate(([0.0], np.cumsum([t.t[-1] - t.t[0] + EVERY_S for t in tracks])[:-1]))
-    later = [start + tracks[0].t[0] - t.t[0] for start, t in zip(starts, tracks, strict=True)]
-    t = np.concatenate([one.t + late for one, late in zip(tracks, later, strict=True)])
+    t = one_after_another([one.t for one in tracks], EVERY_S)
     x, y = (np.concatenate([getattr(one, n) for one in tracks]) for n in ("x", "y"))
     residuals = []
     for key in (FORCE, ANGLE):
         sides = [np.concatenate([one.found[key][i] for one in tracks]) for i in range(3)]
         residuals.append(
             Residual(channel=key[0], unit=key[1], t_s=t, x_m=x, y_m=y,
-                     before=sides[0], after=sides[1], std=_honest(sides[1], sides[2]))
+                     before=sides[0], after=sides[1], std=honest(sides[1], sides[2]))
         )  # fmt: skip
     return tuple(residuals)
 
 
-def _honest(after: Floats, std: Floats) -> Floats:
-    """Return a band that what is left after all is known does not leave more often than it may."""
-    known = np.isfinite(after)
+def one_after_another(times: Sequence[Floats], apart_s: float) -> Floats:
+    """Return times of several drives, each moved to follow the one before; the first stays."""
+    found = [times[0]]
+    for t in times[1:]:
+        found.append(t - t[0] + found[-1][-1] + apart_s)
+    return np.concatenate(found)
+
+
+def honest(after: Floats, std: Floats) -> Floats:
+    """Return a band that what is left after all is known leaves as often as it may."""
+    known = np.isfinite(after) & np.isfinite(std)
     if not known.any():
         return std
-    return np.asarray(std * max(1.0, float(np.percentile(np.abs(after / std)[known], 90)) / 1.645))
+    spread = float(np.percentile(np.abs(after / std)[known], 90)) / 1.645
+    return np.asarray(std * max(LEAST_BAND, spread))
 
 
 def _track(drive: Drive, car: Car, before: Numbers, after: Numbers) -> _Track:
     force = LEAN * GRAVITY * car.value("body.mass_kg")
     camera = Camera(drive, after)
     sides = [
-        Side(before, Camera(drive, before)),
+        Side(before, camera),
         Side(after, camera),
         Side(after, camera, like=1, push=(force, 0.0)),
         Side(after, camera, like=1, push=(0.0, ANGLE_RAD)),

@@ -12,11 +12,13 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.mismatch.evidence import Residual
-from scm.mismatch.findings import Located, Place, Span
+from scm.mismatch.findings import Equation, Located, Place, Span
 from scm.mismatch.fit import TAIL, Fitted, Fitter
 from scm.mismatch.leftover import leftover
 from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.predict import NEUTRAL
+from scm.mismatch.sensed import sensed
 
 BLOCK_S = 2.5
 CELLS = 8  # along the longer side of the floor
@@ -26,6 +28,10 @@ MOST_TIME = 0.4  # what acts for longer, or comes and goes, acts all the time
 MOST_SPANS = 3
 MOST_FLOOR = 0.35
 LEAST_SHARE = 0.03  # of a sensor in the gain, to be named
+_OWN = {  # sensors by the keys of their faults
+    "measure.gyro": "imu.gyro", "measure.accel": "imu.accel", "measure.imu": "imu.accel",
+    "measure.encoder": "encoder.", "wheel.radius": "encoder.", "measure.": "pose.",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +67,16 @@ def locate(
         for (effect, values), gain in zip(_each(best), gains, strict=True)
         if gain.sum() > chance(1)
     ]
+    shown = [name for one in located if one.equation is Equation.SENSOR for name in one.channels]
+    faults = {key for effect in best.effects for key in _faults(effect)}
+    if shown and faults:
+        residuals = (*sensed(model, numbers, faults, shown), *residuals)
     return tuple(sorted(located, key=lambda one: -one.share_of_error)), residuals
+
+
+def _faults(effect: Candidate) -> Iterator[str]:
+    """Yield the keys of an effect's own faults of measurement."""
+    yield from (knob.key for knob in effect.knobs if knob.key in NEUTRAL)
 
 
 def chance(places: int) -> float:
@@ -124,7 +139,7 @@ def _located(
     when, where = _when(gain, looked.t), _named(effect, values) or _where(gain, looked)
     return Located(
         equation=effect.equation,
-        channels=_channels(gain, looked),
+        channels=_channels(effect, gain, looked),
         depends_on=effect.depends_on,
         when_s=when,
         where=where,
@@ -132,9 +147,21 @@ def _located(
     )
 
 
-def _channels(gain: Floats, looked: _Looked) -> tuple[str, ...]:
-    """Return the sensors that show an effect, most telling first."""
+def _channels(effect: Candidate, gain: Floats, looked: _Looked) -> tuple[str, ...]:
+    """Return the sensors that show an effect, most telling first.
+
+    A filter that weighs sensors against each other blames whichever comes later; a fault of
+    measurement is that of its own sensor.
+    """
     per = np.bincount(looked.stream, weights=gain, minlength=len(looked.names))
+    order = [looked.names[i] for i in np.argsort(-per)]
+    own = tuple(
+        next((start for key, start in _OWN.items() if knob.key.startswith(key)), "")
+        for knob in effect.knobs
+    )
+    own = tuple(start for start in own if start and any(n.startswith(start) for n in order))
+    if own:
+        return tuple(name for name in order if name.startswith(own))
     least = max(chance(len(per)), LEAST_SHARE * float(gain.sum()))
     return tuple(looked.names[i] for i in np.argsort(-per) if per[i] > least)
 

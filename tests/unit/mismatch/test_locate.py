@@ -1,0 +1,133 @@
+"""Where an error lies: by sensor, in time, on the floor; what is left over; effects as curves."""
+
+import numpy as np
+import pytest
+
+from scm.mismatch.curves import curve
+from scm.mismatch.findings import Equation
+from scm.mismatch.leftover import honest, leftover, one_after_another
+from scm.mismatch.locate import chance, locate
+from tests.unit.mismatch import made_fit
+from tests.unit.mismatch.made_drive import big_nigel, driven
+
+
+def rms(values):
+    return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def by_channel(residuals):
+    return {residual.channel: residual for residual in residuals}
+
+
+def test_nothing_is_located_where_nothing_was_found():
+    located, residuals = locate(*made_fit.healthy())
+    assert located == ()
+    assert {r.channel for r in residuals} == {"drive force", "wheel angle"}
+
+
+def test_an_effect_that_acts_all_the_time_has_neither_time_nor_place():
+    (found,), _ = locate(*made_fit.trimmed())
+    assert (found.when_s, found.where) == (None, None)
+    assert found.equation is Equation.STEERING
+    assert found.share_of_error == pytest.approx(1.0)
+
+
+def test_the_sensors_that_show_an_effect_are_named():
+    (found,), _ = locate(*made_fit.trimmed())
+    assert "imu.gyro_z" in found.channels
+    (found,), _ = locate(*made_fit.biased())
+    assert found.channels == ("imu.gyro_z",)
+
+
+def test_a_spot_of_floor_is_located_where_it_is():
+    (found,), _ = locate(*made_fit.patched())
+    assert found.equation is Equation.SURFACE
+    assert found.where.x_m[0] < 0.0 < found.where.x_m[1]
+    assert found.where.y_m[0] < 0.0 < found.where.y_m[1]
+
+
+def test_what_lasts_for_a_part_of_the_drive_is_located_in_time():
+    model, retuned, best = made_fit.patched()
+    (found,), _ = locate(model, retuned, best)
+    drive = model.drives[0]
+    near = [np.hypot(drive.smoothed["pose.x"].at(np.array([t])), drive.smoothed["pose.y"].at(
+        np.array([t])))[0] for span in found.when_s for t in span]  # fmt: skip
+    assert min(near) < 0.6
+    assert sum(b - a for a, b in found.when_s) < 0.5 * (drive.edges[-1] - drive.edges[0])
+
+
+def test_two_effects_share_the_error():
+    located, _ = locate(*made_fit.both())
+    assert {found.equation for found in located} == {Equation.STEERING, Equation.SENSOR}
+    assert sum(found.share_of_error for found in located) == pytest.approx(1.0)
+    assert located[0].share_of_error >= located[1].share_of_error
+
+
+def test_more_places_looked_at_need_more_gain():
+    assert chance(100) == pytest.approx(chance(1) + 2.0 * np.log(100))
+
+
+def test_the_angle_left_over_is_the_one_that_the_wheels_stand_off_by():
+    drive = driven((("steering.trim_rad", 0.05),))
+    residuals = by_channel(leftover([drive], big_nigel(), {}, {"steering.trim_rad": 0.05}))
+    assert np.nanmedian(residuals["wheel angle"].before) == pytest.approx(0.05, rel=0.2)
+    assert rms(residuals["wheel angle"].after) < 0.01
+    assert rms(residuals["drive force"].before) < 3.0 * rms(residuals["drive force"].std)
+
+
+def test_the_force_left_over_is_the_one_that_acted():
+    (knob,) = made_fit.candidate("viscous_drag").knobs
+    brake = {knob.key: 4.0}
+    drive = driven(tuple(brake.items()))
+    residual = by_channel(leftover([drive], big_nigel(), {}, brake))["drive force"]
+    x, y = drive.smoothed["pose.x"], drive.smoothed["pose.y"]
+    speed = np.interp(residual.t_s, x.t, np.hypot(x.rate, y.rate))
+    acted, sure = -4.0 * speed, np.isfinite(residual.before)
+    assert np.median(residual.before[sure] - acted[sure]) == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_healthy_car_stays_within_the_band():
+    for residual in leftover([driven()], big_nigel(), {}, {}):
+        inside = np.abs(residual.before) < 1.645 * residual.std
+        assert np.mean(inside[np.isfinite(residual.before)]) > 0.85
+
+
+def test_a_band_is_never_narrower_than_what_is_left():
+    after = np.full(50, 3.0)
+    assert honest(after, np.ones(50))[0] == pytest.approx(3.0 / 1.645)
+    assert honest(0.0 * after, np.ones(50))[0] == pytest.approx(0.5)
+
+
+def test_a_sensor_s_fault_is_drawn_as_what_the_sensor_reads_too_much():
+    _, residuals = locate(*made_fit.biased())
+    gyro = residuals[0]
+    assert (gyro.channel, gyro.unit) == ("gyro", "rad/s")
+    assert np.nanmean(gyro.before) == pytest.approx(0.05, abs=0.01)
+    assert abs(np.nanmean(gyro.after)) < 0.005
+
+
+def test_drives_follow_one_another_in_time():
+    t = one_after_another([np.array([3.0, 4.0]), np.array([100.0, 101.0])], 0.5)
+    assert t.tolist() == [3.0, 4.0, 4.5, 5.5]
+
+
+def test_a_trim_is_a_level_curve_at_its_angle():
+    model, _, best = made_fit.trimmed()
+    found = curve(model, best, best.effects[0])
+    assert (found.x_name, found.y_name, found.y_unit) == ("speed", "wheel angle", "rad")
+    assert np.allclose(found.y, best.values[0], rtol=0.3)
+    assert np.all((found.low <= found.y) & (found.y <= found.high))
+
+
+def test_a_gyro_s_bias_is_a_curve_over_the_turning_seen():
+    model, _, best = made_fit.biased()
+    found = curve(model, best, best.effects[0])
+    assert found.x_name == "yaw rate"
+    assert np.allclose(found.y, best.values[0])
+    assert np.all(found.low < 0.05 + 0.01)
+    assert np.all(found.high > 0.05 - 0.01)
+
+
+def test_an_effect_that_no_curve_would_tell_has_none():
+    model, _, best = made_fit.biased()
+    assert curve(model, best, made_fit.candidate("pose_latency")) is None
