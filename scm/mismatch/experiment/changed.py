@@ -10,12 +10,15 @@ from dataclasses import dataclass, replace
 from scm.mismatch.experiment import manoeuvres
 from scm.mismatch.experiment.manoeuvres import Manoeuvre
 from scm.mismatch.experiment.pace import Pace
-from scm.mismatch.experiment.plan import Leg, Numbers
+from scm.mismatch.experiment.plan import Change, Leg, Numbers
 from scm.vehicles.car import Car
 
-SLOPE = 0.1
+SLOPE, GENTLE = 0.1, 0.05
 RAMP_M = 2.0
 COOLING_S = 180.0  # a motor's heat is 95 % gone
+HEADED = ("grade.slope", "wind.force_x_n", "surface_patch.x_m", "measure.pose_scale",
+          "measure.camera_tilt_x_per_m")  # fmt: skip
+HEATED = ("drive.fade", "drive.sag_per_min")
 WHEELS = ("wheel.radius_m", "tyre_stiffness.scale", "tyre_grip.scale", "tyre_relaxation.length_m")
 
 
@@ -25,7 +28,7 @@ class Experiment:
 
     Attributes:
         said: Before the sentence of the drive itself.
-        asks: Key of an effect's number without which the experiment makes no sense; empty: none.
+        asks: Keys of numbers of which a rival must have one; empty: it makes sense for all.
     """
 
     name: str
@@ -41,22 +44,37 @@ def drive_alone(build: Callable[[Pace], Manoeuvre], name: str) -> Experiment:
 
 def ramp(_car: Car) -> Experiment:
     """Up and down a slope that is known."""
-
-    def build(pace: Pace) -> Manoeuvre:
-        short = replace(pace, run_m=min(pace.run_m, RAMP_M))
-        return replace(manoeuvres.straight_steps(short), name="throttle steps on a ramp")
-
-    def change(numbers: Numbers, yaw: float) -> Numbers:
-        slope, up = numbers.get("grade.slope", 0.0), numbers.get("grade.uphill_rad", 0.0)
-        x = slope * math.cos(up) + SLOPE * math.cos(yaw)
-        y = slope * math.sin(up) + SLOPE * math.sin(yaw)
-        return {**numbers, "grade.slope": math.hypot(x, y), "grade.uphill_rad": math.atan2(y, x)}
-
     said = (
         f"lay a ramp that rises {100.0 * SLOPE:g} cm a metre and tell the tool its slope "
         f"(grade.slope = {SLOPE:g}); up and down that ramp: "
     )
-    return Experiment("ramp", (Leg(build, change),), said)
+    return Experiment("ramp", (Leg(_climb, _tilted(SLOPE)),), said)
+
+
+def slope(_car: Car) -> Experiment:
+    """Circles on a slope that is known, for cars that roll when they stop."""
+    said = (
+        f"take the car to an even slope that rises {100.0 * GENTLE:g} cm a metre and tell the tool "
+        f"(grade.slope = {GENTLE:g}); on that slope, starting uphill: "
+    )
+    return Experiment("slope", (Leg(manoeuvres.circles, _tilted(GENTLE)),), said)
+
+
+def _climb(pace: Pace) -> Manoeuvre:
+    short = replace(pace, run_m=min(pace.run_m, RAMP_M))
+    return replace(manoeuvres.straight_steps(short), name="throttle steps on a ramp")
+
+
+def _tilted(rise: float) -> Change:
+    """Return the change to a floor that rises along the heading in which a leg starts."""
+
+    def change(numbers: Numbers, yaw: float) -> Numbers:
+        steep, up = numbers.get("grade.slope", 0.0), numbers.get("grade.uphill_rad", 0.0)
+        x = steep * math.cos(up) + rise * math.cos(yaw)
+        y = steep * math.sin(up) + rise * math.sin(yaw)
+        return {**numbers, "grade.slope": math.hypot(x, y), "grade.uphill_rad": math.atan2(y, x)}
+
+    return change
 
 
 def known_mass(car: Car) -> Experiment:
@@ -72,23 +90,22 @@ def known_mass(car: Car) -> Experiment:
 
 def ramp_and_mass(car: Car) -> Experiment:
     """Up and down a known slope, without and with a known weight."""
-    alone, loaded = ramp(car), _load(car)
-    climb = alone.legs[0]
+    alone, loaded, tilted = ramp(car), _load(car), _tilted(SLOPE)
 
     def change(numbers: Numbers, yaw: float) -> Numbers:
-        return loaded(climb.change(numbers, yaw) if climb.change else numbers, yaw)
+        return loaded(tilted(numbers, yaw), yaw)
 
     said = alone.said + (
         f"drive twice, first as the car is, then with a weighed {_mass(car):g} kg over its centre; "
     )
-    return Experiment("known mass on a ramp", (climb, Leg(climb.build, change)), said)
+    return Experiment("known mass on a ramp", (*alone.legs, Leg(_climb, change)), said)
 
 
 def _mass(car: Car) -> float:
     return max(round(0.3 * car.value("body.mass_kg"), 1), 0.1)
 
 
-def _load(car: Car) -> Callable[[Numbers, float], Numbers]:
+def _load(car: Car) -> Change:
     mass = _mass(car)
 
     def change(numbers: Numbers, _yaw: float) -> Numbers:
@@ -101,7 +118,7 @@ def rotated(_car: Car) -> Experiment:
     """The same drive along the floor and across it."""
     said = "drive the same course twice, the second time turned by 90 degrees on the floor: "
     legs = (Leg(manoeuvres.shuttle), Leg(manoeuvres.shuttle, turned=True))
-    return Experiment("rotated course", legs, said)
+    return Experiment("rotated course", legs, said, HEADED)
 
 
 def other_wheels(car: Car) -> Experiment:
@@ -129,11 +146,12 @@ def cooled(_car: Car) -> Experiment:
             (before, drive, (COOLING_S, 0.0, 0.0), again, after), said,
         )  # fmt: skip
 
-    return Experiment("rest", (Leg(build),))
+    return Experiment("rest", (Leg(build),), "", HEATED)
 
 
 CHANGED: Mapping[str, Callable[[Car], Experiment]] = {
     "ramp": ramp,
+    "slope": slope,
     "known_mass": known_mass,
     "ramp_and_mass": ramp_and_mass,
     "rotated": rotated,

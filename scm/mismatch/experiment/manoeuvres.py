@@ -124,27 +124,35 @@ def _circle(pace: Pace, share: float = 0.7) -> float:
     return round(max(pace.steering(max(share * pace.turn_m, pace.tightest_m)), 0.1), 2)
 
 
+def _laps(pace: Pace, throttle: float, steering: float, about_s: float = 8.0) -> float:
+    """Return how long whole laps take, as many as fill about so long [s]."""
+    lap = 2.0 * math.pi * pace.radius(steering) / max(pace.speed(throttle), 1e-3)
+    return round(max(round(about_s / lap), 1) * lap / ROW_S) * ROW_S
+
+
 def circles(pace: Pace) -> Manoeuvre:
     """Circles left and right, slow and fast."""
     u, s = pace.throttle, _circle(pace)
     slow = round(0.5 * u, 2)
+    slowly, fast = _laps(pace, slow, s), _laps(pace, u, s)
     said = (
-        f"circles of {pace.radius(s):.2g} m radius (steering {s:.2f}): 8 s left at throttle "
-        f"{slow:.2f}, 8 s left at {u:.2f}, then the same to the right"
+        f"circles of {pace.radius(s):.2g} m radius (steering {s:.2f}): {slowly:.2g} s left at "
+        f"throttle {slow:.2f}, {fast:.2g} s left at {u:.2f}, then the same to the right"
     )
-    pieces = [(8.0, slow, s), (8.0, u, s), (8.0, slow, -s), (8.0, u, -s)]
+    pieces = [(slowly, slow, s), (fast, u, s), (slowly, slow, -s), (fast, u, -s)]
     return Manoeuvre("circles at two speeds", _again(pieces), said)
 
 
 def steering_steps(pace: Pace) -> Manoeuvre:
     """Steering that steps from side to side at speed."""
     u, s = round(0.8 * pace.throttle, 2), _circle(pace, 0.5)
+    t = min(0.5 * pace.lasts(u), 4.0)
     said = (
-        f"at throttle {u:.2f} steer {s:.2f} left for 2 s, {s:.2f} right for 2 s, and so on for "
-        f"half a minute"
+        f"at throttle {u:.2f} steer {s:.2f} left for {0.5 * t:.2g} s, right for {t:.2g} s, left "
+        f"for {0.5 * t:.2g} s, stop, the same backwards, and so on for half a minute"
     )
-    pieces = [(1.0, u, s), (2.0, u, -s), (1.0, u, s)]
-    return Manoeuvre("steering from side to side", _again(pieces), said)
+    run = [(0.5 * t, u, s), (t, u, -s), (0.5 * t, u, s)]
+    return Manoeuvre("steering from side to side", _again(_there_and_back(run)), said)
 
 
 def slalom(pace: Pace) -> Manoeuvre:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -14,9 +13,9 @@ from scm.mismatch.experiment.manoeuvres import ROW_S, Manoeuvre
 from scm.mismatch.experiment.pace import SIDEWAYS_M_S2, Pace
 from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.noise import Noise
 from scm.mismatch.predict import Prediction
 from scm.mismatch.rollouts import Rollouts
-from scm.mismatch.whiten import Noise
 from scm.recording.read import Channel, Recording
 from scm.replay import FULL_SPEED
 from scm.vehicles.car import Car
@@ -28,18 +27,12 @@ Change = Callable[[Numbers, float], Numbers]
 """Turns a car's numbers into those on a changed experiment that starts with some heading [rad]."""
 
 
-class Rival(Protocol):
-    """An explanation: effects with values; a `Fitted` is one."""
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """An explanation: effects with their numbers, in the order of their knobs."""
 
-    @property
-    def effects(self) -> tuple[Candidate, ...]:
-        """What is missing in the car."""
-        ...
-
-    @property
-    def values(self) -> Floats:
-        """The effects' numbers, in the order of their knobs."""
-        ...
+    effects: tuple[Candidate, ...]
+    values: Floats
 
 
 @dataclass(frozen=True, slots=True)
