@@ -1,6 +1,8 @@
 """A whole diagnosis: read, doubt, fit, search, judge, say."""
 
 import math
+import shutil
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +14,9 @@ from scm.errors import RecordingError
 from scm.mismatch.doubt.corrected import corrected
 from scm.mismatch.doubt.doubt import doubt
 from scm.mismatch.drive import Drive
+from scm.mismatch.evidence import Evidence, Ordinary, Tried
+from scm.mismatch.experiment.plan import Rival as Contender
+from scm.mismatch.experiment.suggest import suggest
 from scm.mismatch.findings import (
     DataProblem,
     Diagnosis,
@@ -22,9 +27,14 @@ from scm.mismatch.findings import (
     Verdict,
 )
 from scm.mismatch.fit import Fitted
+from scm.mismatch.judge import judge
 from scm.mismatch.library import Candidate, candidates, shown_by, terms_needed
 from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.search import Search
+from scm.mismatch.locate import locate
+from scm.mismatch.parts import split
+from scm.mismatch.report.car_file import write_car
+from scm.mismatch.report.write import write_report
+from scm.mismatch.search import Search, price
 from scm.recording.read import Recording, read_recordings
 from scm.vehicles.car import Car, load_car
 
@@ -47,14 +57,14 @@ class Found:
     car: Car
     patched: Car
     retuned: Car
-    search: Search | None = None
-    best: Fitted | None = None
+    evidence: Evidence
 
 
 def diagnose(
     paths: Sequence[Path | str],
     car_file: str | None = None,
     *,
+    budget_s: float = 120.0,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
 ) -> Found:
@@ -63,6 +73,7 @@ def diagnose(
     Args:
         paths: Recordings' folders or descriptions.
         car_file: The car's name or file; None takes the recordings' own.
+        budget_s: After so long no further effect is looked for.
         tell: Is told what is being tried.
         clock: For the time it took.
 
@@ -80,8 +91,8 @@ def diagnose(
     tell("doubting the data")
     usable, problems = _doubted(recordings, car)
     if not usable:
-        return _nothing(car, problems, seconds(clock.now_ns() - began_ns))
-    found = _searched(usable, car, tell)
+        return _nothing(recordings, car, problems, seconds(clock.now_ns() - began_ns))
+    found = _searched(usable, car, tell, lambda: seconds(clock.now_ns() - began_ns) > budget_s)
     diagnosis = replace(
         found.diagnosis, data=problems, runtime_s=seconds(clock.now_ns() - began_ns)
     )
@@ -101,29 +112,92 @@ def _doubted(
     return usable, tuple(problems)
 
 
-def _nothing(car: Car, problems: tuple[DataProblem, ...], took_s: float) -> Found:
+def write(found: Found, out: Path) -> None:
+    """Write the report, the car found and the re-tuned car, `retuned.toml`, into a folder.
+
+    Raises:
+        ScmError: when the folder cannot be written.
+    """
+    write_report(found.diagnosis, found.evidence, found.car, found.patched, out)
+    retuned = replace(found.diagnosis, effects=())
+    with tempfile.TemporaryDirectory() as folder:
+        write_car(retuned, found.evidence, found.car, found.retuned, Path(folder))
+        shutil.copy(Path(folder) / "car.toml", out / "retuned.toml")
+
+
+def _nothing(
+    recordings: Sequence[Recording], car: Car, problems: tuple[DataProblem, ...], took_s: float
+) -> Found:
     none = Diagnosis(verdict=Verdict.NONE, located=(), effects=(), undecided=(), fit=None,
                      runtime_s=took_s, data=problems)  # fmt: skip
-    return Found(none, car, car, car)
+    evidence = Evidence(vehicle=car.name, recordings=_titles(recordings))
+    return Found(none, car, car, car, evidence)
 
 
-def _searched(recordings: Sequence[Recording], car: Car, tell: Tell) -> Found:
+def _titles(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    return tuple(
+        r.path.parent.name if r.path.name == "recording.yaml" else r.path.stem for r in recordings
+    )
+
+
+def _searched(
+    recordings: Sequence[Recording], car: Car, tell: Tell, is_over: Callable[[], bool]
+) -> Found:
     big = car.with_terms(terms_needed(car))
     drives = [Drive(recording, big) for recording in recordings]
     model = Likelihood(drives, big)
+    parts = split(model)
     library = shown_by(candidates(big), drives)
-    search = Search(model, np.ones(len(model.t)), library, tell)
-    best = search.run()
+    search = Search(model, parts.fit.weight + parts.choose.weight, library, tell)
+    best = search.run(is_over)
+    tell("judging on what the fit did not see")
+    best = search.confirmed(best, parts.confirm.weight)
+    numbers = search.fitter.numbers(best.effects, best.z, best.values)
+    fit, free_runs = judge(drives, big, {}, numbers, parts)
+    located, residuals = locate(model, search.retuned, best)
     effects = tuple(_effect(search, best, i) for i in range(len(best.effects)))
-    undecided = tuple(_undecided(effect) for effect in effects if _ties(effect))
+    undecided = _undecided(model, search, best, tell)
     verdict = Verdict.NONE if not effects else Verdict.MISMATCH
     if undecided:
         verdict = Verdict.UNDECIDED
-    diagnosis = Diagnosis(verdict=verdict, located=(), effects=effects, undecided=undecided,
-                          fit=None, runtime_s=0.0)  # fmt: skip
+    diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
+                          fit=fit, runtime_s=0.0)  # fmt: skip
+    evidence = Evidence(
+        vehicle=car.name, recordings=_titles(recordings), residuals=residuals,
+        free_runs=free_runs, ordinary=_ordinary(model, best, car), tried=_tried(search),
+    )  # fmt: skip
     return Found(
-        diagnosis, car, patched(car, model, best), patched(car, model, search.retuned), search, best
+        diagnosis, car, patched(car, model, best), patched(car, model, search.retuned), evidence
     )
+
+
+def _ordinary(model: Likelihood, best: Fitted, car: Car) -> tuple[Ordinary, ...]:
+    """Return the car's own numbers, as the file gives them and as the recordings do."""
+    found = []
+    for j, own in enumerate(model.ordinary):
+        if own.key.startswith("clock."):
+            continue
+        std = math.sqrt(max(best.covariance[j, j], 0.0)) * own.std
+        value = model.numbers(best.z)[own.key]
+        unit = model.unit(own.key)
+        estimate = Estimate(
+            value=value, low=value - NINETY * std, high=value + NINETY * std, unit=unit
+        )
+        given = car.value(own.key) if car.has(own.key) else own.mean
+        found.append(Ordinary(key=own.key, given=given, given_std=own.std, found=estimate))
+    return tuple(found)
+
+
+def _tried(search: Search) -> tuple[Tried, ...]:
+    """Return every effect tried beside the re-tuned car, best first."""
+    best: dict[str, Tried] = {}
+    for base, fitted in [(step.base, f) for step in search.steps[:1] for f in step.rivals]:
+        name = fitted.names[-1]
+        needed = price(fitted.effects, search.events, len(search.library))
+        one = Tried(name=name, gain=base.q - fitted.q, needed=needed)
+        if name not in best or best[name].gain < one.gain:
+            best[name] = one
+    return tuple(sorted(best.values(), key=lambda tried: -tried.gain))
 
 
 def _effect(search: Search, best: Fitted, i: int) -> Effect:
@@ -165,11 +239,9 @@ def _number(value: float, unit: str) -> str:
 
 def _rivals(search: Search, candidate: Candidate) -> tuple[float, tuple[Rival, ...]]:
     """Return an effect's probability among all that were tried in its place, and the next ones."""
-    for step in search.steps:
-        tried = [(f, c) for f, c in zip(step.rivals, step.criteria, strict=True)]
-        tried = [(f, c) for f, c in tried if not step.base.effects or f.effects[-1] is not None]
-        if not any(f.effects[-1] is candidate for f, _ in tried):
-            continue
+    step = search.step_of(candidate)
+    if step is not None:
+        tried = list(zip(step.rivals, step.criteria, strict=True))
         lowest = min(c for _, c in tried)
         weights = {id(f): math.exp(-0.5 * min(c - lowest, 1400.0)) for f, c in tried}
         total = sum(weights.values())
@@ -189,13 +261,29 @@ def _against(worse: float) -> str:
     return f"the recording: it explains it worse by {math.sqrt(worse):.1f} standard deviations"
 
 
-def _ties(effect: Effect) -> bool:
-    return any(r.ruled_out_by == "nothing in this recording" for r in effect.rivals)
-
-
-def _undecided(effect: Effect) -> Undecided:
-    names = [r.name for r in effect.rivals if r.ruled_out_by == "nothing in this recording"]
-    return Undecided(between=(effect.name, *names), drive_this="", expected_separation=0.0)
+def _undecided(
+    model: Likelihood, search: Search, best: Fitted, tell: Tell
+) -> tuple[Undecided, ...]:
+    """Return which effects found could as well be others, and the drive that would tell."""
+    found = []
+    for effect in best.effects:
+        step = search.step_of(effect)
+        if step is None:
+            continue
+        lowest = next(
+            c for f, c in zip(step.rivals, step.criteria, strict=True) if f.names[-1] == effect.name
+        )
+        near = [
+            Contender(f.effects, f.values)
+            for f, c in zip(step.rivals, step.criteria, strict=True)
+            if c - f.effects[-1].rare < lowest + TIE and f.names[-1] not in best.names
+        ]
+        if near:
+            tell("designing the drive that would tell")
+            mine = next(f for f in step.rivals if f.names[-1] == effect.name)
+            contenders = [Contender(mine.effects, mine.values), *near]
+            found.append(suggest(model, contenders, tell=tell).undecided)
+    return tuple(found)
 
 
 def patched(car: Car, model: Likelihood, fitted: Fitted) -> Car:

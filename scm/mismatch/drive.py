@@ -3,6 +3,7 @@
 Streams keep the times and values of the recording; nothing is resampled.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -80,7 +81,7 @@ class Drive:
         first = max(float(pose[0]), commands.span_s[0])
         last = min(float(pose[-1]), commands.span_s[1] + 0.05)
         steps = int((last - first) / STEP_S)
-        self.edges: Floats = first + STEP_S * np.arange(steps + 1)
+        self.edges: Floats = np.asarray(first + STEP_S * np.arange(steps + 1), dtype=np.float64)
         self.battery = commands.voltage(self.edges)
         self.streams: Sequence[Stream] = [stream.within(first, last) for stream in streams]
 
@@ -106,7 +107,7 @@ class Drive:
 def _stream(recording: Recording, name: str) -> Stream:
     channel = forward(recording, name)
     values = np.unwrap(channel.values) if name == "pose.yaw" else channel.values
-    std = channel.std if channel.std else _roughness(values)
+    std = channel.std or _roughness(values)
     if name.startswith("encoder."):
         std = max(std if channel.std else 0.0, 0.4)  # a count is a count
     return _thinned(name, channel.t, values, std)
@@ -124,7 +125,7 @@ def _thinned(name: str, t: Floats, values: Floats, std: float) -> Stream:
         return Stream(name, t, values, std, t[:, None], np.zeros(len(t)))
     whole = len(t) // every * every
     taps = t[:whole].reshape(-1, every)
-    means, std = values[:whole].reshape(-1, every).mean(axis=1), std / np.sqrt(every)
+    means, std = values[:whole].reshape(-1, every).mean(axis=1), std / math.sqrt(every)
     unsure = _leaps(means, std) if name.startswith("imu.accel") else np.zeros(len(means))
     return Stream(name, taps.mean(axis=1), means, std, taps, unsure)
 
@@ -136,11 +137,11 @@ def _leaps(values: Floats, std: float) -> Floats:
     """
     padded = np.pad(values, 1, mode="edge")
     around = np.stack((padded[:-2], values, padded[2:]))
-    return LEAP * np.maximum(np.ptp(around, axis=0) - 4.0 * std, 0.0)
+    return np.asarray(LEAP * np.maximum(np.ptp(around, axis=0) - 4.0 * std, 0.0))
 
 
 def _roughness(values: Floats) -> float:
     """Return the noise that a channel's third differences show, whose median motion is slow."""
     jumps = np.diff(values, 3)
     moving = jumps[jumps != 0.0] if np.any(jumps) else jumps
-    return max(_MAD * float(np.median(np.abs(moving))) / np.sqrt(20.0), 1e-6)
+    return max(_MAD * float(np.median(np.abs(moving))) / math.sqrt(20.0), 1e-6)

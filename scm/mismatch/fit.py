@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.library import Candidate
+from scm.mismatch.library import Candidate, Knob
 from scm.mismatch.likelihood import Likelihood
 
 ROUNDS = 5
@@ -169,13 +169,21 @@ class Fitter:
         prior = np.concatenate((np.ones(own), np.full(f.knobs, 1e-6)))
         weighted = f.jacobian.T * self.weights(f.e)
         normal = weighted @ f.jacobian + np.diag(prior)
-        f.covariance = np.linalg.pinv(normal)
+        f.covariance = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
         slope = weighted @ f.e + prior * np.concatenate((f.z, np.zeros(f.knobs)))
         scales = np.array([k.step for k in knobs])
-        low = np.concatenate((-FARTHEST - f.z, [(k.bounds[0] - v) / k.step
-                                                for k, v in zip(knobs, f.values, strict=True)]))
-        high = np.concatenate((FARTHEST - f.z, [(k.bounds[1] - v) / k.step
-                                                for k, v in zip(knobs, f.values, strict=True)]))
+        low = np.concatenate(
+            (
+                -FARTHEST - f.z,
+                [(k.bounds[0] - v) / k.step for k, v in zip(knobs, f.values, strict=True)],
+            )
+        )
+        high = np.concatenate(
+            (
+                FARTHEST - f.z,
+                [(k.bounds[1] - v) / k.step for k, v in zip(knobs, f.values, strict=True)],
+            )
+        )
         full = _bounded(normal, slope, low, high)
         moves = [length * full for length in LENGTHS]
         moves += [
@@ -231,5 +239,5 @@ def _bounded(normal: Floats, slope: Floats, low: Floats, high: Floats) -> Floats
     return step
 
 
-def _knobs(f: Fitted) -> list[object]:
+def _knobs(f: Fitted) -> list[Knob]:
     return [knob for effect in f.effects for knob in effect.knobs]

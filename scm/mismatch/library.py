@@ -184,7 +184,12 @@ SHOWS_ABOVE: Mapping[str, tuple[float, float]] = {
 """Speed [m/s] and side acceleration [m/s^2] that a drive must reach to show an effect at all."""
 
 
-RARE: Mapping[str, float] = {"motor_gain": 14.0, "drive_curve": 10.0, "load_transfer": 6.0}
+RARE: Mapping[str, float] = {
+    "motor_gain": 14.0,
+    "drive_curve": 10.0,
+    "load_transfer": 6.0,
+    "tyre_grip": 4.0,
+}
 
 
 def shown_by(found: tuple[Candidate, ...], drives: Sequence[Drive]) -> tuple[Candidate, ...]:
@@ -238,7 +243,9 @@ def candidates(car: Car) -> tuple[Candidate, ...]:
             _knob(car, name, param, neutral.get(param.name, param.default), step)
             for param, step in zip(wanted, steps, strict=True)
         )
-        found.append(Candidate(name, equation, depends_on, knobs, starts, said, RARE.get(name, 0.0)))
+        found.append(
+            Candidate(name, equation, depends_on, knobs, starts, said, RARE.get(name, 0.0))
+        )
         if name == "com_shift":
             tied = replace(knobs[0], ties=((POINT_X, 1.0),))
             found.append(Candidate(name, equation, depends_on, (tied,), starts, said))

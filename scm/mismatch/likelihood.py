@@ -1,17 +1,19 @@
 """How well a car with given numbers explains recordings: weighed residuals of many sets at once."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from scm.arrays import Bools, Floats
 from scm.mismatch.drive import Drive
+from scm.mismatch.noise import Noise, usual_noise
 from scm.mismatch.predict import POSE_CLOCK, Prediction
 from scm.mismatch.rollouts import COMMAND_CLOCK, Numbers, Rollouts
-from scm.mismatch.whiten import Noise, Whitener
+from scm.mismatch.whiten import Whitener
 from scm.vehicles.car import Car
 from scm.vehicles.param import Param
+
 
 @dataclass(frozen=True, slots=True)
 class Ordinary:
@@ -25,10 +27,6 @@ class Ordinary:
 
 LOCK = "drive.axle_lock"
 _UNKNOWN = {LOCK: (0.5, 0.5)}  # what no car file says and every car has
-ALIKE, ABRUPT = 0.005, 0.1
-JOLTS = 0.05
-LASTS_S = 2.0
-LEAST_NOISE = 0.7
 TIMING_S = 0.003  # no recording's stamps are better than that
 LEAST_SCATTER = {"body.mass_kg": 0.06}  # cars are weighed without cables, tape and battery
 _CLOCKS = tuple(
@@ -66,6 +64,10 @@ class Likelihood:
         self._predictions = [Prediction(drive) for drive in drives]
         self.believe(usual_noise(drives))
         self.runs = 0
+
+    def unit(self, key: str) -> str:
+        """Return the unit of one of the car's numbers."""
+        return next((p.unit for p in self._rollouts[0].params if p.key == key), "s")
 
     def believe(self, noise: Noise) -> None:
         """Take another belief about noise."""
@@ -108,97 +110,3 @@ def clipped(ordinary: Ordinary, z: float) -> float:
     """Return a number at `z` standard deviations, within its bounds."""
     low, high = ordinary.bounds
     return float(min(max(ordinary.mean + z * ordinary.std, low), high))
-
-
-def usual_noise(drives: Sequence[Drive]) -> Noise:
-    """Return the least that any car model is off: half a per cent of the usual speed and turning.
-
-    A launch leaves a tenth of a throttle leap's speed open, a steering leap a tenth of its turning. Less is
-    never believed: two simulators of the same car differ by as much.
-    """
-    speeds = [np.hypot(d.smoothed["pose.x"].rate, d.smoothed["pose.y"].rate) for d in drives]
-    turns = [np.abs(d.smoothed["pose.yaw"].rate) for d in drives]
-    fast = float(np.percentile(np.concatenate(speeds), 90))
-    turning = float(np.percentile(np.concatenate(turns), 90))
-    own = dict[str, float]()
-    for name in drives[0].names:
-        if name.startswith(("encoder.", "wheel_speed.")):
-            own[name] = ALIKE * fast
-        elif name.startswith("imu.accel"):
-            stream = drives[0].stream(name)
-            own[name] = JOLTS * float(np.percentile(np.abs(stream.values), 90)) + 0.5 * stream.std
-    scale = dict.fromkeys(drives[0].names, 1.0)
-    return Noise(
-        ALIKE * fast, ALIKE * fast, ALIKE * turning, own, scale, lasts_s=LASTS_S,
-        launch=ABRUPT * fast, turn=ABRUPT * turning,
-    )  # fmt: skip
-
-
-def learn_noise(model: Likelihood, residuals: Sequence[Sequence[Floats]], rounds: int = 2) -> Noise:
-    """Return the belief under which residuals are most likely, by steps of two."""
-
-    def cost(noise: Noise) -> float:
-        model.believe(noise)
-        e = model.weigh(residuals)
-        return float((e * e).sum() + model.log_size.sum())
-
-    best = model.noise
-    lowest = cost(best)
-    least = usual_noise(model.drives)
-    for _ in range(rounds):
-        for change in _CHANGES:
-            for factor in (2.0, 0.5):
-                while True:
-                    other = _at_least(change(best, factor), least)
-                    if other == best:
-                        break
-                    value = cost(other)
-                    if value > lowest - 2.0:
-                        break
-                    best, lowest = other, value
-    model.believe(best)
-    return best
-
-
-def _at_least(noise: Noise, least: Noise) -> Noise:
-    """Return a belief no smaller than another one in anything."""
-    return Noise(
-        max(noise.speed, least.speed), max(noise.side, least.side),
-        max(noise.yaw_rate, least.yaw_rate),
-        {k: max(v, least.own[k]) for k, v in noise.own.items()},
-        {k: max(v, LEAST_NOISE) for k, v in noise.scale.items()},
-        noise.lasts_s, max(noise.launch, least.launch), max(noise.turn, least.turn),
-    )  # fmt: skip
-
-
-def _own(kinds: tuple[str, ...]) -> "object":
-    def change(noise: Noise, factor: float) -> Noise:
-        own = {k: v * factor if k.startswith(kinds) else v for k, v in noise.own.items()}
-        return replace(noise, own=own)
-
-    return change
-
-
-def _scale(kinds: tuple[str, ...]) -> "object":
-    def change(noise: Noise, factor: float) -> Noise:
-        scale = {k: v * np.sqrt(factor) if k.startswith(kinds) else v
-                 for k, v in noise.scale.items()}
-        return replace(noise, scale=scale)
-
-    return change
-
-
-_CHANGES = (
-    lambda n, f: replace(n, launch=n.launch * f),
-    lambda n, f: replace(n, turn=n.turn * f),
-    lambda n, f: replace(n, speed=n.speed * f),
-    lambda n, f: replace(n, side=n.side * f),
-    lambda n, f: replace(n, yaw_rate=n.yaw_rate * f),
-    _own(("encoder.", "wheel_speed.")),
-    _own(("imu.accel_x",)),
-    _own(("imu.accel_y",)),
-    _scale(("imu.accel_x",)),
-    _scale(("imu.accel_y",)),
-    _scale(("imu.gyro_z", "yaw_rate")),
-    _scale(("encoder.",)),
-)

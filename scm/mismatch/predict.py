@@ -15,8 +15,8 @@ from scm.mismatch.rollouts import Motions, Numbers
 # Faults of measurement by the key that their library parameter has, and their neutral values.
 POSE_CLOCK = "clock.pose_s"  # poses are stamped so much later than the other sensors
 NEUTRAL: Mapping[str, float] = {
-    POSE_CLOCK: 0.0, "measure.pose_delay_s": 0.0, "measure.clock_offset_s": 0.0, "measure.clock_rate": 0.0,
-    "measure.pose_scale": 1.0, "measure.camera_tilt_x_per_m": 0.0,
+    POSE_CLOCK: 0.0, "measure.pose_delay_s": 0.0, "measure.clock_offset_s": 0.0,
+    "measure.clock_rate": 0.0, "measure.pose_scale": 1.0, "measure.camera_tilt_x_per_m": 0.0,
     "measure.camera_tilt_y_per_m": 0.0, "measure.pose_point_x_m": 0.0,
     "measure.pose_point_y_m": 0.0, "measure.pose_heading_rad": 0.0, "measure.encoder_loss": 0.0,
     "measure.gyro_bias_rad_s": 0.0, "measure.gyro_scale": 1.0, "measure.accel_bias_x_m_s2": 0.0,
@@ -39,9 +39,9 @@ class _Taps:
 
     def __call__(self, signal: Floats) -> Floats:
         """Return means over the taps of a signal (edges, sets): (samples, sets)."""
-        before = signal[self._row]
+        before: Floats = signal[self._row]
         before += self._share * (signal[self._row + 1] - before)
-        return before[:, 0] if before.shape[1] == 1 else before.mean(axis=1)
+        return before[:, 0] if before.shape[1] == 1 else np.mean(before, axis=1)
 
 
 class Prediction:
@@ -78,7 +78,9 @@ class Prediction:
         Args:
             motions: What the car did.
             now: Faults, each (sets,).
-            x, y, yaw: Where the camera saw it, on the edges' true times, (edges,).
+            x: Where the camera saw it, on the edges' true times, (edges,).
+            y: Likewise.
+            yaw: Likewise.
         """
         heading = yaw[:, None] - now["measure.pose_heading_rad"]
         c, s = np.cos(heading), np.sin(heading)

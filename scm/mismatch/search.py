@@ -12,8 +12,9 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.fit import Fitted, Fitter
+from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.library import Candidate
-from scm.mismatch.likelihood import Likelihood, learn_noise
+from scm.mismatch.likelihood import Likelihood
 
 MOST_EFFECTS = 4
 REFITTED = 14
@@ -62,12 +63,16 @@ class Search:
         """Return Q and the price of its effects."""
         return fitted.q + price(fitted.effects, self.events, len(self.library))
 
-    def run(self) -> Fitted:
-        """Return the model that explains the recordings best without inventing anything."""
+    def run(self, is_over: Callable[[], bool] = lambda: False) -> Fitted:
+        """Return the model that explains the recordings best without inventing anything.
+
+        Args:
+            is_over: Says when no further effect is to be looked for.
+        """
         self.tell("fitting the car's own numbers")
         best = self.settle(self.fitter.null())
         self.retuned = best
-        while len(best.effects) < MOST_EFFECTS:
+        while len(best.effects) < MOST_EFFECTS and not is_over():
             step = self.extend(best)
             self.steps.append(step)
             if not step.rivals or step.criteria[0] > self.criterion(best):
@@ -75,6 +80,12 @@ class Search:
             best = self.settle(step.rivals[0])
             best = self.prune(best)
         return best
+
+    def step_of(self, effect: Candidate) -> Step | None:
+        """Return the round in which an effect was found."""
+        found = [s for s in self.steps if any(f.effects[-1] is effect for f in s.rivals)]
+        chosen = [s for s in found if s.rivals[0].effects[-1] is effect]
+        return chosen[0] if chosen else None
 
     def settle(self, fitted: Fitted) -> Fitted:
         """Fit a hypothesis and the noise, one after the other, twice."""
@@ -110,9 +121,23 @@ class Search:
         near = [f for f in ranked if self.criterion(f) < self.criterion(ranked[0]) + NEAR]
         if self.criterion(ranked[0]) < self.criterion(base) + NEAR:
             near = self.fitter.refine(near[:6], rounds=3, fresh=True)
-        ranked = sorted([*near, *(f for f in ranked if all(f is not n for n in near))],
-                        key=self.criterion)
+        ranked = sorted(
+            [*near, *(f for f in ranked if all(f is not n for n in near))], key=self.criterion
+        )
         return Step(base, tuple(ranked), tuple(self.criterion(f) for f in ranked))
+
+    def confirmed(self, best: Fitted, unseen: Floats) -> Fitted:
+        """Return the model without effects that do not help on a part that no fit has seen."""
+        while best.effects:
+            others = self._without_each(best)
+            fitter = Fitter(self.model, unseen)
+            own = float(best.z @ best.z)
+            seen = fitter.score(best.e[:, None], best.z)[0] - own
+            gains = [float(fitter.score(f.e[:, None], f.z)[0] - f.z @ f.z - seen) for f in others]
+            if min(gains) > 0.0:
+                return best
+            best = others[int(np.argmin(gains))]
+        return best
 
     def _not_worse(self, fitted: Fitted, base: Fitted) -> None:
         """Let an effect that found nothing do nothing: it contains the model without it."""
@@ -124,19 +149,36 @@ class Search:
     def prune(self, fitted: Fitted) -> Fitted:
         """Take back every effect that the others make needless."""
         while len(fitted.effects) > 1:
-            fewer = []
-            for i, effect in enumerate(fitted.effects):
-                del effect
-                effects = (*fitted.effects[:i], *fitted.effects[i + 1 :])
-                at = sum(len(e.knobs) for e in fitted.effects[:i])
-                values = np.delete(fitted.values, slice(at, at + len(fitted.effects[i].knobs)))
-                own = len(fitted.z)
-                keep = np.delete(np.arange(fitted.jacobian.shape[1]),
-                                 slice(own + at, own + at + len(fitted.effects[i].knobs)))
-                fewer.append(Fitted(effects, fitted.z.copy(), values, fitted.e, fitted.q,
-                                    fitted.jacobian[:, keep]))
-            fewer = sorted(self.fitter.refine(fewer, rounds=4, fresh=True), key=self.criterion)
+            fewer = sorted(self._without_each(fitted), key=self.criterion)
             if not fewer or self.criterion(fewer[0]) > self.criterion(fitted):
                 return fitted
             fitted = fewer[0]
+        return fitted
+
+    def _without_each(self, fitted: Fitted) -> list[Fitted]:
+        """Return refitted models that lack one effect each, in the effects' order."""
+        if len(fitted.effects) == 1:
+            return [self.retuned_now()]
+        fewer, at, own = list[Fitted](), 0, len(fitted.z)
+        for i, effect in enumerate(fitted.effects):
+            gone = slice(at, at + len(effect.knobs))
+            columns = np.delete(
+                np.arange(fitted.jacobian.shape[1]), slice(own + gone.start, own + gone.stop)
+            )
+            fewer.append(
+                Fitted(
+                    (*fitted.effects[:i], *fitted.effects[i + 1 :]),
+                    fitted.z.copy(),
+                    np.delete(fitted.values, gone),
+                    fitted.e,
+                    fitted.q,
+                    fitted.jacobian[:, columns],
+                )
+            )
+            at = gone.stop
+        return self.fitter.refine(fewer, rounds=4, fresh=True)
+
+    def retuned_now(self) -> Fitted:
+        """Return the car with its own numbers refitted, under the present belief about noise."""
+        (fitted,) = self.fitter.refine([self.fitter.null(self.retuned.z)], rounds=4, fresh=True)
         return fitted

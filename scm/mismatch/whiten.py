@@ -6,7 +6,7 @@ not depend on the prediction, so one pass weighs the residuals of many parameter
 are independent of unit variance where the prediction is right, and no derivative is ever taken.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.mismatch.commanded import Commanded
 from scm.mismatch.drive import Drive
+from scm.mismatch.noise import Noise
 from scm.vehicles.jit import array_kernel
 
 EX, EY, EPSI, DV, DY, DR = range(6)
@@ -24,30 +25,6 @@ HALT, HALTING = 0.3, 3.0  # as a leap of so much throttle; of an accelerometer's
 SHORT_S = 0.3  # how long an accelerometer's own disturbance lasts
 POSES = {"pose.x": EX, "pose.y": EY, "pose.yaw": EPSI}
 RATES = {"imu.gyro_z": DR, "yaw_rate": DR, "velocity.x": DV, "speed": DV, "velocity.y": DY}
-
-
-@dataclass(frozen=True, slots=True)
-class Noise:
-    """How far a right model may be off.
-
-    Attributes:
-        speed, side, yaw_rate: Shared disturbances [m/s, m/s, rad/s].
-        own: Of each stream that has one, by channel [its rate's unit, or its own].
-        lasts_s: How long disturbances last.
-        scale: Factor on the noise of each stream, by channel.
-        launch, turn: What a leap of the whole throttle adds to speed, wheels included, and one of
-            the whole steering to yaw rate, for as long as a leap is felt: transients are where any
-            car model is worst [m/s, rad/s].
-    """
-
-    speed: float
-    side: float
-    yaw_rate: float
-    own: Mapping[str, float]
-    scale: Mapping[str, float]
-    lasts_s: float = 1.0
-    launch: float = 0.0
-    turn: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +46,10 @@ class _System:
 def _system(drive: Drive, noise: Noise) -> _System:
     radius, half = drive.car.value("wheel.radius_m"), 0.5 * drive.car.value("body.track_m")
     couple: list[tuple[int, int, float]] = [(EPSI, DR, 1.0)]
-    lasts, spread = [0.0] * 3 + [noise.lasts_s] * 3, [0.0] * 3 + [noise.speed, noise.side, noise.yaw_rate]
+    lasts, spread = (
+        [0.0] * 3 + [noise.lasts_s] * 3,
+        [0.0] * 3 + [noise.speed, noise.side, noise.yaw_rate],
+    )
     start = [1e4 * drive.stream("pose.x").std, 1e4 * drive.stream("pose.y").std, 10.0]
     start += [noise.speed, noise.side, noise.yaw_rate]
     see, variance, wheels = list[dict[int, float]](), list[float](), list[int]()
@@ -91,7 +71,11 @@ def _system(drive: Drive, noise: Noise) -> _System:
         elif s.name.startswith("encoder."):
             counts = drive.car.value("encoder.counts_per_revolution") / (2.0 * np.pi) / radius
             total, slip = add(0.0, 0.0, 1e5), add(noise.lasts_s, own, own)
-            couple += [(total, DV, counts), (total, DR, -left * half * counts), (total, slip, counts)]
+            couple += [
+                (total, DV, counts),
+                (total, DR, -left * half * counts),
+                (total, slip, counts),
+            ]
             see.append({total: 1.0})
             wheels.append(slip)
         elif s.name.startswith("wheel_speed."):
@@ -134,7 +118,8 @@ class Whitener:
         x, y = drive.smoothed["pose.x"], drive.smoothed["pose.y"]
         speed = np.hypot(x.rate_at(self.t), y.rate_at(self.t))
         self._halting = (speed < SLOW * np.percentile(speed, 90)).astype(np.float64)
-        jolt = np.array([noise.own.get(s.name, 0.0) * s.name.startswith("imu.") for s in drive.streams])
+        jolt = np.array([noise.own.get(s.name, 0.0) for s in drive.streams])
+        jolt *= [s.name.startswith("imu.") for s in drive.streams]
         unsure = np.hypot(unsure, HALTING * jolt[self.stream] * self._halting)
         psi = drive.smoothed["pose.yaw"].at(self.t)
         self._cos, self._sin = np.cos(psi), np.sin(psi)
@@ -146,8 +131,8 @@ class Whitener:
         p, room = np.diag(system.start**2), np.zeros((2, n, n))
         _gains(
             self.t, self.stream, self._cos, self._sin, system.rows, system.columns,
-            system.factors, system.lasts, system.spread, system.see, system.variance, unsure, leaps, p, room,
-            self._gain, self._variance, self._keep,
+            system.factors, system.lasts, system.spread, system.see, system.variance, unsure,
+            leaps, p, room, self._gain, self._variance, self._keep,
         )  # fmt: skip
         self.log_size = np.log(self._variance)
 
@@ -192,48 +177,57 @@ def _gains(
     p: Floats, room: Floats, gain: Floats, total: Floats, keep: Floats,
 ) -> None:  # fmt: skip
     """Run the covariance alone: gains, innovation variances and decays of each event."""
-    n = p.shape[0]
-    f, half = room[0], room[1]
+    n, f = p.shape[0], room[0]
     for k in range(len(t)):
         dt = t[k] - t[k - 1] if k > 0 else 0.0
         for i in range(n):
-            for j in range(n):
-                f[i, j] = 0.0
             keep[k, i] = np.exp(-dt / lasts[i]) if lasts[i] > 0.0 else 1.0
-            f[i, i] = keep[k, i]
+            for j in range(n):
+                f[i, j] = keep[k, i] if i == j else 0.0
         f[0, 3], f[0, 4] = cos[k] * dt, -sin[k] * dt
         f[1, 3], f[1, 4] = sin[k] * dt, cos[k] * dt
         for c in range(len(rows)):
             f[rows[c], columns[c]] = factors[c] * dt
+        _carry(f, p, room[1])
         for i in range(n):
-            for j in range(n):
-                half[i, j] = 0.0
-            for m in range(n):
-                if f[i, m] != 0.0:
-                    for j in range(n):
-                        half[i, j] += f[i, m] * p[m, j]
-        for i in range(n):
-            for j in range(n):
-                p[i, j] = 0.0
-            for m in range(n):
-                for j in range(n):
-                    if f[j, m] != 0.0:
-                        p[i, j] += half[i, m] * f[j, m]
             p[i, i] += spread[i] * spread[i] * (1.0 - keep[k, i] * keep[k, i]) + leaps[k, i]
-        s, h = variance[stream[k]] + unsure[k] * unsure[k], see[stream[k]]
-        for i in range(n):
-            gain[k, i] = 0.0
-            for j in range(n):
-                gain[k, i] += p[i, j] * h[j]
-            s += h[i] * gain[k, i]
-        total[k] = s
-        for i in range(n):
-            for j in range(n):
-                half[i, j] = p[i, j] - gain[k, i] * gain[k, j] / s
-        for i in range(n):
-            for j in range(n):
-                p[i, j] = half[i, j]
-            gain[k, i] /= s
+        total[k] = variance[stream[k]] + unsure[k] * unsure[k]
+        total[k] = _seen(p, see[stream[k]], total[k], gain[k])
+
+
+@array_kernel
+def _carry(f: Floats, p: Floats, half: Floats) -> None:
+    """Replace p by f p f', passing over the zeros of f."""
+    n = p.shape[0]
+    for i in range(n):
+        for j in range(n):
+            half[i, j] = 0.0
+        for m in range(n):
+            if f[i, m] != 0.0:
+                for j in range(n):
+                    half[i, j] += f[i, m] * p[m, j]
+    for i in range(n):
+        for j in range(n):
+            p[i, j] = 0.0
+            for m in range(n):
+                p[i, j] += half[i, m] * f[j, m] if f[j, m] != 0.0 else 0.0
+
+
+@array_kernel
+def _seen(p: Floats, h: Floats, noise: float, gain: Floats) -> float:
+    """Take one measurement into the covariance; write its gain, return its whole variance."""
+    n, s = p.shape[0], noise
+    for i in range(n):
+        gain[i] = 0.0
+        for j in range(n):
+            gain[i] += p[i, j] * h[j]
+        s += h[i] * gain[i]
+    for i in range(n):
+        for j in range(n):
+            p[i, j] -= gain[i] * gain[j] / s
+    for i in range(n):
+        gain[i] /= s
+    return s
 
 
 @array_kernel
@@ -246,28 +240,41 @@ def _innovations(
     n, sets = x.shape
     for k in range(len(t)):
         dt = t[k] - t[k - 1] if k > 0 else 0.0
-        c, s, h = cos[k] * dt, sin[k] * dt, see[stream[k]]
-        for b in range(sets):
-            x[0, b] += c * x[3, b] - s * x[4, b]
-            x[1, b] += s * x[3, b] + c * x[4, b]
-        for m in range(len(rows)):
-            i, j, a = rows[m], columns[m], factors[m] * dt
-            for b in range(sets):
-                x[i, b] += a * x[j, b]
-        for i in range(3, n):
-            if keep[k, i] != 1.0:
-                for b in range(sets):
-                    x[i, b] *= keep[k, i]
+        _move(x, cos[k] * dt, sin[k] * dt, rows, columns, factors, dt, keep[k])
         for b in range(sets):
             out[k, b] = residual[k, b]
-        for i in range(n):
-            if h[i] != 0.0:
-                for b in range(sets):
-                    out[k, b] -= h[i] * x[i, b]
-        for i in range(n):
-            a = gain[k, i]
-            for b in range(sets):
-                x[i, b] += a * out[k, b]
+        _add(out[k], see[stream[k]], x)
         size = 1.0 / np.sqrt(variance[k])
+        for i in range(n):
+            for b in range(sets):
+                x[i, b] += gain[k, i] * out[k, b]
         for b in range(sets):
             out[k, b] *= size
+
+
+@array_kernel
+def _move(
+    x: Floats, c: float, s: float, rows: Ints, columns: Ints, factors: Floats, dt: float,
+    keep: Floats,
+) -> None:  # fmt: skip
+    """Carry the states of all sets over a step."""
+    n, sets = x.shape
+    for b in range(sets):
+        x[0, b] += c * x[3, b] - s * x[4, b]
+        x[1, b] += s * x[3, b] + c * x[4, b]
+    for m in range(len(rows)):
+        for b in range(sets):
+            x[rows[m], b] += factors[m] * dt * x[columns[m], b]
+    for i in range(3, n):
+        if keep[i] != 1.0:
+            for b in range(sets):
+                x[i, b] *= keep[i]
+
+
+@array_kernel
+def _add(out: Floats, h: Floats, x: Floats) -> None:
+    """Take what the states predict off a measurement's residuals."""
+    for i in range(len(h)):
+        if h[i] != 0.0:
+            for b in range(len(out)):
+                out[b] -= h[i] * x[i, b]

@@ -5,11 +5,11 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 import msgspec
 
+from scm.mismatch.diagnose import diagnose, write
 from scm.mismatch.findings import Diagnosis
 from scm.mismatch.trial.labels import Case
 
@@ -74,6 +74,6 @@ def kept_answers(cases: Sequence[Case], out: Path) -> Iterator[Answer]:
 
 def by_engine(recording: Path, out: Path) -> Diagnosis:
     """Diagnose with the project's own engine."""
-    engine = import_module("scm.mismatch.diagnose")
-    found: Diagnosis = engine.diagnose([recording], None, out=out)
-    return found
+    found = diagnose([recording])
+    write(found, out)
+    return found.diagnosis

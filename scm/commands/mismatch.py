@@ -1,0 +1,50 @@
+"""`scm mismatch`: what the simulator left out, found in recordings of a car."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from scm.command import Command
+
+FOLDER = "mismatch"
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "recording", nargs="+", type=Path, help="description files, or their folders, of one car"
+    )
+    parser.add_argument("--car", metavar="FILE", help="car file or name; default: the recording's")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help=f"the report's folder; default: runs/{FOLDER}-NAME"
+    )
+    parser.add_argument(
+        "--budget-s", type=float, default=120.0, help="time for the search (%(default)s)"
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.mismatch.diagnose import diagnose, write
+    from scm.mismatch.report.summary import summary
+
+    name = arguments.recording[0].resolve()
+    title = name.parent.name if name.name == "recording.yaml" else name.stem
+    out = arguments.out or Path("runs") / f"{FOLDER}-{title}"
+    found = diagnose(arguments.recording, arguments.car, budget_s=arguments.budget_s, tell=_tell)
+    write(found, out)
+    _tell("")
+    print(summary(found.diagnosis, out))
+    return 0
+
+
+def _tell(text: str) -> None:
+    """Show what is being tried, on one line that the next one replaces."""
+    if sys.stderr.isatty():
+        print(f"\r\033[K{text[:100]}", end="", file=sys.stderr, flush=True)
+
+
+COMMAND = Command(
+    help="find what the simulator left out",
+    example="scm mismatch trial/drive --out found",
+    arguments=_arguments,
+    run=_run,
+)

@@ -1,0 +1,60 @@
+"""How far a right model may be off: the least that is believed of any."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.mismatch.drive import Drive
+
+ALIKE, ABRUPT = 0.003, 0.1
+JOLTS = 0.05
+LASTS_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """How far a right model may be off.
+
+    Attributes:
+        speed, side, yaw_rate: Shared disturbances [m/s, m/s, rad/s].
+        own: Of each stream that has one, by channel [its rate's unit, or its own].
+        lasts_s: How long disturbances last.
+        scale: Factor on the noise of each stream, by channel.
+        launch, turn: What a leap of the whole throttle adds to speed, wheels included, and one of
+            the whole steering to yaw rate, for as long as a leap is felt: transients are where any
+            car model is worst [m/s, rad/s].
+    """
+
+    speed: float
+    side: float
+    yaw_rate: float
+    own: Mapping[str, float]
+    scale: Mapping[str, float]
+    lasts_s: float = 1.0
+    launch: float = 0.0
+    turn: float = 0.0
+
+
+def usual_noise(drives: Sequence[Drive]) -> Noise:
+    """Return the least that any car model is off: 0.3 % of the usual speed and turning.
+
+    A launch leaves a tenth of a throttle leap's speed open, a steering leap a tenth of its turning.
+    Less is never believed: two simulators of the same car differ by as much.
+    """
+    speeds = [np.hypot(d.smoothed["pose.x"].rate, d.smoothed["pose.y"].rate) for d in drives]
+    turns = [np.abs(d.smoothed["pose.yaw"].rate) for d in drives]
+    fast = float(np.percentile(np.concatenate(speeds), 90))
+    turning = float(np.percentile(np.concatenate(turns), 90))
+    own = dict[str, float]()
+    for name in drives[0].names:
+        if name.startswith(("encoder.", "wheel_speed.")):
+            own[name] = ALIKE * fast
+        elif name.startswith("imu.accel"):
+            stream = drives[0].stream(name)
+            own[name] = JOLTS * float(np.percentile(np.abs(stream.values), 90)) + 0.5 * stream.std
+    scale = dict.fromkeys(drives[0].names, 1.0)
+    return Noise(
+        ALIKE * fast, ALIKE * fast, ALIKE * turning, own, scale, lasts_s=LASTS_S,
+        launch=ABRUPT * fast, turn=ABRUPT * turning,
+    )  # fmt: skip
