@@ -18,7 +18,7 @@ def _angle(name: str) -> Knob:
     return _knob(name, "rad", (-30.0, 30.0), 0.1)
 
 
-_PERIOD = _knob("period_s", "s", (0.5, 1000.0), 0.05)
+_PERIOD = _knob("period_s", "s", (0.5, 200.0), 0.05)
 _PHASE = _angle("phase_rad")
 _FROM = _knob("from_s", "s", (-10.0, 1e4), 0.5)
 _LENGTH = _knob("length_m", "m", (0.05, 100.0), 0.01)

@@ -1,4 +1,4 @@
-"""A law's curve beside the law: what each bin of what it depends on asks for by itself, with a band.
+"""A law's curve beside the law: what each bin of what it depends on asks for, with a band.
 
 The bins are pushes in the same channel, fitted together and free of any form; a law that is right
 runs through their bands.

@@ -5,7 +5,7 @@ for its numbers and for the size of the dictionary it was chosen from.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,13 +17,17 @@ from scm.mismatch.laws.dictionary import dictionary
 from scm.mismatch.laws.law import Law
 from scm.mismatch.laws.learned import THROTTLE, learned_terms
 from scm.mismatch.laws.screen import Start, polished, screen
+from scm.mismatch.laws.sensed import Sensed, Sensing, sensor_laws
+from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
 
 FALSE_ALARMS = 0.01
 LISTED = 45
 REFITTED, FOLLOWED, FRESH = 12, 3, 4
 UNSURE = 15.0  # of the gain, which is a linear guess until a free run
+MOST = 18
 Tell = Callable[[str], None]
+_Begun = tuple[Candidate, tuple[float, ...], float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,22 +50,21 @@ class Sought:
 
 def criterion(fitted: Fitted, events: int, listed: int = LISTED) -> float:
     """Return Q and what its effects must gain to be believed, laws at the dictionary's price."""
+    laws = len(dictionary()) + len(sensor_laws())
     total = fitted.q + fitted.knobs * math.log(events)
     for effect in fitted.effects:
-        size = len(dictionary()) if isinstance(effect, Law) else listed
+        size = laws if isinstance(effect, Law | Sensed) else listed
         total += effect.rare + 2.0 * math.log(size / FALSE_ALARMS)
     return total
 
 
-def with_laws(model: Likelihood) -> Likelihood:
+def with_laws(model: Likelihood) -> Sensing:
     """Return a model whose car can carry laws, under the same belief about noise."""
-    wanted = learned_terms(model.car)
-    have = {term.name for term in model.car.terms}
-    if all(term.name in have for term in wanted):
+    if isinstance(model, Sensing):
         return model
-    able = Likelihood(model.drives, model.car.with_terms(wanted))
-    able.believe(model.noise)
-    return able
+    have = {term.name for term in model.car.terms}
+    wanted = [term for term in learned_terms(model.car) if term.name not in have]
+    return Sensing(model, model.car.with_terms(wanted))
 
 
 def seek(model: Likelihood, base: Fitted, part: Floats, tell: Tell = lambda _: None) -> Sought:
@@ -77,6 +80,7 @@ def seek(model: Likelihood, base: Fitted, part: Floats, tell: Tell = lambda _: N
     fitter = Fitter(model, part)
     base = _carried(base, model)
     tell("asking what a push at each moment would explain")
+    model.learn(fitter.numbers(base.effects, base.z, base.values))
     cells = cells_of(model, fitter, base)
     asked = [c for c in AMOUNTS if c != "throttle_add" or THROTTLE in model.car.terms]
     responses = {channel: respond(model, fitter, base, cells, channel) for channel in asked}
@@ -84,7 +88,9 @@ def seek(model: Likelihood, base: Fitted, part: Floats, tell: Tell = lambda _: N
     tell(f"laying {len(laws)} laws over them")
     starts = _worth(screen(laws, cells, responses), part)
     starts = [polished(s, cells, responses[s.law.channel.response]) for s in starts]
-    found = _refitted(fitter, base, starts, tell)
+    begun = [(s.law, s.values, s.gain) for s in starts] + _of_sensors(model, fitter, base, part)
+    begun.sort(key=lambda one: _price(one[0], part) - one[2])
+    found = _refitted(fitter, base, begun[:MOST], tell)
     events = int(part.sum())
     ranked = sorted(found, key=lambda f: criterion(f, events))
     return Sought(
@@ -97,9 +103,9 @@ def _carried(base: Fitted, model: Likelihood) -> Fitted:
     return replace(base, z=base.z.copy(), values=base.values.copy())
 
 
-def _price(law: Law, part: Floats) -> float:
+def _price(law: Candidate, part: Floats) -> float:
     """Return what a law must gain to be believed."""
-    size = 2.0 * math.log(len(dictionary()) / FALSE_ALARMS)
+    size = 2.0 * math.log((len(dictionary()) + len(sensor_laws())) / FALSE_ALARMS)
     return law.rare + len(law.knobs) * math.log(float(part.sum())) + size
 
 
@@ -111,12 +117,34 @@ def _worth(groups: list[list[Start]], part: Floats) -> list[Start]:
     return firsts + [start for g in groups[:FOLLOWED] for start in g[1:]]
 
 
-def _refitted(fitter: Fitter, base: Fitted, begun: list[Start], tell: Tell) -> list[Fitted]:
+def _of_sensors(model: Sensing, fitter: Fitter, base: Fitted, part: Floats) -> list[_Begun]:
+    """Return the sensor laws worth a free run, with amounts and what they would explain."""
+    weights, jacobian = fitter.weights(base.e), base.jacobian
+    weighted = jacobian.T * weights
+    prior = np.full(jacobian.shape[1], 1e-6)
+    prior[: len(base.z)] = 1.0
+    inverse = np.linalg.inv(weighted @ jacobian + np.diag(prior))
+    tilt = weighted @ base.e
+    tilt[: len(base.z)] += base.z
+    found = list[_Begun]()
+    for law in sensor_laws():
+        if law.knobs[0].key in model.learned:
+            felt = model.felt(law)
+            own = weighted @ felt
+            slope = float((weights * felt) @ base.e - own @ inverse @ tilt)
+            bend = max(float((weights * felt) @ felt - own @ inverse @ own), 1e-12)
+            gain = slope * slope / bend
+            if gain > _price(law, part) - UNSURE:
+                found.append((law, (-slope / bend,), gain))
+    return found
+
+
+def _refitted(fitter: Fitter, base: Fitted, begun: Sequence[_Begun], tell: Tell) -> list[Fitted]:
     """Refit starts together; of each law the best fit stays."""
     if not begun:
         return []
-    tell(f"refitting {len(begun)} laws, such as {begun[0].law.name}")
-    trials = [((*base.effects, s.law), np.append(base.values, s.values)) for s in begun]
+    tell(f"refitting {len(begun)} laws, such as {begun[0][0].name}")
+    trials = [((*base.effects, law), np.append(base.values, values)) for law, values, _ in begun]
     fits = _one_each(fitter.refine(fitter.begin(base, trials), rounds=3))
     best = _one_each(fitter.refine(fits[:FRESH], rounds=3, fresh=True))
     return [*best, *fits[FRESH:]]
