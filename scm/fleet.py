@@ -57,6 +57,10 @@ class Link(Protocol):
         """Return a mailbox that fills from now on."""
         ...
 
+    def publish(self, message: Message) -> None:
+        """Send a message from the script."""
+        ...
+
     def run_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
         """Let the city go on until `done()`; return whether that came in time."""
         ...
@@ -80,6 +84,10 @@ class LockstepLink:
     def hear(self, hears: Hears) -> Mailbox:
         """Return a mailbox on the in-memory bus."""
         return self._lockstep.hear(hears)
+
+    def publish(self, message: Message) -> None:
+        """Send on the in-memory bus."""
+        self._lockstep.publish(message)
 
     def run_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
         """Step the city until `done()`."""
@@ -112,6 +120,10 @@ class LiveLink:
         mailbox = Mailbox(1000, self._wake)
         self._bus.subscribe(hears.kind, hears.where, mailbox)
         return mailbox
+
+    def publish(self, message: Message) -> None:
+        """Send on the bus."""
+        self._bus.publish(message)
 
     def run_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
         """Wait, looking again whenever something is heard."""
