@@ -16,6 +16,7 @@ from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.evidence import Residual
 from scm.mismatch.rollouts import Numbers
 from scm.mismatch.seen import Camera
+from scm.mismatch.smooth import Smooth
 from scm.mismatch.windows import Runs, Side, Windows
 from scm.vehicles.car import Car
 
@@ -24,6 +25,7 @@ EVERY_S = 0.2
 WIDTH_S = 0.4  # of the smoothing, one standard deviation
 LEAN, ANGLE_RAD = 0.02, 0.02  # pushes that measure the response: force over weight, wheel angle
 GRAVITY = 9.80665
+LEAP = 0.05  # of a change within a window that smoothing misplaces
 LEAST_BAND = 0.5  # of what noise alone is thought to make
 UNSURE = 4.0  # times the usual standard deviation: the car stands, nothing is known
 FORCE, ANGLE = ("drive force", "N"), ("wheel angle", "rad")
@@ -96,13 +98,14 @@ def _track(drive: Drive, car: Car, before: Numbers, after: Numbers) -> _Track:
     at = np.arange(1, len(drive.edges) - steps - 1, every)
     runs = Windows(drive, car).run(sides, np.tile(at, (len(sides), 1)), steps)
     end = drive.edges[at + steps]
-    moved = [side.camera.motion(end) for side in sides[:2]]
+    begun, ended = camera.motion(drive.edges[at]), camera.motion(end)
     change = response(runs, 1, ((2, force), (3, ANGLE_RAD)))
+    real = np.stack([getattr(ended, name) for name in MOVED])
+    leaps = LEAP * (real - np.stack([getattr(begun, name) for name in MOVED]))
+    lacks = [real - np.stack([runs[name][-1, i] for name in MOVED]) for i in range(2)]
     found = _found(
-        drive.edges[at],
-        [np.stack([getattr(m, n) - runs[n][-1, i] for n in MOVED]) for i, m in enumerate(moved)],
-        change, np.stack(_stds(drive, drive.edges[at], end)),
-    )  # fmt: skip
+        drive.edges[at], lacks, change, np.hypot(_stds(drive, drive.edges[at], end), leaps)
+    )
     middle = drive.edges[at] + 0.5 * RUN_S
     x, y, _ = camera.truly(*camera.recorded(camera.stamp(middle)))
     return _Track(middle, x, y, found)
@@ -150,17 +153,14 @@ def _found(
     }
 
 
-def _stds(drive: Drive, start: Floats, end: Floats) -> tuple[Floats, Floats]:
-    """Return how unsure the change of speed and of yaw rate is, start and end together."""
+def _stds(drive: Drive, start: Floats, end: Floats) -> Floats:
+    """Return how unsure speed and yaw rate are, start and end together, (2, windows)."""
     x, y, yaw = (drive.smoothed[f"pose.{n}"] for n in ("x", "y", "yaw"))
-    speed = np.sqrt(0.5 * (x.rate_std**2 + y.rate_std**2))
 
-    def both(t: Floats, std: Floats) -> Floats:
-        return np.asarray(np.hypot(np.interp(start, t, std), np.interp(end, t, std)))
+    def both(of: Smooth) -> Floats:
+        return np.hypot(*(np.interp(t, of.t, of.rate_std) for t in (start, end)))
 
-    return both(x.t, speed) if len(x.t) == len(y.t) else both(x.t, x.rate_std), both(
-        yaw.t, yaw.rate_std
-    )
+    return np.stack((np.sqrt(0.5 * (both(x) ** 2 + both(y) ** 2)), both(yaw)))
 
 
 def _smoothed(
