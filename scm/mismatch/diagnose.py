@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock, seconds
 from scm.errors import RecordingError
@@ -92,7 +93,8 @@ def diagnose(
     usable, problems = _doubted(recordings, car)
     if not usable:
         return _nothing(recordings, car, problems, seconds(clock.now_ns() - began_ns))
-    found = _searched(usable, car, tell, lambda: seconds(clock.now_ns() - began_ns) > budget_s)
+    with threadpool_limits(1):  # two threads drive already: more for small matrices only wait
+        found = _searched(usable, car, tell, lambda: seconds(clock.now_ns() - began_ns) > budget_s)
     diagnosis = replace(
         found.diagnosis, data=problems, runtime_s=seconds(clock.now_ns() - began_ns)
     )

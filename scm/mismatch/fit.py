@@ -97,16 +97,16 @@ class Fitter:
         sets = [self.numbers(effects, base.z, values) for effects, values in trials]
         e, ok = self.model(sets)
         jacobian = base.jacobian[:, : len(base.z)]
-        weighted = jacobian.T * self.weights(base.e)
-        normal = weighted @ jacobian + np.eye(len(base.z))
+        weights = self.weights(base.e)
+        normal = _normal(jacobian, weights) + np.eye(len(base.z))
+        slopes = jacobian.T @ (weights[:, None] * np.nan_to_num(e)) + base.z[:, None]
         found = []
         for i, (effects, values) in enumerate(trials):
             column = e[:, i]
             if not ok[i] or not np.isfinite(column).all():
                 found.append(Fitted(effects, base.z, values, column, np.inf, jacobian))
                 continue
-            slope = weighted @ column + base.z
-            dz = _bounded(normal, slope, -FARTHEST - base.z, FARTHEST - base.z)
+            dz = _bounded(normal, slopes[:, i], -FARTHEST - base.z, FARTHEST - base.z)
             moved = column + jacobian @ dz
             q = float(self.score(moved[:, None], base.z + dz)[0])
             found.append(Fitted(effects, base.z + dz, values, moved, q, jacobian))
@@ -167,10 +167,10 @@ class Fitter:
         """Return new numbers to try for one fit: shorter and more damped Gauss-Newton steps."""
         own, knobs = len(f.z), _knobs(f)
         prior = np.concatenate((np.ones(own), np.full(f.knobs, 1e-6)))
-        weighted = f.jacobian.T * self.weights(f.e)
-        normal = weighted @ f.jacobian + np.diag(prior)
+        weights = self.weights(f.e)
+        normal = _normal(f.jacobian, weights) + np.diag(prior)
         f.covariance = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
-        slope = weighted @ f.e + prior * np.concatenate((f.z, np.zeros(f.knobs)))
+        slope = f.jacobian.T @ (weights * f.e) + prior * np.concatenate((f.z, np.zeros(f.knobs)))
         scales = np.array([k.step for k in knobs])
         low = np.concatenate(
             (
@@ -221,6 +221,12 @@ class Fitter:
                     f.q, f.z, f.values, f.e = q, z, values, e[:, i].copy()
         for f in fits:
             f.done = f.done or before[id(f)] - f.q < ENOUGH
+
+
+def _normal(jacobian: Floats, weights: Floats) -> Floats:
+    """Return J' W J."""
+    rooted = jacobian * np.sqrt(weights)[:, None]
+    return np.asarray(rooted.T @ rooted)
 
 
 def _bounded(normal: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:

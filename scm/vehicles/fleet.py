@@ -21,11 +21,11 @@ from scm.vehicles.fleet_rows import (
     COG_CHANGED,
     READ,
     SLOT_OF,
-    WHEELS,
     WRITTEN,
     aligned,
     columns_of_command,
     pool,
+    slots_of_signals,
     whole_steps,
 )
 from scm.vehicles.kernel_file import compile_kernel
@@ -102,6 +102,7 @@ class Fleet:
         self.threads = 1
         self.columns = columns_of(car.terms)
         self._slots = slots_of(car.terms)
+        self._signal_slots = slots_of_signals(self._slots)
         self._kernel = compile_kernel(car.name, car.terms)
         padded = -(-capacity // LANES) * LANES
         height = max(offset + width for offset, width in self._slots.values())
@@ -462,15 +463,11 @@ class Fleet:
         return CommandPast(padded, np.array(slots), np.array(columns))
 
     def _slot_of_signal(self, name: str) -> int:
-        names = {n: WRITTEN.get(n, SLOT_OF.get(n, n)) for n in (*READ, *WRITTEN)}
-        slots = {n: self._slots[slot][0] for n, slot in names.items() if self._slots[slot][1] == 1}
-        for n in names.keys() - slots.keys():
-            first = self._slots[names[n]][0]
-            slots |= {f"{n}.{wheel}": first + w for w, wheel in enumerate(WHEELS)}
-        if name not in slots:
-            msg = f"rollout: {name!r} is no signal of each car{nearest(name, sorted(slots))}"
+        if name not in self._signal_slots:
+            hint = nearest(name, sorted(self._signal_slots))
+            msg = f"rollout: {name!r} is no signal of each car{hint}"
             raise RunError(msg)
-        return slots[name]
+        return self._signal_slots[name]
 
     def _parameter(self, row: int, name: str) -> float:
         return float(self.parameters[row, self.parameter_names.index(name)])

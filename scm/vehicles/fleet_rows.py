@@ -1,6 +1,7 @@
 """The names of a fleet's arrays, the memory behind them, and what may be asked of it."""
 
 import math
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
@@ -27,6 +28,16 @@ WHEELS = ("fl", "fr", "rl", "rr")
 SLOT_OF = {"wheel_x": "ground_x", "wheel_y": "ground_y"}
 COG = ("x_cog", "y_cog", "yaw", "vx_world", "vy_world", "yaw_rate")
 COG_CHANGED = ("vx_world", "vy_world", "yaw_rate", "x_cog", "y_cog", "yaw")
+
+
+def slots_of_signals(slots: Mapping[str, tuple[int, int]]) -> dict[str, int]:
+    """Return the slot of each number that may be asked of a car; a wheel's as `wheel_angle.rl`."""
+    found = dict[str, int]()
+    for name in (*READ, *WRITTEN):
+        first, width = slots[WRITTEN.get(name, SLOT_OF.get(name, name))]
+        wheels = {f"{name}.{wheel}": first + w for w, wheel in enumerate(WHEELS)}
+        found |= {name: first} if width == 1 else wheels
+    return found
 
 
 def whole_steps(duration: float, substep: float) -> int:
