@@ -22,6 +22,7 @@ from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 
 SCALES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15)
+LONGEST_S = 300.0
 Numbers = Mapping[str, float]
 Change = Callable[[Numbers, float], Numbers]
 """Turns a car's numbers into those on a changed experiment that starts with some heading [rad]."""
@@ -77,6 +78,9 @@ def numbers_of(effects: Sequence[Candidate], values: Floats) -> dict[str, float]
 def place(leg: Leg, car: Car, pace: Pace, rivals: Sequence[Numbers]) -> Placed | None:
     """Return a leg with the most throttle that keeps every rival's car on the floor, upright."""
     wishes = [leg.build(replace(pace, throttle=round(s * pace.throttle, 3))) for s in SCALES]
+    wishes = [wish for wish in wishes if wish.lasts_s < LONGEST_S]
+    if not wishes:
+        return None
     longest = max(round(w.lasts_s / STEP_S) for w in wishes) + 10
     commands = np.zeros((2, longest, len(wishes) * len(rivals)))
     for k, wish in enumerate(wishes):
