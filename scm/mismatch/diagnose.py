@@ -29,7 +29,7 @@ from scm.mismatch.findings import (
 )
 from scm.mismatch.fit import Fitted
 from scm.mismatch.judge import judge
-from scm.mismatch.library import Candidate, candidates, shown_by, terms_needed
+from scm.mismatch.library import Candidate, candidates, placed, shown_by, terms_needed
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.locate import locate
 from scm.mismatch.parts import split
@@ -149,7 +149,7 @@ def _searched(
     drives = [Drive(recording, big) for recording in recordings]
     model = Likelihood(drives, big)
     parts = split(model)
-    library = shown_by(candidates(big), drives)
+    library = placed(shown_by(candidates(big), drives), drives)
     search = Search(model, parts.fit.weight + parts.choose.weight, library, tell)
     best = search.run(is_over)
     tell("judging on what the fit did not see")

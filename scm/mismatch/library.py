@@ -19,6 +19,7 @@ from scm.vehicles.measure import all_measures
 from scm.vehicles.param import Param
 from scm.vehicles.term import flat
 
+PATCH, SPOTS_ACROSS = "surface_patch", 7
 POINT_X = "measure.pose_point_x_m"
 
 
@@ -202,6 +203,38 @@ def shown_by(found: tuple[Candidate, ...], drives: Sequence[Drive]) -> tuple[Can
         hard = max(hard, float(np.percentile(speed * np.abs(yaw.rate), 95)))
     needs = {c.name: SHOWS_ABOVE.get(c.name, (0.0, 0.0)) for c in found}
     return tuple(c for c in found if fast >= needs[c.name][0] and hard >= needs[c.name][1])
+
+
+def placed(found: Sequence[Candidate], drives: Sequence[Drive]) -> tuple[Candidate, ...]:
+    """Return candidates with a spot of floor given spots to begin from, where the car was."""
+    return tuple(p for c in found for p in (_spots(c, drives) if c.name == PATCH else (c,)))
+
+
+def _spots(patch: Candidate, drives: Sequence[Drive]) -> tuple[Candidate, ...]:
+    """Return a spot of other grip and one of other rolling resistance, from cells of the way."""
+    x = np.concatenate([drive.smoothed["pose.x"].value for drive in drives])
+    y = np.concatenate([drive.smoothed["pose.y"].value for drive in drives])
+    cell = max(float(np.ptp(x)), float(np.ptp(y))) / SPOTS_ACROSS
+    cells = np.stack((np.round(x / cell), np.round(y / cell)))
+    centres = np.unique(cells, axis=1).T * cell
+    knobs = {knob.name: knob for knob in patch.knobs}
+    where = (
+        replace(knobs["x_m"], bounds=(float(x.min()), float(x.max()))),
+        replace(knobs["y_m"], bounds=(float(y.min()), float(y.max()))),
+        replace(knobs["radius_m"], bounds=(0.3 * cell, 3.0 * cell)),
+    )
+    return tuple(
+        replace(
+            patch,
+            knobs=(*where, knobs[name]),
+            starts=tuple((float(cx), float(cy), cell, value) for cx, cy in centres),
+            said=f"A spot of floor near ({{x_m}}, {{y_m}}), {{radius_m}} in radius, {words}.",
+        )
+        for name, value, words in (
+            ("grip", 0.6, "has {grip} of the grip around it"),
+            ("rolling", 0.04, "has a rolling resistance {rolling} above the rest"),
+        )
+    )
 
 
 def terms_needed(car: Car) -> list[str]:
