@@ -24,6 +24,7 @@ from scm.mismatch.leftover import (
     RUN_S,
     inverse_of,
     response,
+    starts_of,
 )
 from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
@@ -153,7 +154,9 @@ def _acted(
         *(Side(numbers(values), camera) for values in (neutral, *moved)),
     ]
     steps, every = round(RUN_S / STEP_S), round(EVERY_S / STEP_S)
-    at = np.arange(1, len(drive.edges) - steps - 1, every)
+    at = starts_of(drive, camera, steps, every)
+    if not len(at):
+        return np.zeros(0), np.zeros(0), np.zeros(0)
     runs = Windows(drive, car).run(sides, np.tile(at, (len(sides), 1)), steps)
     inverse = inverse_of(response(runs, 0, ((1, force), (2, ANGLE_RAD))))
     last = np.stack([runs[name][-1] for name in MOVED])

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scm.arrays import Floats
+from scm.arrays import Floats, Ints
 from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.evidence import Residual
 from scm.mismatch.rollouts import Numbers
@@ -25,7 +25,7 @@ EVERY_S = 0.2
 WIDTH_S = 0.4  # of the smoothing, one standard deviation
 LEAN, ANGLE_RAD = 0.02, 0.02  # pushes that measure the response: force over weight, wheel angle
 GRAVITY = 9.80665
-LEAP = 0.05  # of a change within a window that smoothing misplaces
+LEAP = 0.15  # of a change within a window that smoothing misplaces
 LEAST_BAND = 0.5  # of what noise alone is thought to make
 UNSURE = 4.0  # times the usual standard deviation: the car stands, nothing is known
 FORCE, ANGLE = ("drive force", "N"), ("wheel angle", "rad")
@@ -47,7 +47,7 @@ def leftover(
 ) -> tuple[Residual, ...]:
     """Return the force and the wheel angle left over by two cars, smoothed, with their bands.
 
-    Several drives follow one another in time.
+    Several drives follow one another in time; one shorter than a window shows nothing.
 
     Args:
         drives: The recordings.
@@ -55,7 +55,9 @@ def leftover(
         before: Numbers of the car as given, by key.
         after: Of the car as found.
     """
-    tracks = [_track(drive, car, before, after) for drive in drives]
+    tracks = [track for drive in drives if (track := _track(drive, car, before, after)) is not None]
+    if not tracks:
+        return ()
     t = one_after_another([one.t for one in tracks], EVERY_S)
     x, y = (np.concatenate([getattr(one, n) for one in tracks]) for n in ("x", "y"))
     residuals = []
@@ -85,7 +87,7 @@ def honest(after: Floats, std: Floats) -> Floats:
     return np.asarray(std * max(LEAST_BAND, spread))
 
 
-def _track(drive: Drive, car: Car, before: Numbers, after: Numbers) -> _Track:
+def _track(drive: Drive, car: Car, before: Numbers, after: Numbers) -> _Track | None:
     force = LEAN * GRAVITY * car.value("body.mass_kg")
     camera = Camera(drive, after)
     sides = [
@@ -95,7 +97,9 @@ def _track(drive: Drive, car: Car, before: Numbers, after: Numbers) -> _Track:
         Side(after, camera, like=1, push=(0.0, ANGLE_RAD)),
     ]
     steps, every = round(RUN_S / STEP_S), round(EVERY_S / STEP_S)
-    at = np.arange(1, len(drive.edges) - steps - 1, every)
+    at = starts_of(drive, camera, steps, every)
+    if not len(at):
+        return None
     runs = Windows(drive, car).run(sides, np.tile(at, (len(sides), 1)), steps)
     end = drive.edges[at + steps]
     begun, ended = camera.motion(drive.edges[at]), camera.motion(end)
@@ -109,6 +113,14 @@ def _track(drive: Drive, car: Car, before: Numbers, after: Numbers) -> _Track:
     middle = drive.edges[at] + 0.5 * RUN_S
     x, y, _ = camera.truly(*camera.recorded(camera.stamp(middle)))
     return _Track(middle, x, y, found)
+
+
+def starts_of(drive: Drive, camera: Camera, steps: int, every: int) -> Ints:
+    """Return the edges at which windows start whose poses were all recorded."""
+    at: Ints = np.arange(1, len(drive.edges) - steps - 1, every)
+    stamps, t = drive.smoothed["pose.x"].t, camera.stamp(drive.edges)
+    known = (t[at - 1] >= stamps[0]) & (t[at + steps + 1] <= stamps[-1])
+    return np.asarray(at[known])
 
 
 def response(runs: Runs, base: int, pushes: Sequence[tuple[int, float]]) -> Floats:

@@ -106,6 +106,15 @@ def test_a_sensor_s_fault_is_drawn_as_what_the_sensor_reads_too_much():
     assert abs(np.nanmean(gyro.after)) < 0.005
 
 
+def test_no_force_is_made_up_beyond_the_poses_of_a_late_camera():
+    late = {"measure.pose_delay_s": 0.3}
+    drive = driven(sense=lambda name, t, v: np.interp(t - 0.3, t, v) if "pose" in name else v)
+    for residual in leftover([drive], big_nigel(), late, late):
+        assert residual.t_s[-1] < drive.edges[-1] - 0.3
+        known = np.isfinite(residual.after)
+        assert np.mean(np.abs(residual.after[known]) > 4.0 * residual.std[known]) < 0.02
+
+
 def test_drives_follow_one_another_in_time():
     t = one_after_another([np.array([3.0, 4.0]), np.array([100.0, 101.0])], 0.5)
     assert t.tolist() == [3.0, 4.0, 4.5, 5.5]
