@@ -16,6 +16,7 @@ from scm.mismatch.experiment.pace import Pace
 ROW_S = 0.05
 ABOUT_S = 30.0
 REST_S = 1.0
+EIGHT = 0.17  # radius over length of an eight, with some room to drift
 Piece = tuple[float, float, float]
 """Seconds, throttle, steering."""
 
@@ -121,7 +122,8 @@ def launches(pace: Pace) -> Manoeuvre:
 
 def _circle(pace: Pace, share: float = 0.7) -> float:
     """Return the steering of a circle that two halves of an eight leave room for."""
-    return round(max(pace.steering(max(share * pace.turn_m, pace.tightest_m)), 0.1), 2)
+    radius = max(min(share * pace.turn_m, EIGHT * pace.run_m), pace.tightest_m)
+    return round(max(pace.steering(radius), 0.1), 2)
 
 
 def _laps(pace: Pace, throttle: float, steering: float, about_s: float = 8.0) -> float:
@@ -199,14 +201,14 @@ def out_and_back(pace: Pace) -> Manoeuvre:
     """Straight along the floor, turn round, and straight back, at one throttle."""
     u, s = round(0.8 * pace.throttle, 2), min(pace.steering(0.4 * pace.turn_m), 0.95)
     v, radius = pace.speed(u), pace.radius(s)
-    straight = max((pace.run_m - 2.0 * radius) / max(v, 1e-3), 0.5)
+    straight = max(0.6 * (pace.run_m - 2.0 * radius) / max(v, 1e-3), 0.5)
     turn = math.pi * radius / max(v, 1e-3)
     said = (
         f"at throttle {u:.2f} drive {straight:.2g} s straight, turn round to the left, steering "
-        f"{s:.2f} for {turn:.2g} s, drive straight back as long, turn round again, and so on"
+        f"{s:.2f} for {turn:.2g} s, drive straight back as long, and turn round again"
     )
-    once = [(straight, u, 0.0), (turn, u, s)]
-    return Manoeuvre("two headings", _again(once, max(ABOUT_S, 3.0 * (straight + turn))), said)
+    loop = [(straight, u, 0.0), (turn, u, s)] * 2
+    return Manoeuvre("two headings", _again(loop, 1.0), said)
 
 
 def long_laps(pace: Pace) -> Manoeuvre:
