@@ -57,11 +57,11 @@ class Fitter:
     """Fits hypotheses on a part of the innovations.
 
     Attributes:
-        part: Weight of each innovation, 0 or 1, (events,).
+        part: Weight of each innovation, 0 or 1, (events,); a drive's first second never counts.
     """
 
     def __init__(self, model: Likelihood, part: Floats) -> None:
-        self.model, self.part = model, part
+        self.model, self.part = model, part * model.settled
 
     def numbers(self, effects: Sequence[Candidate], z: Floats, values: Floats) -> dict[str, float]:
         """Return the numbers by key of a hypothesis."""
@@ -230,18 +230,29 @@ def _normal(jacobian: Floats, weights: Floats) -> Floats:
 
 
 def _bounded(normal: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
-    """Return the step that minimises a quadratic within bounds, by holding what leaves them."""
+    """Return the step that minimises a quadratic within bounds that hold 0: active sets."""
     n = len(slope)
     step, held = np.zeros(n), np.zeros(n, dtype=np.bool_)
-    for _ in range(n):
-        free = ~held
-        wanted = -slope[free] - normal[np.ix_(free, held)] @ step[held]
-        step[free] = np.linalg.lstsq(normal[np.ix_(free, free)], wanted, rcond=1e-12)[0]
-        out = free & ((step < low) | (step > high))
-        if not out.any():
+    for _ in range(4 * n):
+        free = np.flatnonzero(~held)
+        wanted = -slope[free] - normal[np.ix_(free, np.flatnonzero(held))] @ step[held]
+        best = np.linalg.lstsq(normal[np.ix_(free, free)], wanted, rcond=1e-12)[0]
+        way = best - step[free]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = np.where(way > 0.0, high[free] - step[free], low[free] - step[free]) / way
+        reach = np.where(np.abs(way) > 1e-12, np.maximum(reach, 0.0), np.inf)
+        if len(free) and reach.min() < 1.0:
+            first = int(np.argmin(reach))
+            step[free] += reach[first] * way
+            held[free[first]] = True
+            continue
+        step[free] = best
+        pull = normal @ step + slope
+        outward = np.where(step >= high - 1e-12, -pull, pull)
+        outward[~held] = np.inf
+        if not held.any() or outward.min() >= -1e-9:
             break
-        step[out] = np.clip(step[out], low[out], high[out])
-        held |= out
+        held[int(np.argmin(outward))] = False
     return step
 
 

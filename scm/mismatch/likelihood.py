@@ -27,6 +27,7 @@ class Ordinary:
 
 LOCK = "drive.axle_lock"
 _UNKNOWN = {LOCK: (0.5, 0.5)}  # what no car file says and every car has
+SETTLED_S = 1.0
 TIMING_S = 0.003  # no recording's stamps are better than that
 LEAST_SCATTER = {"body.mass_kg": 0.06}  # cars are weighed without cables, tape and battery
 _CLOCKS = tuple(
@@ -55,6 +56,7 @@ class Likelihood:
 
     Attributes:
         ordinary: The car's own uncertain numbers, in the order of every `z`.
+        t: Times of all innovations, (events,); `settled`: 0 while the start still matters, else 1.
     """
 
     def __init__(self, drives: Sequence[Drive], car: Car) -> None:
@@ -74,6 +76,10 @@ class Likelihood:
         self.noise = noise
         self.whiteners = [Whitener(drive, noise) for drive in self.drives]
         self.t = np.concatenate([w.t for w in self.whiteners])
+        begun = [
+            w.t > d.edges[0] + SETTLED_S for w, d in zip(self.whiteners, self.drives, strict=True)
+        ]
+        self.settled = np.concatenate(begun).astype(np.float64)
 
     @property
     def log_size(self) -> Floats:
