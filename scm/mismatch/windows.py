@@ -60,6 +60,15 @@ class Runs:
         return self.signals[name]
 
 
+@dataclass(frozen=True, slots=True)
+class _Leader:
+    """A car that drives the whole recording: its commands, and its motion as measured."""
+
+    side: Side
+    commands: Floats
+    moved: Moved
+
+
 class Windows:
     """Drives windows of one recording again."""
 
@@ -78,7 +87,10 @@ class Windows:
         windows = starts.shape[1]
         fleet = Fleet(self.car, len(leaders) + len(sides) * windows)
         commands = [self._commands(side.numbers) for side in sides]
-        leading = [(sides[i], commands[i]) for i in leaders]
+        leading = [
+            _Leader(sides[i], commands[i], sides[i].camera.motion(self.drive.edges))
+            for i in leaders
+        ]
         self._lead(fleet, leading)
         rows = len(leaders) + np.arange(len(sides) * windows).reshape(len(sides), windows)
         moved = [
@@ -110,16 +122,16 @@ class Windows:
             for command, delay in zip((self.drive.throttle, self.drive.steering), late, strict=True)
         ])  # fmt: skip
 
-    def _lead(self, fleet: Fleet, leading: Sequence[tuple[Side, Floats]]) -> None:
+    def _lead(self, fleet: Fleet, leading: Sequence[_Leader]) -> None:
         """Put one car of each side at the recording's start, its actuators run in."""
-        starts = [side.camera.motion(self.drive.edges[:1]) for side, _ in leading]
-        for i, ((side, _), at) in enumerate(zip(leading, starts, strict=True)):
-            fleet.add(Pose2(float(at.x[0]), float(at.y[0]), float(at.yaw[0])))
-            fleet.parameters[i] = self._values(fleet, side.numbers)
+        for i, one in enumerate(leading):
+            x, y, yaw = (float(v[0]) for v in (one.moved.x, one.moved.y, one.moved.yaw))
+            fleet.add(Pose2(x, y, yaw))
+            fleet.parameters[i] = self._values(fleet, one.side.numbers)
         run_in = round(RUN_IN_S / STEP_S)
-        self._drive(fleet, [c[:, :run_in] for _, c in leading])
-        for i, at in enumerate(starts):
-            _place(fleet, i, at, 0)
+        self._drive(fleet, [one.commands[:, :run_in] for one in leading])
+        for i, one in enumerate(leading):
+            _place(fleet, i, one.moved, 0)
 
     def _values(self, fleet: Fleet, numbers: Numbers) -> Floats:
         """Return a row's numbers: the car's own but for those named."""
@@ -135,19 +147,16 @@ class Windows:
             wide[:, :, i] = command
         fleet.rollout(wide[0], wide[1], STEP_S, ())
 
-    def _advance(
-        self, fleet: Fleet, leading: Sequence[tuple[Side, Floats]], now: int, to: int
-    ) -> int:
+    def _advance(self, fleet: Fleet, leading: Sequence[_Leader], now: int, to: int) -> int:
         """Let the leaders drive on, carried to the measured pose from time to time."""
         run_in = round(RUN_IN_S / STEP_S)
         while now < to:
             then = min(now + TETHER_STEPS, to)
             if self.drive.battery is not None:
                 fleet.battery[: len(leading)] = self.drive.battery[now]
-            self._drive(fleet, [c[:, run_in + now : run_in + then] for _, c in leading])
+            self._drive(fleet, [one.commands[:, run_in + now : run_in + then] for one in leading])
             now = then
-            at = self.drive.edges[now : now + 1]
-            _carry(fleet, [side.camera.motion(at) for side, _ in leading])
+            _carry(fleet, [one.moved for one in leading], now)
         return now
 
     def _start(
@@ -204,10 +213,10 @@ def _signal(fleet: Fleet, name: str) -> Floats:
     return np.array(getattr(fleet, whole)[:, ("fl", "fr", "rl", "rr").index(wheel)])
 
 
-def _carry(fleet: Fleet, measured: Sequence[Moved]) -> None:
-    """Carry the first rows to measured poses; their motion in their own frames stays."""
+def _carry(fleet: Fleet, measured: Sequence[Moved], k: int) -> None:
+    """Carry the first rows to poses measured at an edge; their motion in their own frames stays."""
     rows = np.arange(len(measured))
-    x, y, yaw = (np.array([getattr(m, n)[0] for m in measured]) for n in ("x", "y", "yaw"))
+    x, y, yaw = (np.array([getattr(m, n)[k] for m in measured]) for n in ("x", "y", "yaw"))
     now = fleet.planar_cogs(rows)
     turn = yaw - fleet.yaw[rows]
     turn = np.arctan2(np.sin(turn), np.cos(turn))
