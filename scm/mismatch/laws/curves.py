@@ -5,13 +5,14 @@ runs through their bands.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.evidence import Curve
-from scm.mismatch.fit import Fitted
-from scm.mismatch.laws.cells import Cells
+from scm.mismatch.fit import Fitted, Fitter
+from scm.mismatch.laws.cells import Cells, respond
 from scm.mismatch.laws.law import Law, Values
 from scm.mismatch.laws.pushes import amount, shape
 from scm.mismatch.laws.seek import Sought
@@ -30,25 +31,21 @@ _UNITS = {"along_n": "N", "turn_rad": "rad", "throttle_add": "1", "moment_nm": "
 def law_curves(fitted: Fitted, sought: Sought) -> tuple[Curve, ...]:
     """Return a hypothesis' law as the recordings show it in bins, and as it was fitted."""
     law = fitted.effects[-1]
-    if not isinstance(law, Law) or law.channel.response not in sought.responses:
+    if not isinstance(law, Law):
         return ()
     values = tuple(float(v) for v in fitted.values[-len(law.knobs) :])
     n, cells = len(law.channel.knobs), sought.cells
     x, x_name, x_unit = _axis(law, values[n:], cells)
-    one = (1.0, *values[1:n])
-    unit = amount(law.channel.numbers(one), cells)
+    unit = amount(law.channel.numbers((1.0, *values[1:n])), cells)
     edges = np.linspace(float(x.min()), float(x.max()), BINS + 1)
     place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
     used = [b for b in range(BINS) if np.count_nonzero(place == b) >= LEAST_CELLS]
     courses = np.stack([np.where(place == b, unit, 0.0) for b in used], axis=1)
-    response = sought.responses[law.channel.response]
-    bend = courses.T @ response.bend @ courses
-    bend += 1e-9 * np.trace(bend) * np.eye(len(used))
-    covariance = np.linalg.inv(bend)
-    y = -covariance @ (courses.T @ response.slope)
-    band = NINETY * np.sqrt(np.maximum(covariance.diagonal(), 0.0))
-    middle = 0.5 * (edges[:-1] + edges[1:])[used]
+    more, covariance = _left_over(law, fitted, sought, courses)
     fit = values[0] * shape(law.curve.numbers(values[n:]), cells)
+    y = np.array([fit[place == b].mean() for b in used]) + more
+    band = NINETY * np.sqrt(np.maximum(covariance.diagonal(), 0.0))
+    middle = np.array([x[place == b].mean() for b in used])
     order = np.argsort(x)
     names = {"x_name": x_name, "x_unit": x_unit, "y_name": law.channel.word,
              "y_unit": _UNITS[law.channel.response]}  # fmt: skip
@@ -56,6 +53,18 @@ def law_curves(fitted: Fitted, sought: Sought) -> tuple[Curve, ...]:
         Curve(effect=law.name, x=middle, y=y, low=y - band, high=y + band, **names),
         Curve(effect=law.name, x=x[order], y=fit[order], low=fit[order], high=fit[order], **names),
     )
+
+
+def _left_over(law: Law, fitted: Fitted, sought: Sought, courses: Floats) -> tuple[Floats, Floats]:
+    """Return what each course asks for beyond the law, and how sure, the law's numbers as found."""
+    kept = fitted.jacobian.shape[1] - len(law.knobs)
+    held = replace(fitted, jacobian=fitted.jacobian[:, :kept])
+    fitter = Fitter(sought.model, sought.part)
+    response = respond(sought.model, fitter, held, sought.cells, law.channel.response)
+    bend = courses.T @ response.bend @ courses
+    bend += 1e-9 * np.trace(bend) * np.eye(len(bend))
+    covariance: Floats = np.linalg.inv(bend).astype(np.float64)
+    return -covariance @ (courses.T @ response.slope), covariance
 
 
 def _axis(law: Law, values: Values, cells: Cells) -> tuple[Floats, str, str]:

@@ -224,7 +224,10 @@ THROTTLE = _term(
 )
 
 
+TERMS = (PUSH, ACROSS, TWIST, TURN, THROTTLE)
+
+
 def learned_terms(car: Car) -> list[Term]:
     """Return the general effect's parts that a car can carry; a steering's trim stays as it is."""
     taken = {term.sets for term in car.terms if term.sets}
-    return [PUSH, ACROSS, TWIST, TURN, *(() if THROTTLE.sets in taken else (THROTTLE,))]
+    return [term for term in TERMS if term is not THROTTLE or term.sets not in taken]

@@ -12,12 +12,13 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.fit import Fitted, Fitter
-from scm.mismatch.laws.cells import AMOUNTS, Cells, Response, cells_of, respond
+from scm.mismatch.laws.cells import AMOUNTS, Cells, cells_of, respond
 from scm.mismatch.laws.dictionary import dictionary
 from scm.mismatch.laws.law import Law
 from scm.mismatch.laws.learned import THROTTLE, learned_terms
 from scm.mismatch.laws.screen import Start, polished, screen
 from scm.mismatch.laws.sensed import Sensed, Sensing, sensor_laws
+from scm.mismatch.laws.tidy import tidied
 from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
 
@@ -36,7 +37,7 @@ class Sought:
 
     Attributes:
         model: With the general effect, under the noise that was believed.
-        base: What the laws were added to, in that model.
+        base: What the laws were added to, in that model; `part` of it was fitted.
         criteria: Of each, lower is better; comparable with `criterion` of any listed hypothesis.
     """
 
@@ -44,8 +45,8 @@ class Sought:
     base: Fitted
     found: tuple[Fitted, ...]
     criteria: tuple[float, ...]
+    part: Floats
     cells: Cells
-    responses: dict[str, Response]
 
 
 def criterion(fitted: Fitted, events: int, listed: int = LISTED) -> float:
@@ -92,9 +93,9 @@ def seek(model: Likelihood, base: Fitted, part: Floats, tell: Tell = lambda _: N
     begun.sort(key=lambda one: _price(one[0], part) - one[2])
     found = _refitted(fitter, base, begun[:MOST], tell)
     events = int(part.sum())
-    ranked = sorted(found, key=lambda f: criterion(f, events))
+    ranked = sorted(map(tidied, found), key=lambda f: criterion(f, events))
     return Sought(
-        model, base, tuple(ranked), tuple(criterion(f, events) for f in ranked), cells, responses
+        model, base, tuple(ranked), tuple(criterion(f, events) for f in ranked), part, cells
     )
 
 

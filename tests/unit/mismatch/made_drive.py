@@ -39,13 +39,14 @@ def commands(seconds):
     return t, throttle, steering
 
 
-def made_drive(numbers=(), seconds=20.0, seed=1, sense=lambda name, t, values: values):
+def made_drive(numbers=(), seconds=20.0, seed=1, sense=lambda name, t, values: values, car=None):
     """The recording of a car that differs from its file by numbers, as (key, value) pairs.
 
     `sense` may spoil a channel: it gets its name, times and noisy values and returns values.
+    `car` drives in place of the usual one: it may have more effects.
     """
     t, throttle, steering = commands(seconds)
-    fleet = Fleet(big_nigel(), 1)
+    fleet = Fleet(car or big_nigel(), 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
     for key, value in dict(numbers).items():
         fleet.set_parameter(0, key, value)

@@ -1,0 +1,86 @@
+"""Made drives of a car that obeys a law outside the library, and what is found in them."""
+
+from functools import cache
+
+import numpy as np
+
+from scm.mismatch.drive import Drive
+from scm.mismatch.fit import Fitter
+from scm.mismatch.laws.dictionary import dictionary
+from scm.mismatch.laws.learned import learned_terms
+from scm.mismatch.laws.seek import seek
+from scm.mismatch.laws.sensed import Sensing, sensor_laws
+from scm.mismatch.likelihood import Likelihood
+from tests.unit.mismatch.made_drive import big_nigel, made_drive
+
+GUST = (0.8, 0.9, 4.0, 0.5)
+GUST_NAME = "floor force against time"
+
+
+@cache
+def lawful_nigel():
+    return big_nigel().with_terms(learned_terms(big_nigel()))
+
+
+def law(name, curve):
+    return next(x for x in dictionary() if x.name == name and x.curve.name == curve)
+
+
+def gust():
+    return law(GUST_NAME, "swing")
+
+
+def side():
+    return law("wheel angle against steering sign", "side")
+
+
+def lawful_drive(numbers=(), seconds=16.0, **more):
+    """A drive of a car whose general effect has these numbers."""
+    recording = made_drive(tuple(dict(numbers).items()), seconds, car=lawful_nigel(), **more)
+    return Drive(recording, lawful_nigel())
+
+
+def sought(drive):
+    """What is found in a drive, beside the car with its own numbers refitted."""
+    model = Likelihood([drive], lawful_nigel())
+    fitter = Fitter(model, np.ones(len(model.t)))
+    (base,) = fitter.refine([fitter.null()], rounds=2, fresh=True)
+    return seek(model, base, np.ones(len(model.t)))
+
+
+@cache
+def gusty():
+    return sought(lawful_drive(gust().numbers(GUST)))
+
+
+@cache
+def lens():
+    """A camera whose scale grows with |x|, as a cheap lens."""
+    drive = lawful_drive(seconds=30.0, sense=_bent())
+    model = Sensing(Likelihood([drive], lawful_nigel()), lawful_nigel())
+    fitter = Fitter(model, np.ones(len(model.t)))
+    (base,) = fitter.refine([fitter.null()], rounds=2, fresh=True)
+    model.learn(fitter.numbers((), base.z, base.values))
+    law = sensor_laws()[0]
+    (found,) = fitter.refine(fitter.begin(base, [((law,), np.array([0.01]))]), rounds=3)
+    return model, base, found
+
+
+def _bent(size=0.05):
+    """Spoil x as it comes, and y by the x of the same samples."""
+    true_x = []
+
+    def sense(name, _, values):
+        if name == "pose.x":
+            true_x.append(values)
+            return values * (1.0 + size * np.abs(values))
+        if name == "pose.y":
+            return values * (1.0 + size * np.abs(true_x[0]))
+        return values
+
+    return sense
+
+
+@cache
+def healthy():
+    return sought(lawful_drive())

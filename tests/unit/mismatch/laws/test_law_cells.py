@@ -1,0 +1,82 @@
+"""Responses of moments: their sums are what a rollout gives, and the best law is found in them."""
+
+from functools import cache
+
+import numpy as np
+
+from scm.mismatch.fit import Fitter
+from scm.mismatch.laws.cells import Cells, Response, cells_of, respond
+from scm.mismatch.laws.learned import PREFIX
+from scm.mismatch.laws.pushes import pushes
+from scm.mismatch.laws.screen import polished, screen
+from scm.mismatch.likelihood import Likelihood
+from tests.unit.mismatch.laws import made_law
+
+
+@cache
+def asked():
+    """Model, fitter and base of a healthy drive, and its moments."""
+    model = Likelihood([made_law.lawful_drive()], made_law.lawful_nigel())
+    fitter = Fitter(model, np.ones(len(model.t)))
+    (base,) = fitter.refine([fitter.null()], rounds=1, fresh=True)
+    return model, fitter, base, cells_of(model, fitter, base)
+
+
+def explained(model, fitter, base, change):
+    """What a change of the innovations adds to the objective, own numbers refitted linearly."""
+    weights, own = fitter.weights(base.e), base.jacobian
+    normal = (own.T * weights) @ own + np.eye(own.shape[1])
+    held = np.linalg.solve(normal, (own.T * weights) @ change)
+    return float(change @ (weights * change) - held @ normal @ held)
+
+
+def test_hats_together_are_the_rollout_of_the_whole_course():
+    model, fitter, base, cells = asked()
+    for channel, size in (("along_n", 0.2), ("turn_rad", 0.01)):
+        response = respond(model, fitter, base, cells, channel)
+        course = size * np.sin(2.0 * np.pi * cells.driven["time"] / 4.0)
+        swing = {
+            PREFIX + "by_time": 2.0 * np.pi / 4.0,
+            PREFIX + "sine": size,
+            PREFIX + channel: 1.0,
+        }
+        numbers = fitter.numbers((), base.z, base.values)
+        e, _ = model([numbers, numbers | swing])
+        true = explained(model, fitter, base, e[:, 1] - e[:, 0])
+        np.testing.assert_allclose(course @ response.bend @ course, true, rtol=0.1)
+
+
+def made_cells():
+    t = 0.1 * np.arange(600)
+    driven = {"time": t, "x": np.cos(0.5 * t), "y": np.sin(0.5 * t), "yaw": 0.5 * t + 1.57,
+              "speed": 0.5 + 0.2 * np.sin(1.3 * t), "steer": 0.3 * np.sin(0.9 * t),
+              "throttle": 0.5 + 0.3 * np.cos(1.1 * t), "rate": np.full(600, 0.5)}  # fmt: skip
+    return Cells(0.1, np.zeros(600, dtype=np.int64), driven)
+
+
+def best_of(law, values):
+    """The best start where every moment is measured by itself and one law is true."""
+    cells = made_cells()
+    response = Response(-pushes(law, cells, values), np.eye(len(cells)))
+    ((first, *_),) = screen([law], cells, {law.channel.response: response})
+    return polished(first, cells, response), cells, response
+
+
+def test_the_period_of_a_gust_is_found():
+    best, _, response = best_of(made_law.gust(), (0.8, 0.9, 3.3, 0.5))
+    assert abs(best.values[2] - 3.3) < 0.05
+    assert best.gain > 0.95 * float(response.slope @ response.slope)
+
+
+def test_the_way_of_a_nap_is_found():
+    law = made_law.law("drive force against heading", "one way")
+    best, _, _ = best_of(law, (0.8, 2.0))
+    np.testing.assert_allclose(best.values, (0.8, 2.0), atol=0.05)
+
+
+def test_the_waves_of_a_floor_are_found():
+    law = made_law.law("drive force against position", "wave")
+    best, cells, response = best_of(law, (0.5, 0.7, 0.4, 0.3))
+    assert abs(best.values[1] - 0.7) < 0.02
+    assert best.gain > 0.9 * float(response.slope @ response.slope)
+    assert len(cells) == len(response.slope)

@@ -1,0 +1,49 @@
+"""Laws outside the library are found by what they depend on, and healthy drives give none."""
+
+import numpy as np
+
+from scm.mismatch.laws.curves import law_curves
+from scm.mismatch.laws.seek import criterion
+from tests.unit.mismatch.laws import made_law
+
+
+def test_a_gust_is_a_force_over_the_floor_against_time():
+    found = made_law.gusty().found[0]
+    law = found.effects[-1]
+    assert (law.name, law.equation, law.depends_on) == (
+        "floor force against time",
+        "body",
+        ("time",),
+    )
+    np.testing.assert_allclose(found.values[2], made_law.GUST[2], rtol=0.03)
+    np.testing.assert_allclose(abs(found.values[0]), made_law.GUST[0], rtol=0.15)
+
+
+def test_a_bent_lens_is_a_law_of_the_camera_that_a_fit_takes_off():
+    model, before, after = made_law.lens()
+    assert after.effects[0].equation == "sensor"
+    np.testing.assert_allclose(after.values, 0.05, atol=0.015)
+    assert after.q < before.q - 30.0
+    assert len(after.e) == len(model.t)
+
+
+def test_no_law_is_worth_its_price_on_a_healthy_drive():
+    sought = made_law.healthy()
+    assert [
+        f.names for f, c in zip(sought.found, sought.criteria, strict=True) if c < sought.base.q
+    ] == []
+
+
+def test_laws_come_best_first_by_a_criterion_that_counts_their_numbers():
+    sought = made_law.gusty()
+    assert list(sought.criteria) == sorted(sought.criteria)
+    first = sought.found[0]
+    assert criterion(first, len(sought.model.t)) > first.q + 4 * 9.0
+
+
+def test_bins_of_a_curve_agree_with_the_law():
+    sought = made_law.gusty()
+    bins, fit = law_curves(sought.found[0], sought)
+    y = np.interp(bins.x, fit.x, fit.y)
+    assert np.mean((bins.low <= y) & (y <= bins.high)) > 0.6
+    assert np.ptp(fit.y) > 1.2
