@@ -166,13 +166,16 @@ def free_run(
     _refuse_incomplete(recording, car)
     poses, commands = Poses(recording), Commands(recording, car)
     starts, initial = _windows(recording, poses, commands, horizon_s)
-    fleet = Fleet(car, len(starts))
+    fleet = Fleet(car, len(starts) + 1)
     _run_in(fleet, commands, starts, initial)
     t_s: Floats = np.append(np.arange(0.0, horizon_s - 0.5 * STEP_S, save_every_s), horizon_s)
     steps = np.diff(np.rint(t_s / STEP_S).astype(np.int64))
     x, y, yaw, speed = (np.empty((len(starts), len(t_s))) for _ in range(4))
     for k, t in enumerate(t_s):
-        x[:, k], y[:, k], yaw[:, k], speed[:, k] = fleet.x, fleet.y, fleet.yaw, fleet.speed
+        for out, now in zip(
+            (x, y, yaw, speed), (fleet.x, fleet.y, fleet.yaw, fleet.speed), strict=True
+        ):
+            out[:, k] = now[: len(starts)]
         if k < len(steps):
             _advance(fleet, commands, starts + t, int(steps[k]))
     measured = poses.motion((starts[:, None] + t_s).ravel())
@@ -214,20 +217,43 @@ def _windows(
 
 
 def _run_in(fleet: Fleet, commands: Commands, starts: Floats, initial: Motion) -> None:
-    """Put a car at the start of every window, its actuators where the commands before left them."""
+    """Put a car at the start of every window, all it remembers as the whole drive before left it.
+
+    One more car drives the recording through; where a window starts it is copied and put in the
+    measured place and motion. So servo, lags, motor heat and the time since the start are right.
+    """
     poses = [Pose2(*at) for at in zip(initial.x, initial.y, initial.yaw, strict=True)]
-    for pose, speed in zip(poses, initial.speed, strict=True):
-        fleet.add(pose, float(speed))
-    _advance(fleet, commands, starts - RUN_IN_S, round(RUN_IN_S / STEP_S))
-    for row, pose in enumerate(poses):
+    leader = fleet.capacity - 1
+    fleet.alive[leader] = True
+    fleet.place(leader, poses[0], float(initial.speed[0]))
+    now = float(starts[0]) - RUN_IN_S
+    for row, start in enumerate(starts):
+        _lead(fleet, leader, commands, now, round((start - now) / STEP_S))
+        now = float(start)
+        time = float(fleet.time[leader])
+        fleet.copy_row(leader, row)
         fleet.place(
             row,
-            pose,
+            poses[row],
             float(initial.speed[row]),
             float(initial.lateral_speed[row]),
             float(initial.yaw_rate[row]),
             keep_actuators=True,
         )
+        fleet.time[row] = time - RUN_IN_S
+    fleet.remove(leader)
+
+
+def _lead(fleet: Fleet, row: int, commands: Commands, t: float, steps: int) -> None:
+    """Advance one car alone by `steps` from the time `t`."""
+    for k in range(steps):
+        at = np.array([t + k * STEP_S])
+        throttle, steering = commands.at(at)
+        fleet.throttle[row], fleet.steering[row] = throttle[0], steering[0]
+        voltage = commands.voltage(at)
+        if voltage is not None:
+            fleet.battery[row] = voltage[0]
+        fleet.advance_rows(row, row + 1, STEP_S)
 
 
 def _advance(fleet: Fleet, commands: Commands, t: Floats, steps: int) -> None:

@@ -255,3 +255,12 @@ def test_commands_before_the_first_are_the_first(nigel: Car) -> None:
         recording.channels[name] = replace(whole, t=whole.t[keep], values=whole.values[keep])
     run = free_run(recording, nigel, 1.0)
     assert run.yaw_error()[0, -1] < 0.02
+
+
+def test_windows_late_in_a_drive_feel_a_battery_that_has_run_down(nigel: Car) -> None:
+    tired = nigel.with_terms(["battery_sag"], {"drive.sag_per_min": 0.5})
+    recording = drive(tired, seconds=40.0)
+    own = dict(error_table(free_run(recording, tired)))["position [m]"][:, 1].max()
+    fresh = dict(error_table(free_run(recording, nigel)))["position [m]"][:, 1].max()
+    assert own < 0.006
+    assert fresh > 5.0 * own
