@@ -27,6 +27,7 @@ REST = 0.05  # of the gain may lie outside the places named
 MOST_TIME = 0.4  # what acts for longer, or comes and goes, acts all the time
 MOST_SPANS = 3
 MOST_FLOOR = 0.35
+NOISE_LOSS = 0.862  # mean loss of an innovation that is nothing but noise
 LEAST_SHARE = 0.03  # of a sensor in the gain, to be named
 _OWN = {  # sensors by the keys of their faults
     "measure.gyro": "imu.gyro", "measure.accel": "imu.accel", "measure.imu": "imu.accel",
@@ -59,9 +60,9 @@ def locate(
     residuals = leftover(model.drives, model.car, {}, numbers)
     if not best.effects:
         return (), residuals
-    gains = _gains(model, retuned, best)
+    gains, rest = _gains(model, retuned, best)
     looked = _looked(model)
-    total = sum(max(float(gain.sum()), 0.0) for gain in gains)
+    total = rest + sum(max(float(gain.sum()), 0.0) for gain in gains)
     located = [
         _located(effect, values, gain, looked, total)
         for (effect, values), gain in zip(_each(best), gains, strict=True)
@@ -84,8 +85,11 @@ def chance(places: int) -> float:
     return 2.0 * math.log(places / ALARM)
 
 
-def _gains(model: Likelihood, retuned: Fitted, best: Fitted) -> list[Floats]:
-    """Return what each effect gains at each innovation, over the same car without it."""
+def _gains(model: Likelihood, retuned: Fitted, best: Fitted) -> tuple[list[Floats], float]:
+    """Return what each effect gains at each innovation, and what all of them leave beyond noise.
+
+    An effect's gain is over the same car without it, its own numbers refitted.
+    """
     fitter, own = Fitter(model, np.ones(len(model.t))), len(best.z)
     alone = [retuned.z if len(best.effects) == 1 else best.z for _ in best.effects]
     without = list[tuple[tuple[Candidate, ...], Floats]]()
@@ -95,13 +99,16 @@ def _gains(model: Likelihood, retuned: Fitted, best: Fitted) -> list[Floats]:
         without.append(((*best.effects[:i], *best.effects[i + 1 :]), values))
         at += len(effect.knobs)
     e, _ = model([fitter.numbers(best.effects, best.z, best.values)])
-    jacobian, gains = best.jacobian[:, :own], list[Floats]()
+    after, jacobian, gains = _loss(e[:, 0]), best.jacobian[:, :own], list[Floats]()
     for z, trial in zip(alone, without, strict=True):
         before, _ = model([fitter.numbers(*trial[:1], z, trial[1])])
         base = replace(best, z=z, e=before[:, 0], jacobian=jacobian)
         (moved,) = fitter.begin(base, [trial])
-        gains.append(_loss(moved.e if np.isfinite(moved.q) else before[:, 0]) - _loss(e[:, 0]))
-    return gains
+        without_it = moved.e if np.isfinite(moved.q) else before[:, 0]
+        gains.append(model.settled * (_loss(without_it) - after))
+    events = float(model.settled.sum())
+    rest = float((model.settled * after).sum()) - NOISE_LOSS * events - 2.0 * math.sqrt(events)
+    return gains, max(rest, 0.0)
 
 
 def _loss(e: Floats) -> Floats:
