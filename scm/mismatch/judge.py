@@ -11,14 +11,14 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import RecordingError
-from scm.mismatch.drive import STEP_S, Drive, Stream
+from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.evidence import FreeRuns
 from scm.mismatch.findings import Fit, PartErrors, Span
 from scm.mismatch.parts import NAMES, Parts
-from scm.mismatch.predict import NEUTRAL, Prediction
-from scm.mismatch.rollouts import Motions, Numbers
+from scm.mismatch.rollouts import Numbers
 from scm.mismatch.seen import Camera
 from scm.mismatch.smooth import Smooth, smooth
+from scm.mismatch.window_errors import poses_of, sensor_errors, turned
 from scm.mismatch.windows import Runs, Side, Windows
 from scm.recording.motion import Poses
 from scm.vehicles.car import Car
@@ -29,7 +29,6 @@ NEXT_S = 1.0  # between the starts of windows at most
 SHOWN_EVERY_S = 0.05
 DRAWS = 2
 WORSE = 1.02
-END_S = 0.2  # speeds are means over the window's end of this length
 _BEFORE, _AFTER = 0, 1
 
 
@@ -134,7 +133,7 @@ def _judged(
     fine: Bools = np.asarray(runs.ok.all(axis=0))
     since = first - drive.edges[starts], last - drive.edges[starts]
     errors, floor = _pose_errors(sides, runs, since[1], stamps + horizon)
-    for name, miss, noise in _sensor_errors(drive, sides, runs, starts, since):
+    for name, miss, noise in sensor_errors(drive, sides, runs, starts, since):
         _join(errors, name, miss[: _AFTER + 1])
         _join(floor, name, np.sqrt((miss[_AFTER + 1 :] - miss[_AFTER]) ** 2 + noise))
     shown = _shown(sides, runs, stamps, drive.edges[starts], horizon)
@@ -182,42 +181,20 @@ def _starts(
     return np.array(found), tuple(part)
 
 
-def _taken(signal: Floats, since: Floats) -> Floats:
-    """Return signals (steps + 1, sides, windows) at times since the start, (sides, windows)."""
-    at = since / STEP_S
-    row = np.clip(at.astype(np.int64), 0, len(signal) - 2)
-    low = np.take_along_axis(signal, row[None], axis=0)[0]
-    high = np.take_along_axis(signal, row[None] + 1, axis=0)[0]
-    return np.asarray(low + (at - row) * (high - low))
-
-
-def _turned(angle: Floats) -> Floats:
-    return np.arctan2(np.sin(angle), np.cos(angle))
-
-
-def _poses_of(sides: Sequence[Side], runs: Runs, since: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return what each side's camera would have recorded, each (sides, windows)."""
-    yaw = np.unwrap(runs["yaw"], axis=0)
-    at = [_taken(signal, since) for signal in (runs["x"], runs["y"], yaw)]
-    seen = [side.camera.seen(*(s[i] for s in at)) for i, side in enumerate(sides)]
-    x, y, psi = (np.stack(each) for each in zip(*seen, strict=True))
-    return x, y, psi
-
-
 def _pose_errors(
     sides: Sequence[Side], runs: Runs, since: Floats, stamps: Floats
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """Return pose errors of both cars at the windows' ends, and those of noise alone."""
-    x, y, psi = _poses_of(sides, runs, since)
+    x, y, psi = poses_of(sides, runs, since)
     recorded = [np.stack(each) for each in zip(
         *(side.camera.recorded(stamps) for side in sides), strict=True)]  # fmt: skip
-    dx, dy, turn = x - recorded[0], y - recorded[1], _turned(psi - recorded[2])
+    dx, dy, turn = x - recorded[0], y - recorded[1], turned(psi - recorded[2])
     both, draws = slice(0, _AFTER + 1), slice(_AFTER + 1, None)
     far = np.hypot(dx, dy)
     noise = np.hypot(dx[draws] - dx[_AFTER], dy[draws] - dy[_AFTER])
     return (
         {"position_m": far[both, :, None], "yaw_rad": turn[both, :, None]},
-        {"position_m": noise[..., None], "yaw_rad": _turned(turn[draws] - turn[_AFTER])[..., None]},
+        {"position_m": noise[..., None], "yaw_rad": turned(turn[draws] - turn[_AFTER])[..., None]},
     )
 
 
@@ -225,70 +202,6 @@ def _join(errors: dict[str, Floats], name: str, more: Floats) -> None:
     """Add one stream's errors, (sides, windows), to its channel's."""
     more = more[..., None]
     errors[name] = np.concatenate((errors[name], more), axis=2) if name in errors else more
-
-
-def _sensor_errors(
-    drive: Drive, sides: Sequence[Side], runs: Runs, starts: Ints, since: tuple[Floats, Floats]
-) -> Iterator[tuple[str, Floats, float]]:
-    """Yield name, error (sides, windows) and own variance of what every other sensor shows.
-
-    Rates are summed over the window, speeds are means at its end.
-    """
-    prediction, radius = Prediction(drive), drive.car.value("wheel.radius_m")
-    shape = (len(next(iter(runs.signals.values()))), -1)
-    motions = Motions(
-        {k: v.reshape(shape) for k, v in runs.signals.items()}, runs.ok.ravel().astype(np.float64)
-    )
-    faults = {
-        key: np.repeat([side.numbers.get(key, neutral) for side in sides], starts.shape[1])
-        for key, neutral in NEUTRAL.items()
-    }
-    begin = drive.edges[starts]
-    for stream in drive.streams:
-        if stream.name.startswith("pose."):
-            continue
-        signal = prediction.sensor(stream.name, motions, faults).reshape(-1, *starts.shape)
-        name, per_unit, kind = _channel(stream.name, drive, radius)
-        first = since[1] - END_S if kind == "end" else since[0]
-        length = since[1] - first
-        seen = _sums(stream, begin + first, begin + since[1], kind)
-        if kind == "count":
-            meant = _taken(signal, since[1]) - _taken(signal, first)
-            variance = 2.0 * stream.std**2
-        else:
-            total = np.zeros_like(signal)
-            np.cumsum(0.5 * STEP_S * (signal[1:] + signal[:-1]), axis=0, out=total[1:])
-            meant = _taken(total, since[1]) - _taken(total, first)
-            pace = float(np.median(np.diff(stream.t)))
-            variance = stream.std**2 * pace * float(length.mean())
-        scale = per_unit / (END_S if kind == "end" else 1.0)
-        yield name, scale * (meant - seen), scale**2 * variance
-
-
-def _channel(name: str, drive: Drive, radius: float) -> tuple[str, float, str]:
-    """Return an error's name, its factor on the stream, and whether it counts, sums or ends."""
-    if name.startswith("encoder."):
-        counts = drive.car.value("encoder.counts_per_revolution") / (2.0 * np.pi)
-        return "wheel_m", radius / counts, "count"
-    if name.startswith("wheel_speed."):
-        return "wheel_m", radius, "sum"
-    if name.startswith("imu.accel"):
-        return f"{name[4:]}_mps", 1.0, "sum"
-    if name in ("speed", "velocity.x"):
-        return "speed_mps", 1.0, "end"
-    if name == "velocity.y":
-        return "side_speed_mps", 1.0, "end"
-    return "gyro_rad", 1.0, "sum"
-
-
-def _sums(stream: Stream, first: Floats, last: Floats, kind: str) -> Floats:
-    """Return what a stream counted, or its integral, between times."""
-    if kind == "count":
-        return np.asarray(np.interp(last, stream.t, stream.values)
-                          - np.interp(first, stream.t, stream.values))  # fmt: skip
-    steps = 0.5 * np.diff(stream.t) * (stream.values[1:] + stream.values[:-1])
-    total = np.concatenate(([0.0], np.cumsum(steps)))
-    return np.asarray(np.interp(last, stream.t, total) - np.interp(first, stream.t, total))
 
 
 def _shown(
@@ -303,7 +216,7 @@ def _shown(
         since = np.stack([
             side.camera.taken(stamps + t) - edges[i] for i, side in enumerate(both)
         ])  # fmt: skip
-        found = _poses_of(both, part, since)
+        found = poses_of(both, part, since)
         recorded = both[0].camera.recorded(stamps + t)
         for name, sim, real in zip(("x", "y", "yaw"), found, recorded, strict=True):
             out[name][0, :, k], out[name][1:, :, k] = real, sim
