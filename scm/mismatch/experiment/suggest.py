@@ -13,6 +13,7 @@ from scm.mismatch.findings import Undecided
 from scm.mismatch.likelihood import Likelihood
 
 NOBODY, ANYBODY = 10.0, 25.0
+PLENTY = 400.0  # twenty sigma: what would be better still need not be looked for
 # By algebra the same on a level floor, whatever a simulation's small print says.
 TWINS = (frozenset({"payload", "motor_gain"}), frozenset({"grade", "wind"}))
 MOST_RIVALS = 4
@@ -115,13 +116,18 @@ def _search(
         if len(placed) == len(legs):
             apart = quick(Planned(model, placed, numbers[0]), rivals)
             found.append(Weighed(experiment, placed, apart))
+            if apart.least > PLENTY:
+                found[-1] = _refitted(model, rivals, found[-1])
+                if found[-1].least > PLENTY:
+                    break
     found.sort(key=lambda w: -w.least)
     for k in range(len(found)):
         known = max((w.least for w in found if w.sure), default=0.0)
         enough = found[k].least <= known or (k >= MOST_EXACT and known >= NOBODY)
         if enough or found[k].least < NOBODY:
             break
-        found[k] = _refitted(model, rivals, found[k])
+        if not found[k].sure:
+            found[k] = _refitted(model, rivals, found[k])
     sure = [w for w in found if w.sure]
     rest = [w for w in found if not w.sure]
     return [*sorted(sure, key=lambda w: -w.least), *rest]

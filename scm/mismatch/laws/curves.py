@@ -29,11 +29,17 @@ _UNITS = {"along_n": "N", "turn_rad": "rad", "throttle_add": "1", "moment_nm": "
 
 
 def law_curves(fitted: Fitted, sought: Sought) -> tuple[Curve, ...]:
-    """Return a hypothesis' law as the recordings show it in bins, and as it was fitted."""
-    law = fitted.effects[-1]
-    if not isinstance(law, Law):
-        return ()
-    values = tuple(float(v) for v in fitted.values[-len(law.knobs) :])
+    """Return a model's law as the recordings show it in bins, and as it was fitted."""
+    first = 0
+    for effect in fitted.effects:
+        if isinstance(effect, Law):
+            return _curves(effect, slice(first, first + len(effect.knobs)), fitted, sought)
+        first += len(effect.knobs)
+    return ()
+
+
+def _curves(law: Law, mine: slice, fitted: Fitted, sought: Sought) -> tuple[Curve, Curve]:
+    values = tuple(float(v) for v in fitted.values[mine])
     n, cells = len(law.channel.knobs), sought.cells
     x, x_name, x_unit = _axis(law, values[n:], cells)
     unit = amount(law.channel.numbers((1.0, *values[1:n])), cells)
@@ -41,7 +47,7 @@ def law_curves(fitted: Fitted, sought: Sought) -> tuple[Curve, ...]:
     place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
     used = [b for b in range(BINS) if np.count_nonzero(place == b) >= LEAST_CELLS]
     courses = np.stack([np.where(place == b, unit, 0.0) for b in used], axis=1)
-    more, covariance = _left_over(law, fitted, sought, courses)
+    more, covariance = _left_over(law, mine, fitted, sought, courses)
     fit = values[0] * shape(law.curve.numbers(values[n:]), cells)
     y = np.array([fit[place == b].mean() for b in used]) + more
     band = NINETY * np.sqrt(np.maximum(covariance.diagonal(), 0.0))
@@ -55,10 +61,12 @@ def law_curves(fitted: Fitted, sought: Sought) -> tuple[Curve, ...]:
     )
 
 
-def _left_over(law: Law, fitted: Fitted, sought: Sought, courses: Floats) -> tuple[Floats, Floats]:
+def _left_over(
+    law: Law, mine: slice, fitted: Fitted, sought: Sought, courses: Floats
+) -> tuple[Floats, Floats]:
     """Return what each course asks for beyond the law, and how sure, the law's numbers as found."""
-    kept = fitted.jacobian.shape[1] - len(law.knobs)
-    held = replace(fitted, jacobian=fitted.jacobian[:, :kept])
+    own = np.arange(len(fitted.z) + mine.start, len(fitted.z) + mine.stop)
+    held = replace(fitted, jacobian=np.delete(fitted.jacobian, own, axis=1))
     fitter = Fitter(sought.model, sought.part)
     response = respond(sought.model, fitter, held, sought.cells, law.channel.response)
     bend = courses.T @ response.bend @ courses

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from scm.mismatch.diagnose import said
 from scm.mismatch.drive import Drive
+from scm.mismatch.explain import said
 from scm.mismatch.findings import Estimate
 from scm.mismatch.library import by_name, candidates, placed, shown_by, terms_needed
 from scm.vehicles.car import load_car

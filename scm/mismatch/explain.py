@@ -1,0 +1,139 @@
+"""What is said of a model that was found: its effects, their rivals, what stays undecided."""
+
+import math
+from collections.abc import Callable
+
+from scm.mismatch.evidence import Ordinary, Tried
+from scm.mismatch.experiment.plan import Rival as Contender
+from scm.mismatch.experiment.suggest import suggest
+from scm.mismatch.findings import Effect, Estimate, Rival, Undecided
+from scm.mismatch.fit import Fitted
+from scm.mismatch.laws.decide import is_law
+from scm.mismatch.laws.law import Law
+from scm.mismatch.laws.sensed import Sensed
+from scm.mismatch.library import Candidate
+from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.search import Search, price
+from scm.vehicles.car import Car
+
+NINETY = 1.645
+WIDER = 1.3  # intervals from curvature alone are too narrow for what any model leaves out
+TIE = 6.0
+Tell = Callable[[str], None]
+
+
+def ordinary_of(model: Likelihood, best: Fitted, car: Car) -> tuple[Ordinary, ...]:
+    """Return the car's own numbers, as the file gives them and as the recordings do."""
+    found = []
+    for j, own in enumerate(model.ordinary):
+        if own.key.startswith("clock."):
+            continue
+        std = math.sqrt(max(best.covariance[j, j], 0.0)) * own.std
+        value = model.numbers(best.z)[own.key]
+        unit = model.unit(own.key)
+        estimate = Estimate(
+            value=value, low=value - NINETY * std, high=value + NINETY * std, unit=unit
+        )
+        given = car.value(own.key) if car.has(own.key) else own.mean
+        found.append(Ordinary(key=own.key, given=given, given_std=own.std, found=estimate))
+    return tuple(found)
+
+
+def tried_of(search: Search) -> tuple[Tried, ...]:
+    """Return every effect tried beside the re-tuned car, best first."""
+    best: dict[str, Tried] = {}
+    for base, fitted in [(step.base, f) for step in search.steps[:1] for f in step.rivals]:
+        name = fitted.names[-1]
+        needed = price(fitted.effects, search.events, len(search.library))
+        one = Tried(name=name, gain=base.q - fitted.q, needed=needed)
+        if name not in best or best[name].gain < one.gain:
+            best[name] = one
+    return tuple(sorted(best.values(), key=lambda tried: -tried.gain))
+
+
+def effect_of(search: Search, best: Fitted, i: int) -> Effect:
+    """Return what is reported of one effect of the model found."""
+    candidate = best.effects[i]
+    at = sum(len(effect.knobs) for effect in best.effects[:i])
+    own, estimates = len(best.z), dict[str, Estimate]()
+    mine = tuple(float(v) for v in best.values[at : at + len(candidate.knobs)])
+    for j, knob in enumerate(candidate.knobs):
+        value, place = mine[j], own + at + j
+        spread = WIDER * NINETY * knob.step * math.sqrt(max(best.covariance[place, place], 0.0))
+        low, high = knob.bounds
+        estimates[knob.name] = Estimate(
+            value=value, low=max(value - spread, low), high=min(value + spread, high),
+            unit=knob.unit,
+        )  # fmt: skip
+    probability, rivals = _rivals(search, candidate)
+    return Effect(
+        name=candidate.name,
+        listed=not is_law(candidate),
+        equation=candidate.equation,
+        depends_on=candidate.depends_on,
+        parameters=estimates,
+        probability=probability,
+        said=said(candidate, estimates),
+        law=candidate.formula(mine) if isinstance(candidate, Law | Sensed) else None,
+        rivals=rivals,
+    )
+
+
+def said(candidate: Candidate, estimates: dict[str, Estimate]) -> str:
+    """Return an effect's sentence with its numbers."""
+    words = {name: _number(e.value, e.unit) for name, e in estimates.items()}
+    return candidate.said.format(**words)
+
+
+def _number(value: float, unit: str) -> str:
+    text = f"{value:.3g}"
+    return text if unit == "1" else f"{text} {unit.replace('*', ' ')}"
+
+
+def _rivals(search: Search, candidate: Candidate) -> tuple[float, tuple[Rival, ...]]:
+    """Return an effect's probability among all that were tried in its place, and the next ones."""
+    step = search.step_of(candidate)
+    if step is not None:
+        tried = list(zip(step.rivals, step.criteria, strict=True))
+        lowest = min(c for _, c in tried)
+        weights = {id(f): math.exp(-0.5 * min(c - lowest, 1400.0)) for f, c in tried}
+        total = sum(weights.values())
+        mine = sum(weights[id(f)] for f, _ in tried if f.names[-1] == candidate.name)
+        others = [(f, c) for f, c in tried if f.names[-1] != candidate.name][:5]
+        return mine / total, tuple(
+            Rival(name=f.names[-1], probability=weights[id(f)] / total,
+                  ruled_out_by=_against(c - lowest))
+            for f, c in others
+        )  # fmt: skip
+    return 1.0, ()
+
+
+def _against(worse: float) -> str:
+    if worse < TIE:
+        return "nothing in this recording"
+    return f"the recording: it explains it worse by {math.sqrt(worse):.1f} standard deviations"
+
+
+def undecided_of(
+    model: Likelihood, search: Search, best: Fitted, tell: Tell
+) -> tuple[Undecided, ...]:
+    """Return which effects found could as well be others, and the drive that would tell."""
+    found = []
+    for effect in best.effects:
+        step = search.step_of(effect)
+        if step is None:
+            continue
+        lowest = next(
+            c for f, c in zip(step.rivals, step.criteria, strict=True) if f.names[-1] == effect.name
+        )
+        near = [
+            Contender(f.effects, f.values)
+            for f, c in zip(step.rivals, step.criteria, strict=True)
+            if c - f.effects[-1].rare < lowest + TIE and f.names[-1] not in best.names
+        ]
+        if near:
+            tell("designing the drive that would tell")
+            mine = next(f for f in step.rivals if f.names[-1] == effect.name)
+            contenders = [Contender(mine.effects, mine.values), *near]
+            found.append(suggest(model, contenders, tell=tell).undecided)
+    return tuple(found)
