@@ -5,6 +5,7 @@ better hypothesis by its price and a margin, and explain a part that no fit has 
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,16 +14,32 @@ from scm.mismatch.fit import Fitted, Fitter
 from scm.mismatch.laws.law import Law
 from scm.mismatch.laws.seek import Sought, criterion, seek
 from scm.mismatch.laws.sensed import Sensed, Sensing
+from scm.mismatch.noise import Noise, usual_noise
 from scm.mismatch.search import Search
 
 MARGIN = 10.0  # a law that is hardly better than a known effect is that effect
-MOST_BESIDE = 2
+MOST_BESIDE, SETTLED = 2, 2
+CALM = 3.0  # times the least noise: what is believed beyond that may be the law itself
 Tell = Callable[[str], None]
 
 
 def is_law(effect: object) -> bool:
     """Say whether an effect is a law outside the library."""
     return isinstance(effect, Law | Sensed)
+
+
+@dataclass(frozen=True, slots=True)
+class _Settled:
+    """A hypothesis under the noise that it leaves, and what both cost together.
+
+    Attributes:
+        unseen: Loss on the part that no fit has seen.
+    """
+
+    fitted: Fitted
+    noise: Noise
+    cost: float
+    unseen: float
 
 
 def lawful(
@@ -39,36 +56,64 @@ def lawful(
     model = search.model
     if not isinstance(model, Sensing):
         return best, None
-    base = _bare(search, best)
-    sought = seek(model, base, search.fitter.part, tell)
-    if not sought.found or not _beats(search, sought.found[0], best, unseen):
+    listed = _settled(search, best, unseen)
+    model.believe(_calm(model))
+    sought = seek(model, _bare(search, best), search.fitter.part, tell)
+    calm, laws = model.noise, list[_Settled]()
+    for fitted in sought.found[:SETTLED]:
+        model.believe(calm)
+        laws.append(_settled(search, search.settle(fitted), unseen))
+    law = min(laws, key=lambda one: one.cost, default=listed)
+    if law.cost > listed.cost - MARGIN or (unseen.any() and law.unseen > listed.unseen):
+        model.believe(listed.noise)
         return best, None
-    settled = search.settle(sought.found[0])
+    model.believe(law.noise)
+    return _with_known(search, law, unseen), sought
+
+
+def _with_known(search: Search, law: _Settled, unseen: Floats) -> Fitted:
+    """Return a law with the listed effects that it leaves to be found."""
     for _ in range(MOST_BESIDE):
-        step = search.extend(settled)
-        if not step.rivals or _cost(search, step.rivals[0]) > _cost(search, settled):
-            return settled, sought
-        settled = search.settle(step.rivals[0])
-    return settled, sought
+        step = search.extend(law.fitted)
+        if not step.rivals or _price(search, step.rivals[0]) > _price(search, law.fitted):
+            break
+        more = _settled(search, search.settle(step.rivals[0]), unseen)
+        if more.cost > law.cost:
+            search.model.believe(law.noise)
+            break
+        law = more
+    return law.fitted
+
+
+def _calm(model: Sensing) -> Noise:
+    """Return the noise believed now, but for disturbances that are larger than a car's usual."""
+    now, least = model.noise, usual_noise(model.drives)
+    return replace(
+        now,
+        speed=min(now.speed, CALM * least.speed),
+        side=min(now.side, CALM * least.side),
+        yaw_rate=min(now.yaw_rate, CALM * least.yaw_rate),
+        own={name: min(value, CALM * least.own[name]) for name, value in now.own.items()},
+        launch=min(now.launch, CALM * least.launch),
+        turn=min(now.turn, CALM * least.turn),
+    )
 
 
 def _bare(search: Search, best: Fitted) -> Fitted:
     """Return the car without effects, refitted under the noise that is believed now."""
-    if not best.effects:
-        return best
     start = search.fitter.null(best.z)
     (base,) = search.fitter.refine([start], rounds=3, fresh=True)
     return base
 
 
-def _cost(search: Search, fitted: Fitted) -> float:
+def _price(search: Search, fitted: Fitted) -> float:
     return criterion(fitted, search.events, len(search.library))
 
 
-def _beats(search: Search, law: Fitted, best: Fitted, unseen: Floats) -> bool:
-    """Say whether a law is better than a listed model, by price and on an unseen part."""
-    if _cost(search, law) > _cost(search, best) - MARGIN:
-        return False
+def _settled(search: Search, fitted: Fitted, unseen: Floats) -> _Settled:
+    """Return a hypothesis with the noise believed now: whoever needs more noise pays for it."""
+    sizes = search.model.log_size
     judge = Fitter(search.model, unseen)
-    losses = [float(judge.score(f.e[:, None], np.zeros_like(f.z))[0]) for f in (law, best)]
-    return not unseen.any() or losses[0] < losses[1]
+    loss = float(judge.score(fitted.e[:, None], np.zeros_like(fitted.z))[0])
+    cost = _price(search, fitted) + float(search.fitter.part @ sizes)
+    return _Settled(fitted, search.model.noise, cost, loss + float(unseen @ sizes))
