@@ -2,12 +2,10 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from scm.command import Command
 
-if TYPE_CHECKING:
-    from scm.fleet import Link
+NAME = "played"
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,24 +39,16 @@ def _run(arguments: argparse.Namespace) -> int:
     else:
         beside = arguments.drive.parent / drive.map
         city_map = load_map(beside if beside.is_file() else drive.map)
-        with Lockstep([WorldPart(city_map)]) as lockstep:
-            link = LockstepLink(lockstep)
-            played = play(link, _spawned(link, car, drive.spawn), rows)
+        part = WorldPart(city_map)
+        with Lockstep([part]) as lockstep:
+            lockstep.run_for(0.1)
+            start = drive.spawn or city_map.spawns[0].name
+            world = part.world  # not by request: only who is in this process may name any car file
+            world.host(NAME, car, world.roads.spawn_pose(start), lockstep.now_ns)
+            played = play(LockstepLink(lockstep), NAME, rows)
     write_recording(played, car, arguments.out)
     print(f"{len(played.poses)} poses of {rows[-1][0]:.0f} s recorded in {arguments.out}")
     return 0
-
-
-def _spawned(link: "Link", car: str, spawn: str) -> str:
-    from scm.errors import ScmError
-    from scm.v2x.message import Refused
-    from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
-
-    reply = link.ask(SpawnRequest(car=car, spawn=spawn))
-    if isinstance(reply, SpawnReply):
-        return reply.vehicle
-    msg = f"{car}: {reply.detail if isinstance(reply, Refused) else type(reply).__name__}"
-    raise ScmError(msg)
 
 
 COMMAND = Command(
