@@ -15,6 +15,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--car", metavar="FILE", help="car file or name; default: the recording's")
     parser.add_argument(
+        "--data", type=Path, metavar="DIR", help="where the tables are; default: beside"
+    )
+    parser.add_argument(
         "--out", type=Path, metavar="DIR", help=f"the report's folder; default: runs/{FOLDER}-NAME"
     )
     parser.add_argument(
@@ -29,7 +32,9 @@ def _run(arguments: argparse.Namespace) -> int:
     name = arguments.recording[0].resolve()
     title = name.parent.name if name.name == "recording.yaml" else name.stem
     out = arguments.out or Path("runs") / f"{FOLDER}-{title}"
-    found = diagnose(arguments.recording, arguments.car, budget_s=arguments.budget_s, tell=_tell)
+    found = diagnose(
+        arguments.recording, arguments.car, arguments.data, budget_s=arguments.budget_s, tell=_tell
+    )
     write(found, out)
     _tell("")
     print(summary(found.diagnosis, out))

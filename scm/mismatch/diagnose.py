@@ -61,6 +61,7 @@ class Found:
 def diagnose(
     paths: Sequence[Path | str],
     car_file: str | None = None,
+    data: Path | None = None,
     *,
     budget_s: float = 120.0,
     tell: Tell = lambda _: None,
@@ -71,6 +72,7 @@ def diagnose(
     Args:
         paths: Recordings' folders or descriptions.
         car_file: The car's name or file; None takes the recordings' own.
+        data: Folder of the recordings' tables; None: beside each description.
         budget_s: After so long no further effect is looked for.
         tell: Is told what is being tried.
         clock: For the time it took.
@@ -80,9 +82,9 @@ def diagnose(
     """
     clock = clock or WallClock()
     began_ns = clock.now_ns()
-    recordings = [one for path in paths for one in read_recordings(path)]
+    recordings = [one for path in paths for one in read_recordings(path, data)]
     vehicle = car_file or recordings[0].vehicle
-    car = load_car(vehicle)
+    car = load_car(vehicle, trusted=car_file is not None)
     if car_file is None and any(r.vehicle != vehicle for r in recordings):
         msg = f"{paths[0]}: recordings of several cars; say which with --car"
         raise RecordingError(msg)
