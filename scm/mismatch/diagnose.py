@@ -14,11 +14,14 @@ from scm.mismatch.curves import curve
 from scm.mismatch.doubt.corrected import corrected
 from scm.mismatch.doubt.doubt import doubt
 from scm.mismatch.drive import Drive
-from scm.mismatch.evidence import Curve, Evidence
+from scm.mismatch.evidence import Curve, Evidence, FreeRuns
 from scm.mismatch.explain import effect_of, ordinary_of, tried_of, undecided_of
 from scm.mismatch.findings import (
     DataProblem,
     Diagnosis,
+    Effect,
+    Fit,
+    Undecided,
     Verdict,
 )
 from scm.mismatch.fit import Fitted
@@ -29,14 +32,17 @@ from scm.mismatch.laws.seek import Sought, with_laws
 from scm.mismatch.library import candidates, placed, shown_by, terms_needed
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.locate import locate
-from scm.mismatch.parts import split
+from scm.mismatch.parts import Parts, split
 from scm.mismatch.patch import patched
 from scm.mismatch.report.car_file import write_car
 from scm.mismatch.report.write import write_report
+from scm.mismatch.rollouts import Numbers
 from scm.mismatch.search import Search
 from scm.recording.read import Recording, read_recordings
 from scm.vehicles.car import Car, load_car
 
+POSE = ("position_m", "yaw_rad")
+STRAYS = 6.0  # times what noise alone makes of a free run's error
 Tell = Callable[[str], None]
 
 
@@ -140,6 +146,25 @@ def _curves(model: Likelihood, best: Fitted, sought: Sought | None) -> tuple[Cur
     return (*(c for c in drawn if c is not None), *of_laws)
 
 
+def _judged(
+    drives: Sequence[Drive], car: Car, numbers: Numbers, parts: Parts
+) -> tuple[Fit | None, FreeRuns | None]:
+    """Return free runs before and after; nothing where no part has a whole window."""
+    try:
+        return judge(drives, car, {}, numbers, parts)
+    except RecordingError:
+        return None, None
+
+
+def _verdict(effects: Sequence[Effect], undecided: Sequence[Undecided], fit: Fit | None) -> Verdict:
+    """Return the verdict; a car that strays for no cause that was tried is a mismatch too."""
+    if undecided:
+        return Verdict.UNDECIDED
+    after, floor = (fit.confirm.after, fit.confirm.noise_floor) if fit else ({}, {})
+    strays = any(after[name] > STRAYS * floor[name] for name in POSE if name in after)
+    return Verdict.MISMATCH if effects or strays else Verdict.NONE
+
+
 def _nothing(
     recordings: Sequence[Recording], car: Car, problems: tuple[DataProblem, ...], took_s: float
 ) -> Found:
@@ -169,13 +194,11 @@ def _searched(
     tell("judging on what the fit did not see")
     best = search.confirmed(best, parts.confirm.weight)
     numbers = search.fitter.numbers(best.effects, best.z, best.values)
-    fit, free_runs = judge(drives, big, {}, numbers, parts)
+    fit, free_runs = _judged(drives, big, numbers, parts)
     located, residuals = locate(model, search.retuned, best)
     effects = tuple(effect_of(search, best, i) for i in range(len(best.effects)))
     undecided = undecided_of(model, search, best, tell)
-    verdict = Verdict.NONE if not effects else Verdict.MISMATCH
-    if undecided:
-        verdict = Verdict.UNDECIDED
+    verdict = _verdict(effects, undecided, fit)
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
                           fit=fit, runtime_s=0.0)  # fmt: skip
     evidence = Evidence(
