@@ -12,7 +12,7 @@ from scm.recording.motion import Poses
 from scm.replay import Commands
 from scm.vehicles.fleet import Fleet
 
-EVERY_S, STEP_S, SETTLED_S = 0.05, 0.005, 3.0
+EVERY_S, STEP_S, SETTLED_S = 0.1, 0.005, 3.0
 
 
 def position_error(recording, car, pushes, horizon_s=1.0):
@@ -39,8 +39,11 @@ def position_error(recording, car, pushes, horizon_s=1.0):
         if pushes is not None:
             along, turn = pushes(history.state(fleet, commands, float(now)))
             c, s = np.cos(fleet.yaw[0]), np.sin(fleet.yaw[0])
-            change = (c * along, s * along, turn, 0.0, 0.0, 0.0)
-            fleet.push_rows(np.array([0]), EVERY_S * np.array([change]))
+            # tyres and motors undo a push at once, so a step's lack of speed goes into its way too
+            dv, dr = EVERY_S * along, EVERY_S * turn
+            way, yaw = EVERY_S * dv, EVERY_S * dr
+            change = (c * dv, s * dv, dr, c * way, s * way, yaw)
+            fleet.push_rows(np.array([0]), np.array([change]))
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
