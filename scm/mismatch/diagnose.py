@@ -194,7 +194,7 @@ def _searched(
     tell("judging on what the fit did not see")
     best = search.confirmed(best, parts.confirm.weight)
     numbers = search.fitter.numbers(best.effects, best.z, best.values)
-    fit, free_runs = _judged(drives, big, numbers, parts)
+    fit, free_runs = _judged(drives, model.car, numbers, parts)
     located, residuals = locate(model, search.retuned, best)
     effects = tuple(effect_of(search, best, i) for i in range(len(best.effects)))
     undecided = undecided_of(model, search, best, tell)
