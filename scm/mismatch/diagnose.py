@@ -15,6 +15,8 @@ from scm.mismatch.doubt.corrected import corrected
 from scm.mismatch.doubt.doubt import doubt
 from scm.mismatch.drive import Drive
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns
+from scm.mismatch.experiment.scenario import write_scenario
+from scm.mismatch.experiment.suggest import Suggestion
 from scm.mismatch.explain import effect_of, ordinary_of, tried_of, undecided_of
 from scm.mismatch.findings import (
     DataProblem,
@@ -54,6 +56,7 @@ class Found:
         car: As given.
         model: Of the recordings; None where they cannot be used, like the two fits.
         best: What was found; `retuned`: the car's own numbers refitted alone.
+        suggestions: Drives that would tell what this one cannot.
     """
 
     diagnosis: Diagnosis
@@ -62,6 +65,7 @@ class Found:
     model: Likelihood | None = None
     best: Fitted | None = None
     retuned: Fitted | None = None
+    suggestions: tuple[Suggestion, ...] = ()
 
 
 def diagnose(
@@ -120,7 +124,9 @@ def _doubted(
 
 
 def write(found: Found, out: Path) -> None:
-    """Write the report, the car found and the re-tuned car, `retuned.toml`, into a folder.
+    """Write the report, the car found, the re-tuned car, `retuned.toml`, and the next drive.
+
+    A drive that would tell what this one cannot goes to `next_drive/`, for `scm play`.
 
     Raises:
         ScmError: when the folder cannot be written.
@@ -137,6 +143,8 @@ def write(found: Found, out: Path) -> None:
         aside.mkdir()
         write_car(plain, found.evidence, found.car, cars[1], aside)
         shutil.copy(aside / "car.toml", out / "retuned.toml")
+    for suggestion in found.suggestions:
+        write_scenario(suggestion, str(found.car.path), out / "next_drive")
 
 
 def _curves(model: Likelihood, best: Fitted, sought: Sought | None) -> tuple[Curve, ...]:
@@ -197,7 +205,8 @@ def _searched(
     fit, free_runs = _judged(drives, model.car, numbers, parts)
     located, residuals = locate(model, search.retuned, best)
     effects = tuple(effect_of(search, best, i) for i in range(len(best.effects)))
-    undecided = undecided_of(model, search, best, tell)
+    suggestions = undecided_of(model, search, best, tell)
+    undecided = tuple(suggestion.undecided for suggestion in suggestions)
     verdict = _verdict(effects, undecided, fit)
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
                           fit=fit, runtime_s=0.0)  # fmt: skip
@@ -206,4 +215,4 @@ def _searched(
         free_runs=free_runs, ordinary=ordinary_of(model, best, car), tried=tried_of(search),
         curves=_curves(model, best, sought),
     )  # fmt: skip
-    return Found(diagnosis, car, evidence, model, best, search.retuned)
+    return Found(diagnosis, car, evidence, model, best, search.retuned, suggestions)

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 from scm.mismatch.evidence import Ordinary, Tried
 from scm.mismatch.experiment.plan import Rival as Contender
-from scm.mismatch.experiment.suggest import suggest
-from scm.mismatch.findings import Effect, Estimate, Rival, Undecided
+from scm.mismatch.experiment.suggest import Suggestion, suggest
+from scm.mismatch.findings import Effect, Estimate, Rival
 from scm.mismatch.fit import Fitted
 from scm.mismatch.laws.decide import is_law
 from scm.mismatch.laws.law import Law
@@ -116,8 +116,8 @@ def _against(worse: float) -> str:
 
 def undecided_of(
     model: Likelihood, search: Search, best: Fitted, tell: Tell
-) -> tuple[Undecided, ...]:
-    """Return which effects found could as well be others, and the drive that would tell."""
+) -> tuple[Suggestion, ...]:
+    """Return which effects found could as well be others, and the drives that would tell."""
     found = []
     for effect in best.effects:
         step = search.step_of(effect)
@@ -135,5 +135,5 @@ def undecided_of(
             tell("designing the drive that would tell")
             mine = next(f for f in step.rivals if f.names[-1] == effect.name)
             contenders = [Contender(mine.effects, mine.values), *near]
-            found.append(suggest(model, contenders, tell=tell).undecided)
+            found.append(suggest(model, contenders, tell=tell))
     return tuple(found)

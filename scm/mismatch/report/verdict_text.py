@@ -47,7 +47,8 @@ def _undecided_sentence(diagnosis: Diagnosis) -> str:
     either = joined(list(dict.fromkeys(between)), "or")
     if not either:
         return "Something is left out, but this recording does not tell what."
-    sure = list(map(effect_title, diagnosis.effects))
+    open_names = {name for u in diagnosis.undecided for name in u.between}
+    sure = [effect_title(e) for e in diagnosis.effects if e.name not in open_names]
     also = f"{joined(sure)}; and " if sure else ""
     return capital(f"{also}{either}: this recording cannot tell which.")
 
