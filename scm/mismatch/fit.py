@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scm.arrays import Floats
+from scm.arrays import Bools, Floats
 from scm.mismatch.library import Candidate, Knob
 from scm.mismatch.likelihood import Likelihood
 
@@ -106,11 +106,20 @@ class Fitter:
             if not ok[i] or not np.isfinite(column).all():
                 found.append(Fitted(effects, base.z, values, column, np.inf, jacobian))
                 continue
-            dz = _bounded(normal, slopes[:, i], -FARTHEST - base.z, FARTHEST - base.z)
-            moved = column + jacobian @ dz
+            mine = self._free(effects)
+            dz = -base.z * ~mine  # a number that an effect sets is not the car's to move
+            low, high = (np.where(mine, limit - base.z, 0.0) for limit in (-FARTHEST, FARTHEST))
+            dz += _bounded(normal * np.outer(mine, mine), slopes[:, i] * mine, low, high)
+            own = jacobian if mine.all() else jacobian * mine
+            moved = column + own @ dz
             q = float(self.score(moved[:, None], base.z + dz)[0])
-            found.append(Fitted(effects, base.z + dz, values, moved, q, jacobian))
+            found.append(Fitted(effects, base.z + dz, values, moved, q, own))
         return found
+
+    def _free(self, effects: Sequence[Candidate]) -> Bools:
+        """Return which of the car's own numbers no effect sets."""
+        taken = {knob.key for effect in effects for knob in effect.knobs}
+        return np.array([own.key not in taken for own in self.model.ordinary])
 
     def refine(
         self, fits: Sequence[Fitted], rounds: int = ROUNDS, *, fresh: bool = False

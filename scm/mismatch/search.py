@@ -5,13 +5,13 @@ the library's size twice its logarithm (the criterion of PASTIS).
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.fit import Fitted, Fitter
+from scm.mismatch.fit import FARTHEST, Fitted, Fitter
 from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
@@ -20,6 +20,15 @@ MOST_EFFECTS = 4
 REFITTED = 14
 FALSE_ALARMS = 0.01
 NEAR = 40.0
+DRIFTED = 8.0
+OF_OWN: Mapping[str, str] = {
+    "payload.mass_kg": "body.mass_kg",
+    "com_shift.shift_m": "body.cog_to_rear_axle_m",
+    "tyre_stiffness.scale": "tyre.lateral_slip_extremum",
+    "steering.rate_scale": "steering.rate_rad_s",
+    "motor.gain": "drive.stall_torque_nm",
+}
+"""Numbers of effects by the car's own number that means the same."""
 
 Tell = Callable[[str], None]
 
@@ -112,19 +121,30 @@ class Search:
             key = id(fitted.effects[-1])
             if key not in best or fitted.q < best[key].q:
                 best[key] = fitted
-        ranked = sorted(best.values(), key=self.criterion)[:REFITTED]
+
+        def cost(fitted: Fitted) -> float:
+            return self.criterion(fitted) - self._drifted(fitted.effects[-1], base)
+
+        ranked = sorted(best.values(), key=cost)[:REFITTED]
         self.tell("refitting " + ", ".join(f.names[-1] for f in ranked[:4]) + " ...")
         ranked = self.fitter.refine(ranked, rounds=4)
         for f in ranked:
             self._not_worse(f, base)
-        ranked = sorted(ranked, key=self.criterion)
-        near = [f for f in ranked if self.criterion(f) < self.criterion(ranked[0]) + NEAR]
-        if self.criterion(ranked[0]) < self.criterion(base) + NEAR:
+        ranked = sorted(ranked, key=cost)
+        near = [f for f in ranked if cost(f) < cost(ranked[0]) + NEAR]
+        if cost(ranked[0]) < self.criterion(base) + NEAR:
             near = self.fitter.refine(near[:6], rounds=3, fresh=True)
-        ranked = sorted(
-            [*near, *(f for f in ranked if all(f is not n for n in near))], key=self.criterion
-        )
-        return Step(base, tuple(ranked), tuple(self.criterion(f) for f in ranked))
+        ranked = sorted([*near, *(f for f in ranked if all(f is not n for n in near))], key=cost)
+        return Step(base, tuple(ranked), tuple(cost(f) for f in ranked))
+
+    def _drifted(self, effect: Candidate, base: Fitted) -> float:
+        """Return what speaks for an effect because the car's own number for it is at its limit.
+
+        A number that the recording pulls as far as its scatter allows is most likely the cause.
+        """
+        keys = {OF_OWN.get(knob.key, knob.key) for knob in effect.knobs}
+        own = zip(self.model.ordinary, base.z, strict=True)
+        return DRIFTED * any(o.key in keys and abs(z) > 0.85 * FARTHEST for o, z in own)
 
     def confirmed(self, best: Fitted, unseen: Floats) -> Fitted:
         """Return the model without effects that do not help on a part that no fit has seen."""
