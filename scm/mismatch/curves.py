@@ -26,8 +26,8 @@ from scm.mismatch.leftover import (
     response,
     starts_of,
 )
-from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import Candidate
 from scm.mismatch.rollouts import Numbers
 from scm.mismatch.seen import Camera, Moved
 from scm.mismatch.windows import Side, Windows

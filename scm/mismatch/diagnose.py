@@ -31,8 +31,8 @@ from scm.mismatch.judge import judge
 from scm.mismatch.laws.curves import law_curves
 from scm.mismatch.laws.decide import is_law, lawful
 from scm.mismatch.laws.seek import Sought, with_laws
-from scm.mismatch.library import candidates, placed, shown_by, terms_needed
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import candidates, placed, shown_by, terms_needed
 from scm.mismatch.locate import locate
 from scm.mismatch.parts import Parts, split
 from scm.mismatch.patch import patched

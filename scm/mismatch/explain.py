@@ -11,8 +11,8 @@ from scm.mismatch.fit import Fitted
 from scm.mismatch.laws.decide import is_law
 from scm.mismatch.laws.law import Law
 from scm.mismatch.laws.sensed import Sensed
-from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import Candidate
 from scm.mismatch.search import Search, price
 from scm.vehicles.car import Car
 
@@ -44,7 +44,7 @@ def tried_of(search: Search) -> tuple[Tried, ...]:
     best: dict[str, Tried] = {}
     for base, fitted in [(step.base, f) for step in search.steps[:1] for f in step.rivals]:
         name = fitted.names[-1]
-        needed = price(fitted.effects, search.events, len(search.library))
+        needed = price(fitted.effects, search.events, len(search.listed))
         one = Tried(name=name, gain=base.q - fitted.q, needed=needed)
         if name not in best or best[name].gain < one.gain:
             best[name] = one

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scm.arrays import Bools, Floats
-from scm.mismatch.library import Candidate, Knob
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import Candidate, Knob
 
 ROUNDS = 5
 SMALL = 0.1  # a derivative's step of an ordinary number, in standard deviations

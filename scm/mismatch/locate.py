@@ -15,8 +15,8 @@ from scm.mismatch.evidence import Residual
 from scm.mismatch.findings import Equation, Located, Place, Span
 from scm.mismatch.fit import TAIL, Fitted, Fitter
 from scm.mismatch.leftover import leftover
-from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import Candidate
 from scm.mismatch.predict import NEUTRAL
 from scm.mismatch.sensed import sensed
 

@@ -13,8 +13,8 @@ import numpy as np
 from scm.arrays import Floats
 from scm.mismatch.fit import FARTHEST, Fitted, Fitter
 from scm.mismatch.learn_noise import learn_noise
-from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import Candidate
 
 MOST_EFFECTS = 4
 REFITTED = 14
@@ -63,14 +63,14 @@ class Search:
     def __init__(
         self, model: Likelihood, part: Floats, library: Sequence[Candidate], tell: Tell
     ) -> None:
-        self.model, self.library, self.tell = model, tuple(library), tell
+        self.model, self.listed, self.tell = model, tuple(library), tell
         self.fitter = Fitter(model, part)
         self.events = int(part.sum())
         self.steps: list[Step] = []
 
     def criterion(self, fitted: Fitted) -> float:
         """Return Q and the price of its effects."""
-        return fitted.q + price(fitted.effects, self.events, len(self.library))
+        return fitted.q + price(fitted.effects, self.events, len(self.listed))
 
     def run(self, is_over: Callable[[], bool] = lambda: False) -> Fitted:
         """Return the model that explains the recordings best without inventing anything.
@@ -110,11 +110,11 @@ class Search:
         """Try every effect beside those of `base`."""
         trials = [
             ((*base.effects, candidate), np.concatenate((base.values, start)))
-            for candidate in self.library
+            for candidate in self.listed
             if candidate.name not in base.names
             for start in candidate.starts
         ]
-        self.tell(f"trying {len(self.library)} effects from {len(trials)} starts")
+        self.tell(f"trying {len(self.listed)} effects from {len(trials)} starts")
         begun = self.fitter.begin(base, trials)
         best: dict[int, Fitted] = {}
         for fitted in begun:

@@ -11,8 +11,8 @@ from scm.geometry import Pose2
 from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.experiment.manoeuvres import ROW_S, Manoeuvre
 from scm.mismatch.experiment.pace import SIDEWAYS_M_S2, Pace
-from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import Candidate
 from scm.mismatch.noise import Noise
 from scm.mismatch.predict import Prediction
 from scm.mismatch.rollouts import Rollouts

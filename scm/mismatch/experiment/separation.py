@@ -13,8 +13,8 @@ import numpy as np
 from scm.arrays import Floats
 from scm.mismatch.experiment.plan import Planned, Rival, numbers_of
 from scm.mismatch.fit import FARTHEST, SMALL, TAIL, Fitted, Fitter
-from scm.mismatch.library import Knob
 from scm.mismatch.likelihood import Ordinary
+from scm.mismatch.listed import Knob
 
 ROUNDS = 3
 

@@ -4,7 +4,7 @@ import math
 
 from scm.mismatch.findings import Equation
 from scm.mismatch.laws.law import Channel, ToNumbers, Values, Written
-from scm.mismatch.library import Knob
+from scm.mismatch.listed import Knob
 
 _FORCE = (-200.0, 200.0)
 

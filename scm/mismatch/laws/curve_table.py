@@ -4,7 +4,7 @@ import math
 
 from scm.mismatch.findings import Equation
 from scm.mismatch.laws.law import Curve, ToNumbers, Values
-from scm.mismatch.library import Knob
+from scm.mismatch.listed import Knob
 
 EDGE_S, EDGE_M = 0.2, 0.05  # over which steps in time and on the floor rise
 _TURN = 2.0 * math.pi

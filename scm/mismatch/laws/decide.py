@@ -107,7 +107,7 @@ def _bare(search: Search, best: Fitted) -> Fitted:
 
 
 def _price(search: Search, fitted: Fitted) -> float:
-    return criterion(fitted, search.events, len(search.library))
+    return criterion(fitted, search.events, len(search.listed))
 
 
 def _settled(search: Search, fitted: Fitted, unseen: Floats) -> _Settled:

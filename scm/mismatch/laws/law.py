@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from scm.mismatch.findings import Equation
 from scm.mismatch.laws.learned import PREFIX
-from scm.mismatch.library import Candidate, Knob
+from scm.mismatch.listed import Candidate, Knob
 
 Values = tuple[float, ...]
 ToNumbers = Callable[[Values], Mapping[str, float]]

@@ -19,8 +19,8 @@ from scm.mismatch.laws.learned import THROTTLE, learned_terms
 from scm.mismatch.laws.screen import Start, polished, screen
 from scm.mismatch.laws.sensed import Sensed, Sensing, sensor_laws
 from scm.mismatch.laws.tidy import tidied
-from scm.mismatch.library import Candidate
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import Candidate
 
 FALSE_ALARMS = 0.01
 LISTED = 45

@@ -12,8 +12,8 @@ import numpy as np
 from scm.arrays import Bools, Floats
 from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.findings import Equation
-from scm.mismatch.library import Candidate, Knob
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import Candidate, Knob
 from scm.mismatch.rollouts import Motions, Numbers
 from scm.vehicles.car import Car
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from scm.errors import TermError
 from scm.mismatch.laws.law import Law, Values, Written
 from scm.mismatch.laws.learned import TRIM
-from scm.mismatch.library import Knob
+from scm.mismatch.listed import Knob
 from scm.vehicles.own_term import SUFFIX, load_own_term
 from scm.vehicles.term import Term
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scm.errors import ScmError
-from scm.mismatch.library import terms_needed
+from scm.mismatch.listed import terms_needed
 from scm.mismatch.trial.continuous import position_error
 from scm.mismatch.trial.known import is_measure, parameters_of
 from scm.mismatch.trial.labels import Case, Label

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 
 from scm.mismatch.fit import Fitter
-from scm.mismatch.library import by_name, candidates
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import by_name, candidates
 from tests.unit.mismatch.made_drive import big_nigel, driven
 
 

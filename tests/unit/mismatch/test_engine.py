@@ -5,8 +5,8 @@ import pytest
 
 from scm.mismatch.drive import Drive
 from scm.mismatch.fit import Fitter, _bounded
-from scm.mismatch.library import by_name, candidates
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import by_name, candidates
 from scm.mismatch.rollouts import Rollouts
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 

@@ -14,8 +14,8 @@ from scm.mismatch.experiment.plan import Leg, Planned, Rival, numbers_of, place
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.separation import quick
 from scm.mismatch.experiment.suggest import ANYBODY, NOBODY, names_of, suggest
-from scm.mismatch.library import by_name, candidates, terms_needed
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import by_name, candidates, terms_needed
 from scm.play import read_drive
 from scm.recording.read import Channel, Recording
 from scm.vehicles.car import load_car

@@ -11,8 +11,8 @@ from scm.mismatch.laws.dictionary import dictionary
 from scm.mismatch.laws.learned import learned_terms
 from scm.mismatch.laws.seek import seek, with_laws
 from scm.mismatch.laws.sensed import Sensing, sensor_laws
-from scm.mismatch.library import by_name, candidates
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import by_name, candidates
 from scm.mismatch.search import Search
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
