@@ -12,6 +12,7 @@ import msgspec
 from scm.mismatch.diagnose import diagnose, write
 from scm.mismatch.findings import Diagnosis
 from scm.mismatch.trial.labels import Case
+from scm.parent_watch import end_with
 
 SAID, BROKEN = "diagnosis.json", "failed.txt"
 Diagnose = Callable[[Path, Path], Diagnosis]
@@ -43,7 +44,12 @@ def answer_all(
             yield _answer(case, out, diagnose)
         return
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+    leashes, hand = context.Pipe(duplex=False)
+    # The hand opens before the pool waits for its work: a trial broken off waits for nobody.
+    with (
+        ProcessPoolExecutor(workers, context, initializer=end_with, initargs=(leashes,)) as pool,
+        hand,
+    ):
         waiting: list[Future[Answer]] = [pool.submit(_answer, c, out, diagnose) for c in cases]
         for done in as_completed(waiting):
             yield done.result()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import scm
 from scm.errors import RunError
+from scm.parent_watch import with_parent
 
 PLACE = "tests/reality"
 KINDS = ("mixed", "single", "none", "pair", "unlisted", "shuffled", "other_car")
@@ -58,7 +59,11 @@ def make_cases(wish: Wish, out: Path, say: Callable[[int], None]) -> None:
         "--engine", wish.engine, "--strength", *map(str, wish.strength),
     ]  # fmt: skip
     with subprocess.Popen(
-        command, cwd=find_root(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        with_parent(command),
+        cwd=find_root(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     ) as running:
         if running.stdout is None or running.stderr is None:
             return

@@ -1,0 +1,27 @@
+"""A trial whose diagnoses never end, for the test that ends it: `python sleeping_trial.py FOLDER`.
+
+Each worker holds a lock on a file of its own for as long as it lives, so that a test sees it go
+whoever buries it.
+"""
+
+import fcntl
+import sys
+import threading
+from pathlib import Path
+
+from scm.mismatch.trial.blind import answer_all
+from scm.mismatch.trial.labels import Case
+
+
+def sleep(_recording, out):
+    """Hold a lock and diagnose for ever."""
+    with (out / "alive").open("w") as alive:
+        fcntl.flock(alive, fcntl.LOCK_EX)
+        (out / "began").touch()
+        threading.Event().wait()
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    for _ in answer_all([Case(n, folder, folder) for n in ("00", "01", "02")], folder, sleep, 2):
+        pass
