@@ -26,6 +26,7 @@ from scm.vehicles.fleet_rows import (
     columns_of_command,
     pool,
     slots_of_signals,
+    steps_of,
     whole_steps,
 )
 from scm.vehicles.kernel_file import compile_kernel
@@ -343,7 +344,7 @@ class Fleet:
             Each signal after every step, (T, capacity).
 
         Raises:
-            RunError: when shapes do not fit, or a signal is not one of each car.
+            RunError: when shapes or steps do not fit, or a signal is not one of each car.
         """
         commands = [np.ascontiguousarray(columns_of_command(c, self.capacity), dtype=np.float64)
                     for c in (throttle, steering)]  # fmt: skip
@@ -352,7 +353,7 @@ class Fleet:
             raise RunError(msg)
         slots = np.array([self._slot_of_signal(name) for name in signals], dtype=np.int64)
         out = np.zeros((len(commands[0]), len(slots), self._alive.size))
-        steps = whole_steps(step_s, substep)
+        steps = steps_of(step_s, substep)
         if self._past is None:
             self._kernel.rollout(
                 self._block, self._numbers, self._alive, self._status, 0, self.capacity, steps,

@@ -52,6 +52,25 @@ def whole_steps(duration: float, substep: float) -> int:
     return round(duration / substep)
 
 
+def steps_of(step_s: float, substep: float) -> int:
+    """Return how many substeps a recording's step is made of [s].
+
+    Raises:
+        RunError: when they are no times, or the step is not a whole number of substeps.
+    """
+    steps = whole_steps(step_s, substep)
+    if not math.isclose(steps * substep, step_s, rel_tol=1e-6):
+        fitting = [n for n in (int(step_s / substep), int(step_s / substep) + 1) if n]
+        whole = " or ".join(f"{n * substep:.6g} s" for n in fitting)
+        parts = " or ".join(f"{step_s / n:.6g} s" for n in fitting)
+        msg = (
+            f"steps of {step_s:g} s are no whole number of substeps of {substep:g} s: take steps "
+            f"of {whole}, or substeps of {parts}"
+        )
+        raise RunError(msg)
+    return steps
+
+
 def columns_of_command(command: Floats, capacity: int) -> Floats:
     """Return a recording's command as (T, 1) or (T, capacity).
 

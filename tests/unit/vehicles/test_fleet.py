@@ -184,3 +184,16 @@ def test_a_row_restarts_elsewhere_with_its_actuators_as_they_were():
     fleet.throttle[:] = 0.4
     fleet.advance(0.002)
     assert fleet.speed[0] > fleet.speed[1]  # its throttle lag was already filled
+
+
+def test_a_rollout_in_steps_of_no_whole_substeps_is_refused_with_the_nearest_that_fit(fleet):
+    words = r"steps of 0\.005 s .* substeps of 0\.002 s: .* steps of 0\.004 s or 0\.006 s, or"
+    with pytest.raises(RunError, match=words + r" substeps of 0\.0025 s"):
+        fleet.rollout(np.zeros(3), np.zeros(3), 0.005, substep=0.002)
+
+
+@pytest.mark.parametrize(("step_s", "substep"), [(0.3, 0.001), (0.005, 0.0025), (0.7, 0.001)])
+def test_steps_that_are_whole_but_for_the_last_bit_are_driven(fleet, step_s, substep):
+    fleet.add(Pose2(0.0, 0.0, 0.0))
+    fleet.rollout(np.zeros(1), np.zeros(1), step_s, substep=substep)
+    np.testing.assert_allclose(fleet.time[0], step_s, rtol=1e-9)
