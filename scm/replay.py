@@ -3,7 +3,8 @@
 Every window starts from the measured pose and velocities and then gets nothing but the recorded
 commands. All windows run side by side as rows of one fleet. Before a window starts, its commands of
 the last second run the actuators in, so that servo and lags begin where they were. A car whose
-drive knows its battery gets the voltage that was measured.
+drive knows its battery gets the voltage that was measured. Faults of measurement that the car file
+states, such as a tilted camera, are undone in the poses first.
 """
 
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from scm.recording.motion import Motion, Poses, forward
 from scm.recording.read import Channel, Recording
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
+from scm.vehicles.undone import without_faults
 
 STEP_S = 0.005
 RUN_IN_S = 1.0
@@ -36,7 +38,8 @@ class FreeRun:
         start_s: When each window starts on the recording's clock, shape `(windows,)`.
         t_s: Time since the window's start, shape `(times,)`.
         x, y, yaw, speed: Simulated.
-        x_measured, y_measured, yaw_measured, speed_measured: From the recording; NaN in a gap.
+        x_measured, y_measured, yaw_measured, speed_measured: From the recording, without the faults
+            of measurement in the car file; NaN in a gap.
     """
 
     start_s: Floats
@@ -164,6 +167,7 @@ def free_run(
         msg = f"horizon: got {horizon_s:g} s, expected {SHORTEST_HORIZON_S:g} s or more"
         raise RecordingError(msg)
     _refuse_incomplete(recording, car)
+    recording = without_faults(recording, car.faults)
     poses, commands = Poses(recording), Commands(recording, car)
     starts, initial = _windows(recording, poses, commands, horizon_s)
     fleet = Fleet(car, len(starts) + 1)

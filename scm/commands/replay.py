@@ -31,6 +31,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.recording.read import read_recordings
     from scm.replay import free_run
     from scm.vehicles.car import load_car
+    from scm.vehicles.undone import POSES
 
     if arguments.save:
         _refuse_unwritable(arguments.save)
@@ -44,6 +45,9 @@ def _run(arguments: argparse.Namespace) -> int:
                 f"{path}  car {car.name}: {len(run.start_s)} windows of {arguments.horizon_s:g} s,"
             )
             print("free run from the measured state, median and 90th percentile of the error")
+            undone = [f.measure.name for f in car.faults if any(map(f.law_of, POSES))]
+            if undone:
+                print(f"poses as they are without {', '.join(undone)} of the car file")
             print(_table(run, arguments.horizon_s) + "\n")
             runs.append(run)
     if arguments.save:

@@ -15,6 +15,8 @@ from scm.recording.read import Channel, Recording, read_recordings
 from scm.replay import HORIZONS_S, error_table, free_run
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.fleet import Fleet
+from scm.vehicles.measure import Series, measure
+from scm.vehicles.undone import POSES
 
 
 @pytest.fixture(scope="module")
@@ -264,3 +266,26 @@ def test_windows_late_in_a_drive_feel_a_battery_that_has_run_down(nigel: Car) ->
     fresh = dict(error_table(free_run(recording, nigel)))["position [m]"][:, 1].max()
     assert own < 0.006
     assert fresh > 5.0 * own
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("camera_tilt", {"measure.camera_tilt_x_per_m": 0.12}),
+        ("pose_latency", {"measure.pose_delay_s": 0.15}),
+        ("pose_scale", {"measure.pose_scale": 1.1}),
+    ],
+)
+def test_faults_of_measurement_in_the_car_file_are_undone(
+    nigel: Car, name: str, values: dict[str, float]
+) -> None:
+    faulty, recording = nigel.with_measures([name], values), drive(nigel)
+    seen = measure({n: Series(recording.channels[n].t, recording.channels[n].values)
+                    for n in POSES}, faulty.faults)  # fmt: skip
+    channels = {n: replace(recording.channels[n], t=s.t_s, values=s.values)
+                for n, s in seen.items()}  # fmt: skip
+    recording = replace(recording, channels={**recording.channels, **channels})
+    plain = dict(error_table(free_run(recording, nigel)))["position [m]"][2, 0]
+    known = dict(error_table(free_run(recording, faulty)))["position [m]"][2, 0]
+    assert plain > 0.02
+    assert known < 0.004

@@ -11,11 +11,9 @@ from scm.mismatch.trial.known import is_measure, parameters_of
 from scm.mismatch.trial.labels import Case, Label
 from scm.recording.read import Recording, read_recordings
 from scm.vehicles.car import Car, load_car
-from scm.vehicles.measure import Fault, Series, measure
+from scm.vehicles.undone import without_faults
 
 SHIFT, POINT = "com_shift.shift_m", "measure.pose_point_x_m"
-POSES = ("pose.x", "pose.y", "pose.yaw")
-ROUNDS = 8
 SHOWS = 1.2  # where the nominal car's error is below this times the true car's, nothing is to gain
 # Effects whose number stands beside one that ordinary cars have already.
 ADDED = {"rolling_resistance", "viscous_drag", "aero_drag"}
@@ -64,7 +62,7 @@ def compare(case: Case, label: Label, folder: Path) -> Ratio | None:
 
 def error(recording: Recording, car: Car) -> float:
     """Return the root mean square position error of free runs [m], faults of measurement undone."""
-    return position_error(_undone(recording, car.faults), car)
+    return position_error(without_faults(recording, car.faults), car)
 
 
 def true_cars(base: Car, label: Label) -> list[Car]:
@@ -115,28 +113,3 @@ def _on(base: Car, patched: Car) -> Car:
     }
     car = base.with_terms([], moved)
     return replace(car, measures=patched.measures, values={**patched.values, **car.values})
-
-
-def _undone(recording: Recording, faults: tuple[Fault, ...]) -> Recording:
-    """Return the recording with the poses as they would be without these faults."""
-    known = {name: recording.channels[name] for name in POSES if name in recording.channels}
-    seen = {name: Series(channel.t, channel.values) for name, channel in known.items()}
-    true = dict(seen)
-    for _ in range(ROUNDS if faults else 0):
-        again = measure(true, [fault for fault in faults if _on_poses(fault)])
-        true = {
-            name: Series(
-                series.t_s + seen[name].t_s - again[name].t_s,
-                series.values + seen[name].values - again[name].values,
-            )
-            for name, series in true.items()
-        }
-    poses = {
-        name: replace(known[name], t=series.t_s, values=series.values)
-        for name, series in true.items()
-    }
-    return replace(recording, channels={**recording.channels, **poses})
-
-
-def _on_poses(fault: Fault) -> bool:
-    return any(fault.law_of(name) is not None for name in POSES)
