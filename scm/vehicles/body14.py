@@ -2,6 +2,8 @@
 
 Sprung mass: x y z roll pitch yaw (angles small but for yaw). Each wheel: hop and spin. Velocities
 of the sprung mass are kept in the world frame, so a coasting turn neither gains nor loses energy.
+x, y and yaw are the whole car's, about its centre of gravity; z, roll and pitch are the sprung
+mass's about its own, which lies where the whole car's is once four wheels are added at the axles.
 
     (M + dt * sum J^T K J) * dv = dt * (sum J^T F + F_body - weight)     [kg*m/s, kg*m^2*rad/s]
 
@@ -81,6 +83,15 @@ MOTION = (
 
 
 @law
+def sprung_part(
+    mass: float, cog_to_rear_axle: float, wheel_mass: float, wheelbase: float
+) -> tuple[float, float]:
+    """Mass [kg] and place ahead of the rear axle [m] of what the springs carry."""
+    sprung_mass = mass - 4.0 * wheel_mass
+    return sprung_mass, (mass * cog_to_rear_axle - 2.0 * wheel_mass * wheelbase) / sprung_mass
+
+
+@law
 def contact_velocity(
     vx: float, vy: float, roll_rate: float, pitch_rate: float, yaw_rate: float,
     wheel_x: float, wheel_y: float, cog_height: float,
@@ -93,9 +104,9 @@ def contact_velocity(
 
 
 @law
-def corner_height(z: float, roll: float, pitch: float, wheel_x: float, wheel_y: float) -> float:
+def corner_height(z: float, roll: float, pitch: float, seat_x: float, wheel_y: float) -> float:
     """How far (or, of rates, how fast) the body's corner is up from rest [m, m/s]."""
-    return z + wheel_y * roll - wheel_x * pitch
+    return z + wheel_y * roll - seat_x * pitch
 
 
 @law

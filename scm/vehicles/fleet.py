@@ -14,7 +14,7 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import RunError, TermError, nearest
 from scm.geometry import Pose2
-from scm.vehicles.body14 import GRAVITY, STATUS_DIVERGED, STATUS_OK, STATUS_ROLLED
+from scm.vehicles.body14 import GRAVITY, STATUS_DIVERGED, STATUS_OK, STATUS_ROLLED, sprung_part
 from scm.vehicles.car import Car
 from scm.vehicles.fleet_rows import (
     COG,
@@ -29,6 +29,7 @@ from scm.vehicles.fleet_rows import (
     steps_of,
     whole_steps,
 )
+from scm.vehicles.jit import plain
 from scm.vehicles.kernel_file import compile_kernel
 from scm.vehicles.lanes import LANES
 from scm.vehicles.layout import columns_of, find_column, slots_of
@@ -252,9 +253,8 @@ class Fleet:
         car[offset : offset + 4] = rolling / param(row, "wheel_radius")
         front = shape.cog_to_rear_axle / param(row, "wheelbase")
         offset = self._slots["wheel_load"][0]
-        weight = 0.5 * GRAVITY * (shape.mass - 4.0 * param(row, "wheel_mass"))
-        load = np.array([front, front, 1.0 - front, 1.0 - front]) * weight
-        car[offset : offset + 4] = load + param(row, "wheel_mass") * GRAVITY
+        shares = np.array([front, front, 1.0 - front, 1.0 - front])
+        car[offset : offset + 4] = 0.5 * shape.mass * GRAVITY * shares
 
     def copy_row(self, source: int, row: int) -> None:
         """Make a row the very car of another one: its numbers, and all that it remembers."""
@@ -271,11 +271,13 @@ class Fleet:
         rise = (0.5 * (front_left + front_right) - rear) / self._parameter(row, "wheelbase")
         left_up = 0.5 * (front_left + rear_left - front_right - rear_right)
         roll, height = left_up / self._parameter(row, "track"), shape.cog_height
+        masses = (self._parameter(row, name) for name in ("wheel_mass", "wheelbase"))
+        _, ahead = plain(sprung_part)(shape.mass, shape.cog_to_rear_axle, *masses)
         c, s = math.cos(float(self.yaw[row])), math.sin(float(self.yaw[row]))
         for name, change in (
             ("x_cog", height * (s * roll - c * rise)),
             ("y_cog", -height * (c * roll + s * rise)),
-            ("z_cog", rear + shape.cog_to_rear_axle * rise),
+            ("z_cog", rear + ahead * rise),
             ("roll", roll),
             ("pitch", -rise),
             ("hop", self.floor_height[row].copy()),

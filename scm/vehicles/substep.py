@@ -21,7 +21,7 @@ cog_height = cog_height + added_cog_z
 # forces act in the frame of the substep's end: in a steady turn one of its start sees the turning
 # of a whole substep as side slip
 BODY = """
-sprung_mass = mass - 4.0 * wheel_mass
+sprung_mass, sprung_to_rear_axle = sprung_part(mass, cog_to_rear_axle, wheel_mass, wheelbase)
 sin_yaw, cos_yaw = sin_cos(yaw + dt * yaw_rate)
 vx = cos_yaw * vx_world + sin_yaw * vy_world
 vy = cos_yaw * vy_world - sin_yaw * vx_world
@@ -36,8 +36,9 @@ WHEEL = """
 driven = front_driven if front > 0.5 else rear_driven
 wheel_x = wheelbase - cog_to_rear_axle if front > 0.5 else -cog_to_rear_axle
 wheel_y = 0.5 * side * track
-front_x = wheelbase - cog_to_rear_axle
-share = 0.5 * (cog_to_rear_axle if front > 0.5 else front_x) / wheelbase
+seat_front_x = wheelbase - sprung_to_rear_axle
+seat_x = seat_front_x if front > 0.5 else -sprung_to_rear_axle
+share = 0.5 * (sprung_to_rear_axle if front > 0.5 else seat_front_x) / wheelbase
 rest_spring_force = share * sprung_mass * GRAVITY
 rest_load = rest_spring_force + wheel_mass * GRAVITY
 x_wheel = x_cog + cos_yaw * wheel_x - sin_yaw * wheel_y
@@ -47,9 +48,9 @@ axle_omega = axle_front if front > 0.5 else axle_rear
 over_x, over_y = contact_velocity(
     vx, vy, roll_rate, pitch_rate, yaw_rate, wheel_x, wheel_y, cog_height
 )
-compression_rate = hop_rate - corner_height(vz, roll_rate, pitch_rate, wheel_x, wheel_y)
+compression_rate = hop_rate - corner_height(vz, roll_rate, pitch_rate, seat_x, wheel_y)
 compression = (
-    hop - corner_height(z_cog - cog_height, roll, pitch, wheel_x, wheel_y) + dt * compression_rate
+    hop - corner_height(z_cog - cog_height, roll, pitch, seat_x, wheel_y) + dt * compression_rate
 )
 slope_x = cos_yaw * floor_slope_x + sin_yaw * floor_slope_y
 slope_y = cos_yaw * floor_slope_y - sin_yaw * floor_slope_x
@@ -91,6 +92,8 @@ wheel_load = load
 SOLVE = """
 x_front = wheelbase - cog_to_rear_axle
 x_rear = -cog_to_rear_axle
+seat_x_front = wheelbase - sprung_to_rear_axle
+seat_x_rear = -sprung_to_rear_axle
 y_left = 0.5 * track
 seat_front = seat_force__0 + seat_force__1
 seat_rear = seat_force__2 + seat_force__3
@@ -118,13 +121,13 @@ dvx, dvy, dvz, droll_rate, dpitch_rate, dyaw_rate = body_step(
     force_x, force_y, moment_z, force_x_damping, force_y_damping, moment_z_damping,
     seat_front + seat_rear,
     y_left * seat_left,
-    -(x_front * seat_front + x_rear * seat_rear),
+    -(seat_x_front * seat_front + seat_x_rear * seat_rear),
     all_seat_stiff,
     y_left * (hold_front_left + hold_rear_left),
-    x_front * hold_front + x_rear * hold_rear,
+    seat_x_front * hold_front + seat_x_rear * hold_rear,
     y_left * y_left * all_seat_stiff,
-    y_left * (x_front * hold_front_left + x_rear * hold_rear_left),
-    x_front * x_front * hold_front + x_rear * x_rear * hold_rear,
+    y_left * (seat_x_front * hold_front_left + seat_x_rear * hold_rear_left),
+    seat_x_front * seat_x_front * hold_front + seat_x_rear * seat_x_rear * hold_rear,
     pull,
     side_front + side_rear,
     x_front * side_front + x_rear * side_rear - y_left * pull_left,
@@ -138,7 +141,7 @@ dvx, dvy, dvz, droll_rate, dpitch_rate, dyaw_rate = body_step(
 )
 accel_x = dvx * (1.0 / dt)
 accel_y = dvy * (1.0 / dt)
-accel_z = dvz * (1.0 / dt)
+accel_z = (dvz + (sprung_to_rear_axle - cog_to_rear_axle) * dpitch_rate) * (1.0 / dt)
 roll_accel = droll_rate * (1.0 / dt)
 pitch_accel = dpitch_rate * (1.0 / dt)
 yaw_accel = dyaw_rate * (1.0 / dt)
@@ -164,7 +167,7 @@ change_x, change_y = contact_velocity(
 wheel_speed = spin + spin_follow * (cos_steer * change_x + sin_steer * change_y)
 wheel_angle = wheel_angle + dt * wheel_speed
 hop_rate = hop_rate + hop_free + hop_follow * corner_height(
-    dvz, droll_rate, dpitch_rate, wheel_x, wheel_y
+    dvz, droll_rate, dpitch_rate, seat_x, wheel_y
 )
 hop = hop + dt * hop_rate
 """
@@ -177,7 +180,7 @@ back = cog_to_rear_axle + cog_height * pitch
 left = cog_height * roll
 x = x_cog - end_cos * back - end_sin * left
 y = y_cog - end_sin * back + end_cos * left
-z = z_cog - cog_height + pitch * cog_to_rear_axle
+z = z_cog - cog_height + pitch * sprung_to_rear_axle
 speed, lateral_speed = contact_velocity(
     end_cos * vx_world + end_sin * vy_world, end_cos * vy_world - end_sin * vx_world,
     roll_rate, pitch_rate, yaw_rate, -cog_to_rear_axle, 0.0, cog_height

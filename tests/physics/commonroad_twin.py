@@ -199,10 +199,12 @@ def parameters(car: Car) -> VehicleParameters:
     p = VehicleParameters()
     v = car.value
     p.m = v("body.mass_kg")
-    unsprung = 2.0 * v("wheel.mass_kg")
-    p.m_s, p.m_uf, p.m_ur = p.m - 2.0 * unsprung, unsprung, unsprung
     p.b = v("body.cog_to_rear_axle_m")
     p.a = v("body.wheelbase_m") - p.b
+    # its one a and b are the whole car's and the sprung mass's: so are the wheels' then
+    unsprung = 2.0 * v("wheel.mass_kg")
+    p.m_s = p.m - 2.0 * unsprung
+    p.m_uf, p.m_ur = (2.0 * unsprung * arm / (p.a + p.b) for arm in (p.b, p.a))
     p.I_Phi_s, p.I_y_s = v("body.roll_inertia_kgm2"), v("body.pitch_inertia_kgm2")
     p.I_z, p.I_xz_s = v("body.yaw_inertia_kgm2"), 0.0
     p.K_sf = p.K_sr = v("suspension.spring_n_m")
