@@ -92,9 +92,9 @@ class Likelihood:
         ok = np.ones(len(sets), dtype=np.bool_)
         found = []
         for rollouts, prediction in zip(self._rollouts, self._predictions, strict=True):
-            motions = rollouts.run(sets)
-            ok &= motions.ok
-            found.append(prediction.residuals(motions, sets))
+            left, fine = residuals_of(rollouts, prediction, sets)
+            ok &= fine
+            found.append(left)
         return found, ok
 
     def weigh(self, residuals: Sequence[Sequence[Floats]]) -> Floats:
@@ -110,6 +110,17 @@ class Likelihood:
     def numbers(self, z: Floats) -> dict[str, float]:
         """Return the car's own numbers at `z` standard deviations from the file's."""
         return {o.key: clipped(o, v) for o, v in zip(self.ordinary, z, strict=True)}
+
+
+def residuals_of(
+    rollouts: Rollouts, prediction: Prediction, sets: Sequence[Numbers]
+) -> tuple[list[Floats], Bools]:
+    """Return residuals of each stream of one drive, (samples, sets), and which sets were fine."""
+    done = rollouts.each(
+        sets, lambda motions, some: (prediction.residuals(motions, some), motions.ok)
+    )
+    streams = [np.concatenate(parts, axis=1) for parts in zip(*(d[0] for d in done), strict=True)]
+    return streams, np.concatenate([d[1] for d in done])
 
 
 def clipped(ordinary: Ordinary, z: float) -> float:

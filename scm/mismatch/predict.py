@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from scm.arrays import Floats
+from scm.arrays import Bools, Floats, Ints
 from scm.mismatch.drive import STEP_S, WHEELS, Drive, Stream
 from scm.mismatch.rollouts import Motions, Numbers
+from scm.vehicles.jit import array_kernel
 
 # Faults of measurement by the key that their library parameter has, and their neutral values.
 POSE_CLOCK = "clock.pose_s"  # poses are stamped so much later than the other sensors
@@ -24,6 +25,7 @@ NEUTRAL: Mapping[str, float] = {
 }  # fmt: skip
 
 
+POSES = ("pose.x", "pose.y", "pose.yaw")
 _LATE = (POSE_CLOCK, "measure.pose_delay_s", "measure.clock_offset_s")
 _POSE = (*_LATE, "measure.clock_rate", "measure.pose_scale", "measure.camera_tilt_x_per_m",
          "measure.camera_tilt_y_per_m", "measure.pose_heading_rad")  # fmt: skip
@@ -49,9 +51,10 @@ class Prediction:
 
     def __init__(self, drive: Drive) -> None:
         self.drive = drive
-        smoothed, edges = drive.smoothed, drive.edges
-        self._seen = [smoothed[f"pose.{n}"].at(edges) for n in ("x", "y", "yaw")]
-        self._taps = {s.name: _Taps(s, edges) for s in drive.streams}
+        self._taps = {s.name: _Taps(s, drive.edges) for s in drive.streams}
+        x, y, yaw = (drive.smoothed[name] for name in POSES)
+        values = np.stack((x.at(yaw.t), y.at(yaw.t), yaw.value))
+        self._seen = yaw.t, values, np.stack((x.rate_at(yaw.t), y.rate_at(yaw.t), yaw.rate))
         self._counts = 0.0
         if any(s.name.startswith("encoder.") for s in drive.streams):
             self._counts = drive.car.value("encoder.counts_per_revolution") / (2.0 * np.pi)
@@ -59,72 +62,43 @@ class Prediction:
     def residuals(self, motions: Motions, faults: Sequence[Numbers]) -> list[Floats]:
         """Return measured minus predicted of every stream, each (samples, sets)."""
         now = {key: np.array([n.get(key, value) for n in faults]) for key, value in NEUTRAL.items()}
-        path = self._path(motions, now, *self._seen)
+        path = self._path(motions, now)
         found = []
         for stream in self.drive.streams:
-            signal = path.get(stream.name)
-            signal = self.sensor(stream.name, motions, now) if signal is None else signal
-            found.append(stream.values[:, None] - self._taps[stream.name](signal))
-        faulty = np.any([now[key] != NEUTRAL[key] for key in _POSE], axis=0)
-        for row in np.flatnonzero(faulty):
-            self._faulty_pose(motions, now, int(row), found)
+            predicted = path.get(stream.name)
+            if predicted is None:
+                signal = self.sensor(stream.name, motions, now)
+                predicted = self._taps[stream.name](signal)
+            found.append(stream.values[:, None] - predicted)
         return found
 
-    def _path(
-        self, motions: Motions, now: Mapping[str, Floats], x: Floats, y: Floats, yaw: Floats,
-    ) -> dict[str, Floats]:  # fmt: skip
-        """Return the measured point's way from its start, on the drive's edges.
+    def _path(self, motions: Motions, now: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Return what the camera records of each set's way from its start, (samples, sets).
 
-        Args:
-            motions: What the car did.
-            now: Faults, each (sets,).
-            x: Where the camera saw it, on the edges' true times, (edges,).
-            y: Likewise.
-            yaw: Likewise.
+        Each set is seen in its own camera's time, which may be late and run fast.
         """
-        heading = yaw[:, None] - now["measure.pose_heading_rad"]
-        c, s = np.cos(heading), np.sin(heading)
-        rate = motions["yaw_rate"]
-        along = motions["speed"] - rate * (self.drive.point[1] + now["measure.pose_point_y_m"])
-        across = motions["lateral_speed"] + rate * (
-            self.drive.point[0] + now["measure.pose_point_x_m"]
+        drive, edges = self.drive, self.drive.edges
+        late = np.sum([now[key] for key in _LATE], axis=0)
+        rate = now["measure.clock_rate"]
+        faulty = np.any([now[key] != NEUTRAL[key] for key in _POSE], axis=0)
+        tilt = np.stack((now["measure.camera_tilt_x_per_m"], now["measure.camera_tilt_y_per_m"]))
+        arm = (
+            drive.point[0] + now["measure.pose_point_x_m"],
+            drive.point[1] + now["measure.pose_point_y_m"],
         )
-        vx, vy = c * along - s * across, s * along + c * across
-        tilt_x, tilt_y = now["measure.camera_tilt_x_per_m"], now["measure.camera_tilt_y_per_m"]
-        if np.any(tilt_x) or np.any(tilt_y):
-            size = 1.0 / (1.0 - tilt_x * x[:, None] - tilt_y * y[:, None])
-            true_x, true_y = x[:, None] * size, y[:, None] * size
-            depth = 1.0 + tilt_x * true_x + tilt_y * true_y
-            turn = (tilt_x * vx + tilt_y * vy) / (depth * depth)
-            vx, vy = vx / depth - true_x * turn, vy / depth - true_y * turn
-        scale = now["measure.pose_scale"]
-        return {
-            "pose.x": _summed(scale * vx, STEP_S),
-            "pose.y": _summed(scale * vy, STEP_S),
-            "pose.yaw": _summed(rate, STEP_S),
-        }
-
-    def _faulty_pose(
-        self, motions: Motions, now: Mapping[str, Floats], row: int, found: list[Floats]
-    ) -> None:
-        """Predict the pose of one set whose camera has faults, in its own time."""
-        one = {key: values[row : row + 1] for key, values in now.items()}
-        edges, smoothed = self.drive.edges, self.drive.smoothed
-        late = float(sum(one[key][0] for key in _LATE))
-        rate = float(one["measure.clock_rate"][0])
-        seen = self._seen
-        if late or rate:
-            stamps = edges + late + rate * (edges - edges[0])
-            seen = [smoothed[f"pose.{n}"].at(stamps) for n in ("x", "y", "yaw")]
-        alone = Motions(
-            {key: values[:, row : row + 1] for key, values in motions.signals.items()},
-            motions.ok[row : row + 1],
-        )
-        path = self._path(alone, one, *seen)
-        for stream, column in zip(self.drive.streams, found, strict=True):
-            if stream.name in path:
-                t = edges[0] + (stream.t - late - edges[0]) / (1.0 + rate)
-                column[:, row] = stream.values - np.interp(t, edges, path[stream.name][:, 0])
+        way = np.empty((3, len(edges), len(late)))
+        _drive_way(
+            edges, late, rate, *self._seen, motions["speed"], motions["lateral_speed"],
+            motions["yaw_rate"], *arm, now["measure.pose_heading_rad"], tilt,
+            now["measure.pose_scale"], STEP_S, np.zeros(len(late), np.int64), np.empty(3),
+            np.zeros((3, len(late))), way,
+        )  # fmt: skip
+        found = {}
+        for name, signal in zip(POSES, way, strict=True):
+            t = drive.stream(name).t
+            found[name] = np.empty((len(t), len(late)))
+            _seen_late(edges, t, late, rate, faulty, signal, found[name])
+        return found
 
     def sensor(self, name: str, motions: Motions, now: Mapping[str, Floats]) -> Floats:
         """Return what any other sensor reads, on the drive's edges, (edges, sets)."""
@@ -146,8 +120,73 @@ class Prediction:
         return motions[plain.get(name, "yaw_rate")]
 
 
-def _summed(rate: Floats, step: float) -> Floats:
-    """Return the integral of (edges, sets) from the first edge, by trapezoids."""
-    total = np.zeros_like(rate)
-    np.cumsum(0.5 * step * (rate[1:] + rate[:-1]), axis=0, out=total[1:])
-    return total
+@array_kernel
+def _drive_way(
+    edges: Floats, late: Floats, rate: Floats, t: Floats, values: Floats, rates: Floats,
+    speed: Floats, lateral_speed: Floats, yaw_rate: Floats, arm_x: Floats, arm_y: Floats,
+    heading: Floats, tilt: Floats, scale: Floats, step: float, row: Ints, seen: Floats,
+    last: Floats, way: Floats,
+) -> None:  # fmt: skip
+    """Write each set's way in the measured frame, from its start, by trapezoids along its time.
+
+    `t`, `values` and `rates`, (3, n), are the measured pose, smoothed; `way` is x, y and yaw, (3,
+    edges, sets). `row`, all 0, `seen` and `last` are room to work in.
+    """
+    for k in range(len(edges)):
+        for b in range(len(late)):
+            stamp = edges[k] + late[b] + rate[b] * (edges[k] - edges[0])
+            stamp = min(max(stamp, t[0]), t[len(t) - 1])
+            i = row[b]
+            while i < len(t) - 2 and t[i + 1] <= stamp:
+                i += 1
+            row[b] = i
+            _measured(stamp, i, t, values, rates, seen)
+            c, s = np.cos(seen[2] - heading[b]), np.sin(seen[2] - heading[b])
+            turning = yaw_rate[k, b]
+            along = speed[k, b] - turning * arm_y[b]
+            across = lateral_speed[k, b] + turning * arm_x[b]
+            vx, vy = c * along - s * across, s * along + c * across
+            if tilt[0, b] != 0.0 or tilt[1, b] != 0.0:
+                size = 1.0 / (1.0 - tilt[0, b] * seen[0] - tilt[1, b] * seen[1])
+                x, y = seen[0] * size, seen[1] * size
+                depth = 1.0 + tilt[0, b] * x + tilt[1, b] * y
+                turn = (tilt[0, b] * vx + tilt[1, b] * vy) / (depth * depth)
+                vx, vy = vx / depth - x * turn, vy / depth - y * turn
+            vx, vy = scale[b] * vx, scale[b] * vy
+            if k == 0:
+                way[0, k, b] = way[1, k, b] = way[2, k, b] = 0.0
+            else:
+                way[0, k, b] = way[0, k - 1, b] + 0.5 * step * (vx + last[0, b])
+                way[1, k, b] = way[1, k - 1, b] + 0.5 * step * (vy + last[1, b])
+                way[2, k, b] = way[2, k - 1, b] + 0.5 * step * (turning + last[2, b])
+            last[0, b], last[1, b], last[2, b] = vx, vy, turning
+
+
+@array_kernel
+def _measured(stamp: float, i: int, t: Floats, values: Floats, rates: Floats, out: Floats) -> None:
+    """Write the measured pose at a time within row `i`, by cubics as `Smooth.at`."""
+    h = t[i + 1] - t[i]
+    s = (stamp - t[i]) / h
+    for n in range(3):
+        a, b = values[n, i], values[n, i + 1]
+        da, db = rates[n, i] * h, rates[n, i + 1] * h
+        bend = 3.0 * (b - a) - 2.0 * da - db
+        out[n] = a + s * (da + s * (bend + s * (2.0 * (a - b) + da + db)))
+
+
+@array_kernel
+def _seen_late(
+    edges: Floats, t: Floats, late: Floats, rate: Floats, faulty: Bools, signal: Floats,
+    out: Floats,
+) -> None:  # fmt: skip
+    """Take a signal (edges, sets) at stamps `t` of cameras with clocks of their own."""
+    first, final = edges[0], edges[len(edges) - 1]
+    step = edges[1] - edges[0]
+    for k in range(len(t)):
+        for b in range(len(late)):
+            true = first + (t[k] - late[b] - first) / (1.0 + rate[b])
+            if faulty[b]:
+                true = min(max(true, first), final)
+            at = (true - first) / step
+            i = min(max(int(at), 0), len(edges) - 2)
+            out[k, b] = signal[i, b] + (at - i) * (signal[i + 1, b] - signal[i, b])

@@ -5,20 +5,23 @@ bit, so one kernel serves all hypotheses. Motion of the body contracts under rec
 needs no restart; the pose does not, and is carried back to the measured one twice a second.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
-from scm.arrays import Bools, Floats
+from scm.arrays import Bools, Floats, Ints
 from scm.geometry import Pose2
 from scm.mismatch.commanded import Commanded
 from scm.mismatch.drive import RUN_IN_S, STEP_S, Drive
 from scm.vehicles.car import Car
-from scm.vehicles.fleet import Fleet, VehicleStatus
-from scm.vehicles.fleet_rows import WHEELS, pool
+from scm.vehicles.fleet import SUBSTEP_S, Fleet, VehicleStatus
+from scm.vehicles.fleet_rows import COG, WHEELS, pool, whole_steps
+from scm.vehicles.jit import array_kernel
+from scm.vehicles.lanes import LANES
 
-ROWS, THREADS = 32, 2
+ROWS, THREADS = LANES, 2
 TETHER_STEPS = 50
 SIGNALS = (
     "speed", "lateral_speed", "yaw_rate", "accel_x", "accel_y", "steer_angle",
@@ -27,7 +30,7 @@ SIGNALS = (
 THROTTLE_DELAY, STEERING_DELAY = "drive.delay_s", "steering.delay_s"
 COMMAND_CLOCK = "clock.commands_s"  # commands take effect so much later than they are stamped
 Numbers = Mapping[str, float]
-_Driven = tuple[dict[str, Floats], Bools]
+_Used = TypeVar("_Used")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,40 +66,49 @@ class Rollouts:
 
     def run(self, sets: Sequence[Numbers]) -> Motions:
         """Drive all parameter sets; each is nominal but for the numbers it names by key."""
-        chunks = [sets[i : i + ROWS] for i in range(0, len(sets), ROWS)]
-        jobs = [(self._fleets[k % THREADS], chunk) for k, chunk in enumerate(chunks)]
-        shares = [jobs[k::THREADS] for k in range(THREADS)]
-        others = pool(THREADS).map(self._drive_all, shares[1:])
-        done = [self._drive_all(shares[0]), *others]
-        parts = [done[k % THREADS][k // THREADS] for k in range(len(chunks))]
+        parts = self.each(sets, lambda motions, _: motions)
         return Motions(
-            {name: np.concatenate([p[0][name] for p in parts], axis=1) for name in SIGNALS},
-            np.concatenate([p[1] for p in parts]),
+            {name: np.concatenate([p[name] for p in parts], axis=1) for name in SIGNALS},
+            np.concatenate([p.ok for p in parts]),
         )
 
-    def _drive_all(self, jobs: Sequence[tuple[Fleet, Sequence[Numbers]]]) -> list[_Driven]:
-        return [self._run(fleet, sets) for fleet, sets in jobs]
+    def each(
+        self, sets: Sequence[Numbers], use: Callable[[Motions, Sequence[Numbers]], _Used]
+    ) -> list[_Used]:
+        """Drive all parameter sets, a tile at a time; return what `use` makes of each tile.
 
-    def _run(self, fleet: Fleet, sets: Sequence[Numbers]) -> _Driven:
-        n, edges = len(sets), self.drive.edges
+        Motions of many sets are large: what is read of them is better read where they are made.
+        `use` is called on several threads.
+        """
+        chunks = [sets[i : i + ROWS] for i in range(0, len(sets), ROWS)]
+
+        def share(first: int) -> list[_Used]:
+            fleet = self._fleets[first]
+            return [use(self._run(fleet, chunk), chunk) for chunk in chunks[first::THREADS]]
+
+        others = pool(THREADS).map(share, range(1, min(THREADS, len(chunks))))
+        done = [share(0), *others]
+        return [done[k % THREADS][k // THREADS] for k in range(len(chunks))]
+
+    def _run(self, fleet: Fleet, sets: Sequence[Numbers]) -> Motions:
+        n, edges, tether = len(sets), self.drive.edges, _Tether(fleet)
         delays = self._set(fleet, sets)
         self._begin(fleet, n, delays)
         commands = [
             means(command, edges, delays[k])
             for k, command in enumerate((self.drive.throttle, self.drive.steering))
         ]
-        out, first = {s: np.empty((len(edges), n)) for s in SIGNALS}, _now(fleet)
-        for name in SIGNALS:
-            out[name][0] = first[name][:n]
+        out, first = np.empty((len(edges), len(SIGNALS), fleet.capacity)), _now(fleet)
+        for k, name in enumerate(SIGNALS):
+            out[0, k] = first[name]
         for a in range(0, len(edges) - 1, TETHER_STEPS):
             b = min(a + TETHER_STEPS, len(edges) - 1)
             if self.drive.battery is not None:
                 fleet.battery[:n] = self.drive.battery[a]
-            got = fleet.rollout(commands[0][a:b], commands[1][a:b], STEP_S, SIGNALS)
-            for name in SIGNALS:
-                out[name][a + 1 : b + 1] = got[name][:, :n]
-            self._carry(fleet, n, b)
-        return out, fleet.status[:n] == VehicleStatus.OK
+            tether.rollout(commands[0][a:b], commands[1][a:b], out[a + 1 : b + 1])
+            tether.carry(n, self._x[b], self._y[b], self._yaw[b])
+        ok = fleet.status[:n] == VehicleStatus.OK
+        return Motions({name: out[:, k, :n] for k, name in enumerate(SIGNALS)}, ok)
 
     def _set(self, fleet: Fleet, sets: Sequence[Numbers]) -> Floats:
         """Give each row its numbers; return the commands' delays, (2, rows)."""
@@ -130,26 +142,60 @@ class Rollouts:
         for row in range(n):
             fleet.place(row, pose, c * vx + s * vy, 0.0, float(yaw.rate[0]), keep_actuators=True)
 
-    def _carry(self, fleet: Fleet, n: int, k: int) -> None:
-        """Carry every row to the measured pose; its motion in its own frame stays."""
-        rows = np.arange(n)
-        now = fleet.planar_cogs(rows)
-        turn = self._yaw[k] - fleet.yaw[:n]
+
+class _Tether:
+    """Drives a fleet's rows stretch by stretch, and carries them to the measured pose between.
+
+    It is what `Fleet.rollout`, `planar_cogs` and `push_rows` do, without their checks and copies.
+    """
+
+    def __init__(self, fleet: Fleet) -> None:
+        self._fleet = fleet
+        self._kernel, slots = fleet._kernel, fleet._slots  # noqa: SLF001 its innermost loop
+        self._state = (fleet._block, fleet._numbers, fleet._alive, fleet._status)  # noqa: SLF001
+        self._cog = np.array([slots[n][0] for n in (*COG, "x", "y")], dtype=np.int64)
+        self._kept = np.array([fleet._slot_of_signal(n) for n in SIGNALS])  # noqa: SLF001
+        self._steps = whole_steps(STEP_S, SUBSTEP_S)
+        self._remembers = fleet._past is not None  # noqa: SLF001
+
+    def rollout(self, throttle: Floats, steering: Floats, out: Floats) -> None:
+        """Drive all rows through commands, (steps,) or (steps, rows); write every signal."""
+        if self._remembers:
+            got = self._fleet.rollout(throttle, steering, STEP_S, SIGNALS)
+            for k, name in enumerate(SIGNALS):
+                out[:, k] = got[name]
+            return
+        given = [c[:, None] if c.ndim == 1 else c for c in (throttle, steering)]
+        self._kernel.rollout(
+            *self._state, 0, self._fleet.capacity, self._steps, SUBSTEP_S, *given, self._kept, out
+        )
+
+    def carry(self, n: int, x: float, y: float, yaw: float) -> None:
+        """Carry the first rows to a measured pose; their motion in their own frames stays."""
+        block, _, _, status = self._state
+        _carry(block, status, self._cog, n, x, y, yaw)
+        self._kernel.advance(*self._state, 0, self._fleet.capacity, 0, SUBSTEP_S)
+
+
+@array_kernel
+def _carry(
+    block: Floats, status: Ints, slots: Ints, n: int, x: float, y: float, yaw: float
+) -> None:
+    cog_x, cog_y, heading, vx, vy, _, rear_x, rear_y = slots
+    for row in range(n):
+        if status[row] != 0:
+            continue
+        turn = yaw - block[heading, row]
         turn = np.arctan2(np.sin(turn), np.cos(turn))
         c, s = np.cos(turn), np.sin(turn)
-        arm_x, arm_y = now[:, 0] - fleet.x[:n], now[:, 1] - fleet.y[:n]
-        changes = np.stack(
-            (
-                c * now[:, 3] - s * now[:, 4] - now[:, 3],
-                s * now[:, 3] + c * now[:, 4] - now[:, 4],
-                np.zeros(n),
-                self._x[k] + c * arm_x - s * arm_y - now[:, 0],
-                self._y[k] + s * arm_x + c * arm_y - now[:, 1],
-                turn,
-            ),
-            axis=1,
-        )
-        fleet.push_rows(rows, changes)
+        arm_x = block[cog_x, row] - block[rear_x, row]
+        arm_y = block[cog_y, row] - block[rear_y, row]
+        fast, side = block[vx, row], block[vy, row]
+        block[vx, row] += c * fast - s * side - fast
+        block[vy, row] += s * fast + c * side - side
+        block[cog_x, row] += x + c * arm_x - s * arm_y - block[cog_x, row]
+        block[cog_y, row] += y + s * arm_x + c * arm_y - block[cog_y, row]
+        block[heading, row] += turn
 
 
 def _now(fleet: Fleet) -> dict[str, Floats]:

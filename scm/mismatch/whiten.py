@@ -128,11 +128,11 @@ class Whitener:
         n, events = system.size, len(self.t)
         self._gain, self._variance = np.zeros((events, n)), np.zeros(events)
         self._keep = np.zeros((events, n))
-        p, room = np.diag(system.start**2), np.zeros((2, n, n))
+        p = np.diag(system.start**2)
         _gains(
             self.t, self.stream, self._cos, self._sin, system.rows, system.columns,
             system.factors, system.lasts, system.spread, system.see, system.variance, unsure,
-            leaps, p, room, self._gain, self._variance, self._keep,
+            leaps, p, self._gain, self._variance, self._keep,
         )  # fmt: skip
         self.log_size = np.log(self._variance)
 
@@ -162,55 +162,59 @@ class Whitener:
 def _felt(command: Commanded, t: Floats) -> Floats:
     """Return the squared leaps of a command as they are still felt, fading, at given times."""
     felt = np.zeros(len(command.t))
-    leaps, fade = np.abs(np.diff(command.values)), np.exp(-np.diff(command.t) / FELT_S)
-    for k in range(1, len(felt)):
-        felt[k] = felt[k - 1] * fade[k - 1] + leaps[k - 1]
+    _fade(np.abs(np.diff(command.values)), np.exp(-np.diff(command.t) / FELT_S), felt)
     row = np.maximum(np.searchsorted(command.t, t, side="right") - 1, 0)
     now = felt[row] * np.exp(-np.maximum(t - command.t[row], 0.0) / FELT_S)
     return np.asarray(now * now)
 
 
 @array_kernel
+def _fade(leaps: Floats, fade: Floats, felt: Floats) -> None:
+    """Write how much of all leaps so far is still felt at each of them and the start."""
+    for k in range(1, len(felt)):
+        felt[k] = felt[k - 1] * fade[k - 1] + leaps[k - 1]
+
+
+@array_kernel
 def _gains(
     t: Floats, stream: Ints, cos: Floats, sin: Floats, rows: Ints, columns: Ints, factors: Floats,
     lasts: Floats, spread: Floats, see: Floats, variance: Floats, unsure: Floats, leaps: Floats,
-    p: Floats, room: Floats, gain: Floats, total: Floats, keep: Floats,
+    p: Floats, gain: Floats, total: Floats, keep: Floats,
 ) -> None:  # fmt: skip
-    """Run the covariance alone: gains, innovation variances and decays of each event."""
-    n, f = p.shape[0], room[0]
+    """Run the covariance alone: gains, innovation variances and decays of each event.
+
+    What is coupled to others never decays, and what others are coupled to is coupled to nothing.
+    """
+    n = p.shape[0]
     for k in range(len(t)):
         dt = t[k] - t[k - 1] if k > 0 else 0.0
         for i in range(n):
-            keep[k, i] = np.exp(-dt / lasts[i]) if lasts[i] > 0.0 else 1.0
-            for j in range(n):
-                f[i, j] = keep[k, i] if i == j else 0.0
-        f[0, 3], f[0, 4] = cos[k] * dt, -sin[k] * dt
-        f[1, 3], f[1, 4] = sin[k] * dt, cos[k] * dt
+            if i > 0 and lasts[i] == lasts[i - 1]:
+                keep[k, i] = keep[k, i - 1]
+            else:
+                keep[k, i] = np.exp(-dt / lasts[i]) if lasts[i] > 0.0 else 1.0
+        _couple(p, 0, 3, cos[k] * dt)
+        _couple(p, 0, 4, -sin[k] * dt)
+        _couple(p, 1, 3, sin[k] * dt)
+        _couple(p, 1, 4, cos[k] * dt)
         for c in range(len(rows)):
-            f[rows[c], columns[c]] = factors[c] * dt
-        _carry(f, p, room[1])
+            _couple(p, rows[c], columns[c], factors[c] * dt)
         for i in range(n):
+            for j in range(n):
+                p[i, j] *= keep[k, i] * keep[k, j]
             p[i, i] += spread[i] * spread[i] * (1.0 - keep[k, i] * keep[k, i]) + leaps[k, i]
         total[k] = variance[stream[k]] + unsure[k] * unsure[k]
         total[k] = _seen(p, see[stream[k]], total[k], gain[k])
 
 
 @array_kernel
-def _carry(f: Floats, p: Floats, half: Floats) -> None:
-    """Replace p by f p f', passing over the zeros of f."""
+def _couple(p: Floats, i: int, j: int, factor: float) -> None:
+    """Add so much of state `j` to state `i`, in the covariance."""
     n = p.shape[0]
-    for i in range(n):
-        for j in range(n):
-            half[i, j] = 0.0
-        for m in range(n):
-            if f[i, m] != 0.0:
-                for j in range(n):
-                    half[i, j] += f[i, m] * p[m, j]
-    for i in range(n):
-        for j in range(n):
-            p[i, j] = 0.0
-            for m in range(n):
-                p[i, j] += half[i, m] * f[j, m] if f[j, m] != 0.0 else 0.0
+    for m in range(n):
+        p[i, m] += factor * p[j, m]
+    for m in range(n):
+        p[m, i] += factor * p[m, j]
 
 
 @array_kernel
@@ -219,12 +223,16 @@ def _seen(p: Floats, h: Floats, noise: float, gain: Floats) -> float:
     n, s = p.shape[0], noise
     for i in range(n):
         gain[i] = 0.0
-        for j in range(n):
-            gain[i] += p[i, j] * h[j]
+    for j in range(n):
+        if h[j] != 0.0:
+            for i in range(n):
+                gain[i] += p[j, i] * h[j]
+    for i in range(n):
         s += h[i] * gain[i]
     for i in range(n):
+        part = gain[i] / s
         for j in range(n):
-            p[i, j] -= gain[i] * gain[j] / s
+            p[i, j] -= part * gain[j]
     for i in range(n):
         gain[i] /= s
     return s

@@ -11,7 +11,7 @@ from scm.geometry import Pose2
 from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.experiment.manoeuvres import ROW_S, Manoeuvre
 from scm.mismatch.experiment.pace import SIDEWAYS_M_S2, Pace
-from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.likelihood import Likelihood, residuals_of
 from scm.mismatch.listed import Candidate
 from scm.mismatch.noise import Noise
 from scm.mismatch.predict import Prediction
@@ -164,9 +164,9 @@ class Planned(Likelihood):
             self._legs, self._rollouts, self._predictions, strict=True
         ):
             changed = [leg.change(numbers) for numbers in sets]
-            motions = rollouts.run(changed)
-            ok &= motions.ok.astype(np.bool_)
-            found.append(prediction.residuals(motions, changed))
+            left, fine = residuals_of(rollouts, prediction, changed)
+            ok &= fine
+            found.append(left)
         return found, ok
 
 
