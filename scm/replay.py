@@ -113,14 +113,14 @@ class Commands:
 
 def _drive_of(recording: Recording, car: Car) -> Channel:
     """Return the throttle that drives the car, or the speed that does, over its full speed."""
-    name = _drive_name(recording, car)
+    name = drive_name(recording, car)
     channel = forward(recording, name)
     if name == "command.throttle":
         return channel
     return replace(channel, values=channel.values / car.value(FULL_SPEED), dimension="ratio")
 
 
-def _drive_name(recording: Recording, car: Car) -> str:
+def drive_name(recording: Recording, car: Car) -> str:
     """Return the channel that drives a car: a speed only where the car has a speed control."""
     if any(term.name == "speed_control" for term in car.terms):
         return next((name for name in SPEEDS if name in recording.channels), SPEEDS[0])
@@ -140,7 +140,7 @@ def _steering_limit(recording: Recording, car: Car) -> float:
 
 def _refuse_incomplete(recording: Recording, car: Car) -> None:
     """Say in one sentence which channels a replay lacks."""
-    needed = (_drive_name(recording, car), *NEEDED)
+    needed = (drive_name(recording, car), *NEEDED)
     missing = [name for name in needed if name not in recording.channels]
     if missing:
         speed = missing[0] == "command.throttle" and "command.speed" in recording.channels

@@ -32,7 +32,7 @@ def learn_noise(model: Likelihood, residuals: Sequence[Sequence[Floats]], rounds
                     if other == best:
                         break
                     value = cost(other)
-                    if value > lowest - 2.0:
+                    if not value <= lowest - 2.0:  # no number is no improvement either
                         break
                     best, lowest = other, value
     model.believe(best)

@@ -16,6 +16,7 @@ ALIKE = 0.6
 BETTER = 0.05
 SURE = 0.9
 SAME_S = 0.06
+MOST, LARGE = 98, 0.3  # a car may stand for nearly all of a recording
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,7 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
 def _clipped(values: Floats) -> Floats:
     """Return values without spikes, that one glitch may not outweigh a whole drive."""
     middle = float(np.median(values))
-    high = 2.0 * float(np.percentile(np.abs(values - middle), 95))
+    high = 2.0 * float(np.percentile(np.abs(values - middle), MOST))
     return np.clip(values, middle - high, middle + high)
 
 
@@ -80,7 +81,8 @@ def _size(first: Floats, second: Floats) -> float:
     """Return how large the first is against the second: the middle of many ratios, both ways."""
 
     def ratio(over: Floats, under: Floats) -> float:
-        large = np.abs(under) > max(float(np.percentile(np.abs(under), 70)), 1e-30)
+        usual, most = np.percentile(np.abs(under), (70, MOST))
+        large = np.abs(under) > max(usual, LARGE * most, 1e-30)
         return max(float(np.median(over[large] / under[large])), 1e-12) if large.any() else 1e-12
 
     return float(np.sqrt(ratio(first, second) / ratio(second, first)))

@@ -51,6 +51,9 @@ def forward_speed(poses: Track | None) -> Series | None:
 def _repaired(channel: Channel, repair: Repair, signs: Series | None) -> Channel:
     values: Floats = repair.factor * channel.values + repair.offset
     t = repair.time_factor * channel.t + repair.shift_s
+    if repair.in_order:
+        rows = np.argsort(t, kind="stable")
+        t, values = t[rows], values[rows]
     if signs is not None:
         values = np.abs(values) * np.where(signs.at(t) < 0.0, -1.0, 1.0)
     std = None if channel.std is None else abs(repair.factor) * channel.std

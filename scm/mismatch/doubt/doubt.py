@@ -1,19 +1,27 @@
 """Ask a recording's sensors about each other, before any model of the car."""
 
 from scm.mismatch.doubt.compared import compare_all, no_witnesses
+from scm.mismatch.doubt.conclusion import no_verdict
 from scm.mismatch.doubt.corrected import forward_speed
 from scm.mismatch.doubt.driven import command_problems
-from scm.mismatch.doubt.mend import Mending, mend_heading, mend_stamps, mend_unsigned
+from scm.mismatch.doubt.mend import (
+    Mending,
+    mend_heading,
+    mend_order,
+    mend_stamps,
+    mend_unsigned,
+)
 from scm.mismatch.doubt.mend_commands import mend_commands
 from scm.mismatch.doubt.mend_pairs import mend_pairs
 from scm.mismatch.doubt.other_car import other_car
 from scm.mismatch.doubt.rows import row_problems
+from scm.mismatch.doubt.standing import standing_problem, stands
 from scm.mismatch.doubt.stuck import stuck_problems
 from scm.mismatch.doubt.suspect import from_repairs
 from scm.mismatch.doubt.suspicion import Doubts, Relation, Suspicion
 from scm.mismatch.doubt.track import track
 from scm.mismatch.doubt.usable import usable
-from scm.mismatch.doubt.way import ways
+from scm.mismatch.doubt.way import uncounted, ways
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
@@ -26,7 +34,7 @@ def doubt(recording: Recording, car: Car | None = None) -> Doubts:
         car: Gives wheel radius, counts a turn and track; without it wheels are not compared.
     """
     state = Mending(recording)
-    problems = list(mend_stamps(state))
+    problems = [*mend_order(state), *mend_stamps(state)]
     problems += row_problems(state.recording)
     problems += mend_heading(state)
     problems += mend_unsigned(state)
@@ -34,22 +42,31 @@ def doubt(recording: Recording, car: Car | None = None) -> Doubts:
     problems += mend_commands(state, car)
     now = state.recording
     poses, found = track(now), ways(now, car)
+    if poses is not None and stands(poses, found):
+        problems.append(standing_problem())
+        poses = None
     movement = forward_speed(poses)
-    problems += stuck_problems(now, found)
+    problems += stuck_problems(now, found, movement)
     not_own = no_witnesses(problems)
     found = [way for way in found if not not_own.intersection((*way.channels, way.name))]
-    problems += command_problems(now, movement, poses)
+    problems += command_problems(now, movement, poses, car)
     relations: list[Relation] = []
     suspicions: list[Suspicion] = []
     if poses is not None:
         relations, suspicions = compare_all(now, car, poses, found, problems)
     suspicions += from_repairs(state.repairs)
+    if car is not None:
+        problems += uncounted(now, car)
     if car is not None and movement is not None and poses is not None:
         problems += other_car(now, car, movement, poses, relations)
+    suspicions.sort(key=lambda s: -s.sigma)
+    can_use = usable(now, problems, car)
+    if not can_use.can_diagnose:
+        problems.insert(0, no_verdict(can_use.lacks, relations, suspicions))
     return Doubts(
         problems=tuple(problems),
-        suspicions=tuple(sorted(suspicions, key=lambda s: -s.sigma)),
-        usable=usable(now, problems),
+        suspicions=tuple(suspicions),
+        usable=can_use,
         repairs=tuple(state.repairs),
         relations=tuple(relations),
     )

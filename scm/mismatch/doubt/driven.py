@@ -8,6 +8,7 @@ from scm.arrays import Floats
 from scm.mismatch.doubt.track import Grid, Series, Track, clean, grid, held
 from scm.mismatch.findings import DataProblem
 from scm.recording.read import Recording
+from scm.vehicles.car import Car
 
 LARGEST_COMMAND = 1.05
 LARGEST_ANGLE = 1.2
@@ -18,15 +19,23 @@ LATEST_S = 1.5
 RELATED = 0.35
 HARDLY = 0.2  # a driver who holds the speed against slopes and turns undoes most of it
 VARIED = 0.5  # a speed held steady by its driver says nothing about the throttle
-LONGEST_S = 20.0
+LONGEST_S, SHORTEST_S = 20.0, 5.0
+WHEELBASE_M, TURNED_RAD, STARTS = 0.25, 0.25, 3
 DRIVE = ("command.throttle", "command.speed", "motor.current")
 RECORD = "Record what is sent to the car, throttle and steering, with the stamps of sending."
 
 
 def command_problems(
-    recording: Recording, movement: Series | None, poses: Track | None
+    recording: Recording, movement: Series | None, poses: Track | None, car: Car | None = None
 ) -> Iterator[DataProblem]:
-    """Yield what is wrong with the commands and with what they do."""
+    """Yield what is wrong with the commands and with what they do.
+
+    Args:
+        recording: Repaired.
+        movement: As the poses show it; None where the car stands or nothing shows it.
+        poses: Likewise.
+        car: Says how long it is.
+    """
     yield from _missing(recording)
     for name in ("command.throttle", "command.steering", "command.speed"):
         if name in recording.channels and len(clean(recording.channels[name]).t):
@@ -34,8 +43,8 @@ def command_problems(
             yield from _range(recording, name, channel)
             yield from _constant(name, channel)
     if movement is not None and poses is not None:
-        yield from _standing(movement)
         yield from _without_effect(recording, movement, poses)
+        yield from _unmoved(recording, movement, poses, car)
 
 
 def _missing(recording: Recording) -> Iterator[DataProblem]:
@@ -44,24 +53,23 @@ def _missing(recording: Recording) -> Iterator[DataProblem]:
         yield DataProblem(
             channel="command.throttle",
             name="missing",
-            said="Nothing says what drove the car: its drive cannot be judged, but steering, tyres "
-            "and sensors can.",
+            said="Nothing says what drove the car, so no simulator can drive it again: neither its "
+            "drive nor its tyres can be judged.",
             record_instead=RECORD,
         )
     elif "command.throttle" not in have:
         yield DataProblem(
             channel="command.throttle",
             name="missing",
-            said="There is no throttle command: how the drive answers to it cannot be judged, but "
-            "steering, tyres and sensors can.",
+            said="There is no throttle command; only a car whose file has a speed control can be "
+            "driven again without one.",
             record_instead=RECORD,
         )
     if "command.steering" not in have:
         yield DataProblem(
             channel="command.steering",
             name="missing",
-            said="There is no steering command: the steering cannot be judged, but straight "
-            "driving and sensors can.",
+            said="There is no steering command, so no simulator can drive the same way again.",
             record_instead=RECORD,
         )
     missing = [name for name in ("pose.x", "pose.y", "pose.yaw") if name not in have]
@@ -69,8 +77,8 @@ def _missing(recording: Recording) -> Iterator[DataProblem]:
         yield DataProblem(
             channel=", ".join(missing) if len(missing) < 3 else "pose.*",
             name="missing",
-            said="Without a whole pose there is no measure of where the car went: wheels and gyro "
-            "can be held against each other, but no free run can be judged.",
+            said="Without a whole pose there is no measure of where the car went, and nothing that "
+            "another sensor could be held against.",
             record_instead="Record x, y and yaw of the car by camera, motion capture or satellite.",
         )
 
@@ -91,9 +99,7 @@ def _range(recording: Recording, name: str, channel: Series) -> Iterator[DataPro
 
 
 def _constant(name: str, channel: Series) -> Iterator[DataProblem]:
-    reach = float(np.percentile(channel.values, 99) - np.percentile(channel.values, 1))
-    size = max(1e-9, float(np.abs(channel.values).max()))
-    if reach < EXCITED * max(size, 0.1):
+    if not _excited(channel):
         other = "steering" if name.endswith("steering") else "drive"
         yield DataProblem(
             channel=name,
@@ -101,16 +107,6 @@ def _constant(name: str, channel: Series) -> Iterator[DataProblem]:
             said=f"Stays at {float(np.median(channel.values)):.3g}: delays, lags and play of the "
             f"{other} cannot show, only its steady state.",
             record_instead="Drive with steps and sines of this command.",
-        )
-
-
-def _standing(movement: Series) -> Iterator[DataProblem]:
-    if np.percentile(np.abs(movement.values), 95) < 0.01:
-        yield DataProblem(
-            channel="pose.*",
-            name="constant",
-            said="The car does not move: only biases can be judged.",
-            record_instead="Drive.",
         )
 
 
@@ -133,6 +129,38 @@ def _without_effect(recording: Recording, movement: Series, poses: Track) -> Ite
         answers = ((speed, lagged), (slope, asked), (speed, asked))
         if not any(_follows(motion, signal, on, HARDLY) for motion, signal in answers):
             yield _unrelated("command.throttle", "The car's speed does not follow its throttle")
+
+
+def _unmoved(
+    recording: Recording, movement: Series, poses: Track, car: Car | None
+) -> Iterator[DataProblem]:
+    """Yield commands that stay as they are while the car does what they would have to ask for."""
+    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S)
+    if len(on.t) < SHORTEST_S / STEP_S:
+        return
+    speed, rate = on.smooth(movement), on.smooth(Series(poses.t, poses.yaw), 1)
+    fast = float(np.percentile(np.abs(speed), 90))
+    going = np.abs(speed) > 0.3 * fast
+    length = car.value("body.wheelbase_m") if car else WHEELBASE_M
+    right, left = np.percentile(np.arctan(length * rate[going] / speed[going]), (5, 95))
+    if _stays(recording, "command.steering") and left - right > TURNED_RAD:
+        said = f"The steering stays as it is, and the wheels turned by {left - right:.2f} rad"
+        yield _unrelated("command.steering", said)
+    slow_or_fast = np.where(speed > 0.8 * fast, 1, np.where(speed < 0.2 * fast, -1, 0))
+    starts = int((np.diff(slow_or_fast[slow_or_fast != 0]) > 0).sum())
+    if _stays(recording, "command.throttle") and starts >= STARTS:
+        said = f"The throttle stays as it is, and the car started {starts} times"
+        yield _unrelated("command.throttle", said)
+
+
+def _stays(recording: Recording, name: str) -> bool:
+    channel = clean(recording.channels[name]) if name in recording.channels else None
+    return channel is not None and len(channel.t) > 1 and not _excited(channel)
+
+
+def _excited(channel: Series) -> bool:
+    reach = float(np.percentile(channel.values, 99) - np.percentile(channel.values, 1))
+    return reach >= EXCITED * max(0.1, float(np.abs(channel.values).max()))
 
 
 def _varied(speed: Floats) -> bool:

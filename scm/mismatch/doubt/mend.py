@@ -9,6 +9,7 @@ from scm.mismatch.doubt import gross
 from scm.mismatch.doubt.corrected import forward_speed, repaired
 from scm.mismatch.doubt.gross import Sensed, compare
 from scm.mismatch.doubt.rows import called, tables
+from scm.mismatch.doubt.standing import moves
 from scm.mismatch.doubt.suspicion import Repair
 from scm.mismatch.doubt.track import Series, Track, clean, series, track
 from scm.mismatch.findings import DataProblem
@@ -16,6 +17,7 @@ from scm.recording.read import Recording
 
 GYROS = ("imu.gyro_z", "yaw_rate")
 SHORTEST_S = 4.0
+OUT_OF_ORDER = 0.1
 DESCRIBE = "Give the unit and sign of the column in the recording's description."
 
 
@@ -35,7 +37,26 @@ class Mending:
     def poses(self) -> Track | None:
         """The poses, None where there are too few to compare."""
         found = track(self.recording)
-        return found if found is not None and np.ptp(found.t) > SHORTEST_S else None
+        long = found is not None and np.ptp(found.t) > SHORTEST_S
+        return found if found is not None and long and moves(found) else None
+
+
+def mend_order(now: Mending) -> Iterator[DataProblem]:
+    """Sort tables whose rows stand in another order than their stamps, not a few late ones."""
+    for names in tables(now.recording):
+        step = np.diff(now.recording.channels[names[0]].t)
+        back = int((step < 0.0).sum())
+        if back <= OUT_OF_ORDER * len(step):
+            continue
+        now.repair(Repair(channels=names, in_order=True))
+        yield DataProblem(
+            channel=called(names),
+            name="time_backwards",
+            said="Rows do not stand in the order of their stamps: time runs backwards after "
+            f"{back} of {len(step)} rows.",
+            corrected="Sorted by their stamps.",
+            record_instead="Write rows as they come, each stamped where it is measured.",
+        )
 
 
 def mend_stamps(now: Mending) -> Iterator[DataProblem]:

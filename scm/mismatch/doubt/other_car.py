@@ -1,15 +1,20 @@
 """Whether a recording can be of the car whose file was given: speed, turning circle, wheels."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
+from scm.arrays import Floats
+from scm.geometry import Pose2
+from scm.mismatch.doubt.conclusion import ANOTHER
 from scm.mismatch.doubt.steered import STEP_S, WIDTH_S, steered
 from scm.mismatch.doubt.suspicion import Relation
 from scm.mismatch.doubt.track import Series, Track, clean, grid, held
 from scm.mismatch.findings import DataProblem
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
+from scm.vehicles.fleet import Fleet
 
 TOO_FAST = 1.4
 TOO_SLOW = 0.3
@@ -17,6 +22,30 @@ TURNS = (0.55, 1.8)
 IMPOSSIBLE = (0.15, 4.0)  # in between, play, slow servos and weak steering may be to blame alone
 ROLLS = (0.7, 1.4)
 FOLLOWS = 0.7
+THROTTLES: Floats = np.linspace(0.0, 1.0, 11)
+SETTLED_S = 8.0
+LEAST_ASKED = 0.05  # of the top speed
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Which speed throttles ask for in the end.
+
+    Attributes:
+        throttle: Rising, (n,); `speed`: reached with each [m/s].
+    """
+
+    throttle: Floats
+    speed: Floats
+
+    @property
+    def top(self) -> float:
+        """With all of it [m/s]."""
+        return float(self.speed[-1])
+
+    def at(self, throttle: Floats) -> Floats:
+        """Return the speeds of throttles of any sign, as sizes [m/s]."""
+        return np.interp(np.abs(throttle), self.throttle, self.speed)
 
 
 def other_car(
@@ -38,7 +67,7 @@ def other_car(
             name="other_car",
             said=f"The car file {car.name!r} does not fit this recording: {'; '.join(reasons)}. "
             "Effects found with it would make up for the wrong car.",
-            record_instead="Nothing: give the file of the car that was driven.",
+            record_instead=ANOTHER,
         )
 
 
@@ -48,22 +77,41 @@ def top_speed(car: Car) -> float | None:
     return car.value(keys[0]) * car.value(keys[1]) if all(car.has(k) for k in keys) else None
 
 
-def _speed(recording: Recording, car: Car, movement: Series) -> str:
+def steady_speed(car: Car) -> Asked | None:
+    """Return the speed that throttles lead to on a level floor, without loss if the file says so.
+
+    None where a car is not driven by its throttle.
+    """
+    if any(term.name == "speed_control" for term in car.terms):
+        return None
     top = top_speed(car)
-    if top is None:
+    if top is not None:
+        return Asked(np.array([0.0, 1.0]), np.array([0.0, top]))
+    fleet = Fleet(car, len(THROTTLES))
+    for _ in THROTTLES:
+        fleet.add(Pose2(0.0, 0.0, 0.0))
+    throttle = np.tile(THROTTLES, (round(SETTLED_S / STEP_S), 1))
+    reached = fleet.rollout(throttle, np.zeros_like(throttle), STEP_S, ("speed",))["speed"][-1]
+    return Asked(THROTTLES, np.maximum.accumulate(reached))
+
+
+def _speed(recording: Recording, car: Car, movement: Series) -> str:
+    asked = steady_speed(car)
+    if asked is None:
         return ""
+    top = asked.top
     fast = float(np.percentile(np.abs(movement.values), 98))
     if fast > TOO_FAST * top:
         metres = ", or its positions are not in metres" if fast > 20.0 * top else ""
         return f"it drives {fast:.2f} m/s, the car file's car at most {top:.2f} m/s{metres}"
-    share = _share_of_asked(recording, movement, top)
+    share = _share_of_asked(recording, movement, asked)
     if share is None or share > TOO_SLOW:
         return ""
     return f"it drives {100.0 * share:.0f} % of the speed that the throttle asks of the file's car"
 
 
-def _share_of_asked(recording: Recording, movement: Series, top: float) -> float | None:
-    """Return steady speed over throttle times top speed; None where nothing is steady."""
+def _share_of_asked(recording: Recording, movement: Series, wanted: Asked) -> float | None:
+    """Return steady speed over the one that the throttle asks for; None where nothing is steady."""
     throttle = recording.channels.get("command.throttle")
     if throttle is None or len(clean(throttle).t) < 2:
         return None
@@ -72,11 +120,9 @@ def _share_of_asked(recording: Recording, movement: Series, top: float) -> float
     speed, push = np.abs(on.smooth(movement)), np.abs(on.smooth(movement, 1))
     fast = float(np.percentile(speed, 98))
     steady = (asked > 0.3) & (push < 0.1 * fast) & (speed > 0.3 * fast)
-    return (
-        float(np.median(speed[steady] / (asked[steady] * top)))
-        if steady.sum() * STEP_S > 3.0
-        else None
-    )
+    full = wanted.at(asked)
+    steady &= full > LEAST_ASKED * wanted.top
+    return float(np.median(speed[steady] / full[steady])) if steady.sum() * STEP_S > 3.0 else None
 
 
 def _turning(recording: Recording, car: Car, movement: Series, poses: Track) -> float | None:

@@ -16,6 +16,7 @@ RESET_S = 1.0
 SLOWEST_POSE_S = 0.1
 UNEVEN = 2.0
 BURST_SHARE = 0.1
+SAME_TABLE = 0.5  # of the stamps are a sister's too
 
 
 def tables(recording: Recording) -> list[tuple[str, ...]]:
@@ -66,19 +67,18 @@ def _not_finite(channels: Mapping[str, Channel], names: Iterable[str]) -> Iterat
 
 
 def _lost_values(channels: Mapping[str, Channel]) -> Iterator[DataProblem]:
-    """Yield channels that have fewer rows than their sisters at the same stamps."""
+    """Yield channels that lack stamps which their sisters in the same table have."""
     for name, channel in channels.items():
         family = name.partition(".")[0] + "."
-        sisters = [c for n, c in channels.items() if n.startswith(family) and n != name]
-        more = max((len(c.t) for c in sisters), default=0)
-        longest = next((c for c in sisters if len(c.t) == more), None)
-        if longest is None or not 0 < len(channel.t) < more:
-            continue
-        if np.isin(channel.t, longest.t).all():
+        sisters = [c.t for n, c in channels.items() if n.startswith(family) and n != name]
+        shared = [t for t in sisters if len(t) and np.isin(channel.t, t).mean() > SAME_TABLE]
+        every = np.unique(np.concatenate((channel.t, *shared)))
+        lost = len(every) - len(np.unique(channel.t))
+        if lost > 0:
             yield DataProblem(
                 channel=name,
                 name="not_finite",
-                said=f"{more - len(channel.t)} of {more} rows hold no number.",
+                said=f"{lost} of {len(every)} rows hold no number.",
                 corrected="These rows are left out.",
             )
 

@@ -6,7 +6,6 @@ from itertools import combinations
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.doubt.corrected import forward_speed
 from scm.mismatch.doubt.rows import called
 from scm.mismatch.doubt.track import (
     Series,
@@ -16,7 +15,6 @@ from scm.mismatch.doubt.track import (
     rows_a_value,
     runs,
     series,
-    track,
     track_with_jumps,
 )
 from scm.mismatch.doubt.way import Way
@@ -26,16 +24,23 @@ from scm.recording.read import Recording
 FROZEN_S = 1.0
 FEWEST_FROZEN = 10
 OUTLASTS = 10.0  # times what values are usually repeated for
-MOVING = 0.2  # of the speed that is exceeded a tenth of the time
+MOVING = 0.2  # of the speed that is hardly ever exceeded
 COARSE = 0.02
 SAME = 0.999999
 DERIVED = 0.99995
 MOTION = ("pose.", "velocity.", "speed", "yaw_rate", "wheel_speed.", "encoder.", "imu.")
 
 
-def stuck_problems(recording: Recording, found: list[Way]) -> Iterator[DataProblem]:
-    """Yield channels whose values cannot be what a sensor of a moving car says."""
-    movement = forward_speed(track(recording))
+def stuck_problems(
+    recording: Recording, found: list[Way], movement: Series | None
+) -> Iterator[DataProblem]:
+    """Yield channels whose values cannot be what a sensor of a moving car says.
+
+    Args:
+        recording: Repaired.
+        found: Sensors of distance.
+        movement: As the poses show it; None where the car stands or nothing shows it.
+    """
     yield from _held(recording)
     coarse = list(_coarse(recording))
     yield from _frozen(recording, movement, found, {problem.channel for problem in coarse})
@@ -96,7 +101,7 @@ def frozen_spans(channel: Series, witness: Series | None) -> tuple[Span, ...]:
     """Return spans in which values are equal to the last bit while the witness moves."""
     if witness is None or len(channel.t) < FEWEST_FROZEN:
         return ()
-    fast = np.percentile(np.abs(witness.values), 90) * MOVING
+    fast = np.percentile(np.abs(witness.values), 98) * MOVING
     starts, ends = runs(channel.values)
     usual = OUTLASTS * float(np.percentile(ends - starts, 95))
     spans = []

@@ -74,6 +74,7 @@ class Repair:
     Attributes:
         channels: Exact names.
         signed: Only the size was recorded: the values take the sign of the pose's speed.
+        in_order: The rows are sorted by their stamps.
     """
 
     channels: tuple[str, ...]
@@ -82,6 +83,7 @@ class Repair:
     time_factor: float = 1.0
     shift_s: float = 0.0
     signed: bool = False
+    in_order: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,27 +2,32 @@
 
 from collections.abc import Iterable
 
+from scm.mismatch.doubt.conclusion import OTHER_CAR
 from scm.mismatch.doubt.rows import gaps_of
 from scm.mismatch.doubt.suspicion import Usable
 from scm.mismatch.doubt.track import clean
 from scm.mismatch.findings import DataProblem, Span
 from scm.recording.read import Recording
+from scm.replay import drive_name
+from scm.vehicles.car import Car
 
 SHORTEST_SPAN_S = 0.5
 SHORTEST_DRIVE_S = 5.0
 POSE = ("pose.x", "pose.y", "pose.yaw")
-COMMANDS = ("command.throttle", "command.speed", "command.steering")
+COMMANDS = ("command.throttle", "command.steering")
 SPOILS = ("frozen", "jump")
 
 
-def usable(recording: Recording, problems: Iterable[DataProblem]) -> Usable:
+def usable(recording: Recording, problems: Iterable[DataProblem], car: Car | None = None) -> Usable:
     """Return the usable spans of each channel, and what keeps the recording from being used.
 
     Args:
         recording: After repair.
         problems: Found in it.
+        car: Says what drives it; None takes a throttle for granted.
     """
     listed = list(problems)
+    driver = drive_name(recording, car) if car else COMMANDS[0]
     spans: dict[str, tuple[Span, ...]] = {}
     for name, channel in recording.channels.items():
         t = clean(channel).t
@@ -34,7 +39,7 @@ def usable(recording: Recording, problems: Iterable[DataProblem]) -> Usable:
             if problem.name in SPOILS and problem.when_s and _concerns(problem.channel, name):
                 bad += problem.when_s
         spans[name] = _between((float(t[0]), float(t[-1])), bad)
-    return Usable(spans=spans, lacks=tuple(_lacks(spans, listed)))
+    return Usable(spans=spans, lacks=tuple(_lacks(spans, listed, driver)))
 
 
 def _concerns(pattern: str, name: str) -> bool:
@@ -53,14 +58,18 @@ def _between(whole: Span, bad: Iterable[Span]) -> tuple[Span, ...]:
     return tuple(left)
 
 
-def _lacks(spans: dict[str, tuple[Span, ...]], problems: list[DataProblem]) -> Iterable[str]:
-    missing = [name for name in POSE if not spans.get(name)]
-    driven = [name for name in COMMANDS if spans.get(name)]
-    if missing or not driven:
-        yield f"missing: {', '.join(missing or COMMANDS)}"
+def _lacks(
+    spans: dict[str, tuple[Span, ...]], problems: list[DataProblem], driver: str
+) -> Iterable[str]:
+    driven = (driver, COMMANDS[1])
+    missing = [name for name in (*driven, *POSE) if not spans.get(name)]
+    if missing:
+        yield f"missing: {', '.join(missing)}"
         return
+    if any(p.name == "standing" for p in problems):
+        yield "the car does not move"
     if any(p.name == "other_car" for p in problems):
-        yield "the car file is another car's"
+        yield OTHER_CAR
     unrelated = [p.channel for p in problems if p.name == "without_effect"]
     if unrelated:
         yield f"commands without effect: {', '.join(unrelated)}"

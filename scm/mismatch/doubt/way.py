@@ -1,11 +1,13 @@
 """How far the car has gone, as each sensor that knows it says; and turned, as its wheels say."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from scm.mismatch.doubt.track import Series, series
+from scm.mismatch.findings import DataProblem
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
@@ -40,6 +42,19 @@ def ways(recording: Recording, car: Car | None) -> list[Way]:
         if speed is not None:
             found.append(Way(name, (name,), False, _rounded(speed), speed.integral()))
     return [way for way in found if way is not None and np.ptp(way.distance.values) > 0.0]
+
+
+def uncounted(recording: Recording, car: Car) -> Iterator[DataProblem]:
+    """Yield that encoders are of no use where the car file does not say what they count."""
+    names = [name for name in SIDES[0] if name in recording.channels]
+    if names and not car.has("encoder.counts_per_revolution"):
+        yield DataProblem(
+            channel="encoder.*",
+            name="unknown_counts",
+            said=f"The car file {car.name!r} does not say how many counts a turn makes: encoders "
+            "are not used.",
+            record_instead="Nothing: state encoder.counts_per_revolution in the car file.",
+        )
 
 
 def _rounded(speed: Series) -> float:

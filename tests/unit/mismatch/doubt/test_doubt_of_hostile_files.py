@@ -1,0 +1,113 @@
+"""What a hostile user brings: each file says what is wrong, and no fault is made up for it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scm.mismatch.doubt.corrected import corrected
+from scm.mismatch.doubt.doubt import doubt
+from scm.mismatch.doubt.suspicion import Doubts
+from scm.recording.read import Channel, Recording
+from scm.vehicles.car import Car, load_car
+
+Drive = Callable[[int], Recording]
+
+POSE = ("pose.x", "pose.y", "pose.yaw")
+COMMANDS = ("command.throttle", "command.steering")
+STD = {"pose.x": 0.002, "pose.y": 0.002, "pose.yaw": 0.0087, "imu.accel_x": 0.03,
+       "imu.accel_y": 0.03, "imu.gyro_z": 0.002}  # fmt: skip
+
+
+def names_of(found: Doubts) -> set[str]:
+    return {problem.name for problem in found.problems}
+
+
+def changed(recording: Recording, change: Callable[[str, Channel], Channel]) -> Recording:
+    channels = {name: change(name, channel) for name, channel in recording.channels.items()}
+    return replace(recording, channels=channels)
+
+
+def standing(recording: Recording, first_s: float, last_s: float) -> Recording:
+    """The same drive, but the car stands before and after a while of it."""
+    rng = np.random.default_rng(4)
+
+    def stand(name: str, channel: Channel) -> Channel:
+        t, values = channel.t, channel.values.copy()
+        noise = STD.get(name, 0.0) * rng.standard_normal(len(t))
+        early, late = t < first_s, t >= last_s
+        moves = name.startswith(("pose.", "encoder."))
+        middle = values[~early & ~late]
+        begin, end = (middle[0], middle[-1]) if moves and len(middle) else (0.0, 0.0)
+        values[early], values[late] = begin + noise[early], end + noise[late]
+        return replace(channel, values=values)
+
+    return changed(recording, stand)
+
+
+@pytest.mark.parametrize("missing", COMMANDS)
+def test_one_command_is_not_enough(drive: Drive, nigel: Car, missing: str) -> None:
+    kept = {name: c for name, c in drive(0).channels.items() if name != missing}
+    found = doubt(replace(drive(0), channels=kept), nigel)
+    assert found.usable.lacks == (f"missing: {missing}",)
+
+
+def test_a_short_drive_in_a_long_stand_makes_no_sensor_wrong(drive: Drive, nigel: Car) -> None:
+    found = doubt(standing(drive(0), 10.0, 16.0), nigel)
+    assert not names_of(found) & {"unit", "sign", "frozen", "unrelated"}
+    assert found.usable.can_diagnose
+
+
+def test_a_car_that_never_moves_allows_no_verdict(drive: Drive, nigel: Car) -> None:
+    found = doubt(standing(drive(0), 100.0, 100.0), nigel)
+    assert not names_of(found) & {"unit", "sign", "frozen", "unrelated", "without_effect"}
+    assert found.usable.lacks == ("the car does not move",)
+
+
+@pytest.mark.parametrize("order", ["descending", "shuffled"])
+def test_rows_out_of_order_are_sorted(drive: Drive, nigel: Car, order: str) -> None:
+    rng = np.random.default_rng(1)
+    rows = {len(c.t): rng.permutation(len(c.t)) for c in drive(0).channels.values()}
+
+    def mixed(_name: str, c: Channel) -> Channel:
+        at = slice(None, None, -1) if order == "descending" else rows[len(c.t)]
+        return replace(c, t=c.t[at], values=c.values[at])
+
+    recording = changed(drive(0), mixed)
+    found = doubt(recording, nigel)
+    assert names_of(found) == {"time_backwards"}
+    right = corrected(recording, found)
+    for name, channel in drive(0).channels.items():
+        np.testing.assert_array_equal(right.channels[name].values, channel.values)
+
+
+def test_rows_without_a_number_are_counted_in_each_column(drive: Drive, nigel: Car) -> None:
+    rng = np.random.default_rng(2)
+
+    def holes(name: str, c: Channel) -> Channel:
+        keep = rng.random(len(c.t)) > (0.05 if name in POSE else -1.0)
+        return replace(c, t=c.t[keep], values=c.values[keep])
+
+    found = doubt(changed(drive(0), holes), nigel)
+    assert {p.channel for p in found.problems if p.name == "not_finite"} == set(POSE)
+
+
+@pytest.mark.parametrize("car", ["dart", "f1tenth"])
+def test_the_file_of_another_car_is_told_whatever_drives_it(drive: Drive, car: str) -> None:
+    assert ("*", "other_car") in {
+        (p.channel, p.name) for p in doubt(drive(0), load_car(car)).problems
+    }
+
+
+def test_without_a_verdict_it_is_said_what_can_still_be_concluded(drive: Drive, nigel: Car) -> None:
+    def biased(name: str, c: Channel) -> Channel:
+        return replace(c, values=c.values + 0.1) if name == "imu.gyro_z" else c
+
+    kept = {name: c for name, c in drive(0).channels.items() if name not in COMMANDS}
+    undriven = replace(drive(0), channels=kept)
+    healthy = doubt(undriven, nigel).problems[0]
+    assert healthy.name == "no_verdict"
+    assert "agree" in healthy.said
+    assert healthy.record_instead
+    assert "+0.10" in doubt(changed(undriven, biased), nigel).problems[0].said
