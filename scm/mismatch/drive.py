@@ -74,7 +74,7 @@ class Drive:
         commands = Commands(recording, car)
         throttle, steering = commands.rows
         self.throttle, self.steering = Commanded(*throttle), Commanded(*steering)
-        names = [name for name in KNOWN if name in recording.channels]
+        names = [name for name in KNOWN if name in recording.channels and _can_predict(car, name)]
         streams = [_stream(recording, name) for name in names]
         self.point = recording.channel("pose.x").point
         pose = recording.channel("pose.x").t
@@ -102,6 +102,11 @@ class Drive:
             for name in ("pose.x", "pose.y", "pose.yaw")
             for s in (self.stream(name),)
         }
+
+
+def _can_predict(car: Car, name: str) -> bool:
+    """Say whether the car file tells what a sensor counts."""
+    return not name.startswith("encoder.") or car.has("encoder.counts_per_revolution")
 
 
 def _stream(recording: Recording, name: str) -> Stream:
