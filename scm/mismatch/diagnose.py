@@ -117,7 +117,8 @@ def _doubted(
     usable, problems = list[Recording](), list[DataProblem]()
     for recording in recordings:
         doubts = doubt(recording, car)
-        problems += doubts.problems
+        where = f"{_titles([recording])[0]}: " if len(recordings) > 1 else ""
+        problems += [replace(problem, said=where + problem.said) for problem in doubts.problems]
         if doubts.usable.can_diagnose:
             usable.append(corrected(recording, doubts))
     return usable, tuple(problems)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from scm.mismatch.findings import Diagnosis, Effect
 from scm.mismatch.report.first_screen import name_of
-from scm.mismatch.report.verdict_text import verdict_sentence
+from scm.mismatch.report.verdict_text import can_judge, verdict_sentence
 from scm.mismatch.report.wording import interval, percent, quantity, title_of
 from scm.mismatch.report.write import PAGE
 
@@ -16,7 +16,8 @@ def summary(diagnosis: Diagnosis, out: Path) -> str:
 
 
 def _lines(diagnosis: Diagnosis, out: Path) -> Iterator[str]:
-    yield f"{diagnosis.verdict}: {verdict_sentence(diagnosis)}"
+    verdict = str(diagnosis.verdict) if can_judge(diagnosis) else "no verdict"
+    yield f"{verdict}: {verdict_sentence(diagnosis)}"
     for effect in diagnosis.effects:
         yield f"  {effect.name}  {percent(effect.probability)}  {_numbers(effect)}".rstrip()
         yield f"    {effect.said}"

@@ -36,9 +36,10 @@ def diagnosed(folder):
 
 
 @pytest.mark.parametrize("missing", [COMMANDS, POSE])
-def test_what_is_missing_is_said_and_nothing_is_invented(tmp_path, missing):
+def test_what_is_missing_is_said_and_nothing_is_invented(tmp_path, missing, capsys):
     names = [name for name in (*POSE, *COMMANDS) if name not in missing]
     report = diagnosed(write(tmp_path, names))
+    assert capsys.readouterr().out.startswith("no verdict: ")
     assert report["verdict"] == "none"
     assert report["effects"] == []
     assert "missing" in {problem["name"] for problem in report["data"]}
@@ -71,3 +72,15 @@ def test_the_page_says_that_there_is_no_verdict(tmp_path):
     diagnosed(tmp_path)
     page = (tmp_path / "found" / "report.html").read_text(encoding="utf-8")
     assert "does not allow a verdict" in page
+
+
+def test_of_several_recordings_it_is_said_which_one_is_broken(tmp_path):
+    for name, channels in (("one", POSE), ("two", COMMANDS)):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name, channels)
+    both = [str(tmp_path / name) for name in ("one", "two")]
+    assert main(["mismatch", *both, "--out", str(tmp_path / "found")]) == 0
+    report = json.loads((tmp_path / "found" / "report.json").read_text(encoding="utf-8"))
+    assert [p["said"][:25] for p in report["data"] if p["name"] == "no_verdict"] == [
+        "one: No verdict on the ca", "two: No verdict on the ca",
+    ]  # fmt: skip
