@@ -4,8 +4,8 @@ Fast-math stays off: sums keep their order, so equal inputs give equal bits on e
 """
 
 import ast
-import contextlib
 import inspect
+import linecache
 import os
 import textwrap
 from collections.abc import Callable
@@ -22,10 +22,11 @@ from numba.np import linalg
 
 from scm.vehicles.asked_once import remember_answers
 from scm.vehicles.lanes import LANES, WIDTH, Rows, copy_lanes
-from scm.vehicles.nested import NestedDispatcher
+from scm.vehicles.nested import KernelCompiler, NestedDispatcher, nest_builtins
 
 remember_answers()
-_SOURCES: dict[Callable[..., Any], str] = {}
+nest_builtins()
+_SOURCES: dict[Callable[..., Any], list[str]] = {}
 _Matrices: Any = linalg
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -47,8 +48,9 @@ def law(function: Function) -> Function:
 
     It may take arrays and look into them; it makes and returns none.
     """
-    with contextlib.suppress(OSError):  # typed in by hand: it has no source
-        _SOURCES[function] = inspect.getsource(function)
+    path = function.__code__.co_filename
+    linecache.checkcache(path)
+    _SOURCES[function] = linecache.getlines(path)
     return cast("Function", NestedDispatcher(function, _BORROWING))
 
 
@@ -59,7 +61,10 @@ def inlined(function: Function) -> Function:
 
 def source_of(function: Callable[..., Any]) -> str:
     """Return a law's source as it stood when the law was loaded."""
-    return _SOURCES.get(function) or inspect.getsource(function)
+    lines = _SOURCES.get(function)
+    if not lines:  # typed in by hand
+        return inspect.getsource(function)
+    return "".join(inspect.getblock(lines[function.__code__.co_firstlineno - 1 :]))
 
 
 def array_kernel(function: Function) -> Function:
@@ -190,7 +195,8 @@ class _ForgivingCache(_Cache):  # type: ignore[misc]
 
 def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     compile_later: Any = numba.njit
-    compiled = compile_later(**options, no_cfunc_wrapper=True)(function)
+    options = {**options, "no_cfunc_wrapper": True, "pipeline_class": KernelCompiler}
+    compiled = compile_later(**options)(function)
     compiled._cache = _ForgivingCache(function)  # noqa: SLF001 as its own enable_caching does
     return compiled
 

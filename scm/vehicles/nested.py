@@ -3,11 +3,13 @@
 As numba stands, each function that another one calls becomes machine code of its own, with two
 wrappers for callers in Python and C that never come: half of the time that a kernel takes to
 compile. Here only the kernel at the top is optimised and becomes machine code, with all that it
-calls inside. A plain call from Python still works, and compiles as ever.
+calls inside, numba's own `min`, `max` and `int` among them. A plain call from Python still works,
+and compiles as ever.
 """
 
 from typing import Any
 
+from llvmlite.binding import create_new_function_pass_manager
 from numba.core import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
@@ -19,6 +21,7 @@ from numba.core.typed_passes import (
     NopythonTypeInference,
     PreLowerStripPhis,
 )
+from numba.core.typing.templates import _OverloadFunctionTemplate
 from numba.core.untyped_passes import (
     DeadBranchPrune,
     FixupArgs,
@@ -28,11 +31,14 @@ from numba.core.untyped_passes import (
     RewriteSemanticConstants,
     TranslateByteCode,
 )
+from numba.cpython import builtins
 
 _Library: Any = JITCodeLibrary
 _Compiler: Any = Compiler
 _Dispatcher: Any = CPUDispatcher
 _Passes: Any = PassManager
+_Overload: Any = _OverloadFunctionTemplate
+_usual_compiler = _Overload._get_jit_decorator  # noqa: SLF001
 
 # Those of numba's steps that scalar code needs: no closures, array expressions, lists or parallel
 # loops, and no variables to let go of, for nothing is counted.
@@ -53,6 +59,18 @@ _STEPS = (
 
 class _Text(_Library):  # type: ignore[misc]
     """LLVM text of one function and of those that it calls, to be linked into a caller."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        """Shorten them by the quickest steps, so that there is less to link and to inline."""
+        codegen = self._codegen
+        module.data_layout = codegen._data_layout  # noqa: SLF001
+        steps, builder = create_new_function_pass_manager(), codegen._pass_builder()  # noqa: SLF001
+        steps.add_sroa_pass()
+        steps.add_instruction_combine_pass()
+        steps.add_simplify_cfg_pass()
+        for function in module.functions:
+            if not function.is_declaration:
+                steps.run(function, builder)
 
     def _optimize_final_module(self) -> None:
         """Leave this to the caller, who sees the whole."""
@@ -94,15 +112,50 @@ class _TextCompiler(_Compiler):  # type: ignore[misc]
         return [steps]
 
 
+class _Kernel(_Library):  # type: ignore[misc]
+    """Machine code of a kernel, optimised as a whole only: that begins with each function alone."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout  # noqa: SLF001
+
+
+class KernelCompiler(_Compiler):  # type: ignore[misc]
+    """All of numba's steps, into machine code."""
+
+    def __init__(
+        self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, own: Any
+    ) -> None:
+        super().__init__(typing, target, library, args, result, flags, own)
+        if library is None:
+            self.state.library = _Kernel(self.state.targetctx.codegen(), "kernel")
+            self.state.library.enable_object_caching()
+
+
 class NestedDispatcher(_Dispatcher):  # type: ignore[misc]
     """What numba makes of a function, but for callers that are compiled only text."""
 
     def __init__(self, function: Any, options: dict[str, object]) -> None:
         options = {**options, "nopython": True}
         super().__init__(function, targetoptions=options)
-        own = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        self._text = _Dispatcher(function, targetoptions=own, pipeline_class=_TextCompiler)
+        self._text = _as_text(function, options)
 
     @property
     def _numba_type_(self) -> Any:
         return types.Dispatcher(self._text)
+
+
+def _as_text(function: Any, options: dict[str, object]) -> Any:
+    own = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return _Dispatcher(function, targetoptions=own, pipeline_class=_TextCompiler)
+
+
+def _compiler_of(overload: Any) -> Any:
+    """Return what compiles numba's own version of a function for some types."""
+    if overload._overload_func.__module__ != builtins.__name__:  # noqa: SLF001
+        return _usual_compiler(overload)
+    return lambda **options: lambda function: _as_text(function, {**options, "nopython": True})
+
+
+def nest_builtins() -> None:
+    """Let what numba writes for Python's own functions of numbers be text too, in this process."""
+    _Overload._get_jit_decorator = _compiler_of  # noqa: SLF001

@@ -14,6 +14,7 @@ import signal
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 
 from scm.log import event
 from scm.vehicles.drivers.law import decide
@@ -48,21 +49,21 @@ def compile_together(jobs: Sequence[Job]) -> None:
 
 
 def share(jobs: Sequence[Job]) -> None:
-    """Do jobs in this process and a copy of it; at the end, here too what the copy has taken.
+    """Do jobs in this process and a copy of it; here too what the copy has done, once it has.
 
-    Should the copy fail at a job, this process is the one that says so.
+    When nothing is left to take, what the copy has done is loaded while it does the rest. Should
+    the copy fail at a job, this process is the one that says so.
     """
     heap, end = _heap(len(jobs)), os.pipe()
     left = list(range(len(jobs)))
     copy = _copied()
     if copy == 0:
-        _help(jobs, heap)
+        _help(jobs, heap, end[1])
     os.close(end[1])
     try:
-        for number in _taken(heap):
+        for number in chain(_taken(heap), _told(end[0])):
             jobs[number]()
             left.remove(number)
-        select.select([end[0]], [], [], _GRACE_S)  # it is closed when the copy is gone
     finally:
         os.kill(copy, signal.SIGKILL)
         os.waitpid(copy, 0)
@@ -114,11 +115,19 @@ def _taken(heap: int) -> Iterator[int]:
         yield number[0]
 
 
-def _help(jobs: Sequence[Job], heap: int) -> None:
-    """Be the copy: do what is left on the heap, and end without a word."""
+def _told(end: int) -> Iterator[int]:
+    """Yield what the copy tells that it has done; it has no more to tell when it is gone."""
+    while select.select([end], [], [], _GRACE_S)[0] and (number := os.read(end, 1)):
+        yield number[0]
+
+
+def _help(jobs: Sequence[Job], heap: int, tell: int | None = None) -> None:
+    """Be the copy: do what is left on the heap, tell the number of each, and end without a word."""
     try:
         for number in _taken(heap):
             jobs[number]()
+            if tell is not None:
+                os.write(tell, bytes([number]))
     finally:
         os._exit(0)
 

@@ -6,6 +6,7 @@ import pytest
 from numba import float64, int64
 from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
+from numba.extending import overload
 
 from scm.vehicles import jit
 
@@ -32,3 +33,18 @@ def test_what_cannot_be_is_refused_each_time(give):
     for _ in range(2):
         with pytest.raises(TypingError):
             give(float64, int64)
+
+
+def test_a_rule_that_comes_later_is_known_after_a_refresh():
+    jit.load_compiler()
+
+    def halved(x):
+        return 0.5 * x
+
+    @overload(halved)
+    def _give(x):
+        return lambda x: 0.5 * x
+
+    context = cpu_target.typing_context
+    cpu_target.target_context.refresh()
+    assert context.resolve_value_type(halved).get_call_type(context, (float64,), {})

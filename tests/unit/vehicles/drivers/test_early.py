@@ -50,6 +50,19 @@ def test_two_jobs_run_at_the_same_time(notebook):
     assert first.split()[1] != second.split()[1]
 
 
+def test_what_is_done_beside_is_done_here_while_the_copy_goes_on(notebook, monkeypatch):
+    monkeypatch.setattr(early, "_GRACE_S", 5.0)
+    begin, end = notebook.job("c began"), notebook.job("c", wait_for="b here")
+
+    def long():
+        begin()
+        end()
+
+    early.share([notebook.job("a", wait_for="c began"), notebook.job("b"), long])
+    lines = notebook.lines()
+    assert "c beside" in lines or "a beside" in lines  # if the copy was first, it waits for us
+
+
 def children():
     """The processes that this one has started and not waited for, other tests' among them."""
     return Path(f"/proc/self/task/{os.getpid()}/children").read_text(encoding="ascii").split()
