@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.vehicles.jit import allocating_kernel, array_kernel, law
+from scm.vehicles.jit import array_kernel, law
 
 LEEWAY_M = 0.025
 LOOK_AHEAD_S = 0.1
@@ -113,9 +113,11 @@ class Near:
         self._leeway = LEEWAY_M + LOOK_AHEAD_S * np.hypot(motion[:, 3], motion[:, 4])
         reach = outlines[:, 4] + self._leeway
         room = max(64, 4 * len(order))
+        head = np.zeros(_buckets(len(order)), np.int64)
+        after, places = np.zeros(len(order), np.int64), np.zeros((len(order), 2), np.int64)
         while True:
             self._pairs = np.empty((room, 2), np.int64)
-            count = list_pairs(self._pairs, motion, reach)
+            count = list_pairs(self._pairs, motion, reach, head, after, places)
             if count <= room:
                 break
             room = 2 * count
@@ -130,6 +132,11 @@ class Near:
         self._walls = self._walls[:count]
 
 
+def _buckets(n: int) -> int:
+    """Return how many heads of lists the bodies are spread over: a power of two."""
+    return 1 << max(6, (2 * n - 1).bit_length())
+
+
 @array_kernel
 def has_strayed(begun: Floats, leeway: Floats, motion: Floats) -> bool:
     """Return whether any body is further from where it was listed than its leeway."""
@@ -140,20 +147,22 @@ def has_strayed(begun: Floats, leeway: Floats, motion: Floats) -> bool:
     return False
 
 
-@allocating_kernel
-def list_pairs(pairs: Ints, motion: Floats, reach: Floats) -> int:
-    """Write the pairs whose circles overlap; return how many there are, written or not."""
+@array_kernel
+def list_pairs(
+    pairs: Ints, motion: Floats, reach: Floats, head: Ints, after: Ints, places: Ints
+) -> int:
+    """Write the pairs whose circles overlap; return how many there are, written or not.
+
+    `head`, a power of two long, `after` (n,) and `places` (n, 2) are room to work in.
+    """
     n = reach.shape[0]
     widest = 0.01
     for i in range(n):
         widest = max(widest, reach[i])
     cell = 2.0 * widest
-    size = 64
-    while size < 2 * n:
-        size *= 2
-    head = np.full(size, -1, np.int64)
-    after = np.empty(n, np.int64)
-    places = np.empty((n, 2), np.int64)
+    size = head.shape[0]
+    for bucket in range(size):
+        head[bucket] = -1
     count = 0
     for i in range(n):
         column, row = math.floor(motion[i, 0] / cell), math.floor(motion[i, 1] / cell)
