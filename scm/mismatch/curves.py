@@ -47,6 +47,7 @@ _SENSORS: Mapping[str, _Line] = {
     "camera_tilt": ("position", "m", "scale error", "1", lambda x, v: 1.0 / (1.0 + v * x) - 1.0),
     "wheel_radius": ("speed", "m/s", "wheel speed error", "m/s", lambda x, v: (1.0 / v - 1.0) * x),
     "encoder_loss": ("speed", "m/s", "wheel speed error", "m/s", lambda x, v: -v * x),
+    "speed_scale": ("speed", "m/s", "odometer error", "m/s", lambda x, v: (v - 1.0) * x),
     "gyro_scale": ("yaw rate", "rad/s", "gyro error", "rad/s", lambda x, v: (v - 1.0) * x),
     "gyro_bias": ("yaw rate", "rad/s", "gyro error", "rad/s", lambda x, v: v + 0.0 * x),
 }  # fmt: skip

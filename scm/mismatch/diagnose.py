@@ -27,7 +27,7 @@ from scm.mismatch.findings import (
     Verdict,
 )
 from scm.mismatch.fit import Fitted
-from scm.mismatch.judge import judge
+from scm.mismatch.judge import judge, nothing_got_worse
 from scm.mismatch.laws.curves import law_curves
 from scm.mismatch.laws.decide import is_law, lawful
 from scm.mismatch.laws.seek import Sought, with_laws
@@ -39,6 +39,7 @@ from scm.mismatch.patch import patched
 from scm.mismatch.report.car_file import write_car
 from scm.mismatch.report.write import write_report
 from scm.mismatch.rollouts import Numbers
+from scm.mismatch.rough import roughly, strays
 from scm.mismatch.search import Search
 from scm.recording.read import Recording, read_recordings
 from scm.vehicles.car import Car, load_car
@@ -194,19 +195,27 @@ def _searched(
 ) -> Found:
     big = car.with_terms(terms_needed(car))
     drives = [Drive(recording, big) for recording in recordings]
-    model = with_laws(Likelihood(drives, big))
+    model: Likelihood = with_laws(Likelihood(drives, big))
     parts = split(model)
     library = placed(shown_by(candidates(big), drives), drives)
     search = Search(model, parts.fit.weight + parts.choose.weight, library, tell)
+    rough, sought = strays(search), None
+    if rough:
+        model, parts, search = roughly(drives, big, library, tell)
     best = search.run(is_over)
-    best, sought = lawful(search, best, parts.confirm.weight, tell)
+    if not rough:
+        best, sought = lawful(search, best, parts.confirm.weight, tell)
     tell("judging on what the fit did not see")
     best = search.confirmed(best, parts.confirm.weight)
     numbers = search.fitter.numbers(best.effects, best.z, best.values)
     fit, free_runs = _judged(drives, model.car, numbers, parts)
+    while rough and best.effects and fit is not None and POSE[0] in nothing_got_worse(fit):
+        best = search.without_one(best)
+        numbers = search.fitter.numbers(best.effects, best.z, best.values)
+        fit, free_runs = _judged(drives, model.car, numbers, parts)
     located, residuals = locate(model, search.retuned, best)
     effects = tuple(effect_of(search, best, i) for i in range(len(best.effects)))
-    suggestions = undecided_of(model, search, best, tell)
+    suggestions = () if rough else undecided_of(model, search, best, tell)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
     verdict = _verdict(effects, undecided, fit)
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,

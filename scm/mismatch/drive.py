@@ -104,6 +104,13 @@ class Drive:
         }
 
 
+def has_odometer(drive: Drive) -> bool:
+    """Say whether a drive has a measured speed that is not what drives the car."""
+    given = any(term.name == "speed_control" for term in drive.car.terms)
+    channels = drive.recording.channels
+    return "speed" in drive.names and (not given or "command.speed" in channels)
+
+
 def _can_predict(car: Car, name: str) -> bool:
     """Say whether the car file tells what a sensor counts."""
     return not name.startswith("encoder.") or car.has("encoder.counts_per_revolution")

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from scm.errors import TermError
-from scm.mismatch.drive import Drive
+from scm.mismatch.drive import Drive, has_odometer
 from scm.mismatch.findings import Equation
 from scm.mismatch.rollouts import Numbers
 from scm.vehicles.car import Car, all_terms
@@ -165,6 +165,8 @@ _TABLE: tuple[_Row, ...] = (
      "The gyro reads {bias_rad_s} too much."),
     ("gyro_scale", M, ("yaw rate",), ((1.03,), (0.97,)), (0.01,),
      "The gyro reads {scale} of the true rate."),
+    ("speed_scale", M, ("speed",), ((1.03,), (0.97,)), (0.005,),
+     "The odometer reads {scale} of the true speed."),
     ("accel_bias", M, ("constant",), ((0.1, 0.0), (0.0, 0.1)), (0.02, 0.02),
      "The accelerometer reads {x_mps2} and {y_mps2} too much along and across."),
     ("imu_misalignment", M, ("acceleration",), ((0.05,), (-0.05,)), (0.01,),
@@ -202,7 +204,11 @@ def shown_by(found: tuple[Candidate, ...], drives: Sequence[Drive]) -> tuple[Can
         fast = max(fast, float(np.percentile(speed, 95)))
         hard = max(hard, float(np.percentile(speed * np.abs(yaw.rate), 95)))
     needs = {c.name: SHOWS_ABOVE.get(c.name, (0.0, 0.0)) for c in found}
-    return tuple(c for c in found if fast >= needs[c.name][0] and hard >= needs[c.name][1])
+    return tuple(
+        c for c in found
+        if fast >= needs[c.name][0] and hard >= needs[c.name][1]
+        and (c.name != "speed_scale" or any(has_odometer(drive) for drive in drives))
+    )  # fmt: skip
 
 
 def placed(found: Sequence[Candidate], drives: Sequence[Drive]) -> tuple[Candidate, ...]:

@@ -31,7 +31,8 @@ NOISE_LOSS = 0.862  # mean loss of an innovation that is nothing but noise
 LEAST_SHARE = 0.03  # of a sensor in the gain, to be named
 _OWN = {  # sensors by the keys of their faults
     "measure.gyro": "imu.gyro", "measure.accel": "imu.accel", "measure.imu": "imu.accel",
-    "measure.encoder": "encoder.", "wheel.radius": "encoder.", "measure.": "pose.",
+    "measure.speed": "speed", "measure.encoder": "encoder.", "wheel.radius": "encoder.",
+    "measure.": "pose.",
 }  # fmt: skip
 
 

@@ -51,7 +51,7 @@ def split(model: Likelihood, block_s: float = BLOCK_S) -> Parts:
     weights = [list[Floats]() for _ in NAMES]
     spans = [list[tuple[Span, ...]]() for _ in NAMES]
     for number, (drive, whitener) in enumerate(zip(model.drives, model.whiteners, strict=True)):
-        cuts = _cuts(float(drive.edges[0]), float(drive.edges[-1]), block_s)
+        cuts = cuts_of(float(drive.edges[0]), float(drive.edges[-1]), block_s)
         whose = _whose(len(cuts) - 1, number)
         block = np.clip(np.searchsorted(cuts, whitener.t, side="right") - 1, 0, len(whose) - 1)
         for part in range(len(NAMES)):
@@ -60,7 +60,7 @@ def split(model: Likelihood, block_s: float = BLOCK_S) -> Parts:
     return Parts(*(Part(np.concatenate(w), tuple(s)) for w, s in zip(weights, spans, strict=True)))
 
 
-def _cuts(first: float, last: float, block_s: float) -> Floats:
+def cuts_of(first: float, last: float, block_s: float) -> Floats:
     """Return where blocks begin and end: at least four, all of one length."""
     blocks = max(round((last - first) / block_s), LEAST_BLOCKS)
     return np.linspace(first, last, blocks + 1)

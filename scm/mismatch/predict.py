@@ -20,8 +20,9 @@ NEUTRAL: Mapping[str, float] = {
     "measure.clock_rate": 0.0, "measure.pose_scale": 1.0, "measure.camera_tilt_x_per_m": 0.0,
     "measure.camera_tilt_y_per_m": 0.0, "measure.pose_point_x_m": 0.0,
     "measure.pose_point_y_m": 0.0, "measure.pose_heading_rad": 0.0, "measure.encoder_loss": 0.0,
-    "measure.gyro_bias_rad_s": 0.0, "measure.gyro_scale": 1.0, "measure.accel_bias_x_m_s2": 0.0,
-    "measure.accel_bias_y_m_s2": 0.0, "measure.imu_angle_rad": 0.0,
+    "measure.gyro_bias_rad_s": 0.0, "measure.gyro_scale": 1.0, "measure.speed_scale": 1.0,
+    "measure.accel_bias_x_m_s2": 0.0, "measure.accel_bias_y_m_s2": 0.0,
+    "measure.imu_angle_rad": 0.0,
 }  # fmt: skip
 
 
@@ -117,7 +118,8 @@ class Prediction:
         if name.startswith("wheel_speed."):
             return kept * np.gradient(motions[f"wheel_angle.{name[-2:]}"], STEP_S, axis=0)
         plain = {"speed": "speed", "velocity.x": "speed", "velocity.y": "lateral_speed"}
-        return motions[plain.get(name, "yaw_rate")]
+        signal = motions[plain.get(name, "yaw_rate")]
+        return now["measure.speed_scale"] * signal if name == "speed" else signal
 
 
 @array_kernel

@@ -7,6 +7,7 @@ the library's size twice its logarithm (the criterion of PASTIS).
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from scm.mismatch.fit import FARTHEST, Fitted, Fitter
 from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate
+from scm.mismatch.noise import Noise
 
 MOST_EFFECTS = 4
 REFITTED = 14
@@ -31,6 +33,7 @@ OF_OWN: Mapping[str, str] = {
 """Numbers of effects by the car's own number that means the same."""
 
 Tell = Callable[[str], None]
+Learn = Callable[[Likelihood, Sequence[Sequence[Floats]], int], Noise]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +64,15 @@ class Search:
     """
 
     def __init__(
-        self, model: Likelihood, part: Floats, library: Sequence[Candidate], tell: Tell
+        self,
+        model: Likelihood,
+        part: Floats,
+        library: Sequence[Candidate],
+        tell: Tell,
+        learn: Learn = learn_noise,
     ) -> None:
         self.model, self.listed, self.tell = model, tuple(library), tell
+        self._learn = learn
         self.fitter = Fitter(model, part)
         self.events = int(part.sum())
         self.steps: list[Step] = []
@@ -78,9 +87,7 @@ class Search:
         Args:
             is_over: Says when no further effect is to be looked for.
         """
-        self.tell("fitting the car's own numbers")
-        best = self.settle(self.fitter.null())
-        self.retuned = best
+        best = self.retuned
         while len(best.effects) < MOST_EFFECTS and not is_over():
             step = self.extend(best)
             self.steps.append(step)
@@ -89,6 +96,12 @@ class Search:
             best = self.settle(step.rivals[0])
             best = self.prune(best)
         return best
+
+    @cached_property
+    def retuned(self) -> Fitted:
+        """The car with its own numbers refitted alone, under the noise that this leaves."""
+        self.tell("fitting the car's own numbers")
+        return self.settle(self.fitter.null())
 
     def step_of(self, effect: Candidate) -> Step | None:
         """Return the round in which an effect was found."""
@@ -102,7 +115,7 @@ class Search:
             (fitted,) = self.fitter.refine([fitted], rounds=4, fresh=True)
             numbers = self.fitter.numbers(fitted.effects, fitted.z, fitted.values)
             residuals, _ = self.model.residuals([numbers])
-            learn_noise(self.model, residuals, rounds=1)
+            self._learn(self.model, residuals, 1)
         (fitted,) = self.fitter.refine([fitted], rounds=4, fresh=True)
         return fitted
 
@@ -174,6 +187,10 @@ class Search:
                 return fitted
             fitted = fewer[0]
         return fitted
+
+    def without_one(self, fitted: Fitted) -> Fitted:
+        """Return the best refitted model that lacks one of the effects."""
+        return min(self._without_each(fitted), key=self.criterion)
 
     def _without_each(self, fitted: Fitted) -> list[Fitted]:
         """Return refitted models that lack one effect each, in the effects' order."""

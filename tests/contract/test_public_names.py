@@ -46,6 +46,7 @@ PUBLIC = {
     "encoder_loss": {"fraction"},
     "gyro_bias": {"bias_rad_s"},
     "gyro_scale": {"scale"},
+    "speed_scale": {"scale"},
     "accel_bias": {"x_mps2", "y_mps2"},
     "imu_misalignment": {"angle_rad"},
     "clock_offset": {"offset_s"},

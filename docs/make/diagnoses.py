@@ -1,0 +1,104 @@
+"""Makes the pictures and figures of docs/diagnoses: what is found in other people's cars.
+
+Run with `python docs/make/diagnoses.py ucar dart ...`; needs the shared recordings. The figures go
+to the screen, three pictures of each report to docs/diagnoses.
+"""
+
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from scm.mismatch.diagnose import Found, diagnose, write
+from scm.mismatch.evidence import FreeRuns
+from scm.mismatch.fit import Fitter
+from scm.mismatch.judge import judge
+from scm.mismatch.parts import split
+
+ROOT = Path(__file__).parents[2]
+OUT = ROOT / "docs" / "diagnoses"
+DATA = ROOT.parent / "shared" / "recordings"
+SLALOM = [path.name for path in sorted((ROOT / "recordings/f1tenth_optitrack").glob("slalom_*"))]
+SETS = {
+    "ucar": ("cpm_ucar", ["a_first56s.yaml", "b.yaml", "d_warmed_up.yaml"]),
+    "slalom": ("f1tenth_optitrack", SLALOM),
+    "dart": (
+        "dart",
+        [f"free_driving_{name}.yaml" for name in ("10_01_01", "10_02_28", "10_27_02")],
+    ),
+    "genesis": ("genesis", ["rfs_path1.yaml", "rfs_path2.yaml", "cpg_slow_lap.yaml"]),
+    "av21": ("iac_av21", ["putnam.yaml", "lvms.yaml"]),
+    "frictionmaps": ("f1tenth_frictionmaps", ["ds3.yaml"]),
+}
+SHOWN = ("free_run_errors", "free_runs", "parameters")
+BUDGET_S = 900.0
+
+
+def main(names: list[str]) -> None:
+    """Diagnose sets by name, or all."""
+    OUT.mkdir(exist_ok=True)
+    for name in names or list(SETS):
+        folder, files = SETS[name]
+        paths = [ROOT / "recordings" / folder / file for file in files]
+        found = diagnose(paths, None, DATA / folder, budget_s=BUDGET_S, tell=_tell)
+        _say(f"{name}: {len(files)} recordings, {found.diagnosis.runtime_s:.0f} s")
+        report = ROOT / "runs" / f"diagnosis-{name}"
+        write(found, report)
+        _figures(found)
+        for picture in sorted((report / "pictures").glob("*.svg")):
+            if picture.stem in SHOWN:
+                shutil.copy(picture, OUT / f"{name}_{picture.name}")
+
+
+def _figures(found: Found) -> None:
+    """Print the verdict, each effect, and position errors of free runs held out."""
+    diagnosis = found.diagnosis
+    _say(f"verdict: {diagnosis.verdict.value}")
+    for problem in diagnosis.data:
+        _say(f"data: {problem}")
+    for effect in diagnosis.effects:
+        numbers = ", ".join(
+            f"{name} {e.value:.4g} ({e.low:.4g} to {e.high:.4g})"
+            for name, e in effect.parameters.items()
+        )
+        rivals = ", ".join(f"{r.name} {r.probability:.2f}" for r in effect.rivals[:3])
+        _say(f"effect: {effect.name}: {numbers}; {effect.said} rivals: {rivals}")
+    for own in found.evidence.ordinary:
+        if abs(own.found.value - own.given) > 0.5 * (own.given_std or 1.0):
+            _say(f"own: {own.key}: {own.given:.4g} -> {own.found.value:.4g}")
+    model, retuned, runs = found.model, found.retuned, found.evidence.free_runs
+    if model is None or retuned is None or runs is None or diagnosis.fit is None:
+        return
+    plain = Fitter(model, np.ones(len(model.t))).numbers((), retuned.z, np.zeros(0))
+    parts = split(model)
+    tuned = judge(model.drives, model.car, {}, plain, parts, diagnosis.fit.horizon_s)[1]
+    _say(f"free runs of {diagnosis.fit.horizon_s:g} s, position [cm], held out:")
+    for title, side in (("nominal", runs), ("retuned", tuned), ("found", runs)):
+        _say(f"  {title}: {_errors(side, 'before' if title == 'nominal' else 'after')}")
+    for name, before in diagnosis.fit.confirm.before.items():
+        _say(f"  rms {name}: {before:.4g} -> {diagnosis.fit.confirm.after[name]:.4g}")
+
+
+def _errors(runs: FreeRuns, side: str) -> str:
+    held = np.array([part == "confirm" for part in runs.part])
+    end = getattr(runs, side)
+    miss = [(end[axis] - runs.measured[axis])[held, -1] for axis in ("x", "y")]
+    far = 100.0 * np.hypot(*miss)
+    return (
+        f"{len(far)} windows, mean {far.mean():.2f}, median {np.median(far):.2f}, "
+        f"rms {np.sqrt((far**2).mean()):.2f}, p90 {np.percentile(far, 90):.2f}"
+    )
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def _tell(text: str) -> None:
+    sys.stderr.write(f"  {text}\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

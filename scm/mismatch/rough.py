@@ -1,0 +1,149 @@
+"""The search for what a simulator lacks of a car that it is far from: many effects at once.
+
+A car that nobody has measured differs in more ways than one, and its residuals are no noise with
+one effect in it. What is left is then judged by strides, and each round takes every effect that
+pays beside those before it, until what the others make needless is taken back.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.drive import Drive
+from scm.mismatch.findings import Equation
+from scm.mismatch.fit import Fitted
+from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import Candidate, Knob
+from scm.mismatch.noise import usual_noise
+from scm.mismatch.parts import Parts, split
+from scm.mismatch.search import Search, Step, price
+from scm.mismatch.strides import Striding, learn_sizes, told_anew
+from scm.vehicles.car import Car
+
+MOST_EFFECTS = 10
+AT_ONCE, MARGIN = 4, 10.0  # effects of one round; what each beside the first gains beyond its price
+MOST_DOUBLINGS = 9.0
+LATE_CAR = Candidate(
+    "clock_offset", Equation.SENSOR, ("speed",),
+    (Knob("offset_s", "measure.clock_offset_s", "s", (-0.3, 0.0), 0.0, 0.01),),
+    ((-0.04,), (-0.1,)),
+    "The poses' clock is {offset_s} against the car's: commands and sensors are stamped late.",
+)  # fmt: skip
+"""Its other sign is the camera's latency, which every search tries."""
+Tell = Callable[[str], None]
+
+
+def strays(search: Search) -> bool:
+    """Say whether a re-tuned car differs in so many ways that what is left is no noise.
+
+    That is so where the least disturbances had to be doubled very often to explain it.
+    """
+    return search.retuned is not None and doublings(search.model) >= MOST_DOUBLINGS
+
+
+def doublings(model: Likelihood) -> float:
+    """Return how often the least disturbances were doubled, summed over their kinds."""
+    now, least = model.noise, usual_noise(model.drives)
+    kinds = ("speed", "side", "yaw_rate", "launch", "turn")
+    return float(sum(np.log2(getattr(now, k) / getattr(least, k)) for k in kinds))
+
+
+def roughly(
+    drives: Sequence[Drive], car: Car, library: Sequence[Candidate], tell: Tell
+) -> tuple[Likelihood, Parts, "RoughSearch"]:
+    """Return a model that judges by strides, its parts, and the search that goes with it."""
+    tell("judging by strides: the car differs in many ways")
+    model = Striding(drives, car)
+    parts = split(model)
+    seen = parts.fit.weight + parts.choose.weight
+    return model, parts, RoughSearch(model, seen, (*library, LATE_CAR), tell)
+
+
+class RoughSearch(Search):
+    """Looks for many effects at once, by strides."""
+
+    def __init__(
+        self, model: Likelihood, part: Floats, library: Sequence[Candidate], tell: Tell
+    ) -> None:
+        super().__init__(model, part, library, tell, learn_sizes)
+
+    def run(self, is_over: Callable[[], bool] = lambda: False) -> Fitted:
+        """Return the model that explains the recordings best, see `Search.run`."""
+        best = self.retuned
+        while len(best.effects) < MOST_EFFECTS and not is_over():
+            steps = self._at_once(self.extend(best))
+            if not steps:
+                break
+            self.steps += steps
+            more = self._joined(best, [step.rivals[0] for step in steps])
+            settled = self.prune(self.settle(more))
+            if set(settled.names) <= set(best.names):
+                break
+            best = settled
+        return best
+
+    def confirmed(self, best: Fitted, unseen: Floats) -> Fitted:
+        """Return the model without effects that do not help on an unseen part.
+
+        Its intervals know how much of what is left comes together.
+        """
+        best = super().confirmed(best, unseen)
+        best.covariance = best.covariance / told_anew(self.model, best.e)
+        return best
+
+    def _at_once(self, step: Step) -> list[Step]:
+        """Return a round for each effect that pays beside those before it, best first.
+
+        The first was refitted; what another adds to it is a linear guess from its derivatives.
+        """
+        base, first = step.base, step.rivals[0]
+        if step.criteria[0] > self.criterion(base):
+            return []
+        rounds, known = [step], len(base.z) + len(base.values)
+        e, columns = first.e, first.jacobian
+        while len(rounds) < min(AT_ONCE, MOST_EFFECTS - len(base.effects)):
+            taken = {one.rivals[0].names[-1] for one in rounds}
+            left = [f for f in step.rivals if f.names[-1] not in taken]
+            beside = [np.hstack((columns, f.jacobian[:, known:])) for f in left]
+            costs = [
+                self._cost(f) - self._gain(e, all_) for f, all_ in zip(left, beside, strict=True)
+            ]
+            order = sorted(range(len(left)), key=costs.__getitem__)
+            if not order or costs[order[0]] > -MARGIN:
+                break
+            columns = beside[order[0]]
+            e = e + columns @ self._move(e, columns)
+            rounds.append(Step(
+                base, tuple(left[k] for k in order),
+                tuple(self.criterion(base) + costs[k] for k in order),
+            ))  # fmt: skip
+        return rounds
+
+    def _cost(self, fitted: Fitted) -> float:
+        return price(fitted.effects[-1:], self.events, len(self.listed))
+
+    def _gain(self, e: Floats, columns: Floats) -> float:
+        """Return how much less the loss would be, were everything linear."""
+        weights = self.fitter.weights(e)
+        moved = e + columns @ self._move(e, columns)
+        return float(weights @ (e * e - moved * moved))
+
+    def _move(self, e: Floats, columns: Floats) -> Floats:
+        """Return the least-squares move of all numbers; the car's own are held a little."""
+        weights = self.fitter.weights(e)
+        rooted = columns * np.sqrt(weights)[:, None]
+        held = np.full(columns.shape[1], 1e-6)
+        held[: len(self.model.ordinary)] = 1.0
+        normal = rooted.T @ rooted + np.diag(held)
+        return np.asarray(-np.linalg.solve(normal, columns.T @ (weights * e)))
+
+    def _joined(self, base: Fitted, found: Sequence[Fitted]) -> Fitted:
+        """Return one hypothesis with the last effect of each of several, not refitted yet."""
+        first, known = found[0], len(base.values)
+        values = np.concatenate((first.values[:known], *(f.values[known:] for f in found)))
+        return Fitted(
+            effects=(*base.effects, *(f.effects[-1] for f in found)),
+            z=first.z.copy(), values=values, e=first.e, q=first.q,
+            jacobian=np.zeros((len(first.e), len(base.z) + len(values))),
+        )  # fmt: skip

@@ -1,0 +1,27 @@
+"""Speed scale: the recorded speed is so many times the true one.
+
+    speed_measured = scale * speed    [m/s]
+
+Holds: one odometer on all wheels, no slip.   Shows in: straight drives, pose against odometer.
+Source: rolling without slip; an odometer knows its wheels' radius and gearing only by its settings.
+"""
+
+from scm.arrays import Floats
+from scm.vehicles.measure import Measure
+from scm.vehicles.param import Normal, Param
+
+
+def speed_scale(value: Floats, scale: float) -> Floats:
+    """Speed that the recording carries [m/s]."""
+    return scale * value
+
+
+MEASURE = Measure(
+    laws={"speed": speed_scale},
+    neutral={"scale": 1.0},
+    shows_in=("straight",),
+    params=(
+        Param("scale", 1.0, "1", "measure.speed_scale", (0.2, 5.0),
+              "measured over true speed", Normal(1.0, 0.03)),
+    ),
+)  # fmt: skip

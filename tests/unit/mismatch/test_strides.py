@@ -1,0 +1,93 @@
+"""A car judged by strides, and the search for many effects at once."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.noise import usual_noise
+from scm.mismatch.parts import split
+from scm.mismatch.rough import doublings, roughly
+from scm.mismatch.strides import LENGTH_S, Striding, learn_sizes, least_sizes
+from tests.unit.mismatch.made_drive import big_nigel, driven
+from tests.unit.mismatch.made_fit import candidate
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    return driven()
+
+
+@pytest.fixture(scope="module")
+def model(healthy):
+    return Striding([healthy], big_nigel())
+
+
+def test_strides_are_linear_in_residuals(model):
+    residuals, _ = model.residuals([{}, {"steering.trim_rad": 0.05}])
+    e = model.weigh(residuals)
+    mixed = [[3.0 * r[:, :1] - 2.0 * r[:, 1:] for r in residuals[0]]]
+    np.testing.assert_allclose(model.weigh(mixed)[:, 0], 3.0 * e[:, 0] - 2.0 * e[:, 1], atol=1e-6)
+
+
+def test_a_stride_lies_within_one_part(model):
+    parts = split(model)
+    weights = parts.fit.weight + parts.choose.weight + parts.confirm.weight
+    np.testing.assert_array_equal(weights, np.ones(len(model.t)))
+    for part in (parts.fit, parts.choose, parts.confirm):
+        middles = model.t[part.weight > 0.0]
+        inside = [
+            any(a - 1e-6 <= t - 0.5 * LENGTH_S and t + 0.5 * LENGTH_S <= b + 1e-6
+                for a, b in part.spans[0])
+            for t in middles
+        ]  # fmt: skip
+        assert all(inside)
+
+
+def test_a_wrong_heading_is_missed_across_the_body_too(model):
+    """The simulator turns at a wrong rate: half of it times the way is missed across."""
+    drive, weigher = model.drives[0], model.whiteners[0]
+    zero = [np.zeros((len(s.t), 1)) for s in drive.streams]
+    rate = 0.1
+    zero[drive.names.index("pose.yaw")] = (rate * drive.stream("pose.yaw").t)[:, None]
+    misses = weigher.misses(zero)[:, 0]
+    by = {name: misses[weigher.stream == i] for i, name in enumerate(drive.names)}
+    np.testing.assert_allclose(by["pose.yaw"], rate * LENGTH_S, atol=1e-9)
+    begin = weigher.t[: len(by["pose.y"])] - 0.5 * LENGTH_S
+    x, y = drive.smoothed["pose.x"], drive.smoothed["pose.y"]
+    way = np.hypot(x.at(begin + 1.0) - x.at(begin), y.at(begin + 1.0) - y.at(begin))
+    assert np.median(by["pose.y"] / way) == pytest.approx(0.5 * rate * LENGTH_S, rel=0.2)
+
+
+def test_sizes_grow_with_what_is_missed_and_never_below_the_least(model, healthy):
+    residuals, _ = model.residuals([{}, {"steering.trim_rad": 0.1}])
+    right, wrong = ([[r[:, i : i + 1] for r in residuals[0]]] for i in (0, 1))
+    calm = learn_sizes(model, right).own
+    least = least_sizes([healthy])
+    assert all(calm[name] >= least[name] for name in least)
+    assert learn_sizes(model, wrong).own["pose.yaw"] > 2.0 * calm["pose.yaw"]
+    learn_sizes(model, right)
+
+
+def test_least_disturbances_are_no_doublings(healthy):
+    model = Likelihood([healthy], big_nigel())
+    assert doublings(model) == pytest.approx(0.0)
+    noise = usual_noise([healthy])
+    noise = replace(noise, side=4.0 * noise.side)
+    model.believe(noise)
+    assert doublings(model) == pytest.approx(2.0)
+
+
+def test_two_effects_are_found_in_one_round():
+    truth = {"steering.trim_rad": 0.06, "drive.gain": 0.8}
+    drive = driven(tuple(truth.items()))
+    names = ("steer_trim", "drive_gain", "grade", "gyro_bias", "steer_gain")
+    library = [candidate(name) for name in names]
+    _, _, search = roughly([drive], big_nigel(), library, lambda _: None)
+    found = search.run()
+    assert set(found.names) == {"steer_trim", "drive_gain"}
+    assert len(search.steps) >= 2
+    values = dict(zip(found.names, found.values, strict=True))
+    assert values["steer_trim"] == pytest.approx(0.06, abs=0.01)
+    assert values["drive_gain"] == pytest.approx(0.8, abs=0.08)
