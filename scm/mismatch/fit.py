@@ -15,9 +15,12 @@ from scm.mismatch.listed import Candidate, Knob
 
 ROUNDS = 5
 SMALL = 0.1  # a derivative's step of an ordinary number, in standard deviations
-LENGTHS = (1.0, 0.5, 0.2, 0.05)
+SHORTER = (0.5, 0.2, 0.05)
 DAMPINGS = (0.03, 0.3)
+FEW = 2  # fits whose trials fill no more than a tile: all are tried at once
+KEPT = 0.8  # of what a whole step promised is good enough
 ENOUGH = 0.5
+IDLE = 0.1  # of what the car file knows of a number; a recording that says less says nothing
 TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild moments prove nothing
 FARTHEST = 2.0  # beyond twice its scatter a number is no longer ordinary
 
@@ -139,97 +142,165 @@ class Fitter:
 
     def _differentiate(self, fits: Sequence[Fitted], *, fresh: bool) -> None:
         """Renew `e` and the derivatives of each fit, all in one batch."""
-        sets, own = list[dict[str, float]](), len(self.model.ordinary)
-        for f in fits:
+        own, wanted = len(self.model.ordinary), [self._moving(f, fresh=fresh) for f in fits]
+        sets = list[dict[str, float]]()
+        for f, moving in zip(fits, wanted, strict=True):
             sets.append(self.numbers(f.effects, f.z, f.values))
-            if fresh:
-                for j in range(own):
-                    z = f.z.copy()
-                    z[j] += self._side(f, j)
-                    sets.append(self.numbers(f.effects, z, f.values))
-            for j, step in enumerate(self._knob_steps(f)):
-                values = f.values.copy()
-                values[j] += step
-                sets.append(self.numbers(f.effects, f.z, values))
+            sets += self._beside(f, f.z, f.values, moving)
         e, ok = self.model(sets)
         e[:, ~ok] = np.nan
         at = 0
-        for f in fits:
-            now, jacobian = e[:, at], np.empty((len(e), own + f.knobs))
+        for f, moving in zip(fits, wanted, strict=True):
+            now, jacobian = e[:, at], np.zeros((len(e), own + f.knobs))
             at += 1
-            jacobian[:, :own] = f.jacobian[:, :own] if not fresh else 0.0
-            if fresh:
-                for j in range(own):
-                    jacobian[:, j] = (e[:, at + j] - now) / self._side(f, j)
-                at += own
-            for j, step in enumerate(self._knob_steps(f)):
+            if len(moving) < own:
+                jacobian[:, :own] = f.jacobian[:, :own]
+            for j in moving:
+                jacobian[:, j] = (e[:, at] - now) / self._side(f, j)
+                at += 1
+            for j, step in enumerate(self._knob_steps(f, f.values)):
                 scale = _knobs(f)[j].step
-                jacobian[:, own + j] = (e[:, at + j] - now) / (step / scale)
-            at += f.knobs
+                jacobian[:, own + j] = (e[:, at] - now) / (step / scale)
+                at += 1
             if not np.isfinite(now).all():
                 f.done, f.q = True, np.inf
                 continue
             f.jacobian = np.nan_to_num(jacobian)
             f.e, f.q = now, float(self.score(now[:, None], f.z)[0])
 
-    def _trials(self, f: Fitted) -> list[tuple[Floats, Floats]]:
-        """Return new numbers to try for one fit: shorter and more damped Gauss-Newton steps."""
+    def _moving(self, f: Fitted, *, fresh: bool) -> list[int]:
+        """Return which of the car's own numbers' derivatives are to be renewed.
+
+        What the recording says nothing about stays where the car file has it, and its derivative
+        what it was.
+        """
+        own = len(self.model.ordinary)
+        if not fresh:
+            return []
+        if f.jacobian.shape[1] < own:
+            return list(range(own))
+        told = self.weights(f.e) @ (f.jacobian[:, :own] ** 2)
+        idle = (told < IDLE) & (np.abs(f.z) < SMALL)
+        return [j for j in range(own) if not idle[j]]
+
+    def _beside(
+        self, f: Fitted, z: Floats, values: Floats, moving: Sequence[int]
+    ) -> list[dict[str, float]]:
+        """Return sets a small step away, in the car's own numbers named and in every knob."""
+        sets = list[dict[str, float]]()
+        for j in moving:
+            other = z.copy()
+            other[j] += self._side(f, j)
+            sets.append(self.numbers(f.effects, other, values))
+        for j, step in enumerate(self._knob_steps(f, values)):
+            moved = values.copy()
+            moved[j] += step
+            sets.append(self.numbers(f.effects, z, moved))
+        return sets
+
+    def _plan(self, f: Fitted) -> "_Plan":
+        """Return the quadratic that one fit's next step is to lower; renew its covariance."""
         own, knobs = len(f.z), _knobs(f)
         prior = np.concatenate((np.ones(own), np.full(f.knobs, 1e-6)))
         weights = self.weights(f.e)
         normal = _normal(f.jacobian, weights) + np.diag(prior)
         f.covariance = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
         slope = f.jacobian.T @ (weights * f.e) + prior * np.concatenate((f.z, np.zeros(f.knobs)))
-        scales = np.array([k.step for k in knobs])
-        low = np.concatenate(
-            (
-                -FARTHEST - f.z,
-                [(k.bounds[0] - v) / k.step for k, v in zip(knobs, f.values, strict=True)],
-            )
-        )
-        high = np.concatenate(
-            (
-                FARTHEST - f.z,
-                [(k.bounds[1] - v) / k.step for k, v in zip(knobs, f.values, strict=True)],
-            )
-        )
-        full = _bounded(normal, slope, low, high)
-        moves = [length * full for length in LENGTHS]
-        moves += [
-            _bounded(normal + np.diag(damping * normal.diagonal()), slope, low, high)
-            for damping in DAMPINGS
+        bounds = [
+            [(k.bounds[side] - v) / k.step for k, v in zip(knobs, f.values, strict=True)]
+            for side in (0, 1)
         ]
-        return [(f.z + move[:own], f.values + move[own:] * scales) for move in moves]
+        low = np.concatenate((-FARTHEST - f.z, bounds[0]))
+        high = np.concatenate((FARTHEST - f.z, bounds[1]))
+        scales = np.concatenate((np.ones(own), [k.step for k in knobs]))
+        return _Plan(f, normal, slope, low, high, scales)
 
     def _side(self, f: Fitted, j: int) -> float:
         """Return a small step of an ordinary number that stays within its bounds."""
         o = self.model.ordinary[j]
         return -SMALL if o.mean + (f.z[j] + SMALL) * o.std > o.bounds[1] else SMALL
 
-    def _knob_steps(self, f: Fitted) -> list[float]:
+    def _knob_steps(self, f: Fitted, values: Floats) -> list[float]:
         """Return small steps of the effects' numbers that stay within their bounds."""
         return [
             -0.5 * k.step if v + 0.5 * k.step > k.bounds[1] else 0.5 * k.step
-            for k, v in zip(_knobs(f), f.values, strict=True)
+            for k, v in zip(_knobs(f), values, strict=True)
         ]
 
     def _step(self, fits: Sequence[Fitted]) -> None:
-        """Move each fit along its Gauss-Newton step, by the best of a few lengths."""
-        trials = list[tuple[Fitted, Floats, Floats]]()
+        """Move each fit along its Gauss-Newton step, by the best of a few lengths.
+
+        Of many fits all but the whole step is tried only where that does not keep its promise.
+        """
+        plans = [self._plan(f) for f in fits if not f.done]
+        if not plans:
+            return
+        before = {id(f): f.q for f in fits}
+        if len(plans) > FEW:
+            self._try([(plan, plan.whole) for plan in plans])
+            plans = [plan for plan in plans
+                     if before[id(plan.fitted)] - plan.fitted.q < KEPT * plan.promise]  # fmt: skip
+            self._try([(plan, move) for plan in plans for move in plan.others()])
+        else:
+            trials = [(plan, move) for plan in plans for move in (plan.whole, *plan.others())]
+            self._try(trials, ahead=plans)
         for f in fits:
-            if not f.done:
-                trials += [(f, z, values) for z, values in self._trials(f)]
+            f.done = f.done or before[id(f)] - f.q < ENOUGH
+
+    def _try(self, trials: Sequence[tuple["_Plan", Floats]], ahead: Sequence["_Plan"] = ()) -> None:
+        """Move fits to the best of some moves, if any is better than where they are.
+
+        Args:
+            trials: Plans, each with a move.
+            ahead: Whose next derivatives are driven too, about the whole step: a tile has room,
+                and the model remembers them.
+        """
         if not trials:
             return
-        e, ok = self.model([self.numbers(f.effects, z, v) for f, z, v in trials])
-        before = {id(f): f.q for f in fits}
-        for i, (f, z, values) in enumerate(trials):
+        moved = [(plan.fitted, *plan.moved(move)) for plan, move in trials]
+        sets = [self.numbers(f.effects, z, v) for f, z, v in moved]
+        for plan in ahead:
+            sets += self._beside(plan.fitted, *plan.moved(plan.whole), ())
+        e, ok = self.model(sets)
+        for i, (f, z, values) in enumerate(moved):
             if ok[i] and np.isfinite(e[:, i]).all():
                 q = float(self.score(e[:, i : i + 1], z)[0])
                 if q < f.q:
                     f.q, f.z, f.values, f.e = q, z, values, e[:, i].copy()
-        for f in fits:
-            f.done = f.done or before[id(f)] - f.q < ENOUGH
+
+
+class _Plan:
+    """A quadratic about a fit where it was, and the steps that should lower it.
+
+    Attributes:
+        whole: The Gauss-Newton step within bounds; `promise`: what it should gain.
+    """
+
+    def __init__(
+        self, fitted: Fitted, normal: Floats, slope: Floats, low: Floats, high: Floats,
+        scales: Floats,
+    ) -> None:  # fmt: skip
+        self.fitted, self._z, self._values = fitted, fitted.z, fitted.values
+        self._normal, self._slope, self._low, self._high = normal, slope, low, high
+        self._scales = scales
+        self.whole = _bounded(normal, slope, low, high)
+        self.promise = -float(self.whole @ (2.0 * slope + normal @ self.whole))
+
+    def others(self) -> list[Floats]:
+        """Return shorter and more damped steps."""
+        damped = [
+            _bounded(
+                self._normal + np.diag(damping * self._normal.diagonal()), self._slope, self._low,
+                self._high,
+            )
+            for damping in DAMPINGS
+        ]  # fmt: skip
+        return [length * self.whole for length in SHORTER] + damped
+
+    def moved(self, move: Floats) -> tuple[Floats, Floats]:
+        """Return the numbers after a move."""
+        own, by = len(self._z), move * self._scales
+        return self._z + by[:own], self._values + by[own:]
 
 
 def _normal(jacobian: Floats, weights: Floats) -> Floats:

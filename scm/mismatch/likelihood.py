@@ -1,5 +1,6 @@
 """How well a car with given numbers explains recordings: weighed residuals of many sets at once."""
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,10 +10,12 @@ from scm.arrays import Bools, Floats
 from scm.mismatch.drive import Drive
 from scm.mismatch.noise import Noise, usual_noise
 from scm.mismatch.predict import POSE_CLOCK, Prediction
-from scm.mismatch.rollouts import COMMAND_CLOCK, Numbers, Rollouts
+from scm.mismatch.rollouts import COMMAND_CLOCK, Numbers, Rollouts, Tiles
 from scm.mismatch.whiten import Whitener
 from scm.vehicles.car import Car
 from scm.vehicles.param import Param
+
+Recent = OrderedDict[frozenset[tuple[str, float]], tuple[Floats, bool]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +31,7 @@ class Ordinary:
 LOCK = "drive.axle_lock"
 _UNKNOWN = {LOCK: (0.5, 0.5)}  # what no car file says and every car has
 SETTLED_S = 1.0
+KEPT = 160  # sets whose residuals are remembered
 TIMING_S = 0.003  # no recording's stamps are better than that
 LEAST_SCATTER = {"body.mass_kg": 0.06}  # cars are weighed without cables, tape and battery
 _CLOCKS = tuple(
@@ -59,9 +63,11 @@ class Likelihood:
         t: Times of all innovations, (events,); `settled`: 0 while the start still matters, else 1.
     """
 
-    def __init__(self, drives: Sequence[Drive], car: Car) -> None:
+    def __init__(self, drives: Sequence[Drive], car: Car, tiles: Tiles | None = None) -> None:
         self.car, self.drives = car, drives
-        self._rollouts = [Rollouts(drive, car) for drive in drives]
+        self.tiles = tiles or Tiles(car)
+        self._rollouts = [Rollouts(drive, car, self.tiles) for drive in drives]
+        self._recent: list[Recent] = [OrderedDict() for _ in drives]
         self.ordinary = ordinary_numbers(car, self._rollouts[0].params)
         self._predictions = [Prediction(drive) for drive in drives]
         self.believe(usual_noise(drives))
@@ -89,13 +95,32 @@ class Likelihood:
     def residuals(self, sets: Sequence[Numbers]) -> tuple[list[list[Floats]], Bools]:
         """Return residuals of every drive's streams, and which sets stayed physical."""
         self.runs += len(sets)
-        ok = np.ones(len(sets), dtype=np.bool_)
-        found = []
-        for rollouts, prediction in zip(self._rollouts, self._predictions, strict=True):
-            left, fine = residuals_of(rollouts, prediction, sets)
-            ok &= fine
-            found.append(left)
-        return found, ok
+        found = [self._left(i, sets) for i in range(len(self.drives))]
+        return [left for left, _ in found], np.all([ok for _, ok in found], axis=0)
+
+    def _left(self, i: int, sets: Sequence[Numbers]) -> tuple[list[Floats], Bools]:
+        """Return residuals of each stream of one drive, (samples, sets), and which sets were fine.
+
+        A set that was driven lately is not driven again: fits return to their best so far.
+        """
+        recent, keys = self._recent[i], [frozenset(numbers.items()) for numbers in sets]
+        new = {key: numbers for key, numbers in zip(keys, sets, strict=True) if key not in recent}
+        known = {key: recent[key] for key in keys if key in recent}
+        wanted = list(new)
+        prediction = self._predictions[i]
+        for which, (left, ok) in self._rollouts[i].each(
+            list(new.values()),
+            lambda motions, some: (np.concatenate(prediction.residuals(motions, some)), motions.ok),
+        ):
+            for k, column, fine in zip(which, left.T, ok, strict=True):
+                known[wanted[k]] = recent[wanted[k]] = column.copy(), bool(fine)
+        for key in keys:
+            recent.move_to_end(key)
+        while len(recent) > KEPT:
+            recent.popitem(last=False)
+        left = np.stack([known[key][0] for key in keys], axis=1)
+        cuts = np.cumsum([len(stream.t) for stream in self.drives[i].streams])[:-1]
+        return np.split(left, cuts), np.array([known[key][1] for key in keys])
 
     def weigh(self, residuals: Sequence[Sequence[Floats]]) -> Floats:
         """Return the unit innovations of all drives, (events, sets)."""
@@ -110,17 +135,6 @@ class Likelihood:
     def numbers(self, z: Floats) -> dict[str, float]:
         """Return the car's own numbers at `z` standard deviations from the file's."""
         return {o.key: clipped(o, v) for o, v in zip(self.ordinary, z, strict=True)}
-
-
-def residuals_of(
-    rollouts: Rollouts, prediction: Prediction, sets: Sequence[Numbers]
-) -> tuple[list[Floats], Bools]:
-    """Return residuals of each stream of one drive, (samples, sets), and which sets were fine."""
-    done = rollouts.each(
-        sets, lambda motions, some: (prediction.residuals(motions, some), motions.ok)
-    )
-    streams = [np.concatenate(parts, axis=1) for parts in zip(*(d[0] for d in done), strict=True)]
-    return streams, np.concatenate([d[1] for d in done])
 
 
 def clipped(ordinary: Ordinary, z: float) -> float:

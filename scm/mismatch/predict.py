@@ -134,16 +134,23 @@ def _drive_way(
     `t`, `values` and `rates`, (3, n), are the measured pose, smoothed; `way` is x, y and yaw, (3,
     edges, sets). `row`, all 0, `seen` and `last` are room to work in.
     """
+    c, s = 1.0, 0.0
     for k in range(len(edges)):
         for b in range(len(late)):
-            stamp = edges[k] + late[b] + rate[b] * (edges[k] - edges[0])
-            stamp = min(max(stamp, t[0]), t[len(t) - 1])
-            i = row[b]
-            while i < len(t) - 2 and t[i + 1] <= stamp:
-                i += 1
-            row[b] = i
-            _measured(stamp, i, t, values, rates, seen)
-            c, s = np.cos(seen[2] - heading[b]), np.sin(seen[2] - heading[b])
+            if (
+                b == 0
+                or late[b] != late[b - 1]
+                or rate[b] != rate[b - 1]
+                or heading[b] != heading[b - 1]
+            ):
+                stamp = edges[k] + late[b] + rate[b] * (edges[k] - edges[0])
+                stamp = min(max(stamp, t[0]), t[len(t) - 1])
+                i = row[b]
+                while i < len(t) - 2 and t[i + 1] <= stamp:
+                    i += 1
+                row[b] = i
+                _measured(stamp, i, t, values, rates, seen)
+                c, s = np.cos(seen[2] - heading[b]), np.sin(seen[2] - heading[b])
             turning = yaw_rate[k, b]
             along = speed[k, b] - turning * arm_y[b]
             across = lateral_speed[k, b] + turning * arm_x[b]

@@ -29,6 +29,7 @@ SIGNALS = (
 )  # fmt: skip
 THROTTLE_DELAY, STEERING_DELAY = "drive.delay_s", "steering.delay_s"
 COMMAND_CLOCK = "clock.commands_s"  # commands take effect so much later than they are stamped
+_LATE = (COMMAND_CLOCK, THROTTLE_DELAY, STEERING_DELAY)
 Numbers = Mapping[str, float]
 _Used = TypeVar("_Used")
 
@@ -47,15 +48,43 @@ class Motions:
     def __getitem__(self, name: str) -> Floats:
         return self.signals[name]
 
+    def of(self, columns: Sequence[int]) -> "Motions":
+        """Return the motions in these columns, each as often as it is named."""
+        if list(columns) == list(range(len(self.ok))):
+            return self
+        some = {name: signal[:, columns] for name, signal in self.signals.items()}
+        return Motions(some, self.ok[columns])
+
+
+class Tiles:
+    """Fleets of one compiled car, a tile for each thread, that rollouts take turns with.
+
+    Attributes:
+        params: The car's numbers; `columns`: where each stands in a fleet, by key.
+        lean: Of the same car with fewer effects, for sets that name none of the others.
+    """
+
+    def __init__(self, car: Car, lean: "Tiles | None" = None) -> None:
+        self.car, self.lean = car, lean
+        self.fleets = [Fleet(car, ROWS) for _ in range(THREADS)]
+        self.params = tuple(column.param for column in self.fleets[0].columns)
+        self.columns = {param.key: i for i, param in enumerate(self.params)}
+
+    def enough_for(self, sets: Sequence[Numbers]) -> "Tiles":
+        """Return the tiles of the smallest car that has all the numbers named."""
+        if self.lean is None:
+            return self
+        more = self.columns.keys() - self.lean.columns.keys()
+        return self if any(more & numbers.keys() for numbers in sets) else self.lean
+
 
 class Rollouts:
     """Drives one recording again."""
 
-    def __init__(self, drive: Drive, car: Car) -> None:
+    def __init__(self, drive: Drive, car: Car, tiles: Tiles | None = None) -> None:
         self.drive, self.car = drive, car
-        self._fleets = [Fleet(car, ROWS) for _ in range(THREADS)]
-        self.params = tuple(column.param for column in self._fleets[0].columns)
-        self._column = {param.key: i for i, param in enumerate(self.params)}
+        self.tiles = tiles or Tiles(car)
+        self.params = self.tiles.params
         smoothed, edges = drive.smoothed, drive.edges
         psi = smoothed["pose.yaw"].at(edges)
         px, py = drive.point
@@ -67,32 +96,46 @@ class Rollouts:
     def run(self, sets: Sequence[Numbers]) -> Motions:
         """Drive all parameter sets; each is nominal but for the numbers it names by key."""
         parts = self.each(sets, lambda motions, _: motions)
-        return Motions(
-            {name: np.concatenate([p[name] for p in parts], axis=1) for name in SIGNALS},
-            np.concatenate([p.ok for p in parts]),
-        )
+        back = np.argsort(np.concatenate([which for which, _ in parts]))
+        together = {n: np.concatenate([p[n] for _, p in parts], axis=1)[:, back] for n in SIGNALS}
+        return Motions(together, np.concatenate([p.ok for _, p in parts])[back])
 
     def each(
         self, sets: Sequence[Numbers], use: Callable[[Motions, Sequence[Numbers]], _Used]
-    ) -> list[_Used]:
-        """Drive all parameter sets, a tile at a time; return what `use` makes of each tile.
+    ) -> list[tuple[list[int], _Used]]:
+        """Drive all parameter sets, a tile at a time; return what `use` makes of each, and which.
 
         Motions of many sets are large: what is read of them is better read where they are made.
-        `use` is called on several threads.
+        Sets that differ only in faults of measurement share one. `use` is called on all threads.
         """
-        chunks = [sets[i : i + ROWS] for i in range(0, len(sets), ROWS)]
+        moving = [self._moving(numbers) for numbers in sets]
+        places = {one: k for k, one in enumerate(dict.fromkeys(moving))}
+        at = [places[one] for one in moving]
+        different = [dict(one) for one in places]
+        which = [[i for i, k in enumerate(at) if first <= k < first + ROWS]
+                 for first in range(0, len(different), ROWS)]  # fmt: skip
 
-        def share(first: int) -> list[_Used]:
-            fleet = self._fleets[first]
-            return [use(self._run(fleet, chunk), chunk) for chunk in chunks[first::THREADS]]
+        def share(thread: int) -> list[tuple[list[int], _Used]]:
+            found = list[tuple[list[int], _Used]]()
+            for tile in range(thread, len(which), THREADS):
+                first, mine = tile * ROWS, which[tile]
+                motions = self._run(thread, different[first : first + ROWS])
+                some = motions.of([at[i] - first for i in mine])
+                found.append((mine, use(some, [sets[i] for i in mine])))
+            return found
 
-        others = pool(THREADS).map(share, range(1, min(THREADS, len(chunks))))
-        done = [share(0), *others]
-        return [done[k % THREADS][k // THREADS] for k in range(len(chunks))]
+        others = pool(THREADS).map(share, range(1, min(THREADS, len(which))))
+        return [*share(0), *(one for other in others for one in other)]
 
-    def _run(self, fleet: Fleet, sets: Sequence[Numbers]) -> Motions:
+    def _moving(self, numbers: Numbers) -> tuple[tuple[str, float], ...]:
+        """Return the numbers that a car's motion depends on."""
+        return tuple((k, v) for k, v in numbers.items() if k in self.tiles.columns or k in _LATE)
+
+    def _run(self, thread: int, sets: Sequence[Numbers]) -> Motions:
+        tiles = self.tiles.enough_for(sets)
+        fleet = tiles.fleets[thread]
         n, edges, tether = len(sets), self.drive.edges, _Tether(fleet)
-        delays = self._set(fleet, sets)
+        delays = self._set(fleet, tiles.columns, sets)
         self._begin(fleet, n, delays)
         commands = [
             means(command, edges, delays[k])
@@ -110,7 +153,7 @@ class Rollouts:
         ok = fleet.status[:n] == VehicleStatus.OK
         return Motions({name: out[:, k, :n] for k, name in enumerate(SIGNALS)}, ok)
 
-    def _set(self, fleet: Fleet, sets: Sequence[Numbers]) -> Floats:
+    def _set(self, fleet: Fleet, columns: Mapping[str, int], sets: Sequence[Numbers]) -> Floats:
         """Give each row its numbers; return the commands' delays, (2, rows)."""
         delays = np.zeros((2, fleet.capacity))
         for row in range(fleet.capacity):
@@ -122,8 +165,8 @@ class Rollouts:
                     delays[:, row] += value
                 elif key in (THROTTLE_DELAY, STEERING_DELAY):
                     delays[int(key == STEERING_DELAY), row] += value
-                elif key in self._column:
-                    fleet.parameters[row, self._column[key]] = value
+                else:
+                    fleet.parameters[row, columns[key]] = value
         return delays
 
     def _begin(self, fleet: Fleet, n: int, delays: Floats) -> None:

@@ -20,6 +20,7 @@ from scm.vehicles.jit import array_kernel
 EX, EY, EPSI, DV, DY, DR = range(6)
 BODY = 6
 FELT_S = 0.1
+AT_ONCE = 64  # sets weighed together: what is worked on stays small
 SLOW = 0.12  # of the usual speed: below it dry friction decides, to the moment, when a car halts
 HALT, HALTING = 0.3, 3.0  # as a leap of so much throttle; of an accelerometer's own disturbance
 SHORT_S = 0.3  # how long an accelerometer's own disturbance lasts
@@ -149,14 +150,18 @@ class Whitener:
 
     def innovations(self, residuals: Sequence[Floats]) -> Floats:
         """Return unit innovations, (events, sets), of measured minus predicted of each stream."""
-        stacked = np.ascontiguousarray(np.concatenate(residuals, axis=0)[self._order])
-        out, system = np.empty_like(stacked), self._system
-        _innovations(
-            self.t, self.stream, self._cos, self._sin, system.rows, system.columns,
-            system.factors, system.see, self._gain, self._variance, self._keep,
-            np.zeros((system.size, stacked.shape[1])), stacked, out,
-        )  # fmt: skip
-        return out
+        sets, system = residuals[0].shape[1], self._system
+        found = np.empty((len(self.t), sets))
+        for first in range(0, sets, AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            stacked = np.concatenate([r[:, some] for r in residuals], axis=0)[self._order]
+            _innovations(
+                self.t, self.stream, self._cos, self._sin, system.rows, system.columns,
+                system.factors, system.see, self._gain, self._variance, self._keep,
+                np.zeros((system.size, stacked.shape[1])), stacked,
+            )  # fmt: skip
+            found[:, some] = stacked
+        return found
 
 
 def _felt(command: Commanded, t: Floats) -> Floats:
@@ -241,16 +246,13 @@ def _seen(p: Floats, h: Floats, noise: float, gain: Floats) -> float:
 @array_kernel
 def _innovations(
     t: Floats, stream: Ints, cos: Floats, sin: Floats, rows: Ints, columns: Ints, factors: Floats,
-    see: Floats, gain: Floats, variance: Floats, keep: Floats, x: Floats, residual: Floats,
-    out: Floats,
+    see: Floats, gain: Floats, variance: Floats, keep: Floats, x: Floats, out: Floats,
 ) -> None:  # fmt: skip
-    """Run the state of many residual sequences through known gains."""
+    """Turn many sequences of residuals into innovations, through known gains."""
     n, sets = x.shape
     for k in range(len(t)):
         dt = t[k] - t[k - 1] if k > 0 else 0.0
         _move(x, cos[k] * dt, sin[k] * dt, rows, columns, factors, dt, keep[k])
-        for b in range(sets):
-            out[k, b] = residual[k, b]
         _add(out[k], see[stream[k]], x)
         size = 1.0 / np.sqrt(variance[k])
         for i in range(n):

@@ -11,7 +11,7 @@ from scm.geometry import Pose2
 from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.experiment.manoeuvres import ROW_S, Manoeuvre
 from scm.mismatch.experiment.pace import SIDEWAYS_M_S2, Pace
-from scm.mismatch.likelihood import Likelihood, residuals_of
+from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate
 from scm.mismatch.noise import Noise
 from scm.mismatch.predict import Prediction
@@ -145,11 +145,11 @@ class Planned(Likelihood):
         drives = list[Drive]()
         for leg in legs:
             rough = _imagined(model.drives[0], leg, None)
-            seen = _read(rough, model.car, leg.change(truth))
+            seen = _read(rough, model, leg.change(truth))
             drives.append(_imagined(model.drives[0], leg, seen))
-        super().__init__(drives, model.car)
+        super().__init__(drives, model.car, model.tiles)
         for drive, leg in zip(drives, legs, strict=True):
-            _read(drive, model.car, leg.change(truth))
+            _read(drive, model, leg.change(truth))
 
     def believe(self, noise: Noise) -> None:
         """Take the belief about noise that the recording gave, whichever these drives would."""
@@ -159,20 +159,17 @@ class Planned(Likelihood):
     def residuals(self, sets: Sequence[Numbers]) -> tuple[list[list[Floats]], Bools]:
         """Return residuals of every leg, each with what was changed for it."""
         self.runs += len(sets)
-        ok, found = np.ones(len(sets), dtype=np.bool_), []
-        for leg, rollouts, prediction in zip(
-            self._legs, self._rollouts, self._predictions, strict=True
-        ):
-            changed = [leg.change(numbers) for numbers in sets]
-            left, fine = residuals_of(rollouts, prediction, changed)
-            ok &= fine
-            found.append(left)
-        return found, ok
+        found = [
+            self._left(i, [leg.change(numbers) for numbers in sets])
+            for i, leg in enumerate(self._legs)
+        ]
+        return [left for left, _ in found], np.all([ok for _, ok in found], axis=0)
 
 
-def _read(drive: Drive, car: Car, truth: Numbers) -> dict[str, Floats]:
+def _read(drive: Drive, model: Likelihood, truth: Numbers) -> dict[str, Floats]:
     """Let a drive's sensors have read what this car would have done; return the values."""
-    residuals = Prediction(drive).residuals(Rollouts(drive, car).run([truth]), [truth])
+    motions = Rollouts(drive, model.car, model.tiles).run([truth])
+    residuals = Prediction(drive).residuals(motions, [truth])
     drive.streams = [
         replace(stream, values=stream.values - left[:, 0])
         for stream, left in zip(drive.streams, residuals, strict=True)

@@ -68,7 +68,7 @@ def cells_of(model: Likelihood, fitter: Fitter, base: Fitted) -> Cells:
     parts, numbers = list[dict[str, Floats]](), list[Ints]()
     values = fitter.numbers(base.effects, base.z, base.values)
     for i, drive in enumerate(model.drives):
-        motion = Rollouts(drive, model.car).run([values])
+        motion = Rollouts(drive, model.car, model.tiles).run([values])
         edges = drive.edges
         t = wide * np.arange(int(spans[i] / wide) + 1, dtype=np.float64)
         x, y, yaw = (drive.smoothed[f"pose.{n}"].at(edges[0] + t) for n in ("x", "y", "yaw"))

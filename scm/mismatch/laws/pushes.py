@@ -1,6 +1,6 @@
 """Laws as courses of pushes over moments: what the general effect gives where the car was then."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -23,24 +23,33 @@ def shape(curve: Mapping[str, float], cells: Cells) -> Floats:
     for name in WEIGHTS:
         if f"by_{name}" in curve:
             q += curve[f"by_{name}"] * cells.driven[name]
-    away = np.abs(q)
-    parts = {
-        "sine": np.sin(q), "cosine": np.cos(q), "one": np.ones(len(q)), "line": q, "size": away,
-        "square": q * q, "cube": q * q * q, "heavy": away * q * q, "ramp": np.maximum(q, 0.0),
-        "step": np.clip(q + 0.5, 0.0, 1.0),
-    }  # fmt: skip
-    return sum((curve[k] * part for k, part in parts.items() if k in curve), np.zeros(len(q)))
+    parts = (curve[name] * part(q) for name, part in _SHAPES.items() if name in curve)
+    return sum(parts, np.zeros(len(cells)))
 
 
 def amount(channel: Mapping[str, float], cells: Cells) -> Floats:
     """Return what the shape is multiplied with at each moment, (cells,)."""
-    driven = cells.driven
+    parts = (channel[name] * _FACTORS[name](cells.driven) for name in channel)
+    return sum(parts, np.zeros(len(cells)))
+
+
+def _ones(driven: Mapping[str, Floats]) -> Floats:
+    return np.ones_like(driven["speed"])
+
+
+def _drag(driven: Mapping[str, Floats]) -> Floats:
     speed = driven["speed"] / SLOW
-    ones = np.ones(len(cells))
-    factors: dict[str, Floats] = {
-        "along_n": ones, "drag_n": -speed / np.sqrt(1.0 + speed * speed),
-        "world_x_n": np.cos(driven["yaw"]), "world_y_n": np.sin(driven["yaw"]),
-        "turn_rad": ones, "turn_gain": driven["steer"], "throttle_gain": driven["throttle"],
-        "moment_nm": ones,
-    }  # fmt: skip
-    return sum((channel[k] * factors[k] for k in channel), np.zeros(len(cells)))
+    return -speed / np.sqrt(1.0 + speed * speed)
+
+
+_SHAPES: Mapping[str, Callable[[Floats], Floats]] = {
+    "sine": np.sin, "cosine": np.cos, "one": np.ones_like, "line": lambda q: q, "size": np.abs,
+    "square": lambda q: q * q, "cube": lambda q: q * q * q, "heavy": lambda q: np.abs(q) * q * q,
+    "ramp": lambda q: np.maximum(q, 0.0), "step": lambda q: np.clip(q + 0.5, 0.0, 1.0),
+}  # fmt: skip
+_FACTORS: Mapping[str, Callable[[Mapping[str, Floats]], Floats]] = {
+    "along_n": _ones, "drag_n": _drag, "world_x_n": lambda d: np.cos(d["yaw"]),
+    "world_y_n": lambda d: np.sin(d["yaw"]), "turn_rad": _ones,
+    "turn_gain": lambda d: d["steer"], "throttle_gain": lambda d: d["throttle"],
+    "moment_nm": _ones,
+}  # fmt: skip

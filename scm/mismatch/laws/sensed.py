@@ -14,7 +14,7 @@ from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.findings import Equation
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate, Knob
-from scm.mismatch.rollouts import Motions, Numbers
+from scm.mismatch.rollouts import Motions, Numbers, Tiles
 from scm.vehicles.car import Car
 
 PREFIX = "sensed."
@@ -132,7 +132,7 @@ class Sensing(Likelihood):
     """
 
     def __init__(self, model: Likelihood, car: Car) -> None:
-        super().__init__(model.drives, car)
+        super().__init__(model.drives, car, Tiles(car, model.tiles))
         self.believe(model.noise)
         self.learned: dict[str, list[list[Floats]]] = {}
 

@@ -37,7 +37,7 @@ def test_a_delay_is_the_command_later(healthy):
 def test_the_pose_is_carried_back_so_that_a_long_drive_ends_where_it_was_measured(healthy):
     rollouts = Rollouts(healthy, big_nigel())
     rollouts.run([{"steering.trim_rad": 0.1}])
-    fleet = rollouts._fleets[0]
+    fleet = rollouts.tiles.fleets[0]
     assert abs(float(fleet.x[0]) - healthy.smoothed["pose.x"].value[-1]) < 0.05
 
 
