@@ -19,19 +19,19 @@ from scm.mismatch.parts import split
 ROOT = Path(__file__).parents[2]
 OUT = ROOT / "docs" / "diagnoses"
 DATA = ROOT.parent / "shared" / "recordings"
-SLALOM = [path.name for path in sorted((ROOT / "recordings/f1tenth_optitrack").glob("slalom_*"))]
+SLALOM = sorted((ROOT / "recordings" / "f1tenth_optitrack").glob("slalom_*"))
 SETS = {
     "ucar": ("cpm_ucar", ["a_first56s.yaml", "b.yaml", "d_warmed_up.yaml"]),
-    "slalom": ("f1tenth_optitrack", SLALOM),
+    "slalom": ("f1tenth_optitrack", [path.name for path in SLALOM]),
     "dart": (
         "dart",
         [f"free_driving_{name}.yaml" for name in ("10_01_01", "10_02_28", "10_27_02")],
     ),
-    "genesis": ("genesis", ["rfs_path1.yaml", "rfs_path2.yaml", "cpg_slow_lap.yaml"]),
-    "av21": ("iac_av21", ["putnam.yaml", "lvms.yaml"]),
+    "genesis": ("genesis", ["rfs_path1.yaml", "rfs_path2.yaml"]),
+    "av21": ("iac_av21", ["lvms.yaml"]),
     "frictionmaps": ("f1tenth_frictionmaps", ["ds3.yaml"]),
 }
-SHOWN = ("free_run_errors", "free_runs", "parameters")
+SHOWN = ("better", "error_position", "numbers")
 BUDGET_S = 900.0
 
 

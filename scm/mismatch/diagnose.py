@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock, seconds
@@ -13,6 +14,7 @@ from scm.errors import RecordingError
 from scm.mismatch.curves import curve
 from scm.mismatch.doubt.corrected import corrected
 from scm.mismatch.doubt.doubt import doubt
+from scm.mismatch.doubt.suspicion import Doubts
 from scm.mismatch.drive import Drive
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns
 from scm.mismatch.experiment.scenario import write_scenario
@@ -45,6 +47,8 @@ from scm.recording.read import Recording, read_recordings
 from scm.vehicles.car import Car, load_car
 
 POSE = ("position_m", "yaw_rad")
+POSE_X, SHORTEST_S = "pose.x", 20.0  # of several recordings together, where each is short
+OF_SHORT = ("no_verdict", "too_short")
 STRAYS = 6.0  # times what noise alone makes of a free run's error
 Tell = Callable[[str], None]
 
@@ -115,14 +119,22 @@ def _doubted(
     recordings: Sequence[Recording], car: Car
 ) -> tuple[list[Recording], tuple[DataProblem, ...]]:
     """Return the recordings that can be used, repaired, and everything wrong with any."""
+    every = [doubt(recording, car) for recording in recordings]
     usable, problems = list[Recording](), list[DataProblem]()
-    for recording in recordings:
-        doubts = doubt(recording, car)
-        where = f"{_titles([recording])[0]}: " if len(recordings) > 1 else ""
-        problems += [replace(problem, said=where + problem.said) for problem in doubts.problems]
-        if doubts.usable.can_diagnose:
+    length_s = sum(float(np.ptp(recording.channel(POSE_X).t)) for recording in recordings
+                   if POSE_X in recording.channels)  # fmt: skip
+    for recording, doubts in zip(recordings, every, strict=True):
+        together = length_s > SHORTEST_S and _is_only_short(doubts)
+        problems += [p for p in doubts.problems if not together or p.name not in OF_SHORT]
+        if together or doubts.usable.can_diagnose:
             usable.append(corrected(recording, doubts))
     return usable, tuple(problems)
+
+
+def _is_only_short(doubts: Doubts) -> bool:
+    """Say whether a recording lacks nothing but length, which several have together."""
+    lacks = doubts.usable.lacks
+    return bool(lacks) and all(lack.startswith("only ") for lack in lacks)
 
 
 def write(found: Found, out: Path) -> None:

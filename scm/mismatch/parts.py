@@ -4,16 +4,19 @@ Parts are blocks of a few seconds that take turns, so that each part sees all of
 of the turns changes from four blocks to four, or laps as long as they would tie parts to places.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
+from scm.mismatch.drive import Drive
 from scm.mismatch.findings import Span
 from scm.mismatch.likelihood import Likelihood
 
 BLOCK_S = 5.0
 LEAST_BLOCKS = 4
+WHOLE = 2.0  # blocks: drives that are shorter are not cut, where there are enough of them
 NAMES = ("fit", "choose", "confirm")
 _FIT, _CHOOSE, _CONFIRM = range(3)
 _TURNS = (
@@ -47,11 +50,14 @@ class Parts:
 
 
 def split(model: Likelihood, block_s: float = BLOCK_S) -> Parts:
-    """Return about half, a quarter and a quarter of each recording; the same for the same ones."""
+    """Return about half, a quarter and a quarter of each recording; the same for the same ones.
+
+    Of many recordings too short for four blocks, whole ones take turns.
+    """
     weights = [list[Floats]() for _ in NAMES]
     spans = [list[tuple[Span, ...]]() for _ in NAMES]
-    for number, (drive, whitener) in enumerate(zip(model.drives, model.whiteners, strict=True)):
-        cuts = cuts_of(float(drive.edges[0]), float(drive.edges[-1]), block_s)
+    every = blocks(model.drives, block_s)
+    for number, (cuts, whitener) in enumerate(zip(every, model.whiteners, strict=True)):
         whose = _whose(len(cuts) - 1, number)
         block = np.clip(np.searchsorted(cuts, whitener.t, side="right") - 1, 0, len(whose) - 1)
         for part in range(len(NAMES)):
@@ -60,16 +66,24 @@ def split(model: Likelihood, block_s: float = BLOCK_S) -> Parts:
     return Parts(*(Part(np.concatenate(w), tuple(s)) for w, s in zip(weights, spans, strict=True)))
 
 
-def cuts_of(first: float, last: float, block_s: float) -> Floats:
-    """Return where blocks begin and end: at least four, all of one length."""
-    blocks = max(round((last - first) / block_s), LEAST_BLOCKS)
-    return np.linspace(first, last, blocks + 1)
+def blocks(drives: Sequence[Drive], block_s: float = BLOCK_S) -> list[Floats]:
+    """Return where the blocks of each drive begin and end, all of a drive of one length."""
+    longest = max(float(drive.edges[-1] - drive.edges[0]) for drive in drives)
+    least = 1 if len(drives) >= LEAST_BLOCKS and longest < WHOLE * block_s else LEAST_BLOCKS
+    return [
+        np.linspace(
+            first, last, max(round((last - first) / block_s) if least > 1 else 1, least) + 1
+        )
+        for first, last in ((float(drive.edges[0]), float(drive.edges[-1])) for drive in drives)
+    ]
 
 
-def _whose(blocks: int, first: int) -> Ints:
+def _whose(count: int, first: int) -> Ints:
     """Return the part of each block; drives begin with different turns."""
-    turns = [_TURNS[(first + i) % len(_TURNS)] for i in range(-(-blocks // LEAST_BLOCKS))]
-    return np.array([part for turn in turns for part in turn])[:blocks]
+    if count < LEAST_BLOCKS:
+        return np.array([_TURNS[first // LEAST_BLOCKS % len(_TURNS)][first % LEAST_BLOCKS]])
+    turns = [_TURNS[(first + i) % len(_TURNS)] for i in range(-(-count // LEAST_BLOCKS))]
+    return np.array([part for turn in turns for part in turn])[:count]
 
 
 def _spans(cuts: Floats, mine: Bools) -> tuple[Span, ...]:

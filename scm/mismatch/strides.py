@@ -19,7 +19,7 @@ from scm.mismatch.drive import Drive
 from scm.mismatch.fit import TAIL
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.noise import Noise, usual_noise
-from scm.mismatch.parts import BLOCK_S, cuts_of
+from scm.mismatch.parts import blocks
 
 LENGTH_S, EVERY_S = 1.0, 0.5
 ROUNDS = 20
@@ -35,10 +35,10 @@ class Strides:
         log_size: Logarithm of each value's variance, (events,).
     """
 
-    def __init__(self, drive: Drive, noise: Noise) -> None:
+    def __init__(self, drive: Drive, noise: Noise, cuts: Floats) -> None:
         self.drive = drive
         names = drive.names
-        self._begin = _begins(drive)
+        self._begin = _begins(drive, cuts)
         self._end = self._begin + LENGTH_S
         self._names = [*_POSES, *(n for n in names if n not in _POSES)]
         middle, count = self._begin + 0.5 * LENGTH_S, len(self._begin)
@@ -104,7 +104,10 @@ class Striding(Likelihood):
         least = least_sizes(self.drives)
         own = {name: max(size, least[name]) for name, size in own.items()}
         self.noise = Noise(noise.speed, noise.side, noise.yaw_rate, own, noise.scale)
-        self.whiteners = [Strides(drive, self.noise) for drive in self.drives]  # type: ignore[misc]
+        self.whiteners = [
+            Strides(drive, self.noise, cuts)  # type: ignore[misc]
+            for drive, cuts in zip(self.drives, blocks(self.drives), strict=True)
+        ]
         self.t = np.concatenate([w.t for w in self.whiteners])
         self.settled = np.ones(len(self.t))
 
@@ -171,9 +174,8 @@ def _size(misses: Floats, rounds: int) -> float:
     return float(np.sqrt(square))
 
 
-def _begins(drive: Drive) -> Floats:
+def _begins(drive: Drive, cuts: Floats) -> Floats:
     """Return when strides begin: each within one block, none in the first second."""
-    cuts = cuts_of(float(drive.edges[0]), float(drive.edges[-1]), BLOCK_S)
     begins = [np.arange(a, b - LENGTH_S + 1e-6, EVERY_S) for a, b in pairwise(cuts)]
     every = np.concatenate(begins)
     return np.asarray(every[every >= drive.edges[0] + LENGTH_S])

@@ -52,3 +52,12 @@ def test_two_drives_are_split_each():
         first, second = getattr(parts, name).spans
         assert abs(lengths(first) - lengths(second)) < 0.1 * lengths(first)
         assert first != second
+
+
+def test_many_drives_too_short_to_cut_take_turns_as_wholes():
+    one = driven(seconds=4.0)
+    parts = split(Likelihood([one] * 4, big_nigel()))
+    held = [sum(len(getattr(parts, name).spans[i]) for name in NAMES) for i in range(4)]
+    assert held == [1, 1, 1, 1]
+    counts = {name: sum(map(bool, getattr(parts, name).spans)) for name in NAMES}
+    assert counts == {"fit": 2, "choose": 1, "confirm": 1}
