@@ -26,25 +26,26 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from scm.clock import WallClock
     from scm.mismatch.diagnose import diagnose, write
+    from scm.mismatch.progress import Progress
     from scm.mismatch.report.summary import summary
 
     name = arguments.recording[0].resolve()
     title = name.parent.name if name.name == "recording.yaml" else name.stem
     out = arguments.out or Path("runs") / f"{FOLDER}-{title}"
-    found = diagnose(
-        arguments.recording, arguments.car, arguments.data, budget_s=arguments.budget_s, tell=_tell
-    )
-    write(found, out)
-    _tell("")
+    progress = Progress(sys.stderr, WallClock())
+    try:
+        found = diagnose(
+            arguments.recording, arguments.car, arguments.data, budget_s=arguments.budget_s,
+            tell=progress.tell,
+        )  # fmt: skip
+        progress.tell("writing the report")
+        write(found, out)
+    finally:
+        progress.close()
     print(summary(found.diagnosis, out))
     return 0
-
-
-def _tell(text: str) -> None:
-    """Show what is being tried, on one line that the next one replaces."""
-    if sys.stderr.isatty():
-        print(f"\r\033[K{text[:100]}", end="", file=sys.stderr, flush=True)
 
 
 COMMAND = Command(

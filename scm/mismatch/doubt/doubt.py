@@ -13,6 +13,7 @@ from scm.mismatch.doubt.mend import (
 )
 from scm.mismatch.doubt.mend_commands import mend_commands
 from scm.mismatch.doubt.mend_pairs import mend_pairs
+from scm.mismatch.doubt.mirrored import mirrored
 from scm.mismatch.doubt.other_car import other_car
 from scm.mismatch.doubt.rows import row_problems
 from scm.mismatch.doubt.standing import standing_problem, stands
@@ -58,8 +59,14 @@ def doubt(recording: Recording, car: Car | None = None) -> Doubts:
     if car is not None:
         problems += uncounted(now, car)
     if car is not None and movement is not None and poses is not None:
-        problems += other_car(now, car, movement, poses, relations)
+        others = list(other_car(now, car, movement, poses, relations))
+        if others:  # its wheels count otherwise, no unit is wrong
+            problems = [p for p in problems if not (p.name == "unit" and p.channel == "encoder.*")]
+        problems += others
     suspicions.sort(key=lambda s: -s.sigma)
+    backwards = mirrored(problems)
+    if backwards is not None:
+        problems.append(backwards)
     can_use = usable(now, problems, car)
     if not can_use.can_diagnose:
         problems.insert(0, no_verdict(can_use.lacks, relations, suspicions))

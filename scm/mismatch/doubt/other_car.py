@@ -20,10 +20,12 @@ TOO_FAST = 1.4
 TOO_SLOW = 0.3
 TURNS = (0.55, 1.8)
 IMPOSSIBLE = (0.15, 4.0)  # in between, play, slow servos and weak steering may be to blame alone
+DOUBTFUL, MORE_THAN_PLAY = (0.5, 2.0), 0.1  # rad: no play, and no give of a steering, is so wide
 ROLLS = (0.7, 1.4)
 FOLLOWS = 0.7
 THROTTLES: Floats = np.linspace(0.0, 1.0, 11)
 SETTLED_S = 8.0
+UNSURE_THROTTLE = 0.1
 LEAST_ASKED = 0.05  # of the top speed
 
 
@@ -37,6 +39,11 @@ class Asked:
 
     throttle: Floats
     speed: Floats
+
+    @property
+    def bent(self) -> bool:
+        """Say whether a little throttle may mean a lot of speed, or none."""
+        return len(self.throttle) > 2
 
     @property
     def top(self) -> float:
@@ -54,9 +61,10 @@ def other_car(
     """Yield the problem that the car file is another car's, with all that says so."""
     reasons = [_speed(recording, car, movement), *(_wheels(relation) for relation in relations)]
     reasons = [reason for reason in reasons if reason]
-    gain = _turning(recording, car, movement, poses)
+    gain, lost_rad = _turning(recording, car, movement, poses)
+    wide = lost_rad > MORE_THAN_PLAY and gain is not None and not DOUBTFUL[0] < gain < DOUBTFUL[1]
     length = car.value("body.wheelbase_m")
-    if gain is not None and (reasons or not IMPOSSIBLE[0] < gain < IMPOSSIBLE[1]):
+    if gain is not None and (reasons or not IMPOSSIBLE[0] < gain < IMPOSSIBLE[1] or wide):
         reasons.append(
             f"it turns {gain:.2f} times as tightly as it is steered, as a wheelbase of "
             f"{length / gain:.2f} m would instead of {length:.2f} m"
@@ -120,19 +128,26 @@ def _share_of_asked(recording: Recording, movement: Series, wanted: Asked) -> fl
     speed, push = np.abs(on.smooth(movement)), np.abs(on.smooth(movement, 1))
     fast = float(np.percentile(speed, 98))
     steady = (asked > 0.3) & (push < 0.1 * fast) & (speed > 0.3 * fast)
-    full = wanted.at(asked)
+    full = wanted.at(np.maximum(asked - UNSURE_THROTTLE, 0.0) if wanted.bent else asked)
     steady &= full > LEAST_ASKED * wanted.top
     return float(np.median(speed[steady] / full[steady])) if steady.sum() * STEP_S > 3.0 else None
 
 
-def _turning(recording: Recording, car: Car, movement: Series, poses: Track) -> float | None:
-    """Return how tightly it turns against what is steered; None where nothing is odd about it."""
+def _turning(
+    recording: Recording, car: Car, movement: Series, poses: Track
+) -> tuple[float | None, float]:
+    """Return how tightly it turns against what is steered, and how many rad of steering that is.
+
+    None where nothing is odd about it.
+    """
     found = steered(recording, car, movement, poses)
     if found is None or not car.has("steering.limit_rad"):
-        return None
+        return None, 0.0
     angle = recording.channels["command.steering"].dimension == "angle"
-    gain = found.gain / (1.0 if angle else car.value("steering.limit_rad"))
-    return None if found.alike < FOLLOWS or TURNS[0] < gain < TURNS[1] else gain
+    unit = 1.0 if angle else car.value("steering.limit_rad")
+    gain = found.gain / unit
+    odd = found.alike >= FOLLOWS and not TURNS[0] < gain < TURNS[1]
+    return (gain if odd else None), found.swing * unit * abs(1.0 - gain)
 
 
 def _wheels(found: Relation) -> str:

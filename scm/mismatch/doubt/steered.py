@@ -26,10 +26,13 @@ class Steered:
         alike: Correlation, negative where the car turns the other way.
         gain: Curvature driven over that of an angle of one unit of the command, times the
             wheelbase [rad a unit]; a small-angle figure.
+        swing: From right to left of the command where this was seen, its outermost twentieths left
+            out.
     """
 
     alike: float
     gain: float
+    swing: float
 
 
 def steered(recording: Recording, car: Car, movement: Series, poses: Track) -> Steered | None:
@@ -43,7 +46,8 @@ def steered(recording: Recording, car: Car, movement: Series, poses: Track) -> S
     if len(on.t) < SHORTEST_S / STEP_S:
         return None
     speed, rate = on.smooth(movement), on.smooth(Series(poses.t, poses.yaw), 1)
-    asked = speed * on.smooth_even(held(steering, on.t - LATE_S)) / car.value("body.wheelbase_m")
+    wheels = on.smooth_even(held(steering, on.t - LATE_S))
+    asked = speed * wheels / car.value("body.wheelbase_m")
     fast = np.percentile(np.abs(speed), 90)
     rows = (np.abs(speed) > 0.3 * fast) & (np.abs(speed * rate) < QUIET_MPS2)
     if rows.sum() < SHORTEST_S / STEP_S or rate[rows].std() < STRAIGHT_RAD_S:
@@ -53,4 +57,5 @@ def steered(recording: Recording, car: Car, movement: Series, poses: Track) -> S
     swing = float(np.ptp(np.percentile(steering.values, (5, 95))))
     if own <= 0.0 or swing < LEAST_SWING * float(np.abs(steering.values).max()):
         return None
-    return Steered(both / math.sqrt(own * float((b * b).sum())), both / own)
+    seen = float(np.ptp(np.percentile(wheels[rows], (5, 95))))
+    return Steered(both / math.sqrt(own * float((b * b).sum())), both / own, seen)

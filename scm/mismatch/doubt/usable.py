@@ -66,6 +66,8 @@ def _lacks(
     if missing:
         yield f"missing: {', '.join(missing)}"
         return
+    if any(p.name == "time_backwards" and p.channel == "*" for p in problems):
+        yield "time runs backwards"
     if any(p.name == "standing" for p in problems):
         yield "the car does not move"
     if any(p.name == "other_car" for p in problems):

@@ -100,6 +100,11 @@ def test_the_file_of_another_car_is_told_whatever_drives_it(drive: Drive, car: s
     }
 
 
+def test_a_car_of_half_the_length_is_told_by_its_turning(drive: Drive, nigel: Car) -> None:
+    short = nigel.with_terms([], {"body.wheelbase_m": 0.4 * nigel.value("body.wheelbase_m")})
+    assert ("*", "other_car") in {(p.channel, p.name) for p in doubt(drive(0), short).problems}
+
+
 def test_without_a_verdict_it_is_said_what_can_still_be_concluded(drive: Drive, nigel: Car) -> None:
     def biased(name: str, c: Channel) -> Channel:
         return replace(c, values=c.values + 0.1) if name == "imu.gyro_z" else c
@@ -111,3 +116,13 @@ def test_without_a_verdict_it_is_said_what_can_still_be_concluded(drive: Drive, 
     assert "agree" in healthy.said
     assert healthy.record_instead
     assert "+0.10" in doubt(changed(undriven, biased), nigel).problems[0].said
+
+
+def test_a_recording_that_runs_backwards_in_time_allows_no_verdict(
+    drive: Drive, nigel: Car
+) -> None:
+    def mirror(_name: str, c: Channel) -> Channel:
+        return replace(c, t=90.0 - c.t[::-1], values=c.values[::-1].copy())
+
+    found = doubt(changed(drive(0), mirror), nigel)
+    assert found.usable.lacks == ("time runs backwards",)

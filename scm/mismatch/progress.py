@@ -1,0 +1,100 @@
+"""How far a diagnosis is: a bar on a terminal that is drawn anew twice a second, elsewhere lines.
+
+The share done is an estimate: each thing that is tried has a usual place in the whole, measured on
+drives of 90 s, and between two of them the bar creeps.
+"""
+
+import math
+import threading
+from typing import TextIO
+
+from scm.clock import Clock, seconds
+
+BAR, WIDTH = 24, 100
+CLEARED = "\r\033[K"
+REDRAWN_S = 0.5
+CREEP_S = 12.0
+# What a step's words begin with, and the usual share of the work that is done when it begins.
+STEPS = (
+    ("doubting", 0.0), ("fitting", 0.04), ("trying", 0.15), ("refitting", 0.22),
+    ("asking", 0.6), ("laying", 0.66), ("judging", 0.88), ("designing", 0.93),
+    ("simulating", 0.94), ("no drive", 0.95), ("writing", 0.98),
+)  # fmt: skip
+ANOTHER_EFFECT, LAST_EFFECT, LAWS = 0.16, 0.56, 0.7
+
+
+class Progress:
+    """Shows what is being tried, for how long, and about how much is done.
+
+    Args:
+        stream: Where to; a bar if it is a terminal.
+        clock: For the seconds.
+    """
+
+    def __init__(self, stream: TextIO, clock: Clock) -> None:
+        self._stream, self._clock = stream, clock
+        self._began_ns = self._step_ns = clock.now_ns()
+        self._share, self._next, self._shown, self._text = 0.0, STEPS[1][1], 0.0, ""
+        self._lock, self._over = threading.Lock(), threading.Event()
+        self._drawing: threading.Thread | None = None
+        if stream.isatty():
+            self._drawing = threading.Thread(target=self._redraw, daemon=True)
+            self._drawing.start()
+
+    def tell(self, text: str) -> None:
+        """Say what is tried from now on."""
+        with self._lock:
+            self._shown = self._done()
+            self._share = _share(text, self._share)
+            after = min((s for _, s in STEPS if s > self._share + 0.005), default=1.0)
+            self._next = min(after, self._share + ANOTHER_EFFECT)
+            self._text, self._step_ns = text, self._clock.now_ns()
+        if self._drawing is None:
+            self._write(f"{self._elapsed_s():5.0f} s  {text}\n")
+        else:
+            self._draw()
+
+    def close(self) -> None:
+        """Take the bar away."""
+        self._over.set()
+        if self._drawing is not None:
+            self._drawing.join()
+            self._write(CLEARED)
+
+    def line(self) -> str:
+        """Return the bar as it is now."""
+        with self._lock:
+            done, text = self._done(), self._text
+        filled = round(BAR * done)
+        bar = "#" * filled + "." * (BAR - filled)
+        return f"[{bar}] {100.0 * done:3.0f} %  {self._elapsed_s():3.0f} s  {text}"[:WIDTH]
+
+    def _done(self) -> float:
+        """Return the share done, never less than was shown before."""
+        since = seconds(self._clock.now_ns() - self._step_ns)
+        crept = 0.9 * (self._next - self._share) * (1.0 - math.exp(-since / CREEP_S))
+        return max(self._shown, self._share + crept)
+
+    def _elapsed_s(self) -> float:
+        return seconds(self._clock.now_ns() - self._began_ns)
+
+    def _draw(self) -> None:
+        self._write(CLEARED + self.line())
+
+    def _write(self, text: str) -> None:
+        self._stream.write(text)
+        self._stream.flush()
+
+    def _redraw(self) -> None:
+        while not self._over.wait(REDRAWN_S):
+            self._draw()
+
+
+def _share(text: str, before: float) -> float:
+    """Return about how much is done when a step begins, never less than before."""
+    if text.startswith("trying") and before >= STEPS[3][1]:
+        return max(before, min(before + ANOTHER_EFFECT, LAST_EFFECT))
+    if text.startswith("refitting") and "laws" in text:
+        return max(before, LAWS)
+    known = next((share for words, share in STEPS if text.startswith(words)), before)
+    return max(before, known)
