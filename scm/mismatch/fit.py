@@ -5,7 +5,7 @@ scatter that the car file states.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -89,6 +89,12 @@ class Fitter:
         z = np.zeros(len(self.model.ordinary)) if z is None else z
         e, _ = self.model([self.numbers((), z, np.zeros(0))])
         return Fitted((), z, np.zeros(0), e[:, 0], float(self.score(e, z)[0]), np.zeros((0, 0)))
+
+    def nominal(self, base: Fitted) -> Fitted:
+        """Return a hypothesis with the car's own numbers as the file says, with derivatives."""
+        fitted = replace(base, z=np.zeros_like(base.z), values=base.values.copy())
+        self._differentiate([fitted], fresh=True)
+        return fitted
 
     def begin(
         self, base: Fitted, trials: Sequence[tuple[tuple[Candidate, ...], Floats]]

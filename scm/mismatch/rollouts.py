@@ -23,6 +23,7 @@ from scm.vehicles.lanes import LANES
 
 ROWS, THREADS = LANES, 2
 TETHER_STEPS = 50
+COMMANDED = 2  # parts of a step with a command each: a servo at its rate moves by when, not how far
 SIGNALS = (
     "speed", "lateral_speed", "yaw_rate", "accel_x", "accel_y", "steer_angle",
     "wheel_angle.fl", "wheel_angle.fr", "wheel_angle.rl", "wheel_angle.rr",
@@ -137,10 +138,9 @@ class Rollouts:
         n, edges, tether = len(sets), self.drive.edges, _Tether(fleet)
         delays = self._set(fleet, tiles.columns, sets)
         self._begin(fleet, n, delays)
-        commands = [
-            means(command, edges, delays[k])
-            for k, command in enumerate((self.drive.throttle, self.drive.steering))
-        ]
+        changes = np.linspace(edges[0], edges[-1], COMMANDED * (len(edges) - 1) + 1)
+        throttle = means(self.drive.throttle, changes, delays[0])
+        steering = means(self.drive.steering, changes, delays[1])
         out, first = np.empty((len(edges), len(SIGNALS), fleet.capacity)), _now(fleet)
         for k, name in enumerate(SIGNALS):
             out[0, k] = first[name]
@@ -148,7 +148,8 @@ class Rollouts:
             b = min(a + TETHER_STEPS, len(edges) - 1)
             if self.drive.battery is not None:
                 fleet.battery[:n] = self.drive.battery[a]
-            tether.rollout(commands[0][a:b], commands[1][a:b], out[a + 1 : b + 1])
+            now = slice(COMMANDED * a, COMMANDED * b)
+            tether.rollout(throttle[now], steering[now], out[a + 1 : b + 1])
             tether.carry(n, self._x[b], self._y[b], self._yaw[b])
         ok = fleet.status[:n] == VehicleStatus.OK
         return Motions({name: out[:, k, :n] for k, name in enumerate(SIGNALS)}, ok)
@@ -198,15 +199,15 @@ class _Tether:
         self._state = (fleet._block, fleet._numbers, fleet._alive, fleet._status)  # noqa: SLF001
         self._cog = np.array([slots[n][0] for n in (*COG, "x", "y")], dtype=np.int64)
         self._kept = np.array([fleet._slot_of_signal(n) for n in SIGNALS])  # noqa: SLF001
-        self._steps = whole_steps(STEP_S, SUBSTEP_S)
+        self._steps = whole_steps(STEP_S / COMMANDED, SUBSTEP_S)
         self._remembers = fleet._past is not None  # noqa: SLF001
 
     def rollout(self, throttle: Floats, steering: Floats, out: Floats) -> None:
-        """Drive all rows through commands, (steps,) or (steps, rows); write every signal."""
+        """Drive all rows through commands, (parts,) or (parts, rows); write steps' signals."""
         if self._remembers:
-            got = self._fleet.rollout(throttle, steering, STEP_S, SIGNALS)
+            got = self._fleet.rollout(throttle, steering, STEP_S / COMMANDED, SIGNALS)
             for k, name in enumerate(SIGNALS):
-                out[:, k] = got[name]
+                out[:, k] = got[name][COMMANDED - 1 :: COMMANDED]
             return
         given = [c[:, None] if c.ndim == 1 else c for c in (throttle, steering)]
         self._kernel.rollout(

@@ -128,7 +128,8 @@ class Search:
             for start in candidate.starts
         ]
         self.tell(f"trying {len(self.listed)} effects from {len(trials)} starts")
-        begun = self.fitter.begin(base, trials)
+        nominal = self.fitter.nominal(base)  # a re-tuned car bends towards what is missing
+        begun = [*self.fitter.begin(base, trials), *self.fitter.begin(nominal, trials)]
         best: dict[int, Fitted] = {}
         for fitted in begun:
             key = id(fitted.effects[-1])

@@ -97,7 +97,8 @@ def advance(block, numbers, alive, status, first, last, steps, dt):
 def rollout(
     block, numbers, alive, status, first, last, steps, dt, throttle, steering, slots, out
 ):
-    """Drive rows first..last-1 through a recording; keep the slots after each of its steps."""
+    """Drive rows first..last-1 through a recording; keep the slots every so many of its steps."""
+    every = throttle.shape[0] // max(out.shape[0], 1)
     for start in range(first, last, {lanes}):
         stop = min(last, start + {lanes})
         for t in range(throttle.shape[0]):
@@ -105,9 +106,10 @@ def rollout(
                 block[THROTTLE_COMMAND, row] = throttle[t, min(row, throttle.shape[1] - 1)]
                 block[STEERING_COMMAND, row] = steering[t, min(row, steering.shape[1] - 1)]
             advance(block, numbers, alive, status, start, stop, steps, dt)
-            for k in range(slots.shape[0]):
-                for row in range(start, stop):
-                    out[t, k, row] = block[slots[k], row]
+            if (t + 1) % every == 0:
+                for k in range(slots.shape[0]):
+                    for row in range(start, stop):
+                        out[t // every, k, row] = block[slots[k], row]
 '''
 
 
