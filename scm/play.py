@@ -5,7 +5,10 @@ mismatch` writes such files for the drive that would tell rivals apart.
 """
 
 import csv
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import msgspec
@@ -25,6 +28,8 @@ from scm.v2x.messages.vehicle_state import VehicleState
 OWNER = "script"
 LEASE_MS = 5000
 RENEW_S = 1.0
+REPEATED_S = 0.05
+Row = tuple[float, float, float]
 POSE_M, POSE_RAD, GYRO_RAD_S = 0.002, 0.005, 0.002
 _DESCRIPTION = """recording: 1
 vehicle: {car}
@@ -79,8 +84,8 @@ class Played:
     sensors: list[tuple[float, ...]] = field(default_factory=list)
 
 
-def read_drive(path: Path) -> tuple[Drive, list[tuple[float, float, float]]]:
-    """Return a drive and its rows of time, throttle and steering.
+def read_drive(path: Path) -> tuple[Drive, list[Row]]:
+    """Return a drive and its rows of time, throttle and steering, in the order of time.
 
     Raises:
         ScmError: naming the file and what is wrong with it.
@@ -93,10 +98,14 @@ def read_drive(path: Path) -> tuple[Drive, list[tuple[float, float, float]]]:
     table = read_table(path.parent / drive.commands)
     columns = [table[name] for name in ("t_s", "throttle", "steering")]
     rows = [(float(t), float(u), float(s)) for t, u, s in zip(*columns, strict=True)]
+    times = [t for t, _, _ in rows]
+    if not rows or times != sorted(times) or not all(map(math.isfinite, sum(rows, ()))):
+        msg = f"{path.parent / drive.commands}: expected rows of numbers, t_s going up"
+        raise ScmError(msg)
     return drive, rows
 
 
-def play(link: Link, vehicle: str, rows: list[tuple[float, float, float]]) -> Played:
+def play(link: Link, vehicle: str, rows: list[Row]) -> Played:
     """Command a car row by row and return what it reported; the lease is given back at the end.
 
     Raises:
@@ -106,7 +115,7 @@ def play(link: Link, vehicle: str, rows: list[tuple[float, float, float]]) -> Pl
     sensors = link.hear(Hears(VehicleSensors, {"vehicle": vehicle}))
     epoch = _lease(link, vehicle, "acquire", 0)
     played, began_ns, renewed = Played(), link.now_ns, 0.0
-    for seq, (t, throttle, steering) in enumerate(rows, 1):
+    for seq, (t, throttle, steering) in enumerate(_repeated(rows), 1):
         due_ns = began_ns + round(t * 1e9)
         link.run_until(lambda due_ns=due_ns: link.now_ns >= due_ns, 60.0)  # type: ignore[misc]
         if t - renewed > RENEW_S:
@@ -128,6 +137,18 @@ def play(link: Link, vehicle: str, rows: list[tuple[float, float, float]]) -> Pl
                 (seconds(read.t_ns), read.encoder_left, read.encoder_right, read.gyro_radps[2])
             )
     return played
+
+
+def _repeated(rows: list[Row]) -> Iterator[Row]:
+    """Yield the rows, each again and again until the next: a command that is not repeated expires.
+
+    The last row is sent once: after it the car is given back.
+    """
+    for (t, throttle, steering), (end, _, _) in pairwise(rows):
+        times = max(1, math.ceil((end - t) / REPEATED_S - 1e-6))
+        for k in range(times):
+            yield t + k * (end - t) / times, throttle, steering
+    yield rows[-1]
 
 
 def write_recording(played: Played, car: str, folder: Path) -> None:

@@ -1,6 +1,7 @@
 """`scm play`: a written drive, open loop, with a car of this city or of a running one."""
 
 import argparse
+import os
 from pathlib import Path
 
 from scm.command import Command
@@ -31,14 +32,15 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.world.part import WorldPart
 
     drive, rows = read_drive(arguments.drive)
-    car = arguments.car or drive.car
+    beside = arguments.drive.parent / drive.car
+    car = arguments.car or (str(beside) if beside.is_file() else drive.car)
     print(drive.say)
     if arguments.connect:
         with ZenohBus("city", "script", arguments.connect) as bus:
             played = play(LiveLink(bus), arguments.vehicle or "n1", rows)
     else:
-        beside = arguments.drive.parent / drive.map
-        city_map = load_map(beside if beside.is_file() else drive.map)
+        floor = arguments.drive.parent / drive.map
+        city_map = load_map(floor if floor.is_file() else drive.map)
         part = WorldPart(city_map)
         with Lockstep([part]) as lockstep:
             lockstep.run_for(0.1)
@@ -46,14 +48,19 @@ def _run(arguments: argparse.Namespace) -> int:
             world = part.world  # not by request: only who is in this process may name any car file
             world.host(NAME, car, world.roads.spawn_pose(start), lockstep.now_ns)
             played = play(LockstepLink(lockstep), NAME, rows)
-    write_recording(played, car, arguments.out)
+    write_recording(played, _named(car, arguments.out), arguments.out)
     print(f"{len(played.poses)} poses of {rows[-1][0]:.0f} s recorded in {arguments.out}")
     return 0
 
 
+def _named(car: str, folder: Path) -> str:
+    """Return a car as a recording in `folder` names it: a file by the way to it from there."""
+    return os.path.relpath(car, folder) if Path(car).is_file() else car
+
+
 COMMAND = Command(
     help="Drive a written table of commands with one car, and record it for scm mismatch.",
-    example="scm play found/next_drive.yaml --out again",
+    example="scm play found/next_drive/next_drive.yaml --out again",
     arguments=_arguments,
     run=_run,
 )

@@ -125,7 +125,12 @@ def _doubted(
                    if POSE_X in recording.channels)  # fmt: skip
     for recording, doubts in zip(recordings, every, strict=True):
         together = length_s > SHORTEST_S and _is_only_short(doubts)
-        problems += [p for p in doubts.problems if not together or p.name not in OF_SHORT]
+        where = f"{_titles([recording])[0]}: " if len(recordings) > 1 else ""
+        problems += [
+            replace(p, said=where + p.said)
+            for p in doubts.problems
+            if not together or p.name not in OF_SHORT
+        ]
         if together or doubts.usable.can_diagnose:
             usable.append(corrected(recording, doubts))
     return usable, tuple(problems)

@@ -10,6 +10,7 @@ from scm.mismatch.drive import Drive
 ALIKE, ABRUPT = 0.003, 0.1
 JOLTS = 0.05
 LASTS_S = 2.0
+SLOWEST_MPS, STRAIGHTEST_RAD_S = 0.01, 0.01  # a drive straight ahead, without noise, turns by none
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +45,8 @@ def usual_noise(drives: Sequence[Drive]) -> Noise:
     """
     speeds = [np.hypot(d.smoothed["pose.x"].rate, d.smoothed["pose.y"].rate) for d in drives]
     turns = [np.abs(d.smoothed["pose.yaw"].rate) for d in drives]
-    fast = float(np.percentile(np.concatenate(speeds), 90))
-    turning = float(np.percentile(np.concatenate(turns), 90))
+    fast = max(float(np.percentile(np.concatenate(speeds), 90)), SLOWEST_MPS)
+    turning = max(float(np.percentile(np.concatenate(turns), 90)), STRAIGHTEST_RAD_S)
     own = dict[str, float]()
     for name in drives[0].names:
         if name.startswith(("encoder.", "wheel_speed.")):

@@ -1,7 +1,10 @@
 """A written drive is played with a car, recorded, and the recording replays the same car."""
 
+from pathlib import Path
+
 import pytest
 
+from scm.__main__ import main
 from scm.errors import RunError, ScmError
 from scm.fleet import LockstepLink
 from scm.lockstep import Lockstep
@@ -41,3 +44,30 @@ def test_a_drive_with_an_unknown_key_is_refused_with_file_and_key(tmp_path):
     path.write_text("drive: 1\ncommands: a.csv\nfloor: 3\n", encoding="utf-8")
     with pytest.raises(ScmError, match=r"drive\.yaml.*floor"):
         read_drive(path)
+
+
+def test_a_drive_played_with_a_car_file_names_it_from_where_the_recording_lies(tmp_path):
+    (tmp_path / "cars").mkdir()
+    own = load_car("nigel").path.read_text(encoding="utf-8")
+    (tmp_path / "cars" / "mine.toml").write_text(own, encoding="utf-8")
+    (tmp_path / "a.csv").write_text("t_s,throttle,steering\n0,0,0\n0.5,0.6,0\n1.5,0,0\n", "utf-8")
+    text = "drive: 1\ncar: cars/mine.toml\nmap: parking_school\ncommands: a.csv\n"
+    (tmp_path / "drive.yaml").write_text(text, encoding="utf-8")
+    out = tmp_path / "far" / "away"
+    assert main(["play", str(tmp_path / "drive.yaml"), "--out", str(out)]) == 0
+    (recording,) = read_recordings(out)
+    assert Path(recording.vehicle).samefile(tmp_path / "cars" / "mine.toml")
+
+
+def test_a_command_is_held_for_as_long_as_the_table_says(link):
+    played = play(link, "n1", [(0.0, 0.6, 0.0), (2.0, 0.0, 0.0)])
+    assert len(played.commands) == 41
+    assert played.poses[-1][1] - played.poses[0][1] > 0.2
+
+
+@pytest.mark.parametrize("rows", ["", "1,0,0\n0,0,0\n", "0,nan,0\n"])
+def test_a_table_without_a_course_of_time_is_refused(tmp_path, rows):
+    (tmp_path / "a.csv").write_text(f"t_s,throttle,steering\n{rows}", encoding="utf-8")
+    (tmp_path / "drive.yaml").write_text("drive: 1\ncommands: a.csv\n", encoding="utf-8")
+    with pytest.raises(ScmError, match=r"a\.csv"):
+        read_drive(tmp_path / "drive.yaml")

@@ -42,7 +42,7 @@ def write_scenario(suggestion: Suggestion, car: str, folder: Path) -> list[Path]
 
     Args:
         suggestion: What to do next.
-        car: The car's name or file, as `scm play` takes it.
+        car: The car's name or file; a file is named by its whole path.
         folder: Is made where it is missing.
     """
     if suggestion.best is None:
@@ -69,7 +69,7 @@ def _written(leg: Placed, name: str, said: str, car: str, floor: Floor, folder: 
     said_all = {
         "drive": 1,
         "say": said,
-        "car": car,
+        "car": str(Path(car).resolve()) if Path(car).is_file() else car,
         "map": floor_map.name,
         "spawn": "start",
         "commands": commands.name,
