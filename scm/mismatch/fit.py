@@ -4,7 +4,7 @@ A hypothesis is a tuple of effects. Its numbers are free; the car's own are free
 scatter that the car file states.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,10 +19,19 @@ SHORTER = (0.5, 0.2, 0.05)
 DAMPINGS = (0.03, 0.3)
 FEW = 2  # fits whose trials fill no more than a tile: all are tried at once
 KEPT = 0.8  # of what a whole step promised is good enough
-ENOUGH = 0.5
+SOFT = (3.0, 30.0, 300.0, 3e3, 3e4)  # how much a recording tells along a way, at most
+ENOUGH, POLISHED = 0.5, 0.02
 IDLE = 0.1  # of what the car file knows of a number; a recording that says less says nothing
 TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild moments prove nothing
 FARTHEST = 2.0  # beyond twice its scatter a number is no longer ordinary
+OF_OWN: Mapping[str, str] = {
+    "payload.mass_kg": "body.mass_kg",
+    "com_shift.shift_m": "body.cog_to_rear_axle_m",
+    "tyre_stiffness.scale": "tyre.lateral_slip_extremum",
+    "steering.rate_scale": "steering.rate_rad_s",
+    "motor.gain": "drive.stall_torque_nm",
+}
+"""Numbers of effects by the car's own number that means the same."""
 
 
 @dataclass(slots=True)
@@ -103,31 +112,39 @@ class Fitter:
 
         A trial that leaves physical bounds has an infinite `q`.
         """
-        sets = [self.numbers(effects, base.z, values) for effects, values in trials]
+        free = [self._free(effects) for effects, _ in trials]
+        sets = [
+            self.numbers(effects, base.z * mine, values)
+            for (effects, values), mine in zip(trials, free, strict=True)
+        ]
         e, ok = self.model(sets)
         jacobian = base.jacobian[:, : len(base.z)]
         weights = self.weights(base.e)
         normal = _normal(jacobian, weights) + np.eye(len(base.z))
         slopes = jacobian.T @ (weights[:, None] * np.nan_to_num(e)) + base.z[:, None]
-        found = []
+        masked, found = dict[bytes, Floats](), list[Fitted]()
         for i, (effects, values) in enumerate(trials):
-            column = e[:, i]
+            column = e[:, i].copy()
             if not ok[i] or not np.isfinite(column).all():
                 found.append(Fitted(effects, base.z, values, column, np.inf, jacobian))
                 continue
-            mine = self._free(effects)
+            mine = free[i]
             dz = -base.z * ~mine  # a number that an effect sets is not the car's to move
             low, high = (np.where(mine, limit - base.z, 0.0) for limit in (-FARTHEST, FARTHEST))
             dz += _bounded(normal * np.outer(mine, mine), slopes[:, i] * mine, low, high)
-            own = jacobian if mine.all() else jacobian * mine
+            alike = mine.tobytes()  # trials that set the same numbers share one large array
+            if alike not in masked:
+                masked[alike] = jacobian if mine.all() else jacobian * mine
+            own = masked[alike]
             moved = column + own @ dz
             q = float(self.score(moved[:, None], base.z + dz)[0])
             found.append(Fitted(effects, base.z + dz, values, moved, q, own))
         return found
 
     def _free(self, effects: Sequence[Candidate]) -> Bools:
-        """Return which of the car's own numbers no effect sets."""
+        """Return which of the car's own numbers no effect sets, or means the same by."""
         taken = {knob.key for effect in effects for knob in effect.knobs}
+        taken |= {OF_OWN[key] for key in taken & OF_OWN.keys()}
         return np.array([own.key not in taken for own in self.model.ordinary])
 
     def refine(
@@ -138,6 +155,7 @@ class Fitter:
         for fitted in fits:
             fitted.done = False
             fitted.q = np.inf  # a linear guess is no fit: the first round says what it really is
+            fitted.z = fitted.z * self._free(fitted.effects)
         for count in range(rounds):
             active = [f for f in fits if not f.done]
             if not active:
@@ -145,6 +163,15 @@ class Fitter:
             self._differentiate(active, fresh=fresh and count % 3 == 0)
             self._step(active)
         return list(fits)
+
+    def polish(self, fitted: Fitted, rounds: int = 8) -> Fitted:
+        """Fit one hypothesis to the end, with new derivatives in every round."""
+        for _ in range(rounds):
+            before = fitted.q
+            (fitted,) = self.refine([fitted], rounds=1, fresh=True)
+            if before - fitted.q < POLISHED:
+                break
+        return fitted
 
     def _differentiate(self, fits: Sequence[Fitted], *, fresh: bool) -> None:
         """Renew `e` and the derivatives of each fit, all in one batch."""
@@ -157,7 +184,7 @@ class Fitter:
         e[:, ~ok] = np.nan
         at = 0
         for f, moving in zip(fits, wanted, strict=True):
-            now, jacobian = e[:, at], np.zeros((len(e), own + f.knobs))
+            now, jacobian = e[:, at].copy(), np.zeros((len(e), own + f.knobs))
             at += 1
             if len(moving) < own:
                 jacobian[:, :own] = f.jacobian[:, :own]
@@ -216,8 +243,9 @@ class Fitter:
             [(k.bounds[side] - v) / k.step for k, v in zip(knobs, f.values, strict=True)]
             for side in (0, 1)
         ]
-        low = np.concatenate((-FARTHEST - f.z, bounds[0]))
-        high = np.concatenate((FARTHEST - f.z, bounds[1]))
+        mine = self._free(f.effects)
+        low = np.concatenate((np.where(mine, -FARTHEST - f.z, 0.0), bounds[0]))
+        high = np.concatenate((np.where(mine, FARTHEST - f.z, 0.0), bounds[1]))
         scales = np.concatenate((np.ones(own), [k.step for k in knobs]))
         return _Plan(f, normal, slope, low, high, scales)
 
@@ -248,7 +276,10 @@ class Fitter:
                      if before[id(plan.fitted)] - plan.fitted.q < KEPT * plan.promise]  # fmt: skip
             self._try([(plan, move) for plan in plans for move in plan.others()])
         else:
-            trials = [(plan, move) for plan in plans for move in (plan.whole, *plan.others())]
+            trials = [
+                (plan, move) for plan in plans
+                for move in (plan.whole, *plan.others(), *plan.soft())
+            ]  # fmt: skip
             self._try(trials, ahead=plans)
         for f in fits:
             f.done = f.done or before[id(f)] - f.q < ENOUGH
@@ -302,6 +333,13 @@ class _Plan:
             for damping in DAMPINGS
         ]  # fmt: skip
         return [length * self.whole for length in SHORTER] + damped
+
+    def soft(self) -> list[Floats]:
+        """Return steps along what the recording hardly tells, which no kink of the rest spoils."""
+        curvature, ways = np.linalg.eigh(self._normal)
+        along = ways.T @ self._slope / np.maximum(curvature, 1e-9)
+        steps = [-ways @ np.where(curvature < most, along, 0.0) for most in SOFT]
+        return [np.clip(k * step, self._low, self._high) for k in (1.0, 0.3) for step in steps]
 
     def moved(self, move: Floats) -> tuple[Floats, Floats]:
         """Return the numbers after a move."""
