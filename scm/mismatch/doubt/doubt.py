@@ -26,6 +26,8 @@ from scm.mismatch.doubt.way import uncounted, ways
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
+SLOWEST_WITNESS_S = 0.3  # poses that come later do not see a car stop
+
 
 def doubt(recording: Recording, car: Car | None = None) -> Doubts:
     """Return what is wrong with a recording, or with its sensors against each other.
@@ -47,7 +49,8 @@ def doubt(recording: Recording, car: Car | None = None) -> Doubts:
         problems.append(standing_problem())
         poses = None
     movement = forward_speed(poses)
-    problems += stuck_problems(now, found, movement)
+    sees_stops = poses is not None and poses.period_s < SLOWEST_WITNESS_S
+    problems += stuck_problems(now, found, movement if sees_stops else None)
     not_own = no_witnesses(problems)
     found = [way for way in found if not not_own.intersection((*way.channels, way.name))]
     problems += command_problems(now, movement, poses, car)

@@ -23,6 +23,7 @@ BLOCKS = 40
 HUBER = 3.0
 ROUNDS = 3
 SHORTEST = 5
+TINY = 1e-300  # what is left of a recording without any noise
 FREE = 100.0  # what no number of ours comes near; keeps the std of what nothing shows finite
 
 
@@ -139,7 +140,7 @@ def _likeliest(residual: Floats, parts: Sequence[slice]) -> float:
     costs = []
     for theta in THETAS:
         e = whiten(residual, theta, parts)
-        costs.append(np.log(np.minimum(e**2, (4.0 * _spread(e)) ** 2).mean()))
+        costs.append(np.log(np.minimum(e**2, (4.0 * _spread(e)) ** 2).mean() + TINY))
     return THETAS[int(np.argmin(costs))]
 
 

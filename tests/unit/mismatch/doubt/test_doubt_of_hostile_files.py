@@ -126,3 +126,20 @@ def test_a_recording_that_runs_backwards_in_time_allows_no_verdict(
 
     found = doubt(changed(drive(0), mirror), nigel)
     assert found.usable.lacks == ("time runs backwards",)
+
+
+def test_poses_once_a_second_do_not_call_a_stopped_encoder_frozen(drive: Drive, nigel: Car) -> None:
+    def slow(name: str, c: Channel) -> Channel:
+        return replace(c, t=c.t[::30], values=c.values[::30]) if name in POSE else c
+
+    assert names_of(doubt(changed(standing(drive(0), 0.0, 70.0), slow), nigel)) == {"slow"}
+
+
+def test_a_recording_without_any_noise_is_no_reason_to_warn(drive: Drive, nigel: Car) -> None:
+    def exact(name: str, c: Channel) -> Channel:
+        way = np.clip(0.2 * (c.t - 5.0), 0.0, 6.0)
+        values = {"pose.x": way, "pose.y": 0.0 * way, "pose.yaw": 0.0 * way}
+        gyro = np.zeros_like(c.t) if name == "imu.gyro_z" else c.values
+        return replace(c, values=values.get(name, gyro))
+
+    doubt(changed(drive(0), exact), nigel)
