@@ -216,12 +216,11 @@ def _searched(
     parts = split(model)
     library = placed(shown_by(candidates(big), drives), drives)
     search = Search(model, parts.fit.weight + parts.choose.weight, library, tell)
-    rough, sought = strays(search), None
+    best, sought = lawful(search, search.run(is_over), parts.confirm.weight, tell)
+    rough = strays(model)
     if rough:
         model, parts, search = roughly(drives, big, library, tell)
-    best = search.run(is_over)
-    if not rough:
-        best, sought = lawful(search, best, parts.confirm.weight, tell)
+        best, sought = search.run(is_over), None
     tell("judging on what the fit did not see")
     best = search.confirmed(best, parts.confirm.weight)
     numbers = search.fitter.numbers(best.effects, best.z, best.values)

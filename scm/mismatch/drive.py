@@ -106,9 +106,13 @@ class Drive:
 
 def has_odometer(drive: Drive) -> bool:
     """Say whether a drive has a measured speed that is not what drives the car."""
+    return "speed" in drive.names and not is_led(drive)
+
+
+def is_led(drive: Drive) -> bool:
+    """Say whether the measured speed drives the car, so that only how it turns can be judged."""
     given = any(term.name == "speed_control" for term in drive.car.terms)
-    channels = drive.recording.channels
-    return "speed" in drive.names and (not given or "command.speed" in channels)
+    return given and "command.speed" not in drive.recording.channels
 
 
 def _can_predict(car: Car, name: str) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.drive import Drive
+from scm.mismatch.drive import Drive, is_led
 from scm.mismatch.findings import Equation
 from scm.mismatch.fit import Fitted
 from scm.mismatch.likelihood import Likelihood
@@ -34,12 +34,12 @@ LATE_CAR = Candidate(
 Tell = Callable[[str], None]
 
 
-def strays(search: Search) -> bool:
-    """Say whether a re-tuned car differs in so many ways that what is left is no noise.
+def strays(model: Likelihood) -> bool:
+    """Say whether a car differs in so many ways that what its best model leaves is no noise.
 
     That is so where the least disturbances had to be doubled very often to explain it.
     """
-    return search.retuned is not None and doublings(search.model) >= MOST_DOUBLINGS
+    return doublings(model) >= MOST_DOUBLINGS
 
 
 def doublings(model: Likelihood) -> float:
@@ -52,11 +52,16 @@ def doublings(model: Likelihood) -> float:
 def roughly(
     drives: Sequence[Drive], car: Car, library: Sequence[Candidate], tell: Tell
 ) -> tuple[Likelihood, Parts, "RoughSearch"]:
-    """Return a model that judges by strides, its parts, and the search that goes with it."""
+    """Return a model that judges by strides, its parts, and the search that goes with it.
+
+    Where the measured speed drives the car, neither drive nor tyres are proposed.
+    """
     tell("judging by strides: the car differs in many ways")
     model = Striding(drives, car)
     parts = split(model)
     seen = parts.fit.weight + parts.choose.weight
+    if any(is_led(drive) for drive in drives):
+        library = [c for c in library if c.equation in (Equation.STEERING, Equation.SENSOR)]
     return model, parts, RoughSearch(model, seen, (*library, LATE_CAR), tell)
 
 

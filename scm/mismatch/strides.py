@@ -17,11 +17,12 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.mismatch.drive import Drive
 from scm.mismatch.fit import TAIL
-from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.likelihood import SETTLED_S, Likelihood
 from scm.mismatch.noise import Noise, usual_noise
 from scm.mismatch.parts import blocks
 
 LENGTH_S, EVERY_S = 1.0, 0.5
+LEAST_SETTLED = 0.2  # of a drive, where it is shorter than five seconds
 ROUNDS = 20
 _POSES = ("pose.x", "pose.y", "pose.yaw")
 
@@ -160,7 +161,7 @@ def _by_stream(model: Likelihood, e: Floats) -> list[Floats]:
     """Return unit misses of each drive by stride and stream, (strides, streams)."""
     found, at = list[Floats](), 0
     for weigher in model.whiteners:
-        mine, streams = e[at : at + len(weigher.t)], range(int(weigher.stream.max()) + 1)
+        mine, streams = e[at : at + len(weigher.t)], range(len(weigher.drive.streams))
         found.append(np.stack([mine[weigher.stream == number] for number in streams], axis=1))
         at += len(mine)
     return found
@@ -175,10 +176,10 @@ def _size(misses: Floats, rounds: int) -> float:
 
 
 def _begins(drive: Drive, cuts: Floats) -> Floats:
-    """Return when strides begin: each within one block, none in the first second."""
+    """Return when strides begin: each within one block, none before the car has settled."""
     begins = [np.arange(a, b - LENGTH_S + 1e-6, EVERY_S) for a, b in pairwise(cuts)]
-    every = np.concatenate(begins)
-    return np.asarray(every[every >= drive.edges[0] + LENGTH_S])
+    every, length = np.concatenate(begins), float(drive.edges[-1] - drive.edges[0])
+    return np.asarray(every[every >= drive.edges[0] + min(SETTLED_S, LEAST_SETTLED * length)])
 
 
 def _at(t: Floats, values: Floats, when: Floats) -> Floats:
