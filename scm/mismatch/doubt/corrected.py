@@ -2,16 +2,18 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.doubt.suspicion import Doubts, Repair
-from scm.mismatch.doubt.track import Series, Track, grid, track
+from scm.mismatch.doubt.track import POSE, Series, Track, grid, track
 from scm.recording.read import Channel, Recording
 
 WIDTH_S = 0.1
 STEP_S = 0.02
+SHARED = 0.2  # of the stamps, where x, y and yaw are columns of one table
 
 
 def corrected(recording: Recording, doubts: Doubts) -> Recording:
@@ -19,7 +21,26 @@ def corrected(recording: Recording, doubts: Doubts) -> Recording:
 
     Small offsets, scales and biases stay: they are for a fit to find.
     """
-    return repaired(recording, doubts.repairs)
+    return _whole_poses(repaired(recording, doubts.repairs))
+
+
+def _whole_poses(recording: Recording) -> Recording:
+    """Return a recording whose poses are whole: x, y and yaw of the same rows, as far as any are.
+
+    Where they were never rows of one table they stay as they are.
+    """
+    poses = {name: recording.channels[name] for name in POSE if name in recording.channels}
+    if len(poses) < len(POSE):
+        return recording
+    common = reduce(np.intersect1d, (channel.t for channel in poses.values()))
+    rows = [len(channel.t) for channel in poses.values()]
+    if min(rows) == max(rows) == len(common) or len(common) < SHARED * max(rows):
+        return recording
+    cut = dict[str, Channel]()
+    for name, channel in poses.items():
+        keep = np.isin(channel.t, common)
+        cut[name] = replace(channel, t=channel.t[keep], values=channel.values[keep])
+    return replace(recording, channels={**recording.channels, **cut})
 
 
 def repaired(recording: Recording, repairs: Iterable[Repair]) -> Recording:

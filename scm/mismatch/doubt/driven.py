@@ -19,7 +19,8 @@ LATEST_S = 1.5
 RELATED = 0.35
 HARDLY = 0.2  # a driver who holds the speed against slopes and turns undoes most of it
 VARIED = 0.5  # a speed held steady by its driver says nothing about the throttle
-LONGEST_S, SHORTEST_S = 20.0, 5.0
+LONGEST_S, SHORT_S, SHORTEST_S = 20.0, 8.0, 5.0
+RELATED_SHORT = 0.6  # a few seconds of two drives are alike by chance more often
 WHEELBASE_M, TURNED_RAD, STARTS = 0.25, 0.25, 3
 DRIVE = ("command.throttle", "command.speed", "motor.current")
 RECORD = "Record what is sent to the car, throttle and steering, with the stamps of sending."
@@ -114,15 +115,17 @@ def _without_effect(recording: Recording, movement: Series, poses: Track) -> Ite
     """Yield commands whose motion never follows them: those of another drive, or another clock."""
     yaw = Series(poses.t, poses.yaw)
     on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S)
-    if len(on.t) < LONGEST_S / STEP_S:
+    if len(on.t) < SHORT_S / STEP_S:
         return
+    short = len(on.t) < LONGEST_S / STEP_S
+    related = RELATED_SHORT if short else RELATED
     speed, rate = on.smooth(movement), on.smooth(yaw, 1)
     steering, throttle = (_command(recording, n) for n in ("command.steering", "command.throttle"))
     if steering is not None:
         asked = on.smooth_even(held(steering, on.t) * speed)
-        if not _follows(rate, asked, on):
+        if not _follows(rate, asked, on, related):
             yield _unrelated("command.steering", "The car's turning does not follow its steering")
-    if throttle is not None and _varied(speed):
+    if throttle is not None and _varied(speed) and not short:
         asked = on.smooth_even(held(throttle, on.t))
         lagged = _lagged(asked, 0.5, STEP_S)
         slope = on.smooth_even(speed, 1)
@@ -183,7 +186,7 @@ def _lagged(values: Floats, time_s: float, step_s: float) -> Floats:
     return np.convolve(padded, kernel / kernel.sum(), mode="valid")
 
 
-def _follows(motion: Floats, asked: Floats, on: Grid, related: float = RELATED) -> bool:
+def _follows(motion: Floats, asked: Floats, on: Grid, related: float) -> bool:
     """Say whether the motion follows within a second or two, better than at any other delay."""
     if motion.std() < 1e-6 or asked.std() < 1e-6:
         return True

@@ -37,6 +37,7 @@ ALIKE = 0.6
 LEVEL, BETTER = 0.95, 0.05  # wheels that spin follow the car that badly
 UNLIKE = 0.35
 FAR_S = 0.2
+LARGEST_UNKNOWN = 50.0  # a factor that is no unit's
 SMALLEST_SIZE, LARGEST_SIZE = 0.6, 1.0 / 0.6
 
 
@@ -68,7 +69,11 @@ class Pair:
         size = 1.0 / self.lag.size if self.lag.size else 1.0
         if SMALLEST_SIZE < size < LARGEST_SIZE:
             return 1.0
-        return nearest_factor(size, self.what)
+        found = nearest_factor(size, self.what)
+        believable = (
+            unit_of(found, self.what) or 1.0 / LARGEST_UNKNOWN < abs(size) < LARGEST_UNKNOWN
+        )
+        return found if believable else math.copysign(1.0, size)
 
     @property
     def far_s(self) -> float:

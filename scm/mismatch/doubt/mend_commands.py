@@ -16,6 +16,7 @@ from scm.vehicles.car import Car
 LARGEST_RATIO, PERCENT = 1.5, 105.0
 LARGEST_ANGLE = 1.2
 FOLLOWS = 0.7
+SURELY, LONG_S = 0.9, 20.0  # a few seconds of another drive may turn the other way by chance
 NEAR = 0.35
 DEGREE = math.radians(1.0)
 
@@ -32,8 +33,13 @@ def mend_commands(now: Mending, car: Car | None) -> Iterator[DataProblem]:
         return
     found = _steered(now, car)
     yield from _unit(now, car, found)
-    if found is not None and found.alike < -FOLLOWS:
+    turned = FOLLOWS if _is_long(now) else SURELY
+    if found is not None and found.alike < -turned:
         yield _mended(now, "command.steering", -1.0, "The car turns to the other side.")
+
+
+def _is_long(now: Mending) -> bool:
+    return now.poses is not None and float(np.ptp(now.poses.t)) > LONG_S
 
 
 def _pulls_back(now: Mending) -> bool:

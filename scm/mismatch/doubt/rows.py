@@ -108,6 +108,7 @@ def _order(t: Floats, at: str) -> Iterator[DataProblem]:
             name="duplicate",
             said=f"{int(same.sum())} of {len(t)} rows repeat the stamp of the row before.",
             corrected="Only the first row of a stamp counts.",
+            record_instead="Write one row a reading, with all digits of its stamp.",
         )
 
 

@@ -1,6 +1,6 @@
 """What a hostile user brings: each file says what is wrong, and no fault is made up for it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -89,7 +89,11 @@ def test_rows_without_a_number_are_counted_in_each_column(drive: Drive, nigel: C
         keep = rng.random(len(c.t)) > (0.05 if name in POSE else -1.0)
         return replace(c, t=c.t[keep], values=c.values[keep])
 
-    found = doubt(changed(drive(0), holes), nigel)
+    recording = changed(drive(0), holes)
+    found = doubt(recording, nigel)
+    x, y, yaw = (corrected(recording, found).channels[name].t for name in POSE)
+    np.testing.assert_array_equal(x, y)
+    np.testing.assert_array_equal(x, yaw)
     assert {p.channel for p in found.problems if p.name == "not_finite"} == set(POSE)
 
 
@@ -143,3 +147,17 @@ def test_a_recording_without_any_noise_is_no_reason_to_warn(drive: Drive, nigel:
         return replace(c, values=values.get(name, gyro))
 
     doubt(changed(drive(0), exact), nigel)
+
+
+def test_ten_seconds_are_enough_to_see_commands_of_another_drive(drive: Drive, nigel: Car) -> None:
+    def cut(first_s: float, recording: Recording) -> Mapping[str, Channel]:
+        def within(_name: str, c: Channel) -> Channel:
+            keep = (c.t >= first_s) & (c.t < first_s + 10.0)
+            return replace(c, t=c.t[keep] - first_s, values=c.values[keep])
+
+        return changed(recording, within).channels
+
+    own, other = cut(40.0, drive(0)), cut(20.0, drive(2))
+    mixed = {name: other[name] if name in COMMANDS else c for name, c in own.items()}
+    assert "without_effect" not in names_of(doubt(replace(drive(0), channels=own), nigel))
+    assert "without_effect" in names_of(doubt(replace(drive(0), channels=mixed), nigel))
