@@ -1,7 +1,7 @@
 """Whether a recording can be of the car whose file was given: speed, turning circle, wheels."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,11 +20,13 @@ TOO_FAST = 1.4
 TOO_SLOW = 0.3
 TURNS = (0.55, 1.8)
 IMPOSSIBLE = (0.15, 4.0)  # in between, play, slow servos and weak steering may be to blame alone
-DOUBTFUL, MORE_THAN_PLAY = (0.5, 2.0), 0.1  # rad: no play, and no give of a steering, is so wide
+# No play, and no give of a steering, is so wide [rad]; a floor that is slippery follows worse.
+DOUBTFUL, MORE_THAN_PLAY, CLOSELY = (0.53, 1.9), 0.1, 0.9
 ROLLS = (0.7, 1.4)
 FOLLOWS = 0.7
 THROTTLES: Floats = np.linspace(0.0, 1.0, 11)
-SETTLED_S = 8.0
+STEERINGS: Floats = np.linspace(-1.0, 1.0, 21)
+SETTLED_S, STEERED_S = 8.0, 3.0
 UNSURE_THROTTLE = 0.1
 LEAST_ASKED = 0.05  # of the top speed
 
@@ -138,16 +140,38 @@ def _turning(
 ) -> tuple[float | None, float]:
     """Return how tightly it turns against what is steered, and how many rad of steering that is.
 
-    None where nothing is odd about it.
+    None where nothing is odd about it, and no rad where it follows its steering badly.
     """
-    found = steered(recording, car, movement, poses)
-    if found is None or not car.has("steering.limit_rad"):
+    if "command.steering" not in recording.channels:
         return None, 0.0
-    angle = recording.channels["command.steering"].dimension == "angle"
-    unit = 1.0 if angle else car.value("steering.limit_rad")
+    recording, unit = _in_wheel_angles(recording, car)
+    found = steered(recording, car, movement, poses)
+    if found is None:
+        return None, 0.0
     gain = found.gain / unit
     odd = found.alike >= FOLLOWS and not TURNS[0] < gain < TURNS[1]
-    return (gain if odd else None), found.swing * unit * abs(1.0 - gain)
+    lost_rad = found.swing * unit * abs(1.0 - gain) if found.alike > CLOSELY else 0.0
+    return (gain if odd else None), lost_rad
+
+
+def _in_wheel_angles(recording: Recording, car: Car) -> tuple[Recording, float]:
+    """Return the recording and what one unit of its steering means [rad].
+
+    Where the car file has no such number its own steering tells, tried at rest.
+    """
+    steering = recording.channels["command.steering"]
+    if steering.dimension == "angle":
+        return recording, 1.0
+    if car.has("steering.limit_rad"):
+        return recording, car.value("steering.limit_rad")
+    fleet = Fleet(car, len(STEERINGS))
+    for _ in STEERINGS:
+        fleet.add(Pose2(0.0, 0.0, 0.0))
+    asked = np.tile(STEERINGS, (round(STEERED_S / STEP_S), 1))
+    turned = fleet.rollout(np.zeros_like(asked), asked, STEP_S, ("steer_angle",))["steer_angle"]
+    values = np.interp(steering.values, STEERINGS, turned[-1])
+    changed = replace(steering, values=values, dimension="angle")
+    return replace(recording, channels={**recording.channels, "command.steering": changed}), 1.0
 
 
 def _wheels(found: Relation) -> str:
