@@ -7,12 +7,12 @@ from scm.mismatch.evidence import Ordinary, Tried
 from scm.mismatch.experiment.plan import Rival as Contender
 from scm.mismatch.experiment.suggest import Suggestion, suggest
 from scm.mismatch.findings import Effect, Estimate, Rival
-from scm.mismatch.fit import Fitted
+from scm.mismatch.fit import OF_OWN, Fitted
 from scm.mismatch.laws.decide import is_law
 from scm.mismatch.laws.law import Law
 from scm.mismatch.laws.sensed import Sensed
 from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.listed import Candidate
+from scm.mismatch.listed import Candidate, Knob
 from scm.mismatch.search import Search, price
 from scm.vehicles.car import Car
 
@@ -59,7 +59,8 @@ def effect_of(search: Search, best: Fitted, i: int) -> Effect:
     mine = tuple(float(v) for v in best.values[at : at + len(candidate.knobs)])
     for j, knob in enumerate(candidate.knobs):
         value, place = mine[j], own + at + j
-        spread = WIDER * NINETY * knob.step * math.sqrt(max(best.covariance[place, place], 0.0))
+        told = WIDER * knob.step * math.sqrt(max(best.covariance[place, place], 0.0))
+        spread = NINETY * math.hypot(told, _scatter(search.model, knob, value))
         low, high = knob.bounds
         estimates[knob.name] = Estimate(
             value=value, low=max(value - spread, low), high=min(value + spread, high),
@@ -77,6 +78,14 @@ def effect_of(search: Search, best: Fitted, i: int) -> Effect:
         law=candidate.formula(mine) if isinstance(candidate, Law | Sensed) else None,
         rivals=rivals,
     )
+
+
+def _scatter(model: Likelihood, knob: Knob, value: float) -> float:
+    """Return how far the car's own number that means the same may be from the file's."""
+    own = next((o for o in model.ordinary if o.key == OF_OWN.get(knob.key)), None)
+    if own is None:
+        return 0.0
+    return own.std * abs(value / own.mean) if knob.unit == "1" else own.std
 
 
 def said(candidate: Candidate, estimates: dict[str, Estimate]) -> str:

@@ -5,14 +5,14 @@ the library's size twice its logarithm (the criterion of PASTIS).
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.fit import FARTHEST, Fitted, Fitter
+from scm.mismatch.fit import FARTHEST, OF_OWN, Fitted, Fitter
 from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate
@@ -23,15 +23,6 @@ REFITTED = 14
 FALSE_ALARMS = 0.01
 NEAR = 40.0
 DRIFTED = 8.0
-OF_OWN: Mapping[str, str] = {
-    "payload.mass_kg": "body.mass_kg",
-    "com_shift.shift_m": "body.cog_to_rear_axle_m",
-    "tyre_stiffness.scale": "tyre.lateral_slip_extremum",
-    "steering.rate_scale": "steering.rate_rad_s",
-    "motor.gain": "drive.stall_torque_nm",
-}
-"""Numbers of effects by the car's own number that means the same."""
-
 Tell = Callable[[str], None]
 Learn = Callable[[Likelihood, Sequence[Sequence[Floats]], int], Noise]
 
@@ -169,9 +160,9 @@ class Search:
             seen = fitter.score(best.e[:, None], best.z)[0] - own
             gains = [float(fitter.score(f.e[:, None], f.z)[0] - f.z @ f.z - seen) for f in others]
             if min(gains) > 0.0:
-                return best
+                break
             best = others[int(np.argmin(gains))]
-        return best
+        return self.fitter.polish(best)
 
     def _not_worse(self, fitted: Fitted, base: Fitted) -> None:
         """Let an effect that found nothing do nothing: it contains the model without it."""
