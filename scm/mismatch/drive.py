@@ -23,6 +23,7 @@ FASTEST_HZ = {"imu.accel_x": 25.0, "imu.accel_y": 25.0, "imu.gyro_z": 50.0, "yaw
               "encoder.left": 25.0, "encoder.right": 25.0}  # fmt: skip
 FASTEST_POSE_HZ = 50.0
 RUN_IN_S = 1.0
+MOVING_MPS = 0.2  # a car that begins faster was commanded before its recording began
 WHEELS = {"encoder.left": "rl", "encoder.right": "rr"}
 KNOWN = (
     "pose.x", "pose.y", "pose.yaw", "imu.gyro_z", "yaw_rate", "encoder.left", "encoder.right",
@@ -73,7 +74,6 @@ class Drive:
         self.recording, self.car = recording, car
         commands = Commands(recording, car)
         throttle, steering = commands.rows
-        self.throttle, self.steering = Commanded(*throttle), Commanded(*steering)
         names = [name for name in KNOWN if name in recording.channels and _can_predict(car, name)]
         streams = [_stream(recording, name) for name in names]
         self.point = recording.channel("pose.x").point
@@ -84,6 +84,9 @@ class Drive:
         self.edges: Floats = np.asarray(first + STEP_S * np.arange(steps + 1), dtype=np.float64)
         self.battery = commands.voltage(self.edges)
         self.streams: Sequence[Stream] = [stream.within(first, last) for stream in streams]
+        x, y = (self.smoothed[f"pose.{axis}"].rate[0] for axis in ("x", "y"))
+        moving = bool(np.hypot(x, y) > MOVING_MPS)
+        self.throttle, self.steering = (_commanded(*one, moving) for one in (throttle, steering))
 
     def stream(self, name: str) -> Stream:
         """Return a stream by its channel's name."""
@@ -102,6 +105,14 @@ class Drive:
             for name in ("pose.x", "pose.y", "pose.yaw")
             for s in (self.stream(name),)
         }
+
+
+def _commanded(t: Floats, values: Floats, moving: bool) -> Commanded:
+    """Return a command; what drives a car before its first row is that row's."""
+    if not moving:
+        return Commanded(t, values)
+    before = t[0] - 2.0 * RUN_IN_S
+    return Commanded(np.concatenate(([before], t)), np.concatenate((values[:1], values)))
 
 
 def has_odometer(drive: Drive) -> bool:

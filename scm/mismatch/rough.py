@@ -31,6 +31,13 @@ LATE_CAR = Candidate(
     "The poses' clock is {offset_s} against the car's: commands and sensors are stamped late.",
 )  # fmt: skip
 """Its other sign is the camera's latency, which every search tries."""
+HELD = Candidate(
+    "drive_saturation", Equation.DRIVE, ("throttle",),
+    (Knob("forward", "drive.limit_forward", "1", (0.02, 1.0), 1.0, 0.02),),
+    ((0.7,), (0.4,), (0.15,)),
+    "Whatever is asked for, the drive takes no more than {forward} of full throttle.",
+)  # fmt: skip
+"""A speed that is commanded may be more than a car is allowed to drive."""
 Tell = Callable[[str], None]
 
 
@@ -57,12 +64,16 @@ def roughly(
     Where the measured speed drives the car, neither drive nor tyres are proposed.
     """
     tell("judging by strides: the car differs in many ways")
+    extras, have = [LATE_CAR], {term.name for term in car.terms}
+    if any(is_led(drive) for drive in drives):
+        known = (Equation.STEERING, Equation.SENSOR)
+        library = [c for c in library if c.equation in known]
+    elif "speed_control" in have and HELD.name not in have:
+        car, extras = car.with_terms([HELD.name]), [LATE_CAR, HELD]
     model = Striding(drives, car)
     parts = split(model)
     seen = parts.fit.weight + parts.choose.weight
-    if any(is_led(drive) for drive in drives):
-        library = [c for c in library if c.equation in (Equation.STEERING, Equation.SENSOR)]
-    return model, parts, RoughSearch(model, seen, (*library, LATE_CAR), tell)
+    return model, parts, RoughSearch(model, seen, (*library, *extras), tell)
 
 
 class RoughSearch(Search):

@@ -21,8 +21,9 @@ from scm.mismatch.likelihood import SETTLED_S, Likelihood
 from scm.mismatch.noise import Noise, usual_noise
 from scm.mismatch.parts import blocks
 
-LENGTH_S, EVERY_S = 1.0, 0.5
-LEAST_SETTLED = 0.2  # of a drive, where it is shorter than five seconds
+LENGTH_S, SHORT_S = 1.0, 0.5  # of a stride, and where all drives are shorter than ten
+OVERLAP = 2  # strides begin so many times within one's length
+LEAST_SETTLED = 0.1  # of a drive, where it is shorter than ten seconds
 ROUNDS = 20
 _POSES = ("pose.x", "pose.y", "pose.yaw")
 
@@ -36,19 +37,21 @@ class Strides:
         log_size: Logarithm of each value's variance, (events,).
     """
 
-    def __init__(self, drive: Drive, noise: Noise, cuts: Floats) -> None:
+    def __init__(
+        self, drive: Drive, noise: Noise, cuts: Floats, length_s: float = LENGTH_S
+    ) -> None:
         self.drive = drive
         names = drive.names
-        self._begin = _begins(drive, cuts)
-        self._end = self._begin + LENGTH_S
+        self._begin = _begins(drive, cuts, length_s)
+        self._end = self._begin + length_s
         self._names = [*_POSES, *(n for n in names if n not in _POSES)]
-        middle, count = self._begin + 0.5 * LENGTH_S, len(self._begin)
+        middle, count = self._begin + 0.5 * length_s, len(self._begin)
         self.t: Floats = np.tile(middle, len(self._names))
         self.stream: Ints = np.repeat([names.index(n) for n in self._names], count)
         size = np.array([noise.own[name] for name in self._names])
         # strides overlap, so each counts for the part that is its own
-        self._weight = np.repeat(np.sqrt(EVERY_S / LENGTH_S) / size, count)
-        self.log_size: Floats = np.repeat(2.0 * np.log(size), count) * EVERY_S / LENGTH_S
+        self._weight = np.repeat(np.sqrt(1.0 / OVERLAP) / size, count)
+        self.log_size: Floats = np.repeat(2.0 * np.log(size), count) / OVERLAP
         x, y, psi = (drive.smoothed[name] for name in _POSES)
         self._cos, self._sin = np.cos(psi.at(middle)), np.sin(psi.at(middle))
         yaw_t = drive.stream("pose.yaw").t
@@ -106,7 +109,7 @@ class Striding(Likelihood):
         own = {name: max(size, least[name]) for name, size in own.items()}
         self.noise = Noise(noise.speed, noise.side, noise.yaw_rate, own, noise.scale)
         self.whiteners = [
-            Strides(drive, self.noise, cuts)  # type: ignore[misc]
+            Strides(drive, self.noise, cuts, length_of(self.drives))  # type: ignore[misc]
             for drive, cuts in zip(self.drives, blocks(self.drives), strict=True)
         ]
         self.t = np.concatenate([w.t for w in self.whiteners])
@@ -135,7 +138,7 @@ def learn_sizes(
     every = np.concatenate(_by_stream(model, model.weigh(residuals)[:, 0]), axis=0)
     now, names = model.noise, model.drives[0].names
     own = {
-        name: now.own[name] * _size(column, max(rounds, ROUNDS)) * np.sqrt(LENGTH_S / EVERY_S)
+        name: now.own[name] * _size(column, max(rounds, ROUNDS)) * np.sqrt(OVERLAP)
         for name, column in zip(names, every.T, strict=True)
     }
     model.believe(Noise(now.speed, now.side, now.yaw_rate, own, now.scale))
@@ -151,8 +154,7 @@ def told_anew(model: Likelihood, e: Floats) -> float:
     every = np.concatenate(tame, axis=0)
     together = np.atleast_2d(np.corrcoef(every.T))
     of_streams = len(together) / float((together * together).sum())
-    lag = round(LENGTH_S / EVERY_S)
-    again = sum(float((one[lag:] * one[:-lag]).sum()) for one in tame)
+    again = sum(float((one[OVERLAP:] * one[:-OVERLAP]).sum()) for one in tame)
     again = min(max(again / float((every * every).sum()), 0.0), 0.9)
     return of_streams * (1.0 - again) / (1.0 + again)
 
@@ -175,9 +177,15 @@ def _size(misses: Floats, rounds: int) -> float:
     return float(np.sqrt(square))
 
 
-def _begins(drive: Drive, cuts: Floats) -> Floats:
+def length_of(drives: Sequence[Drive]) -> float:
+    """Return how long strides are."""
+    longest = max(float(drive.edges[-1] - drive.edges[0]) for drive in drives)
+    return LENGTH_S if longest > SETTLED_S / LEAST_SETTLED else SHORT_S
+
+
+def _begins(drive: Drive, cuts: Floats, length_s: float) -> Floats:
     """Return when strides begin: each within one block, none before the car has settled."""
-    begins = [np.arange(a, b - LENGTH_S + 1e-6, EVERY_S) for a, b in pairwise(cuts)]
+    begins = [np.arange(a, b - length_s + 1e-6, length_s / OVERLAP) for a, b in pairwise(cuts)]
     every, length = np.concatenate(begins), float(drive.edges[-1] - drive.edges[0])
     return np.asarray(every[every >= drive.edges[0] + min(SETTLED_S, LEAST_SETTLED * length)])
 
