@@ -6,6 +6,7 @@ pays beside those before it, until what the others make needless is taken back.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from scm.mismatch.strides import Striding, learn_sizes, told_anew
 from scm.vehicles.car import Car
 
 MOST_EFFECTS = 10
+CLOSE = 25.0  # two effects that no screening tells apart
 AT_ONCE, MARGIN = 4, 10.0  # effects of one round; what each beside the first gains beyond its price
 MOST_DOUBLINGS = 9.0
 LATE_CAR = Candidate(
@@ -88,7 +90,7 @@ class RoughSearch(Search):
         """Return the model that explains the recordings best, see `Search.run`."""
         best = self.retuned
         while len(best.effects) < MOST_EFFECTS and not is_over():
-            steps = self._at_once(self.extend(best))
+            steps = self._at_once(self._compared(self.extend(best)))
             if not steps:
                 break
             self.steps += steps
@@ -107,6 +109,24 @@ class RoughSearch(Search):
         best = super().confirmed(best, unseen)
         best.covariance = best.covariance / told_anew(self.model, best.e)
         return best
+
+    def _compared(self, step: Step) -> Step:
+        """Return a round whose two best effects, if close, stand as their settled models do."""
+        close = len(step.rivals) > 1 and step.criteria[1] < step.criteria[0] + CLOSE
+        if not close or step.criteria[1] > self.criterion(step.base):
+            return step
+        noise, costs = self.model.noise, list[float]()
+        for rival in step.rivals[:2]:
+            self.tell(f"comparing {step.rivals[0].names[-1]} and {step.rivals[1].names[-1]}")
+            self.model.believe(noise)
+            settled = self.settle(replace(rival, done=False))
+            sizes = float(self.fitter.part @ self.model.log_size)
+            costs.append(self.criterion(settled) + sizes)
+        self.model.believe(noise)
+        if costs[0] <= costs[1]:
+            return step
+        first, second, *rest = step.rivals
+        return Step(step.base, (second, first, *rest), step.criteria)
 
     def _at_once(self, step: Step) -> list[Step]:
         """Return a round for each effect that pays beside those before it, best first.
