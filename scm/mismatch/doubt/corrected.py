@@ -77,5 +77,6 @@ def _repaired(channel: Channel, repair: Repair, signs: Series | None) -> Channel
         t, values = t[rows], values[rows]
     if signs is not None:
         values = np.abs(values) * np.where(signs.at(t) < 0.0, -1.0, 1.0)
-    std = None if channel.std is None else abs(repair.factor) * channel.std
+    # Nobody knows in which unit a std beside a wrong unit was meant: the values tell it instead.
+    std = channel.std if abs(repair.factor) == 1.0 else None
     return replace(channel, t=t, values=values, std=std)

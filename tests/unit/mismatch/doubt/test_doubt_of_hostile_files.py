@@ -161,3 +161,13 @@ def test_ten_seconds_are_enough_to_see_commands_of_another_drive(drive: Drive, n
     mixed = {name: other[name] if name in COMMANDS else c for name, c in own.items()}
     assert "without_effect" not in names_of(doubt(replace(drive(0), channels=own), nigel))
     assert "without_effect" in names_of(doubt(replace(drive(0), channels=mixed), nigel))
+
+
+def test_a_std_beside_a_wrong_unit_is_not_believed(drive: Drive, nigel: Car) -> None:
+    def degrees(name: str, c: Channel) -> Channel:
+        if name != "pose.yaw":
+            return c
+        return replace(c, values=np.degrees(c.values), std=0.0087)
+
+    recording = changed(drive(0), degrees)
+    assert corrected(recording, doubt(recording, nigel)).channels["pose.yaw"].std is None
