@@ -86,7 +86,7 @@ class Drive:
         self.streams: Sequence[Stream] = [stream.within(first, last) for stream in streams]
         x, y = (self.smoothed[f"pose.{axis}"].rate[0] for axis in ("x", "y"))
         moving = bool(np.hypot(x, y) > MOVING_MPS)
-        self.throttle, self.steering = (_commanded(*one, moving) for one in (throttle, steering))
+        self.throttle, self.steering = (_commanded(*one, moving=moving) for one in (throttle, steering))
 
     def stream(self, name: str) -> Stream:
         """Return a stream by its channel's name."""
@@ -107,7 +107,7 @@ class Drive:
         }
 
 
-def _commanded(t: Floats, values: Floats, moving: bool) -> Commanded:
+def _commanded(t: Floats, values: Floats, *, moving: bool) -> Commanded:
     """Return a command; what drives a car before its first row is that row's."""
     if not moving:
         return Commanded(t, values)

@@ -1,0 +1,29 @@
+"""A recording on the simulation's grid."""
+
+import numpy as np
+import pytest
+
+from scm.mismatch.drive import Drive, _commanded, has_odometer, is_led
+from tests.unit.mismatch.made_drive import big_nigel, made_drive
+
+ROWS = np.array([1.0, 1.1, 1.3]), np.array([0.4, 0.5, 0.6])
+
+
+def before(command):
+    return command.means(np.array([0.5, 0.6]), np.zeros(1))[0, 0]
+
+
+def test_a_drive_that_begins_at_rest_was_not_commanded_before():
+    assert before(_commanded(*ROWS, moving=False)) == 0.0
+
+
+def test_what_drives_a_moving_car_before_its_first_row_is_that_row():
+    command = _commanded(*ROWS, moving=True)
+    assert before(command) == pytest.approx(0.4)
+    assert command.means(np.array([1.1, 1.3]), np.zeros(1))[0, 0] == pytest.approx(0.5)
+
+
+def test_a_car_that_is_given_a_throttle_is_not_led_by_its_speed():
+    drive = Drive(made_drive(seconds=6.0), big_nigel())
+    assert not is_led(drive)
+    assert has_odometer(drive) == ("speed" in drive.names)
