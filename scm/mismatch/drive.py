@@ -86,7 +86,8 @@ class Drive:
         self.streams: Sequence[Stream] = [stream.within(first, last) for stream in streams]
         x, y = (self.smoothed[f"pose.{axis}"].rate[0] for axis in ("x", "y"))
         moving = bool(np.hypot(x, y) > MOVING_MPS)
-        self.throttle, self.steering = (_commanded(*one, moving=moving) for one in (throttle, steering))
+        self.throttle = _commanded(*throttle, moving=moving)
+        self.steering = _commanded(*steering, moving=moving)
 
     def stream(self, name: str) -> Stream:
         """Return a stream by its channel's name."""
