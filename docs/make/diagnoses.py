@@ -28,7 +28,7 @@ SETS = {
         [f"free_driving_{name}.yaml" for name in ("10_01_01", "10_02_28", "10_27_02")],
     ),
     "genesis": ("genesis", ["rfs_path1.yaml", "rfs_path2.yaml"]),
-    "av21": ("iac_av21", ["lvms.yaml"]),
+    "av21": ("iac_av21", ["putnam.yaml"]),
     "frictionmaps": ("f1tenth_frictionmaps", ["ds3.yaml"]),
 }
 SHOWN = ("better", "error_position", "numbers")
