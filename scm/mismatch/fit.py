@@ -145,6 +145,7 @@ class Fitter:
         """Return which of the car's own numbers no effect sets, or means the same by."""
         taken = {knob.key for effect in effects for knob in effect.knobs}
         taken |= {OF_OWN[key] for key in taken & OF_OWN.keys()}
+        taken |= {tie[0] for effect in effects for knob in effect.knobs for tie in knob.ties}
         return np.array([own.key not in taken for own in self.model.ordinary])
 
     def refine(

@@ -7,7 +7,7 @@ import numpy as np
 
 from scm.mismatch.drive import Drive
 
-ALIKE, ABRUPT = 0.003, 0.3
+ALIKE, ABRUPT = 0.003, 0.1
 JOLTS = 0.05
 LASTS_S = 2.0
 SLOWEST_MPS, STRAIGHTEST_RAD_S = 0.01, 0.01  # a drive straight ahead, without noise, turns by none
@@ -40,8 +40,7 @@ class Noise:
 def usual_noise(drives: Sequence[Drive]) -> Noise:
     """Return the least that any car model is off: 0.3 % of the usual speed and turning.
 
-    A launch leaves three tenths of a throttle leap's speed open, a steering leap as much of its
-    turning.
+    A launch leaves a tenth of a throttle leap's speed open, a steering leap a tenth of its turning.
     Less is never believed: two simulators of the same car differ by as much.
     """
     speeds = [np.hypot(d.smoothed["pose.x"].rate, d.smoothed["pose.y"].rate) for d in drives]
