@@ -41,7 +41,7 @@ from scm.mismatch.patch import patched
 from scm.mismatch.report.car_file import write_car
 from scm.mismatch.report.write import write_report
 from scm.mismatch.rollouts import Numbers
-from scm.mismatch.rough import roughly, strays
+from scm.mismatch.rough import is_far, roughly, strays
 from scm.mismatch.search import Search
 from scm.recording.read import Recording, read_recordings
 from scm.vehicles.car import Car, load_car
@@ -49,6 +49,7 @@ from scm.vehicles.car import Car, load_car
 POSE = ("position_m", "yaw_rad")
 POSE_X, SHORTEST_S = "pose.x", 20.0  # of several recordings together, where each is short
 OF_SHORT = ("no_verdict", "too_short")
+USUAL_S = 90.0  # of a recording
 STRAYS = 6.0  # times what noise alone makes of a free run's error
 Tell = Callable[[str], None]
 
@@ -88,7 +89,8 @@ def diagnose(
         paths: Recordings' folders or descriptions.
         car_file: The car's name or file; None takes the recordings' own.
         data: Folder of the recordings' tables; None: beside each description.
-        budget_s: After so long no further effect is looked for.
+        budget_s: After so long no further effect is looked for; of recordings longer than 90 s
+            together, after as many times longer.
         tell: Is told what is being tried.
         clock: For the time it took.
 
@@ -107,8 +109,9 @@ def diagnose(
     usable, problems = _doubted(recordings, car)
     if not usable:
         return _nothing(recordings, car, problems, seconds(clock.now_ns() - began_ns))
+    paid_s = budget_s * max(1.0, _length_s(usable) / USUAL_S)
     with threadpool_limits(1):  # two threads drive already: more for small matrices only wait
-        found = _searched(usable, car, tell, lambda: seconds(clock.now_ns() - began_ns) > budget_s)
+        found = _searched(usable, car, tell, lambda: seconds(clock.now_ns() - began_ns) > paid_s)
     diagnosis = replace(
         found.diagnosis, data=problems, runtime_s=seconds(clock.now_ns() - began_ns)
     )
@@ -121,8 +124,7 @@ def _doubted(
     """Return the recordings that can be used, repaired, and everything wrong with any."""
     every = [doubt(recording, car) for recording in recordings]
     usable, problems = list[Recording](), list[DataProblem]()
-    length_s = sum(float(np.ptp(recording.channel(POSE_X).t)) for recording in recordings
-                   if POSE_X in recording.channels)  # fmt: skip
+    length_s = _length_s(recordings)
     for recording, doubts in zip(recordings, every, strict=True):
         together = length_s > SHORTEST_S and _is_only_short(doubts)
         where = f"{_titles([recording])[0]}: " if len(recordings) > 1 else ""
@@ -134,6 +136,12 @@ def _doubted(
         if together or doubts.usable.can_diagnose:
             usable.append(corrected(recording, doubts))
     return usable, tuple(problems)
+
+
+def _length_s(recordings: Sequence[Recording]) -> float:
+    """Return how long recordings with poses are together."""
+    posed = [r.channel(POSE_X).t for r in recordings if POSE_X in r.channels]
+    return sum(float(np.ptp(t)) for t in posed)
 
 
 def _is_only_short(doubts: Doubts) -> bool:
@@ -216,8 +224,10 @@ def _searched(
     parts = split(model)
     library = placed(shown_by(candidates(big), drives), drives)
     search = Search(model, parts.fit.weight + parts.choose.weight, library, tell)
-    best, sought = lawful(search, search.run(is_over), parts.confirm.weight, tell)
-    rough = strays(model)
+    rough, sought, best = is_far(search), None, search.retuned
+    if not rough:
+        best, sought = lawful(search, search.run(is_over), parts.confirm.weight, tell)
+        rough = strays(model)
     if rough:
         model, parts, search = roughly(drives, big, library, tell)
         best, sought = search.run(is_over), None

@@ -25,7 +25,7 @@ from scm.vehicles.car import Car
 MOST_EFFECTS = 10
 CLOSE = 25.0  # two effects that no screening tells apart
 AT_ONCE, MARGIN = 4, 10.0  # effects of one round; what each beside the first gains beyond its price
-MOST_DOUBLINGS = 9.0
+MOST_DOUBLINGS, FAR_DOUBLINGS = 9.0, 16.0
 LATE_CAR = Candidate(
     "clock_offset", Equation.SENSOR, ("speed",),
     (Knob("offset_s", "measure.clock_offset_s", "s", (-0.3, 0.0), 0.0, 0.01),),
@@ -49,6 +49,11 @@ def strays(model: Likelihood) -> bool:
     That is so where the least disturbances had to be doubled very often to explain it.
     """
     return doublings(model) >= MOST_DOUBLINGS
+
+
+def is_far(search: Search) -> bool:
+    """Say whether a re-tuned car is so far off that one effect after another would not find it."""
+    return search.retuned is not None and doublings(search.model) >= FAR_DOUBLINGS
 
 
 def doublings(model: Likelihood) -> float:
