@@ -1,7 +1,7 @@
 """Makes the pictures and figures of docs/diagnoses: what is found in other people's cars.
 
 Run with `python docs/make/diagnoses.py ucar dart ...`; needs the shared recordings. The figures go
-to the screen, three pictures of each report to docs/diagnoses.
+to the screen, two pictures of each report to docs/diagnoses.
 """
 
 import shutil
@@ -31,7 +31,7 @@ SETS = {
     "av21": ("iac_av21", ["putnam.yaml"]),
     "frictionmaps": ("f1tenth_frictionmaps", ["ds3.yaml"]),
 }
-SHOWN = ("better", "error_position", "numbers")
+SHOWN = ("error_position", "numbers")
 BUDGET_S = 900.0
 
 
