@@ -17,11 +17,8 @@ ROUNDS = 5
 SMALL = 0.1  # a derivative's step of an ordinary number, in standard deviations
 SHORTER = (0.5, 0.2, 0.05)
 DAMPINGS = (0.03, 0.3)
-FEW = 2  # fits whose trials fill no more than a tile: all are tried at once
-KEPT = 0.8  # of what a whole step promised is good enough
-SOFT = (3.0, 30.0, 300.0, 3e3, 3e4)  # how much a recording tells along a way, at most
-ENOUGH, POLISHED = 0.5, 0.02
-IDLE = 0.1  # of what the car file knows of a number; a recording that says less says nothing
+FEW = 2  # fits whose trials leave room in a tile
+ENOUGH = 0.5
 TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild moments prove nothing
 FARTHEST = 2.0  # beyond twice its scatter a number is no longer ordinary
 OF_OWN: Mapping[str, str] = {
@@ -145,7 +142,6 @@ class Fitter:
         """Return which of the car's own numbers no effect sets, or means the same by."""
         taken = {knob.key for effect in effects for knob in effect.knobs}
         taken |= {OF_OWN[key] for key in taken & OF_OWN.keys()}
-        taken |= {tie[0] for effect in effects for knob in effect.knobs for tie in knob.ties}
         return np.array([own.key not in taken for own in self.model.ordinary])
 
     def refine(
@@ -164,15 +160,6 @@ class Fitter:
             self._differentiate(active, fresh=fresh and count % 3 == 0)
             self._step(active)
         return list(fits)
-
-    def polish(self, fitted: Fitted, rounds: int = 8) -> Fitted:
-        """Fit one hypothesis to the end, with new derivatives in every round."""
-        for _ in range(rounds):
-            before = fitted.q
-            (fitted,) = self.refine([fitted], rounds=1, fresh=True)
-            if before - fitted.q < POLISHED:
-                break
-        return fitted
 
     def _differentiate(self, fits: Sequence[Fitted], *, fresh: bool) -> None:
         """Renew `e` and the derivatives of each fit, all in one batch."""
@@ -203,19 +190,9 @@ class Fitter:
             f.e, f.q = now, float(self.score(now[:, None], f.z)[0])
 
     def _moving(self, f: Fitted, *, fresh: bool) -> list[int]:
-        """Return which of the car's own numbers' derivatives are to be renewed.
-
-        What the recording says nothing about stays where the car file has it, and its derivative
-        what it was.
-        """
+        """Return which of the car's own numbers' derivatives are to be renewed."""
         own = len(self.model.ordinary)
-        if not fresh:
-            return []
-        if f.jacobian.shape[1] < own:
-            return list(range(own))
-        told = self.weights(f.e) @ (f.jacobian[:, :own] ** 2)
-        idle = (told < IDLE) & (np.abs(f.z) < SMALL)
-        return [j for j in range(own) if not idle[j]]
+        return list(range(own)) if fresh or f.jacobian.shape[1] < own else []
 
     def _beside(
         self, f: Fitted, z: Floats, values: Floats, moving: Sequence[int]
@@ -263,25 +240,13 @@ class Fitter:
         ]
 
     def _step(self, fits: Sequence[Fitted]) -> None:
-        """Move each fit along its Gauss-Newton step, by the best of a few lengths.
-
-        Of many fits all but the whole step is tried only where that does not keep its promise.
-        """
+        """Move each fit along its Gauss-Newton step, by the best of a few lengths."""
         plans = [self._plan(f) for f in fits if not f.done]
         if not plans:
             return
         before = {id(f): f.q for f in fits}
-        if len(plans) > FEW:
-            self._try([(plan, plan.whole) for plan in plans])
-            plans = [plan for plan in plans
-                     if before[id(plan.fitted)] - plan.fitted.q < KEPT * plan.promise]  # fmt: skip
-            self._try([(plan, move) for plan in plans for move in plan.others()])
-        else:
-            trials = [
-                (plan, move) for plan in plans
-                for move in (plan.whole, *plan.others(), *plan.soft())
-            ]  # fmt: skip
-            self._try(trials, ahead=plans)
+        trials = [(plan, move) for plan in plans for move in (plan.whole, *plan.others())]
+        self._try(trials, ahead=plans if len(plans) <= FEW else ())
         for f in fits:
             f.done = f.done or before[id(f)] - f.q < ENOUGH
 
@@ -311,7 +276,7 @@ class _Plan:
     """A quadratic about a fit where it was, and the steps that should lower it.
 
     Attributes:
-        whole: The Gauss-Newton step within bounds; `promise`: what it should gain.
+        whole: The Gauss-Newton step within bounds.
     """
 
     def __init__(
@@ -322,7 +287,6 @@ class _Plan:
         self._normal, self._slope, self._low, self._high = normal, slope, low, high
         self._scales = scales
         self.whole = _bounded(normal, slope, low, high)
-        self.promise = -float(self.whole @ (2.0 * slope + normal @ self.whole))
 
     def others(self) -> list[Floats]:
         """Return shorter and more damped steps."""
@@ -334,13 +298,6 @@ class _Plan:
             for damping in DAMPINGS
         ]  # fmt: skip
         return [length * self.whole for length in SHORTER] + damped
-
-    def soft(self) -> list[Floats]:
-        """Return steps along what the recording hardly tells, which no kink of the rest spoils."""
-        curvature, ways = np.linalg.eigh(self._normal)
-        along = ways.T @ self._slope / np.maximum(curvature, 1e-9)
-        steps = [-ways @ np.where(curvature < most, along, 0.0) for most in SOFT]
-        return [np.clip(k * step, self._low, self._high) for k in (1.0, 0.3) for step in steps]
 
     def moved(self, move: Floats) -> tuple[Floats, Floats]:
         """Return the numbers after a move."""

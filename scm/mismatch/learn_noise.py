@@ -1,5 +1,6 @@
 """The belief about noise under which what is left of a fit is most likely."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -14,16 +15,30 @@ Change = Callable[[Noise, float], Noise]
 
 
 def learn_noise(model: Likelihood, residuals: Sequence[Sequence[Floats]], rounds: int = 2) -> Noise:
-    """Return the belief under which residuals are most likely, by steps of two."""
+    """Return the belief under which residuals are most likely, by steps of two.
+
+    Steps begin at what is believed now and at the least: a poor model before this one may have
+    raised disturbances that no single step takes back.
+    """
 
     def cost(noise: Noise) -> float:
         model.believe(noise)
         e = model.weigh(residuals)
-        return float((e * e).sum() + model.log_size.sum())
+        return float(model.settled @ ((e * e).sum(axis=1) + model.log_size))
 
-    best = model.noise
-    lowest = cost(best)
     least = usual_noise(model.drives)
+    starts = [model.noise] if model.noise == least else [model.noise, least]
+    found = [_descended(cost, start, least, rounds) for start in starts]
+    best = min(found, key=lambda one: one[1] if math.isfinite(one[1]) else math.inf)[0]
+    model.believe(best)
+    return best
+
+
+def _descended(
+    cost: Callable[[Noise], float], best: Noise, least: Noise, rounds: int
+) -> tuple[Noise, float]:
+    """Return where steps from one belief end, and its cost."""
+    lowest = cost(best)
     for _ in range(rounds):
         for change in _CHANGES:
             for factor in (2.0, 0.5):
@@ -35,8 +50,7 @@ def learn_noise(model: Likelihood, residuals: Sequence[Sequence[Floats]], rounds
                     if not value <= lowest - 2.0:  # no number is no improvement either
                         break
                     best, lowest = other, value
-    model.believe(best)
-    return best
+    return best, lowest
 
 
 def _at_least(noise: Noise, least: Noise) -> Noise:

@@ -32,7 +32,7 @@ class Knob:
         neutral: Where the effect does nothing.
         step: A change that shows, for derivatives.
         given: What the car file says of the key; an effect is told as what is added to it.
-        ties: Other keys that move with it: how much for one unit, and where they begin.
+        ties: Other keys that move with it, and how much for one unit.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Knob:
     step: float
     per_unit: float = 1.0
     given: float = 0.0
-    ties: tuple[tuple[str, float, float], ...] = ()
+    ties: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +69,8 @@ class Candidate:
         found = dict[str, float]()
         for knob, value in zip(self.knobs, values, strict=True):
             found[knob.key] = knob.given + value * knob.per_unit
-            for key, factor, begin in knob.ties:
-                found[key] = begin + value * factor
+            for key, factor in knob.ties:
+                found[key] = value * factor
         return found
 
 
@@ -287,18 +287,10 @@ def candidates(car: Car) -> tuple[Candidate, ...]:
         found.append(
             Candidate(name, equation, depends_on, knobs, starts, said, RARE.get(name, 0.0))
         )
-        if name in ("com_shift", "payload"):
-            tied = replace(knobs[0], ties=(_tie(car, name),))
+        if name == "com_shift":
+            tied = replace(knobs[0], ties=((POINT_X, 1.0),))
             found.append(Candidate(name, equation, depends_on, (tied,), starts, said))
     return tuple(found)
-
-
-def _tie(car: Car, name: str) -> tuple[str, float, float]:
-    """Return what moves with an effect: the tracked point, or the inertia of a spread load."""
-    if name == "com_shift":
-        return POINT_X, 1.0, 0.0
-    inertia = car.value("body.yaw_inertia_kgm2")
-    return "body.yaw_inertia_kgm2", inertia / car.value("body.mass_kg"), inertia
 
 
 def _is_own(name: str, param: Param) -> bool:

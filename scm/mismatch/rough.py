@@ -86,6 +86,8 @@ def roughly(
 class RoughSearch(Search):
     """Looks for many effects at once, by strides."""
 
+    holds = 0.0
+
     def __init__(
         self, model: Likelihood, part: Floats, library: Sequence[Candidate], tell: Tell
     ) -> None:

@@ -5,7 +5,7 @@ the library's size twice its logarithm (the criterion of PASTIS).
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,10 +19,15 @@ from scm.mismatch.listed import Candidate
 from scm.mismatch.noise import Noise
 
 MOST_EFFECTS = 4
-REFITTED = 14
+REFITTED, AFRESH = 14, 8
+AFRESH_GAIN = 60.0
 FALSE_ALARMS = 0.01
 NEAR = 40.0
 DRIFTED = 8.0
+TWINS: Mapping[str, str] = {
+    "payload": "motor_gain", "motor_gain": "payload", "grade": "wind", "wind": "grade",
+}  # fmt: skip
+"""Effects that a level floor cannot tell apart: one of them undoes the other."""
 Tell = Callable[[str], None]
 Learn = Callable[[Likelihood, Sequence[Sequence[Floats]], int], Noise]
 
@@ -52,7 +57,10 @@ class Search:
 
     Attributes:
         steps: What was tried, round by round.
+        holds: Share of an effect's gain that must hold where nothing was fitted.
     """
+
+    holds = 0.4
 
     def __init__(
         self,
@@ -111,28 +119,25 @@ class Search:
         return fitted
 
     def extend(self, base: Fitted) -> Step:
-        """Try every effect beside those of `base`."""
+        """Try every effect beside those of `base`, but none that undoes one of them."""
+        taken = {*base.names, *(TWINS[name] for name in base.names if name in TWINS)}
         trials = [
             ((*base.effects, candidate), np.concatenate((base.values, start)))
             for candidate in self.listed
-            if candidate.name not in base.names
+            if candidate.name not in taken
             for start in candidate.starts
         ]
         self.tell(f"trying {len(self.listed)} effects from {len(trials)} starts")
         nominal = self.fitter.nominal(base)  # a re-tuned car bends towards what is missing
-        begun = [*self.fitter.begin(base, trials), *self.fitter.begin(nominal, trials)]
-        best: dict[int, Fitted] = {}
-        for fitted in begun:
-            key = id(fitted.effects[-1])
-            if key not in best or fitted.q < best[key].q:
-                best[key] = fitted
+        begun = [_best_of_each(self.fitter.begin(start, trials)) for start in (base, nominal)]
 
         def cost(fitted: Fitted) -> float:
             return self.criterion(fitted) - self._drifted(fitted.effects[-1], base)
 
-        ranked = sorted(best.values(), key=cost)[:REFITTED]
-        self.tell("refitting " + ", ".join(f.names[-1] for f in ranked[:4]) + " ...")
-        ranked = self.fitter.refine(ranked, rounds=4)
+        near, far = (sorted(fits, key=cost)[:REFITTED] for fits in begun)
+        self.tell("refitting " + ", ".join(f.names[-1] for f in near[:4]) + " ...")
+        near, far = (self.fitter.refine(fits, rounds=4) for fits in (near, far[:AFRESH]))
+        ranked = _preferred(near, far)
         for f in ranked:
             self._not_worse(f, base)
         ranked = sorted(ranked, key=cost)
@@ -152,17 +157,25 @@ class Search:
         return DRIFTED * any(o.key in keys and abs(z) > 0.85 * FARTHEST for o, z in own)
 
     def confirmed(self, best: Fitted, unseen: Floats) -> Fitted:
-        """Return the model without effects that do not help on a part that no fit has seen."""
+        """Return the model without effects that do not help on a part that no fit has seen.
+
+        Of what an effect gains where it was fitted, a share must come out there too, by length.
+        """
+        share = self.holds * float(unseen.sum()) / max(self.events, 1)
         while best.effects:
             others = self._without_each(best)
             fitter = Fitter(self.model, unseen)
             own = float(best.z @ best.z)
             seen = fitter.score(best.e[:, None], best.z)[0] - own
-            gains = [float(fitter.score(f.e[:, None], f.z)[0] - f.z @ f.z - seen) for f in others]
+            gains = [
+                float(fitter.score(f.e[:, None], f.z)[0] - f.z @ f.z - seen)
+                - share * max(f.q - best.q, 0.0)
+                for f in others
+            ]
             if min(gains) > 0.0:
-                break
+                return best
             best = others[int(np.argmin(gains))]
-        return self.fitter.polish(best)
+        return best
 
     def _not_worse(self, fitted: Fitted, base: Fitted) -> None:
         """Let an effect that found nothing do nothing: it contains the model without it."""
@@ -211,3 +224,21 @@ class Search:
         """Return the car with its own numbers refitted, under the present belief about noise."""
         (fitted,) = self.fitter.refine([self.fitter.null(self.retuned.z)], rounds=4, fresh=True)
         return fitted
+
+
+def _preferred(near: Sequence[Fitted], far: Sequence[Fitted]) -> list[Fitted]:
+    """Return, of each last effect, the fit that went far only where re-tuning really hid it."""
+    best = {id(fitted.effects[-1]): fitted for fitted in near}
+    for fitted in far:
+        other = best.setdefault(id(fitted.effects[-1]), fitted)
+        if fitted.q < other.q - AFRESH_GAIN:
+            best[id(fitted.effects[-1])] = fitted
+    return list(best.values())
+
+
+def _best_of_each(fits: Sequence[Fitted]) -> list[Fitted]:
+    """Return the best fit of each last effect."""
+    best = dict[int, Fitted]()
+    for fitted in sorted(fits, key=lambda f: f.q):
+        best.setdefault(id(fitted.effects[-1]), fitted)
+    return list(best.values())

@@ -56,6 +56,7 @@ def lawful(
     model = search.model
     if not isinstance(model, Sensing):
         return best, None
+    best = search.settle(best)  # as often as a law will be
     listed = _settled(search, best, unseen)
     model.believe(_calm(model))
     sought = seek(model, _bare(search, best), search.fitter.part, tell)

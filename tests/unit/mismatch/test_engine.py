@@ -1,13 +1,17 @@
 """Rollouts, prediction, whitening and fits, on drives that the simulator itself made."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from scm.mismatch.drive import Drive
 from scm.mismatch.fit import Fitter, _bounded
+from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
 from scm.mismatch.rollouts import Rollouts
+from scm.mismatch.search import Search
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
 
@@ -32,6 +36,18 @@ def test_a_delay_is_the_command_later(healthy):
     motions = Rollouts(healthy, big_nigel()).run([{}, {"steering.delay_s": 0.1}])
     now, late = motions["steer_angle"].T
     np.testing.assert_allclose(late[300:], now[290:-10], atol=2e-3)
+
+
+def test_a_servo_at_its_rate_is_not_hurried_by_a_command_within_a_step(healthy):
+    motions = Rollouts(healthy, big_nigel()).run([{}, {"clock.commands_s": 0.005}])
+    now, late = motions["steer_angle"].T
+    rate = np.diff(now) / 0.01
+    slewing = np.flatnonzero(
+        (rate[:-2] == rate[1:-1]) & (rate[1:-1] == rate[2:]) & (rate[1:-1] > 0.2)
+    )
+    assert len(slewing) > 50
+    behind = (now - late)[slewing + 2] / rate[slewing + 1]
+    assert np.median(behind) == pytest.approx(0.005, abs=0.0005)
 
 
 def test_the_pose_is_carried_back_so_that_a_long_drive_ends_where_it_was_measured(healthy):
@@ -108,3 +124,54 @@ def test_a_fit_finds_what_was_concealed(name, key, value):
     assert best.q < base.q - 30.0
     assert best.values[0] == pytest.approx(value, rel=0.15)
     assert np.all(np.abs(best.z) <= 2.0)
+
+
+def test_the_cars_own_twin_of_an_effect_stays_as_the_file_has_it():
+    drive = Drive(made_drive((("steering.rate_scale", 0.6),), seconds=12.0), big_nigel())
+    model = Likelihood([drive], big_nigel())
+    fitter = Fitter(model, np.ones(len(model.t)))
+    (base,) = fitter.refine([fitter.null()], rounds=3, fresh=True)
+    own = [o.key for o in model.ordinary].index("steering.rate_rad_s")
+    assert base.z[own] < -0.2
+    effect = by_name(candidates(big_nigel()), "steer_rate")
+    (best,) = fitter.refine(
+        fitter.begin(base, [((effect,), np.array([0.75]))]), rounds=6, fresh=True
+    )
+    assert best.z[own] == 0.0
+    assert best.values[0] == pytest.approx(0.6, rel=0.02)
+
+
+def test_noise_that_a_poor_model_raised_is_taken_back(healthy):
+    model = Likelihood([healthy], big_nigel())
+    least, (residuals, _) = model.noise, model.residuals([{}])
+    raised = replace(least, speed=16 * least.speed, side=16 * least.side, launch=8 * least.launch)
+    model.believe(raised)
+    learnt = learn_noise(model, residuals, rounds=1)
+    assert learnt.speed <= 2 * least.speed
+    assert learnt.launch <= 2 * least.launch
+
+
+def test_no_effect_is_tried_beside_its_twin(healthy):
+    model = Likelihood([healthy], big_nigel())
+    listed = [c for c in candidates(big_nigel()) if c.name in {"grade", "wind", "steer_trim"}]
+    search = Search(model, np.ones(len(model.t)), listed, lambda _: None)
+    (base,) = search.fitter.refine([search.fitter.null()], rounds=1, fresh=True)
+    grade = next(c for c in listed if c.name == "grade")
+    (sloped,) = search.fitter.refine(
+        search.fitter.begin(base, [((grade,), np.array([0.01, 0.0]))]), rounds=1, fresh=True
+    )
+    tried = {rival.names[-1] for rival in search.extend(sloped).rivals}
+    assert tried == {"steer_trim"}
+
+
+def test_a_delay_is_told_from_a_lag():
+    made = made_drive(seconds=12.0)
+    sent = made.channels["command.steering"]
+    early = {**made.channels, "command.steering": replace(sent, t=sent.t - 0.03)}
+    drive = Drive(replace(made, channels=early), big_nigel())
+    model = Likelihood([drive], big_nigel())
+    listed = [c for c in candidates(big_nigel()) if c.name in {"steer_delay", "steer_lag"}]
+    search = Search(model, np.ones(len(model.t)), listed, lambda _: None)
+    best = search.extend(search.retuned).rivals[0]
+    assert best.names == ("steer_delay",)
+    assert best.values[0] == pytest.approx(0.03, abs=0.006)
