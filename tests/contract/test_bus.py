@@ -216,9 +216,11 @@ def test_a_late_joiner_gets_the_last_events_of_each_key_and_then_the_new_ones(ci
 
 
 def test_of_a_state_that_is_kept_once_a_late_joiner_gets_the_newest(city):
-    sender = city.bus("world")
+    sender, heard = city.bus("world"), Mailbox(10)
+    city.bus("api").subscribe(CityStop, {}, heard)
     for engaged in (True, False, True):
         sender.publish(CityStop(t_ns=1, engaged=engaged, by=str(engaged)))
+    assert len(gather(city, heard, 3)) == 3  # else it joins amid them, and hears two
     mailbox = Mailbox(10)
     city.bus("n1").subscribe(CityStop, {}, mailbox)
     assert [i.message.engaged for i in gather(city, mailbox, 1)] == [True]
