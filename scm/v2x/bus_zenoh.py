@@ -29,6 +29,7 @@ from scm.v2x.mailbox import Mailbox, RawMailbox
 from scm.v2x.message import Delivery, Message, Refused, Request, decode, encode, is_bulk
 from scm.v2x.messages.presence import Presence
 from scm.v2x.reader import Reader
+from scm.v2x.yielding import yielding
 
 REQUESTS_KEPT = 1024
 ASK_AGAIN = timedelta(seconds=1)
@@ -391,7 +392,8 @@ def _undeclare(things: Iterable[Any]) -> None:
 def _open(endpoint: str, connect_timeout_s: float) -> zenoh.Session:
     try:
         config = zenoh.Config.from_json5(zenoh_config.client(endpoint, connect_timeout_s))
-        return zenoh.open(config)
+        with yielding():
+            return zenoh.open(config)
     except zenoh.ZError as cause:
         why = zenoh_config.reason(cause)
         msg = f"no city at {endpoint!r} within {connect_timeout_s} s: is `scm up` running? ({why})"

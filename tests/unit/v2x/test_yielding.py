@@ -1,0 +1,59 @@
+"""Threads that yield: which ones do, and that the caller's own does not."""
+
+import os
+import sys
+import threading
+
+import pytest
+
+from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.router import Router, free_endpoint
+from scm.v2x.yielding import yielding
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="scheduling classes are Linux's")
+
+
+def classes_of_other_threads() -> list[int]:
+    mine = threading.get_native_id()
+    others = [int(name) for name in os.listdir("/proc/self/task") if int(name) != mine]
+    return [os.sched_getscheduler(other) for other in others]
+
+
+def class_in_a_new_thread() -> int:
+    found: list[int] = []
+    thread = threading.Thread(target=lambda: found.append(os.sched_getscheduler(0)))
+    thread.start()
+    thread.join()
+    return found[0]
+
+
+def test_threads_started_within_yield_and_later_ones_do_not() -> None:
+    with yielding():
+        assert class_in_a_new_thread() == os.SCHED_BATCH
+    assert os.sched_getscheduler(0) == os.SCHED_OTHER
+    assert class_in_a_new_thread() == os.SCHED_OTHER
+
+
+def test_the_caller_is_as_before_after_an_error() -> None:
+    with pytest.raises(RuntimeError), yielding():
+        raise RuntimeError
+    assert os.sched_getscheduler(0) == os.SCHED_OTHER
+
+
+def test_a_class_that_a_user_gave_is_kept() -> None:
+    os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    try:
+        with yielding():
+            pass
+        assert os.sched_getscheduler(0) == os.SCHED_BATCH
+    finally:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+def test_the_threads_of_a_bus_yield_and_its_owner_does_not() -> None:
+    before = classes_of_other_threads()
+    endpoint = free_endpoint()
+    with Router(endpoint), ZenohBus("city", "alone", endpoint):
+        now = classes_of_other_threads()
+        assert now.count(os.SCHED_BATCH) > before.count(os.SCHED_BATCH)
+        assert os.sched_getscheduler(0) == os.SCHED_OTHER
