@@ -1,4 +1,4 @@
-"""Threads that never push another one aside: they wake when a processor is free, or at the next turn.
+"""Threads that never push another aside: they wake when a processor is free, or at the next turn.
 
 A part sends a burst of messages each step. Every one wakes a thread of Zenoh, which on a busy
 machine takes the processor from the very loop that sends: 400 states were put aside 250 times and

@@ -3,6 +3,7 @@
 import os
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -15,8 +16,8 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="scheduling clas
 
 def classes_of_other_threads() -> list[int]:
     mine = threading.get_native_id()
-    others = [int(name) for name in os.listdir("/proc/self/task") if int(name) != mine]
-    return [os.sched_getscheduler(other) for other in others]
+    others = [int(task.name) for task in Path("/proc/self/task").iterdir()]
+    return [os.sched_getscheduler(other) for other in others if other != mine]
 
 
 def class_in_a_new_thread() -> int:
