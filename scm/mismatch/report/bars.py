@@ -7,7 +7,7 @@ from scm.maps.svg import element
 from scm.mismatch.evidence import Tried
 from scm.mismatch.findings import Fit
 from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text, ticks_across
-from scm.mismatch.report.wording import quantity, title_of
+from scm.mismatch.report.wording import quantities, title_of
 
 _WIDTH = 440.0
 _ROW = 25.0
@@ -30,6 +30,7 @@ def better_picture(fit: Fit | None) -> Picture | None:
     long = 300.0 / (max(*values, floor if math.isfinite(floor) else 0.0) or 1.0)
     parts = []
     names = ("before", "after")
+    *said, noise = quantities((*values, floor), "m")
     for i, (name, value) in enumerate(zip(names, values, strict=True)):
         y = 8.0 + 40.0 * i
         parts += [text(0, y + 20, name, kind="title")]
@@ -39,11 +40,11 @@ def better_picture(fit: Fit | None) -> Picture | None:
                 class_=f"bar-{name}",
             )
         ]  # fmt: skip
-        parts += [text(66 + long * value, y + 20, quantity(value, "m"), kind="strong")]
+        parts += [text(66 + long * value, y + 20, said[i], kind="strong")]
     if math.isfinite(floor):
         x = 58 + long * floor
         parts += [element("path", d=f"M{x:.1f} 2V88", class_="needed")]
-        parts += [text(max(x, 58), 104, f"noise of measuring alone: {quantity(floor, 'm')}")]
+        parts += [text(max(x, 58), 104, f"noise of measuring alone: {noise}")]
     return Picture(
         name="better",
         title="",

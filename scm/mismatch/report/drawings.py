@@ -8,7 +8,7 @@ import numpy as np
 from scm.mismatch.evidence import Evidence, Residual
 from scm.mismatch.findings import Diagnosis
 from scm.mismatch.report.bars import better_picture, tried_picture
-from scm.mismatch.report.curve_pictures import curve_picture
+from scm.mismatch.report.curve_pictures import curve_pictures
 from scm.mismatch.report.floor_map import floor_map
 from scm.mismatch.report.forest import forest_picture
 from scm.mismatch.report.free_run_pictures import error_pictures, window_pictures
@@ -38,11 +38,10 @@ class Drawings:
         return [picture for picture in (*single, *several) if picture is not None]
 
 
-def draw(diagnosis: Diagnosis, evidence: Evidence) -> Drawings:
-    """Return the pictures of a diagnosis."""
+def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Drawings:
+    """Return the pictures of a diagnosis; `start_s` was taken off its times already."""
     residuals = sorted(evidence.residuals, key=strength, reverse=True)
     on_floor = [r for r in residuals if (np.isfinite(r.x_m) & np.isfinite(r.y_m)).any()]
-    curves = [curve_picture(curve, i) for i, curve in enumerate(evidence.curves, start=1)]
     after = "with what was found" if diagnosis.effects else "with its numbers refitted"
     return Drawings(
         better=better_picture(diagnosis.fit) if diagnosis.effects else None,
@@ -50,8 +49,8 @@ def draw(diagnosis: Diagnosis, evidence: Evidence) -> Drawings:
             floor_map(residual, diagnosis.located, i)
             for i, residual in enumerate(on_floor[:_MOST_MAPS], start=1)
         ],
-        time_line=time_line(residuals, diagnosis.located, evidence.free_runs, after),
-        curves=[curve for curve in curves if curve is not None],
+        time_line=time_line(residuals, diagnosis.located, evidence.free_runs, after, start_s),
+        curves=curve_pictures(evidence.curves),
         windows=window_pictures(evidence.free_runs),
         errors=error_pictures(evidence.free_runs),
         numbers=forest_picture(evidence.ordinary),

@@ -1,22 +1,24 @@
 """Below the first screen: what an expert needs to check the verdict."""
 
+import math
 import platform
 from collections.abc import Iterable
 from importlib.metadata import version
 
 import scm
-from scm.mismatch.evidence import Evidence
+from scm.mismatch.evidence import Evidence, Ordinary
 from scm.mismatch.findings import DataProblem, Diagnosis, Effect, Fit
 from scm.mismatch.report.drawings import Drawings
 from scm.mismatch.report.first_screen import name_of
 from scm.mismatch.report.html_text import around, figure, section, table, tag
+from scm.mismatch.report.places import sensors, spans
 from scm.mismatch.report.wording import (
     capital,
     interval,
     percent,
+    quantities,
     quantity,
     short,
-    spans,
     title_of,
     unit_text,
 )
@@ -40,9 +42,17 @@ _READING = (
      "not help; the drive that is named does."),
 )  # fmt: skip
 _PART_NAMES = {
-    "confirm": "unseen, to confirm",
-    "choose": "to choose the effect",
-    "fit": "to fit the numbers",
+    "confirm": "the part that only confirms",
+    "choose": "the part that chooses the effect",
+    "fit": "the part that fits the numbers",
+}
+_NOTHING = 1e-4
+_ERROR_NAMES = {
+    "yaw": "heading",
+    "gyro": "turn, gyro",
+    "wheel": "way, wheels",
+    "accel_x": "speed along, accelerometer",
+    "accel_y": "speed across, accelerometer",
 }
 _ERROR_UNITS = {"m": "m", "rad": "rad", "mps": "m/s", "s": "s"}
 
@@ -60,7 +70,7 @@ def expert_sections(
                 _fit_table(diagnosis.fit), _grid(map(figure, drawings.errors)),
                 _windows_head(drawings) + windows if drawings.windows else ""),
         section("numbers", "Numbers", _parameter_table(diagnosis),
-                _beside(figure(drawings.numbers), _ordinary_table(evidence))),
+                _beside(figure(drawings.numbers), _ordinary_table(evidence, cars[0]))),
         section("tried", "What was tried, and what ruled rivals out",
                 _beside(figure(drawings.tried), _rival_table(diagnosis))),
         section("data", "The recording itself", _data_table(diagnosis)),
@@ -104,24 +114,28 @@ def _windows_head(drawings: Drawings) -> str:
 def _fit_table(fit: Fit | None) -> str:
     if fit is None:
         return ""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, words in _PART_NAMES.items():
         part = getattr(fit, name)
-        first = f"{words}: {part.windows} windows"
-        for i, key in enumerate(part.before):
+        rows.append((f"{capital(words)}: {part.windows} windows",))
+        for key in part.before:
             title, unit = error_name(key)
             sides = (part.before, part.after, part.noise_floor)
-            values = [quantity(s[key], unit) if s.get(key) is not None else "" for s in sides]
-            rows.append((first if i == 0 else "", title, *values))
-    head = ("part of the recording", "error", "before", "after", "noise alone")
-    said = f"Root mean squares over free runs of {quantity(fit.horizon_s, 's')}."
-    return tag("p", said) + table(head, rows, (2, 3, 4)) if rows else ""
+            known = [side.get(key, math.nan) for side in sides]
+            shown = zip(quantities(known, unit), sides, strict=True)
+            values = [text if key in side else "" for text, side in shown]
+            rows.append((title, *values))
+    head = ("error", "before", "after", "noise alone")
+    said = f"Root mean squares at the end of free runs of {quantity(fit.horizon_s, 's')}."
+    return tag("p", said) + table(head, rows, (1, 2, 3)) if rows else ""
 
 
 def error_name(key: str) -> tuple[str, str]:
     """Return the words and the unit of an error such as `position_m`."""
     stem, _, unit = key.rpartition("_")
-    return (stem.replace("_", " "), _ERROR_UNITS[unit]) if unit in _ERROR_UNITS else (key, "1")
+    if unit not in _ERROR_UNITS:
+        return key, "1"
+    return _ERROR_NAMES.get(stem, stem.replace("_", " ")), _ERROR_UNITS[unit]
 
 
 def _parameter_table(diagnosis: Diagnosis) -> str:
@@ -154,17 +168,19 @@ def _believed(param: Param | None) -> str:
     return bounds
 
 
-def _ordinary_table(evidence: Evidence) -> str:
-    rows = [
-        (
-            o.key,
-            f"{short(o.given)} ± {short(o.given_std)}",
-            short(o.found.value),
-            f"{short(o.found.low)} to {short(o.found.high)}",
-        )
-        for o in evidence.ordinary
-    ]
-    return table(("ordinary number", "car file", "found", "90 % interval"), rows, (1, 2, 3))
+def _ordinary_table(evidence: Evidence, car: Car) -> str:
+    bounds = {param.key: param.bounds for term in car.terms for param in params_of(term)}
+    rows = [_ordinary_row(o, bounds.get(o.key, (-math.inf, math.inf))) for o in evidence.ordinary]
+    return table(("ordinary number", "car file", "found (90 %)"), rows, (1, 2))
+
+
+def _ordinary_row(o: Ordinary, bounds: tuple[float, float]) -> tuple[str, str, str]:
+    """Return a number's row; what is far below its own scatter is nothing."""
+    least, most = bounds
+    ends = (o.found.value, max(o.found.low, least), min(o.found.high, most))
+    value, low, high = (0.0 if abs(v) < _NOTHING * o.given_std else v for v in ends)
+    given = f"{short(o.given)} ± {short(o.given_std)}"
+    return o.key, given, f"{short(value)} ({short(low)} to {short(high)})"
 
 
 def _rival_table(diagnosis: Diagnosis) -> str:
@@ -182,7 +198,7 @@ def _rival_table(diagnosis: Diagnosis) -> str:
 
 
 def _data_table(diagnosis: Diagnosis) -> str:
-    head = ("channel", "problem", "what", "when", "put right by", "record instead")
+    head = ("sensor", "problem", "what", "when", "put right", "record instead")
     rows = [_data_row(problem) for problem in diagnosis.data]
     nothing = tag("p", "Sensors were held against each other; nothing wrong was found.")
     return table(head, rows) or nothing
@@ -190,9 +206,9 @@ def _data_table(diagnosis: Diagnosis) -> str:
 
 def _data_row(problem: DataProblem) -> tuple[str, ...]:
     when = spans(problem.when_s) if problem.when_s else "all the time"
-    corrected = problem.corrected or "nothing could be done"
+    corrected = problem.corrected or "left as it is"
     name = problem.name.replace("_", " ")
-    return (problem.channel, name, problem.said, when, corrected, problem.record_instead)
+    return (sensors([problem.channel]), name, problem.said, when, corrected, problem.record_instead)
 
 
 def _reading() -> str:

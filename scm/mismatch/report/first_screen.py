@@ -1,52 +1,54 @@
 """The first screen: what, where, how sure, how much better, and what to do."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 from scm.mismatch.evidence import Evidence, Tried
-from scm.mismatch.findings import DataProblem, Diagnosis, Effect, Undecided, Verdict
+from scm.mismatch.findings import Diagnosis, Effect, Equation, Located, Undecided, Verdict
 from scm.mismatch.report.advice import advice_of
 from scm.mismatch.report.bars import better_picture
 from scm.mismatch.report.html_text import around, tag
+from scm.mismatch.report.places import where_and_when
 from scm.mismatch.report.plot import Picture
-from scm.mismatch.report.verdict_text import (
-    can_judge,
-    other_problems,
-    pressing_problems,
-    verdict_sentence,
-)
+from scm.mismatch.report.problems import other_problems_said, problem_cards
+from scm.mismatch.report.verdict_text import all_named, can_judge, verdict_sentence
 from scm.mismatch.report.wording import (
     capital,
     interval,
     joined,
+    pretty,
+    quantities,
     quantity,
-    spans,
     sureness,
     title_of,
-    where_and_when,
 )
+
+_ENOUGH_STDS = 5.0
 
 
 def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
     """Return the page's head."""
     kind = str(diagnosis.verdict) if can_judge(diagnosis) else "unable"
-    where = f"Car {evidence.vehicle}, recording {joined(evidence.recordings) or 'unnamed'}"
+    recordings = "recordings" if len(evidence.recordings) > 1 else "recording"
+    where = f"Car {evidence.vehicle}, {recordings} {joined(evidence.recordings) or 'unnamed'}"
     head = tag("p", where, "inputs") + tag("h1", verdict_sentence(diagnosis))
+    names = all_named(diagnosis.effects)
+    head += tag("p", names) if names else ""
     verdict = around("div", head + better(diagnosis), "words")
-    picture = better_picture(diagnosis.fit) if _shows_better(diagnosis) else None
+    picture = better_picture(diagnosis.fit) if diagnosis.effects else None
     bars = around("div", _bars(diagnosis, picture), "bars") if picture else ""
     cards = [*_effect_cards(diagnosis), *_undecided_cards(diagnosis), *_located_card(diagnosis)]
     if diagnosis.verdict is Verdict.NONE and can_judge(diagnosis):
         cards.append(_checked_card(evidence))
-    cards += _data_cards(diagnosis)
+    cards += [
+        _card("data", "Problem of the recording", title, rows)
+        for title, rows in problem_cards(diagnosis, evidence)
+    ]
     return (
         around("header", verdict + bars, f"verdict {kind}")
         + around("div", "".join(cards), "cards")
-        + _other_problems_line(diagnosis)
+        + _other_problems_line(diagnosis, evidence)
     )
-
-
-def _shows_better(diagnosis: Diagnosis) -> bool:
-    return bool(diagnosis.effects)
 
 
 def better(diagnosis: Diagnosis) -> str:
@@ -57,26 +59,23 @@ def better(diagnosis: Diagnosis) -> str:
     before, after = (side.get("position_m") for side in (fit.confirm.before, fit.confirm.after))
     if before is None or after is None:
         return ""
-    horizon = f"after {quantity(fit.horizon_s, 's')} of free running"
-    if not _shows_better(diagnosis):
-        floor = fit.confirm.noise_floor.get("position_m")
-        noise = f"; noise of measuring alone makes {quantity(floor, 'm')}" if floor else ""
-        best = ""
-        if diagnosis.undecided and after < before:
-            best = f"; with the best of these it would be {quantity(after, 'm')}"
-        said = f"The simulator is off by {quantity(before, 'm')} {horizon}{best}{noise}."
-        return tag("p", said)
-    said = (
-        f"On drives that the fit did not see, the simulator was off by {quantity(before, 'm')} "
-        f"{horizon}; with what was found it is off by {quantity(after, 'm')}."
-    )
-    return tag("p", said)
+    floor = fit.confirm.noise_floor.get("position_m", math.nan)
+    was, now, noise = quantities((before, after, floor), "m")
+    seen = f"on parts of the recording that no fit has seen, after {quantity(fit.horizon_s, 's')}"
+    said = f"{capital(seen)} of driving by the recorded commands alone, the simulator is {was} off"
+    if diagnosis.effects:
+        return tag("p", f"{said}; with what was found, {now}.")
+    if diagnosis.undecided and after < before:
+        said += f"; with the best of these, {now}"
+    elif diagnosis.verdict is Verdict.NONE:
+        said += f"; with its own numbers refitted inside their scatter, {now}"
+    return tag("p", f"{said}. Noise of measuring alone makes {noise}." if floor > 0 else f"{said}.")
 
 
 def _bars(diagnosis: Diagnosis, picture: Picture) -> str:
     if diagnosis.fit is None:
         return ""
-    title = f"Position error after {quantity(diagnosis.fit.horizon_s, 's')}, on unseen drives"
+    title = f"Position error after {quantity(diagnosis.fit.horizon_s, 's')}, on unseen parts"
     return tag("h2", title) + around("div", picture.svg, "canvas")
 
 
@@ -88,18 +87,26 @@ def _card(kind: str, label: str, title: str, rows: Sequence[tuple[str, str]]) ->
 
 def _effect_cards(diagnosis: Diagnosis) -> Iterator[str]:
     for i, effect in enumerate(diagnosis.effects, start=1):
-        number = f" {i} of {len(diagnosis.effects)}" if len(diagnosis.effects) > 1 else ""
-        where = [found for found in diagnosis.located if found.equation is effect.equation]
+        number = f", {i} of {len(diagnosis.effects)}" if len(diagnosis.effects) > 1 else ""
+        where = _located_of(effect, diagnosis.located)
         rows = [
-            ("What", effect.said),
+            ("What", pretty(effect.said)),
             ("How much", _amounts(effect)),
-            ("Law", effect.law or ""),
+            ("Law", pretty(effect.law or "").replace(" * ", " · ")),
             ("Where", where_and_when(where)),
             ("How sure", sureness(effect)),
             ("What to do", advice_of(effect)),
         ]
-        label = f"Left out{number}" if effect.listed else f"Left out{number}, outside the library"
+        kind = "Measuring off" if effect.equation is Equation.SENSOR else "Left out"
+        label = f"{kind}{number}" + ("" if effect.listed else ", outside the library")
         yield _card("effect", label, capital(title_of(effect.name)), rows)
+
+
+def _located_of(effect: Effect, located: Sequence[Located]) -> Sequence[Located]:
+    """Return where an effect's own error lies, or else that of its part of the car."""
+    alike = [found for found in located if found.equation is effect.equation]
+    own = [found for found in alike if found.depends_on == effect.depends_on]
+    return own[:1] or alike[:1]
 
 
 def _amounts(effect: Effect) -> str:
@@ -111,8 +118,8 @@ def _amounts(effect: Effect) -> str:
 
 def name_of(name: str, unit: str) -> str:
     """Return a parameter's name in words, without the unit that follows its value."""
-    suffix = "_" + unit.replace("*", "").replace("/", "").replace("^", "")
-    ends = (suffix, "_mps2", "_rad_s", "_nm") if unit != "1" else ()
+    suffix = "_" + unit.replace("*", "").replace("/", "").replace("^", "").lower()
+    ends = (suffix, "_mps2", "_rad_s", "_per_min") if unit != "1" else ()
     stem = next((name.removesuffix(end) for end in ends if name.endswith(end)), name)
     return stem.replace("_", " ")
 
@@ -132,7 +139,8 @@ def _undecided_cards(diagnosis: Diagnosis) -> Iterator[str]:
 def _undecided_card(question: Undecided) -> str:
     titles = [title_of(name) for name in question.between]
     tells = (
-        f"It would tell them apart by {question.expected_separation:.1f} standard deviations."
+        f"The two then differ by {question.expected_separation:.1f} standard deviations; "
+        f"{_ENOUGH_STDS:g} are enough to be sure."
         if question.expected_separation > 0.0
         else ""
     )
@@ -164,37 +172,12 @@ def _best_tried(best: Tried) -> str:
     """Say how near the best of those tried came to being one."""
     title = title_of(best.name)
     if best.gain <= best.needed:
-        return (
-            f"None explains more than luck may: the best, {title}, brings {best.gain:.1f} of the "
-            f"{best.needed:.1f} that it would need."
-        )
-    return f"The best, {title}, explains something, and not enough to be called an effect."
+        return f"None explains more than chance would; {title} comes nearest."
+    return f"The best, {title}, explains something, but not enough to be called an effect."
 
 
-def _data_cards(diagnosis: Diagnosis) -> Iterator[str]:
-    yield from (_data_card(problem) for problem in pressing_problems(diagnosis))
-
-
-def _data_card(problem: DataProblem) -> str:
-    rows = [
-        ("What", problem.said),
-        ("When", capital(spans(problem.when_s)) if problem.when_s else ""),
-        ("Record instead", problem.record_instead),
-    ]
-    title = capital(problem.name.replace("_", " "))
-    title += f": {problem.channel}" if problem.channel not in ("", "*") else ""
-    return _card("data", "Problem of the recording", title, rows)
-
-
-def _other_problems_line(diagnosis: Diagnosis) -> str:
-    fixed = _named(other_problems(diagnosis, corrected=True))
-    noticed = _named(other_problems(diagnosis, corrected=False))
-    said = f"Put right in the recording before the car was blamed: {fixed}. " if fixed else ""
-    said += f"Noticed in the recording, and left as it is: {noticed}. " if noticed else ""
+def _other_problems_line(diagnosis: Diagnosis, evidence: Evidence) -> str:
+    said = other_problems_said(diagnosis, evidence)
     if not said:
         return ""
     return around("p", tag("span", said) + '<a href="#data">Details below.</a>', "corrected")
-
-
-def _named(problems: Sequence[DataProblem]) -> str:
-    return joined([f"{p.name.replace('_', ' ')} of {p.channel}" for p in problems])

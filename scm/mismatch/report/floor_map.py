@@ -20,7 +20,7 @@ from scm.mismatch.report.plot import (
     span_of,
     text,
 )
-from scm.mismatch.report.wording import capital, unit_text
+from scm.mismatch.report.wording import capital, short, unit_text
 
 WIDTH = 440.0
 _LOWEST, _HIGHEST = 130.0, 400.0  # of the floor in the picture
@@ -124,7 +124,7 @@ def _colour_bar(residual: Residual, bound: float, y: float) -> Iterator[str]:
         yield element("path", d=data, class_=f"butt d{kind}", stroke_width=11)
     ends = ((0.0, -bound), (0.5, 0.0), (1.0, bound))
     for share, value in ends:
-        number = f"{value:+.2g}".replace("-", "\N{MINUS SIGN}") if value else "0"
+        number = ("+" if value > 0.0 else "") + short(float(f"{value:.2g}"))
         yield text(left + wide * _CLASSES * share, y + 23, number, "middle")
     yield text(
         left + wide * _CLASSES + 10, y + 4, f"{residual.channel} [{unit_text(residual.unit)}]"

@@ -8,6 +8,7 @@ from scm.mismatch.evidence import Ordinary
 from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text, ticks_across
 
 _WIDTH, _ROW = 440.0, 25.0
+_MOST_LABEL = 270.0
 _FEWEST_STDS, _MOST_STDS = 2.5, 6.0
 
 
@@ -18,7 +19,7 @@ def forest_picture(ordinary: Sequence[Ordinary]) -> Picture | None:
         return None
     ends = [abs(_moved(o, v)) for o in shown for v in (o.found.value, o.found.low, o.found.high)]
     wide = min(_MOST_STDS, max(_FEWEST_STDS, 1.1 * max(e for e in ends if math.isfinite(e))))
-    left = min(220.0, 14.0 + TEXT_PX * max(len(o.key) for o in shown))
+    left = min(_MOST_LABEL, 14.0 + TEXT_PX * max(len(o.key) for o in shown))
     height = 30.0 + _ROW * len(shown) + 44.0
     room = frame((-wide, wide), (0.0, 1.0), (_WIDTH, height), margins=(left, 14, 26, 44))
     parts = []

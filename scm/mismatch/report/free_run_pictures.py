@@ -21,6 +21,7 @@ from scm.mismatch.report.plot import (
     span_of,
     text,
 )
+from scm.mismatch.report.wording import quantities
 
 WINDOWS = 8
 _SIDE = 200.0
@@ -87,7 +88,8 @@ def _window(runs: FreeRuns, row: int, number: int) -> Picture:
         _last_known(position_error(runs, side)[row]) for side in (runs.before, runs.after)
     )
     parts += [text(10, 18, f"from {runs.start_s[row]:.1f} s", kind="title")]
-    parts += [text(10, 35, f"{100 * before:.1f} \N{RIGHTWARDS ARROW} {100 * after:.1f} cm")]
+    was, now = quantities((before, after), "m")
+    parts += [text(10, 35, f"{was} \N{RIGHTWARDS ARROW} {now}")]
     return Picture(
         name=f"free_run_{number}",
         title="",
@@ -110,8 +112,8 @@ def error_pictures(runs: FreeRuns | None) -> list[Picture]:
     rows = unseen(runs)
     found = []
     for name, title, unit, factor, error in (
-        ("error_position", "Position error of free runs", "cm", 100.0, position_error),
-        ("error_yaw", "Heading error of free runs", "°", 180.0 / np.pi, yaw_error),
+        ("error_position", "Position error", "cm", 100.0, position_error),
+        ("error_yaw", "Heading error", "°", 180.0 / np.pi, yaw_error),
     ):
         before, after = (
             _spread(factor * error(runs, side)[rows]) for side in (runs.before, runs.after)
@@ -140,7 +142,7 @@ def _growth(
         margins=(58.0, 14.0, 50.0, 44.0),
     )
     parts = list(legend(62.0, 16.0, [("before", "before"), ("after", "after")]))
-    parts += grid(room, "time since the window's start [s]", f"[{unit}]")
+    parts += grid(room, "time since the window's start [s]", f"{title.lower()} [{unit}]")
     parts += [
         band(room, t_s, side[0], side[2], f"band-{kind}")
         for side, kind in ((before, "before"), (after, "after"))
@@ -148,8 +150,8 @@ def _growth(
     parts += [line(room, t_s, before[1], "before"), line(room, t_s, after[1], "after")]
     return Picture(
         name=name,
-        title=title,
+        title=f"{title} of free runs",
         said="Windows that the fit did not see. Lines: half of the windows lie below; areas: "
         "from the best tenth of the windows to the worst tenth.",
-        svg=picture_svg(_WIDTH, _HEIGHT, parts, title),
+        svg=picture_svg(_WIDTH, _HEIGHT, parts, f"{title} of free runs"),
     )

@@ -6,13 +6,16 @@ from html import escape
 
 from scm.mismatch.report.plot import Picture
 
+_CODE = re.compile(r"`([^`<>]+)`")
+_KEY = re.compile(r"\w+\.[\w.*]+")  # such as `body.mass_kg`, which may be parted at its joints
+_JOINT = re.compile(r"([._])(?=\w)")
 _BEFORE_UNIT = re.compile(r"(\d) (?=(?:%|[mcμ]?m|m?s|k?g|N|rad|m/s)\b|%)")
 
 
 def tag(name: str, said: str, kind: str = "") -> str:
-    """Return one element around a text; a line of the text is one of the page."""
+    """Return one element around a text; a line is one of the page, `so` is what to type."""
     lines = _BEFORE_UNIT.sub("\\1&nbsp;", escape(said)).replace("\n", "<br>")
-    return around(name, lines, kind)
+    return around(name, _CODE.sub(r"<code>\1</code>", lines), kind)
 
 
 def around(name: str, inner: str, kind: str = "") -> str:
@@ -40,17 +43,25 @@ def section(anchor: str, title: str, *inner: str) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """Return a table of texts; columns whose index is in `numbers` stand at the right."""
+    """Return a table of texts; a row of one text heads those below it.
+
+    Columns whose index is in `numbers` stand at the right.
+    """
     if not rows:
         return ""
     top = "".join(_cell("th", text, i in numbers) for i, text in enumerate(head))
-    body = "".join(
-        around("tr", "".join(_cell("td", text, i in numbers) for i, text in enumerate(row)))
-        for row in rows
-    )
+    body = "".join(_row(row, len(head), numbers) for row in rows)
     inner = around("thead", around("tr", top)) + around("tbody", body)
     return around("div", around("table", inner), "scroll")
 
 
+def _row(row: Sequence[str], columns: int, numbers: Sequence[int]) -> str:
+    if len(row) == 1 < columns:
+        words = tag("b", row[0])
+        return around("tr", f'<td class="heads" colspan="{columns}">{words}</td>')
+    return around("tr", "".join(_cell("td", text, i in numbers) for i, text in enumerate(row)))
+
+
 def _cell(name: str, text: str, is_number: bool) -> str:
-    return tag(name, text, "number" if is_number else "")
+    cell = tag(name, text, "number" if is_number else "")
+    return _JOINT.sub("\\1<wbr>", cell) if _KEY.fullmatch(text) else cell

@@ -14,6 +14,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats
 from scm.maps.svg import element
+from scm.mismatch.report.wording import short
 from scm.vehicles.manual.line_svg import Axis, equally_scaled
 
 MARGINS = (62.0, 14.0, 30.0, 40.0)  # left, right, top, bottom
@@ -172,7 +173,7 @@ def tick_text(value: float, step: float) -> str:
     if abs(value) < 1e-9 * step:
         return "0"
     if not 1e-4 <= abs(step) < 1e6:
-        return f"{value:.3g}"
+        return short(value)
     decimals = max(0, -math.floor(math.log10(step) + 1e-9))
     return f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}")
 

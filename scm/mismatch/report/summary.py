@@ -1,12 +1,20 @@
 """The few lines that the command line prints at the end."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
 from scm.mismatch.findings import Diagnosis, Effect
 from scm.mismatch.report.first_screen import name_of
 from scm.mismatch.report.verdict_text import can_judge, verdict_sentence
-from scm.mismatch.report.wording import interval, percent, quantity, title_of
+from scm.mismatch.report.wording import (
+    interval,
+    percent,
+    pretty,
+    quantities,
+    quantity,
+    title_of,
+)
 from scm.mismatch.report.write import PAGE
 
 
@@ -20,7 +28,7 @@ def _lines(diagnosis: Diagnosis, out: Path) -> Iterator[str]:
     yield f"{verdict}: {verdict_sentence(diagnosis)}"
     for effect in diagnosis.effects:
         yield f"  {effect.name}  {percent(effect.probability)}  {_numbers(effect)}".rstrip()
-        yield f"    {effect.said}"
+        yield f"    {pretty(effect.said)}"
     for question in diagnosis.undecided:
         yield f"  undecided: {' or '.join(map(title_of, question.between))}"
         yield f"    drive this: {question.drive_this}"
@@ -42,7 +50,7 @@ def _better(diagnosis: Diagnosis) -> Iterator[str]:
     fit = diagnosis.fit
     if fit is None or "position_m" not in fit.confirm.before:
         return
-    before = quantity(fit.confirm.before["position_m"], "m")
-    after = quantity(fit.confirm.after.get("position_m", float("nan")), "m")
+    sides = fit.confirm.before["position_m"], fit.confirm.after.get("position_m", math.nan)
+    before, after = quantities(sides, "m")
     horizon = quantity(fit.horizon_s, "s")
     yield f"  position error after {horizon}, on unseen parts: {before} -> {after}"

@@ -11,6 +11,7 @@ from scm.mismatch.evidence import FreeRuns, Residual
 from scm.mismatch.findings import Located, Span
 from scm.mismatch.report.plot import (
     BAND_STDS,
+    TEXT_PX,
     Frame,
     Picture,
     band,
@@ -30,13 +31,25 @@ _MARGINS = (66.0, 14.0, 26.0, 10.0)
 _TOP = 26.0
 _MOST_PANELS = 5
 _COLUMNS = 450
-PARTS = {"fit": "fitted", "choose": "chosen", "confirm": "confirmed"}
+PARTS = {"fit": "fits the numbers", "choose": "chooses the effect", "confirm": "only confirms"}
 
 
 def time_line(
-    residuals: Sequence[Residual], located: Sequence[Located], runs: FreeRuns | None, after: str
+    residuals: Sequence[Residual],
+    located: Sequence[Located],
+    runs: FreeRuns | None,
+    after: str,
+    start_s: float = 0.0,
 ) -> Picture | None:
-    """Return the picture, `after` in the legend; None where there is nothing to draw."""
+    """Return the picture; None where there is nothing to draw.
+
+    Args:
+        residuals: One panel each, the first few.
+        located: When the error acts.
+        runs: Which part of the recording served what.
+        after: In the legend.
+        start_s: What was taken off all times.
+    """
     shown = [r for r in residuals if len(r.t_s)][:_MOST_PANELS]
     if not shown:
         return None
@@ -50,14 +63,15 @@ def time_line(
         room = frame(span, _heights(residual), (WIDTH, PANEL), (0.0, y), _MARGINS)
         parts += _panel(room, residual, spans)
         y += PANEL
-    parts += _strip(span, y, runs)
+    clock = f"since {start_s:.0f} s of" if start_s else "on"
+    parts += _strip(span, y, runs, f"time {clock} the recording's clock [s]")
     return Picture(
         name="time_line",
         title="",
         said="Zero means that the simulator is right. Lines are smoothed; the areas around them "
         "hold the truth with 90 %. Where the orange line leaves zero by more than its area and the "
-        f"blue line stays, the car {after} explains it. The strip below shows what served to fit "
-        "the numbers, to choose the effect, and only to confirm.",
+        f"blue line stays, the car {after} explains it. The strip at the foot shows which "
+        "part of the recording served what.",
         svg=picture_svg(WIDTH, y + STRIP, parts, "Residuals along the recording"),
         wide=True,
     )
@@ -147,7 +161,7 @@ def _known(values: Floats, how: Callable[[Floats], np.float64]) -> float:
     return float(how(known)) if len(known) else float("nan")
 
 
-def _strip(span: Span, y: float, runs: FreeRuns | None) -> Iterator[str]:
+def _strip(span: Span, y: float, runs: FreeRuns | None, title: str) -> Iterator[str]:
     """Yield the time's numbers and, below, which part of the recording served what."""
     room = frame(span, (0.0, 1.0), (WIDTH, STRIP), (0.0, y), (66.0, 14.0, 0.0, 40.0))
     for start, end, part in part_spans(runs):
@@ -155,14 +169,14 @@ def _strip(span: Span, y: float, runs: FreeRuns | None) -> Iterator[str]:
             float(np.clip(room.across.at(t), room.left, room.right)) for t in (start, end)
         )
         yield element("rect", x=left, y=y, width=right - left, height=14, class_=f"part-{part}")
-        words = PARTS.get(part, part)
-        if right - left > 7.5 * len(words):
-            yield text(0.5 * (left + right), y + 11, words, "middle")
-        elif right - left > 7.5 * len(part):
-            yield text(0.5 * (left + right), y + 11, part, "middle")
     for value in room.across.ticks():
         yield text(room.across.at(value), y + 31, f"{value:g}", "middle")
-    yield text(room.right, y + 48, "time on the recording's clock [s]", "end", "title")
+    x = room.left
+    for part, words in PARTS.items() if part_spans(runs) else ():
+        yield element("rect", x=x, y=y + 38, width=24, height=12, class_=f"part-{part}")
+        yield text(x + 30, y + 48, words)
+        x += 30 + TEXT_PX * len(words) + 22
+    yield text(room.right, y + 48, title, "end", "title")
 
 
 def part_spans(runs: FreeRuns | None) -> list[tuple[float, float, str]]:

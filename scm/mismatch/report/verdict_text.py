@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from scm.mismatch.findings import DataProblem, Diagnosis, Effect, Equation, Verdict
 from scm.mismatch.report.wording import capital, joined, title_of
 
-_MOST_PRESSING = 4
+_MOST_NAMED = 4  # effects in the verdict's sentence
+_COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
 def verdict_sentence(diagnosis: Diagnosis) -> str:
@@ -25,6 +26,8 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
 
 def _mismatch_sentence(effects: Sequence[Effect]) -> str:
     """Say apart what the car does and what only its measuring does."""
+    if len(effects) > _MOST_NAMED:
+        return _many_sentence(effects)
     car, measuring = (
         joined([effect_title(e) for e in effects if (e.equation is Equation.SENSOR) is sensor])
         for sensor in (False, True)
@@ -34,6 +37,31 @@ def _mismatch_sentence(effects: Sequence[Effect]) -> str:
     if not car:
         return f"Not the car, its measuring is off: {measuring}."
     return f"The simulator leaves out {car}, and the measuring is off: {measuring}."
+
+
+def _many_sentence(effects: Sequence[Effect]) -> str:
+    """Count effects that no sentence can hold."""
+    measuring = sum(effect.equation is Equation.SENSOR for effect in effects)
+    car = len(effects) - measuring
+    if not measuring or not car:
+        if car:
+            return f"The simulator leaves out {count(car)} effects."
+        return f"Not the car, its measuring is off in {count(measuring)} ways."
+    faults = f"{count(measuring)} fault{'s' if measuring > 1 else ''} of the measuring"
+    left_out = f"{count(car)} effect{'s' if car > 1 else ''} that the simulator leaves out"
+    return capital(f"{left_out}, and {faults}.")
+
+
+def count(number: int) -> str:
+    """Return a small number as a word."""
+    return _COUNTS[number] if number < len(_COUNTS) else str(number)
+
+
+def all_named(effects: Sequence[Effect]) -> str:
+    """Return the effects by name where the verdict's sentence only counts them."""
+    if len(effects) <= _MOST_NAMED:
+        return ""
+    return capital(joined([effect_title(effect) for effect in effects])) + "."
 
 
 def effect_title(effect: Effect) -> str:
@@ -61,14 +89,11 @@ def can_judge(diagnosis: Diagnosis) -> bool:
 
 
 def pressing_problems(diagnosis: Diagnosis) -> Sequence[DataProblem]:
-    """Return data problems that stand in the verdict's way, or that the next recording can avoid.
-
-    The first few of them: a list of twenty is read by nobody, and all stand below.
-    """
+    """Return data problems in the verdict's way, or that the next recording avoids."""
     open_ones = [problem for problem in diagnosis.data if not problem.corrected]
     if can_judge(diagnosis):
         open_ones = [problem for problem in open_ones if problem.record_instead]
-    return sorted(open_ones, key=lambda problem: problem.name != "other_car")[:_MOST_PRESSING]
+    return sorted(open_ones, key=lambda problem: problem.name != "other_car")
 
 
 def other_problems(diagnosis: Diagnosis, *, corrected: bool) -> Sequence[DataProblem]:

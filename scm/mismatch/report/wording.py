@@ -1,19 +1,12 @@
 """Names, numbers and doubts in the words of the report."""
 
 import math
+import re
 from collections.abc import Sequence
 
-from scm.mismatch.findings import Effect, Equation, Estimate, Located, Place, Span
+from scm.mismatch.findings import Effect, Estimate
 from scm.vehicles.describe_effects import all_effects
 
-PARTS_OF_CAR = {
-    Equation.DRIVE: "In the drive",
-    Equation.STEERING: "In the steering",
-    Equation.TYRE: "In the tyres",
-    Equation.BODY: "On the body",
-    Equation.SURFACE: "From the floor",
-    Equation.SENSOR: "In the measuring",
-}
 _SCALES = {  # smallest value of each unit, and how many of it one SI unit is
     "m": ((1.0, "m", 1.0), (0.01, "cm", 100.0), (0.0, "mm", 1000.0)),
     "s": ((1.0, "s", 1.0), (0.0, "ms", 1000.0)),
@@ -21,7 +14,11 @@ _SCALES = {  # smallest value of each unit, and how many of it one SI unit is
     "rad": ((0.0, "°", 180.0 / math.pi),),
 }
 _SURE = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
-_MOST_SPANS = 4
+_MOST_DIGITS = 6
+_INTEGERS, _FINEST, _TWO_DIGITS = 1000.0, 1e-4, 3.0
+MINUS = "\N{MINUS SIGN}"
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_NEGATIVE = re.compile(r"(^|[\s(])-(?=[\d.])")
 
 
 def title_of(name: str) -> str:
@@ -55,20 +52,71 @@ def quantity(value: float, unit: str) -> str:
     return f"{short(value * factor)}{space}{name}".rstrip()
 
 
+def quantities(values: Sequence[float], unit: str) -> list[str]:
+    """Return values to be compared, all in the unit that suits the largest."""
+    known = [abs(value) for value in values if math.isfinite(value)]
+    largest = max(known, default=0.0)
+    scales = _SCALES.get(unit, ((0.0, unit_text(unit), 1.0),))
+    name, factor = next((name, per) for least, name, per in scales if largest >= least)
+    space = "" if name == "°" else " "
+    decimals = _decimals(largest * factor, 3)
+    said = []
+    for value in values:
+        if not math.isfinite(value):
+            said.append("unknown")
+            continue
+        number = f"{value * factor:.{max(decimals, _decimals(value * factor, 2))}f}"
+        number = number if math.log10(largest * factor or 1.0) < _MOST_DIGITS else f"{value:.3g}"
+        said.append(f"{number.replace('-', MINUS)}{space}{name}".rstrip())
+    return said
+
+
+def _decimals(value: float, digits: int) -> int:
+    """Return how many decimals show so many digits of a value; none of zero."""
+    if value == 0.0 or not math.isfinite(value):
+        return 0
+    return min(6, max(0, digits - 1 - math.floor(math.log10(abs(value)))))
+
+
 def short(value: float) -> str:
     """Return three digits, without an exponent where people would write none."""
     text = f"{value:.3g}"
-    return (text if "e" not in text else f"{value:.2e}").replace("-", "\N{MINUS SIGN}")
+    digits, e, power = text.partition("e")
+    if e and 0 < int(power) < _MOST_DIGITS:
+        text = f"{float(text):.0f}"
+    elif e:
+        text = f"{digits}·10{str(int(power)).translate(_RAISED)}"
+    return text.replace("-", MINUS)
+
+
+def pretty(said: str) -> str:
+    """Return a sentence with units and signs as they are printed."""
+    said = said.replace("^2", "²").replace("^3", "³")
+    return _NEGATIVE.sub(f"\\1{MINUS}", said)
 
 
 def interval(estimate: Estimate) -> str:
-    """Return a value with its 90 % interval in one unit."""
-    low, high = short(estimate.low), short(estimate.high)
+    """Return a value with its 90 % interval in one unit, to the digits that the interval allows."""
     unit = unit_text(estimate.unit)
+    value, low, high = _rounded(estimate, 1.0)
     degrees = ""
     if estimate.unit == "rad" and math.isfinite(estimate.value):
-        degrees = f" = {short(math.degrees(estimate.value))}°"
-    return f"{short(estimate.value)} {unit}".rstrip() + f"{degrees} (90 %: {low} to {high})"
+        degrees = f" = {_rounded(estimate, 180.0 / math.pi)[0]}°"
+    return f"{value} {unit}".rstrip() + f"{degrees} (90 %: {low} to {high})"
+
+
+def _rounded(estimate: Estimate, factor: float) -> tuple[str, str, str]:
+    """Return value and ends times a factor, with the decimals that show the interval's width."""
+    value, low, high = (v * factor for v in (estimate.value, estimate.low, estimate.high))
+    half = 0.5 * (high - low)
+    if not (math.isfinite(value) and math.isfinite(half) and half > _FINEST * abs(value)):
+        return short(value), short(low), short(high)
+    two = half / 10.0 ** math.floor(math.log10(half)) < _TWO_DIGITS
+    decimals = _decimals(half, 2 if two else 1)
+    if abs(value) + half >= _INTEGERS or decimals > _MOST_DIGITS - 1:
+        return short(value), short(low), short(high)
+    text, least, most = (f"{v:.{decimals}f}".replace("-", MINUS) for v in (value, low, high))
+    return text, least, most
 
 
 def percent(share: float) -> str:
@@ -85,40 +133,11 @@ def percent(share: float) -> str:
 def sureness(effect: Effect) -> str:
     """Return how sure an effect is, and what else it might be."""
     words = next((said for least, said in _SURE if effect.probability >= least), "Possible")
-    said = f"{words}, {percent(effect.probability)}"
+    said = f"{words}: {percent(effect.probability)}"
     if effect.rivals:
         best = max(effect.rivals, key=lambda rival: rival.probability)
-        said += f"; next best: {title_of(best.name)}, {percent(best.probability)}"
+        said += f". Next best is {title_of(best.name)}, {percent(best.probability)}"
     return said + "."
-
-
-def where_and_when(found: Sequence[Located]) -> str:
-    """Return where and when the error lies."""
-    return " ".join(_one_place(located) for located in found)
-
-
-def _one_place(located: Located) -> str:
-    where = place(located.where) if located.where else "everywhere on the floor"
-    when = spans(located.when_s) if located.when_s else "all the time"
-    said = f"{PARTS_OF_CAR[located.equation]}, {where}, {when}."
-    if located.channels:
-        said += f" Seen in {joined(located.channels)}."
-    if located.depends_on:
-        said += f" It depends on {joined(located.depends_on)}."
-    return f"{said} It makes {percent(located.share_of_error)} of the error."
-
-
-def place(box: Place) -> str:
-    """Return a box of the floor."""
-    (x0, x1), (y0, y1) = box.x_m, box.y_m
-    return f"at x {short(x0)} to {short(x1)} m, y {short(y0)} to {short(y1)} m"
-
-
-def spans(when_s: Sequence[Span]) -> str:
-    """Return spans of time, the first few by their numbers."""
-    shown = [f"{a:.1f} to {b:.1f} s" for a, b in when_s[:_MOST_SPANS]]
-    more = len(when_s) - len(shown)
-    return "at " + ", ".join(shown) + (f" and {more} more times" if more else "")
 
 
 def joined(names: Sequence[str], word: str = "and") -> str:

@@ -9,6 +9,7 @@ from scm.mismatch.report.as_json import json_text
 from scm.mismatch.report.car_file import FILE, write_car
 from scm.mismatch.report.drawings import draw
 from scm.mismatch.report.page import page_html
+from scm.mismatch.report.shown_time import since_start
 from scm.vehicles.car import Car
 
 PAGE, FIELDS, PICTURES = "report.html", "report.json", "pictures"
@@ -32,10 +33,11 @@ def write_report(
     for old in pictures.glob("*.svg"):
         old.unlink()
     (out / FIELDS).write_text(json_text(diagnosis), encoding="utf-8")
-    drawings = draw(diagnosis, evidence)
+    use = _written_car(diagnosis, evidence, car, patched, out)
+    diagnosis, evidence, start_s = since_start(diagnosis, evidence)
+    drawings = draw(diagnosis, evidence, start_s)
     for picture in drawings.all():
         (pictures / f"{picture.name}.svg").write_text(picture.as_file(), encoding="utf-8")
-    use = _written_car(diagnosis, evidence, car, patched, out)
     page = page_html(diagnosis, evidence, drawings, (car, patched), use)
     (out / PAGE).write_text(page, encoding="utf-8")
 
@@ -51,10 +53,11 @@ def _written_car(
         return f"The car with what was found could not be written as a file: {error}"
     beside = f" It needs {', '.join(files[1:])} beside it." if files[1:] else ""
     if not _is_changed(car, patched):
-        return f"{FILE} beside this page is the car as it was given.{beside}"
+        return f"`{FILE}` beside this page is the car as it was given.{beside}"
+    what = "with what was found" if diagnosis.effects else "with its own numbers refitted"
     return (
-        f"{FILE} beside this page is the given car with what was found.{beside} The simulator "
-        f"loads it: scm replay RECORDING --car {FILE}"
+        f"`{FILE}` beside this page is the given car {what}.{beside} The simulator loads it; see "
+        f"how it does on another drive: `scm replay ANOTHER_DRIVE --car {FILE}`"
     )
 
 

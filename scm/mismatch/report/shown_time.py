@@ -1,0 +1,41 @@
+"""Times as a page shows them: since the start, where the recording's clock counts from 1970."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.evidence import Evidence
+from scm.mismatch.findings import Diagnosis, Span
+
+_READABLE_S = 1e5  # a clock beyond it is no stop watch
+
+
+def since_start(diagnosis: Diagnosis, evidence: Evidence) -> tuple[Diagnosis, Evidence, float]:
+    """Return both with times that can be read, and what was taken off them [s]."""
+    start_s = _start_s(evidence)
+    if not start_s:
+        return diagnosis, evidence, 0.0
+    located = tuple(replace(e, when_s=_spans(e.when_s, start_s)) for e in diagnosis.located)
+    data = tuple(replace(p, when_s=_spans(p.when_s, start_s)) for p in diagnosis.data)
+    residuals = tuple(replace(r, t_s=r.t_s - start_s) for r in evidence.residuals)
+    runs = evidence.free_runs
+    if runs is not None:
+        runs = replace(runs, start_s=runs.start_s - start_s)
+    shown = replace(evidence, residuals=residuals, free_runs=runs)
+    return replace(diagnosis, located=located, data=data), shown, start_s
+
+
+def _start_s(evidence: Evidence) -> float:
+    """Return the whole second at which a clock that nobody can read begins; 0 of any other."""
+    runs = evidence.free_runs
+    times: list[Floats] = [r.t_s for r in evidence.residuals]
+    times += [runs.start_s] if runs is not None else []
+    known = [float(np.nanmin(t)) for t in times if np.isfinite(t).any()]
+    first = min(known, default=0.0)
+    return float(math.floor(first)) if abs(first) > _READABLE_S else 0.0
+
+
+def _spans(when_s: tuple[Span, ...] | None, start_s: float) -> tuple[Span, ...] | None:
+    return when_s and tuple((a - start_s, b - start_s) for a, b in when_s)
