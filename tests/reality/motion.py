@@ -1,8 +1,9 @@
 """How a four-wheeled car moves: 4 kHz, wheel spin solved implicitly, the body half explicitly.
 
-The plane only. Each wheel has its motor, load, tyre and dry friction; loads follow accelerations
-through a lag of 8 ms. Positions are those of the rear axle's centre. Order of wheels: front left,
-front right, rear left, rear right. All numbers come as one record, so that laws read by name.
+Each wheel has its motor, load, tyre and dry friction. The body heaves, rolls and pitches a little,
+on springs and dampers over tyres that press in; hubs have no mass here. Positions are those of the
+floor under the middle of the rear axle. Order of wheels: front left, front right, rear left, rear
+right. All numbers come as one record, so that laws read by name.
 """
 
 import math
@@ -17,7 +18,8 @@ STEPS_PER_COMMAND = 200
 STEPS_PER_ROW = 10
 COMMAND_S = STEP * STEPS_PER_COMMAND
 ROW_S = STEP * STEPS_PER_ROW
-LOAD_LAG = 0.008
+TYRE_STIFFNESS, TYRE_DAMPING = 2.0e4, 10.0
+YIELD_LAG = 0.004  # of wheels that give way: forces and angles settle on each other
 WARM_S = 60.0
 STICTION_FADE = 0.6
 
@@ -27,12 +29,13 @@ STATE = np.dtype(
         (name, "f8")
         for name in (
             "x", "y", "yaw", "vx", "vy", "yaw_rate", "throttle", "target", "servo", "linkage",
-            "angle", "push", "side", "front_side", "load_x", "load_y",
+            "angle", "yielded", "push", "side", "front_side", "heave", "heave_rate", "roll",
+            "roll_rate", "pitch", "pitch_rate",
         )
     ]
 )  # fmt: skip
 ROW = ("t", "x", "y", "yaw", "vx", "vy", "yaw_rate", "push", "side", "left", "right")
-WHEEL = ("spin", "turned", "strength", "lag")
+WHEEL = ("spin", "turned", "strength", "lag", "squeeze")
 
 
 @njit(cache=True)
@@ -66,10 +69,10 @@ def steer(c, s, t, command, shake):
     s.linkage = min(max(s.linkage, s.servo - half), s.servo + half)
     angle = s.linkage + c.trim + c.steer_per_speed * s.vx
     angle += c.weave * math.sin(2.0 * math.pi * t / c.weave_period)
-    angle -= c.give * s.front_side / (c.mass * GRAVITY)
     angle -= c.understeer * s.vx * s.yaw_rate
-    share = STEP / (0.02 + STEP) if c.give > 0.0 else 1.0
-    s.angle += share * (angle - s.angle)
+    gives = c.give * s.front_side / (c.mass * GRAVITY)
+    s.yielded += STEP / (YIELD_LAG + STEP) * (gives - s.yielded)
+    s.angle = angle - s.yielded
 
 
 @njit(cache=True)
@@ -155,21 +158,44 @@ def spin_wheel(c, wheels, i, u, slow, load, grip, v_long, v_lat, rolling):
 
 
 @njit(cache=True)
+def press(c, s, wheels, i, ahead, aside):
+    """Advance the squeeze of one tyre under its spring; return the load beyond that at rest [N]."""
+    up = s.heave + aside * s.roll - ahead * s.pitch
+    rise = s.heave_rate + aside * s.roll_rate - ahead * s.pitch_rate
+    stiff, damped = c.spring + TYRE_STIFFNESS, c.damper + TYRE_DAMPING
+    change = -(c.spring * up + c.damper * rise + stiff * wheels[i, 4]) / (damped + STEP * stiff)
+    wheels[i, 4] += STEP * change
+    return TYRE_STIFFNESS * wheels[i, 4] + TYRE_DAMPING * change
+
+
+@njit(cache=True)
+def sway(c, s, lift, roll, pitch):
+    """Advance heave, roll and pitch by one step under a force [N] and moments [N*m]."""
+    s.heave_rate += STEP * lift / (c.mass - 4.0 * c.hub)
+    s.roll_rate += STEP * roll / c.roll_inertia
+    s.pitch_rate += STEP * pitch / c.pitch_inertia
+    s.heave += STEP * s.heave_rate
+    s.roll += STEP * s.roll_rate
+    s.pitch += STEP * s.pitch_rate
+
+
+@njit(cache=True)
 def move(c, s, wheels, t, u):
     """Advance wheels and body by one step."""
     along, across, twist = outside_force(c, s, t)
+    lift, roll, pitch = 0.0, 0.0, 0.0
     slow, tan, front_side = abs(s.throttle) < 0.005, math.tan(s.angle), 0.0
     cos_yaw, sin_yaw = math.cos(s.yaw), math.sin(s.yaw)
     for i in range(4):
         front, left = i < 2, 1.0 if i % 2 == 0 else -1.0
         ahead, aside = (c.base if front else 0.0), 0.5 * c.track * left
         share = (c.cog if front else c.base - c.cog) / c.base
-        lean = 1.0 - 2.0 * left * s.load_y * c.height / (GRAVITY * c.track)
-        dive = (-1.0 if front else 1.0) * s.load_x * c.height / (GRAVITY * c.base)
-        load = max(0.5 * c.mass * GRAVITY * (share * lean + dive), 0.0)
+        more = press(c, s, wheels, i, ahead - c.cog, aside)
+        load = max(0.5 * c.mass * GRAVITY * share + more, 0.0)
         bend = math.atan2(c.base * tan, c.base - aside * tan) if front else 0.0
         cos, sin = math.cos(bend), math.sin(bend)
-        v_x, v_y = s.vx - s.yaw_rate * aside, s.vy + s.yaw_rate * (ahead - c.cog)
+        v_x = s.vx - s.yaw_rate * aside - s.pitch_rate * c.height
+        v_y = s.vy + s.yaw_rate * (ahead - c.cog) + s.roll_rate * c.height
         at_x = s.x + cos_yaw * ahead - sin_yaw * aside
         on = inside_patch(c, at_x, s.y + sin_yaw * ahead + cos_yaw * aside)
         f_long, f_lat = spin_wheel(
@@ -179,10 +205,11 @@ def move(c, s, wheels, t, u):
         f_x, f_y = cos * f_long - sin * f_lat, sin * f_long + cos * f_lat
         along, across = along + f_x, across + f_y
         twist += (ahead - c.cog) * f_y - aside * f_x
+        lift, roll = lift + more, roll + aside * more + c.height * f_y
+        pitch -= (ahead - c.cog) * more + c.height * f_x
         front_side += f_lat if front else 0.0
     s.front_side, s.push, s.side = front_side, along / c.mass, across / c.mass
-    s.load_x += (s.push - s.load_x) * STEP / LOAD_LAG
-    s.load_y += (s.side - s.load_y) * STEP / LOAD_LAG
+    sway(c, s, lift, roll, pitch)
     vx = s.vx + STEP * (s.push + s.yaw_rate * s.vy)
     s.vy += STEP * (s.side - s.yaw_rate * s.vx)
     s.vx = vx
@@ -192,6 +219,14 @@ def move(c, s, wheels, t, u):
     s.x += STEP * (s.vx * math.cos(middle) - drift * math.sin(middle))
     s.y += STEP * (s.vx * math.sin(middle) + drift * math.cos(middle))
     s.yaw += STEP * s.yaw_rate
+
+
+@njit(cache=True)
+def under_axle(c, s):
+    """Return the floor's point under the middle of the rear axle, which a leaning body moves."""
+    back, left = c.height * s.pitch, c.height * s.roll
+    cos, sin = math.cos(s.yaw), math.sin(s.yaw)
+    return s.x - cos * back - sin * left, s.y - sin * back + cos * left
 
 
 @njit(cache=True)
@@ -215,7 +250,8 @@ def advance(numbers, state, wheels, throttle, steering, shake, first, rows):
             move(c, s, wheels, t, u)
             push, side = push + s.push, side + s.side
         out[row, 0] = (first + row + 1) * STEPS_PER_ROW * STEP
-        out[row, 1], out[row, 2], out[row, 3] = s.x, s.y, s.yaw
+        out[row, 1], out[row, 2] = under_axle(c, s)
+        out[row, 3] = s.yaw
         out[row, 4], out[row, 5], out[row, 6] = s.vx, s.vy, s.yaw_rate
         out[row, 7], out[row, 8] = push / STEPS_PER_ROW, side / STEPS_PER_ROW
         out[row, 9], out[row, 10] = wheels[2, 1], wheels[3, 1]

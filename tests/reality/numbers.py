@@ -12,6 +12,8 @@ GRAVITY = 9.80665
 KEYS = {
     "mass": "body.mass_kg",
     "inertia": "body.yaw_inertia_kgm2",
+    "roll_inertia": "body.roll_inertia_kgm2",
+    "pitch_inertia": "body.pitch_inertia_kgm2",
     "base": "body.wheelbase_m",
     "track": "body.track_m",
     "cog": "body.cog_to_rear_axle_m",
@@ -19,6 +21,9 @@ KEYS = {
     "drag_linear": "body.drag_linear_ns_m",
     "drag_square": "body.drag_quadratic_ns2_m2",
     "drag_turn": "body.drag_angular_nms",
+    "spring": "suspension.spring_n_m",
+    "damper": "suspension.damper_ns_m",
+    "hub": "wheel.mass_kg",
     "radius": "wheel.radius_m",
     "spin_inertia": "wheel.spin_inertia_kgm2",
     "damping": "wheel.damping_linear_nms",

@@ -38,3 +38,24 @@ def test_an_effect_shows_alike_in_both_engines():
     usual = driven(motion.Moving, "nigel", 0.6, 0.2)
     off = np.hypot(*(own[-1, 1:3] - theirs[-1, 1:3]))
     assert off < 0.05 * np.hypot(*(own[-1, 1:3] - usual[-1, 1:3]))
+
+
+@pytest.mark.parametrize("give", [0.0, 0.2])
+def test_both_engines_answer_leaps_of_the_steering_alike(give):
+    from tests.reality.in_mujoco import Moving
+
+    steering = np.repeat(np.random.default_rng(1).uniform(-0.25, 0.25, 10), 8)
+    rows = []
+    for moving in (motion.Moving, Moving):
+        body = moving(nominal("f1tenth") | {"give": give}, (0.0, 0.0, 0.0), 80)
+        rows.append(np.vstack([body.command(k, 0.45, steering[k]) for k in range(80)]))
+    off = np.sqrt(np.mean(np.square(rows[0] - rows[1]), axis=0))
+    assert off[6] < 5e-4
+    assert off[8] < 0.01
+    assert off[7] < 0.01
+
+
+def test_mujocos_forces_are_compiled_with_the_laws_as_they_are_now():
+    from tests.reality.in_mujoco import push
+
+    assert push.stats.cache_path is None

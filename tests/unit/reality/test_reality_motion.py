@@ -6,8 +6,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from tests.reality.motion import Moving
-from tests.reality.numbers import TYPES, nominal
+from tests.reality.motion import STEP, TYRE_STIFFNESS, Moving, steer
+from tests.reality.numbers import GRAVITY, TYPES, nominal
 
 
 def driven(car, seconds, throttle, steering=0.0, **changed):
@@ -96,3 +96,55 @@ def test_effects_of_the_drive_change_its_speed_the_right_way(changed, slower):
 def test_effects_of_the_steering_turn_a_straight_drive_left(changed):
     _, rows = driven("nigel", 10.0, 0.6, **changed)
     assert rows[-1, 3] > 0.01
+
+
+def test_wheels_that_give_way_turn_as_fast_as_the_servo_where_nothing_presses_them():
+    for commands in (1, 2, 3):
+        body, _ = driven("f1tenth", commands / 20, 0.0, 1.0, give=0.2)
+        assert body.state["angle"][0] == pytest.approx(body.state["servo"][0], abs=1e-9)
+
+
+def test_wheels_give_way_in_the_end_by_their_side_force():
+    body, _ = driven("f1tenth", 8.0, 0.4, 0.4, give=0.2)
+    s, numbers = body.state[0], nominal("f1tenth")
+    gives = 0.2 * s["front_side"] / (numbers["mass"] * GRAVITY)
+    assert s["servo"] - s["angle"] == pytest.approx(gives, rel=1e-3)
+    assert gives > 0.01
+
+
+def test_wheels_give_way_within_ten_milliseconds():
+    body = Moving(nominal("f1tenth") | {"give": 0.2}, (0.0, 0.0, 0.0), 1)
+    s = body.state[0]
+    s["front_side"] = 0.5 * nominal("f1tenth")["mass"] * GRAVITY
+    for _ in range(round(0.01 / STEP)):
+        steer(body.numbers[0], s, 0.0, 0.0, 0.0)
+    assert s["angle"] == pytest.approx(-0.1, rel=0.1)
+
+
+@pytest.mark.parametrize("car", ["nigel", "f1tenth"])
+def test_a_body_leans_out_of_a_circle_by_what_its_springs_give(car):
+    body, rows = driven(car, 12.0, 0.35, 0.3)
+    numbers = nominal(car)
+    spring = 1.0 / (1.0 / numbers["spring"] + 1.0 / TYRE_STIFFNESS)
+    moment = numbers["mass"] * rows[-1, 8] * numbers["height"]
+    leans = moment / (spring * numbers["track"] ** 2)
+    assert body.state["roll"][0] == pytest.approx(leans, rel=0.01)
+    assert body.state["roll"][0] > 0.0
+
+
+def test_a_launch_lifts_the_nose_and_loads_the_rear():
+    body, _ = driven("f1tenth", 0.2, 0.5)
+    assert body.state["pitch"][0] < -0.003
+    squeeze = body.wheels[:, 4]
+    assert squeeze[2] > 0.0 > squeeze[0]
+    assert abs(squeeze.sum()) < 0.1 * np.abs(squeeze).sum()
+
+
+def test_a_body_that_leans_answers_steering_later_across_than_one_on_rails():
+    def pushed(**changed):
+        numbers = nominal("f1tenth") | changed
+        body = Moving(numbers, (0.0, 0.0, 0.0), 100)
+        return np.vstack([body.command(k, 0.4, 0.3 * (k >= 95)) for k in range(100)])[950 * 2 :, 8]
+
+    soft, hard = pushed(), pushed(roll_inertia=10.0)
+    assert hard[4] > 1.1 * soft[4]

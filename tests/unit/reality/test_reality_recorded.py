@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from scm.recording.read import read_recordings
+from tests.reality import motion
 from tests.reality.cases import apply
 from tests.reality.concealed import EFFECTS, UNLISTED
 from tests.reality.numbers import nominal
 from tests.reality.recorded import record, write
-from tests.reality.sensing import FAULTS
+from tests.reality.sensing import FAULTS, inertial
 
 SECONDS = 20.0
 
@@ -49,6 +50,14 @@ def test_the_driver_follows_his_route_and_stops_now_and_then():
 def test_the_same_seed_gives_the_same_drive():
     np.testing.assert_array_equal(recorded(seed=5).imu, recorded(seed=5).imu)
     assert not np.array_equal(recorded(seed=5).imu, recorded(seed=6).imu)
+
+
+def test_an_accelerometer_shows_the_push_of_its_own_instant():
+    rows = np.zeros((400, len(motion.ROW)))
+    rows[:, 0] = motion.ROW_S * np.arange(1, 401)
+    rows[:, 7] = rows[:, 0] - 0.5 * motion.ROW_S  # mean over each row of a push that is the time
+    imu = inertial(rows, FAULTS, (0.0, 0.0), 1.0, np.random.default_rng(0))
+    np.testing.assert_allclose(imu[:-1, 1], imu[:-1, 0], atol=1e-9)
 
 
 def test_a_late_camera_shows_where_the_car_was():
