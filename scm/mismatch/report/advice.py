@@ -1,11 +1,12 @@
 """What to do about an effect, in a sentence for who has the car before them."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
 from scm.mismatch.findings import Effect
+from scm.mismatch.report.wording import capital, title_of
 
 _UNLISTED = (
     "No known effect explains it, so look at what changes with {drivers}. Until the cause is "
@@ -22,6 +23,12 @@ def advice_of(effect: Effect) -> str:
     if effect.listed:
         return _table().get(effect.name, _LISTED)
     return _UNLISTED.format(drivers=" and ".join(effect.depends_on) or "the drive")
+
+
+def checks_of(names: Sequence[str]) -> list[str]:
+    """Return what to check for each of several effects of which one is there."""
+    table = _table()
+    return [f"{capital(title_of(name))}: {table[name]}" for name in names if name in table]
 
 
 @cache

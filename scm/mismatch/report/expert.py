@@ -36,7 +36,7 @@ _READING = (
     ("90 %", "An interval or area that holds the truth nine times out of ten."),
     ("Ordinary numbers", "Mass, stall torque and the like may move within the scatter that the "
      "car file states. A number a little off is no physics left out, and is never called so."),
-    ("Gain and needed", "How much better an effect explains the recording, and how much the "
+    ("Gain and chance", "How much better an effect explains the recording, and how much the "
      "luckiest of all effects tried would gain by chance alone."),
     ("Undecided", "Two effects explain the recording equally well. More of the same drive does "
      "not help; the drive that is named does."),

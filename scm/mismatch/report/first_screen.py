@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from scm.mismatch.evidence import Evidence, Tried
 from scm.mismatch.findings import Diagnosis, Effect, Equation, Located, Undecided, Verdict
-from scm.mismatch.report.advice import advice_of
+from scm.mismatch.report.advice import advice_of, checks_of
 from scm.mismatch.report.bars import better_picture
 from scm.mismatch.report.html_text import around, tag
 from scm.mismatch.report.places import where_and_when
@@ -23,7 +23,7 @@ from scm.mismatch.report.wording import (
     title_of,
 )
 
-_ENOUGH_STDS = 5.0
+_ENOUGH_STDS, _OFFERED_STDS = 5.0, 3.2
 
 
 def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
@@ -64,7 +64,8 @@ def better(diagnosis: Diagnosis) -> str:
     seen = f"on parts of the recording that no fit has seen, after {quantity(fit.horizon_s, 's')}"
     said = f"{capital(seen)} of driving by the recorded commands alone, the simulator is {was} off"
     if diagnosis.effects:
-        return tag("p", f"{said}; with what was found, {now}.")
+        found = "the likeliest of them" if diagnosis.undecided else "what was found"
+        return tag("p", f"{said}; with {found}, {now}.")
     if diagnosis.undecided and after < before:
         said += f"; with the best of these, {now}"
     elif diagnosis.verdict is Verdict.NONE:
@@ -86,6 +87,7 @@ def _card(kind: str, label: str, title: str, rows: Sequence[tuple[str, str]]) ->
 
 
 def _effect_cards(diagnosis: Diagnosis) -> Iterator[str]:
+    open_names = {name for question in diagnosis.undecided for name in question.between}
     for i, effect in enumerate(diagnosis.effects, start=1):
         number = f", {i} of {len(diagnosis.effects)}" if len(diagnosis.effects) > 1 else ""
         where = _located_of(effect, diagnosis.located)
@@ -98,6 +100,7 @@ def _effect_cards(diagnosis: Diagnosis) -> Iterator[str]:
             ("What to do", advice_of(effect)),
         ]
         kind = "Measuring off" if effect.equation is Equation.SENSOR else "Left out"
+        kind = "Likeliest, but undecided" if effect.name in open_names else kind
         label = f"{kind}{number}" + ("" if effect.listed else ", outside the library")
         yield _card("effect", label, capital(title_of(effect.name)), rows)
 
@@ -138,20 +141,30 @@ def _undecided_cards(diagnosis: Diagnosis) -> Iterator[str]:
 
 def _undecided_card(question: Undecided) -> str:
     titles = [title_of(name) for name in question.between]
-    tells = (
-        f"The two then differ by {question.expected_separation:.1f} standard deviations; "
-        f"{_ENOUGH_STDS:g} are enough to be sure."
-        if question.expected_separation > 0.0
-        else ""
-    )
-    all_of_them = "Both" if len(titles) == 2 else "All of them"
-    which = f"Either {joined(titles, 'or')}. {all_of_them} explain this recording equally well."
+    which = f"Either {joined(titles, 'or')}: each explains this recording, one hardly better."
     rows = [
         ("Which", which),
         ("Drive this", question.drive_this),
-        ("Then", tells),
+        ("Then", _then(question)),
+        ("Or check", "\n".join(checks_of(question.between))),
     ]
     return _card("question", "Undecided", capital(joined(titles, "or")) + "?", rows)
+
+
+def _then(question: Undecided) -> str:
+    """Say how sure the drive would make."""
+    apart = question.expected_separation
+    if apart <= 0.0:
+        return ""
+    if apart < _OFFERED_STDS:
+        return (
+            f"The best drive that was simulated parts them by {apart:.1f} standard deviations; "
+            f"{_ENOUGH_STDS:g} are enough to be sure."
+        )
+    return (
+        f"They differ by {apart:.1f} standard deviations; {_ENOUGH_STDS:g} are enough to be sure. "
+        "The drive's files lie in `next_drive` beside this page, for `scm play`."
+    )
 
 
 def _checked_card(evidence: Evidence) -> str:
