@@ -13,6 +13,7 @@ from scm.mismatch.laws.law import Law
 from scm.mismatch.laws.sensed import Sensed
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate, Knob
+from scm.mismatch.report.wording import quantity
 from scm.mismatch.search import Search, price
 from scm.vehicles.car import Car
 
@@ -42,12 +43,14 @@ def ordinary_of(model: Likelihood, best: Fitted, car: Car) -> tuple[Ordinary, ..
 def tried_of(search: Search) -> tuple[Tried, ...]:
     """Return every effect tried beside the re-tuned car, best first."""
     best: dict[str, Tried] = {}
-    for base, fitted in [(step.base, f) for step in search.steps[:1] for f in step.rivals]:
-        name = fitted.names[-1]
-        needed = price(fitted.effects, search.events, len(search.listed))
-        one = Tried(name=name, gain=base.q - fitted.q, needed=needed)
-        if name not in best or best[name].gain < one.gain:
-            best[name] = one
+    for step in search.steps[:1]:
+        # a rival's own q is none of then: the one that was taken has been settled since
+        for fitted, criterion in zip(step.rivals, step.criteria, strict=True):
+            name = fitted.names[-1]
+            needed = price(fitted.effects, search.events, len(search.listed))
+            one = Tried(name=name, gain=step.base.q + needed - criterion, needed=needed)
+            if name not in best or best[name].gain < one.gain:
+                best[name] = one
     return tuple(sorted(best.values(), key=lambda tried: -tried.gain))
 
 
@@ -95,8 +98,8 @@ def said(candidate: Candidate, estimates: dict[str, Estimate]) -> str:
 
 
 def _number(value: float, unit: str) -> str:
-    text = f"{value:.3g}"
-    return text if unit == "1" else f"{text} {unit.replace('*', ' ')}"
+    """Return a number as a sentence holds it; sentences say themselves what is a minute's."""
+    return quantity(value, "1" if unit == "1/min" else unit)
 
 
 def _rivals(search: Search, candidate: Candidate) -> tuple[float, tuple[Rival, ...]]:

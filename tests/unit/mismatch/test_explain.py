@@ -1,0 +1,45 @@
+"""What is said of a model that was found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scm.mismatch.drive import Drive
+from scm.mismatch.explain import said, tried_of
+from scm.mismatch.findings import Estimate
+from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.listed import by_name, candidates
+from scm.mismatch.search import Search
+from tests.unit.mismatch.made_drive import big_nigel, made_drive
+
+
+def test_what_was_taken_is_shown_with_the_gain_for_which_it_was_taken():
+    made = made_drive(seconds=12.0)
+    sent = made.channels["command.steering"]
+    early = {**made.channels, "command.steering": replace(sent, t=sent.t - 0.06)}
+    model = Likelihood([Drive(replace(made, channels=early), big_nigel())], big_nigel())
+    listed = [c for c in candidates(big_nigel()) if c.name in {"steer_delay", "steer_trim"}]
+    search = Search(model, np.ones(len(model.t)), listed, lambda _: None)
+    assert search.run().names == ("steer_delay",)
+    first = tried_of(search)[0]
+    assert first.name == "steer_delay"
+    assert first.gain > first.needed
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers", "sentence"),
+    [
+        ("steer_trim", {"offset_rad": (0.0638, "rad")},
+         "The wheels stand 3.66° to the left when the command is straight ahead."),
+        ("steer_delay", {"delay_s": (0.08, "s")}, "The steering answers 80 ms late."),
+        ("battery_sag", {"fraction_per_min": (0.126, "1/min")},
+         "The drive weakens by 0.126 a minute, as a battery that runs down."),
+    ],
+)  # fmt: skip
+def test_a_sentence_holds_numbers_as_a_mechanic_says_them(name, numbers, sentence):
+    estimates = {
+        key: Estimate(value=value, low=value, high=value, unit=unit)
+        for key, (value, unit) in numbers.items()
+    }
+    assert said(by_name(candidates(big_nigel()), name), estimates) == sentence
