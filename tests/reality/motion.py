@@ -19,7 +19,7 @@ STEPS_PER_ROW = 10
 COMMAND_S = STEP * STEPS_PER_COMMAND
 ROW_S = STEP * STEPS_PER_ROW
 TYRE_STIFFNESS, TYRE_DAMPING = 2.0e4, 10.0
-YIELD_LAG = 0.004  # of wheels that give way: forces and angles settle on each other
+YIELD_LAG = 0.001  # of wheels that give way: what damps a stiff rod
 WARM_S = 60.0
 STICTION_FADE = 0.6
 
