@@ -37,6 +37,7 @@ _SENSORS = {  # what a person calls the channels, in the order in which they are
 }  # fmt: skip
 _SINGLE = {"encoder.left": "left encoder", "encoder.right": "right encoder"}
 _ALL_OF_IT = 0.995
+_SAYS_NOTHING = ("constant", "wheel")
 _MOST_SPANS = 4
 
 
@@ -51,7 +52,7 @@ def _one_place(located: Located) -> str:
     said = f"{PARTS_OF_CAR[located.equation]}, {where}, {when}."
     if located.channels:
         said += f" Shows in {sensors(located.channels)}."
-    drivers = [name for name in located.depends_on if name != "constant"]
+    drivers = [name for name in located.depends_on if name not in _SAYS_NOTHING]
     if drivers:
         said += f" Depends on {joined(drivers)}."
     share = located.share_of_error
