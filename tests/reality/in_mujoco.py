@@ -167,17 +167,17 @@ class Moving:
 
     def _row(self, row, out):
         qpos, qvel, forces = self.data.qpos, self.data.qvel, self.data.qfrc_applied
-        before = qvel[:2].copy()
         for step in range(STEPS_PER_ROW):
+            before = qvel[:2].copy()
             t = (row * STEPS_PER_ROW + step) * STEP
             push(
                 self.numbers, self.state, self.wheels, self.places, qpos, qvel, forces, t,
                 self.throttle, self.steering, self.shake,
             )  # fmt: skip
             mujoco.mj_step(self.model, self.data)
-        s, gain = self.state[0], (qvel[:2] - before) / ROW_S
+        s, gain = self.state[0], (qvel[:2] - before) / STEP
         _see(self.numbers[0], s, qpos, qvel)
-        middle = s["yaw"] - 0.5 * ROW_S * s["yaw_rate"]
+        middle = s["yaw"] - 0.5 * STEP * s["yaw_rate"]
         cos, sin = math.cos(middle), math.sin(middle)
         out[:4] = (row + 1) * ROW_S, *motion.under_axle(self.numbers[0], s), s["yaw"]
         out[4:7] = s["vx"], s["vy"], s["yaw_rate"]

@@ -238,22 +238,23 @@ def held(commands, t):
 
 @njit(cache=True)
 def advance(numbers, state, wheels, throttle, steering, shake, first, rows):
-    """Advance by `rows` rows of 2.5 ms from row `first`; return them, shape (rows, 11)."""
+    """Advance by `rows` rows of 2.5 ms from row `first`; return them, shape (rows, 11).
+
+    A row tells all of its end, accelerations too: those of the last step.
+    """
     c, s = numbers[0], state[0]
     out = np.empty((rows, 11))
     for row in range(rows):
-        push = side = 0.0
         for k in range(STEPS_PER_ROW):
             t = ((first + row) * STEPS_PER_ROW + k) * STEP
             steer(c, s, t, held(steering, t - c.steer_delay), held(shake, t))
             u = drive(c, s, t, held(throttle, t - c.drive_delay))
             move(c, s, wheels, t, u)
-            push, side = push + s.push, side + s.side
         out[row, 0] = (first + row + 1) * STEPS_PER_ROW * STEP
         out[row, 1], out[row, 2] = under_axle(c, s)
         out[row, 3] = s.yaw
         out[row, 4], out[row, 5], out[row, 6] = s.vx, s.vy, s.yaw_rate
-        out[row, 7], out[row, 8] = push / STEPS_PER_ROW, side / STEPS_PER_ROW
+        out[row, 7], out[row, 8] = s.push, s.side
         out[row, 9], out[row, 10] = wheels[2, 1], wheels[3, 1]
     return out
 

@@ -79,9 +79,7 @@ def encoders(rows, faults, counts, duration):
 def inertial(rows, faults, noise, duration, rng):
     """Return accelerations of the centre of gravity and yaw rate at 100 Hz, t, ax, ay, gz."""
     t = np.arange(10, int(duration * 100)) / 100.0
-    middle = t + 0.5 * ROW_S  # a row's accelerations are means over it, its yaw rate is of its end
-    along, across = (column(rows, name, middle) for name in ("push", "side"))
-    gyro = column(rows, "yaw_rate", t)
+    along, across, gyro = (column(rows, name, t) for name in ("push", "side", "yaw_rate"))
     cos, sin = math.cos(faults["imu_angle"]), math.sin(faults["imu_angle"])
     a_x = cos * along + sin * across + faults["accel_x"]
     a_y = cos * across - sin * along + faults["accel_y"]

@@ -6,7 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from tests.reality.motion import STEP, TYRE_STIFFNESS, Moving, steer
+from tests.reality.motion import ROW_S, STEP, TYRE_STIFFNESS, Moving, steer
 from tests.reality.numbers import GRAVITY, TYPES, nominal
 
 
@@ -148,3 +148,12 @@ def test_a_body_that_leans_answers_steering_later_across_than_one_on_rails():
 
     soft, hard = pushed(), pushed(roll_inertia=10.0)
     assert hard[4] > 1.1 * soft[4]
+
+
+def test_a_rows_accelerations_are_those_of_its_end():
+    numbers = nominal("f1tenth") | {"steer_lag": 0.05}
+    body = Moving(numbers, (0.0, 0.0, 0.0), 60)
+    rows = np.vstack([body.command(k, 0.4, 0.3 * math.sin(0.3 * k)) for k in range(60)])[400:]
+    changes = np.gradient(rows[:, 5], ROW_S) + rows[:, 6] * rows[:, 4]
+    off, late = rows[1:-1, 8] - changes[1:-1], rows[:-2, 8] - changes[1:-1]
+    assert np.std(off) < 0.3 * np.std(late)
