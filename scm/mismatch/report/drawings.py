@@ -13,7 +13,7 @@ from scm.mismatch.report.floor_map import floor_map
 from scm.mismatch.report.forest import forest_picture
 from scm.mismatch.report.free_run_pictures import error_pictures, window_pictures
 from scm.mismatch.report.plot import Picture
-from scm.mismatch.report.time_line import time_line
+from scm.mismatch.report.time_line import ON_ITS_CLOCK, time_line
 
 _MOST_MAPS = 4
 
@@ -43,13 +43,18 @@ def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Draw
     residuals = sorted(evidence.residuals, key=strength, reverse=True)
     on_floor = [r for r in residuals if (np.isfinite(r.x_m) & np.isfinite(r.y_m)).any()]
     after = "with what was found" if diagnosis.effects else "with its numbers refitted"
+    runs, clock = evidence.free_runs, ON_ITS_CLOCK
+    if len(evidence.recordings) > 1:  # their windows have each recording's own times
+        runs, clock = None, "time, one recording after another [s]"
+    elif start_s:
+        clock = f"time since {start_s:.0f} s of the recording's clock [s]"
     return Drawings(
         better=better_picture(diagnosis.fit) if diagnosis.effects else None,
         maps=[
             floor_map(residual, diagnosis.located, i)
             for i, residual in enumerate(on_floor[:_MOST_MAPS], start=1)
         ],
-        time_line=time_line(residuals, diagnosis.located, evidence.free_runs, after, start_s),
+        time_line=time_line(residuals, diagnosis.located, runs, after, clock),
         curves=curve_pictures(evidence.curves),
         windows=window_pictures(evidence.free_runs),
         errors=error_pictures(evidence.free_runs),

@@ -31,6 +31,7 @@ _MARGINS = (66.0, 14.0, 26.0, 10.0)
 _TOP = 26.0
 _MOST_PANELS = 5
 _COLUMNS = 450
+ON_ITS_CLOCK = "time on the recording's clock [s]"
 PARTS = {"fit": "fits the numbers", "choose": "chooses the effect", "confirm": "only confirms"}
 
 
@@ -39,16 +40,16 @@ def time_line(
     located: Sequence[Located],
     runs: FreeRuns | None,
     after: str,
-    start_s: float = 0.0,
+    clock: str = ON_ITS_CLOCK,
 ) -> Picture | None:
     """Return the picture; None where there is nothing to draw.
 
     Args:
         residuals: One panel each, the first few.
         located: When the error acts.
-        runs: Which part of the recording served what.
+        runs: Which part of the recording served what; None: that is not shown.
         after: In the legend.
-        start_s: What was taken off all times.
+        clock: What the times are, below their axis.
     """
     shown = [r for r in residuals if len(r.t_s)][:_MOST_PANELS]
     if not shown:
@@ -63,15 +64,14 @@ def time_line(
         room = frame(span, _heights(residual), (WIDTH, PANEL), (0.0, y), _MARGINS)
         parts += _panel(room, residual, spans)
         y += PANEL
-    clock = f"since {start_s:.0f} s of" if start_s else "on"
-    parts += _strip(span, y, runs, f"time {clock} the recording's clock [s]")
+    parts += _strip(span, y, runs, clock)
+    strip = " The strip at the foot shows which part of the recording served what." if runs else ""
     return Picture(
         name="time_line",
         title="",
         said="Zero means that the simulator is right. Lines are smoothed; the areas around them "
         "hold the truth with 90 %. Where the orange line leaves zero by more than its area and the "
-        f"blue line stays, the car {after} explains it. The strip at the foot shows which "
-        "part of the recording served what.",
+        f"blue line stays, the car {after} explains it.{strip}",
         svg=picture_svg(WIDTH, y + STRIP, parts, "Residuals along the recording"),
         wide=True,
     )
