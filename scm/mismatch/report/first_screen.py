@@ -65,7 +65,7 @@ def better(diagnosis: Diagnosis) -> str:
     said = f"{capital(seen)} of driving by the recorded commands alone, the simulator is {was} off"
     if diagnosis.effects:
         found = "the likeliest of them" if diagnosis.undecided else "what was found"
-        return tag("p", f"{said}; with {found}, {now}.")
+        return tag("p", f"{said}; with {found} and its own numbers refitted, {now}.")
     if diagnosis.undecided and after < before:
         said += f"; with the best of these, {now}"
     elif diagnosis.verdict is Verdict.NONE:

@@ -43,13 +43,11 @@ def _many_sentence(effects: Sequence[Effect]) -> str:
     """Count effects that no sentence can hold."""
     measuring = sum(effect.equation is Equation.SENSOR for effect in effects)
     car = len(effects) - measuring
-    if not measuring or not car:
-        if car:
-            return f"The simulator leaves out {count(car)} effects."
-        return f"Not the car, its measuring is off in {count(measuring)} ways."
-    faults = f"{count(measuring)} fault{'s' if measuring > 1 else ''} of the measuring"
-    left_out = f"{count(car)} effect{'s' if car > 1 else ''} that the simulator leaves out"
-    return capital(f"{left_out}, and {faults}.")
+    faults = f"{count(measuring)} fault{'s' if measuring > 1 else ''}"
+    if not car:
+        return f"Not the car, its measuring is off: it has {faults}."
+    left_out = f"The simulator leaves out {count(car)} effect{'s' if car > 1 else ''}"
+    return f"{left_out}, and the measuring has {faults}." if measuring else f"{left_out}."
 
 
 def count(number: int) -> str:

@@ -197,7 +197,8 @@ def test_what_to_do_stands_on_the_first_screen(tmp_path):
 def test_the_first_screen_says_how_much_better_it_got(tmp_path):
     first, _, _ = written(tmp_path, made_up.one_effect()).partition("<nav>")
     assert "after 3&nbsp;s of driving by the recorded commands alone" in first
-    assert "the simulator is 36.1&nbsp;cm off; with what was found, 4.2&nbsp;cm." in first
+    assert "the simulator is 36.1&nbsp;cm off" in first
+    assert "with what was found and its own numbers refitted, 4.2&nbsp;cm." in first
 
 
 def test_an_undecided_page_says_what_to_drive(tmp_path):
@@ -259,7 +260,7 @@ def test_ten_effects_are_counted_where_no_sentence_holds_their_names(tmp_path):
     found = made_up.diagnosis(verdict=Verdict.MISMATCH, effects=(*car, *measuring))
     nigel = load_car("nigel")
     page = written(tmp_path, (found, made_up.evidence(), nigel, nigel))
-    sentence = "Seven effects that the simulator leaves out, and three faults of the measuring."
+    sentence = "The simulator leaves out seven effects, and the measuring has three faults."
     assert f"<h1>{sentence}</h1>" in page
     assert "Effect 0, effect 1," in page
 
