@@ -19,6 +19,7 @@ from scm.vehicles.car import Car, Quantity, Value, load_car
 from scm.vehicles.measure import Fault
 
 FILE = "car.toml"
+FOUND_DIGITS = 6  # of a number found: far more than any interval allows
 COMMENT = "found by scm mismatch"
 _INTERVAL_STDS = 3.29  # a 90 % interval of a normal belief, from end to end
 _Entries = Mapping[str, Mapping[str, object]]
@@ -57,14 +58,14 @@ def _says(path: Path, patched: Car) -> bool:
         map(measure_entry, patched.measures)
     )
     return same and all(
-        key in read.values and _equal(read.values[key].value, quantity.value)
+        key in read.values and _equal(read.values[key].value, quantity.value, rel_tol=1e-5)
         for key, quantity in patched.values.items()
     )
 
 
-def _equal(a: Value, b: Value) -> bool:
+def _equal(a: Value, b: Value, rel_tol: float = 1e-8) -> bool:
     if isinstance(a, float) and isinstance(b, float):
-        return math.isclose(a, b, rel_tol=1e-8, abs_tol=1e-12)
+        return math.isclose(a, b, rel_tol=rel_tol, abs_tol=1e-12)
     return a == b
 
 
@@ -120,7 +121,7 @@ def _entry(
         std = max(0.0, estimate.high - estimate.low) / _INTERVAL_STDS
     if old is not None:
         source += f"; before: {_before(old)}"
-    return _inline(quantity.value, std, source)
+    return _inline(quantity.value, std, source, FOUND_DIGITS)
 
 
 def _before(old: Mapping[str, object]) -> str:
@@ -134,16 +135,16 @@ def _recording(evidence: Evidence) -> str:
     return f"{first} and {len(more)} more" if more else first
 
 
-def _inline(value: Value, std: float | None, source: str) -> str:
-    fields = [f"value = {_written(value)}"]
+def _inline(value: Value, std: float | None, source: str, digits: int = 9) -> str:
+    fields = [f"value = {_written(value, digits)}"]
     fields += [f"std = {std:.3g}"] if std is not None else []
     return "{ " + ", ".join([*fields, f"source = {quoted(source)}"]) + " }"
 
 
-def _written(value: Value) -> str:
+def _written(value: Value, digits: int) -> str:
     if isinstance(value, tuple):
-        return "[" + ", ".join(map(number, value)) + "]"
-    return quoted(value) if isinstance(value, str) else number(value)
+        return "[" + ", ".join(number(item, digits) for item in value) + "]"
+    return quoted(value) if isinstance(value, str) else number(value, digits)
 
 
 def _edited(car: Car, patched: Car, entries: Mapping[str, str], evidence: Evidence) -> str:

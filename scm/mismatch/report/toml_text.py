@@ -17,9 +17,9 @@ def quoted(text: str) -> str:
     return json.dumps(printable, ensure_ascii=False)
 
 
-def number(value: float) -> str:
-    """Return a float that reads back the same to nine digits."""
-    return repr(float(f"{value:.9g}"))
+def number(value: float, digits: int = 9) -> str:
+    """Return a float that reads back the same to so many digits."""
+    return repr(float(f"{value:.{digits}g}"))
 
 
 def set_entry(text: str, section: str, key: str, entry: str) -> str:

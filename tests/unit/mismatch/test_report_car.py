@@ -73,7 +73,7 @@ def test_every_listed_effect_loads_again_with_its_numbers(tmp_path, name):
     assert {term.name for term in read.terms} == {term.name for term in patched.terms}
     assert read.measures == patched.measures
     for param in params:
-        assert read.value(param.key) == pytest.approx(number_of(param), rel=1e-8)
+        assert read.value(param.key) == pytest.approx(number_of(param), rel=1e-5)
         assert read.quantity(param.key).source.startswith("mismatch: tuesday.yaml, 90 % ")
 
 
@@ -106,7 +106,7 @@ def test_a_moved_number_says_its_interval_and_what_stood_there(tmp_path):
     quantity = load_car(tmp_path / "car.toml").quantity(MOVED[0])
     assert quantity.source == ("mismatch: tuesday.yaml, 90 % 2.4..2.6; before: 2.4 +- 0.15 (ours)")
     assert quantity.std == pytest.approx(0.2 / 3.29, rel=0.01)
-    assert quantity.value == pytest.approx(MOVED[1], rel=1e-8)
+    assert quantity.value == pytest.approx(MOVED[1], rel=1e-5)
 
 
 def test_a_comment_behind_a_moved_number_stays(tmp_path):
@@ -163,7 +163,7 @@ def test_a_file_in_another_form_is_written_anew_rather_than_wrong(tmp_path):
     patched = car.with_terms(["drive_lag"], {"drive.lag_s": 0.1, MOVED[0]: MOVED[1]})
     write_car(made_up.diagnosis(), SHOWN, car, patched, tmp_path)
     read = load_car(tmp_path / "car.toml")
-    assert read.value(MOVED[0]) == pytest.approx(MOVED[1], rel=1e-8)
+    assert read.value(MOVED[0]) == pytest.approx(MOVED[1], rel=1e-5)
     assert read.value("drive.lag_s") == 0.1
 
 
@@ -172,7 +172,7 @@ def test_a_name_of_a_recording_cannot_break_the_file(tmp_path):
     nasty = replace(SHOWN, recordings=('a"\n[body]\nmass_kg = 1 \\ ', "b"))
     write_car(made_up.diagnosis(), nasty, car, car.with_terms([], dict([MOVED])), tmp_path)
     read = load_car(tmp_path / "car.toml")
-    assert read.value(MOVED[0]) == pytest.approx(MOVED[1], rel=1e-8)
+    assert read.value(MOVED[0]) == pytest.approx(MOVED[1], rel=1e-5)
 
 
 TEXT = """# a car
