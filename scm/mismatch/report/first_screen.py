@@ -40,6 +40,8 @@ def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
     cards = [*_effect_cards(diagnosis), *_undecided_cards(diagnosis), *_located_card(diagnosis)]
     if diagnosis.verdict is Verdict.NONE and can_judge(diagnosis):
         cards.append(_checked_card(evidence))
+    if diagnosis.verdict is Verdict.MISMATCH and not diagnosis.effects:
+        cards.append(_no_name_card(evidence))
     cards += [
         _card("data", "Problem of the recording", title, rows)
         for title, rows in problem_cards(diagnosis, evidence)
@@ -172,13 +174,25 @@ def _checked_card(evidence: Evidence) -> str:
     said = "Its ordinary numbers may move inside the scatter that the car file states."
     if tried:
         best = max(tried, key=lambda t: t.gain - t.needed)
-        said = f"{len(tried)} effects were tried, each alone. " + _best_tried(best)
+        said = f"Every effect that this car can show was tried, each alone. {_best_tried(best)}"
     rows = [
         ("Checked", said),
         ("What to do", "Nothing. If the car still surprises you, record faster turns, harder "
                        "starts and stops, and another part of the floor."),
     ]  # fmt: skip
     return _card("clear", "No mismatch", "What was checked", rows)
+
+
+def _no_name_card(evidence: Evidence) -> str:
+    """Say what to do about a difference that nothing explains."""
+    tried = " No effect that was tried explains it." if evidence.tried else ""
+    rows = [
+        ("What", f"The car strays from the simulator by far more than noise.{tried}"),
+        ("What to do", "See below where and when it strays. Weigh and measure the car, and give "
+                       "its file an honest `std` for each number: one that is far off and may not "
+                       "move is the usual cause. Are the commands those of this very drive?"),
+    ]  # fmt: skip
+    return _card("question", "No name", "Cause unknown", rows)
 
 
 def _best_tried(best: Tried) -> str:

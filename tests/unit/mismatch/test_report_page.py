@@ -318,6 +318,14 @@ def test_a_law_is_drawn_over_what_was_measured_without_it(tmp_path):
     assert "the line is the law" in page
 
 
+def test_a_difference_without_a_name_says_what_to_do(tmp_path):
+    nigel = load_car("nigel")
+    case = (made_up.diagnosis(verdict=Verdict.MISMATCH), made_up.evidence(), nigel, nigel)
+    first, _, _ = written(tmp_path, case).partition("<nav>")
+    assert "no cause could be named.</h1>" in first
+    assert "Weigh and measure the car" in first
+
+
 def test_small_things_noticed_in_the_recording_take_one_line_and_no_card(tmp_path):
     small = [
         DataProblem(channel=f"imu.{i}", name="coarse", said=f"Steps of {i}.") for i in range(9)
