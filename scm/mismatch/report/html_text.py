@@ -50,16 +50,18 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
     if not rows:
         return ""
     top = "".join(_cell("th", text, i in numbers) for i, text in enumerate(head))
-    body = "".join(_row(row, len(head), numbers) for row in rows)
+    body = "".join(_row(row, head, numbers) for row in rows)
     inner = around("thead", around("tr", top)) + around("tbody", body)
     return around("div", around("table", inner), "scroll")
 
 
-def _row(row: Sequence[str], columns: int, numbers: Sequence[int]) -> str:
-    if len(row) == 1 < columns:
+def _row(row: Sequence[str], head: Sequence[str], numbers: Sequence[int]) -> str:
+    if len(row) == 1 < len(head):
         words = tag("b", row[0])
-        return around("tr", f'<td class="heads" colspan="{columns}">{words}</td>')
-    return around("tr", "".join(_cell("td", text, i in numbers) for i, text in enumerate(row)))
+        return around("tr", f'<td class="heads" colspan="{len(head)}">{words}</td>')
+    cells = [_cell("td", text, i in numbers) for i, text in enumerate(row)]
+    named = zip(head, cells, strict=True)  # a narrow screen shows cells below each other
+    return around("tr", "".join(f'<td data-head="{escape(h)}"{cell[3:]}' for h, cell in named))
 
 
 def _cell(name: str, text: str, is_number: bool) -> str:
