@@ -191,6 +191,20 @@ def _judged(
         return None, None
 
 
+def retuned_error(
+    drives: Sequence[Drive], car: Car, tuned: Numbers, found: Numbers, parts: Parts
+) -> float | None:
+    """Return how far the re-tuned car strays [m] in the windows in which the one found is judged.
+
+    None where no part has a whole window.
+    """
+    try:
+        fit, _ = judge(drives, car, tuned, found, parts)
+    except RecordingError:
+        return None
+    return fit.confirm.before.get(POSE[0])
+
+
 def _verdict(effects: Sequence[Effect], undecided: Sequence[Undecided], fit: Fit | None) -> Verdict:
     """Return the verdict; a car that strays for no cause that was tried is a mismatch too."""
     if undecided:
@@ -239,6 +253,8 @@ def _searched(
         best = search.without_one(best)
         numbers = search.fitter.numbers(best.effects, best.z, best.values)
         fit, free_runs = _judged(drives, model.car, numbers, parts)
+    tuned = search.fitter.numbers((), search.retuned.z, np.zeros(0))
+    retuned_m = retuned_error(drives, model.car, tuned, numbers, parts) if best.effects else None
     located, residuals = locate(model, search.retuned, best)
     effects = tuple(effect_of(search, best, i) for i in range(len(best.effects)))
     suggestions = () if rough else undecided_of(model, search, best, tell)
@@ -249,6 +265,6 @@ def _searched(
     evidence = Evidence(
         vehicle=car.name, recordings=_titles(recordings), residuals=residuals,
         free_runs=free_runs, ordinary=ordinary_of(model, best, car), tried=tried_of(search),
-        curves=_curves(model, best, sought),
+        curves=_curves(model, best, sought), retuned_m=retuned_m,
     )  # fmt: skip
     return Found(diagnosis, car, evidence, model, best, search.retuned, suggestions)

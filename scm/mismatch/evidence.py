@@ -88,7 +88,12 @@ class Tried:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
-    """All that is drawn; what a recording cannot show is empty."""
+    """All that is drawn; what a recording cannot show is empty.
+
+    Attributes:
+        retuned_m: Position error, as in `Fit.confirm`, of the given car with its own numbers
+            refitted and no effect; None where none was found, then `after` is that car.
+    """
 
     vehicle: str
     recordings: tuple[str, ...]
@@ -97,3 +102,4 @@ class Evidence:
     free_runs: FreeRuns | None = None
     ordinary: tuple[Ordinary, ...] = ()
     tried: tuple[Tried, ...] = ()
+    retuned_m: float | None = None

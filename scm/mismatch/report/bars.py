@@ -10,7 +10,7 @@ from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text,
 from scm.mismatch.report.wording import quantities, title_of
 
 _WIDTH = 440.0
-_ROW = 25.0
+_ROW, _BETTER_ROW = 25.0, 52.0
 _MOST_TRIED = 14
 _FOUND = (
     " Blue bars are what was found; grey bars beyond their mark explain some of the same, and less "
@@ -18,39 +18,43 @@ _FOUND = (
 )
 
 
-def better_picture(fit: Fit | None) -> Picture | None:
-    """Return position errors before and after on the part that the fit did not see."""
+def better_picture(fit: Fit | None, retuned_m: float | None = None) -> Picture | None:
+    """Return position errors on the part that the fit did not see.
+
+    Args:
+        fit: Before and after; None: there is nothing to draw.
+        retuned_m: Of the car with its own numbers refitted alone; None: not shown.
+    """
     if fit is None:
         return None
     part = fit.confirm
-    values = [side.get("position_m", math.nan) for side in (part.before, part.after)]
+    before, after = (side.get("position_m", math.nan) for side in (part.before, part.after))
+    rows = [("before", "the simulator as it was", before), ("after", "with what was found", after)]
+    if retuned_m is not None:
+        rows.insert(1, ("retuned", "its own numbers refitted, no new physics", retuned_m))
+    values = [value for _, _, value in rows]
     if not all(map(math.isfinite, values)):
         return None
     floor = part.noise_floor.get("position_m", math.nan)
-    long = 300.0 / (max(*values, floor if math.isfinite(floor) else 0.0) or 1.0)
-    parts = []
-    names = ("before", "after")
+    long = 350.0 / (max(*values, floor if math.isfinite(floor) else 0.0) or 1.0)
+    parts, foot = list[str](), _BETTER_ROW * len(rows)
     *said, noise = quantities((*values, floor), "m")
-    for i, (name, value) in enumerate(zip(names, values, strict=True)):
-        y = 8.0 + 40.0 * i
-        parts += [text(0, y + 20, name, kind="title")]
-        parts += [
-            element(
-                "rect", x=58, y=y, width=max(2.0, long * value), height=30, rx=3,
-                class_=f"bar-{name}",
-            )
-        ]  # fmt: skip
-        parts += [text(66 + long * value, y + 20, said[i], kind="strong")]
+    for i, (kind, words, value) in enumerate(rows):
+        y = _BETTER_ROW * i
+        parts += [text(0, y + 14, words, kind="title")]
+        parts += [element("rect", x=0, y=y + 20, width=max(2.0, long * value), height=26, rx=3,
+                          class_=f"bar-{kind}")]  # fmt: skip
+        parts += [text(8 + long * value, y + 38, said[i], kind="strong")]
     if math.isfinite(floor):
-        x = 58 + long * floor
-        parts += [element("path", d=f"M{x:.1f} 2V88", class_="needed")]
-        parts += [text(max(x, 58), 104, f"noise of measuring alone: {noise}")]
+        x = long * floor
+        parts += [element("path", d=f"M{x:.1f} 18V{foot:.0f}", class_="needed")]
+        parts += [text(x, foot + 16, f"noise of measuring alone: {noise}")]
     return Picture(
         name="better",
         title="",
         said="",
         svg=picture_svg(
-            460.0, 112.0, parts, f"Position error {values[0]:.3g} m before, {values[1]:.3g} m after"
+            460.0, foot + 24.0, parts, f"Position error {before:.3g} m before, {after:.3g} m after"
         ),
     )
 

@@ -34,8 +34,8 @@ def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
     head = tag("p", where, "inputs") + tag("h1", verdict_sentence(diagnosis))
     names = all_named(diagnosis.effects)
     head += tag("p", names) if names else ""
-    verdict = around("div", head + better(diagnosis), "words")
-    picture = better_picture(diagnosis.fit) if diagnosis.effects else None
+    verdict = around("div", head + better(diagnosis, evidence.retuned_m), "words")
+    picture = better_picture(diagnosis.fit, evidence.retuned_m) if diagnosis.effects else None
     bars = around("div", _bars(diagnosis, picture), "bars") if picture else ""
     cards = [*_effect_cards(diagnosis), *_undecided_cards(diagnosis), *_located_card(diagnosis)]
     if diagnosis.verdict is Verdict.NONE and can_judge(diagnosis):
@@ -53,8 +53,13 @@ def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
     )
 
 
-def better(diagnosis: Diagnosis) -> str:
-    """Return how much better it got, as a paragraph; nothing where nothing was fitted."""
+def better(diagnosis: Diagnosis, retuned_m: float | None = None) -> str:
+    """Return how much better it got, as a paragraph; nothing where nothing was fitted.
+
+    Args:
+        diagnosis: What was found.
+        retuned_m: Error of the car with its own numbers refitted alone; None: not said.
+    """
     fit = diagnosis.fit
     if fit is None:
         return ""
@@ -62,12 +67,15 @@ def better(diagnosis: Diagnosis) -> str:
     if before is None or after is None:
         return ""
     floor = fit.confirm.noise_floor.get("position_m", math.nan)
-    was, now, noise = quantities((before, after, floor), "m")
+    own = math.nan if retuned_m is None else retuned_m
+    was, now, tuned, noise = quantities((before, after, own, floor), "m")
     seen = f"on parts of the recording that no fit has seen, after {quantity(fit.horizon_s, 's')}"
     said = f"{capital(seen)} of driving by the recorded commands alone, the simulator is {was} off"
     if diagnosis.effects:
         found = "the likeliest of them" if diagnosis.undecided else "what was found"
-        return tag("p", f"{said}; with {found} and its own numbers refitted, {now}.")
+        alone = f"; with its own numbers refitted alone, {tuned}" if math.isfinite(own) else ""
+        beside = f" as well, {now}" if alone else f" and its own numbers refitted, {now}"
+        return tag("p", f"{said}{alone}; with {found}{beside}.")
     if diagnosis.undecided and after < before:
         said += f"; with the best of these, {now}"
     elif diagnosis.verdict is Verdict.NONE:

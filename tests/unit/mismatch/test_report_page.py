@@ -352,3 +352,13 @@ def test_noise_is_grey_on_the_map_and_a_force_is_not(tmp_path):
         strong[name] = 1.0 - lengths[4] / sum(lengths.values())
     assert strong["calm"] < 0.2
     assert strong["wind"] > 0.8
+
+
+def test_what_was_found_is_held_against_the_car_with_its_own_numbers_refitted(tmp_path):
+    found, shown, car, patched = made_up.one_effect()
+    page = written(tmp_path, (found, replace(shown, retuned_m=0.213), car, patched))
+    first = page[: page.index("<nav")]
+    said = "with its own numbers refitted alone, 21.3 cm; with what was found as well, 4.2 cm."
+    assert said in first.replace("&nbsp;", " ")
+    assert "its own numbers refitted, no new physics" in first
+    assert first.count('class="bar-') == 3
