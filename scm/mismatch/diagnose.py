@@ -16,7 +16,7 @@ from scm.mismatch.doubt.corrected import corrected
 from scm.mismatch.doubt.doubt import doubt
 from scm.mismatch.doubt.suspicion import Doubts
 from scm.mismatch.drive import Drive
-from scm.mismatch.evidence import Curve, Evidence, FreeRuns
+from scm.mismatch.evidence import Curve, Evidence, FreeRuns, Tried
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.suggest import Suggestion
 from scm.mismatch.explain import effect_of, ordinary_of, tried_of, undecided_of
@@ -30,6 +30,7 @@ from scm.mismatch.findings import (
 )
 from scm.mismatch.fit import Fitted
 from scm.mismatch.judge import judge, nothing_got_worse
+from scm.mismatch.law_rivals import Standing, standing
 from scm.mismatch.laws.curves import law_curves
 from scm.mismatch.laws.decide import is_law, lawful
 from scm.mismatch.laws.seek import Sought, with_laws
@@ -239,12 +240,17 @@ def _searched(
     library = placed(shown_by(candidates(big), drives), drives)
     search = Search(model, parts.fit.weight + parts.choose.weight, library, tell)
     rough, sought, best = is_far(search), None, search.retuned
+    held: Standing | None = None
+    tried: tuple[Tried, ...] = ()
     if not rough:
-        best, sought = lawful(search, search.run(is_over), parts.confirm.weight, tell)
+        listed, unseen = search.run(is_over), parts.confirm.weight
+        held, tried = standing(search, listed, unseen=bool(unseen.any())), tried_of(search)
+        best, sought = lawful(search, listed, unseen, tell)
         rough = strays(model)
     if rough:
         model, parts, search = roughly(drives, big, library, tell)
         best, sought = search.run(is_over), None
+        held, tried = None, tried_of(search)
     tell("judging on what the fit did not see")
     best = search.confirmed(best, parts.confirm.weight)
     numbers = search.fitter.numbers(best.effects, best.z, best.values)
@@ -256,7 +262,7 @@ def _searched(
     tuned = search.fitter.numbers((), search.retuned.z, np.zeros(0))
     retuned_m = retuned_error(drives, model.car, tuned, numbers, parts) if best.effects else None
     located, residuals = locate(model, search.retuned, best)
-    effects = tuple(effect_of(search, best, i) for i in range(len(best.effects)))
+    effects = tuple(effect_of(search, best, i, held, sought) for i in range(len(best.effects)))
     suggestions = () if rough else undecided_of(model, search, best, tell)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
     verdict = _verdict(effects, undecided, fit)
@@ -264,7 +270,7 @@ def _searched(
                           fit=fit, runtime_s=0.0)  # fmt: skip
     evidence = Evidence(
         vehicle=car.name, recordings=_titles(recordings), residuals=residuals,
-        free_runs=free_runs, ordinary=ordinary_of(model, best, car), tried=tried_of(search),
+        free_runs=free_runs, ordinary=ordinary_of(model, best, car), tried=tried,
         curves=_curves(model, best, sought), retuned_m=retuned_m,
     )  # fmt: skip
     return Found(diagnosis, car, evidence, model, best, search.retuned, suggestions)

@@ -8,8 +8,10 @@ from scm.mismatch.experiment.plan import Rival as Contender
 from scm.mismatch.experiment.suggest import Suggestion, suggest
 from scm.mismatch.findings import Effect, Estimate, Rival
 from scm.mismatch.fit import OF_OWN, Fitted
+from scm.mismatch.law_rivals import TIE, Standing, against, rivals_of_law
 from scm.mismatch.laws.decide import is_law
 from scm.mismatch.laws.law import Law
+from scm.mismatch.laws.seek import Sought
 from scm.mismatch.laws.sensed import Sensed
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate, Knob
@@ -19,7 +21,6 @@ from scm.vehicles.car import Car
 
 NINETY = 1.645
 WIDER = 1.3  # intervals from curvature alone are too narrow for what any model leaves out
-TIE = 6.0
 Tell = Callable[[str], None]
 
 
@@ -54,8 +55,18 @@ def tried_of(search: Search) -> tuple[Tried, ...]:
     return tuple(sorted(best.values(), key=lambda tried: -tried.gain))
 
 
-def effect_of(search: Search, best: Fitted, i: int) -> Effect:
-    """Return what is reported of one effect of the model found."""
+def effect_of(
+    search: Search, best: Fitted, i: int, held: Standing | None = None, sought: Sought | None = None
+) -> Effect:
+    """Return what is reported of one effect of the model found.
+
+    Args:
+        search: That found the model.
+        best: The model, of which effect number `i` is told.
+        i: From 0.
+        held: What a law was held against, among the listed; `sought`: among the laws.
+        sought: None, like `held`, where no law was looked for.
+    """
     candidate = best.effects[i]
     at = sum(len(effect.knobs) for effect in best.effects[:i])
     own, estimates = len(best.z), dict[str, Estimate]()
@@ -70,6 +81,8 @@ def effect_of(search: Search, best: Fitted, i: int) -> Effect:
             unit=knob.unit,
         )  # fmt: skip
     probability, rivals = _rivals(search, candidate)
+    if is_law(candidate) and held is not None and sought is not None:
+        probability, rivals = rivals_of_law(search, best, candidate, held, sought)
     return Effect(
         name=candidate.name,
         listed=not is_law(candidate),
@@ -114,16 +127,10 @@ def _rivals(search: Search, candidate: Candidate) -> tuple[float, tuple[Rival, .
         others = [(f, c) for f, c in tried if f.names[-1] != candidate.name][:5]
         return mine / total, tuple(
             Rival(name=f.names[-1], probability=weights[id(f)] / total,
-                  ruled_out_by=_against(c - lowest))
+                  ruled_out_by=against(c - lowest))
             for f, c in others
         )  # fmt: skip
     return 1.0, ()
-
-
-def _against(worse: float) -> str:
-    if worse < TIE:
-        return "nothing in this recording"
-    return f"the recording: it explains it worse by {math.sqrt(worse):.1f} standard deviations"
 
 
 def undecided_of(

@@ -22,7 +22,9 @@ _NEGATIVE = re.compile(r"(^|[\s(])-(?=[\d.])")
 
 
 def title_of(name: str) -> str:
-    """Return an effect's name as a person would say it."""
+    """Return the name of an effect, or of several joined by `and`, as a person would say it."""
+    if " and " in name:
+        return " and ".join(map(title_of, name.split(" and ")))
     effect = all_effects().get(name)
     if effect is None:
         return name.replace("_", " ") if name.isidentifier() else name
