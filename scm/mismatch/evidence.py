@@ -1,4 +1,7 @@
-"""What a report shows beside the findings: arrays to draw, all on the recording's clock."""
+"""What a report shows beside the findings: arrays to draw, all on the recording's clock.
+
+Times of several recordings follow one another; the first keeps its own.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

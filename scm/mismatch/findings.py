@@ -87,7 +87,8 @@ class Located:
 
     Attributes:
         channels: That show it.
-        when_s: Spans on the recording's clock; None: all the time.
+        when_s: Spans on the recording's clock; None: all the time. Of several recordings those of
+            the first, which the others follow.
         where: None: everywhere.
         share_of_error: Of the squared error beyond noise, 0..1.
     """

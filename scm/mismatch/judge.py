@@ -14,6 +14,7 @@ from scm.errors import RecordingError
 from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.evidence import FreeRuns
 from scm.mismatch.findings import Fit, PartErrors, Span
+from scm.mismatch.leftover import on_one_axis
 from scm.mismatch.parts import NAMES, Parts
 from scm.mismatch.rollouts import Numbers
 from scm.mismatch.seen import Camera
@@ -82,8 +83,8 @@ def judge(
     horizon = horizon_of(drives, parts) if horizon_s is None else horizon_s
     horizon = max(round(horizon / STEP_S) * STEP_S, SHORTEST_S)
     judged = [
-        one
-        for number, drive in enumerate(drives)
+        replace(one, start_s=one.start_s + move)
+        for number, (drive, move) in enumerate(zip(drives, on_one_axis(drives), strict=True))
         if (one := _judged(drive, car, (before, after), _spans(parts, number), horizon))
     ]
     if not judged:

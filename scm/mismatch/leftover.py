@@ -7,7 +7,7 @@ out of the measured motion of both cars: a sensor's fault is no force.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from scm.vehicles.car import Car
 
 RUN_S = 0.4
 EVERY_S = 0.2
+APART_S = 1.0  # between drives on one axis
 WIDTH_S = 0.4  # of the smoothing, one standard deviation
 LEAN, ANGLE_RAD = 0.02, 0.02  # pushes that measure the response: force over weight, wheel angle
 GRAVITY = 9.80665
@@ -55,11 +56,14 @@ def leftover(
         before: Numbers of the car as given, by key.
         after: Of the car as found.
     """
-    tracks = [track for drive in drives if (track := _track(drive, car, before, after)) is not None]
+    tracks = [
+        replace(track, t=track.t + move)
+        for drive, move in zip(drives, on_one_axis(drives), strict=True)
+        if (track := _track(drive, car, before, after)) is not None
+    ]
     if not tracks:
         return ()
-    t = one_after_another([one.t for one in tracks], EVERY_S)
-    x, y = (np.concatenate([getattr(one, n) for one in tracks]) for n in ("x", "y"))
+    t, x, y = (np.concatenate([getattr(one, n) for one in tracks]) for n in ("t", "x", "y"))
     residuals = []
     for key in (FORCE, ANGLE):
         sides = [np.concatenate([one.found[key][i] for one in tracks]) for i in range(3)]
@@ -70,12 +74,13 @@ def leftover(
     return tuple(residuals)
 
 
-def one_after_another(times: Sequence[Floats], apart_s: float) -> Floats:
-    """Return times of several drives, each moved to follow the one before; the first stays."""
-    found = [times[0]]
-    for t in times[1:]:
-        found.append(t - t[0] + found[-1][-1] + apart_s)
-    return np.concatenate(found)
+def on_one_axis(drives: Sequence[Drive]) -> tuple[float, ...]:
+    """Return what each drive's times move by to follow those of the one before; the first stay."""
+    moves, end = list[float](), float(drives[0].edges[0])
+    for drive in drives:
+        moves.append(end - float(drive.edges[0]))
+        end = float(drive.edges[-1]) + moves[-1] + APART_S
+    return tuple(moves)
 
 
 def honest(after: Floats, std: Floats) -> Floats:

@@ -14,7 +14,7 @@ from scm.arrays import Bools, Floats, Ints
 from scm.mismatch.evidence import Residual
 from scm.mismatch.findings import Equation, Located, Place, Span
 from scm.mismatch.fit import TAIL, Fitted, Fitter
-from scm.mismatch.leftover import leftover
+from scm.mismatch.leftover import leftover, on_one_axis
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate
 from scm.mismatch.predict import NEUTRAL
@@ -118,18 +118,18 @@ def _loss(e: Floats) -> Floats:
 
 def _looked(model: Likelihood) -> _Looked:
     """Return when, where and by which sensor each innovation was measured."""
-    x, y, names = list[Floats](), list[Floats](), list[str]()
-    stream = list[Ints]()
-    for drive, whitener in zip(model.drives, model.whiteners, strict=True):
+    t, x, y, names = list[Floats](), list[Floats](), list[Floats](), list[str]()
+    stream, moves = list[Ints](), on_one_axis(model.drives)
+    for drive, whitener, move in zip(model.drives, model.whiteners, moves, strict=True):
+        t.append(whitener.t + move)
         x.append(drive.smoothed["pose.x"].at(whitener.t))
         y.append(drive.smoothed["pose.y"].at(whitener.t))
         new = [name for name in drive.names if name not in names]
         names += new
         number = np.array([names.index(name) for name in drive.names])
         stream.append(number[whitener.stream])
-    return _Looked(
-        model.t, np.concatenate(x), np.concatenate(y), np.concatenate(stream), tuple(names)
-    )
+    whole = [np.concatenate(parts) for parts in (t, x, y)]
+    return _Looked(whole[0], whole[1], whole[2], np.concatenate(stream), tuple(names))
 
 
 def _each(fitted: Fitted) -> Iterator[tuple[Candidate, Floats]]:

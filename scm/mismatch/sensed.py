@@ -13,7 +13,7 @@ import numpy as np
 from scm.arrays import Floats
 from scm.mismatch.drive import Drive
 from scm.mismatch.evidence import Residual
-from scm.mismatch.leftover import honest, one_after_another
+from scm.mismatch.leftover import honest, on_one_axis
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.predict import NEUTRAL
 from scm.mismatch.rollouts import Numbers
@@ -60,12 +60,14 @@ def _kind(channel: str) -> str:
 
 def _residual(drives: Sequence[Drive], lines: Sequence[Sequence[_Line]], title: str) -> Residual:
     """Join one residual of all drives that have it."""
-    mine = [(d, line) for d, of in zip(drives, lines, strict=True)
+    mine = [(d, line, move) for d, of, move in zip(drives, lines, on_one_axis(drives), strict=True)
             for line in of if line.channel == title]  # fmt: skip
-    x, y = (np.concatenate([d.smoothed[f"pose.{n}"].at(line.t) for d, line in mine]) for n in "xy")
-    before, after = (np.concatenate([line.sides[i] for _, line in mine]) for i in range(2))
-    std = honest(after, np.concatenate([line.std for _, line in mine]))
-    t_s = one_after_another([line.t for _, line in mine], BIN_S)
+    x, y = (
+        np.concatenate([d.smoothed[f"pose.{n}"].at(line.t) for d, line, _ in mine]) for n in "xy"
+    )
+    before, after = (np.concatenate([line.sides[i] for _, line, _ in mine]) for i in range(2))
+    std = honest(after, np.concatenate([line.std for _, line, _ in mine]))
+    t_s = np.concatenate([line.t + move for _, line, move in mine])
     return Residual(
         channel=title, unit=mine[0][1].unit, t_s=t_s,
         x_m=x, y_m=y, before=before, after=after, std=std,

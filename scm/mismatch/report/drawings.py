@@ -43,9 +43,9 @@ def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Draw
     residuals = sorted(evidence.residuals, key=strength, reverse=True)
     on_floor = [r for r in residuals if (np.isfinite(r.x_m) & np.isfinite(r.y_m)).any()]
     after = "with what was found" if diagnosis.effects else "with its numbers refitted"
-    runs, clock = evidence.free_runs, ON_ITS_CLOCK
-    if len(evidence.recordings) > 1:  # their windows have each recording's own times
-        runs, clock = None, "time, one recording after another [s]"
+    clock = ON_ITS_CLOCK
+    if len(evidence.recordings) > 1:
+        clock = "time, one recording after another [s]"
     elif start_s:
         clock = f"time since {start_s:.0f} s of the recording's clock [s]"
     return Drawings(
@@ -54,7 +54,7 @@ def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Draw
             floor_map(residual, diagnosis.located, i)
             for i, residual in enumerate(on_floor[:_MOST_MAPS], start=1)
         ],
-        time_line=time_line(residuals, diagnosis.located, runs, after, clock),
+        time_line=time_line(residuals, diagnosis.located, evidence.free_runs, after, clock),
         curves=curve_pictures(evidence.curves),
         windows=window_pictures(evidence.free_runs),
         errors=error_pictures(evidence.free_runs),

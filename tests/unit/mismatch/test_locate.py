@@ -5,8 +5,11 @@ import pytest
 
 from scm.mismatch.curves import curve
 from scm.mismatch.findings import Equation
-from scm.mismatch.leftover import honest, leftover, one_after_another
+from scm.mismatch.judge import judge
+from scm.mismatch.leftover import honest, leftover, on_one_axis
+from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.locate import chance, locate
+from scm.mismatch.parts import split
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch.made_drive import big_nigel, driven
 
@@ -122,9 +125,18 @@ def test_no_force_is_made_up_beyond_the_poses_of_a_late_camera():
         assert np.mean(np.abs(residual.after[known]) > 4.0 * residual.std[known]) < 0.02
 
 
-def test_drives_follow_one_another_in_time():
-    t = one_after_another([np.array([3.0, 4.0]), np.array([100.0, 101.0])], 0.5)
-    assert t.tolist() == [3.0, 4.0, 4.5, 5.5]
+def test_drives_follow_one_another_on_one_axis_for_lines_windows_and_places():
+    drives = [driven(seconds=12.0), driven(seconds=12.0, seed=2)]
+    end = drives[0].edges[-1]
+    assert on_one_axis(drives)[0] == 0.0
+    t = leftover(drives, big_nigel(), {}, {})[0].t_s
+    parts = split(Likelihood(drives, big_nigel()), 3.0)
+    _, runs = judge(drives, big_nigel(), {}, {}, parts, 1.0)
+    second = [times[times > end] for times in (t, runs.start_s)]
+    assert len(second[0]) == pytest.approx(0.5 * len(t), abs=1)
+    assert len(second[1]) == pytest.approx(0.5 * len(runs.start_s), abs=1)
+    assert np.all(np.diff(t) > 0.0)
+    assert abs(second[0][0] - second[1][0]) < 2.0
 
 
 def test_a_trim_is_a_level_curve_at_its_angle():
