@@ -44,6 +44,7 @@ from scm.mismatch.report.write import write_report
 from scm.mismatch.rollouts import Numbers
 from scm.mismatch.rough import is_far, roughly, strays
 from scm.mismatch.search import Search
+from scm.mismatch.strayed import strayed
 from scm.recording.read import Recording, read_recordings
 from scm.vehicles.car import Car, load_car
 
@@ -266,6 +267,8 @@ def _searched(
     suggestions = () if rough else undecided_of(model, search, best, tell)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
     verdict = _verdict(effects, undecided, fit)
+    if verdict is Verdict.MISMATCH and not effects and fit and free_runs:
+        located = strayed(free_runs, fit)
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
                           fit=fit, runtime_s=0.0)  # fmt: skip
     evidence = Evidence(

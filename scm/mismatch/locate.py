@@ -144,7 +144,8 @@ def _located(
     effect: Candidate, values: Floats, gain: Floats, looked: _Looked, total: float
 ) -> Located:
     share = max(float(gain.sum()), 0.0) / max(total, 1e-9)
-    when, where = _when(gain, looked.t), _named(effect, values) or _where(gain, looked)
+    when = spans_of(gain, looked.t)
+    where = _named(effect, values) or box_of(gain, looked.x, looked.y)
     return Located(
         equation=effect.equation,
         channels=_channels(effect, gain, looked),
@@ -182,8 +183,8 @@ def _strong(gain: Floats, places: int) -> Bools | None:
     return held if held.any() and few else None
 
 
-def _when(gain: Floats, t: Floats) -> tuple[Span, ...] | None:
-    """Return the spans of time that hold an effect's gain; None for all the time."""
+def spans_of(gain: Floats, t: Floats) -> tuple[Span, ...] | None:
+    """Return the spans of time that hold a gain, (events,); None for all the time."""
     first, last = float(t.min()), float(t.max())
     blocks = max(int((last - first) / BLOCK_S), 2)
     cuts = np.linspace(first, last, blocks + 1)
@@ -199,10 +200,10 @@ def _when(gain: Floats, t: Floats) -> tuple[Span, ...] | None:
     return tuple((float(cuts[a]), float(cuts[b])) for a, b in zip(begins, ends, strict=True))
 
 
-def _where(gain: Floats, looked: _Looked) -> Place | None:
-    """Return the box on the floor that holds an effect's gain; None for everywhere."""
-    size = max(np.ptp(looked.x), np.ptp(looked.y)) / CELLS
-    column, row = (((v - v.min()) / size).astype(np.int64) for v in (looked.x, looked.y))
+def box_of(gain: Floats, x: Floats, y: Floats) -> Place | None:
+    """Return the box on the floor that holds a gain, (events,); None for everywhere."""
+    size = max(np.ptp(x), np.ptp(y)) / CELLS
+    column, row = (((v - v.min()) / size).astype(np.int64) for v in (x, y))
     cell = column + (CELLS + 1) * row
     per: Floats = np.bincount(cell, weights=gain).astype(np.float64)
     seen = np.bincount(cell)
@@ -211,12 +212,12 @@ def _where(gain: Floats, looked: _Looked) -> Place | None:
         return None
     inside = held[cell]
     box = Place(
-        x_m=(float(looked.x[inside].min()), float(looked.x[inside].max())),
-        y_m=(float(looked.y[inside].min()), float(looked.y[inside].max())),
+        x_m=(float(x[inside].min()), float(x[inside].max())),
+        y_m=(float(y[inside].min()), float(y[inside].max())),
     )
     within = (
-        (looked.x >= box.x_m[0]) & (looked.x <= box.x_m[1])
-        & (looked.y >= box.y_m[0]) & (looked.y <= box.y_m[1])
+        (x >= box.x_m[0]) & (x <= box.x_m[1])
+        & (y >= box.y_m[0]) & (y <= box.y_m[1])
     )  # fmt: skip
     return box if within.mean() <= MOST_FLOOR else None
 
