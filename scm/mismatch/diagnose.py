@@ -17,6 +17,7 @@ from scm.mismatch.doubt.doubt import doubt
 from scm.mismatch.doubt.suspicion import Doubts
 from scm.mismatch.drive import Drive
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns, Tried
+from scm.mismatch.experiment.folders import folders_of
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.suggest import Suggestion
 from scm.mismatch.explain import effect_of, ordinary_of, tried_of, undecided_of
@@ -155,7 +156,8 @@ def _is_only_short(doubts: Doubts) -> bool:
 def write(found: Found, out: Path) -> None:
     """Write the report, the car found, the re-tuned car, `retuned.toml`, and the next drive.
 
-    A drive that would tell what this one cannot goes to `next_drive/`, for `scm play`.
+    A drive that would tell what this one cannot goes to `next_drive/`, for `scm play`; that of a
+    second question to `next_drive_2/`.
 
     Raises:
         ScmError: when the folder cannot be written.
@@ -172,8 +174,10 @@ def write(found: Found, out: Path) -> None:
         aside.mkdir()
         write_car(plain, found.evidence, found.car, cars[1], aside)
         shutil.copy(aside / "car.toml", out / "retuned.toml")
-    for suggestion in found.suggestions:
-        write_scenario(suggestion, str(found.car.path), out / "next_drive")
+    folders = folders_of([suggestion.undecided for suggestion in found.suggestions])
+    for suggestion, name in zip(found.suggestions, folders, strict=True):
+        if name:
+            write_scenario(suggestion, str(found.car.path), out / name)
 
 
 def _curves(model: Likelihood, best: Fitted, sought: Sought | None) -> tuple[Curve, ...]:

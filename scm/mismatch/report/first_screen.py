@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from scm.mismatch.evidence import Evidence, Tried
+from scm.mismatch.experiment.folders import folders_of
 from scm.mismatch.findings import Diagnosis, Effect, Equation, Located, Undecided, Verdict
 from scm.mismatch.report.advice import advice_of, checks_of
 from scm.mismatch.report.bars import better_picture
@@ -23,7 +24,7 @@ from scm.mismatch.report.wording import (
     title_of,
 )
 
-_ENOUGH_STDS, _OFFERED_STDS = 5.0, 3.2
+_ENOUGH_STDS = 5.0
 
 
 def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
@@ -146,34 +147,36 @@ def _located_card(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _undecided_cards(diagnosis: Diagnosis) -> Iterator[str]:
-    yield from (_undecided_card(open_question) for open_question in diagnosis.undecided)
+    folders = folders_of(diagnosis.undecided)
+    for question, folder in zip(diagnosis.undecided, folders, strict=True):
+        yield _undecided_card(question, folder)
 
 
-def _undecided_card(question: Undecided) -> str:
+def _undecided_card(question: Undecided, folder: str) -> str:
     titles = [title_of(name) for name in question.between]
     which = f"Either {joined(titles, 'or')}: each explains this recording, one hardly better."
     rows = [
         ("Which", which),
         ("Drive this", question.drive_this),
-        ("Then", _then(question)),
+        ("Then", _then(question, folder)),
         ("Or check", "\n".join(checks_of(question.between))),
     ]
     return _card("question", "Undecided", capital(joined(titles, "or")) + "?", rows)
 
 
-def _then(question: Undecided) -> str:
-    """Say how sure the drive would make."""
+def _then(question: Undecided, folder: str) -> str:
+    """Say how sure the drive would make, and where its files lie."""
     apart = question.expected_separation
     if apart <= 0.0:
         return ""
-    if apart < _OFFERED_STDS:
+    if not folder:
         return (
             f"The best drive that was simulated parts them by {apart:.1f} standard deviations; "
             f"{_ENOUGH_STDS:g} are enough to be sure."
         )
     return (
         f"They differ by {apart:.1f} standard deviations; {_ENOUGH_STDS:g} are enough to be sure. "
-        "The drive's files lie in `next_drive` beside this page, for `scm play`."
+        f"The drive's files lie in `{folder}` beside this page, for `scm play`."
     )
 
 

@@ -1,10 +1,30 @@
 """What a diagnosis says of the car as a whole."""
 
-from scm.mismatch.diagnose import retuned_error
+import numpy as np
+
+from scm.mismatch.diagnose import Found, retuned_error, write
+from scm.mismatch.experiment.changed import drive_alone
+from scm.mismatch.experiment.manoeuvres import MANOEUVRES
+from scm.mismatch.experiment.pace import Floor, pace_of
+from scm.mismatch.experiment.plan import place
+from scm.mismatch.experiment.separation import Apart
+from scm.mismatch.experiment.suggest import Suggestion, Weighed
+from scm.mismatch.findings import Undecided, Verdict
 from scm.mismatch.judge import judge
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.parts import split
-from tests.unit.mismatch.made_drive import big_nigel, driven
+from tests.unit.mismatch import made_up_findings as made_up
+from tests.unit.mismatch.made_drive import big_nigel, driven, healthy_model, nigel
+
+
+def suggested(name, between):
+    """A drive as a search would suggest it."""
+    model, floor = healthy_model(), Floor((-3.0, 3.0), (-3.0, 3.0))
+    experiment = drive_alone(MANOEUVRES[name], name)
+    leg = place(experiment.legs[0], model.car, pace_of(model.car, model.drives, floor), [{}])
+    question = Undecided(between=between, drive_this=f"Drive {name}.", expected_separation=6.0)
+    weighed = Weighed(experiment, (leg,), Apart(np.full((2, 2), 36.0), np.zeros((2, 2, 0)), ()))
+    return Suggestion(question, weighed, (weighed,), floor)
 
 
 def test_the_re_tuned_car_strays_by_what_refitting_alone_could_not_take_off():
@@ -15,3 +35,19 @@ def test_the_re_tuned_car_strays_by_what_refitting_alone_could_not_take_off():
     strays_m = retuned_error([drive], big_nigel(), tuned, {"steering.trim_rad": true}, parts)
     before, after = (side["position_m"] for side in (fit.confirm.before, fit.confirm.after))
     assert after < 0.9 * strays_m < 0.7 * before
+
+
+def test_the_drives_of_two_open_questions_lie_side_by_side(tmp_path):
+    suggestions = (
+        suggested("circles", ("steer_gain", "understeer")),
+        suggested("straight_steps", ("drive_gain", "motor_gain")),
+    )
+    found = made_up.diagnosis(
+        verdict=Verdict.UNDECIDED, undecided=tuple(s.undecided for s in suggestions)
+    )
+    write(Found(found, nigel(), made_up.evidence(), suggestions=suggestions), tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    for folder, said in (("next_drive", "circles"), ("next_drive_2", "straight_steps")):
+        text = (tmp_path / folder / "next_drive.yaml").read_text(encoding="utf-8")
+        assert f"Drive {said}." in text
+        assert f"<code>{folder}</code>" in page
