@@ -41,7 +41,7 @@ def law_curves(fitted: Fitted, sought: Sought) -> tuple[Curve, ...]:
 def _curves(law: Law, mine: slice, fitted: Fitted, sought: Sought) -> tuple[Curve, Curve]:
     values = tuple(float(v) for v in fitted.values[mine])
     n, cells = len(law.channel.knobs), sought.cells
-    x, x_name, x_unit = _axis(law, values[n:], cells)
+    x, x_name, x_unit = axis_of(law, values[n:], cells)
     unit = amount(law.channel.numbers((1.0, *values[1:n])), cells)
     edges = np.linspace(float(x.min()), float(x.max()), BINS + 1)
     place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
@@ -75,8 +75,8 @@ def _left_over(
     return -covariance @ (courses.T @ response.slope), covariance
 
 
-def _axis(law: Law, values: Values, cells: Cells) -> tuple[Floats, str, str]:
-    """Return what a law depends on at each moment; waves are laid over each other."""
+def axis_of(law: Law, values: Values, cells: Cells) -> tuple[Floats, str, str]:
+    """Return what a law depends on at each moment; waves and turns are laid over each other."""
     known = dict(zip((k.name for k in law.curve.knobs), values, strict=True))
     if law.curve.word == "position":
         way = known.get("way_rad", 0.0)
@@ -87,6 +87,8 @@ def _axis(law: Law, values: Values, cells: Cells) -> tuple[Floats, str, str]:
         return np.mod(x, length), f"position within a wave towards {way:.2f} rad", "m"
     name, unit = _AXES[law.curve.word]
     x = cells.driven[name]
+    if name == "yaw":  # turns of the same heading fill the same bin
+        x = np.arctan2(np.sin(x), np.cos(x))
     period = known.get("period_s")
     if period is not None:
         return np.mod(x, period), "time within a swing", unit

@@ -6,6 +6,7 @@ import numpy as np
 
 from scm.mismatch.fit import Fitter
 from scm.mismatch.laws.cells import Cells, Response, cells_of, respond
+from scm.mismatch.laws.curves import axis_of
 from scm.mismatch.laws.learned import PREFIX
 from scm.mismatch.laws.pushes import pushes
 from scm.mismatch.laws.screen import polished, screen
@@ -80,3 +81,13 @@ def test_the_waves_of_a_floor_are_found():
     assert abs(best.values[1] - 0.7) < 0.02
     assert best.gain > 0.9 * float(response.slope @ response.slope)
     assert len(cells) == len(response.slope)
+
+
+def test_turns_are_laid_over_each_other_so_that_a_heading_fills_one_bin():
+    law = made_law.law("drive force against heading", "one way")
+    yaw = np.linspace(-12.0, 3.0, 400)
+    cells = Cells(wide=0.1, drive=np.zeros(400, dtype=np.int64), driven={"yaw": yaw})
+    x, name, unit = axis_of(law, (0.5,), cells)
+    assert (name, unit) == ("heading", "rad")
+    assert np.abs(x).max() <= np.pi
+    np.testing.assert_allclose(np.cos(x), np.cos(yaw), atol=1e-12)
