@@ -25,17 +25,22 @@ Tell = Callable[[str], None]
 
 
 def ordinary_of(model: Likelihood, best: Fitted, car: Car) -> tuple[Ordinary, ...]:
-    """Return the car's own numbers, as the file gives them and as the recordings do."""
+    """Return the car's own numbers, as the file gives them and as the recordings do.
+
+    No recording makes a number less sure than its file, or unphysical.
+    """
     found = []
     for j, own in enumerate(model.ordinary):
         if own.key.startswith("clock."):
             continue
-        std = math.sqrt(max(best.covariance[j, j], 0.0)) * own.std
+        std = math.sqrt(min(max(best.covariance[j, j], 0.0), 1.0)) * own.std
         value = model.numbers(best.z)[own.key]
         unit = model.unit(own.key)
+        least, most = own.bounds
         estimate = Estimate(
-            value=value, low=value - NINETY * std, high=value + NINETY * std, unit=unit
-        )
+            value=value, low=max(value - NINETY * std, least), high=min(value + NINETY * std, most),
+            unit=unit,
+        )  # fmt: skip
         given = car.value(own.key) if car.has(own.key) else own.mean
         found.append(Ordinary(key=own.key, given=given, given_std=own.std, found=estimate))
     return tuple(found)

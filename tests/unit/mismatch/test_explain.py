@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from scm.mismatch.drive import Drive
-from scm.mismatch.explain import said, tried_of
+from scm.mismatch.explain import ordinary_of, said, tried_of
 from scm.mismatch.findings import Estimate
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
 from scm.mismatch.search import Search
+from tests.unit.mismatch import made_fit
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
 
@@ -25,6 +26,16 @@ def test_what_was_taken_is_shown_with_the_gain_for_which_it_was_taken():
     first = tried_of(search)[0]
     assert first.name == "steer_delay"
     assert first.gain > first.needed
+
+
+def test_no_recording_makes_a_number_less_sure_than_its_file_or_unphysical():
+    model, _, best = made_fit.healthy()
+    unsure = replace(best, z=0.0 * best.z, covariance=25.0 * np.eye(len(best.z)))
+    bounds = {own.key: own.bounds for own in model.ordinary}
+    for own in ordinary_of(model, unsure, big_nigel()):
+        prior = next(o for o in model.ordinary if o.key == own.key)
+        assert own.found.high - own.found.low <= 2.0 * 1.645 * prior.std + 1e-12
+        assert bounds[own.key][0] <= own.found.low <= own.found.high <= bounds[own.key][1]
 
 
 @pytest.mark.parametrize(
