@@ -1,7 +1,7 @@
 """Chooses the experiment that separates rivals most, and says it in a sentence."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from scm.mismatch.experiment.changed import CHANGED, Experiment, drive_alone
@@ -14,10 +14,16 @@ from scm.mismatch.likelihood import Likelihood
 
 NOBODY, ANYBODY = 10.0, 25.0
 PLENTY = 400.0  # twenty sigma: what would be better still need not be looked for
-# By algebra the same on a level floor, whatever a simulation's small print says.
-TWINS = (frozenset({"payload", "motor_gain"}), frozenset({"grade", "wind"}))
+TWINS: Mapping[frozenset[str], str] = {
+    frozenset({"payload", "motor_gain"}):
+        "On a level floor these do the same to the car: no drive there tells them apart.",
+    frozenset({"grade", "wind"}):
+        "Both push the car one way wherever it heads: no drive on this floor tells them apart.",
+}  # fmt: skip
+"""By algebra the same, whatever a simulation's small print says; why no drive helps."""
 MOST_RIVALS = 4
 MOST_EXACT = 6
+SLOPE = "grade.slope"
 Tell = Callable[[str], None]
 
 
@@ -70,7 +76,7 @@ def suggest(
     counted = rivals[:MOST_RIVALS]
     pace = pace_of(model.car, model.drives, floor)
     between = names_of(rivals)
-    twins = any(set(between) <= pair for pair in TWINS)
+    twins = next((why for pair, why in TWINS.items() if set(between) <= pair), "")
     weighed = list[Weighed]()
     if not twins:
         tell(f"simulating {len(MANOEUVRES)} drives under each rival")
@@ -83,7 +89,7 @@ def suggest(
         tell("no drive tells them apart: trying a ramp, a known mass, other changes")
         changed = _search(model, counted, pace, _changes(model, counted))
         best = changed[0] if changed and changed[0].least >= NOBODY else None
-        said = _no_drive(weighed, pace, twins=twins) + _instead(best)
+        said = (twins or _no_drive(weighed, pace)) + _instead(best, rivals)
         weighed = sorted([*weighed, *changed], key=lambda w: -w.least)
         hoped = best.least if best else max((w.least for w in weighed), default=0.0)
     undecided = Undecided(between=between, drive_this=said, expected_separation=_sigma(hoped))
@@ -159,10 +165,8 @@ def _sentence(weighed: Weighed) -> str:
     return f"{drive[0].upper()}{drive[1:]}. {where}{often}"
 
 
-def _no_drive(drives: Sequence[Weighed], pace: Pace, *, twins: bool) -> str:
+def _no_drive(drives: Sequence[Weighed], pace: Pace) -> str:
     """Return why driving alone does not help."""
-    if twins:
-        return "On a level floor these do the same to the car: no drive there tells them apart."
     wide, deep = pace.floor.size
     best = max(drives, key=lambda w: w.least, default=None)
     how = (
@@ -171,7 +175,14 @@ def _no_drive(drives: Sequence[Weighed], pace: Pace, *, twins: bool) -> str:
     return f"No drive on a level floor of {wide:.1f} x {deep:.1f} m tells these apart{how}."
 
 
-def _instead(best: Weighed | None) -> str:
+def _instead(best: Weighed | None, rivals: Sequence[Rival]) -> str:
+    """Return what to do where driving alone does not help."""
     if best:
         return f" Change the experiment: {_sentence(best)}"
+    slopes = [abs(slope) for r in rivals if (slope := numbers_of(r.effects, r.values).get(SLOPE))]
+    if slopes:
+        return (
+            " Lay a spirit level on the floor where the car drove: it is the floor if that rises "
+            f"by {100.0 * slopes[0]:.1f} cm a metre, and not if it is level."
+        )
     return " Nor does a ramp, a known mass or a turned course: weigh or measure the car itself."

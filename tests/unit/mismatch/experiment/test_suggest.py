@@ -68,6 +68,14 @@ def test_payload_and_a_weak_motor_call_for_a_ramp_or_a_known_mass():
     assert found.undecided.expected_separation**2 > NOBODY
 
 
+def test_a_slope_or_a_wind_calls_for_a_spirit_level():
+    found = suggest(recorded(), [rival("grade", 0.021, 0.5), rival("wind", -0.3, -0.2)], FLOOR)
+    said = found.undecided.drive_this
+    assert "spirit level" in said
+    assert "rises by 2.1 cm a metre" in said
+    assert "weigh" not in said
+
+
 def test_long_drives_tell_a_sagging_battery_from_motors_that_fade():
     sag, fade = rival("battery_sag", 0.08), rival("motor_fade", 0.2)
     assert lambda_of(MANOEUVRES["shuttle"], sag, fade) < NOBODY
