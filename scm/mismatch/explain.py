@@ -1,7 +1,7 @@
 """What is said of a model that was found: its effects, their rivals, what stays undecided."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from scm.mismatch.evidence import Ordinary, Tried
 from scm.mismatch.experiment.plan import Rival as Contender
@@ -21,6 +21,14 @@ from scm.vehicles.car import Car
 
 NINETY = 1.645
 WIDER = 1.3  # intervals from curvature alone are too narrow for what any model leaves out
+SHARES = {"slope", "difference", "fraction", "fraction_per_min"}
+OPPOSITE: Mapping[str, str] = {
+    "to the left": "to the right", "left": "right", "ahead": "behind", "too much.": "too little.",
+    "further forward": "further back", "higher": "lower",
+    "more than nominal, the right one as much less":
+        "less than nominal, the right one as much more",
+}  # fmt: skip
+"""Words after a number of a sentence, and what they are when it is negative."""
 Tell = Callable[[str], None]
 
 
@@ -110,13 +118,28 @@ def _scatter(model: Likelihood, knob: Knob, value: float) -> float:
 
 
 def said(candidate: Candidate, estimates: dict[str, Estimate]) -> str:
-    """Return an effect's sentence with its numbers."""
-    words = {name: _number(e.value, e.unit) for name, e in estimates.items()}
-    return candidate.said.format(**words)
+    """Return an effect's sentence with its numbers, shares in percent, amounts without signs."""
+    sentence = candidate.said
+    words = {name: _number(name, e.value, e.unit) for name, e in estimates.items()}
+    for name, estimate in estimates.items():
+        turned = _turned(sentence, name) if estimate.value < 0.0 else ""
+        if turned:
+            sentence, words[name] = turned, _number(name, -estimate.value, estimate.unit)
+    return sentence.format(**words)
 
 
-def _number(value: float, unit: str) -> str:
+def _turned(sentence: str, name: str) -> str:
+    """Return a sentence in which one number counts the other way; empty where no word does."""
+    for way, other in OPPOSITE.items():
+        if f"{{{name}}} {way}" in sentence:
+            return sentence.replace(f"{{{name}}} {way}", f"{{{name}}} {other}")
+    return ""
+
+
+def _number(name: str, value: float, unit: str) -> str:
     """Return a number as a sentence holds it; sentences say themselves what is a minute's."""
+    if name in SHARES:
+        return f"{quantity(100.0 * value, '1')} %"
     return quantity(value, "1" if unit == "1/min" else unit)
 
 

@@ -45,7 +45,16 @@ def test_no_recording_makes_a_number_less_sure_than_its_file_or_unphysical():
          "The wheels stand 3.66° to the left when the command is straight ahead."),
         ("steer_delay", {"delay_s": (0.08, "s")}, "The steering answers 80 ms late."),
         ("battery_sag", {"fraction_per_min": (0.126, "1/min")},
-         "The drive weakens by 0.126 a minute, as a battery that runs down."),
+         "The drive weakens by 12.6 % a minute, as a battery that runs down."),
+        ("grade", {"slope": (0.066, "1"), "uphill_rad": (1.414, "rad")},
+         "The floor rises by 6.6 % towards 81° from world x."),
+        ("steer_trim", {"offset_rad": (-0.0638, "rad")},
+         "The wheels stand 3.66° to the right when the command is straight ahead."),
+        ("pose_point", {"x_m": (0.031, "m"), "y_m": (-0.116, "m")},
+         "The tracked point lies 3.1 cm ahead and 11.6 cm right of where it is said to be."),
+        ("drive_asymmetry", {"difference": (-0.0812, "1")},
+         "The left motor pulls 8.12 % less than nominal, the right one as much more."),
+        ("gyro_bias", {"bias_rad_s": (-0.02, "rad/s")}, "The gyro reads 0.02 rad/s too little."),
     ],
 )  # fmt: skip
 def test_a_sentence_holds_numbers_as_a_mechanic_says_them(name, numbers, sentence):
