@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from scm.maps.svg import element
 from scm.mismatch.evidence import Tried
-from scm.mismatch.findings import Fit
+from scm.mismatch.findings import Diagnosis
 from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text, ticks_across
 from scm.mismatch.report.wording import quantities, title_of
 
@@ -18,18 +18,19 @@ _FOUND = (
 )
 
 
-def better_picture(fit: Fit | None, retuned_m: float | None = None) -> Picture | None:
-    """Return position errors on the part that the fit did not see.
+def better_picture(diagnosis: Diagnosis, retuned_m: float | None = None) -> Picture | None:
+    """Return position errors on the part that the fit did not see; None without an effect.
 
     Args:
-        fit: Before and after; None: there is nothing to draw.
+        diagnosis: Its errors before and after.
         retuned_m: Of the car with its own numbers refitted alone; None: not shown.
     """
-    if fit is None:
+    if diagnosis.fit is None or not diagnosis.effects:
         return None
-    part = fit.confirm
+    part = diagnosis.fit.confirm
     before, after = (side.get("position_m", math.nan) for side in (part.before, part.after))
-    rows = [("before", "the simulator as it was", before), ("after", "with what was found", after)]
+    found = "with the likeliest of them" if diagnosis.undecided else "with what was found"
+    rows = [("before", "the simulator as it was", before), ("after", found, after)]
     if retuned_m is not None:
         rows.insert(1, ("retuned", "its own numbers refitted, no new physics", retuned_m))
     values = [value for _, _, value in rows]
@@ -47,8 +48,9 @@ def better_picture(fit: Fit | None, retuned_m: float | None = None) -> Picture |
         parts += [text(8 + long * value, y + 38, said[i], kind="strong")]
     if math.isfinite(floor):
         x = long * floor
-        parts += [element("path", d=f"M{x:.1f} 18V{foot:.0f}", class_="needed")]
-        parts += [text(x, foot + 16, f"noise of measuring alone: {noise}")]
+        marks = "".join(f"M{x:.1f} {_BETTER_ROW * i + 18:.0f}v30" for i in range(len(rows)))
+        parts += [element("path", d=marks, class_="needed")]
+        parts += [text(x, foot + 14, f"noise of measuring alone: {noise}")]
     return Picture(
         name="better",
         title="",

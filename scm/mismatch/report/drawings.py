@@ -49,7 +49,7 @@ def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Draw
     elif start_s:
         clock = f"time since {start_s:.0f} s of the recording's clock [s]"
     return Drawings(
-        better=better_picture(diagnosis.fit, evidence.retuned_m) if diagnosis.effects else None,
+        better=better_picture(diagnosis, evidence.retuned_m),
         maps=[
             floor_map(residual, diagnosis.located, i)
             for i, residual in enumerate(on_floor[:_MOST_MAPS], start=1)

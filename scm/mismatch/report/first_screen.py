@@ -36,7 +36,7 @@ def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
     names = all_named(diagnosis.effects)
     head += tag("p", names) if names else ""
     verdict = around("div", head + better(diagnosis, evidence.retuned_m), "words")
-    picture = better_picture(diagnosis.fit, evidence.retuned_m) if diagnosis.effects else None
+    picture = better_picture(diagnosis, evidence.retuned_m)
     bars = around("div", _bars(diagnosis, picture), "bars") if picture else ""
     cards = [*_effect_cards(diagnosis), *_undecided_cards(diagnosis), *_located_card(diagnosis)]
     if diagnosis.verdict is Verdict.NONE and can_judge(diagnosis):
