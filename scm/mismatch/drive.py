@@ -78,7 +78,7 @@ class Drive:
         streams = [_stream(recording, name) for name in names]
         self.point = recording.channel("pose.x").point
         pose = recording.channel("pose.x").t
-        first = max(float(pose[0]), commands.span_s[0])
+        first = _on_grid(max(float(pose[0]), commands.span_s[0]), float(throttle[0][0]))
         last = min(float(pose[-1]), commands.span_s[1] + 0.05)
         steps = int((last - first) / STEP_S)
         self.edges: Floats = np.asarray(first + STEP_S * np.arange(steps + 1), dtype=np.float64)
@@ -106,6 +106,15 @@ class Drive:
             for name in ("pose.x", "pose.y", "pose.yaw")
             for s in (self.stream(name),)
         }
+
+
+def _on_grid(first: float, row: float) -> float:
+    """Return the first moment of a grid of steps that holds a command row.
+
+    Commands that come at an even rate then change between steps. A change within one would enter
+    as a mean, which sends a servo off at its rate as soon as the step begins.
+    """
+    return row + math.ceil(round((first - row) / STEP_S, 6)) * STEP_S
 
 
 def _commanded(t: Floats, values: Floats, *, moving: bool) -> Commanded:

@@ -4,7 +4,7 @@ A hypothesis is a tuple of effects. Its numbers are free; the car's own are free
 scatter that the car file states.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -99,7 +99,7 @@ class Fitter:
     def nominal(self, base: Fitted) -> Fitted:
         """Return a hypothesis with the car's own numbers as the file says, with derivatives."""
         fitted = replace(base, z=np.zeros_like(base.z), values=base.values.copy())
-        self._differentiate([fitted], fresh=True)
+        self._differentiate([fitted], {id(fitted)})
         return fitted
 
     def begin(
@@ -153,17 +153,27 @@ class Fitter:
             fitted.done = False
             fitted.q = np.inf  # a linear guess is no fit: the first round says what it really is
             fitted.z = fitted.z * self._free(fitted.effects)
+        stalled = set[int]()  # by derivatives that were not new: that says nothing yet
         for count in range(rounds):
             active = [f for f in fits if not f.done]
             if not active:
                 break
-            self._differentiate(active, fresh=fresh and count % 3 == 0)
+            renewed = {id(f) for f in active if fresh and (count % 3 == 0 or id(f) in stalled)}
+            self._differentiate(active, renewed)
             self._step(active)
+            stalled = {id(f) for f in active if f.done and fresh and id(f) not in renewed}
+            for f in active:
+                f.done = f.done and (id(f) not in stalled or not np.isfinite(f.q))
         return list(fits)
 
-    def _differentiate(self, fits: Sequence[Fitted], *, fresh: bool) -> None:
-        """Renew `e` and the derivatives of each fit, all in one batch."""
-        own, wanted = len(self.model.ordinary), [self._moving(f, fresh=fresh) for f in fits]
+    def _differentiate(self, fits: Sequence[Fitted], renewed: Collection[int]) -> None:
+        """Renew `e` and the derivatives of each fit, all in one batch.
+
+        Args:
+            renewed: By `id`, whose derivatives by the car's own numbers are to be new as well.
+        """
+        own = len(self.model.ordinary)
+        wanted = [self._moving(f, fresh=id(f) in renewed) for f in fits]
         sets = list[dict[str, float]]()
         for f, moving in zip(fits, wanted, strict=True):
             sets.append(self.numbers(f.effects, f.z, f.values))

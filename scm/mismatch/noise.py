@@ -1,7 +1,7 @@
 """How far a right model may be off: the least that is believed of any."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from scm.mismatch.drive import Drive
 ALIKE, ABRUPT = 0.003, 0.1
 JOLTS = 0.05
 LASTS_S = 2.0
+CALM = 3.0  # times the least noise: what is believed beyond that may be what is sought
 SLOWEST_MPS, STRAIGHTEST_RAD_S = 0.01, 0.01  # a drive straight ahead, without noise, turns by none
 
 
@@ -35,6 +36,20 @@ class Noise:
     lasts_s: float = 1.0
     launch: float = 0.0
     turn: float = 0.0
+
+
+def calmed(noise: Noise, drives: Sequence[Drive]) -> Noise:
+    """Return a belief with disturbances of at most `CALM` times a car's usual."""
+    least = usual_noise(drives)
+    return replace(
+        noise,
+        speed=min(noise.speed, CALM * least.speed),
+        side=min(noise.side, CALM * least.side),
+        yaw_rate=min(noise.yaw_rate, CALM * least.yaw_rate),
+        own={name: min(value, CALM * least.own[name]) for name, value in noise.own.items()},
+        launch=min(noise.launch, CALM * least.launch),
+        turn=min(noise.turn, CALM * least.turn),
+    )
 
 
 def usual_noise(drives: Sequence[Drive]) -> Noise:

@@ -6,7 +6,7 @@ the library's size twice its logarithm (the criterion of PASTIS).
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,12 +16,17 @@ from scm.mismatch.fit import FARTHEST, OF_OWN, Fitted, Fitter
 from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate
-from scm.mismatch.noise import Noise
+from scm.mismatch.noise import Noise, calmed
 
 MOST_EFFECTS = 4
 REFITTED, AFRESH = 14, 8
 AFRESH_GAIN = 60.0
-FALSE_ALARMS = 0.01
+TO_THE_END = 10  # rounds of a fit that others are held against
+DEEPER = 5.0
+CHANCES = 3
+PLENTY = 25.0  # gained where nothing was fitted, it is enough for any effect
+REMAINDER = 0.005  # of the largest effect's gain: an equation off by 7 % leaves as much
+FALSE_ALARMS = 0.02
 NEAR = 40.0
 DRIFTED = 8.0
 TWINS: Mapping[str, str] = {
@@ -90,11 +95,48 @@ class Search:
         while len(best.effects) < MOST_EFFECTS and not is_over():
             step = self.extend(best)
             self.steps.append(step)
-            if not step.rivals or step.criteria[0] > self.criterion(best):
+            best = step.base
+            if not best.effects:
+                self.retuned = best
+            if step.rivals and step.criteria[0] <= self.criterion(best):
+                best = self.prune(self.settle(step.rivals[0]))
+                continue
+            if best.effects or (found := self._calmly(best)) is best:
                 break
-            best = self.settle(step.rivals[0])
-            best = self.prune(best)
+            best = found
         return best
+
+    def _calmly(self, nothing: Fitted) -> Fitted:
+        """Return the best effect that a calm belief about noise shows, or the re-tuned car.
+
+        Noise that was learned without an effect may have swallowed it. So effects are tried where
+        nothing is put down to disturbances, and judged each under the noise that it leaves: the
+        more of it a hypothesis needs, the more it pays.
+        """
+        self.tell("trying again under a calm belief about noise")
+        before, least = self.model.noise, self._with_noise(nothing)
+        calm = calmed(before, self.model.drives)
+        if calm == before:
+            return nothing
+        self.model.believe(calm)
+        (base,) = self.fitter.refine([replace(nothing, done=False)], rounds=4, fresh=True)
+        step, found, noise = self.extend(base), nothing, before
+        for rival in step.rivals[:CHANCES]:
+            if self.criterion(rival) > self.criterion(step.base):
+                break
+            self.model.believe(calm)
+            settled = self.settle(rival)
+            cost = self._with_noise(settled)
+            if cost < least:
+                found, least, noise = settled, cost, self.model.noise
+        self.model.believe(noise)
+        if found is not nothing:
+            self.steps.append(step)
+        return found
+
+    def _with_noise(self, fitted: Fitted) -> float:
+        """Return the criterion and what the noise that is believed now costs."""
+        return self.criterion(fitted) + float(self.fitter.part @ self.model.log_size)
 
     @cached_property
     def retuned(self) -> Fitted:
@@ -115,11 +157,33 @@ class Search:
             numbers = self.fitter.numbers(fitted.effects, fitted.z, fitted.values)
             residuals, _ = self.model.residuals([numbers])
             self._learn(self.model, residuals, 1)
-        (fitted,) = self.fitter.refine([fitted], rounds=4, fresh=True)
-        return fitted
+        return self._to_the_end(fitted, [fitted.z, np.zeros_like(fitted.z)])
+
+    def _to_the_end(self, fitted: Fitted, starts: Sequence[Floats]) -> Fitted:
+        """Return a hypothesis fitted from several values of the car's own numbers, the best one.
+
+        Valleys are long, and some are dead ends: a comparison is fair only between the deepest.
+        """
+        unlike = {np.round(z, 3).tobytes(): z for z in starts}
+        begun = [
+            replace(fitted, z=z.copy(), values=fitted.values.copy(), done=False)
+            for z in unlike.values()
+        ]
+        return min(self.fitter.refine(begun, rounds=TO_THE_END, fresh=True), key=lambda f: f.q)
 
     def extend(self, base: Fitted) -> Step:
-        """Try every effect beside those of `base`, but none that undoes one of them."""
+        """Try every effect beside those of `base`, but none that undoes one of them.
+
+        Where the car's own numbers that came with an effect suit the model without it better than
+        those it had, that one is tried again from there: an effect must not earn what a fit missed.
+        """
+        step = self._extended(base)
+        deeper = self._to_the_end(base, [base.z, *(f.z for f in step.rivals[:2])])
+        if deeper.q > base.q - DEEPER:
+            return step
+        return self._extended(deeper)
+
+    def _extended(self, base: Fitted) -> Step:
         taken = {*base.names, *(TWINS[name] for name in base.names if name in TWINS)}
         trials = [
             ((*base.effects, candidate), np.concatenate((base.values, start)))
@@ -159,7 +223,8 @@ class Search:
     def confirmed(self, best: Fitted, unseen: Floats) -> Fitted:
         """Return the model without effects that do not help on a part that no fit has seen.
 
-        Of what an effect gains where it was fitted, a share must come out there too, by length.
+        Of what an effect gains where it was fitted, a share must come out there too, by length, or
+        plenty. One that gains next to nothing beside another is what that one's equation leaves.
         """
         share = self.holds * float(unseen.sum()) / max(self.events, 1)
         while best.effects:
@@ -167,12 +232,13 @@ class Search:
             fitter = Fitter(self.model, unseen)
             own = float(best.z @ best.z)
             seen = fitter.score(best.e[:, None], best.z)[0] - own
-            gains = [
-                float(fitter.score(f.e[:, None], f.z)[0] - f.z @ f.z - seen)
-                - share * max(f.q - best.q, 0.0)
-                for f in others
-            ]
-            if min(gains) > 0.0:
+            seen_gains = np.array([max(f.q - best.q, 0.0) for f in others])
+            gains = np.array(
+                [float(fitter.score(f.e[:, None], f.z)[0] - f.z @ f.z - seen) for f in others]
+            )
+            gains -= np.minimum(share * seen_gains, PLENTY)
+            gains[seen_gains < REMAINDER * seen_gains.max()] = -np.inf
+            if gains.min() > 0.0:
                 return best
             best = others[int(np.argmin(gains))]
         return best
@@ -200,7 +266,7 @@ class Search:
     def _without_each(self, fitted: Fitted) -> list[Fitted]:
         """Return refitted models that lack one effect each, in the effects' order."""
         if len(fitted.effects) == 1:
-            return [self.retuned_now()]
+            return [self.retuned_now(fitted.z)]
         fewer, at, own = list[Fitted](), 0, len(fitted.z)
         for i, effect in enumerate(fitted.effects):
             gone = slice(at, at + len(effect.knobs))
@@ -220,10 +286,14 @@ class Search:
             at = gone.stop
         return self.fitter.refine(fewer, rounds=4, fresh=True)
 
-    def retuned_now(self) -> Fitted:
-        """Return the car with its own numbers refitted, under the present belief about noise."""
-        (fitted,) = self.fitter.refine([self.fitter.null(self.retuned.z)], rounds=4, fresh=True)
-        return fitted
+    def retuned_now(self, *others: Floats) -> Fitted:
+        """Return the car with its own numbers refitted, under the present belief about noise.
+
+        Args:
+            others: Values of these numbers to begin from as well.
+        """
+        start = self.fitter.null(self.retuned.z)
+        return self._to_the_end(start, [start.z, *others])
 
 
 def _preferred(near: Sequence[Fitted], far: Sequence[Fitted]) -> list[Fitted]:

@@ -5,7 +5,7 @@ better hypothesis by its price and a margin, and explain a part that no fit has 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,12 +14,11 @@ from scm.mismatch.fit import Fitted, Fitter
 from scm.mismatch.laws.law import Law
 from scm.mismatch.laws.seek import Sought, criterion, seek
 from scm.mismatch.laws.sensed import Sensed, Sensing
-from scm.mismatch.noise import Noise, usual_noise
+from scm.mismatch.noise import Noise, calmed
 from scm.mismatch.search import Search
 
 MARGIN = 10.0  # a law that is hardly better than a known effect is that effect
 MOST_BESIDE, SETTLED = 2, 2
-CALM = 3.0  # times the least noise: what is believed beyond that may be the law itself
 Tell = Callable[[str], None]
 
 
@@ -58,7 +57,7 @@ def lawful(
         return best, None
     best = search.settle(best)  # as often as a law will be
     listed = _settled(search, best, unseen)
-    model.believe(_calm(model))
+    model.believe(calmed(model.noise, model.drives))
     sought = seek(model, _bare(search, best), search.fitter.part, tell)
     calm, laws = model.noise, list[_Settled]()
     for fitted in sought.found[:SETTLED]:
@@ -84,20 +83,6 @@ def _with_known(search: Search, law: _Settled, unseen: Floats) -> Fitted:
             break
         law = more
     return law.fitted
-
-
-def _calm(model: Sensing) -> Noise:
-    """Return the noise believed now, but for disturbances that are larger than a car's usual."""
-    now, least = model.noise, usual_noise(model.drives)
-    return replace(
-        now,
-        speed=min(now.speed, CALM * least.speed),
-        side=min(now.side, CALM * least.side),
-        yaw_rate=min(now.yaw_rate, CALM * least.yaw_rate),
-        own={name: min(value, CALM * least.own[name]) for name, value in now.own.items()},
-        launch=min(now.launch, CALM * least.launch),
-        turn=min(now.turn, CALM * least.turn),
-    )
 
 
 def _bare(search: Search, best: Fitted) -> Fitted:

@@ -1,5 +1,7 @@
 """A recording on the simulation's grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,3 +29,16 @@ def test_a_car_that_is_given_a_throttle_is_not_led_by_its_speed():
     drive = Drive(made_drive(seconds=6.0), big_nigel())
     assert not is_led(drive)
     assert has_odometer(drive) == ("speed" in drive.names)
+
+
+def test_steps_begin_where_commands_change():
+    recording = made_drive(seconds=6.0)
+    late = {
+        name: replace(channel, t=channel.t + 0.0037) if name.startswith("pose.") else channel
+        for name, channel in recording.channels.items()
+    }
+    drive = Drive(replace(recording, channels=late), big_nigel())
+    steps = (drive.edges - recording.channels["command.steering"].t[0]) / 0.01
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
+    assert drive.edges[0] >= late["pose.x"].t[0]
+    assert drive.edges[0] < late["pose.x"].t[0] + 0.01

@@ -1,0 +1,103 @@
+"""What a search believes: noise that is not let swallow effects, numbers at their limits, doubts."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from scm.mismatch.fit import FARTHEST, Fitted, Fitter
+from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.noise import CALM, calmed, usual_noise
+from scm.mismatch.search import DRIFTED, PLENTY, REMAINDER, Search
+from tests.unit.mismatch.made_drive import big_nigel, driven
+from tests.unit.mismatch.made_fit import candidate
+
+
+@pytest.fixture(scope="module")
+def model():
+    return Likelihood([driven(seconds=12.0)], big_nigel())
+
+
+def a_search(model, *names):
+    library = [candidate(name) for name in names]
+    return Search(model, np.ones(len(model.t)), library, lambda _: None)
+
+
+def test_calm_noise_is_no_larger_than_a_cars_usual_times_a_few(model):
+    least = usual_noise(model.drives)
+    loud = replace(least, speed=50.0 * least.speed, turn=least.turn)
+    quiet = calmed(loud, model.drives)
+    assert quiet.speed == pytest.approx(CALM * least.speed)
+    assert quiet.turn == least.turn
+
+
+def test_a_fit_that_ended_in_a_dead_end_is_begun_elsewhere_too(model):
+    search = a_search(model)
+    far = np.where(np.arange(len(model.ordinary)) % 2 == 0, FARTHEST, -FARTHEST)
+    stuck = replace(search.fitter.null(), z=far)
+    alone = search._to_the_end(stuck, [far])
+    several = search._to_the_end(stuck, [far, np.zeros_like(far)])
+    assert several.q <= alone.q
+    best = search._to_the_end(search.fitter.null(), [np.zeros_like(far)])
+    assert several.q == pytest.approx(best.q, abs=1.0)
+
+
+def test_an_effect_does_not_earn_what_a_fit_without_it_missed(model):
+    search = a_search(model, "steer_trim", "battery_sag")
+    poor = search.fitter.null()
+    (poor,) = search.fitter.refine([poor], rounds=1, fresh=True)
+    poor.z = np.full_like(poor.z, 0.9)
+    poor.e = search.fitter.null(poor.z).e
+    poor.q = float(search.fitter.score(poor.e[:, None], poor.z)[0])
+    step = search.extend(poor)
+    assert step.base.q < poor.q
+    assert step.criteria[0] > search.criterion(step.base)  # nothing is concealed in this drive
+
+
+def test_the_effect_of_a_number_at_its_limit_comes_closer_by_more(model):
+    search = a_search(model, "steer_rate")
+    keys = [own.key for own in model.ordinary]
+    z = np.zeros(len(keys))
+    z[keys.index("steering.rate_rad_s")] = -FARTHEST
+    base = replace(search.fitter.null(), z=z)
+    found = Fitted((candidate("steer_rate"),), 0.0 * z, np.array([0.7]), base.e, 0.0, base.jacobian)
+    assert search._drifted(found.effects[-1], base) == DRIFTED
+
+
+def losing(seen, unseen):
+    """A model whose effects each cost so much when left out, where it was fitted and where not."""
+    n = len(seen)
+    e = np.zeros(2 + n)
+    best = Fitted(tuple(candidate("steer_trim") for _ in range(n)), np.zeros(1), np.zeros(n), e,
+                  0.0, np.zeros((2 + n, 1)))  # fmt: skip
+    others = []
+    for lost, hidden in zip(seen, unseen, strict=True):
+        value = np.sqrt(8.0 * np.expm1(hidden / 8.0))  # what the loss makes `hidden` of
+        other = e.copy()
+        other[1] = value
+        others.append(replace(best, effects=best.effects[1:], e=other, q=lost))
+    return best, others
+
+
+@pytest.mark.parametrize(
+    ("seen", "unseen", "stays"),
+    [
+        ((100.0,), (20.0,), True),
+        ((100.0,), (1.0,), False),
+        ((1500.0,), (PLENTY + 1.0,), True),
+        ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), False),
+    ],
+    ids=["its share", "less than its share", "plenty", "a remainder of another"],
+)
+def test_an_effect_stays_where_its_gain_holds_on_an_unseen_part(model, seen, unseen, stays):
+    best, others = losing(seen, unseen)
+    part = np.zeros(len(best.e))
+    part[1] = 1.0
+    fake = SimpleNamespace(settled=np.ones(len(best.e)))
+    search = Search.__new__(Search)
+    search.model, search.events = fake, 4
+    search.fitter = Fitter(fake, 1.0 - part)
+    nothing = replace(others[-1], effects=())
+    search._without_each = lambda fitted: others if len(fitted.effects) == len(seen) else [nothing]
+    assert (search.confirmed(best, part) is best) == stays
