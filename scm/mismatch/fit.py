@@ -169,8 +169,7 @@ class Fitter:
     def _differentiate(self, fits: Sequence[Fitted], renewed: Collection[int]) -> None:
         """Renew `e` and the derivatives of each fit, all in one batch.
 
-        Args:
-            renewed: By `id`, whose derivatives by the car's own numbers are to be new as well.
+        `renewed` holds, by `id`, whose derivatives by the car's own numbers are to be new as well.
         """
         own = len(self.model.ordinary)
         wanted = [self._moving(f, fresh=id(f) in renewed) for f in fits]

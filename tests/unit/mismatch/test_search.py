@@ -1,4 +1,4 @@
-"""What a search believes: noise that is not let swallow effects, numbers at their limits, doubts."""
+"""What a search believes: how deep fits must go, numbers at their limits, and doubts."""
 
 from dataclasses import replace
 from types import SimpleNamespace
