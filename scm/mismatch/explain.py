@@ -88,7 +88,7 @@ def effect_of(
         value, place = mine[j], own + at + j
         told = WIDER * knob.step * math.sqrt(max(best.covariance[place, place], 0.0))
         spread = NINETY * math.hypot(told, _scatter(search.model, knob, value))
-        low, high = knob.bounds
+        low, high = knob.bounds if not _wraps(knob) else (-math.inf, math.inf)
         estimates[knob.name] = Estimate(
             value=value, low=max(value - spread, low), high=min(value + spread, high),
             unit=knob.unit,
@@ -107,6 +107,11 @@ def effect_of(
         law=candidate.formula(mine) if isinstance(candidate, Law | Sensed) else None,
         rivals=rivals,
     )
+
+
+def _wraps(knob: Knob) -> bool:
+    """Say whether a number is a direction, which does not end where its bounds are."""
+    return knob.unit == "rad" and knob.bounds[1] - knob.bounds[0] > 1.99 * math.pi
 
 
 def _scatter(model: Likelihood, knob: Knob, value: float) -> float:

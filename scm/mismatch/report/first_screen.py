@@ -157,8 +157,8 @@ def _undecided_card(question: Undecided, folder: str) -> str:
     which = f"Either {joined(titles, 'or')}: each explains this recording, one hardly better."
     rows = [
         ("Which", which),
-        ("Drive this", question.drive_this),
-        ("Then", _then(question, folder)),
+        ("Drive this" if folder else "Do this", question.drive_this),
+        ("Then" if folder else "By driving", _then(question, folder)),
         ("Or check", "\n".join(checks_of(question.between))),
     ]
     return _card("question", "Undecided", capital(joined(titles, "or")) + "?", rows)

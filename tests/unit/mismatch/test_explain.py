@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scm.mismatch.drive import Drive
-from scm.mismatch.explain import ordinary_of, said, tried_of
+from scm.mismatch.explain import effect_of, ordinary_of, said, tried_of
 from scm.mismatch.findings import Estimate
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
@@ -36,6 +36,16 @@ def test_no_recording_makes_a_number_less_sure_than_its_file_or_unphysical():
         prior = next(o for o in model.ordinary if o.key == own.key)
         assert own.found.high - own.found.low <= 2.0 * 1.645 * prior.std + 1e-12
         assert bounds[own.key][0] <= own.found.low <= own.found.high <= bounds[own.key][1]
+
+
+def test_the_interval_of_a_direction_does_not_end_where_the_angle_wraps():
+    model, _, best = made_fit.healthy()
+    grade, n = made_fit.candidate("grade"), len(best.z)
+    covariance = np.eye(n + 2) * np.append(np.ones(n), (0.01, 1.0))
+    found = replace(best, effects=(grade,), values=np.array([0.02, np.pi]), covariance=covariance)
+    search = Search(model, np.ones(len(model.t)), (grade,), lambda _: None)
+    uphill = effect_of(search, found, 0).parameters["uphill_rad"]
+    assert uphill.high - uphill.value == pytest.approx(uphill.value - uphill.low)
 
 
 @pytest.mark.parametrize(
