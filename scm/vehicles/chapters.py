@@ -14,7 +14,7 @@ CHAPTERS: tuple[tuple[str, frozenset[str]], ...] = (
     ("Steering", frozenset({
         "steering_received", "steering", "steer_demand", "steer_scaled", "steer_target",
         "servo_load_pace", "servo_pace", "servo_angle", "linkage_angle", "steer_trimmed",
-        "steer_angle", "road_angle", "wheel_steer", "wheel_slope"})),
+        "steer_yielded", "steer_angle", "road_angle", "wheel_steer", "wheel_slope"})),
     ("Tyres and floor", frozenset({
         "tyre_x", "tyre_y", "grip_load", "grip_here", "grip", "rolling", "slip_scale", "side_lag",
         "side_lag_speed", "spin_lag", "spin_lag_speed"})),

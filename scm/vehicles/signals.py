@@ -250,6 +250,14 @@ _ALL = (
         otherwise="linkage_angle",
     ),
     _body(
+        "steer_yielded",
+        "rad",
+        Role.CHAIN,
+        "angle that the front wheels have given way, + right",
+        span=(-0.6, 0.6),
+        otherwise="0.0",
+    ),
+    _body(
         "steer_angle",
         "rad",
         Role.CHAIN,
@@ -267,6 +275,7 @@ _ALL = (
         otherwise="steer_angle",
     ),
     _body("road_slope", "1", Role.GIVEN, "tangent of road_angle, to 1.2 rad", span=(-1.0, 1.0)),
+    _body("steer_before", "rad", Role.GIVEN, "steer_angle of the last substep", span=(-0.6, 0.6)),
     _body("added_mass", "kg", Role.SHAPE, "beyond the car file's mass", span=(-1.0, 5.0)),
     _body("added_cog_x", "m", Role.SHAPE, "centre of gravity, + forward", span=(-0.05, 0.05)),
     _body("added_cog_z", "m", Role.SHAPE, "centre of gravity, + up", span=(-0.05, 0.05)),
@@ -371,6 +380,7 @@ _ALL = (
         span=(-1.0, 1.0),
         otherwise="road_slope",
     ),
+    _wheel("slope_before", "1", Role.GIVEN, "wheel_slope of the last substep", span=(-1.0, 1.0)),
     _wheel("load", "N", Role.CHAIN, "floor on tyre, + up, never negative", span=(0.0, 40.0)),
     _wheel(
         "grip_load",

@@ -23,6 +23,7 @@ cog_height = cog_height + added_cog_z
 BODY = """
 sprung_mass, sprung_to_rear_axle = sprung_part(mass, cog_to_rear_axle, wheel_mass, wheelbase)
 sin_yaw, cos_yaw = sin_cos(yaw + dt * yaw_rate)
+steer_before = steer_angle
 vx = cos_yaw * vx_world + sin_yaw * vy_world
 vy = cos_yaw * vy_world - sin_yaw * vx_world
 axle_front = 0.5 * (wheel_speed__0 + wheel_speed__1)
@@ -44,6 +45,7 @@ rest_load = rest_spring_force + wheel_mass * GRAVITY
 x_wheel = x_cog + cos_yaw * wheel_x - sin_yaw * wheel_y
 y_wheel = y_cog + sin_yaw * wheel_x + cos_yaw * wheel_y
 omega = wheel_speed
+slope_before = wheel_slope
 axle_omega = axle_front if front > 0.5 else axle_rear
 over_x, over_y = contact_velocity(
     vx, vy, roll_rate, pitch_rate, yaw_rate, wheel_x, wheel_y, cog_height

@@ -187,7 +187,7 @@ def test_a_relaxed_tyre_has_63_percent_of_its_slip_after_its_length():
     law = plain(all_terms()["tyre_relaxation"].law)
     length, speed, dt, lag = 0.3, 2.0, 1e-4, 0.0
     for _ in range(round(length / speed / dt)):
-        lag = law(speed, 0.1, lag, dt, length, 0.2, 0.05)
+        lag = law(speed, 0.1, lag, dt, 0.0, 0.0, 0.0, length, 0.2, 0.05)
     assert lag == pytest.approx(0.1 / speed * (1.0 - math.exp(-1.0)), rel=0.01)
 
 

@@ -1,6 +1,7 @@
 """Each effect between steering command and road wheel does what its equation says."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scm.vehicles.fleet import Fleet
 from scm.vehicles.jit import plain
 
 LIMIT = 0.5235988
+GENESIS = Path(__file__).parents[2] / "recordings/cars/genesis.toml"
 # one kernel for all tests: whatever a test does not name stays neutral
 STEERING = [
     "steer_saturation", "steer_gain", "steer_lag", "servo_torque", "steer_rate",
@@ -140,6 +142,46 @@ def test_compliance_gives_way_by_side_force_over_weight_and_stands_still():
 def test_the_softest_steering_inside_its_bounds_does_not_chatter():
     _, _, wiggle = settled_circle(["steer_compliance"], {"steering.compliance_rad": 1.0})
     assert wiggle < 2e-3
+
+
+def test_wheels_that_give_way_follow_the_servo_at_once():
+    leaps = np.r_[np.ones(30), -np.ones(60)]
+    stiff = angles(fleet_with([]), leaps)
+    soft = angles(fleet_with(["steer_compliance"], {"steering.compliance_rad": 0.2}), leaps)
+    np.testing.assert_allclose(soft, stiff, rtol=0.0, atol=1e-12)  # at rest no force on them
+
+
+def test_wheels_have_given_way_by_63_percent_after_a_millisecond():
+    yielded, dt = 0.0, 1e-5
+    for _ in range(100):
+        yielded = law(
+            "steer_compliance", steer_trimmed=0.0, steer_before=-yielded, steer_yielded=yielded,
+            accel_y=9.80665, yaw_accel=0.0, vx=3.0, mass=2.0, cog_to_rear_axle=0.1,
+            yaw_inertia=0.02, wheelbase=0.2, rad_per_weight=0.2, dt=dt,
+        )  # fmt: skip
+    assert yielded == pytest.approx(0.2 * 0.5 * (1.0 - math.exp(-1.0)), rel=0.03)
+
+
+@pytest.mark.parametrize("car", ["nigel", "f1tenth", str(GENESIS)])
+@pytest.mark.parametrize("substep", [1e-3, 2e-3, 5e-3])
+def test_no_steering_chatters_whatever_it_gives_way_and_however_long_a_substep(car, substep):
+    full_size = car == str(GENESIS)
+    soft = (0.0, 0.02, 0.1, 0.2, 0.5, 1.0)
+    fleet = Fleet(load_car(car).with_terms(["steer_compliance"]), len(soft))
+    for row, give in enumerate(soft):
+        fleet.add(Pose2(0.0, 0.0, 0.0), speed=15.0 if full_size else 0.2)
+        fleet.set_parameter(row, "steering.compliance_rad", give)
+    fleet.throttle[:] = 0.15 if full_size else 0.35
+    trembling = []
+    for steering in (0.25, -0.25):
+        fleet.steering[:] = steering * (0.3 if full_size else 1.0)
+        fleet.advance(3.0, substep)
+        angle = []
+        for _ in range(100):
+            fleet.advance(substep, substep)
+            angle.append(fleet.steer_angle.copy())
+        trembling.append(np.abs(np.diff(angle, 2, axis=0)).max(axis=0))
+    assert np.max(trembling) < 1e-5
 
 
 def test_a_command_beyond_every_linkage_still_turns_the_car_its_way():

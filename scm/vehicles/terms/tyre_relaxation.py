@@ -1,15 +1,18 @@
 """Tyre relaxation: side force needs a rolled length to build up, and at rest it holds.
 
     length * d(side_lag)/dt + |v_long| * side_lag = v_lat
-    side_lag_speed = length / max(dt, rubber)
+    side_lag_speed = length / max(dt / 2, rubber)
 
-side_lag is the slip that the contact patch still carries. At rest nothing is forgotten: the patch
-is a spring, so a car on a side slope stands where a quasi-static tyre creeps. A patch that slides
-carries no more than the slip of the slide, at rest that of most grip. rubber = 10 ms at rest, 0
-from twice low_speed on, damps that spring.
+side_lag is the slip that the contact patch carries as a substep begins, v_lat the sliding until
+then: before the wheel turned on from slope_before. The tyre feels the mean over the substep. At
+rest nothing is forgotten: the patch is a spring, so a car on a side slope stands where a
+quasi-static tyre creeps. A patch that slides carries no more than the slip of the slide, at rest
+that of most grip. rubber = 10 ms at rest, 0 from twice low_speed on, damps that spring.
 Holds: lengths above 1 mm at 1 ms substeps.   Shows in: steering steps at speed, standing.
 Source: Pacejka, Tire and Vehicle Dynamics, single contact point transient model.
 """
+
+import math
 
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
@@ -25,13 +28,16 @@ _RUBBER = 0.01  # s, how long rubber at rest resists; ours, it ends the swing in
 
 @law
 def tyre_relaxation(
-    v_long: float, v_lat: float, side_lag: float, dt: float, length: float, slip_extremum: float,
-    low_speed: float,
+    v_long: float, v_lat: float, side_lag: float, dt: float, wheel_slope: float,
+    slope_before: float, yaw_rate: float, length: float, slip_extremum: float, low_speed: float,
 ) -> float:  # fmt: skip
-    """Side slip that the contact patch carries, + sliding left; 0 without a length."""
-    most = max(slip_extremum, abs(v_lat) / max(abs(v_long), low_speed))
-    speed = max(abs(v_long) + length / dt, low_speed)
-    carried = (v_lat + length / dt * side_lag) / speed
+    """Side slip that the contact patch carries as the substep begins, + sliding left."""
+    sine, cosine = wheel_slope - slope_before, 1.0 + wheel_slope * slope_before
+    turned = (cosine * v_lat + sine * v_long) / math.sqrt(cosine * cosine + sine * sine)
+    slid = turned + v_long * yaw_rate * dt
+    most = max(slip_extremum, abs(slid) / max(abs(v_long), low_speed))
+    stays = max(length / dt - 0.5 * abs(v_long), 0.0)
+    carried = (slid + stays * side_lag) / max(abs(v_long) + stays, low_speed)
     return min(max(carried, -most), most) if length > 0.0 else 0.0
 
 
@@ -39,7 +45,7 @@ def tyre_relaxation(
 def tyre_relaxation_speed(v_long: float, dt: float, length: float, low_speed: float) -> float:
     """How much of the carried slip the tyre feels beside the new one [m/s]."""
     rubber = _RUBBER * (1.0 - abs(v_long) * (0.5 / low_speed))
-    return length / max(dt, rubber)
+    return length / max(0.5 * dt, rubber)
 
 
 TERM = Term(
