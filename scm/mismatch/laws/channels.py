@@ -50,6 +50,13 @@ ANGLE = Channel(
     (Written("sets steer_trimmed", ("linkage_angle",), "linkage_angle + offset + angle_rad * g",
              "Mean road-wheel angle, + left [rad]."),),
 )  # fmt: skip
+DEMAND = Channel(
+    "wheel angle", "turn_rad", Equation.STEERING,
+    (_amount("angle_rad", "rad", 0.005, (-1.0, 1.0)),), _only("asked_rad"),
+    "The servo is asked for {angle_rad} that nobody meant,", "{angle_rad} * {g}",
+    (Written("sets steer_scaled", ("steer_demand",), "gain * steer_demand + angle_rad * g",
+             "Mean road-wheel angle meant, + left [rad]."),),
+)  # fmt: skip
 STEER_GAIN = Channel(
     "steering gain", "turn_rad", Equation.STEERING, (_amount("gain", "1", 0.02, (-3.0, 3.0)),),
     _only("turn_gain"), "The steering's gain changes by {gain},", "{gain} * wheel angle * {g}",

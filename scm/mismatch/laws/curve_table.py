@@ -165,8 +165,8 @@ TURNED_CUBED = Curve(
 )  # fmt: skip
 SIDE = Curve(
     "side", "steering sign", (), _fixed(by_steer=1.0, size=1.0),
-    "for each radian to the left, and as much less to the right", "|wheel angle| / 1 rad",
-    ("linkage_angle",), "g = abs(linkage_angle)",
+    "for each radian to the left, and as much less to the right", "|angle asked for| / 1 rad",
+    ("steer_demand",), "g = abs(steer_demand)",
 )  # fmt: skip
 LEFT = Curve(
     "left", "steering sign", (), _fixed(by_steer=1.0, ramp=1.0),
@@ -180,8 +180,8 @@ RIGHT = Curve(
 )  # fmt: skip
 BENT = Curve(
     "bent", "steering angle", (), _fixed(by_steer=1.0, cube=1.0),
-    "growing with the angle asked for cubed", "wheel angle^3 / (1 rad)^3", ("linkage_angle",),
-    "g = linkage_angle * linkage_angle * linkage_angle",
+    "growing with the angle asked for cubed", "angle asked for^3 / (1 rad)^3", ("steer_demand",),
+    "g = steer_demand * steer_demand * steer_demand",
 )  # fmt: skip
 DRIVEN = Curve(
     "driven", "throttle", (), _fixed(by_throttle=1.0, line=1.0), "in proportion to the throttle",

@@ -18,7 +18,7 @@ from scm.vehicles.param import Param
 from scm.vehicles.term import Law, Per, Term
 
 PREFIX = "learned."
-TRIM = "steering.trim_rad"
+TRIM, GAIN = "steering.trim_rad", "steering.gain"
 SLOW = 0.02  # speed over which a drag turns round with the car [m/s]
 _FAR = (-1e4, 1e4)
 
@@ -175,6 +175,17 @@ def learned_turn(
 
 
 @law
+def learned_demand(
+    steer_demand: float, gain: float, by_steer: float, size: float, ramp: float, cube: float,
+    asked_rad: float,
+) -> float:  # fmt: skip
+    """Mean road-wheel angle meant, + left [rad]: the shape over the angle asked of the servo."""
+    q = by_steer * steer_demand
+    g = abs(q) * size + ramp * max(q, 0.0) + cube * q * q * q
+    return gain * steer_demand + asked_rad * g
+
+
+@law
 def learned_throttle(
     time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
     throttle_command: float, yaw_rate: float, by_time: float, by_x: float, by_y: float,
@@ -197,7 +208,7 @@ def learned_throttle(
 
 _NEUTRAL = dict.fromkeys(
     ("along_n", "drag_n", "world_x_n", "world_y_n", "moment_nm", "turn_rad", "turn_gain",
-     "throttle_add", "throttle_gain"),
+     "asked_rad", "throttle_add", "throttle_gain"),
     0.0,
 )  # fmt: skip
 
@@ -219,15 +230,21 @@ TWIST = _term(learned_twist, channels=("moment_nm",), adds="moment_z")
 TURN = _term(
     learned_turn, channels=("turn_rad", "turn_gain"), more=(_OFFSET,), sets="steer_trimmed"
 )
+_MEANT = Param("gain", 1.0, "1", GAIN, (0.2, 2.0), "angle over the angle meant", report="gain")
+_BY_STEER = [p for p in _MIX if p.key.removeprefix(PREFIX) in ("by_steer", "size", "ramp", "cube")]
+DEMAND = Term(
+    learned_demand, per=Per.BODY, sets="steer_scaled", neutral={"asked_rad": 0.0},
+    params=(*_BY_STEER, _number("asked_rad", "how much of the shape is asked for"), _MEANT),
+)  # fmt: skip
 THROTTLE = _term(
     learned_throttle, channels=("throttle_add", "throttle_gain"), sets="throttle_received"
 )
 
 
-TERMS = (PUSH, ACROSS, TWIST, TURN, THROTTLE)
+TERMS = (PUSH, ACROSS, TWIST, TURN, DEMAND, THROTTLE)
 
 
 def learned_terms(car: Car) -> list[Term]:
-    """Return the general effect's parts that a car can carry; a steering's trim stays as it is."""
+    """Return the general effect's parts that a car can carry; steering keeps its trim and gain."""
     taken = {term.sets for term in car.terms if term.sets}
     return [term for term in TERMS if term is not THROTTLE or term.sets not in taken]

@@ -49,7 +49,7 @@ _SHAPES: Mapping[str, Callable[[Floats], Floats]] = {
 }  # fmt: skip
 _FACTORS: Mapping[str, Callable[[Mapping[str, Floats]], Floats]] = {
     "along_n": _ones, "drag_n": _drag, "world_x_n": lambda d: np.cos(d["yaw"]),
-    "world_y_n": lambda d: np.sin(d["yaw"]), "turn_rad": _ones,
+    "world_y_n": lambda d: np.sin(d["yaw"]), "turn_rad": _ones, "asked_rad": _ones,
     "turn_gain": lambda d: d["steer"], "throttle_gain": lambda d: d["throttle"],
     "moment_nm": _ones,
 }  # fmt: skip

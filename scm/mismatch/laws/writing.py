@@ -12,12 +12,17 @@ from pathlib import Path
 
 from scm.errors import TermError
 from scm.mismatch.laws.law import Law, Values, Written
-from scm.mismatch.laws.learned import TRIM
+from scm.mismatch.laws.learned import GAIN, TRIM
 from scm.mismatch.listed import Knob
 from scm.vehicles.own_term import SUFFIX, load_own_term
 from scm.vehicles.term import Term
 
 _WIDE = 100
+_WITH = {
+    "sets steer_trimmed": ("offset", f'0.0, "rad", "{TRIM}", (-0.3, 0.3), "trim, + left"'),
+    "sets steer_scaled": ("gain", f'1.0, "1", "{GAIN}", (0.2, 2.0), "gain of the steering"'),
+}
+"""What a signal's own effect does, by target: the law that takes its place does it too."""
 
 
 def file_name(law: Law) -> str:
@@ -105,10 +110,8 @@ def _imports(functions: Sequence[str]) -> list[str]:
 
 def _params(law: Law) -> str:
     rows = [_param(law, knob) for knob in law.knobs]
-    if law.channel.text[0].target == "sets steer_trimmed":
-        rows.append(
-            f'    Param("offset", 0.0, "rad", "{TRIM}", (-0.3, 0.3), "trim of the wheels, + left"),'
-        )
+    more = [_WITH[part.target] for part in law.channel.text if part.target in _WITH]
+    rows += [f'    Param("{name}", {rest}),' for name, rest in more]
     return "\n".join(["_PARAMS = (", *rows, ")"])
 
 
@@ -123,10 +126,9 @@ def _param(law: Law, knob: Knob) -> str:
 
 def _function(law: Law, part: Written) -> str:
     body, names = _straight(f"{law.curve.text}\nresult = {part.returns}")
-    own = {knob.name for knob in law.knobs} | {"offset"}
     signals = [s for s in dict.fromkeys((*part.signals, *law.curve.signals)) if s in names]
     arguments = [*signals, *(k.name for k in law.knobs if k.name in names)]
-    arguments += ["offset"] if "offset" in names & own else []
+    arguments += [_WITH[part.target][0]] if part.target in _WITH else []
     listed = textwrap.wrap(", ".join(f"{a}: float" for a in arguments) + ",", _WIDE - 4)
     *lines, last = body
     return "\n".join([

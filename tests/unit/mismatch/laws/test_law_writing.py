@@ -18,7 +18,7 @@ from tests.unit.mismatch.laws import made_law
 HERE = {
     "time": 3.0, "x_cog": 0.4, "y_cog": -0.3, "yaw": 0.8, "cos_yaw": math.cos(0.8),
     "sin_yaw": math.sin(0.8), "vx": 0.3, "linkage_angle": -0.2, "throttle_command": 0.6,
-    "yaw_rate": 0.5, "offset": 0.01,
+    "yaw_rate": 0.5, "offset": 0.01, "steer_demand": -0.2, "gain": 1.1,
 }  # fmt: skip
 
 
