@@ -21,7 +21,7 @@ from scm.mismatch.noise import Noise, calmed
 MOST_EFFECTS = 4
 REFITTED, AFRESH = 14, 8
 AFRESH_GAIN = 60.0
-TO_THE_END = 10  # rounds of a fit that others are held against
+TO_THE_END = 5, 8  # rounds of a fit that others are held against, of all starts and of the near
 DEEPER = 5.0
 CHANCES = 3
 PLENTY = 25.0  # gained where nothing was fitted, it is enough for any effect
@@ -169,7 +169,10 @@ class Search:
             replace(fitted, z=z.copy(), values=fitted.values.copy(), done=False)
             for z in unlike.values()
         ]
-        return min(self.fitter.refine(begun, rounds=TO_THE_END, fresh=True), key=lambda f: f.q)
+        begun = self.fitter.refine(begun, rounds=TO_THE_END[0], fresh=True)
+        least = min(f.q for f in begun)
+        near = [f for f in begun if f.q < least + NEAR]
+        return min(self.fitter.refine(near, rounds=TO_THE_END[1], fresh=True), key=lambda f: f.q)
 
     def extend(self, base: Fitted) -> Step:
         """Try every effect beside those of `base`, but none that undoes one of them.
@@ -178,10 +181,15 @@ class Search:
         those it had, that one is tried again from there: an effect must not earn what a fit missed.
         """
         step = self._extended(base)
-        deeper = self._to_the_end(base, [base.z, *(f.z for f in step.rivals[:2])])
-        if deeper.q > base.q - DEEPER:
+        if not step.rivals:
             return step
-        return self._extended(deeper)
+        others = [f.z for f in step.rivals]
+        e, ok = self.model([self.fitter.numbers(base.effects, z, base.values) for z in others])
+        costs = np.where(ok, self.fitter.score(np.nan_to_num(e), np.stack(others)), np.inf)
+        best = int(np.argmin(costs))
+        if costs[best] > base.q - DEEPER:
+            return step
+        return self._extended(self._to_the_end(base, [others[best]]))
 
     def _extended(self, base: Fitted) -> Step:
         taken = {*base.names, *(TWINS[name] for name in base.names if name in TWINS)}
