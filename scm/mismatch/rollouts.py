@@ -13,7 +13,6 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.geometry import Pose2
-from scm.mismatch.commanded import Commanded
 from scm.mismatch.drive import RUN_IN_S, STEP_S, Drive
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import SUBSTEP_S, Fleet, VehicleStatus
@@ -23,7 +22,8 @@ from scm.vehicles.lanes import LANES
 
 ROWS, THREADS = LANES, 2
 TETHER_STEPS = 50
-COMMANDED = 2  # parts of a step with a command each: a servo at its rate moves by when, not how far
+COMMANDED = 10  # parts of a step, each with a command: a servo at its rate moves by when
+REMEMBERED = 2  # of a car that remembers its commands: there each part costs a call from Python
 SIGNALS = (
     "speed", "lateral_speed", "yaw_rate", "accel_x", "accel_y", "steer_angle",
     "wheel_angle.fl", "wheel_angle.fr", "wheel_angle.rl", "wheel_angle.rr",
@@ -137,10 +137,9 @@ class Rollouts:
         fleet = tiles.fleets[thread]
         n, edges, tether = len(sets), self.drive.edges, _Tether(fleet)
         delays = self._set(fleet, tiles.columns, sets)
-        self._begin(fleet, n, delays)
-        changes = np.linspace(edges[0], edges[-1], COMMANDED * (len(edges) - 1) + 1)
-        throttle = means(self.drive.throttle, changes, delays[0])
-        steering = means(self.drive.steering, changes, delays[1])
+        parts = tether.parts
+        self._begin(fleet, n, delays, parts)
+        changes = np.linspace(edges[0], edges[-1], parts * (len(edges) - 1) + 1)
         out, first = np.empty((len(edges), len(SIGNALS), fleet.capacity)), _now(fleet)
         for k, name in enumerate(SIGNALS):
             out[0, k] = first[name]
@@ -148,8 +147,8 @@ class Rollouts:
             b = min(a + TETHER_STEPS, len(edges) - 1)
             if self.drive.battery is not None:
                 fleet.battery[:n] = self.drive.battery[a]
-            now = slice(COMMANDED * a, COMMANDED * b)
-            tether.rollout(throttle[now], steering[now], out[a + 1 : b + 1])
+            commands = self._commands(changes[parts * a : parts * b + 1], delays)
+            tether.rollout(*commands, out[a + 1 : b + 1])
             tether.carry(n, self._x[b], self._y[b], self._yaw[b])
         ok = fleet.status[:n] == VehicleStatus.OK
         return Motions({name: out[:, k, :n] for k, name in enumerate(SIGNALS)}, ok)
@@ -170,14 +169,17 @@ class Rollouts:
                     fleet.parameters[row, columns[key]] = value
         return delays
 
-    def _begin(self, fleet: Fleet, n: int, delays: Floats) -> None:
+    def _commands(self, edges: Floats, delays: Floats) -> tuple[Floats, Floats]:
+        """Return what each row is commanded between these times, late by its delays."""
+        throttle, steering = self.drive.throttle, self.drive.steering
+        return throttle.means(edges, delays[0]), steering.means(edges, delays[1])
+
+    def _begin(self, fleet: Fleet, n: int, delays: Floats, parts: int) -> None:
         """Start every row in the measured motion, its actuators run in by the commands before."""
         drive = self.drive
-        before = drive.edges[0] + STEP_S * np.arange(-round(RUN_IN_S / STEP_S), 1)
-        fleet.rollout(
-            means(drive.throttle, before, delays[0]), means(drive.steering, before, delays[1]),
-            STEP_S, (),
-        )  # fmt: skip
+        part_s = STEP_S / parts
+        before = drive.edges[0] + part_s * np.arange(-round(RUN_IN_S / part_s), 1)
+        fleet.rollout(*self._commands(before, delays), part_s, ())
         x, y, yaw = (drive.smoothed[f"pose.{n}"] for n in ("x", "y", "yaw"))
         psi = float(self._yaw[0])
         vx, vy = float(x.rate[0]), float(y.rate[0])
@@ -191,6 +193,9 @@ class _Tether:
     """Drives a fleet's rows stretch by stretch, and carries them to the measured pose between.
 
     It is what `Fleet.rollout`, `planar_cogs` and `push_rows` do, without their checks and copies.
+
+    Attributes:
+        parts: Of a step, with a command each.
     """
 
     def __init__(self, fleet: Fleet) -> None:
@@ -199,20 +204,21 @@ class _Tether:
         self._state = (fleet._block, fleet._numbers, fleet._alive, fleet._status)  # noqa: SLF001
         self._cog = np.array([slots[n][0] for n in (*COG, "x", "y")], dtype=np.int64)
         self._kept = np.array([fleet._slot_of_signal(n) for n in SIGNALS])  # noqa: SLF001
-        self._steps = whole_steps(STEP_S / COMMANDED, SUBSTEP_S)
         self._remembers = fleet._past is not None  # noqa: SLF001
+        self.parts = REMEMBERED if self._remembers else COMMANDED
+        self._steps = whole_steps(STEP_S / self.parts, SUBSTEP_S)
 
     def rollout(self, throttle: Floats, steering: Floats, out: Floats) -> None:
-        """Drive all rows through commands, (parts,) or (parts, rows); write steps' signals."""
+        """Drive all rows through commands, (parts, rows); write steps' signals."""
         if self._remembers:
-            got = self._fleet.rollout(throttle, steering, STEP_S / COMMANDED, SIGNALS)
+            got = self._fleet.rollout(throttle, steering, STEP_S / self.parts, SIGNALS)
             for k, name in enumerate(SIGNALS):
-                out[:, k] = got[name][COMMANDED - 1 :: COMMANDED]
+                out[:, k] = got[name][self.parts - 1 :: self.parts]
             return
-        given = [c[:, None] if c.ndim == 1 else c for c in (throttle, steering)]
         self._kernel.rollout(
-            *self._state, 0, self._fleet.capacity, self._steps, SUBSTEP_S, *given, self._kept, out
-        )
+            *self._state, 0, self._fleet.capacity, self._steps, SUBSTEP_S, throttle, steering,
+            self._kept, out,
+        )  # fmt: skip
 
     def carry(self, n: int, x: float, y: float, yaw: float) -> None:
         """Carry the first rows to a measured pose; their motion in their own frames stays."""
@@ -246,10 +252,3 @@ def _now(fleet: Fleet) -> dict[str, Floats]:
     """Return every signal of a fleet's cars as they are."""
     wheel = dict(zip(WHEELS, fleet.wheel_angle.T, strict=True))
     return {s: wheel[s[-2:]] if "." in s else getattr(fleet, s) for s in SIGNALS}
-
-
-def means(command: Commanded, edges: Floats, delays: Floats) -> Floats:
-    """Return a command for each row, computed once for each different delay."""
-    different, which = np.unique(delays, return_inverse=True)
-    values = command.means(edges, different)
-    return values[:, 0] if len(different) == 1 else np.ascontiguousarray(values[:, which])

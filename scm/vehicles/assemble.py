@@ -12,6 +12,7 @@ from scm.errors import TermError, nearest
 from scm.vehicles import body14, lane_math, substep
 from scm.vehicles.inline import Functions, Inliner, Line
 from scm.vehicles.layout import columns_of, slots_of, states_of
+from scm.vehicles.past import COMMANDS
 from scm.vehicles.print_plain import print_plain
 from scm.vehicles.print_tiles import print_tiles
 from scm.vehicles.program import Program, Stage
@@ -183,7 +184,7 @@ def write_program(terms: Sequence[Term]) -> Program:
         TermError: when the terms do not fit together; all problems in one message.
     """
     write = _Writer(terms)
-    body, wheel, solve, roll, end, end_wheel = (
+    body, wheel, solve, roll, close, end, end_wheel = (
         Stage("effects on the body", Per.BODY, [*write.text(substep.BODY), *write.stage(Per.BODY)]),
         Stage(
             "effects on each wheel",
@@ -196,6 +197,7 @@ def write_program(terms: Sequence[Term]) -> Program:
         ),
         Stage("one implicit step of the whole car", Per.BODY, write.text(substep.SOLVE)),
         Stage("what it does to each wheel", Per.WHEEL, write.text(substep.ROLL)),
+        Stage("whether it still drives", Per.BODY, write.text(substep.CLOSE)),
         Stage("what others read of the car", Per.BODY, write.text(substep.FINISH)),
         Stage("what others read of each wheel", Per.WHEEL, write.text(substep.FINISH_WHEEL)),
     )
@@ -208,6 +210,7 @@ def write_program(terms: Sequence[Term]) -> Program:
     program = Program(
         [Stage("commands and numbers", Per.BODY, write.start())],
         [body, wheel, solve, roll],
+        [close],
         [end, end_wheel],
         constant,
         {name for per in Per for name in body14.INPUTS[per]},
@@ -230,4 +233,5 @@ def write_page(car_name: str, terms: Sequence[Term], *, plain: bool = False) -> 
     if plain:
         return print_plain(title, program, slots, columns)
     program.part_axles()
+    program.part_commands(COMMANDS)
     return print_tiles(title, program, slots, columns)

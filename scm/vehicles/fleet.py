@@ -348,8 +348,7 @@ class Fleet:
         Raises:
             RunError: when shapes or steps do not fit, or a signal is not one of each car.
         """
-        commands = [np.ascontiguousarray(columns_of_command(c, self.capacity), dtype=np.float64)
-                    for c in (throttle, steering)]  # fmt: skip
+        commands = [columns_of_command(c, self.capacity) for c in (throttle, steering)]
         if len(commands[0]) != len(commands[1]):
             msg = f"{len(commands[0])} throttles and {len(commands[1])} steerings: expected as many"
             raise RunError(msg)
@@ -363,7 +362,8 @@ class Fleet:
             )  # fmt: skip
         else:
             for t in range(len(out)):
-                self.throttle[:], self.steering[:] = commands[0][t], commands[1][t]
+                now = (np.resize(command[t], self.capacity) for command in commands)
+                self.throttle[:], self.steering[:] = now
                 self._run(0, self.capacity, steps, substep)
                 out[t] = self._block[slots]
         return {name: out[:, k, : self.capacity] for k, name in enumerate(signals)}

@@ -9,6 +9,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.errors import RunError
+from scm.vehicles.lanes import LANES
 
 # what others write, and what they read: names here, slots of the block where those differ
 WRITTEN = {
@@ -72,18 +73,20 @@ def steps_of(step_s: float, substep: float) -> int:
 
 
 def columns_of_command(command: Floats, capacity: int) -> Floats:
-    """Return a recording's command as (T, 1) or (T, capacity).
+    """Return a recording's command for whole tiles: as wide as one where all cars have the same.
 
     Raises:
         RunError: when it has another shape.
     """
     values = np.asarray(command, dtype=np.float64)
     if values.ndim == 1:
-        return values[:, None]
+        return np.repeat(values[:, None], LANES, axis=1)
     if values.ndim != 2 or values.shape[1] != capacity:
         msg = f"commands of shape {values.shape}: expected (T,) or (T, {capacity})"
         raise RunError(msg)
-    return values
+    if capacity % LANES:
+        values = np.pad(values, ((0, 0), (0, -capacity % LANES)), mode="edge")
+    return np.ascontiguousarray(values)
 
 
 def aligned(shape: tuple[int, int]) -> Floats:

@@ -33,6 +33,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 _BORROWING = {**_OPTIONS, "_nrt": False}  # arrays are the caller's: numba need not count who holds
 _ROWS = "(float64[:,::1],float64[:,::1],boolean[::1],int64[::1],int64,int64,int64,float64)"
+_COMMANDED_ROWS = _ROWS[:-1] + ",float64[:,::1],float64[:,::1],int64[::1],float64[:,:,::1])"
 
 
 def _refuse_blas() -> None:
@@ -110,8 +111,10 @@ def fleet_kernel(function: Function) -> Function:
 
 
 def rollout_kernel(function: Function) -> Function:
-    """Compile a kernel that drives a recording at its first call, cached beside its file."""
-    return cast("Function", _cached(function, _OPTIONS))
+    """As `fleet_kernel`, for one that is given commands, and slots to keep."""
+    compiled = _cached(function, _OPTIONS)
+    compiled.compile(_COMMANDED_ROWS)
+    return cast("Function", compiled)
 
 
 def stage(function: Function) -> Function:
@@ -146,31 +149,58 @@ def stage(function: Function) -> Function:
 
 
 @numba.extending.intrinsic
-def fetch(_: object, rows: Any, row: Any, block: Any, slot: Any, start: Any) -> Any:
-    """Copy the lanes from `start` of one slot of the block into a row of a buffer."""
-    return _copying(rows, row, block, slot, start, into_block=False)
+def fetch(
+    _: object, rows: Any, row: Any, block: Any, slot: Any, start: Any, count: Any, step: Any
+) -> Any:
+    """Copy the lanes from `start` of some slots of the block into rows of a buffer.
+
+    There are `count` rows, one below the other, and `step` slots from each to the next.
+    """
+    return _copying(rows, block, into_block=False)
 
 
 @numba.extending.intrinsic
-def put(_: object, rows: Any, row: Any, block: Any, slot: Any, start: Any) -> Any:
-    """Copy a row of a buffer into the lanes from `start` of one slot of the block."""
-    return _copying(rows, row, block, slot, start, into_block=True)
+def put(
+    _: object, rows: Any, row: Any, block: Any, slot: Any, start: Any, count: Any, step: Any
+) -> Any:
+    """Copy rows of a buffer into the lanes from `start` of slots of the block, as `fetch` does."""
+    return _copying(rows, block, into_block=True)
 
 
-def _copying(rows: Any, row: Any, block: Any, slot: Any, start: Any, *, into_block: bool) -> Any:
+@numba.extending.intrinsic
+def put_lane(
+    _: object, rows: Any, row: Any, block: Any, slot: Any, start: Any, count: Any, step: Any,
+    lane: Any,
+) -> Any:  # fmt: skip
+    """As `put`, of one lane alone: its neighbours in the block are left as they are."""
+    return _copying(rows, block, into_block=True, one=True)
+
+
+def _copying(rows: Any, block: Any, *, into_block: bool, one: bool = False) -> Any:
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         near, far = (
             context.make_array(signature.args[i])(context, builder, value=arguments[i])
             for i in (0, 2)
         )
-        width = cast("Any", cgutils).unpack_tuple(builder, far.shape, 2)[1]
-        lanes = ir.Constant(arguments[1].type, LANES)
-        own = builder.gep(near.data, [builder.mul(arguments[1], lanes)])
-        other = builder.gep(far.data, [builder.add(builder.mul(arguments[3], width), arguments[4])])
-        copy_lanes(builder, *((other, own) if into_block else (own, other)))
+        _, row, _, slot, start, count, step, *lane = arguments
+        *_, width = cast("Any", cgutils).unpack_tuple(builder, far.shape)
+        lanes = ir.Constant(row.type, LANES)
+        with cgutils.for_range(builder, count) as loop:
+            own = builder.mul(builder.add(row, loop.index), lanes)
+            there = builder.add(slot, builder.mul(loop.index, step))
+            other = builder.add(builder.mul(there, width), start)
+            if one:
+                own, other = builder.add(own, *lane), builder.add(other, *lane)
+            ends = builder.gep(near.data, [own]), builder.gep(far.data, [other])
+            target, source = reversed(ends) if into_block else ends
+            if one:
+                builder.store(builder.load(source), target)
+            else:
+                copy_lanes(builder, target, source)
         return context.get_dummy_value()
 
-    return numba.void(rows, numba.int64, block, numba.int64, numba.int64), code
+    places = (numba.int64,) * (4 if one else 3)
+    return numba.void(rows, numba.int64, block, numba.int64, *places), code
 
 
 _Cache: Any = FunctionCache

@@ -56,7 +56,8 @@ def advance(block, numbers, alive, status, first, last, steps, dt):
 def print_plain(title: str, program: Program, slots: Slots, columns: Sequence[str]) -> str:
     """Return the text of a kernel that goes car by car; `columns` names the car's numbers."""
     first_wheel = min(offset for offset, width in slots.values() if width == 4)
-    stages = [*program.once, *program.substep, *program.end]
+    ends = [*program.close, *program.end]
+    stages = [*program.once, *program.substep, *ends]
     wheel = [name for name, (_, width) in slots.items() if width == 4]
     for stage in (stage for stage in stages if stage.per is Per.WHEEL):
         others = {name for other in stages if other is not stage for name in other.reads}
@@ -83,7 +84,7 @@ def print_plain(title: str, program: Program, slots: Slots, columns: Sequence[st
         load=indent("\n".join(load), " " * 8),
         once=write(program.once, 8),
         substep=write(program.substep, 12),
-        end=write(program.end, 8),
+        end=write(ends, 8),
         motion=motion_slots(slots),
         store=indent("\n".join(f"block[{slots[n][0]}, row] = {n}" for n in kept), " " * 8),
     )

@@ -6,12 +6,14 @@ so the compiler turns it into vector instructions without a question left open.
 
 import ast
 import copy
+import re
 from collections.abc import Mapping, Sequence
 from textwrap import indent
 
 from scm.vehicles import body14
 from scm.vehicles.inline import Line
 from scm.vehicles.lanes import LANES
+from scm.vehicles.past import COMMANDS
 from scm.vehicles.program import Program, Stage, names_in
 from scm.vehicles.signals import Per
 
@@ -26,7 +28,7 @@ A stage works on whole rows, so `a * b` is the product for each car; see `scm/ve
 
 import numpy as np
 
-from scm.vehicles.jit import fetch, fleet_kernel, put, rollout_kernel, stage
+from scm.vehicles.jit import fetch, put, put_lane, rollout_kernel, stage
 
 # rows of `car`: those of the fleet's block, then the car's numbers, then what is worked out
 {car_rows}
@@ -39,9 +41,20 @@ WHEEL_ROWS = {wheel_count}
 {stages}
 
 
-@fleet_kernel
-def advance(block, numbers, alive, status, first, last, steps, dt):
-    """Advance rows first..last-1 by `steps` substeps; a car that diverges is put back, marked."""
+@rollout_kernel
+def rollout(
+    block, numbers, alive, status, first, last, steps, dt, throttle, steering, slots, out
+):
+    """Drive rows first..last-1 through commands, `steps` substeps under each.
+
+    Commands have a column for each row, or the columns of one tile for all. The slots are kept
+    after every so many of them, as `out` has room. A tile stays in its buffers
+    as long as it drives. Where a car diverges, the tile goes back to what was stored last and is
+    driven up to the command before: that is what is left of the car, marked.
+    """
+    parts = throttle.shape[0]
+    every = parts // max(out.shape[0], 1)
+    own_throttle, own_steering = throttle.shape[1] > {lanes}, steering.shape[1] > {lanes}
     room = np.empty({lanes} * (CAR_ROWS + 4 * WHEEL_ROWS) + 8)
     begin = (64 - room.ctypes.data % 64) // 8 % 8  # rows begin on a cache line
     car = room[begin : begin + {lanes} * CAR_ROWS].reshape((CAR_ROWS, {lanes}))
@@ -57,59 +70,73 @@ def advance(block, numbers, alive, status, first, last, steps, dt):
             row = start + i
             going[i] = row >= first and row < last and alive[row] and status[row] == 0
             cars += going[i]
-        if cars == 0:
-            continue
-        for slot in range({body_loads}):
-            fetch(car, slot, block, slot, start)
-        for column in range({columns}):
-            fetch(car, {first_wheel} + column, numbers, column, start)
-        for w in range(4):
-            for slot in range({wheel_loads}):
-                fetch(wheel, w * WHEEL_ROWS + slot, block, {first_wheel} + 4 * slot + w, start)
-{once}
-        for _ in range(steps):
-{substep}
-{end}
-        for i in range({lanes}):
-            if going[i] and car[VERDICT, i] != 0.0:
-                status[start + i] = int(car[VERDICT, i])
-                for slot in {motion}:
-                    block[slot, start + i] = 0.0
-                going[i] = False
-                cars = -1
-        if cars == {lanes}:
-            for slot in range({body_inputs}, {first_wheel}):
-                put(car, slot, block, slot, start)
-            for w in range(4):
-                for slot in range({wheel_inputs}, {wheel_slots}):
-                    put(wheel, w * WHEEL_ROWS + slot, block, {first_wheel} + 4 * slot + w, start)
-            continue
-        for i in range({lanes}):
-            if going[i]:
-                for slot in range({body_inputs}, {first_wheel}):
-                    block[slot, start + i] = car[slot, i]
-                for w in range(4):
-                    for slot in range({wheel_inputs}, {wheel_slots}):
-                        block[{first_wheel} + 4 * slot + w, start + i] = wheel[w, slot, i]
-
-
-@rollout_kernel
-def rollout(
-    block, numbers, alive, status, first, last, steps, dt, throttle, steering, slots, out
-):
-    """Drive rows first..last-1 through a recording; keep the slots every so many of its steps."""
-    every = throttle.shape[0] // max(out.shape[0], 1)
-    for start in range(first, last, {lanes}):
-        stop = min(last, start + {lanes})
-        for t in range(throttle.shape[0]):
-            for row in range(start, stop):
-                block[THROTTLE_COMMAND, row] = throttle[t, min(row, throttle.shape[1] - 1)]
-                block[STEERING_COMMAND, row] = steering[t, min(row, steering.shape[1] - 1)]
-            advance(block, numbers, alive, status, start, stop, steps, dt)
-            if (t + 1) % every == 0:
+        t = stored = 0
+        halt = parts
+        fresh = True
+        while t < parts:
+            fetch(car, THROTTLE_COMMAND, throttle, t, start * own_throttle, 1, 1)
+            fetch(car, STEERING_COMMAND, steering, t, start * own_steering, 1, 1)
+            if out.shape[0] > 0:
+                put(car, 0, block, 0, start, {commands}, 1)
+            if cars > 0:
+                if fresh:
+                    fetch(car, {commands}, block, {commands}, start, {body_loads} - {commands}, 1)
+                    fetch(car, {first_wheel}, numbers, 0, start, {columns}, 1)
+                    for w in range(4):
+                        own = w * WHEEL_ROWS
+                        fetch(wheel, own, block, {first_wheel} + w, start, {wheel_loads}, 4)
+                    <once>
+                <commanded>
+                for _ in range(steps):
+                    <substep>
+                <close>
+                fresh = False
+                for i in range({lanes}):
+                    fresh |= going[i] and car[VERDICT, i] != 0.0
+                if fresh and t > stored:
+                    halt = t
+                    t = stored
+                    continue
+                if fresh or t + 1 == halt or (t + 1) % every == 0:
+                    stored, halt = t + 1, parts
+                    <end>
+                    for i in range({lanes}):
+                        if going[i] and car[VERDICT, i] != 0.0:
+                            status[start + i] = int(car[VERDICT, i])
+                            for slot in {motion}:
+                                block[slot, start + i] = 0.0
+                            going[i] = False
+                            cars -= 1
+                    if cars == {lanes}:
+                        put(car, {body_inputs}, block, {body_inputs}, start, {body_kept}, 1)
+                        for w in range(4):
+                            own, there = w * WHEEL_ROWS + {wheel_inputs}, {wheel_kept} + w
+                            put(wheel, own, block, there, start, {wheel_keeps}, 4)
+                    else:
+                        for i in range({lanes}):
+                            if going[i]:
+                                own, there = {body_inputs}, {body_inputs}
+                                put_lane(car, own, block, there, start, {body_kept}, 1, i)
+                                for w in range(4):
+                                    own, there = w * WHEEL_ROWS + {wheel_inputs}, {wheel_kept} + w
+                                    put_lane(wheel, own, block, there, start, {wheel_keeps}, 4, i)
+            t += 1
+            if t % every == 0:
                 for k in range(slots.shape[0]):
-                    for row in range(start, stop):
-                        out[t // every, k, row] = block[slots[k], row]
+                    fetch(car, VERDICT, block, slots[k], start, 1, 1)
+                    put(car, VERDICT, out, (t // every - 1) * slots.shape[0] + k, start, 1, 1)
+
+
+def advance(block, numbers, alive, status, first, last, steps, dt):
+    """Advance rows first..last-1 by `steps` substeps under the commands that the block has."""
+    throttle = block[THROTTLE_COMMAND : THROTTLE_COMMAND + 1]
+    steering = block[STEERING_COMMAND : STEERING_COMMAND + 1]
+    rollout(
+        block, numbers, alive, status, first, last, steps, dt, throttle, steering, NO_SLOTS, NO_OUT
+    )
+
+
+NO_SLOTS, NO_OUT = np.empty(0, np.int64), np.empty((0, 0, 0))
 '''
 
 
@@ -121,10 +148,7 @@ def print_tiles(title: str, program: Program, slots: Slots, columns: Sequence[st
     wheel_slots = sum(1 for _, width in slots.values() if width == 4)
     stages = [stage for stage in rows.stages if stage.lines]
 
-    def calls(some: Sequence[Stage], width: int) -> str:
-        return indent("\n".join(rows.call(stage) for stage in some if stage.lines), " " * width)
-
-    return _HEAD.format(
+    page = _HEAD.format(
         title=title,
         lanes=LANES,
         car_rows=_named_rows(rows.car),
@@ -135,15 +159,20 @@ def print_tiles(title: str, program: Program, slots: Slots, columns: Sequence[st
         columns=len(columns),
         first_wheel=first_wheel,
         body_inputs=len(inputs[Per.BODY]),
+        body_kept=first_wheel - len(inputs[Per.BODY]),
         body_loads=first_wheel - len(outputs[Per.BODY]),
         wheel_inputs=len(inputs[Per.WHEEL]),
         wheel_loads=wheel_slots - len(outputs[Per.WHEEL]),
-        wheel_slots=wheel_slots,
-        once=calls(program.once, 8),
-        substep=calls(program.substep, 12),
-        end=calls(program.end, 8),
+        wheel_kept=first_wheel + 4 * len(inputs[Per.WHEEL]),
+        wheel_keeps=wheel_slots - len(inputs[Per.WHEEL]),
         motion=motion_slots(slots),
+        commands=len(COMMANDS),
     )
+    called = {
+        name: "\n".join(rows.call(stage) for stage in getattr(program, name) if stage.lines)
+        for name in ("once", "commanded", "substep", "close", "end")
+    }
+    return re.sub(r"^( *)<(\w+)>$", lambda m: indent(called[m[2]], m[1]), page, flags=re.MULTILINE)
 
 
 class _Rows:
@@ -151,7 +180,9 @@ class _Rows:
 
     def __init__(self, program: Program, slots: Slots, columns: Sequence[str]) -> None:
         self.laws, self.fused = program.laws, program.substep
-        self.stages = [*program.once, *program.substep, *program.end]
+        self.stages = [
+            *program.once, *program.commanded, *program.substep, *program.close, *program.end
+        ]  # fmt: skip
         self.car = [*(n for n, (_, width) in slots.items() if width == 1), *columns]
         self.wheel = [*(n for n, (_, width) in slots.items() if width == 4), "front", "side"]
         reads = [set(stage.reads) for stage in self.stages]

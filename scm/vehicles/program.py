@@ -43,9 +43,12 @@ class Stage:
 
 @dataclass(slots=True)
 class Program:
-    """One call of the kernel: `once` stages, then `substep` stages again and again, then `end`.
+    """One call of the kernel: `once` stages, `substep` stages again and again, `close`, `end`.
 
     Attributes:
+        close: Brings the states into range and says whether the car still drives.
+        end: What others read of it: nothing of the next call.
+        commanded: Taken out of `once`: what follows from the commands.
         constant: Names that hold still during a call, with what each belongs to.
         inputs: Those of them that come from outside, as commands do.
         kept: Names that outlive a substep: states and results.
@@ -56,12 +59,14 @@ class Program:
 
     once: list[Stage]
     substep: list[Stage]
+    close: list[Stage]
     end: list[Stage]
     constant: dict[str, Per]
     inputs: set[str]
     kept: set[str]
     laws: set[str]
     prepared: dict[Per, list[Line]] = field(default_factory=lambda: {Per.BODY: [], Per.WHEEL: []})
+    commanded: list[Stage] = field(default_factory=list)
 
     def settle(self) -> None:
         """Bring the program into the form that is printed."""
@@ -77,7 +82,7 @@ class Program:
         ]
 
     def _stages(self) -> list[Stage]:
-        return [*self.substep, *self.end]
+        return [*self.substep, *self.close, *self.end]
 
     def _counts(self) -> Counter[str]:
         return Counter(name for stage in self._stages() for name, _ in stage.lines)
@@ -126,6 +131,18 @@ class Program:
             others = (other.reads for other in self._stages() if other is not stage)
             _drop_unneeded(stage.lines, self.kept.union(*others))
         self._drop_unread()
+
+    def part_commands(self, commands: Iterable[str]) -> None:
+        """Part what follows from the commands from what only the car's numbers say; at the end."""
+        changing = set(commands)
+        for stage in self.once:
+            lines, stage.lines = stage.lines, []
+            later = Stage(f"{stage.name} as commanded", stage.per, [])
+            for name, value in lines:
+                follows = not changing.isdisjoint((name, *leaves(value)))
+                changing |= {name} if follows else set()
+                (later if follows else stage).lines.append((name, value))
+            self.commanded.append(later)
 
     def _drop_unread(self) -> None:
         needed, before = set(self.kept), -1

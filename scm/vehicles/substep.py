@@ -174,19 +174,9 @@ hop_rate = hop_rate + hop_free + hop_follow * corner_height(
 hop = hop + dt * hop_rate
 """
 
-# after the substeps: what others read
-FINISH = """
+# after the substeps: whether the car still drives
+CLOSE = """
 yaw = yaw + 6.283185307179586 * math.floor((3.141592653589793 - yaw) * 0.15915494309189535)
-end_sin, end_cos = sin_cos(yaw)
-back = cog_to_rear_axle + cog_height * pitch
-left = cog_height * roll
-x = x_cog - end_cos * back - end_sin * left
-y = y_cog - end_sin * back + end_cos * left
-z = z_cog - cog_height + pitch * sprung_to_rear_axle
-speed, lateral_speed = contact_velocity(
-    end_cos * vx_world + end_sin * vy_world, end_cos * vy_world - end_sin * vx_world,
-    roll_rate, pitch_rate, yaw_rate, -cog_to_rear_axle, 0.0, cog_height
-)
 in_range = (
     (abs(vx_world) + abs(vy_world) + abs(vz) < 1000.0)
     & (abs(roll_rate) + abs(pitch_rate) + abs(yaw_rate) < 10000.0)
@@ -197,6 +187,20 @@ upright = abs(roll) + abs(pitch) < 1.5
 verdict = (0.0 if upright else 2.0) if in_range else 1.0
 """
 
+# and what others read
+FINISH = """
+end_sin, end_cos = sin_cos(yaw)
+back = cog_to_rear_axle + cog_height * pitch
+left = cog_height * roll
+x = x_cog - end_cos * back - end_sin * left
+y = y_cog - end_sin * back + end_cos * left
+z = z_cog - cog_height + pitch * sprung_to_rear_axle
+speed, lateral_speed = contact_velocity(
+    end_cos * vx_world + end_sin * vy_world, end_cos * vy_world - end_sin * vx_world,
+    roll_rate, pitch_rate, yaw_rate, -cog_to_rear_axle, 0.0, cog_height
+)
+"""
+
 FINISH_WHEEL = """
 wheel_steer = atan(wheel_slope)
 ground_x = x_cog + end_cos * wheel_x - end_sin * wheel_y
@@ -205,6 +209,7 @@ ground_y = y_cog + end_sin * wheel_x + end_cos * wheel_y
 
 NAMES = frozenset(
     re.findall(
-        r"[a-z]\w*", "".join((START, BODY, WHEEL, FRAME, ROAD, ELIMINATE, SOLVE, ROLL, FINISH))
+        r"[a-z]\w*",
+        "".join((START, BODY, WHEEL, FRAME, ROAD, ELIMINATE, SOLVE, ROLL, CLOSE, FINISH)),
     )
 )

@@ -178,3 +178,21 @@ def test_no_delay_leaves_the_trajectory_bit_for_bit():
 
 def test_a_car_stays_small():
     assert Fleet(load_car("nigel"), 1600).bytes_per_car < 2048
+
+
+def test_a_car_that_freezes_between_kept_steps_is_left_as_it_was_step_by_step():
+    seldom, often = driving(20), driving(20)
+    rng = np.random.default_rng(5)
+    throttle, steering = rng.uniform(-1, 1, (60, 32)), rng.uniform(-1, 1, (60, 32))
+    steering[13:, 4] = steering[27, 18] = np.nan
+    slots = np.array([seldom._slot_of_signal(name) for name in ("x", "yaw", "speed", "steering")])
+    kept = {every: np.zeros((60 // every, len(slots), 32)) for every in (1, 10)}
+    for fleet, every in ((seldom, 10), (often, 1)):
+        fleet._kernel.rollout(
+            fleet._block, fleet._numbers, fleet._alive, fleet._status, 0, 20, 3, 1e-3,
+            throttle, steering, slots, kept[every],
+        )  # fmt: skip
+    assert seldom.status[[4, 18]].tolist() == [VehicleStatus.DIVERGED] * 2
+    assert np.array_equal(seldom.status, often.status)
+    assert np.array_equal(states(seldom), states(often), equal_nan=True)
+    assert np.array_equal(kept[10][:, :, :20], kept[1][9::10, :, :20], equal_nan=True)
