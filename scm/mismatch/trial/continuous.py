@@ -5,6 +5,8 @@ every window. Here the car drives through the whole recording; where a window be
 is set to the measured one, its motion and actuators stay.
 """
 
+import math
+
 import numpy as np
 
 from scm.arrays import Floats
@@ -22,11 +24,12 @@ SETTLED_S = 3.0
 def position_error(recording: Recording, car: Car, horizon_s: float = 3.0) -> float:
     """Return the root mean square distance from the measured position over all windows [m].
 
-    The first seconds, in which the motion forgets how it began, do not count.
+    The first seconds, in which the motion forgets how it began, do not count. Steps begin where
+    commands that come at an even rate change: one that changes within a step would come late.
     """
     poses, commands = Poses(recording), Commands(recording, car)
     first, last = commands.span_s
-    begin = max(first, float(poses.t[0]) + EVERY_S)
+    begin = first + STEP_S * math.ceil((max(first, float(poses.t[0]) + EVERY_S) - first) / STEP_S)
     end = min(last, float(poses.t[-1]) - EVERY_S)
     count = int((end - begin) / EVERY_S)
     t: Floats = np.linspace(begin, begin + EVERY_S * count, count + 1)
