@@ -24,6 +24,7 @@ AFRESH_GAIN = 60.0
 TO_THE_END = 5, 8  # rounds of a fit that others are held against, of all starts and of the near
 DEEPER = 5.0
 CHANCES = 3
+FINALISTS, CLOSE = 3, 100.0
 PLENTY = 25.0  # gained where nothing was fitted, it is enough for any effect
 REMAINDER = 0.005  # of the largest effect's gain: an equation off by 7 % leaves as much
 FALSE_ALARMS = 0.02
@@ -217,7 +218,20 @@ class Search:
         if cost(ranked[0]) < self.criterion(base) + NEAR:
             near = self.fitter.refine(near[:6], rounds=3, fresh=True)
         ranked = sorted([*near, *(f for f in ranked if all(f is not n for n in near))], key=cost)
+        ranked = sorted(self._deepened(ranked, base, cost), key=cost)
         return Step(base, tuple(ranked), tuple(cost(f) for f in ranked))
+
+    def _deepened(
+        self, ranked: Sequence[Fitted], base: Fitted, cost: Callable[[Fitted], float]
+    ) -> list[Fitted]:
+        """Return fits, the first of them fitted to the end where more than one would be taken."""
+        most = min(self.criterion(base), cost(ranked[0]) + CLOSE)
+        first = [f for f in ranked[:FINALISTS] if cost(f) < most]
+        if len(first) > 1:
+            self.tell("fitting to the end: " + ", ".join(f.names[-1] for f in first))
+            deep = [self._to_the_end(f, [f.z, np.zeros_like(f.z)]) for f in first]
+            return [*deep, *ranked[len(first) :]]
+        return list(ranked)
 
     def _drifted(self, effect: Candidate, base: Fitted) -> float:
         """Return what speaks for an effect because the car's own number for it is at its limit.
