@@ -5,6 +5,7 @@ whoever buries it.
 """
 
 import fcntl
+import signal
 import sys
 import threading
 from pathlib import Path
@@ -22,6 +23,7 @@ def sleep(_recording, out):
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
     folder = Path(sys.argv[1])
     for _ in answer_all([Case(n, folder, folder) for n in ("00", "01", "02")], folder, sleep, 2):
         pass
