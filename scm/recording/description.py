@@ -53,12 +53,14 @@ class Table(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
 
     Attributes:
         file: Relative to the description, or to the folder given when reading.
+        topic: Whose messages are the rows, where the file is a ROS bag.
         where: Keep only rows for which this expression over columns is true.
     """
 
     file: str
     time: TimeColumn
     channels: dict[str, ChannelColumn]
+    topic: str | None = None
     where: str | None = None
     vehicle: str | None = None
 

@@ -2,7 +2,8 @@
 
 The functions are `abs`, `sqrt`, `sin`, `cos`, `tan`, `atan` and `atan2(y, x)`; angles are in rad.
 A text column may be compared with a word: "source == 'pose'". A column name that is not a plain
-word stands in backquotes: "`elapsed time` > 0 and gas > 0.1".
+word stands in backquotes: "`elapsed time` > 0 and gas > 0.1"; fields of messages need none:
+"2 * pose.position.x + axes[1]".
 Where arithmetic has no answer (1 / 0) the value is not finite, and its row is left out.
 """
 
@@ -16,7 +17,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.errors import RecordingError
-from scm.recording.table import Columns
+from scm.recording.columns import Columns
 
 Table = Columns | Mapping[str, Floats]
 
@@ -64,6 +65,33 @@ def evaluate(text: str, columns: Table, rows: int, where: str) -> Floats:
     Raises:
         RecordingError: for an unknown column or anything that is not arithmetic or logic.
     """
+    tree, quoted = _parsed(text, where)
+    with np.errstate(all="ignore"):
+        value = _value(tree, columns, quoted, f"{where}: {text!r}")
+    return np.broadcast_to(np.asarray(value, dtype=np.float64), (rows,)).copy()
+
+
+def columns_of(text: str, where: str) -> set[str]:
+    """Return the names of the columns that an expression asks for.
+
+    Raises:
+        RecordingError: when it is no expression.
+    """
+    tree, quoted = _parsed(text, where)
+    nodes, found = [tree], set[str]()
+    while nodes:
+        node = nodes.pop()
+        name = _name(node, quoted)
+        if name is not None:
+            found.add(name)
+            continue
+        parts = node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node)
+        nodes += [part for part in parts if isinstance(part, ast.expr)]
+    return found
+
+
+def _parsed(text: str, where: str) -> tuple[ast.expr, dict[str, str]]:
+    """Return an expression's tree, and what its stand-ins for names in backquotes stand for."""
     if len(text) > LONGEST:
         msg = f"{where}: an expression of {len(text)} characters, expected at most {LONGEST}"
         raise RecordingError(msg)
@@ -79,9 +107,21 @@ def evaluate(text: str, columns: Table, rows: int, where: str) -> Floats:
     except (SyntaxError, ValueError, MemoryError, RecursionError) as cause:
         msg = f"{where}: cannot read {text!r}: {getattr(cause, 'msg', None) or 'too deep'}"
         raise RecordingError(msg) from cause
-    with np.errstate(all="ignore"):
-        value = _value(tree.body, columns, quoted, f"{where}: {text!r}")
-    return np.broadcast_to(np.asarray(value, dtype=np.float64), (rows,)).copy()
+    return tree.body, quoted
+
+
+def _name(node: ast.AST, quoted: dict[str, str]) -> str | None:
+    """Return the name of the column that a node is: `a`, `a.b` or `a[0].b`; else None."""
+    match node:
+        case ast.Name(id=name):
+            return quoted.get(name, name)
+        case ast.Attribute(value=whole, attr=field):
+            start, end = _name(whole, quoted), f".{field}"
+        case ast.Subscript(value=whole, slice=ast.Constant(value=int() as number)):
+            start, end = _name(whole, quoted), f"[{number}]"
+        case _:
+            return None
+    return None if start is None else start + end
 
 
 def _value(node: ast.expr, columns: Table, quoted: dict[str, str], at: str) -> Any:
@@ -91,12 +131,12 @@ def _value(node: ast.expr, columns: Table, quoted: dict[str, str], at: str) -> A
         return [_value(part, columns, quoted, at) for part in nodes]
 
     match node:
-        case ast.Constant(value=int() | float()) | ast.Name():
+        case ast.Constant(value=int() | float()) | ast.Name() | ast.Attribute() | ast.Subscript():
             return _leaf(node, columns, quoted, at)
-        case ast.Compare(left=ast.Name(id=name), ops=[ast.Eq() | ast.NotEq() as op]) if isinstance(
+        case ast.Compare(left=left, ops=[ast.Eq() | ast.NotEq() as op]) if isinstance(
             word := getattr(node.comparators[0], "value", None), str
-        ):
-            return _compared_with(word, op, quoted.get(name, name), columns, at)
+        ) and (name := _name(left, quoted)):
+            return _compared_with(word, op, name, columns, at)
         case ast.BoolOp(op=logic, values=parts):
             join = np.logical_and if isinstance(logic, ast.And) else np.logical_or
             return _joined(join, values(*parts))
@@ -109,11 +149,14 @@ def _value(node: ast.expr, columns: Table, quoted: dict[str, str], at: str) -> A
     return _applied(node, values, at)
 
 
-def _leaf(node: ast.Constant | ast.Name, columns: Table, quoted: dict[str, str], at: str) -> Any:
-    """Return a number, or a column's numbers."""
-    if isinstance(node, ast.Name):
-        return _column(quoted.get(node.id, node.id), columns, at)
-    return _constant(node.value)  # type: ignore[arg-type]
+def _leaf(node: ast.expr, columns: Table, quoted: dict[str, str], at: str) -> Any:
+    """Return a number, or a column's numbers; an attribute of anything else is refused."""
+    if isinstance(node, ast.Constant):
+        return _constant(node.value)  # type: ignore[arg-type]
+    name = _name(node, quoted)
+    if name is None:
+        raise _refusal(node, at)
+    return _column(name, columns, at)
 
 
 def _compared_with(word: str, op: ast.cmpop, name: str, columns: Table, at: str) -> Any:
@@ -138,9 +181,13 @@ def _applied(node: ast.expr, values: Callable[..., list[Any]], at: str) -> Any:
             count, function = _FUNCTIONS[name]
             if len(inputs) == count:
                 return function(*values(*inputs))
+    raise _refusal(node, at)
+
+
+def _refusal(node: ast.expr, at: str) -> RecordingError:
     known = ", ".join(_FUNCTIONS)
     msg = f"{at}: {ast.unparse(node)!r} is not arithmetic, a comparison, and, or, not, {known}"
-    raise RecordingError(msg)
+    return RecordingError(msg)
 
 
 def _constant(number: float) -> Any:

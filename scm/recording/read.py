@@ -1,12 +1,14 @@
 """A recording as channels in SI, each with its own times."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from scm.arrays import Bools, Floats
+from scm.arrays import Bools, Floats, Ints
 from scm.errors import RecordingError
+from scm.recording.columns import NS_PER_S, Columns
 from scm.recording.description import (
     ChannelColumn,
     Description,
@@ -15,9 +17,11 @@ from scm.recording.description import (
     find_description,
     read_description,
 )
-from scm.recording.expression import evaluate
-from scm.recording.table import Columns, read_table
+from scm.recording.expression import columns_of, evaluate
+from scm.recording.table import read_table
 from scm.recording.units import UNITS, dimensions_of, factor
+
+LONGEST_FROM_ZERO_S = 1e6  # one float holds so many seconds to a nanosecond
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,18 +86,63 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
     description = read_description(found)
     folder = found.parent if data is None else Path(data)
     by_vehicle: dict[str, dict[str, Channel]] = {}
-    loaded: dict[str, Columns] = {}
+    loaded = _loaded(description.tables, folder, found)
+    origin_s = _origin_s(description.tables, loaded)
     for table in description.tables:
-        if table.file not in loaded:
-            loaded[table.file] = read_table(folder / table.file)
         vehicle = _vehicle(description, table, found.parent)
         channels = by_vehicle.setdefault(vehicle, {})
-        for name, channel in _channels(table, loaded[table.file], found).items():
+        for name, channel in _channels(table, loaded[_rows_of(table)], found, origin_s).items():
             if name in channels:
                 msg = f"{found}: table {table.file}: channel {name!r} of {vehicle} is given twice"
                 raise RecordingError(msg)
             channels[name] = channel
     return [Recording(found, vehicle, channels) for vehicle, channels in by_vehicle.items()]
+
+
+def _rows_of(table: Table) -> tuple[str, str | None]:
+    """Return what says whose rows a table has: two tables may share a file and a topic."""
+    return table.file, table.topic
+
+
+def _loaded(
+    tables: Sequence[Table], folder: Path, path: Path
+) -> dict[tuple[str, str | None], Columns]:
+    """Return the columns that the tables ask for; each file, or topic of a bag, is read once."""
+    wanted: dict[tuple[str, str | None], set[str]] = {}
+    for table in tables:
+        names = wanted.setdefault(_rows_of(table), set())
+        sources: dict[str, TimeColumn | ChannelColumn] = {"time": table.time, **table.channels}
+        for name, source in sources.items():
+            if source.expression is not None:
+                names |= columns_of(source.expression, f"{path}: table {table.file}: {name}")
+            else:
+                names.add(str(source.column))
+        if table.where is not None:
+            names |= columns_of(table.where, f"{path}: table {table.file}: where")
+    return {
+        (file, topic): read_table(folder / file, topic, names)
+        for (file, topic), names in wanted.items()
+    }
+
+
+def _origin_s(tables: Sequence[Table], loaded: Mapping[tuple[str, str | None], Columns]) -> int:
+    """Return the instant that all times of the recording are counted from, in whole seconds.
+
+    It is 0 unless a table counts nanoseconds on a clock whose seconds are too many for one float
+    to hold its nanoseconds too: then it is the whole second in which the first such table begins.
+    """
+    for table in tables:
+        t_ns = _nanoseconds(table, loaded[_rows_of(table)])
+        if t_ns is not None and len(t_ns) and abs(int(t_ns.min())) > LONGEST_FROM_ZERO_S * NS_PER_S:
+            return int(t_ns.min()) // NS_PER_S
+    return 0
+
+
+def _nanoseconds(table: Table, columns: Columns) -> Ints | None:
+    """Return a table's times to the nanosecond, without its offset, where they are so exact."""
+    if table.time.column is None:
+        return None
+    return columns.nanoseconds(table.time.column, str(table.time.unit))
 
 
 def _vehicle(description: Description, table: Table, folder: Path) -> str:
@@ -106,19 +155,28 @@ def _vehicle(description: Description, table: Table, folder: Path) -> str:
     return str(beside) if beside.suffix == ".toml" and beside.is_file() else vehicle
 
 
-def _channels(table: Table, columns: Columns, path: Path) -> dict[str, Channel]:
-    """Return the channels of one table in SI."""
+def _channels(table: Table, columns: Columns, path: Path, origin_s: int) -> dict[str, Channel]:
+    """Return the channels of one table in SI, times counted from `origin_s`."""
     where = f"{path}: table {table.file}"
     keep: Bools = np.ones(columns.rows, dtype=np.bool_)
     if table.where is not None:
         keep = evaluate(table.where, columns, columns.rows, f"{where}: where") > 0.0
-    t = _values(table.time, columns, f"{where}: time")[keep]
-    t = (t + table.time.offset) * factor(str(table.time.unit), ("time",), f"{where}: time")
+    t = _times(table, columns, f"{where}: time", origin_s)[keep]
     _refuse_no_rows(t, where)
     return {
         name: _channel(name, channel, t, _values(channel, columns, f"{where}: {name}")[keep], where)
         for name, channel in table.channels.items()
     }
+
+
+def _times(table: Table, columns: Columns, at: str, origin_s: int) -> Floats:
+    """Return the time of each row since `origin_s` [s]."""
+    to_s = factor(str(table.time.unit), ("time",), at)
+    t_ns = _nanoseconds(table, columns)
+    if t_ns is not None:
+        since: Floats = (t_ns - origin_s * NS_PER_S) / NS_PER_S
+        return since + table.time.offset * to_s
+    return (_values(table.time, columns, at) + table.time.offset) * to_s - origin_s
 
 
 def _values(source: TimeColumn | ChannelColumn, columns: Columns, at: str) -> Floats:

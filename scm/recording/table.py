@@ -1,139 +1,106 @@
-"""Files of rows: CSV, gzipped CSV and NPZ, as named columns of floats.
+"""Files of rows as named columns of floats: CSV, gzipped CSV and NPZ, and whose reader is asked.
 
 A column becomes numbers when somebody asks for it: text in one that nobody names does no harm.
 """
 
 import csv
 import gzip
+import importlib
 import io
 import zipfile
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from scm.arrays import Floats
-from scm.errors import RecordingError, nearest
+from scm.errors import RecordingError
+from scm.recording import columns as limits
+from scm.recording.columns import Columns, refuse_large, refuse_unequal
 
-SUFFIXES = (".csv", ".csv.gz", ".npz")
-LARGEST_BYTES = 1 << 30
-WORDS = {
-    **dict.fromkeys(("", "nan", "na", "n/a", "null", "none"), np.nan),
-    "true": 1.0,
-    "false": 0.0,
+BAGS = (".bag", ".db3", ".mcap")
+READERS = {  # how a file's name ends -> the module with `read`, and what it needs installed
+    ".parquet": ("scm.recording.parquet", "pyarrow"),
+    ".mat": ("scm.recording.matlab", "scipy"),
+    **dict.fromkeys(BAGS, ("scm.recording.bag", "rosbags")),
 }
+SUFFIXES = (".csv", ".csv.gz", ".npz", *READERS)
+BAG_FOLDER = "metadata.yaml"
+Reader = Callable[[Path, str | None, Collection[str] | None], Columns]
 
 
-class Columns(Mapping[str, Floats]):
-    """The columns of one file, each of shape `(rows,)`; an empty cell is NaN.
-
-    Asking for a column raises a `RecordingError` when there is none of that name, when its name
-    stands twice, or, with the line, when a cell is not a number.
-    """
-
-    def __init__(
-        self,
-        path: Path,
-        names: Sequence[str],
-        cells: Sequence[Sequence[str] | Floats],
-        lines: Sequence[int] = (),
-    ) -> None:
-        self._path = path
-        self._count = Counter(names)
-        self._cells = dict(zip(names, cells, strict=True))
-        self._lines = lines
-        self._numbers: dict[str, Floats] = {}
-
-    def __getitem__(self, name: str) -> Floats:
-        """Return a column as numbers."""
-        if name not in self._numbers:
-            self._numbers[name] = self._read(name)
-        return self._numbers[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the names, of text columns too."""
-        return iter(self._cells)
-
-    def __len__(self) -> int:
-        """Return how many names there are."""
-        return len(self._cells)
-
-    def words(self, name: str) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
-        """Return a column as text, shape (rows,).
-
-        Raises:
-            RecordingError: when there is none of that name, or it holds numbers.
-        """
-        cells = self._cells.get(name)
-        if cells is None:
-            msg = f"{self._path}: no column {name!r}{nearest(name, list(self._cells))}"
-            raise RecordingError(msg)
-        if isinstance(cells, np.ndarray):
-            msg = f"{self._path}: column {name!r} holds numbers, not words"
-            raise RecordingError(msg)
-        return np.array([cell.strip() for cell in cells], dtype=np.str_)
-
-    @property
-    def rows(self) -> int:
-        """How many rows each column has."""
-        return len(next(iter(self._cells.values()), ()))
-
-    def _read(self, name: str) -> Floats:
-        if name not in self._cells:
-            hint = nearest(name, list(self._cells)) or f"; it has {', '.join(self._cells)}"
-            msg = f"{self._path}: no column {name!r}{hint}"
-            raise RecordingError(msg)
-        if self._count[name] > 1:
-            msg = f"{self._path}: {self._count[name]} columns are named {name!r}"
-            raise RecordingError(msg)
-        cells = self._cells[name]
-        if isinstance(cells, np.ndarray):
-            return cells
-        numbers = (
-            _number(cell, f"{self._path}: line {line}, column {name!r}")
-            for line, cell in zip(self._lines, cells, strict=True)
-        )
-        return np.fromiter(numbers, np.float64, len(cells))
-
-
-def read_table(path: Path) -> Columns:
+def read_table(
+    path: Path, topic: str | None = None, wanted: Collection[str] | None = None
+) -> Columns:
     """Return the columns of a file.
+
+    Args:
+        path: The file, or the folder of a ROS 2 bag.
+        topic: Whose messages are the rows, where the file is a ROS bag.
+        wanted: Names of the columns that will be asked for; None: all. Others may be left out.
 
     Raises:
         RecordingError: naming the file, and for CSV the line that cannot be read.
     """
-    if not path.is_file():
+    is_bag = path.suffix in BAGS or (path / BAG_FOLDER).is_file()
+    if not path.is_file() and not (is_bag and path.is_dir()):
         msg = f"{path}: {'a folder, expected a file' if path.is_dir() else 'no such file'}"
         raise RecordingError(msg)
+    if topic is not None and not is_bag:
+        msg = f"{path}: no ROS bag: it has no topic {topic!r}"
+        raise RecordingError(msg)
+    read = _reader(path, is_bag)
     try:
-        if path.name.endswith(".npz"):
-            return _read_npz(path)
-        if path.name.endswith((".csv", ".csv.gz")):
-            return _read_csv(_text(path), path)
-    except (OSError, EOFError, ValueError, zipfile.BadZipFile, csv.Error) as cause:
-        if isinstance(cause, RecordingError):
-            raise
-        msg = f"{path}: cannot be read: {cause}"
+        return read(path, topic, wanted)
+    except RecordingError:
+        raise
+    except Exception as cause:  # whatever a library makes of a damaged file
+        kind = "" if isinstance(cause, OSError | ValueError) else f"{type(cause).__name__}: "
+        msg = f"{path}: cannot be read: {kind}{cause}"
         raise RecordingError(msg) from cause
-    msg = f"{path}: got a {path.suffix or 'nameless'} file, expected one of {', '.join(SUFFIXES)}"
-    raise RecordingError(msg)
 
 
-def _read_npz(path: Path) -> Columns:
+def _reader(path: Path, is_bag: bool) -> Reader:
+    """Return what reads a file of that name.
+
+    Raises:
+        RecordingError: when nothing does, or a library for it is not installed.
+    """
+    if path.name.endswith(".npz"):
+        return _read_npz
+    if path.name.endswith((".csv", ".csv.gz")):
+        return _read_csv
+    suffix = BAGS[0] if is_bag else path.suffix
+    if suffix not in READERS:
+        got = path.suffix or "nameless"
+        msg = f"{path}: got a {got} file, expected one of {', '.join(SUFFIXES)}"
+        raise RecordingError(msg)
+    module, library = READERS[suffix]
+    try:
+        reader: Reader = importlib.import_module(module).read
+    except ModuleNotFoundError as cause:
+        if (cause.name or "").split(".")[0] != library:
+            raise
+        msg = (
+            f"{path}: reading it needs {library}, which is not installed: "
+            "pip install -e '.[formats]'"
+        )
+        raise RecordingError(msg) from cause
+    return reader
+
+
+def _read_npz(path: Path, topic: str | None, wanted: Collection[str] | None) -> Columns:
     """Return the one-dimensional numeric arrays of an NPZ file; others are for other readers."""
+    del topic, wanted
     with zipfile.ZipFile(path) as members:
-        _refuse_large(sum(member.file_size for member in members.infolist()), path)
+        refuse_large(sum(member.file_size for member in members.infolist()), path)
     columns: dict[str, Floats] = {}
     with np.load(path, allow_pickle=False) as arrays:
         for name in arrays.files:
             array = arrays[name] if _is_plain(path, name) else np.empty((0, 0))
             if array.ndim == 1 and array.dtype.kind in "biuf":
                 columns[name] = np.asarray(array, np.float64)
-    lengths = {name: len(values) for name, values in columns.items()}
-    if len(set(lengths.values())) > 1:
-        msg = f"{path}: columns of different lengths: {lengths}"
-        raise RecordingError(msg)
+    refuse_unequal(columns, path)
     return Columns(path, list(columns), list(columns.values()))
 
 
@@ -149,20 +116,16 @@ def _is_plain(path: Path, name: str) -> bool:
 def _text(path: Path) -> str:
     """Return the text of a plain or gzipped file, without a byte order mark."""
     with gzip.open(path) if path.name.endswith(".gz") else path.open("rb") as stream:
-        data: bytes = stream.read(LARGEST_BYTES + 1)
-    _refuse_large(len(data), path)
+        data: bytes = stream.read(limits.LARGEST_BYTES + 1)
+    refuse_large(len(data), path)
     return data.decode("utf-8-sig")
 
 
-def _refuse_large(size: int, path: Path) -> None:
-    if size > LARGEST_BYTES:
-        msg = f"{path}: holds more than {LARGEST_BYTES >> 20} MiB: split it"
-        raise RecordingError(msg)
-
-
-def _read_csv(text: str, path: Path) -> Columns:
+def _read_csv(path: Path, topic: str | None, wanted: Collection[str] | None) -> Columns:
     """Return the columns of a CSV file; lines that are empty or start with # are comments."""
-    csv.field_size_limit(LARGEST_BYTES)
+    del topic, wanted
+    text = _text(path)
+    csv.field_size_limit(limits.LARGEST_BYTES)
     header, skip = _header(text, path)
     delimiter = _delimiter(header)
     names = [name.strip() for name in next(csv.reader([header], delimiter=delimiter))]
@@ -233,14 +196,3 @@ def _read_cells(reader: Iterator[list[str]], skip: int, names: list[str], path: 
         rows.append(row)
         lines.append(line)
     return Columns(path, names, list(zip(*rows, strict=True)) or [()] * len(names), lines)
-
-
-def _number(cell: str, where: str) -> float:
-    """Return a cell as a number; an empty one, or a word for it, is NaN."""
-    text = cell.strip()
-    try:
-        value = WORDS.get(text.lower())
-        return float(text.replace("_", "?")) if value is None else value
-    except ValueError as cause:
-        msg = f"{where}: got {text[:40]!r}, expected a number"
-        raise RecordingError(msg) from cause

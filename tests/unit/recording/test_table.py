@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from scm.errors import RecordingError
-from scm.recording import table
-from scm.recording.table import Columns, read_table
+from scm.recording import columns as limits
+from scm.recording.columns import Columns
+from scm.recording.table import read_table
 
 PLAIN = b"t,x\n0,1\n1,2\n"
 
@@ -82,7 +83,7 @@ def test_a_folder_is_no_table(tmp_path: Path) -> None:
 def test_a_file_that_is_too_large_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(table, "LARGEST_BYTES", 8)
+    monkeypatch.setattr(limits, "LARGEST_BYTES", 8)
     with pytest.raises(RecordingError, match="split it"):
         columns(tmp_path, PLAIN)
     np.savez(tmp_path / "large.npz", t=np.zeros(9))

@@ -1,0 +1,167 @@
+"""The columns of one file, as numbers or words, whatever the file's format."""
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from scm.arrays import Floats, Ints
+from scm.errors import RecordingError, nearest
+from scm.recording.units import UNITS
+
+LARGEST_BYTES = 1 << 30
+MOST_NAMED = 40
+NS_PER_S = 1_000_000_000
+WORDS = {
+    **dict.fromkeys(("", "nan", "na", "n/a", "null", "none"), np.nan),
+    "true": 1.0,
+    "false": 0.0,
+}
+
+
+class Columns(Mapping[str, Floats]):
+    """The columns of one file, each of shape `(rows,)`; an empty cell is NaN.
+
+    Asking for a column raises a `RecordingError` when there is none of that name, when its name
+    stands twice, or, with the line, when a cell is not a number.
+
+    Args:
+        path: What to name in an error: the file.
+        names, cells: Of each column that was read.
+        lines: Where each row stands in the file, for columns of text.
+        known: Names of all columns of the file, where only some were read.
+        ticks: Columns of whole numbers as such, shape `(rows,)`, and how many make 1 of the
+            column's value: seconds that are counted in nanoseconds have `NS_PER_S`.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        names: Sequence[str],
+        cells: Sequence[Sequence[str] | Floats],
+        lines: Sequence[int] = (),
+        *,
+        known: Sequence[str] = (),
+        ticks: Mapping[str, tuple[Ints, int]] | None = None,
+    ) -> None:
+        self._path = path
+        self._known = known or names
+        self._ticks = ticks or {}
+        self._count = Counter(names)
+        self._cells = dict(zip(names, cells, strict=True))
+        self._lines = lines
+        self._numbers: dict[str, Floats] = {}
+
+    def __getitem__(self, name: str) -> Floats:
+        """Return a column as numbers."""
+        if name not in self._numbers:
+            self._numbers[name] = self._read(name)
+        return self._numbers[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names, of text columns too."""
+        return iter(self._cells)
+
+    def __len__(self) -> int:
+        """Return how many names there are."""
+        return len(self._cells)
+
+    def words(self, name: str) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
+        """Return a column as text, shape (rows,).
+
+        Raises:
+            RecordingError: when there is none of that name, or it holds numbers.
+        """
+        cells = self._cells.get(name)
+        if cells is None:
+            msg = f"{self._path}: no column {name!r}{self._hint(name)}"
+            raise RecordingError(msg)
+        if isinstance(cells, np.ndarray):
+            msg = f"{self._path}: column {name!r} holds numbers, not words"
+            raise RecordingError(msg)
+        return np.array([cell.strip() for cell in cells], dtype=np.str_)
+
+    @property
+    def rows(self) -> int:
+        """How many rows each column has."""
+        return len(next(iter(self._cells.values()), ()))
+
+    def nanoseconds(self, name: str, unit: str) -> Ints | None:
+        """Return a column of times to the nanosecond, None where it holds no whole numbers.
+
+        Seconds since 1970 as one float are good to a quarter of a microsecond only.
+        """
+        if name not in self._ticks or unit not in UNITS:
+            return None
+        ticks, per_value = self._ticks[name]
+        per_tick, left = divmod(round(UNITS[unit][1] * NS_PER_S), per_value)
+        largest = max(-int(ticks.min(initial=0)), int(ticks.max(initial=0)))
+        if left or per_tick == 0 or largest * per_tick > np.iinfo(np.int64).max:
+            return None
+        return ticks * per_tick
+
+    def _hint(self, name: str) -> str:
+        """Return which column may have been meant, or which there are."""
+        known = list(dict.fromkeys(self._known))
+        more = f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
+        return nearest(name, known) or f"; it has {', '.join(known[:MOST_NAMED])}{more}"
+
+    def _read(self, name: str) -> Floats:
+        if name not in self._cells:
+            msg = f"{self._path}: no column {name!r}{self._hint(name)}"
+            raise RecordingError(msg)
+        if self._count[name] > 1:
+            msg = f"{self._path}: {self._count[name]} columns are named {name!r}"
+            raise RecordingError(msg)
+        cells = self._cells[name]
+        if isinstance(cells, np.ndarray):
+            return cells
+        numbers = (
+            number(cell, f"{self._path}: line {line}, column {name!r}")
+            for line, cell in zip(self._lines, cells, strict=True)
+        )
+        return np.fromiter(numbers, np.float64, len(cells))
+
+
+def refuse_large(size: int, path: Path, what: str = "") -> None:
+    """Refuse what would not fit into memory beside its numbers.
+
+    Args:
+        size: Unpacked [bytes].
+        path: Of the file.
+        what: What of it, where it is not the whole file.
+
+    Raises:
+        RecordingError: when it is larger than `LARGEST_BYTES`.
+    """
+    if size > LARGEST_BYTES:
+        msg = f"{path}: {what}holds more than {LARGEST_BYTES >> 20} MiB: split it"
+        raise RecordingError(msg)
+
+
+def refuse_unequal(columns: Mapping[str, Collection[object]], path: Path) -> None:
+    """Refuse columns that cannot be rows of one table.
+
+    Raises:
+        RecordingError: when they differ in length.
+    """
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        msg = f"{path}: columns of different lengths: {lengths}"
+        raise RecordingError(msg)
+
+
+def number(cell: str, where: str) -> float:
+    """Return a cell as a number; an empty one, or a word for it, is NaN.
+
+    Raises:
+        RecordingError: naming `where`, when it is none.
+    """
+    text = cell.strip()
+    try:
+        value = WORDS.get(text.lower())
+        return float(text.replace("_", "?")) if value is None else value
+    except ValueError as cause:
+        msg = f"{where}: got {text[:40]!r}, expected a number"
+        raise RecordingError(msg) from cause

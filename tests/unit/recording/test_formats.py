@@ -1,0 +1,212 @@
+"""Parquet and MATLAB files are tables like any other."""
+
+import datetime
+import importlib
+import struct
+import zlib
+from decimal import Decimal
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import scipy.io
+from numpy.testing import assert_allclose, assert_array_equal
+
+from scm.errors import RecordingError
+from scm.recording import columns as limits
+from scm.recording.read import read_recordings
+from scm.recording.table import read_table
+
+T_NS = 1_700_000_000_123_456_789 + 20_000_001 * np.arange(3)
+TABLE = """\
+recording: 1
+vehicle: nigel
+tables:
+  - file: FILE
+    time: {TIME}
+    where: "WHERE"
+    channels:
+      pose.x: {column: pose.x, unit: mm}
+      pose.yaw: {expression: "atan2(pose.s, pose.c)", unit: rad}
+"""
+
+
+def read_pose(folder: Path, file: str, time: str, where: str = "pose.c > 0"):
+    text = TABLE.replace("FILE", file).replace("TIME", time).replace("WHERE", where)
+    (folder / "recording.yaml").write_text(text)
+    (recording,) = read_recordings(folder)
+    return recording
+
+
+def write_parquet(folder: Path, **columns) -> Path:
+    pq.write_table(pa.table(columns), folder / "drive.parquet")
+    return folder / "drive.parquet"
+
+
+def poses():
+    return [{"x": 10.0 * k, "s": 1.0, "c": 1.0} for k in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "time"),
+    [
+        (pa.timestamp("ns"), "column: t, unit: s"),
+        (pa.timestamp("ns", tz="UTC"), "column: t"),
+        (pa.int64(), "column: t, unit: ns"),
+        (pa.uint64(), "column: t, unit: ns"),
+    ],
+)
+def test_parquet_becomes_channels_with_times_to_the_nanosecond(
+    tmp_path: Path, kind: pa.DataType, time: str
+) -> None:
+    by = pa.array(["lidar", None, "camera"]).dictionary_encode()
+    write_parquet(tmp_path, t=pa.array(T_NS).cast(kind), pose=poses(), by=by)
+    recording = read_pose(tmp_path, "drive.parquet", time, "by == 'camera' or by == 'lidar'")
+    assert_allclose(recording.channel("pose.x").values, [0.0, 0.02])
+    assert_allclose(recording.channel("pose.yaw").values, np.pi / 4)
+    since_ns = T_NS[[0, 2]] - 1_700_000_000 * 10**9
+    assert_array_equal(np.round(recording.channel("pose.x").t * 1e9), since_ns)
+
+
+def test_every_number_of_parquet_is_read(tmp_path: Path) -> None:
+    columns = {
+        "whole": pa.array([1, None, 3], pa.int32()),
+        "small": pa.array([1.5, None, 2.5], pa.float32()),
+        "true": pa.array([True, None, False]),
+        "exact": pa.array([Decimal("1.25"), None, Decimal(3)], pa.decimal128(5, 2)),
+        "late": pa.array([datetime.timedelta(milliseconds=1500)] * 2 + [None], pa.duration("ms")),
+        "name": ["1", "", "x"],
+        "points": [[1.0], [], [2.0]],
+    }
+    read = read_table(write_parquet(tmp_path, **columns))
+    assert_allclose(read["whole"], [1.0, np.nan, 3.0])
+    assert_allclose(read["small"], [1.5, np.nan, 2.5])
+    assert_allclose(read["true"], [1.0, np.nan, 0.0])
+    assert_allclose(read["exact"], [1.25, np.nan, 3.0])
+    assert_allclose(read["late"], [1.5, 1.5, np.nan])
+    assert "points" not in list(read)
+    with pytest.raises(RecordingError, match="line 3, column 'name': got 'x', expected a number"):
+        read["name"]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "said"),
+    [("pose.ex", r"no column 'pose.ex' \(did you mean 'pose.x'"), ("zzz", "it has t, pose.x")],
+)
+def test_a_column_that_parquet_has_not_is_refused(tmp_path: Path, wanted: str, said: str) -> None:
+    read = read_table(write_parquet(tmp_path, t=T_NS, pose=poses()), None, ["t", wanted])
+    with pytest.raises(RecordingError, match=said):
+        read[wanted]
+
+
+def test_a_column_of_lists_is_refused(tmp_path: Path) -> None:
+    file = write_parquet(tmp_path, t=T_NS, points=[[1.0], [2.0], []])
+    with pytest.raises(RecordingError, match=r"holds list<.*, expected numbers, times or words"):
+        read_table(file, None, ["t", "points.list.element"])
+
+
+def test_a_large_parquet_file_is_refused_by_what_is_asked_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = write_parquet(tmp_path, t=np.zeros(500), picture=[b"x" * 10**5] + [b""] * 499)
+    monkeypatch.setattr(limits, "LARGEST_BYTES", 4100)
+    assert read_table(file, None, ["t"]).rows == 500
+    monkeypatch.setattr(limits, "LARGEST_BYTES", 3900)  # some bytes in the file: all are zero
+    with pytest.raises(RecordingError, match="split it"):
+        read_table(file, None, ["t"])
+
+
+def write_mat(folder: Path, *, packed: bool = True, **columns) -> Path:
+    scipy.io.savemat(folder / "drive.mat", columns, do_compression=packed, oned_as="column")
+    return folder / "drive.mat"
+
+
+def log():
+    return {"x": 10.0 * np.arange(3), "s": np.ones(3), "c": np.ones(3)}
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_mat_file_becomes_channels(tmp_path: Path, packed: bool) -> None:
+    write_mat(tmp_path, packed=packed, t=T_NS, pose=log(), gain=2.0, other=np.zeros(9), by="me")
+    recording = read_pose(tmp_path, "drive.mat", "column: t, unit: ns")
+    assert_allclose(recording.channel("pose.x").values, [0.0, 0.01, 0.02])
+    assert_allclose(recording.channel("pose.yaw").values, np.pi / 4)
+    since_ns = T_NS - 1_700_000_000 * 10**9
+    assert_array_equal(np.round(recording.channel("pose.x").t * 1e9), since_ns)
+
+
+def test_columns_of_a_matrix_and_fields_of_many_structs_are_read(tmp_path: Path) -> None:
+    steps = np.array([(1.0, "a"), (2.0, "b")], dtype=[("v", object), ("who", object)])
+    file = write_mat(tmp_path, m=np.array([[1.0, 2.0], [3.0, 4.0]]), steps=steps)
+    read = read_table(file, None, ["m[1]", "steps.v"])
+    assert_allclose(read["m[1]"], [2.0, 4.0])
+    assert_allclose(read["steps.v"], [1.0, 2.0])
+    with pytest.raises(RecordingError, match=r"no column 'steps.who'"):
+        read["steps.who"]
+
+
+def test_mat_columns_of_different_lengths_are_refused_where_they_are_asked_for(
+    tmp_path: Path,
+) -> None:
+    file = write_mat(tmp_path, t=np.zeros(2), x=np.zeros(3))
+    assert read_table(file, None, ["t"]).rows == 2
+    with pytest.raises(RecordingError, match="different lengths"):
+        read_table(file, None, ["t", "x"])
+    with pytest.raises(RecordingError, match=r"no column 'tt' \(did you mean 't'"):
+        read_table(file, None, ["tt", "x"])["tt"]
+
+
+def test_a_mat_file_that_is_large_when_unpacked_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = write_mat(tmp_path, t=np.zeros(100_000))
+    assert file.stat().st_size < 2000
+    monkeypatch.setattr(limits, "LARGEST_BYTES", 700_000)
+    with pytest.raises(RecordingError, match="split it"):
+        read_table(file, None, ["t"])
+
+
+def test_a_mat_file_of_version_7_3_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    head = b"MATLAB 7.3 MAT-file".ljust(124) + struct.pack("<H", 0x0200) + b"IM"
+    (tmp_path / "drive.mat").write_bytes(head.ljust(512, b"\0") + b"\x89HDF\r\n\x1a\n")
+    with pytest.raises(RecordingError, match=r"version 7.3 \(HDF5\): save it with -v7"):
+        read_table(tmp_path / "drive.mat", None, ["t"])
+
+
+@pytest.mark.parametrize("name", ["drive.parquet", "drive.mat", "drive.npz", "drive.csv.gz"])
+def test_a_damaged_file_is_refused_in_a_sentence(tmp_path: Path, name: str) -> None:
+    file = tmp_path / name
+    write_parquet(tmp_path, t=T_NS, x=np.arange(3.0))
+    write_mat(tmp_path, t=T_NS, x=np.arange(3.0), pose=log())
+    np.savez_compressed(tmp_path / "drive.npz", t=T_NS, x=np.arange(3.0))
+    packed = zlib.compressobj(wbits=31)
+    lines = b"t,x\n" + b"".join(b"%d,%d\n" % (k, k * k) for k in range(99))
+    (tmp_path / "drive.csv.gz").write_bytes(packed.compress(lines) + packed.flush())
+    whole, dice = file.read_bytes(), np.random.default_rng(2)
+    assert read_table(file, None, ["x"]).rows >= 3
+    for number in range(90):
+        torn = bytearray(whole[: dice.integers(len(whole))] if number % 3 == 0 else whole)
+        for at in dice.integers(len(torn) or 1, size=number % 3 * 4):
+            torn[at : at + 1] = dice.bytes(1)
+        file.write_bytes(torn)
+        try:
+            read_table(file, None, ["t", "x"])
+        except RecordingError as error:
+            assert str(file) in str(error)  # noqa: PT017  damage may as well go unnoticed
+
+
+@pytest.mark.parametrize(
+    ("name", "library"), [("a.parquet", "pyarrow"), ("a.mat", "scipy"), ("a.bag", "rosbags")]
+)
+def test_a_library_that_is_not_there_is_named_with_the_command_that_brings_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, library: str
+) -> None:
+    def without(module: str) -> None:
+        raise ModuleNotFoundError(name=f"{library}.part")
+
+    (tmp_path / name).touch()
+    monkeypatch.setattr(importlib, "import_module", without)
+    with pytest.raises(RecordingError, match=rf"needs {library}.*pip install -e '\.\[formats\]'"):
+        read_table(tmp_path / name)
