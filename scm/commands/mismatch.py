@@ -11,9 +11,11 @@ FOLDER = "mismatch"
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "recording", nargs="+", type=Path, help="description files, or their folders, of one car"
-    )
+        "recording", nargs="+", type=Path,
+        help="description files, their folders, or .mcap of a city: of one car",
+    )  # fmt: skip
     parser.add_argument("--car", metavar="FILE", help="car file or name; default: the recording's")
+    parser.add_argument("--vehicle", metavar="NAME", help="of several cars this one")
     parser.add_argument(
         "--data", type=Path, metavar="DIR", help="where the tables are; default: beside"
     )
@@ -37,8 +39,8 @@ def _run(arguments: argparse.Namespace) -> int:
     progress = Progress(sys.stderr, WallClock())
     try:
         found = diagnose(
-            arguments.recording, arguments.car, arguments.data, budget_s=arguments.budget_s,
-            tell=progress.tell,
+            arguments.recording, arguments.car, arguments.data, vehicle=arguments.vehicle,
+            budget_s=arguments.budget_s, tell=progress.tell,
         )  # fmt: skip
         progress.tell("writing the report")
         write(found, out)

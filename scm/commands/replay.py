@@ -15,9 +15,13 @@ HORIZONS_S = (0.5, 1.0, 3.0)
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "recording", nargs="+", type=Path, help="description files, or their folders"
+        "recording",
+        nargs="+",
+        type=Path,
+        help="description files, their folders, or .mcap of a city",
     )
     parser.add_argument("--car", metavar="FILE", help="car file or name; default: the recording's")
+    parser.add_argument("--vehicle", metavar="NAME", help="of several cars this one")
     parser.add_argument(
         "--data", type=Path, metavar="DIR", help="where the tables are; default: beside"
     )
@@ -28,7 +32,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from scm.recording.read import read_recordings
+    from scm.recorder.drives import SUFFIX, recordings_of
     from scm.replay import free_run
     from scm.vehicles.car import load_car
     from scm.vehicles.undone import POSES
@@ -37,13 +41,13 @@ def _run(arguments: argparse.Namespace) -> int:
         _refuse_unwritable(arguments.save)
     runs = []
     for path in arguments.recording:
-        for recording in read_recordings(path, arguments.data):
+        for recording in recordings_of(path, arguments.data, arguments.vehicle):
             chosen = arguments.car or recording.vehicle
             car = load_car(chosen, trusted=arguments.car is not None)
             run = free_run(recording, car, arguments.horizon_s)
-            print(
-                f"{path}  car {car.name}: {len(run.start_s)} windows of {arguments.horizon_s:g} s,"
-            )
+            who = f"{recording.name}, " if path.suffix == SUFFIX else ""
+            windows = f"{len(run.start_s)} windows of {arguments.horizon_s:g} s"
+            print(f"{path}  {who}car {car.name}: {windows},")
             print("free run from the measured state, median and 90th percentile of the error")
             undone = [f.measure.name for f in car.faults if any(map(f.law_of, POSES))]
             if undone:

@@ -46,7 +46,8 @@ from scm.mismatch.rollouts import Numbers
 from scm.mismatch.rough import is_far, roughly, strays
 from scm.mismatch.search import Search
 from scm.mismatch.strayed import strayed
-from scm.recording.read import Recording, read_recordings
+from scm.recorder.drives import recordings_of_one
+from scm.recording.read import Recording
 from scm.vehicles.car import Car, load_car
 
 POSE = ("position_m", "yaw_rad")
@@ -82,6 +83,7 @@ def diagnose(
     car_file: str | None = None,
     data: Path | None = None,
     *,
+    vehicle: str | None = None,
     budget_s: float = 120.0,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
@@ -89,9 +91,10 @@ def diagnose(
     """Return what a simulator lacks to explain recordings of one car.
 
     Args:
-        paths: Recordings' folders or descriptions.
+        paths: Recordings' folders or descriptions, or runs of a city.
         car_file: The car's name or file; None takes the recordings' own.
         data: Folder of the recordings' tables; None: beside each description.
+        vehicle: Of recordings of several cars the name of the one; None: they are of one.
         budget_s: After so long no further effect is looked for; of recordings longer than 90 s
             together, after as many times longer.
         tell: Is told what is being tried.
@@ -102,10 +105,10 @@ def diagnose(
     """
     clock = clock or WallClock()
     began_ns = clock.now_ns()
-    recordings = [one for path in paths for one in read_recordings(path, data)]
-    vehicle = car_file or recordings[0].vehicle
-    car = load_car(vehicle, trusted=car_file is not None)
-    if car_file is None and any(r.vehicle != vehicle for r in recordings):
+    recordings = [one for path in paths for one in recordings_of_one(path, data, vehicle)]
+    file = car_file or recordings[0].vehicle
+    car = load_car(file, trusted=car_file is not None)
+    if car_file is None and any(r.vehicle != file for r in recordings):
         msg = f"{paths[0]}: recordings of several cars; say which with --car"
         raise RecordingError(msg)
     tell("doubting the data")

@@ -6,7 +6,7 @@ JSON though they should be.
 """
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -172,16 +172,32 @@ class Recorded(NamedTuple):
     body: bytes
 
 
-def read_run(path: Path) -> Iterator[Recorded]:
-    """Yield the messages of a complete run in the order of their times.
+def read_run(path: Path, keys: Collection[str] | None = None) -> Iterator[Recorded]:
+    """Yield the messages of a complete run in the order of their times; of some keys or of all.
 
     Raises:
         RecordingError: when the file is not a complete MCAP file.
     """
+    with _reading(path), path.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages(topics=keys):
+            yield Recorded(message.log_time, channel.topic, message.data)
+
+
+def read_keys(path: Path) -> list[str]:
+    """Return the keys on which something was heard in a complete run, sorted.
+
+    Raises:
+        RecordingError: when the file is not a complete MCAP file.
+    """
+    with _reading(path), path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+        return sorted({channel.topic for channel in summary.channels.values()}) if summary else []
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
     try:
-        with path.open("rb") as stream:
-            for _, channel, message in make_reader(stream).iter_messages():
-                yield Recorded(message.log_time, channel.topic, message.data)
+        yield
     except (OSError, *UNREADABLE) as cause:
         msg = f"{path}: not a complete recording ({cause}): try `scm recover {path}`"
         raise RecordingError(msg) from cause

@@ -51,11 +51,14 @@ class Recording:
         path: Of its description.
         vehicle: Name or path of its car file.
         channels: By name, as in the recordings contract.
+        name: Which of the recording's cars it is: as its tables call it, or in a run as the city
+            does.
     """
 
     path: Path
     vehicle: str
     channels: dict[str, Channel]
+    name: str = ""
 
     def channel(self, name: str) -> Channel:
         """Return a channel.
@@ -86,17 +89,22 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
     description = read_description(found)
     folder = found.parent if data is None else Path(data)
     by_vehicle: dict[str, dict[str, Channel]] = {}
+    names: dict[str, str] = {}
     loaded = _loaded(description.tables, folder, found)
     origin_s = _origin_s(description.tables, loaded)
     for table in description.tables:
         vehicle = _vehicle(description, table, found.parent)
+        names[vehicle] = table.vehicle or description.vehicle or ""
         channels = by_vehicle.setdefault(vehicle, {})
         for name, channel in _channels(table, loaded[_rows_of(table)], found, origin_s).items():
             if name in channels:
                 msg = f"{found}: table {table.file}: channel {name!r} of {vehicle} is given twice"
                 raise RecordingError(msg)
             channels[name] = channel
-    return [Recording(found, vehicle, channels) for vehicle, channels in by_vehicle.items()]
+    return [
+        Recording(found, vehicle, channels, names[vehicle])
+        for vehicle, channels in by_vehicle.items()
+    ]
 
 
 def _rows_of(table: Table) -> tuple[str, str | None]:

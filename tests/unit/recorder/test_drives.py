@@ -1,0 +1,229 @@
+"""A run of the city is a recording of the cars that were commanded in it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.writer import Writer
+from numpy.testing import assert_allclose
+
+from scm.__main__ import main
+from scm.errors import RecordingError
+from scm.fleet import LockstepLink
+from scm.lockstep import Lockstep
+from scm.maps.load import load_map
+from scm.mismatch.diagnose import diagnose
+from scm.play import play
+from scm.recorder.drives import read_drives, recordings_of
+from scm.recorder.mcap_file import RunFile
+from scm.recorder.part import RecorderPart
+from scm.replay import free_run
+from scm.v2x.exchange import RawSample
+from scm.v2x.key import key_of
+from scm.v2x.message import Message, encode
+from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.vehicle_sensors import VehicleSensors
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.vehicles.car import load_car
+from scm.world.part import WorldPart
+
+MS = 1_000_000
+START_NS = 1_700_000_000_000_000_000
+ROWS = [(0.05 * k, 0.6 if 4 < k < 60 else 0.0, 0.3 if k > 20 else 0.0) for k in range(80)]
+
+
+def city_run(path: Path, *driven: str, sparse: bool = False) -> Path:
+    """Record a city of two cars that circulate until a script drives some of them, one by one."""
+    world = WorldPart(load_map("parking_school"), hosted=(("n1", "nigel"), ("n2", "nigel")))
+    with Lockstep([world, RecorderPart(path, sparse=sparse)]) as city:
+        city.run_for(1.0)
+        for name in driven:
+            way = -1.0 if name == "n2" else 1.0  # ahead of n2 is a wall
+            play(LockstepLink(city), name, [(t, way * u, steering) for t, u, steering in ROWS])
+            city.run_for(0.5)
+    return path
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return city_run(tmp_path_factory.mktemp("run") / "today.mcap", "n1", "n2")
+
+
+def said(path: Path, *messages: Message) -> Path:
+    """Write messages as a recorder would have heard them, each at its own time."""
+    with RunFile(path, "city") as file:
+        for one in sorted(messages, key=lambda one: one.t_ns):
+            file.write(RawSample(key_of("city", one), *encode(one), t_ns=one.t_ns))
+    return path
+
+
+def told(ms: int, throttle: float = 0.5, epoch: int = 3, seq: int | None = None) -> DriveCommand:
+    return DriveCommand(
+        vehicle="n1", t_ns=START_NS + ms * MS, epoch=epoch, seq=ms if seq is None else seq,
+        throttle=throttle, steering=0.2,
+    )  # fmt: skip
+
+
+def reported(ms: int, **other) -> VehicleState:
+    fields = {"epoch": 3, "source": "simulated", "x_m": ms / 1000, "y_m": 0.0, "yaw_rad": 0.1}
+    motion = {"speed_mps": 1.0, "yaw_rate_radps": 0.0, "steering_rad": 0.0, "throttle": 0.5}
+    return VehicleState(vehicle="n1", t_ns=START_NS + ms * MS, seq=ms, **(fields | motion | other))
+
+
+def seen(ms: int, camera: str = "top", x_m: float = 0.0) -> EyePose:
+    covariance = (4e-6, 0.0, 0.0, 0.0, 9e-6, 0.0, 0.0, 0.0, 1e-4)
+    return EyePose(
+        camera=camera, vehicle="n1", tag_id=1, t_ns=START_NS + ms * MS, x_m=x_m, y_m=0.0,
+        yaw_rad=0.0, covariance=covariance,
+    )  # fmt: skip
+
+
+def test_the_same_car_replays_a_run_of_the_city(run: Path) -> None:
+    drives = read_drives(run)
+    assert [(drive.name, drive.vehicle) for drive in drives] == [("n1", "nigel"), ("n2", "nigel")]
+    for drive, start_s in zip(drives, (1.0, 5.5), strict=True):
+        free = free_run(drive, load_car("nigel"), horizon_s=1.0)
+        assert len(free.start_s) == 3
+        assert free.position_error()[:, -1].max() < 0.005
+        x = drive.channel("pose.x")
+        assert np.ptp(x.values) > 0.1
+        assert x.t[0] == pytest.approx(start_s, abs=0.1), "before that the car drove itself"
+        assert x.t[-1] == pytest.approx(start_s + 4.0, abs=0.1), "and so it did later"
+        assert {"encoder.left", "encoder.right", "imu.gyro_z"} <= set(drive.channels)
+
+
+def test_a_sparse_run_is_replayed_from_its_snapshots(tmp_path: Path) -> None:
+    (drive,) = read_drives(city_run(tmp_path / "sparse.mcap", "n1", sparse=True))
+    free = free_run(drive, load_car("nigel"), horizon_s=1.0)
+    assert free.position_error()[:, -1].max() < 0.005
+    assert "imu.gyro_z" not in drive.channels
+
+
+def test_replay_takes_a_run_and_one_of_its_cars(
+    run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", str(run), "--vehicle", "n2", "--horizon-s", "1"]) == 0
+    printed = capsys.readouterr().out
+    assert "n2, car nigel: 3 windows of 1 s" in printed
+    assert "n1" not in printed
+
+
+def test_mismatch_takes_a_run_of_one_car(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["mismatch", str(run), "--out", str(tmp_path)]) == 2
+    assert (
+        "several cars were commanded: n1, n2; say which with --vehicle" in capsys.readouterr().err
+    )
+    found = diagnose([run], vehicle="n1", budget_s=0.0)
+    assert found.car.name == "nigel"
+    assert found.evidence.recordings == ("today",)
+    assert "too_short" in [problem.name for problem in found.diagnosis.data]
+
+
+def test_a_car_that_drives_itself_is_refused_in_a_sentence(tmp_path: Path, run: Path) -> None:
+    alone = city_run(tmp_path / "alone.mcap")
+    with pytest.raises(RecordingError, match=r"none of its cars \(n1, n2\) was commanded over"):
+        read_drives(alone)
+    with pytest.raises(RecordingError, match="n2 was commanded over the bus: a car that drives"):
+        read_drives(alone, "n2")
+    with pytest.raises(RecordingError, match=r"no car 'n11' \(did you mean 'n1'\?\)"):
+        read_drives(run, "n11")
+
+
+def test_poses_count_only_while_the_car_obeys(tmp_path: Path) -> None:
+    states = [reported(ms) for ms in range(0, 1000, 20)]
+    states[12] = reported(240, mode="stop")
+    states[20] = reported(400, epoch=4)
+    (drive,) = read_drives(said(tmp_path / "a.mcap", *states, told(100), told(200), told(900)))
+    ms = np.round(drive.channel("pose.x").t * 1000)
+    assert list(ms) == [t for t in range(100, 501, 20) if t not in (240, 400)] + [
+        900, 920, 940, 960, 980,
+    ]  # fmt: skip
+
+
+def test_a_late_command_lets_go_of_the_throttle_as_the_guard_does(tmp_path: Path) -> None:
+    states = [reported(ms) for ms in range(0, 1000, 20)]
+    late = [told(0), told(100), told(300), told(900)]
+    (drive,) = read_drives(said(tmp_path / "a.mcap", *states, *late))
+    throttle, steering = drive.channel("command.throttle"), drive.channel("command.steering")
+    rows = [(0, 0.5), (100, 0.5), (250, 0), (300, 0.5), (450, 0), (600, 0), (900, 0.5)]
+    rows += [(1050, 0), (1200, 0)]
+    assert_allclose(np.round(throttle.t * 1000), [ms for ms, _ in rows])
+    assert_allclose(throttle.values, [value for _, value in rows])
+    assert_allclose(steering.values, 0.2)
+
+
+def test_commands_that_the_car_refuses_do_not_count(tmp_path: Path) -> None:
+    states = [reported(ms) for ms in range(0, 400, 20)]
+    strange = [told(140, -1.0, epoch=2), told(150, -1.0, seq=60), told(160, 7.0)]
+    (drive,) = read_drives(said(tmp_path / "a.mcap", *states, told(100), *strange))
+    assert_allclose(drive.channel("command.throttle").values, [0.5, 1.0, 0.0, 0.0])
+
+
+def test_a_real_car_is_where_the_camera_that_saw_it_most_says(tmp_path: Path) -> None:
+    states = [reported(ms, source="odometry") for ms in range(0, 1000, 20)]
+    commands = [told(ms) for ms in range(0, 1000, 100)]
+    poses = [seen(ms, x_m=1.0) for ms in range(0, 1000, 100)] + [seen(50, "side", x_m=2.0)]
+    (drive,) = read_drives(said(tmp_path / "a.mcap", *states, *commands, *poses))
+    assert_allclose(drive.channel("pose.x").values, [1.0] * 10)
+    stds = [drive.channel(f"pose.{name}").std for name in ("x", "y", "yaw")]
+    assert_allclose(stds, [0.002, 0.003, 0.01])
+
+
+def test_a_real_car_that_no_camera_saw_is_refused(tmp_path: Path) -> None:
+    states = [reported(ms, source="odometry") for ms in range(0, 400, 20)]
+    with pytest.raises(RecordingError, match="n1: no pose while it obeyed commands"):
+        read_drives(said(tmp_path / "a.mcap", *states, told(100)))
+
+
+def test_times_count_from_the_first_message_of_the_car_to_the_nanosecond(tmp_path: Path) -> None:
+    states = [reported(ms) for ms in range(0, 400, 20)]
+    read = VehicleSensors(
+        vehicle="n1", t_ns=START_NS + 100 * MS + 7, encoder_left=5, encoder_right=6,
+        accel_mps2=(0.0, 0.0, 9.8), gyro_radps=(0.0, 0.0, 0.5),
+    )  # fmt: skip
+    (drive,) = read_drives(said(tmp_path / "a.mcap", *states, told(40), told(100), read))
+    assert round(drive.channel("imu.gyro_z").t[0] * 1e9) == 100 * MS + 7
+
+
+def test_what_strangers_say_on_the_bus_is_passed_over(tmp_path: Path) -> None:
+    states = [reported(ms) for ms in range(0, 400, 20)]
+    path = tmp_path / "a.mcap"
+    with RunFile(path, "city") as file:
+        for one in (*states[:8], told(100), *states[8:]):
+            file.write(RawSample(key_of("city", one), *encode(one), t_ns=one.t_ns))
+        key = key_of("city", told(200))
+        file.write(RawSample(key, b"\xff not json", None, t_ns=START_NS + 200 * MS))
+        file.write(RawSample(key, b'{"vehicle": 3}', None, t_ns=START_NS + 210 * MS))
+    (drive,) = read_drives(path)
+    assert len(drive.channel("pose.x").t) == 15
+
+
+def test_a_file_that_is_no_whole_run_is_refused(tmp_path: Path, run: Path) -> None:
+    torn = tmp_path / "torn.mcap"
+    torn.write_bytes(run.read_bytes()[:-100])
+    with pytest.raises(RecordingError, match="try `scm recover"):
+        read_drives(torn)
+    with (tmp_path / "ros.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2", library="test")
+        channel = writer.register_channel("/odom", "json", 0)
+        writer.add_message(channel, 1, json.dumps({}).encode(), 1)
+        writer.finish()
+    with pytest.raises(RecordingError, match=r"no run of a city: it holds /odom; a ROS 2 bag is"):
+        read_drives(tmp_path / "ros.mcap")
+
+
+def test_a_described_recording_is_read_as_ever_and_may_be_of_several_cars(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t,x\n0,1\n1,2\n")
+    table = "  - {file: a.csv, vehicle: CAR, time: {column: t}, channels: {speed: {column: x, "
+    table += "unit: m/s}}}\n"
+    tables = table.replace("CAR", "nigel") + table.replace("CAR", "f1tenth")
+    (tmp_path / "recording.yaml").write_text(f"recording: 1\ntables:\n{tables}")
+    assert [one.vehicle for one in recordings_of(tmp_path)] == ["nigel", "f1tenth"]
+    assert [one.vehicle for one in recordings_of(tmp_path, None, "f1tenth")] == ["f1tenth"]
+    with pytest.raises(RecordingError, match=r"no car 'nigl' \(did you mean 'nigel'\?\)"):
+        recordings_of(tmp_path, None, "nigl")
