@@ -2,9 +2,11 @@
 
 Only who is commanded over the bus can be driven again. A car that drives itself, hosted by the
 world or by its agent, tells nobody which steering it asked for: its wheels' angle is what came of
-it. What counts is a commanded stretch: from a command on until its guard would stop the car.
+it. What counts is a commanded stretch: from a command on until its guard would stop the car, but
+for what follows each hit that the city tells of, a second at least and until the car is away.
 """
 
+import math
 import re
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -20,6 +22,7 @@ from scm.errors import MessageError, RecordingError, nearest
 from scm.recorder.mcap_file import read_keys, read_run
 from scm.recording.read import Channel, Recording, read_recordings
 from scm.v2x.message import Message, decode
+from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
@@ -30,11 +33,15 @@ from scm.vehicles.guard import HOLD_NS, STOP_NS, Guard
 SUFFIX = ".mcap"
 REPORTED_M, REPORTED_RAD, GYRO_RAD_S = 0.002, 0.005, 0.002
 IN_FORCE_NS = NS_PER_S // 4
+HIT, BEFORE_HIT_NS, AFTER_HIT_NS, AWAY_M = "contact", NS_PER_S // 10, NS_PER_S, 0.3
 SIMULATED, EYE, REAL = "simulated", "eye", "real"
 OBEYED = ("drive", "hold")
 _OURS = re.compile(r"scm/@v\d+/")
 _KEY = re.compile(r"scm/@v\d+/[^/]+/(?:v/([^/]+)/(cmd/drive|state|sensors)|eye/[^/]+/pose/([^/]+))")
-_SNAPSHOT = re.compile(r"scm/@v\d+/[^/]+/world/snapshot")
+_OF_ALL: dict[type[Message], re.Pattern[str]] = {
+    WorldSnapshot: re.compile(r"scm/@v\d+/[^/]+/world/snapshot"),
+    CityEvent: re.compile(r"scm/@v\d+/[^/]+/event/[^/]+/[^/]+"),
+}
 _KINDS: dict[str | None, type[Message]] = {
     "cmd/drive": DriveCommand, "state": VehicleState, "sensors": VehicleSensors, None: EyePose,
 }  # fmt: skip
@@ -55,12 +62,13 @@ class Report(NamedTuple):
 
 @dataclass(slots=True)
 class Heard:
-    """All that a run tells of one car."""
+    """All that a run tells of one car; `hit_ns` is when it hit something hard enough to tell."""
 
     commands: list[DriveCommand] = field(default_factory=list)
     reports: list[Report] = field(default_factory=list)
     sensors: list[VehicleSensors] = field(default_factory=list)
     seen: dict[str, list[EyePose]] = field(default_factory=dict)
+    hit_ns: list[int] = field(default_factory=list)
 
 
 class Stretch(NamedTuple):
@@ -152,11 +160,11 @@ def read_drives(path: Path, vehicle: str | None = None) -> list[Recording]:
 
 
 def _of(key: str) -> tuple[str, type[Message] | None]:
-    """Return which car a key is of, and what travels on it; None for all other keys."""
+    """Return which car a key is of, if of one, and what travels on it; None for all other keys."""
     match = _KEY.fullmatch(key)
-    if match is None:
-        return "", None
-    return match[1] or match[3], _KINDS[match[2]]
+    if match is not None:
+        return match[1] or match[3], _KINDS[match[2]]
+    return "", next((kind for kind, keys in _OF_ALL.items() if keys.fullmatch(key)), None)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -171,23 +179,28 @@ def _heard(path: Path, keys: Iterable[str], chosen: Sequence[str]) -> tuple[dict
     of = {key: _of(key) for key in keys}
     reporting = {name for name, kind in of.values() if kind is VehicleState}
     silent = {name for name in chosen if name not in reporting}
-    wanted = {key for key, (name, _) in of.items() if name in chosen}
-    wanted |= {key for key in of if silent and _SNAPSHOT.fullmatch(key)}
+    of_all = {CityEvent, WorldSnapshot} if silent else {CityEvent}
+    wanted = {key for key, (name, kind) in of.items() if name in chosen or kind in of_all}
     heard = {name: Heard() for name in chosen}
     start_ns = None
     for message in read_run(path, wanted):
         name, kind = of[message.key]
         start_ns = message.t_ns if start_ns is None else start_ns
+        if kind is None:
+            continue
         try:
-            told = decode(kind or WorldSnapshot, message.body)
+            told = decode(kind, message.body)
         except MessageError:
             continue  # a stranger's, as everybody on the bus ignores it
-        if isinstance(told, WorldSnapshot):
-            for one, report in _reports(told):
-                if one in silent:
-                    heard[one].reports.append(report)
-        else:
-            _take(heard[name], told)
+        match told:
+            case WorldSnapshot():
+                for one, report in _reports(told):
+                    if one in silent:
+                        heard[one].reports.append(report)
+            case CityEvent(name=event, vehicle=str() as one) if event == HIT and one in heard:
+                heard[one].hit_ns.append(told.t_ns)
+            case _ if name in heard:
+                _take(heard[name], told)
     return heard, start_ns or 0
 
 
@@ -222,6 +235,8 @@ class _Drive:
         heard.reports.sort()
         self._report_ns = [report.t_ns for report in heard.reports]
         self._rows, self._stretches = _obeyed(heard.commands)
+        hits = heard.hit_ns if heard.reports else []
+        self._leans = [_lean(hit_ns, heard.reports, self._report_ns) for hit_ns in hits]
 
     def recording(self) -> Recording:
         """Return what stands of this car in the run.
@@ -288,11 +303,22 @@ class _Drive:
         i = bisect_right(self._stretches, t_ns, key=lambda stretch: stretch.start_ns) - 1
         if i < 0 or t_ns > self._stretches[i].end_ns:
             return False
+        if any(start_ns <= t_ns <= end_ns for start_ns, end_ns in self._leans):
+            return False
         k = bisect_right(self._report_ns, t_ns) - 1
         if k < 0 or t_ns - self._report_ns[k] > IN_FORCE_NS:
             return False
         report = self._heard.reports[k]
         return report.mode in OBEYED and report.epoch == self._stretches[i].epoch
+
+
+def _lean(hit_ns: int, reports: Sequence[Report], report_ns: Sequence[int]) -> tuple[int, int]:
+    """Return from when to when what a car hit may move it: until it is away from there [ns]."""
+    k = min(bisect_right(report_ns, hit_ns), len(reports) - 1)
+    at = reports[k]
+    away = (r for r in reports[k:] if math.hypot(r.x_m - at.x_m, r.y_m - at.y_m) > AWAY_M)
+    left = next(away, reports[-1])
+    return hit_ns - BEFORE_HIT_NS, max(hit_ns + AFTER_HIT_NS, left.t_ns)
 
 
 def _obeyed(

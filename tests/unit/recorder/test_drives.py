@@ -22,6 +22,7 @@ from scm.replay import free_run
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of
 from scm.v2x.message import Message, encode
+from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
@@ -141,6 +142,32 @@ def test_poses_count_only_while_the_car_obeys(tmp_path: Path) -> None:
     ms = np.round(drive.channel("pose.x").t * 1000)
     assert list(ms) == [t for t in range(100, 501, 20) if t not in (240, 400)] + [
         900, 920, 940, 960, 980,
+    ]  # fmt: skip
+
+
+def test_poses_about_a_hit_do_not_count(tmp_path: Path) -> None:
+    commands = [told(ms) for ms in range(0, 2000, 100)]
+    hit = {"severity": "warning", "source": "world", "name": "contact", "text": "n1 hit wall"}
+    events = [
+        CityEvent(t_ns=START_NS + ms * MS, vehicle=who, **(hit | other))
+        for ms, who, other in [(400, "n1", {}), (1600, "n2", {}), (1700, "n1", {"name": "parked"})]
+    ]
+    states = [reported(ms) for ms in range(0, 2000, 20)]
+    (drive,) = read_drives(said(tmp_path / "a.mcap", *states, *commands, *events))
+    ms = np.round(drive.channel("pose.x").t * 1000)
+    assert list(ms) == [*range(0, 300, 20), *range(1420, 2000, 20)]
+
+
+def test_a_car_that_leans_on_what_it_hit_does_not_count_until_it_is_away(tmp_path: Path) -> None:
+    commands = [told(ms) for ms in range(0, 3000, 100)]
+    hit = CityEvent(
+        severity="warning", source="world", name="contact", text="", vehicle="n1",
+        t_ns=START_NS + 200 * MS,
+    )  # fmt: skip
+    states = [reported(ms, x_m=max(0, ms - 2000) / 1000) for ms in range(0, 3000, 20)]
+    (drive,) = read_drives(said(tmp_path / "a.mcap", *states, *commands, hit))
+    assert list(np.round(drive.channel("pose.x").t * 1000)) == [
+        *range(0, 100, 20), *range(2340, 3000, 20),
     ]  # fmt: skip
 
 
