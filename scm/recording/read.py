@@ -18,7 +18,7 @@ from scm.recording.description import (
     read_description,
 )
 from scm.recording.expression import columns_of, evaluate
-from scm.recording.table import read_table
+from scm.recording.table import SUFFIXES, read_table
 from scm.recording.units import UNITS, dimensions_of, factor
 
 LONGEST_FROM_ZERO_S = 1e6  # one float holds so many seconds to a nanosecond
@@ -85,6 +85,9 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
     Raises:
         RecordingError: naming file, table, column, line and reason.
     """
+    if Path(path).name.endswith(SUFFIXES):
+        msg = f"{path}: a file of data: give the recording.yaml that says what stands where in it"
+        raise RecordingError(msg)
     found = find_description(Path(path))
     description = read_description(found)
     folder = found.parent if data is None else Path(data)

@@ -106,6 +106,13 @@ def test_what_a_bag_has_not_is_refused_with_what_it_has(
     assert "drive.bag" in str(error.value)
 
 
+def test_a_bag_is_no_description(tmp_path: Path) -> None:
+    with pytest.raises(
+        RecordingError, match=r"drive\.bag: a file of data: give the recording.yaml"
+    ):
+        read_recordings(write_bag(tmp_path / "drive.bag"))
+
+
 def test_stamps_that_nobody_set_are_refused(tmp_path: Path) -> None:
     file = write_bag(tmp_path / "drive.bag", stamped=False)
     with pytest.raises(RecordingError, match="stamp_s is 0 in every message: use received_s"):
