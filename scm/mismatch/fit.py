@@ -29,6 +29,7 @@ OF_OWN: Mapping[str, str] = {
     "motor.gain": "drive.stall_torque_nm",
 }
 """Numbers of effects by the car's own number that means the same."""
+Trial = tuple[tuple[Candidate, ...], Floats]
 
 
 @dataclass(slots=True)
@@ -103,32 +104,39 @@ class Fitter:
         return fitted
 
     def begin(
-        self, base: Fitted, trials: Sequence[tuple[tuple[Candidate, ...], Floats]]
+        self, base: Fitted, trials: Sequence[Trial], *, amplified: bool = False
     ) -> list[Fitted]:
         """Return hypotheses at trial values, the car's own numbers refitted linearly from `base`.
 
         A trial that leaves physical bounds has an infinite `q`.
+
+        Args:
+            base: Fitted, with derivatives.
+            trials: Effects and their values.
+            amplified: Try each last effect also as strong, and of such a sign, as its trials say
+                that it suits best: one that is small or negative is not found by trials of 0.1.
         """
-        free = [self._free(effects) for effects, _ in trials]
         sets = [
-            self.numbers(effects, base.z * mine, values)
-            for (effects, values), mine in zip(trials, free, strict=True)
+            self.numbers(effects, base.z * self._free(effects), values)
+            for effects, values in trials
         ]
         e, ok = self.model(sets)
-        jacobian = base.jacobian[:, : len(base.z)]
         weights = self.weights(base.e)
+        jacobian = base.jacobian[:, : len(base.z)]
         normal = _normal(jacobian, weights) + np.eye(len(base.z))
         slopes = jacobian.T @ (weights[:, None] * np.nan_to_num(e)) + base.z[:, None]
         masked, found = dict[bytes, Floats](), list[Fitted]()
+        better = dict[int, tuple[float, Trial]]()
         for i, (effects, values) in enumerate(trials):
             column = e[:, i].copy()
             if not ok[i] or not np.isfinite(column).all():
                 found.append(Fitted(effects, base.z, values, column, np.inf, jacobian))
                 continue
-            mine = free[i]
+            mine = self._free(effects)
             dz = -base.z * ~mine  # a number that an effect sets is not the car's to move
             low, high = (np.where(mine, limit - base.z, 0.0) for limit in (-FARTHEST, FARTHEST))
-            dz += _bounded(normal * np.outer(mine, mine), slopes[:, i] * mine, low, high)
+            own_normal = normal * np.outer(mine, mine)
+            dz += _bounded(own_normal, slopes[:, i] * mine, low, high)
             alike = mine.tobytes()  # trials that set the same numbers share one large array
             if alike not in masked:
                 masked[alike] = jacobian if mine.all() else jacobian * mine
@@ -136,7 +144,26 @@ class Fitter:
             moved = column + own @ dz
             q = float(self.score(moved[:, None], base.z + dz)[0])
             found.append(Fitted(effects, base.z + dz, values, moved, q, own))
+            if amplified and not effects[-1].is_placed:
+                gain, by = self._amplitude(base, column - base.e, weights, own, own_normal)
+                if gain > better.get(id(effects[-1]), (0.0, None))[0]:
+                    better[id(effects[-1])] = gain, (effects, _amplified(effects, values, by))
+        if better:
+            found += self.begin(base, [trial for _, trial in better.values()])
         return found
+
+    def _amplitude(
+        self, base: Fitted, change: Floats, weights: Floats, jacobian: Floats, normal: Floats
+    ) -> tuple[float, float]:
+        """Return what a change of the innovations gains at its best amplitude, and that amplitude.
+
+        The car's own numbers, and only those that are free, go along as they like.
+        """
+        own = np.linalg.pinv(normal) @ (jacobian.T @ (weights * change))
+        left = weights * (change - jacobian @ own)
+        slope = float(left @ base.e) - float(own @ base.z)
+        size = float(left @ change)
+        return (slope * slope / size, -slope / size) if size > 1e-9 else (0.0, 1.0)
 
     def _free(self, effects: Sequence[Candidate]) -> Bools:
         """Return which of the car's own numbers no effect sets, or means the same by."""
@@ -312,6 +339,16 @@ class _Plan:
         """Return the numbers after a move."""
         own, by = len(self._z), move * self._scales
         return self._z + by[:own], self._values + by[own:]
+
+
+def _amplified(effects: Sequence[Candidate], values: Floats, by: float) -> Floats:
+    """Return values with those of the last effect `by` times as far from neutral, in bounds."""
+    knobs = effects[-1].knobs
+    neutral = np.array([knob.neutral for knob in knobs])
+    low, high = np.array([knob.bounds for knob in knobs]).T
+    at = len(values) - len(knobs)
+    last = np.clip(neutral + by * (values[at:] - neutral), low, high)
+    return np.concatenate((values[:at], last))
 
 
 def _normal(jacobian: Floats, weights: Floats) -> Floats:

@@ -9,8 +9,8 @@ import numpy as np
 from scm.arrays import Bools, Floats
 from scm.mismatch.drive import Drive
 from scm.mismatch.noise import Noise, usual_noise
-from scm.mismatch.predict import POSE_CLOCK, Prediction
-from scm.mismatch.rollouts import COMMAND_CLOCK, Numbers, Rollouts, Tiles
+from scm.mismatch.predict import COMMAND_CLOCK, POSE_CLOCK, Prediction
+from scm.mismatch.rollouts import Numbers, Rollouts, Tiles
 from scm.mismatch.whiten import Whitener
 from scm.vehicles.car import Car
 from scm.vehicles.param import Param

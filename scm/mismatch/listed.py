@@ -64,6 +64,11 @@ class Candidate:
     said: str
     rare: float = 0.0
 
+    @property
+    def is_placed(self) -> bool:
+        """Whether a knob says where or which way, and not how much."""
+        return any(knob.name in {"radius_m", "uphill_rad"} for knob in self.knobs)
+
     def numbers(self, values: tuple[float, ...]) -> dict[str, float]:
         """Return the numbers by key that its knobs at these values mean."""
         found = dict[str, float]()

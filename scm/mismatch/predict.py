@@ -14,9 +14,10 @@ from scm.mismatch.rollouts import Motions, Numbers
 from scm.vehicles.jit import array_kernel
 
 # Faults of measurement by the key that their library parameter has, and their neutral values.
+COMMAND_CLOCK = "clock.commands_s"  # commands take effect so much later than they are stamped
 POSE_CLOCK = "clock.pose_s"  # poses are stamped so much later than the other sensors
 NEUTRAL: Mapping[str, float] = {
-    POSE_CLOCK: 0.0, "measure.pose_delay_s": 0.0, "measure.clock_offset_s": 0.0,
+    COMMAND_CLOCK: 0.0, POSE_CLOCK: 0.0, "measure.pose_delay_s": 0.0, "measure.clock_offset_s": 0.0,
     "measure.clock_rate": 0.0, "measure.pose_scale": 1.0, "measure.camera_tilt_x_per_m": 0.0,
     "measure.camera_tilt_y_per_m": 0.0, "measure.pose_point_x_m": 0.0,
     "measure.pose_point_y_m": 0.0, "measure.pose_heading_rad": 0.0, "measure.encoder_loss": 0.0,
@@ -27,7 +28,7 @@ NEUTRAL: Mapping[str, float] = {
 
 
 POSES = ("pose.x", "pose.y", "pose.yaw")
-_LATE = (POSE_CLOCK, "measure.pose_delay_s", "measure.clock_offset_s")
+_LATE = (COMMAND_CLOCK, POSE_CLOCK, "measure.pose_delay_s", "measure.clock_offset_s")
 _POSE = (*_LATE, "measure.clock_rate", "measure.pose_scale", "measure.camera_tilt_x_per_m",
          "measure.camera_tilt_y_per_m", "measure.pose_heading_rad")  # fmt: skip
 
@@ -36,15 +37,16 @@ class _Taps:
     """Takes signals given on a grid at a stream's sample times, by straight lines between."""
 
     def __init__(self, stream: Stream, edges: Floats) -> None:
-        at = (stream.taps - edges[0]) / (edges[1] - edges[0])
-        self._row = np.clip(at.astype(np.int64), 0, len(edges) - 2)
-        self._share = (at - self._row)[:, :, None]
+        self._at = (stream.taps - edges[0]) / STEP_S
 
-    def __call__(self, signal: Floats) -> Floats:
-        """Return means over the taps of a signal (edges, sets): (samples, sets)."""
-        before: Floats = signal[self._row]
-        before += self._share * (signal[self._row + 1] - before)
-        return before[:, 0] if before.shape[1] == 1 else np.mean(before, axis=1)
+    def __call__(self, signal: Floats, late_s: Floats) -> Floats:
+        """Return means over the taps of a signal (edges, sets): (samples, sets).
+
+        `late_s` says by how much each set's car does everything later, (sets,).
+        """
+        taken = np.empty((len(self._at), len(late_s)))
+        _tapped(self._at, late_s / STEP_S, signal, taken)
+        return taken
 
 
 class Prediction:
@@ -69,7 +71,7 @@ class Prediction:
             predicted = path.get(stream.name)
             if predicted is None:
                 signal = self.sensor(stream.name, motions, now)
-                predicted = self._taps[stream.name](signal)
+                predicted = self._taps[stream.name](signal, now[COMMAND_CLOCK])
             found.append(stream.values[:, None] - predicted)
         return found
 
@@ -120,6 +122,20 @@ class Prediction:
         plain = {"speed": "speed", "velocity.x": "speed", "velocity.y": "lateral_speed"}
         signal = motions[plain.get(name, "yaw_rate")]
         return now["measure.speed_scale"] * signal if name == "speed" else signal
+
+
+@array_kernel
+def _tapped(at: Floats, late: Floats, signal: Floats, out: Floats) -> None:
+    """Take a signal (edges, sets) at places between its edges, each set as many steps late."""
+    last = len(signal) - 2
+    for k in range(len(at)):
+        for b in range(len(late)):
+            total = 0.0
+            for j in range(at.shape[1]):
+                place = at[k, j] - late[b]
+                i = min(max(int(place), 0), last)
+                total += signal[i, b] + (place - i) * (signal[i + 1, b] - signal[i, b])
+            out[k, b] = total / at.shape[1]
 
 
 @array_kernel

@@ -29,8 +29,7 @@ SIGNALS = (
     "wheel_angle.fl", "wheel_angle.fr", "wheel_angle.rl", "wheel_angle.rr",
 )  # fmt: skip
 THROTTLE_DELAY, STEERING_DELAY = "drive.delay_s", "steering.delay_s"
-COMMAND_CLOCK = "clock.commands_s"  # commands take effect so much later than they are stamped
-_LATE = (COMMAND_CLOCK, THROTTLE_DELAY, STEERING_DELAY)
+_LATE = (THROTTLE_DELAY, STEERING_DELAY)
 Numbers = Mapping[str, float]
 _Used = TypeVar("_Used")
 
@@ -161,9 +160,7 @@ class Rollouts:
         for numbers in sets:
             row = fleet.add(Pose2(self._x[0], self._y[0], self._yaw[0]))
             for key, value in numbers.items():
-                if key == COMMAND_CLOCK:
-                    delays[:, row] += value
-                elif key in (THROTTLE_DELAY, STEERING_DELAY):
+                if key in _LATE:
                     delays[int(key == STEERING_DELAY), row] += value
                 else:
                     fleet.parameters[row, columns[key]] = value

@@ -202,7 +202,10 @@ class Search:
         ]
         self.tell(f"trying {len(self.listed)} effects from {len(trials)} starts")
         nominal = self.fitter.nominal(base)  # a re-tuned car bends towards what is missing
-        begun = [_best_of_each(self.fitter.begin(start, trials)) for start in (base, nominal)]
+        begun = [
+            _best_of_each(self.fitter.begin(start, trials, amplified=True))
+            for start in (base, nominal)
+        ]
 
         def cost(fitted: Fitted) -> float:
             return self.criterion(fitted) - self._drifted(fitted.effects[-1], base)

@@ -13,8 +13,8 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.geometry import Pose2
 from scm.mismatch.drive import RUN_IN_S, STEP_S, Drive
+from scm.mismatch.predict import COMMAND_CLOCK
 from scm.mismatch.rollouts import (
-    COMMAND_CLOCK,
     SIGNALS,
     STEERING_DELAY,
     TETHER_STEPS,

@@ -10,6 +10,7 @@ from scm.mismatch.fit import Fitter, _bounded
 from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
+from scm.mismatch.predict import COMMAND_CLOCK
 from scm.mismatch.rollouts import Rollouts
 from scm.mismatch.search import Search
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
@@ -40,7 +41,7 @@ def test_a_delay_is_the_command_later(healthy):
 
 @pytest.mark.parametrize("late_s", [0.002, 0.005])
 def test_a_servo_at_its_rate_is_not_hurried_by_a_command_within_a_step(healthy, late_s):
-    motions = Rollouts(healthy, big_nigel()).run([{}, {"clock.commands_s": late_s}])
+    motions = Rollouts(healthy, big_nigel()).run([{}, {"steering.delay_s": late_s}])
     now, late = motions["steer_angle"].T
     rate = np.diff(now) / 0.01
     slewing = np.flatnonzero(
@@ -49,6 +50,21 @@ def test_a_servo_at_its_rate_is_not_hurried_by_a_command_within_a_step(healthy, 
     assert len(slewing) > 50
     behind = (now - late)[slewing + 2] / rate[slewing + 1]
     assert np.median(behind) == pytest.approx(late_s, abs=1e-4)
+
+
+def test_a_clock_of_commands_that_is_late_delays_both_commands(model):
+    both = {"drive.delay_s": 0.02, "steering.delay_s": 0.02}
+    residuals, _ = model.residuals([{}, {COMMAND_CLOCK: 0.02}, both])
+    e = model.weigh(residuals)[model.settled > 0.0]
+    clock, delayed = e[:, 1] - e[:, 0], e[:, 2] - e[:, 0]
+    assert np.linalg.norm(clock - delayed) < 0.1 * np.linalg.norm(delayed)
+
+
+def test_a_clock_of_commands_shows_however_little_it_is_late(model):
+    residuals, _ = model.residuals([{}, {COMMAND_CLOCK: 0.002}, {COMMAND_CLOCK: 0.0001}])
+    e = model.weigh(residuals)[model.settled > 0.0]
+    much, little = e[:, 1] - e[:, 0], e[:, 2] - e[:, 0]
+    np.testing.assert_allclose(20.0 * little, much, atol=0.02 * np.abs(much).max())
 
 
 def test_the_pose_is_carried_back_so_that_a_long_drive_ends_where_it_was_measured(healthy):
@@ -176,3 +192,19 @@ def test_a_delay_is_told_from_a_lag():
     best = search.extend(search.retuned).rivals[0]
     assert best.names == ("steer_delay",)
     assert best.values[0] == pytest.approx(0.03, abs=0.006)
+
+
+def test_an_effect_smaller_than_its_trials_and_of_the_other_sign_is_begun_where_it_is():
+    biased = Drive(made_drive([], sense=_lower_y), big_nigel())
+    fitter = Fitter(Likelihood([biased], big_nigel()), np.ones(1))
+    fitter.part = fitter.model.settled
+    effect = by_name(candidates(big_nigel()), "accel_bias")
+    base = fitter.nominal(fitter.null())
+    trials = [((effect,), np.array(start)) for start in effect.starts]
+    assert min(f.q for f in fitter.begin(base, trials)) > base.q
+    best = min(fitter.begin(base, trials, amplified=True), key=lambda f: f.q)
+    assert best.values[1] == pytest.approx(-0.03, abs=0.01)
+
+
+def _lower_y(name, _t, values):
+    return values - 0.03 if name == "imu.accel_y" else values
