@@ -50,6 +50,7 @@ class Stay:
         self.switches = OFF
         self._cam = CamTrigger()
         self._seq = self._felt = 0
+        self._commanded = 0.0, 0.0
         self._turn: Indicators = "off"
 
     def push(self, contact: Contact) -> None:
@@ -74,12 +75,13 @@ class Stay:
             epoch: Under which the car's own driver commands; None: it must not.
         """
         self._body.advance(now_ns)
-        self._turn = "off"
+        led_here, self._turn = self._commanded, "off"
         if epoch is not None:
             self.guard.take(self._own_command(now_ns, epoch), now_ns)
         guarded = self.guard.output(now_ns)
-        self._body.command(guarded.throttle, guarded.steering)
-        return self._reports(guarded, now_ns)
+        self._commanded = guarded.throttle, guarded.steering
+        self._body.command(*self._commanded)
+        return self._reports(guarded, led_here, now_ns)
 
     def _own_command(self, now_ns: int, epoch: int) -> DriveCommand:
         motion = self._body.motion()
@@ -101,8 +103,10 @@ class Stay:
             steering=steering,
         )
 
-    def _reports(self, guarded: Guarded, now_ns: int) -> list[Outgoing]:
-        state = self._state(guarded, now_ns)
+    def _reports(
+        self, guarded: Guarded, led_here: tuple[float, float], now_ns: int
+    ) -> list[Outgoing]:
+        state = self._state(guarded, led_here, now_ns)
         outbox: list[Outgoing] = [state, *self._body.sensors(self._vehicle, now_ns)]
         if self._cam.due(state, now_ns):
             limits = self._body.limits
@@ -110,8 +114,9 @@ class Stay:
             outbox.append(CamTx(station=self._vehicle, t_ns=now_ns, body=body))
         return [*outbox, *self.trips.reports(now_ns)]
 
-    def _state(self, guarded: Guarded, now_ns: int) -> VehicleState:
+    def _state(self, guarded: Guarded, led_here: tuple[float, float], now_ns: int) -> VehicleState:
         motion = self._body.motion()
+        throttle, steering = led_here
         self._seq += 1
         return VehicleState(
             vehicle=self._vehicle,
@@ -125,7 +130,8 @@ class Stay:
             yaw_rate_radps=motion.yaw_rate,
             accel_mps2=motion.accel,
             steering_rad=motion.steering,
-            throttle=guarded.throttle,
+            throttle=throttle,
+            steering=steering,
             source=motion.source,
             epoch=self.guard.epoch,
             mode="stop" if guarded.mode == "lost" else guarded.mode,

@@ -64,13 +64,14 @@ def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
     slots, signal = world.slots, world.garage.signal
     columns = (
         slots.seq, slots.x, slots.y, slots.yaw, slots.speed, signal("lateral_speed"),
-        slots.yaw_rate, signal("accel_x"), signal("steer_angle"), slots.throttle, slots.mode,
+        slots.yaw_rate, signal("accel_x"), signal("steer_angle"), slots.throttle,
+        slots.steering, slots.mode,
     )  # fmt: skip
     rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)
     for (
         car,
         lit,
-    ), seq, x, y, yaw, speed, lateral, yaw_rate, accel, steering, throttle, mode in rows:
+    ), seq, x, y, yaw, speed, lateral, yaw_rate, accel, wheels, throttle, steering, mode in rows:
         yield VehicleState(
             vehicle=car.name,
             t_ns=now_ns,
@@ -82,8 +83,9 @@ def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
             lateral_speed_mps=lateral,
             yaw_rate_radps=yaw_rate,
             accel_mps2=accel,
-            steering_rad=steering,
+            steering_rad=wheels,
             throttle=throttle,
+            steering=steering,
             source="simulated",
             epoch=car.lease.epoch,
             mode=MODES[mode],

@@ -12,7 +12,8 @@ class VehicleState(Message, kw_only=True, frozen=True):
         t_ns: When it was true, on the sender's clock.
         source: Where the pose comes from: `simulated`, `eye`, `odometry`.
         steering_rad: Mean road-wheel angle, + = left.
-        throttle: Applied command after the guard, -1 to 1.
+        throttle, steering: The commands after the guard that led here, -1 to 1, + = forward and
+            left: in force until `t_ns`, since the sender's step before. Steering None: not told.
         epoch: Of the lease the car obeys now.
         mode: `drive`, `hold` (commands late), `stop` (commands lost or city stopped), `idle`.
         lights: Names of those that are on: `head_low head_high left right tail brake reverse`.
@@ -35,6 +36,7 @@ class VehicleState(Message, kw_only=True, frozen=True):
     accel_mps2: float = 0.0
     steering_rad: float
     throttle: float
+    steering: float | None = None
     source: str
     epoch: int = 0
     mode: str = "drive"
