@@ -19,6 +19,7 @@ from scm.recorder.drives import read_drives, recordings_of
 from scm.recorder.mcap_file import RunFile
 from scm.recorder.part import RecorderPart
 from scm.replay import free_run
+from scm.traffic.part import TrafficPart
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of
 from scm.v2x.message import Message, encode
@@ -29,6 +30,7 @@ from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import load_car
 from scm.world.part import WorldPart
+from vehicle_agent.agent import AgentPart
 
 MS = 1_000_000
 START_NS = 1_700_000_000_000_000_000
@@ -68,9 +70,16 @@ def told(ms: int, throttle: float = 0.5, epoch: int = 3, seq: int | None = None)
 
 
 def reported(ms: int, **other) -> VehicleState:
-    fields = {"epoch": 3, "source": "simulated", "x_m": ms / 1000, "y_m": 0.0, "yaw_rad": 0.1}
+    fields = {
+        "epoch": 3,
+        "seq": ms,
+        "source": "simulated",
+        "x_m": ms / 1000,
+        "y_m": 0.0,
+        "yaw_rad": 0.1,
+    }
     motion = {"speed_mps": 1.0, "yaw_rate_radps": 0.0, "steering_rad": 0.0, "throttle": 0.5}
-    return VehicleState(vehicle="n1", t_ns=START_NS + ms * MS, seq=ms, **(fields | motion | other))
+    return VehicleState(vehicle="n1", t_ns=START_NS + ms * MS, **(fields | motion | other))
 
 
 def seen(ms: int, camera: str = "top", x_m: float = 0.0) -> EyePose:
@@ -116,7 +125,8 @@ def test_mismatch_takes_a_run_of_one_car(
 ) -> None:
     assert main(["mismatch", str(run), "--out", str(tmp_path)]) == 2
     assert (
-        "several cars were commanded: n1, n2; say which with --vehicle" in capsys.readouterr().err
+        "several cars can be driven again: n1, n2; say which with --vehicle"
+        in capsys.readouterr().err
     )
     found = diagnose([run], vehicle="n1", budget_s=0.0)
     assert found.car.name == "nigel"
@@ -124,14 +134,54 @@ def test_mismatch_takes_a_run_of_one_car(
     assert "too_short" in [problem.name for problem in found.diagnosis.data]
 
 
-def test_a_car_that_drives_itself_is_refused_in_a_sentence(tmp_path: Path, run: Path) -> None:
-    alone = city_run(tmp_path / "alone.mcap")
-    with pytest.raises(RecordingError, match=r"none of its cars \(n1, n2\) was commanded over"):
-        read_drives(alone)
-    with pytest.raises(RecordingError, match="n2 was commanded over the bus: a car that drives"):
-        read_drives(alone, "n2")
+def test_cars_that_drive_themselves_are_driven_again_from_what_they_report(tmp_path: Path) -> None:
+    path, city_map = tmp_path / "self.mcap", load_map("driving_school")
+    parts = [WorldPart(city_map, hosted=(("n1", "nigel"),)), TrafficPart(city_map)]
+    with Lockstep([*parts, RecorderPart(path), AgentPart("n7")]) as city:
+        city.run_for(8.0)
+    hosted, remote = read_drives(path)
+    assert (hosted.name, remote.name) == ("n1", "n7")
+    for drive in (hosted, remote):
+        assert np.ptp(drive.channel("command.steering").values) > 0.1
+        free = free_run(drive, load_car("nigel"), horizon_s=3.0)
+        assert len(free.start_s) == 2
+        assert free.position_error()[:, -1].max() < 0.0005, "20 ms too late would be 3 mm"
+
+
+def test_a_car_whose_reports_do_not_tell_the_steering_is_refused(tmp_path: Path, run: Path) -> None:
+    old = said(tmp_path / "old.mcap", *(reported(ms) for ms in range(0, 1000, 20)))
+    with pytest.raises(RecordingError, match=r"none of its cars \(n1\) was commanded over the bus"):
+        read_drives(old)
+    with pytest.raises(RecordingError, match="n1 was commanded over the bus, and no report tells"):
+        read_drives(old, "n1")
     with pytest.raises(RecordingError, match=r"no car 'n11' \(did you mean 'n1'\?\)"):
         read_drives(run, "n11")
+
+
+def test_commands_are_those_that_the_car_reports_from_the_report_before_on(tmp_path: Path) -> None:
+    states = [reported(ms, seq=ms // 20, steering=0.4 - ms / 5000) for ms in range(0, 1000, 20)]
+    del states[40]
+    path = said(tmp_path / "a.mcap", *states, *(told(ms) for ms in range(100, 1000, 100)))
+    (drive,) = read_drives(path)
+    steering = drive.channel("command.steering")
+    assert_allclose(steering.t, [s / 1000 for s in range(0, 980, 20) if s != 780], atol=1e-9)
+    assert_allclose(steering.values, 0.4 - (steering.t + 0.02) / 5)
+    assert drive.channel("pose.x").t[0] == 0.1, "before that nobody commanded it"
+
+
+def test_commands_of_a_car_that_reports_seldom_begin_half_way_through_the_unknown(tmp_path: Path):
+    states = [reported(60 * k, seq=k, steering=k / 100) for k in range(50)]
+    (drive,) = read_drives(said(tmp_path / "a.mcap", *states))
+    steering = drive.channel("command.steering")
+    assert_allclose(steering.t[:3], [0.02, 0.08, 0.14])
+    assert_allclose(steering.values[:3], [0.01, 0.02, 0.03])
+
+
+def test_a_car_that_is_placed_anew_does_not_count_until_its_servo_is_known(tmp_path: Path) -> None:
+    states = [reported(ms, seq=ms // 20 % 100, steering=0.1) for ms in range(0, 4000, 20)]
+    (drive,) = read_drives(said(tmp_path / "a.mcap", *states))
+    ms = np.round(drive.channel("pose.x").t * 1000)
+    assert list(ms) == [*range(1000, 2000, 20), *range(3000, 4000, 20)]
 
 
 def test_poses_count_only_while_the_car_obeys(tmp_path: Path) -> None:
