@@ -27,6 +27,7 @@ OF_OWN: Mapping[str, str] = {
     "tyre_stiffness.scale": "tyre.lateral_slip_extremum",
     "steering.rate_scale": "steering.rate_rad_s",
     "motor.gain": "drive.stall_torque_nm",
+    "drive.delay_s": "clock.throttle_s",
 }
 """Numbers of effects by the car's own number that means the same."""
 Trial = tuple[tuple[Candidate, ...], Floats]

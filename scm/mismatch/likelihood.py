@@ -10,7 +10,7 @@ from scm.arrays import Bools, Floats
 from scm.mismatch.drive import Drive
 from scm.mismatch.noise import Noise, usual_noise
 from scm.mismatch.predict import COMMAND_CLOCK, POSE_CLOCK, Prediction
-from scm.mismatch.rollouts import Numbers, Rollouts, Tiles
+from scm.mismatch.rollouts import THROTTLE_CLOCK, Numbers, Rollouts, Tiles
 from scm.mismatch.whiten import Whitener
 from scm.vehicles.car import Car
 from scm.vehicles.param import Param
@@ -32,11 +32,11 @@ LOCK = "drive.axle_lock"
 _UNKNOWN = {LOCK: (0.5, 0.5)}  # what no car file says and every car has
 SETTLED_S = 1.0
 KEPT = 160  # sets whose residuals are remembered
-TIMING_S = 0.003  # no recording's stamps are better than that
+TIMING_S = 0.003  # no recording's stamps, and no model of a motor's controller, are better
 LEAST_SCATTER = {"body.mass_kg": 0.08}  # cars are weighed without cables, tape and battery
 _CLOCKS = tuple(
     Ordinary(key, 0.0, TIMING_S, (-3.0 * TIMING_S, 3.0 * TIMING_S))
-    for key in (COMMAND_CLOCK, POSE_CLOCK)
+    for key in (COMMAND_CLOCK, THROTTLE_CLOCK, POSE_CLOCK)
 )
 
 

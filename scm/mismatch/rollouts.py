@@ -29,7 +29,8 @@ SIGNALS = (
     "wheel_angle.fl", "wheel_angle.fr", "wheel_angle.rl", "wheel_angle.rr",
 )  # fmt: skip
 THROTTLE_DELAY, STEERING_DELAY = "drive.delay_s", "steering.delay_s"
-_LATE = (THROTTLE_DELAY, STEERING_DELAY)
+THROTTLE_CLOCK = "clock.throttle_s"  # the throttle acts so much later than the steering
+_LATE = (THROTTLE_DELAY, STEERING_DELAY, THROTTLE_CLOCK)
 Numbers = Mapping[str, float]
 _Used = TypeVar("_Used")
 

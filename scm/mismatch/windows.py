@@ -18,6 +18,7 @@ from scm.mismatch.rollouts import (
     SIGNALS,
     STEERING_DELAY,
     TETHER_STEPS,
+    THROTTLE_CLOCK,
     THROTTLE_DELAY,
     Numbers,
 )
@@ -113,8 +114,10 @@ class Windows:
 
     def _commands(self, numbers: Numbers) -> Floats:
         """Return throttle and steering of each step, as late as the numbers say, (2, steps)."""
-        late = [numbers.get(COMMAND_CLOCK, 0.0) + numbers.get(k, 0.0)
-                for k in (THROTTLE_DELAY, STEERING_DELAY)]  # fmt: skip
+        late = [
+            sum(numbers.get(key, 0.0) for key in (COMMAND_CLOCK, *keys))
+            for keys in ((THROTTLE_DELAY, THROTTLE_CLOCK), (STEERING_DELAY,))
+        ]
         before = STEP_S * np.arange(-round(RUN_IN_S / STEP_S), 0)
         edges = np.concatenate((self.drive.edges[0] + before, self.drive.edges))
         return np.stack([

@@ -21,6 +21,7 @@ SHARES = (0.55, 0.15, 0.15, 0.15)
 DRIVES = (("drive", 90.0), ("again", 60.0))
 ENOUGH_ON_PATCH_S = 1.5
 ENOUGH_AT_STOP = 0.03
+ENOUGH_EACH_WAY = 0.1
 
 
 def names_for(kind: str, car: str, rng: np.random.Generator) -> tuple[str, ...]:
@@ -86,7 +87,9 @@ def make_case(
         drives = {
             name: record(car, numbers, faults, duration, rng, moving) for name, duration in DRIVES
         }
-        if all(_shows(drive, numbers) for drive in drives.values()):
+        if all(_shows(drive, numbers) for drive in drives.values()) and (
+            numbers["side_gain"] == 0.0 or _turns_both_ways(drives["drive"])
+        ):
             break
     label = _label(kind, car, effects, ordinary, file_numbers, drives["drive"])
     return label, drives, numbers
@@ -105,6 +108,12 @@ def _shows(drive: Drive, numbers: dict[str, float]) -> bool:
         return True
     on = np.hypot(x - numbers["patch_x"], y - numbers["patch_y"]) < 0.7 * numbers["patch_radius"]
     return float(np.sum(on & (np.abs(speed) > 0.02))) * 0.0025 > ENOUGH_ON_PATCH_S
+
+
+def _turns_both_ways(drive: Drive) -> bool:
+    """Say whether a drive can tell a side's gain from that of the whole steering."""
+    steering = drive.commands[:, 2]
+    return min(float(np.mean(steering > 0.1)), float(np.mean(steering < -0.1))) > ENOUGH_EACH_WAY
 
 
 def _label(kind, car, effects, ordinary, file_numbers, drive):

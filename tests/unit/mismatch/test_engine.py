@@ -67,6 +67,15 @@ def test_a_clock_of_commands_shows_however_little_it_is_late(model):
     np.testing.assert_allclose(20.0 * little, much, atol=0.02 * np.abs(much).max())
 
 
+def test_a_motor_may_answer_milliseconds_late_without_an_effect(model):
+    fitter, late = Fitter(model, model.settled), {"drive.delay_s": 0.004}
+    z = np.zeros(len(model.ordinary))
+    z[[own.key for own in model.ordinary].index("clock.throttle_s")] = -4.0 / 3.0
+    e, _ = model([{}, late, late | fitter.numbers((), z, np.zeros(0))])
+    assert np.abs(e[:, 1] - e[:, 0]).max() > 0.1
+    np.testing.assert_allclose(e[:, 2], e[:, 0], atol=1e-6)
+
+
 def test_the_pose_is_carried_back_so_that_a_long_drive_ends_where_it_was_measured(healthy):
     rollouts = Rollouts(healthy, big_nigel())
     rollouts.run([{"steering.trim_rad": 0.1}])
