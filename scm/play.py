@@ -1,5 +1,8 @@
 """Plays a written drive with a car of a city, open loop, and records it for the mismatch search.
 
+What is recorded is what a run's `.mcap` would tell of the car: the commands that it reports to have
+obeyed, and its poses but for those about a hit.
+
 A drive is a `.yaml` that names a car, a map, a place to start and a table of commands; `scm
 mismatch` writes such files for the drive that would tell rivals apart.
 """
@@ -7,20 +10,24 @@ mismatch` writes such files for the drive that would tell rivals apart.
 import csv
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass
+from itertools import dropwhile, pairwise
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import yaml
 
-from scm.clock import seconds
 from scm.errors import RunError, ScmError
 from scm.fleet import Link
 from scm.part import Hears
+from scm.recorder.driven import RUN_IN_NS, Heard, recording_of
+from scm.recording.read import Recording
 from scm.recording.table import read_table
 from scm.v2x.message import Message, Refused, Request
+from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
@@ -30,30 +37,17 @@ LEASE_MS = 5000
 RENEW_S = 1.0
 REPEATED_S = 0.05
 Row = tuple[float, float, float]
-POSE_M, POSE_RAD, GYRO_RAD_S = 0.002, 0.005, 0.002
-_DESCRIPTION = """recording: 1
-vehicle: {car}
-frame: world
-tables:
-  - file: commands.csv
-    time: {{column: t_s, unit: s}}
-    channels:
-      command.throttle: {{column: throttle, unit: "1"}}
-      command.steering: {{column: steering, unit: "1"}}
-  - file: pose.csv
-    time: {{column: t_s, unit: s}}
-    channels:
-      pose.x: {{column: x_m, unit: m, std: {metre}}}
-      pose.y: {{column: y_m, unit: m, std: {metre}}}
-      pose.yaw: {{column: yaw_rad, unit: rad, std: {radian}}}
-"""
-_SENSORS = """  - file: sensors.csv
-    time: {{column: t_s, unit: s}}
-    channels:
-      encoder.left: {{column: left, unit: count}}
-      encoder.right: {{column: right, unit: count}}
-      imu.gyro_z: {{column: gyro_rad_s, unit: rad/s, std: {gyro}}}
-"""
+_FILES = {
+    "commands.csv": {"throttle": "command.throttle", "steering": "command.steering"},
+    "pose.csv": {"x_m": "pose.x", "y_m": "pose.y", "yaw_rad": "pose.yaw"},
+    "sensors.csv": {
+        "left": "encoder.left", "right": "encoder.right", "gyro_rad_s": "imu.gyro_z",
+    },
+}  # fmt: skip
+_UNITS = {
+    "throttle": "1", "steering": "1", "x_m": "m", "y_m": "m", "yaw_rad": "rad",
+    "left": "count", "right": "count", "gyro_rad_s": "rad/s",
+}  # fmt: skip
 
 
 class Drive(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -75,13 +69,47 @@ class Drive(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     commands: str
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Played:
-    """What was commanded and reported, times on the city's clock [s]."""
+    """A drive that was played.
 
-    commands: list[tuple[float, ...]] = field(default_factory=list)
-    poses: list[tuple[float, ...]] = field(default_factory=list)
-    sensors: list[tuple[float, ...]] = field(default_factory=list)
+    Attributes:
+        vehicle: Who drove it.
+        heard: What was sent to it and what the city told of it.
+        lost: How many of the car's messages did not arrive, or had to make room for newer ones.
+    """
+
+    vehicle: str
+    heard: Heard
+    lost: int
+
+
+class _Ear:
+    """Takes in what a city tells of one car, as it comes: on a long drive no queue may fill up."""
+
+    def __init__(self, link: Link, vehicle: str) -> None:
+        self._link, self._vehicle, self._heard = link, vehicle, Heard()
+        of_car = {"vehicle": vehicle}
+        self._reports = link.hear(Hears(VehicleState, of_car))
+        self._others = [link.hear(Hears(kind, of_car)) for kind in (VehicleSensors, EyePose)]
+        self._others.append(link.hear(Hears(CityEvent)))
+
+    def sent(self, command: DriveCommand) -> None:
+        self._heard.take(command)
+
+    def listen_until(self, due_ns: int) -> None:
+        def is_due() -> bool:
+            for box in (self._reports, *self._others):
+                for item in box.drain():
+                    if getattr(item.message, "vehicle", None) == self._vehicle:
+                        self._heard.take(item.message)
+            return self._link.now_ns >= due_ns
+
+        self._link.run_until(is_due, 60.0)
+
+    def played(self) -> Played:
+        lost = self._heard.lost + sum(box.dropped for box in self._others)
+        return Played(self._vehicle, self._heard, lost)
 
 
 def read_drive(path: Path) -> tuple[Drive, list[Row]]:
@@ -108,35 +136,27 @@ def read_drive(path: Path) -> tuple[Drive, list[Row]]:
 def play(link: Link, vehicle: str, rows: list[Row]) -> Played:
     """Command a car row by row and return what it reported; the lease is given back at the end.
 
+    It is listened to for a second before: the first commands meet a servo that stands somewhere.
+
     Raises:
         RunError: when the car is not to be had.
     """
-    states = link.hear(Hears(VehicleState, {"vehicle": vehicle}))
-    sensors = link.hear(Hears(VehicleSensors, {"vehicle": vehicle}))
+    ear = _Ear(link, vehicle)
+    ear.listen_until(link.now_ns + RUN_IN_NS)
     epoch = _lease(link, vehicle, "acquire", 0)
-    played, began_ns, renewed = Played(), link.now_ns, 0.0
+    began_ns, renewed = link.now_ns, 0.0
     for seq, (t, throttle, steering) in enumerate(_repeated(rows), 1):
-        due_ns = began_ns + round(t * 1e9)
-        link.run_until(lambda due_ns=due_ns: link.now_ns >= due_ns, 60.0)  # type: ignore[misc]
+        ear.listen_until(began_ns + round(t * 1e9))
         if t - renewed > RENEW_S:
             _lease(link, vehicle, "renew", epoch)
             renewed = t
-        now_ns = link.now_ns
-        link.publish(
-            DriveCommand(vehicle=vehicle, t_ns=now_ns, epoch=epoch, seq=seq,
-                         throttle=throttle, steering=steering)
-        )  # fmt: skip
-        played.commands.append((seconds(now_ns), throttle, steering))
+        command = DriveCommand(vehicle=vehicle, t_ns=link.now_ns, epoch=epoch, seq=seq,
+                               throttle=throttle, steering=steering)  # fmt: skip
+        link.publish(command)
+        ear.sent(command)
     _lease(link, vehicle, "release", epoch)
-    for item in states.drain():
-        if isinstance(state := item.message, VehicleState):
-            played.poses.append((seconds(state.t_ns), state.x_m, state.y_m, state.yaw_rad))
-    for item in sensors.drain():
-        if isinstance(read := item.message, VehicleSensors):
-            played.sensors.append(
-                (seconds(read.t_ns), read.encoder_left, read.encoder_right, read.gyro_radps[2])
-            )
-    return played
+    ear.listen_until(link.now_ns)
+    return ear.played()
 
 
 def _repeated(rows: list[Row]) -> Iterator[Row]:
@@ -151,23 +171,59 @@ def _repeated(rows: list[Row]) -> Iterator[Row]:
     yield rows[-1]
 
 
-def write_recording(played: Played, car: str, folder: Path) -> None:
-    """Write what was played as a recording that `scm mismatch` reads."""
+def write_recording(played: Played, car: str, folder: Path) -> Recording:
+    """Write what was played as a recording that `scm mismatch` reads, and return it.
+
+    Raises:
+        RecordingError: when nothing of it can be driven again.
+    """
+    recording = recording_of(played.heard, folder, played.vehicle)
     folder.mkdir(parents=True, exist_ok=True)
-    _write(folder / "commands.csv", ("t_s", "throttle", "steering"), played.commands)
-    _write(folder / "pose.csv", ("t_s", "x_m", "y_m", "yaw_rad"), played.poses)
-    text = _DESCRIPTION.format(car=car, metre=POSE_M, radian=POSE_RAD)
-    if played.sensors:
-        _write(folder / "sensors.csv", ("t_s", "left", "right", "gyro_rad_s"), played.sensors)
-        text += _SENSORS.format(gyro=GYRO_RAD_S)
+    there = recording.channels.keys()
+    written = {file: of for file, of in _FILES.items() if there >= set(of.values())}
+    for file, of in written.items():
+        channels = [recording.channel(name) for name in of.values()]
+        columns = [channels[0].t.tolist(), *(channel.values.tolist() for channel in channels)]
+        with (folder / file).open("w", encoding="utf-8", newline="") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(("t_s", *of))
+            writer.writerows(zip(*columns, strict=True))
+    of_car = {"vehicle": car, "frame": "world"}
+    tables = [_described(file, of, recording) for file, of in written.items()]
+    text = yaml.safe_dump({"recording": 1, **of_car, "tables": tables}, sort_keys=False)
     (folder / "recording.yaml").write_text(text, encoding="utf-8")
+    return recording
 
 
-def _write(path: Path, names: tuple[str, ...], rows: list[tuple[float, ...]]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(names)
-        writer.writerows(rows)
+def _described(file: str, of: dict[str, str], recording: Recording) -> dict[str, Any]:
+    """Return what a description says of one table."""
+    channels: dict[str, dict[str, Any]] = {}
+    for column, name in of.items():
+        std = recording.channel(name).std
+        channels[name] = {"column": column, "unit": _UNITS[column]}
+        channels[name] |= {} if std is None else {"std": std}
+    return {"file": file, "time": {"column": "t_s", "unit": "s"}, "channels": channels}
+
+
+def left_out(played: Played, recording: Recording) -> list[str]:
+    """Return in sentences what of a played drive is not in its recording, or not as it was sent."""
+    heard, said = played.heard, []
+    first_ns, last_ns = heard.commands[0].t_ns, heard.commands[-1].t_ns
+    reports = [report for report in heard.reports if first_ns <= report.t_ns <= last_ns]
+    hits = sum(first_ns <= t_ns <= last_ns for t_ns in heard.hit_ns)
+    missing = len(reports) - len(recording.channel("pose.x").t)
+    if hits and missing > 0:
+        said.append(f"{missing} poses are left out: the car hit something {hits} times")
+    begun = dropwhile(lambda report: report.mode != "drive", reports)
+    late = [report for report in begun if report.mode != "drive"]
+    if late:
+        said.append(
+            f"{len(late)} of {len(reports)} reports say that it did not obey, for commands came "
+            "late or the city was stopped; recorded is what it did obey"
+        )
+    if played.lost:
+        said.append(f"{played.lost} messages of the car were lost on the way: it is not all here")
+    return said
 
 
 def _lease(link: Link, vehicle: str, verb: str, epoch: int) -> int:

@@ -27,7 +27,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.fleet import LiveLink, LockstepLink
     from scm.lockstep import Lockstep
     from scm.maps.load import load_map
-    from scm.play import play, read_drive, write_recording
+    from scm.play import left_out, play, read_drive, write_recording
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.world.part import WorldPart
 
@@ -48,8 +48,11 @@ def _run(arguments: argparse.Namespace) -> int:
             world = part.world  # not by request: only who is in this process may name any car file
             world.host(NAME, car, world.roads.spawn_pose(start), lockstep.now_ns)
             played = play(LockstepLink(lockstep), NAME, rows)
-    write_recording(played, _named(car, arguments.out), arguments.out)
-    print(f"{len(played.poses)} poses of {rows[-1][0]:.0f} s recorded in {arguments.out}")
+    recording = write_recording(played, _named(car, arguments.out), arguments.out)
+    poses = len(recording.channel("pose.x").t)
+    print(f"{poses} poses of {rows[-1][0]:.0f} s recorded in {arguments.out}")
+    for sentence in left_out(played, recording):
+        print(sentence)
     return 0
 
 

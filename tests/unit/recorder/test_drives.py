@@ -93,7 +93,7 @@ def seen(ms: int, camera: str = "top", x_m: float = 0.0) -> EyePose:
 def test_the_same_car_replays_a_run_of_the_city(run: Path) -> None:
     drives = read_drives(run)
     assert [(drive.name, drive.vehicle) for drive in drives] == [("n1", "nigel"), ("n2", "nigel")]
-    for drive, start_s in zip(drives, (1.0, 5.5), strict=True):
+    for drive, start_s in zip(drives, (2.0, 7.5), strict=True):
         free = free_run(drive, load_car("nigel"), horizon_s=1.0)
         assert len(free.start_s) == 3
         assert free.position_error()[:, -1].max() < 0.005
