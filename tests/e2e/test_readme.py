@@ -1,6 +1,7 @@
 """Every command in README is run here, against a city on free ports."""
 
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -9,8 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from scm.recorder.mcap_file import RunFile
-from scm.v2x.exchange import RawSample
+from scm.lockstep import Lockstep
+from scm.maps.load import load_map
+from scm.recorder.part import RecorderPart
+from scm.traffic.part import TrafficPart
+from scm.world.part import WorldPart
 from tests.e2e.city_process import CityProcess, city, wait_for
 
 README = Path(__file__).parents[2] / "README.md"
@@ -30,15 +34,24 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
         yield process
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five seconds of a city, as the recorder leaves them."""
+    path, city_map = tmp_path_factory.mktemp("recorded") / "today.mcap", load_map("driving_school")
+    parts = (WorldPart(city_map, hosted=(("n1", "nigel"),)), TrafficPart(city_map))
+    with Lockstep([*parts, RecorderPart(path)]) as lockstep:
+        lockstep.run_for(5.0)
+    return path
+
+
 @pytest.fixture
-def workplace(tmp_path: Path, root: Path) -> Path:
+def workplace(tmp_path: Path, root: Path, recorded: Path) -> Path:
     """A folder that looks like the project's, so that commands leave nothing behind in it."""
     for name in ("examples", "recordings", "maps", "Makefile", "pyproject.toml"):
         (tmp_path / name).symlink_to(root / name)
     (tmp_path / ".venv").symlink_to(sys.prefix)
     (tmp_path / "runs").mkdir()
-    with RunFile(tmp_path / "runs/today.mcap", "city") as run:
-        run.write(RawSample("scm/@v1/city/part/eye/status", b"{}", None, 1))
+    shutil.copy(recorded, tmp_path / "runs")
     return tmp_path
 
 
