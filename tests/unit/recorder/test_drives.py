@@ -169,7 +169,9 @@ def test_commands_are_those_that_the_car_reports_from_the_report_before_on(tmp_p
     assert drive.channel("pose.x").t[0] == 0.1, "before that nobody commanded it"
 
 
-def test_commands_of_a_car_that_reports_seldom_begin_half_way_through_the_unknown(tmp_path: Path):
+def test_commands_of_a_car_that_reports_seldom_begin_half_way_through_the_unknown(
+    tmp_path: Path,
+) -> None:
     states = [reported(60 * k, seq=k, steering=k / 100) for k in range(50)]
     (drive,) = read_drives(said(tmp_path / "a.mcap", *states))
     steering = drive.channel("command.steering")
