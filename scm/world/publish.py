@@ -94,14 +94,13 @@ def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
         )
 
 
-def _cars(world: World, of: Ints) -> Iterator[tuple[HostedCar, Told]]:
-    """Yield the cars of some slots, and what their lamps are told by driver and guard."""
-    slots = world.slots
-    told = zip(
-        slots.hazard[of].tolist(), (world.crowd.turn * slots.driven)[of].tolist(), strict=True
-    )
-    for slot, (hazard, turn) in zip(of.tolist(), told, strict=True):
-        yield world.hosted[slots.names[slot]], LAMPS[hazard, turn]
+def _cars(world: World, of: Ints) -> list[tuple[HostedCar, Told]]:
+    """Return the cars of some slots, and what their lamps are told by driver and guard."""
+    slots, hosted, names = world.slots, world.hosted, world.slots.names
+    hazards = slots.hazard[of].tolist()
+    turns = (world.crowd.turn * slots.driven)[of].tolist()
+    told = zip(of.tolist(), hazards, turns, strict=True)
+    return [(hosted[names[slot]], LAMPS[hazard, turn]) for slot, hazard, turn in told]
 
 
 def snapshot(world: World, now_ns: int) -> WorldSnapshot:
