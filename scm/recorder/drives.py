@@ -102,9 +102,10 @@ def read_drives(path: Path, vehicle: str | None = None) -> list[Recording]:
     heard, start_ns = _heard(path, keys, chosen)
     able = [name for name in chosen if heard[name].commands or tells_commands(heard[name])]
     if not able:
-        who = vehicle or f"none of its cars ({', '.join(known) or 'none'})"
+        none = f"none of its cars ({', '.join(known) or 'none'}) was"
+        who = f"{vehicle} was not" if vehicle else none
         msg = (
-            f"{path}: {who} was commanded over the bus, and no report tells the steering command: "
+            f"{path}: {who} commanded over the bus, and no report tells the steering command: "
             "nothing can be driven again; record anew, or drive a car by `scm play` or a script"
         )
         raise RecordingError(msg)
