@@ -19,6 +19,7 @@ SHORTER = (0.5, 0.2, 0.05)
 DAMPINGS = (0.03, 0.3)
 FEW = 2  # fits whose trials leave room in a tile
 ENOUGH = 0.5
+SPOTS = 3  # places that an effect of some place is begun at
 TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild moments prove nothing
 FARTHEST = 2.0  # beyond twice its scatter a number is no longer ordinary
 OF_OWN: Mapping[str, str] = {
@@ -127,7 +128,7 @@ class Fitter:
         normal = _normal(jacobian, weights) + np.eye(len(base.z))
         slopes = jacobian.T @ (weights[:, None] * np.nan_to_num(e)) + base.z[:, None]
         masked, found = dict[bytes, Floats](), list[Fitted]()
-        better = dict[int, tuple[float, Trial]]()
+        better = dict[int, list[tuple[float, Trial]]]()
         for i, (effects, values) in enumerate(trials):
             column = e[:, i].copy()
             if not ok[i] or not np.isfinite(column).all():
@@ -145,13 +146,12 @@ class Fitter:
             moved = column + own @ dz
             q = float(self.score(moved[:, None], base.z + dz)[0])
             found.append(Fitted(effects, base.z + dz, values, moved, q, own))
-            if amplified and not effects[-1].is_placed:
+            if amplified:
                 gain, by = self._amplitude(base, column - base.e, weights, own, own_normal)
-                if gain > better.get(id(effects[-1]), (0.0, None))[0]:
-                    better[id(effects[-1])] = gain, (effects, _amplified(effects, values, by))
-        if better:
-            found += self.begin(base, [trial for _, trial in better.values()])
-        return found
+                trial = effects, _amplified(effects, values, by)
+                better.setdefault(id(effects[-1]), []).append((gain, trial))
+        again = [trial for same in better.values() for trial in _most_gaining(same)]
+        return [*found, *(self.begin(base, again) if again else ())]
 
     def _amplitude(
         self, base: Fitted, change: Floats, weights: Floats, jacobian: Floats, normal: Floats
@@ -342,13 +342,20 @@ class _Plan:
         return self._z + by[:own], self._values + by[own:]
 
 
+def _most_gaining(same: Sequence[tuple[float, Trial]]) -> list[Trial]:
+    """Return, of the (gain, trial) of one effect, the best trial, or those at the best places."""
+    ranked = sorted((one for one in same if one[0] > 0.0), key=lambda one: -one[0])
+    return [trial for _, trial in ranked[: SPOTS if same[0][1][0][-1].is_placed else 1]]
+
+
 def _amplified(effects: Sequence[Candidate], values: Floats, by: float) -> Floats:
-    """Return values with those of the last effect `by` times as far from neutral, in bounds."""
+    """Return values with the last effect `by` times as strong, in bounds, at the same place."""
     knobs = effects[-1].knobs
     neutral = np.array([knob.neutral for knob in knobs])
     low, high = np.array([knob.bounds for knob in knobs]).T
     at = len(values) - len(knobs)
-    last = np.clip(neutral + by * (values[at:] - neutral), low, high)
+    amplified = np.clip(neutral + by * (values[at:] - neutral), low, high)
+    last = np.where(effects[-1].amounts, amplified, values[at:])
     return np.concatenate((values[:at], last))
 
 

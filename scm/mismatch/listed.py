@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 
+from scm.arrays import Bools
 from scm.errors import TermError
 from scm.mismatch.drive import Drive, has_odometer
 from scm.mismatch.findings import Equation
@@ -67,7 +68,15 @@ class Candidate:
     @property
     def is_placed(self) -> bool:
         """Whether a knob says where or which way, and not how much."""
-        return any(knob.name in {"radius_m", "uphill_rad"} for knob in self.knobs)
+        return not self.amounts.all()
+
+    @property
+    def amounts(self) -> Bools:
+        """Which knobs say how much, and not where or which way, (knobs,)."""
+        where = {"uphill_rad"}
+        if any(knob.name == "radius_m" for knob in self.knobs):
+            where |= {"x_m", "y_m", "radius_m"}
+        return np.array([knob.name not in where for knob in self.knobs])
 
     def numbers(self, values: tuple[float, ...]) -> dict[str, float]:
         """Return the numbers by key that its knobs at these values mean."""

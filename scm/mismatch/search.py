@@ -12,19 +12,20 @@ from functools import cached_property
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.fit import FARTHEST, OF_OWN, Fitted, Fitter
+from scm.mismatch.fit import FARTHEST, OF_OWN, SPOTS, Fitted, Fitter
 from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate
 from scm.mismatch.noise import Noise, calmed
 
 MOST_EFFECTS = 4
-REFITTED, AFRESH = 14, 8
+REFITTED, AFRESH = 16, 10
 AFRESH_GAIN = 60.0
 TO_THE_END = 5, 8  # rounds of a fit that others are held against, of all starts and of the near
 DEEPER = 5.0
 CHANCES = 3
 FINALISTS, CLOSE = 3, 100.0
+DOUBTFUL = 60.0
 PLENTY = 10.0  # gained where nothing was fitted, it is enough for any effect
 REMAINDER = 0.015  # of the largest effect's gain: an equation off by an eighth leaves as much
 FALSE_ALARMS = 0.02
@@ -94,34 +95,39 @@ class Search:
         """
         best = self.retuned
         while len(best.effects) < MOST_EFFECTS and not is_over():
-            step = self.extend(best)
+            noise, step = self.model.noise, self.extend(best)
             self.steps.append(step)
-            best = step.base
-            if not best.effects:
-                self.retuned = best
-            if step.rivals and step.criteria[0] <= self.criterion(best):
+            before = best = step.base
+            if not before.effects:
+                self.retuned = before
+            margin = self.criterion(before) - step.criteria[0] if step.rivals else -math.inf
+            if margin >= 0.0:
                 best = self.prune(self.settle(step.rivals[0]))
-                continue
-            if best.effects or (found := self._calmly(best)) is best:
+            if not before.effects and margin < DOUBTFUL:
+                best = self._calmly(best, noise)
+            if len(best.effects) == len(before.effects):
                 break
-            best = found
         return best
 
-    def _calmly(self, nothing: Fitted) -> Fitted:
-        """Return the best effect that a calm belief about noise shows, or the re-tuned car.
+    def _calmly(self, best: Fitted, learned: Noise) -> Fitted:
+        """Return the best effect that a calm belief about noise shows, or what was found without.
 
         Noise that was learned without an effect may have swallowed it. So effects are tried where
         nothing is put down to disturbances, and judged each under the noise that it leaves: the
         more of it a hypothesis needs, the more it pays.
+
+        Args:
+            best: What was found, or the re-tuned car, under the present belief.
+            learned: What was believed of noise before anything was found.
         """
         self.tell("trying again under a calm belief about noise")
-        before, least = self.model.noise, self._with_noise(nothing)
-        calm = calmed(before, self.model.drives)
-        if calm == before:
-            return nothing
+        calm = calmed(learned, self.model.drives)
+        if calm == learned:
+            return best
+        least, found, noise = self._with_noise(best), best, self.model.noise
         self.model.believe(calm)
-        (base,) = self.fitter.refine([replace(nothing, done=False)], rounds=4, fresh=True)
-        step, found, noise = self.extend(base), nothing, before
+        (base,) = self.fitter.refine([replace(self.retuned, done=False)], rounds=4, fresh=True)
+        step = self.extend(base)
         for rival in step.rivals[:CHANCES]:
             if self.criterion(rival) > self.criterion(step.base):
                 break
@@ -131,8 +137,8 @@ class Search:
             if cost < least:
                 found, least, noise = settled, cost, self.model.noise
         self.model.believe(noise)
-        if found is not nothing:
-            self.steps.append(step)
+        if found is not best:
+            self.steps[-1:] = [step]
         return found
 
     def _with_noise(self, fitted: Fitted) -> float:
@@ -323,7 +329,7 @@ class Search:
 
 def _preferred(near: Sequence[Fitted], far: Sequence[Fitted]) -> list[Fitted]:
     """Return, of each last effect, the fit that went far only where re-tuning really hid it."""
-    best = {id(fitted.effects[-1]): fitted for fitted in near}
+    best = {id(fitted.effects[-1]): fitted for fitted in sorted(near, key=lambda f: -f.q)}
     for fitted in far:
         other = best.setdefault(id(fitted.effects[-1]), fitted)
         if fitted.q < other.q - AFRESH_GAIN:
@@ -332,8 +338,10 @@ def _preferred(near: Sequence[Fitted], far: Sequence[Fitted]) -> list[Fitted]:
 
 
 def _best_of_each(fits: Sequence[Fitted]) -> list[Fitted]:
-    """Return the best fit of each last effect."""
-    best = dict[int, Fitted]()
+    """Return the best fit of each last effect, of one that has a place the best at some places."""
+    best = dict[int, list[Fitted]]()
     for fitted in sorted(fits, key=lambda f: f.q):
-        best.setdefault(id(fitted.effects[-1]), fitted)
-    return list(best.values())
+        same = best.setdefault(id(fitted.effects[-1]), [])
+        if len(same) < (SPOTS if fitted.effects[-1].is_placed else 1):
+            same.append(fitted)
+    return [fitted for same in best.values() for fitted in same]
