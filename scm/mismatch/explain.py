@@ -1,12 +1,12 @@
 """What is said of a model that was found: its effects, their rivals, what stays undecided."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from scm.mismatch.evidence import Ordinary, Tried
 from scm.mismatch.experiment.plan import Rival as Contender
 from scm.mismatch.experiment.suggest import Suggestion, suggest
-from scm.mismatch.findings import Effect, Estimate, Rival
+from scm.mismatch.findings import Effect, Equation, Estimate, Rival
 from scm.mismatch.fit import OF_OWN, Fitted
 from scm.mismatch.law_rivals import TIE, Standing, against, rivals_of_law
 from scm.mismatch.laws.decide import is_law
@@ -21,6 +21,7 @@ from scm.vehicles.car import Car
 
 NINETY = 1.645
 WIDER = 1.3  # intervals from curvature alone are too narrow for what any model leaves out
+LAW = 0.03  # of an effect's size: no equation of an effect is exactly that of the car
 SHARES = {"slope", "difference", "fraction", "fraction_per_min"}
 OPPOSITE: Mapping[str, str] = {
     "to the left": "to the right", "left": "right", "ahead": "behind", "too much.": "too little.",
@@ -87,7 +88,9 @@ def effect_of(
     for j, knob in enumerate(candidate.knobs):
         value, place = mine[j], own + at + j
         told = WIDER * knob.step * math.sqrt(max(best.covariance[place, place], 0.0))
-        spread = NINETY * math.hypot(told, _scatter(search.model, knob, value))
+        spread = NINETY * math.hypot(
+            told, _scatter(search.model, knob, value), LAW * _size(candidate, j, mine)
+        )
         low, high = knob.bounds if not _wraps(knob) else (-math.inf, math.inf)
         estimates[knob.name] = Estimate(
             value=value, low=max(value - spread, low), high=min(value + spread, high),
@@ -112,6 +115,20 @@ def effect_of(
 def _wraps(knob: Knob) -> bool:
     """Say whether a number is a direction, which does not end where its bounds are."""
     return knob.unit == "rad" and knob.bounds[1] - knob.bounds[0] > 1.99 * math.pi
+
+
+def _size(candidate: Candidate, j: int, values: Sequence[float]) -> float:
+    """Return what an error of a number is measured by: how far it is from doing nothing.
+
+    A fault of a sensor has no equation that could be wrong.
+    """
+    knob = candidate.knobs[j]
+    if candidate.equation is Equation.SENSOR:
+        return 0.0
+    if _wraps(knob):
+        return 1.0
+    radius = [v for k, v in zip(candidate.knobs, values, strict=True) if k.name == "radius_m"]
+    return radius[0] if radius and knob.unit == "m" else abs(values[j] - knob.neutral)
 
 
 def _scatter(model: Likelihood, knob: Knob, value: float) -> float:

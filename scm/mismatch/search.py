@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from scm.arrays import Floats
+from scm.arrays import Bools, Floats
 from scm.mismatch.fit import FARTHEST, OF_OWN, SPOTS, Fitted, Fitter
 from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.likelihood import Likelihood
@@ -27,7 +27,8 @@ CHANCES = 3
 FINALISTS, CLOSE = 3, 100.0
 DOUBTFUL = 60.0
 PLENTY = 10.0  # gained where nothing was fitted, it is enough for any effect
-REMAINDER = 0.015  # of the largest effect's gain: an equation off by an eighth leaves as much
+OFF = 0.125  # two simulators' equations of the same effect differ by as much
+REMAINDER, COVERED = OFF * OFF, 0.2
 FALSE_ALARMS = 0.02
 NEAR = 40.0
 DRIFTED = 8.0
@@ -255,7 +256,8 @@ class Search:
         """Return the model without effects that do not help on a part that no fit has seen.
 
         Of what an effect gains where it was fitted, a share must come out there too, by length, or
-        plenty. One that gains next to nothing beside another is what that one's equation leaves.
+        plenty. One that gains next to nothing beside another, and where that one acts, is what that
+        one's equation leaves.
         """
         share = self.holds * float(unseen.sum()) / max(self.events, 1)
         while best.effects:
@@ -268,11 +270,28 @@ class Search:
                 [float(fitter.score(f.e[:, None], f.z)[0] - f.z @ f.z - seen) for f in others]
             )
             gains -= np.minimum(share * seen_gains, PLENTY)
-            gains[seen_gains < REMAINDER * seen_gains.max()] = -np.inf
+            gains[self._remainders(best, others, seen_gains)] = -np.inf
             if gains.min() > 0.0:
                 return best
             best = others[int(np.argmin(gains))]
         return best
+
+    def _remainders(self, best: Fitted, others: Sequence[Fitted], gains: Floats) -> Bools:
+        """Return which effects are no more than an error in the equation of the largest.
+
+        Args:
+            best: With all effects; `others`: without each.
+            others: In the effects' order.
+            gains: Of each effect.
+        """
+        most = int(np.argmax(gains))
+        large = (OFF * (others[most].e - best.e)) ** 2
+        small = gains < REMAINDER * gains[most]
+        for i in np.flatnonzero(small).tolist():
+            mine = (others[i].e - best.e) ** 2
+            covered = self.fitter.part @ np.minimum(mine, large)
+            small[i] = covered > COVERED * float(self.fitter.part @ mine)
+        return np.asarray(small)
 
     def _not_worse(self, fitted: Fitted, base: Fitted) -> None:
         """Let an effect that found nothing do nothing: it contains the model without it."""

@@ -21,7 +21,7 @@ SHARES = (0.55, 0.15, 0.15, 0.15)
 DRIVES = (("drive", 90.0), ("again", 60.0))
 ENOUGH_ON_PATCH_S = 1.5
 ENOUGH_AT_STOP = 0.03
-ENOUGH_EACH_WAY = 0.1
+ENOUGH_EACH_WAY = 0.08
 
 
 def names_for(kind: str, car: str, rng: np.random.Generator) -> tuple[str, ...]:

@@ -48,6 +48,9 @@ def _shape(kind, rng):
         power = rng.uniform(0.45, 0.7)
         x = np.sign(np.cos(a)) * np.abs(np.cos(a)) ** power
         y = np.sign(np.sin(a)) * np.abs(np.sin(a)) ** power
+    elif kind == "peanut":
+        waist = 1.0 + rng.uniform(0.3, 0.45) * np.cos(2.0 * a)
+        x, y = waist * np.cos(a), waist * np.sin(a)
     else:
         bulge = sum(
             rng.uniform(0.04, 0.22) / k * np.cos(k * a + rng.uniform(0.0, 6.28)) for k in (2, 3, 4)
@@ -78,7 +81,7 @@ def _curvature(x, y, spacing):
 def draw_route(temper, sharpest, rng):
     """Draw a route whose bends the car can take with some steering left."""
     while True:
-        kind = str(rng.choice(["oval", "eight", "box", "wavy", "wavy"]))
+        kind = str(rng.choice(["oval", "eight", "box", "wavy", "peanut"]))
         x, y = _shape(kind, rng)
         x = x * temper.floor[0] * rng.uniform(0.65, 1.0)
         y = y * temper.floor[1] * rng.uniform(0.65, 1.0)

@@ -65,33 +65,37 @@ def test_the_effect_of_a_number_at_its_limit_comes_closer_by_more(model):
     assert search._drifted(found.effects[-1], base) == DRIFTED
 
 
-def losing(seen, unseen):
-    """A model whose effects each cost so much when left out, where it was fitted and where not."""
+def losing(seen, unseen, where):
+    """A model whose effects each cost so much when left out, where it was fitted and where not.
+
+    `where` says at which innovation each acts where it was fitted.
+    """
     n = len(seen)
     e = np.zeros(2 + n)
     best = Fitted(tuple(candidate("steer_trim") for _ in range(n)), np.zeros(1), np.zeros(n), e,
                   0.0, np.zeros((2 + n, 1)))  # fmt: skip
     others = []
-    for lost, hidden in zip(seen, unseen, strict=True):
+    for lost, hidden, at in zip(seen, unseen, where, strict=True):
         value = np.sqrt(8.0 * np.expm1(hidden / 8.0))  # what the loss makes `hidden` of
         other = e.copy()
-        other[1] = value
+        other[1], other[2 + at] = value, np.sqrt(lost)
         others.append(replace(best, effects=best.effects[1:], e=other, q=lost))
     return best, others
 
 
 @pytest.mark.parametrize(
-    ("seen", "unseen", "stays"),
+    ("seen", "unseen", "where", "stays"),
     [
-        ((100.0,), (20.0,), True),
-        ((100.0,), (1.0,), False),
-        ((1500.0,), (PLENTY + 1.0,), True),
-        ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), False),
+        ((100.0,), (20.0,), (0,), True),
+        ((100.0,), (1.0,), (0,), False),
+        ((1500.0,), (PLENTY + 1.0,), (0,), True),
+        ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 0), False),
+        ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 1), True),
     ],
-    ids=["its share", "less than its share", "plenty", "a remainder of another"],
+    ids=["its share", "less than its share", "plenty", "a remainder of another", "small elsewhere"],
 )
-def test_an_effect_stays_where_its_gain_holds_on_an_unseen_part(model, seen, unseen, stays):
-    best, others = losing(seen, unseen)
+def test_an_effect_stays_where_its_gain_holds_on_an_unseen_part(model, seen, unseen, where, stays):
+    best, others = losing(seen, unseen, where)
     part = np.zeros(len(best.e))
     part[1] = 1.0
     fake = SimpleNamespace(settled=np.ones(len(best.e)))
