@@ -84,7 +84,7 @@ def effect_of(
     candidate = best.effects[i]
     at = sum(len(effect.knobs) for effect in best.effects[:i])
     own, estimates = len(best.z), dict[str, Estimate]()
-    mine = tuple(float(v) for v in best.values[at : at + len(candidate.knobs)])
+    mine = upright(candidate, best.values[at : at + len(candidate.knobs)].tolist())
     for j, knob in enumerate(candidate.knobs):
         value, place = mine[j], own + at + j
         told = WIDER * knob.step * math.sqrt(max(best.covariance[place, place], 0.0))
@@ -109,6 +109,20 @@ def effect_of(
         said=said(candidate, estimates),
         law=candidate.formula(mine) if isinstance(candidate, Law | Sensed) else None,
         rivals=rivals,
+    )
+
+
+def upright(candidate: Candidate, values: Sequence[float]) -> tuple[float, ...]:
+    """Return an effect's numbers with a direction in which its amount is positive.
+
+    A floor that falls towards one side rises towards the other.
+    """
+    wraps = [_wraps(knob) for knob in candidate.knobs]
+    if len(set(wraps)) < 2 or is_law(candidate) or values[wraps.index(False)] >= 0.0:
+        return tuple(values)
+    return tuple(
+        math.remainder(value + math.pi, 2.0 * math.pi) if turns else -value
+        for value, turns in zip(values, wraps, strict=True)
     )
 
 

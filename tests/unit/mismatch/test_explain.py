@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scm.mismatch.drive import Drive
-from scm.mismatch.explain import effect_of, ordinary_of, said, tried_of
+from scm.mismatch.explain import effect_of, ordinary_of, said, tried_of, upright
 from scm.mismatch.findings import Estimate
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
@@ -36,6 +36,13 @@ def test_no_recording_makes_a_number_less_sure_than_its_file_or_unphysical():
         prior = next(o for o in model.ordinary if o.key == own.key)
         assert own.found.high - own.found.low <= 2.0 * 1.645 * prior.std + 1e-12
         assert bounds[own.key][0] <= own.found.low <= own.found.high <= bounds[own.key][1]
+
+
+def test_a_floor_that_falls_to_one_side_is_told_to_rise_to_the_other():
+    grade = made_fit.candidate("grade")
+    assert upright(grade, (-0.06, -1.7)) == pytest.approx((0.06, np.pi - 1.7))
+    assert upright(grade, (0.06, -1.7)) == (0.06, -1.7)
+    assert upright(made_fit.candidate("pose_heading"), (-0.03,)) == (-0.03,)
 
 
 def test_the_interval_of_a_direction_does_not_end_where_the_angle_wraps():
