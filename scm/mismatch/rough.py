@@ -84,9 +84,12 @@ def roughly(
 
 
 class RoughSearch(Search):
-    """Looks for many effects at once, by strides."""
+    """Looks for many effects at once, by strides.
 
-    holds = 0.0
+    None is begun as strong as suits it best: it would take what belongs to the others.
+    """
+
+    holds, amplifies = 0.0, False
 
     def __init__(
         self, model: Likelihood, part: Floats, library: Sequence[Candidate], tell: Tell

@@ -66,9 +66,10 @@ class Search:
     Attributes:
         steps: What was tried, round by round.
         holds: Share of an effect's gain that must hold where nothing was fitted.
+        amplifies: Whether effects are begun as strong as suits them, and at several places.
     """
 
-    holds = 0.4
+    holds, amplifies = 0.4, True
 
     def __init__(
         self,
@@ -210,7 +211,10 @@ class Search:
         self.tell(f"trying {len(self.listed)} effects from {len(trials)} starts")
         nominal = self.fitter.nominal(base)  # a re-tuned car bends towards what is missing
         begun = [
-            _best_of_each(self.fitter.begin(start, trials, amplified=True))
+            _best_of_each(
+                self.fitter.begin(start, trials, amplified=self.amplifies),
+                SPOTS if self.amplifies else 1,
+            )
             for start in (base, nominal)
         ]
 
@@ -356,11 +360,11 @@ def _preferred(near: Sequence[Fitted], far: Sequence[Fitted]) -> list[Fitted]:
     return list(best.values())
 
 
-def _best_of_each(fits: Sequence[Fitted]) -> list[Fitted]:
-    """Return the best fit of each last effect, of one that has a place the best at some places."""
+def _best_of_each(fits: Sequence[Fitted], spots: int) -> list[Fitted]:
+    """Return the best fit of each last effect, of one that has a place the best at some spots."""
     best = dict[int, list[Fitted]]()
     for fitted in sorted(fits, key=lambda f: f.q):
         same = best.setdefault(id(fitted.effects[-1]), [])
-        if len(same) < (SPOTS if fitted.effects[-1].is_placed else 1):
+        if len(same) < (spots if fitted.effects[-1].is_placed else 1):
             same.append(fitted)
     return [fitted for same in best.values() for fitted in same]
