@@ -2,9 +2,15 @@
 
 import argparse
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scm.command import Command
+
+if TYPE_CHECKING:
+    from scm.mismatch.progress import Progress
+    from scm.recording.read import Recording
 
 FOLDER = "mismatch"
 
@@ -12,9 +18,11 @@ FOLDER = "mismatch"
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "recording", nargs="+", type=Path,
-        help="description files, their folders, or .mcap of a city: of one car",
+        help="description files, their folders, or .mcap of a city",
     )  # fmt: skip
-    parser.add_argument("--car", metavar="FILE", help="car file or name; default: the recording's")
+    parser.add_argument(
+        "--car", metavar="FILE", help="car file or name, of one car; default: the recording's"
+    )
     parser.add_argument("--vehicle", metavar="NAME", help="of several cars this one")
     parser.add_argument(
         "--data", type=Path, metavar="DIR", help="where the tables are; default: beside"
@@ -29,25 +37,59 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
-    from scm.mismatch.diagnose import diagnose, write
     from scm.mismatch.progress import Progress
-    from scm.mismatch.report.summary import summary
+    from scm.mismatch.several import cars_of
 
     name = arguments.recording[0].resolve()
     title = name.parent.name if name.name == "recording.yaml" else name.stem
     out = arguments.out or Path("runs") / f"{FOLDER}-{title}"
     progress = Progress(sys.stderr, WallClock())
     try:
-        found = diagnose(
-            arguments.recording, arguments.car, arguments.data, vehicle=arguments.vehicle,
-            budget_s=arguments.budget_s, tell=progress.tell,
-        )  # fmt: skip
-        progress.tell("writing the report")
-        write(found, out)
+        if arguments.car is None and arguments.vehicle is None:
+            cars = cars_of(arguments.recording, arguments.data)
+            said = _of_cars(cars, arguments.budget_s, out, progress)
+        else:
+            said = _of_one(arguments, out, progress)
     finally:
         progress.close()
-    print(summary(found.diagnosis, out))
+    print(said)
     return 0
+
+
+def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> str:
+    """Diagnose one car, write its report, and return what to print."""
+    from scm.mismatch.diagnose import diagnose, write
+    from scm.mismatch.report.summary import summary
+
+    found = diagnose(
+        arguments.recording, arguments.car, arguments.data, vehicle=arguments.vehicle,
+        budget_s=arguments.budget_s, tell=progress.tell,
+    )  # fmt: skip
+    progress.tell("writing the report")
+    write(found, out)
+    return summary(found.diagnosis, out)
+
+
+def _of_cars(
+    cars: "Mapping[str, Sequence[Recording]]", budget_s: float, out: Path, progress: "Progress"
+) -> str:
+    """Diagnose cars by their own files, write the report or reports, and return what to print."""
+    from scm.mismatch.diagnose import write
+    from scm.mismatch.report.several_page import several_summary
+    from scm.mismatch.report.summary import summary
+    from scm.mismatch.several import diagnose_one, diagnose_several, write_all
+
+    if len(cars) == 1:
+        (recordings,) = cars.values()
+        found = diagnose_one(recordings, budget_s=budget_s, tell=progress.tell)
+        progress.tell("writing the report")
+        write(found, out)
+        return summary(found.diagnosis, out)
+    several = diagnose_several(cars, budget_s=budget_s, tell=progress.tell, turn=progress.turn)
+    progress.tell("writing the reports")
+    write_all(several, out)
+    diagnoses = {name: found.diagnosis for name, found in several.cars.items()}
+    return several_summary(diagnoses, several.common, out)
 
 
 COMMAND = Command(

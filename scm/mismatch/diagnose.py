@@ -59,6 +59,30 @@ Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
+class Searched:
+    """What a search ended with, ready to be told, or taken further by what other cars show.
+
+    Attributes:
+        recordings, drives: That were usable.
+        car: As given.
+        rough: Whether the car was judged by strides.
+        held, sought: What a law was held against; None where none was looked for.
+    """
+
+    recordings: Sequence[Recording]
+    drives: Sequence[Drive]
+    car: Car
+    model: Likelihood
+    parts: Parts
+    search: Search
+    best: Fitted
+    rough: bool
+    tried: tuple[Tried, ...]
+    held: Standing | None
+    sought: Sought | None
+
+
+@dataclass(frozen=True, slots=True)
 class Found:
     """A diagnosis with what the report needs beside it.
 
@@ -67,6 +91,7 @@ class Found:
         model: Of the recordings; None where they cannot be used, like the two fits.
         best: What was found; `retuned`: the car's own numbers refitted alone.
         suggestions: Drives that would tell what this one cannot.
+        searched: What it was told from; None where nothing could be searched.
     """
 
     diagnosis: Diagnosis
@@ -76,6 +101,7 @@ class Found:
     best: Fitted | None = None
     retuned: Fitted | None = None
     suggestions: tuple[Suggestion, ...] = ()
+    searched: Searched | None = None
 
 
 def diagnose(
@@ -103,14 +129,30 @@ def diagnose(
     Raises:
         ScmError: when a recording or the car file cannot be read.
     """
-    clock = clock or WallClock()
-    began_ns = clock.now_ns()
     recordings = [one for path in paths for one in recordings_of_one(path, data, vehicle)]
     file = car_file or recordings[0].vehicle
     car = load_car(file, trusted=car_file is not None)
     if car_file is None and any(r.vehicle != file for r in recordings):
         msg = f"{paths[0]}: recordings of several cars; say which with --car"
         raise RecordingError(msg)
+    return diagnose_car(recordings, car, budget_s=budget_s, tell=tell, clock=clock)
+
+
+def diagnose_car(
+    recordings: Sequence[Recording],
+    car: Car,
+    *,
+    budget_s: float = 120.0,
+    tell: Tell = lambda _: None,
+    clock: Clock | None = None,
+) -> Found:
+    """Return what `diagnose` does, of recordings that were read already, all of one car.
+
+    Raises:
+        ScmError: when a recording cannot be used as such a car's.
+    """
+    clock = clock or WallClock()
+    began_ns = clock.now_ns()
     tell("doubting the data")
     usable, problems = _doubted(recordings, car)
     if not usable:
@@ -261,6 +303,18 @@ def _searched(
         held, tried = None, tried_of(search)
     tell("judging on what the fit did not see")
     best = search.confirmed(best, parts.confirm.weight)
+    searched = Searched(
+        recordings, drives, car, model, parts, search, best, rough, tried, held, sought
+    )
+    return told(searched, tell)
+
+
+def told(searched: Searched, tell: Tell) -> Found:
+    """Return the diagnosis that a search's best model is, judged, located and put into words."""
+    drives, model, parts, search = (
+        searched.drives, searched.model, searched.parts, searched.search
+    )  # fmt: skip
+    car, best, rough = searched.car, searched.best, searched.rough
     numbers = search.fitter.numbers(best.effects, best.z, best.values)
     fit, free_runs = _judged(drives, model.car, numbers, parts)
     while rough and best.effects and fit is not None and POSE[0] in nothing_got_worse(fit):
@@ -270,7 +324,9 @@ def _searched(
     tuned = search.fitter.numbers((), search.retuned.z, np.zeros(0))
     retuned_m = retuned_error(drives, model.car, tuned, numbers, parts) if best.effects else None
     located, residuals = locate(model, search.retuned, best)
-    effects = tuple(effect_of(search, best, i, held, sought) for i in range(len(best.effects)))
+    effects = tuple(
+        effect_of(search, best, i, searched.held, searched.sought) for i in range(len(best.effects))
+    )
     suggestions = () if rough else undecided_of(model, search, best, tell)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
     verdict = _verdict(effects, undecided, fit)
@@ -279,8 +335,8 @@ def _searched(
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
                           fit=fit, runtime_s=0.0)  # fmt: skip
     evidence = Evidence(
-        vehicle=car.name, recordings=_titles(recordings), residuals=residuals,
-        free_runs=free_runs, ordinary=ordinary_of(model, best, car), tried=tried,
-        curves=_curves(model, best, sought), retuned_m=retuned_m,
+        vehicle=car.name, recordings=_titles(searched.recordings), residuals=residuals,
+        free_runs=free_runs, ordinary=ordinary_of(model, best, car), tried=searched.tried,
+        curves=_curves(model, best, searched.sought), retuned_m=retuned_m,
     )  # fmt: skip
-    return Found(diagnosis, car, evidence, model, best, search.retuned, suggestions)
+    return Found(diagnosis, car, evidence, model, best, search.retuned, suggestions, searched)

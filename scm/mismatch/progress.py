@@ -35,11 +35,25 @@ class Progress:
         self._stream, self._clock = stream, clock
         self._began_ns = self._step_ns = clock.now_ns()
         self._share, self._next, self._shown, self._text = 0.0, STEPS[1][1], 0.0, ""
+        self._of, self._from, self._part = "", 0.0, 1.0
         self._lock, self._over = threading.Lock(), threading.Event()
         self._drawing: threading.Thread | None = None
         if stream.isatty():
             self._drawing = threading.Thread(target=self._redraw, daemon=True)
             self._drawing.start()
+
+    def turn(self, name: str, number: int, count: int) -> None:
+        """Begin with one of several cars, or with what is done after them all.
+
+        Args:
+            name: Stands before what is tried.
+            number: From 0; `count`: of all turns, which take equal shares.
+            count: How many.
+        """
+        with self._lock:
+            self._shown = 0.0
+            self._share, self._next = 0.0, STEPS[1][1]
+            self._of, self._from, self._part = f"{name}: ", number / count, 1.0 / count
 
     def tell(self, text: str) -> None:
         """Say what is tried from now on."""
@@ -48,9 +62,9 @@ class Progress:
             self._share = _share(text, self._share)
             after = min((s for _, s in STEPS if s > self._share + 0.005), default=1.0)
             self._next = min(after, self._share + ANOTHER_EFFECT)
-            self._text, self._step_ns = text, self._clock.now_ns()
+            self._text, self._step_ns = self._of + text, self._clock.now_ns()
         if self._drawing is None:
-            self._write(f"{self._elapsed_s():5.0f} s  {text}\n")
+            self._write(f"{self._elapsed_s():5.0f} s  {self._of}{text}\n")
         else:
             self._draw()
 
@@ -64,7 +78,7 @@ class Progress:
     def line(self) -> str:
         """Return the bar as it is now."""
         with self._lock:
-            done, text = self._done(), self._text
+            done, text = self._from + self._part * self._done(), self._text
         filled = round(BAR * done)
         bar = "#" * filled + "." * (BAR - filled)
         return f"[{bar}] {100.0 * done:3.0f} %  {self._elapsed_s():3.0f} s  {text}"[:WIDTH]

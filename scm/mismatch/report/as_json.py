@@ -19,16 +19,16 @@ def json_text(diagnosis: Diagnosis) -> str:
 def report_fields(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the fields as lists, mappings, text, and finite numbers or None."""
     return {
-        field.name: _plain(getattr(diagnosis, field.name))
-        for field in dataclasses.fields(diagnosis)
+        field.name: plain(getattr(diagnosis, field.name)) for field in dataclasses.fields(diagnosis)
     }
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Return a value as lists, mappings, text, and finite numbers or None."""
     if dataclasses.is_dataclass(value):
-        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, str):
         return str(value)
     if value is None or isinstance(value, (bool, int)):
@@ -36,4 +36,4 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Real):
         number = float(value)
         return number if math.isfinite(number) else None
-    return [_plain(item) for item in value]
+    return [plain(item) for item in value]

@@ -44,7 +44,7 @@ def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
     if diagnosis.verdict is Verdict.MISMATCH and not diagnosis.effects:
         cards.append(_no_name_card(evidence))
     cards += [
-        _card("data", "Problem of the recording", title, rows)
+        card("data", "Problem of the recording", title, rows)
         for title, rows in problem_cards(diagnosis, evidence)
     ]
     return (
@@ -91,7 +91,8 @@ def _bars(diagnosis: Diagnosis, picture: Picture) -> str:
     return tag("h2", title) + around("div", picture.svg, "canvas")
 
 
-def _card(kind: str, label: str, title: str, rows: Sequence[tuple[str, str]]) -> str:
+def card(kind: str, label: str, title: str, rows: Sequence[tuple[str, str]]) -> str:
+    """Return one card: what it is about, its title, and facts by name; empty ones are left out."""
     facts = "".join(tag("dt", name) + tag("dd", said) for name, said in rows if said)
     head = tag("p", label, "label") + tag("h2", title)
     return around("article", head + around("dl", facts), f"card {kind}")
@@ -113,7 +114,7 @@ def _effect_cards(diagnosis: Diagnosis) -> Iterator[str]:
         kind = "Measuring off" if effect.equation is Equation.SENSOR else "Left out"
         kind = "Likeliest, but undecided" if effect.name in open_names else kind
         label = f"{kind}{number}" + ("" if effect.listed else ", outside the library")
-        yield _card("effect", label, capital(title_of(effect.name)), rows)
+        yield card("effect", label, capital(title_of(effect.name)), rows)
 
 
 def _located_of(effect: Effect, located: Sequence[Located]) -> Sequence[Located]:
@@ -141,7 +142,7 @@ def name_of(name: str, unit: str) -> str:
 def _located_card(diagnosis: Diagnosis) -> Iterator[str]:
     """Yield where the error lies, where no effect says it."""
     if diagnosis.located and not diagnosis.effects:
-        yield _card(
+        yield card(
             "effect", "Located", "Where it lies", [("Where", where_and_when(diagnosis.located))]
         )
 
@@ -161,7 +162,7 @@ def _undecided_card(question: Undecided, folder: str) -> str:
         ("Then" if folder else "By driving", _then(question, folder)),
         ("Or check", "\n".join(checks_of(question.between))),
     ]
-    return _card("question", "Undecided", capital(joined(titles, "or")) + "?", rows)
+    return card("question", "Undecided", capital(joined(titles, "or")) + "?", rows)
 
 
 def _then(question: Undecided, folder: str) -> str:
@@ -191,7 +192,7 @@ def _checked_card(evidence: Evidence) -> str:
         ("What to do", "Nothing. If the car still surprises you, record faster turns, harder "
                        "starts and stops, and another part of the floor."),
     ]  # fmt: skip
-    return _card("clear", "No mismatch", "What was checked", rows)
+    return card("clear", "No mismatch", "What was checked", rows)
 
 
 def _no_name_card(evidence: Evidence) -> str:
@@ -203,7 +204,7 @@ def _no_name_card(evidence: Evidence) -> str:
                        "its file an honest `std` for each number: one that is far off and may not "
                        "move is the usual cause. Are the commands those of this very drive?"),
     ]  # fmt: skip
-    return _card("question", "No name", "Cause unknown", rows)
+    return card("question", "No name", "Cause unknown", rows)
 
 
 def _best_tried(best: Tried) -> str:

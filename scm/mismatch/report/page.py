@@ -36,12 +36,16 @@ def page_html(
     """Return the page; `cars` are the given one and the patched one, `use` what to do with it."""
     below = expert_sections(diagnosis, evidence, drawings, cars)
     body = first_screen(diagnosis, evidence) + tag("p", use, "use") + _links(below) + below
-    title = escape(f"{evidence.vehicle}: {verdict_sentence(diagnosis)}")
+    return document(f"{evidence.vehicle}: {verdict_sentence(diagnosis)}", body)
+
+
+def document(title: str, body: str) -> str:
+    """Return a whole page around HTML that is safe already."""
     style = colours_css() + Path(__file__).with_name("style.css").read_text(encoding="utf-8")
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{title}</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
+        f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
         f"{around('main', body)}\n</body>\n</html>\n"
     )
 

@@ -61,3 +61,17 @@ def test_elsewhere_each_step_is_a_plain_line(clock):
     progress.tell("doubting the data")
     progress.close()
     assert stream.getvalue() == "    0 s  doubting the data\n"
+
+
+def test_of_several_cars_each_takes_its_share_and_is_named(clock):
+    progress, seen = Progress(Terminal(), clock), []
+    for number, name in enumerate(("n1", "n2", "all cars")):
+        progress.turn(name, number, 3)
+        for text in STEPS:
+            progress.tell(text)
+            seen.append(share(progress.line()))
+        assert f"{name}: writing" in progress.line()
+    progress.close()
+    assert seen == sorted(seen)
+    assert seen[len(STEPS)] == 33
+    assert seen[-1] >= 95

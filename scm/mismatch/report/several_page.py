@@ -1,0 +1,172 @@
+"""The page of several cars: each car's verdict with its report, and what they have in common."""
+
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from urllib.parse import quote
+
+from scm.mismatch.findings import Diagnosis, Estimate
+from scm.mismatch.report.advice import advice_of
+from scm.mismatch.report.as_json import plain
+from scm.mismatch.report.first_screen import better, card, name_of
+from scm.mismatch.report.html_text import around, section, table, tag
+from scm.mismatch.report.page import document
+from scm.mismatch.report.several_picture import seen_picture
+from scm.mismatch.report.summary import summary
+from scm.mismatch.report.verdict_text import can_judge, count, verdict_sentence
+from scm.mismatch.report.wording import capital, interval, joined, pretty, title_of
+from scm.mismatch.report.write import PAGE
+from scm.mismatch.several_findings import CarSight, Cause, Common, Sight
+
+CARS = "cars.json"
+_SAYS: Mapping[Sight, str] = {
+    Sight.SEES: "sees it",
+    Sight.ADDS: "too weak alone, adds to the others",
+    Sight.CANNOT_TELL: "cannot tell",
+    Sight.OTHERWISE: "contradicts it",
+}
+_LABELS: Mapping[Cause, str] = {
+    Cause.CAMERA: "The camera", Cause.TAGS: "Tags and camera", Cause.FLOOR: "The floor",
+}  # fmt: skip
+_NOTHING = (
+    "No car's report names anything that an overhead camera or a floor does to every car, and "
+    "their drives taken together show none either."
+)
+
+
+def write_several(
+    cars: Mapping[str, Diagnosis],
+    recordings: Mapping[str, Sequence[str]],
+    common: Sequence[Common],
+    runtime_s: float,
+    out: Path,
+) -> None:
+    """Write `report.html` and `cars.json` beside the folders of the cars' own reports.
+
+    Args:
+        cars: Diagnoses by name, which is also the report's folder.
+        recordings: Titles by the same.
+        common: What they share.
+        runtime_s: Of all.
+        out: Is made where it is missing.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    fields = {
+        "cars": [
+            {
+                "name": name,
+                "report": f"{name}/{PAGE}",
+                "verdict": str(diagnosis.verdict),
+                "said": verdict_sentence(diagnosis),
+                "effects": [effect.name for effect in diagnosis.effects],
+            }
+            for name, diagnosis in cars.items()
+        ],
+        "common": [plain(one) for one in common],
+        "runtime_s": runtime_s,
+    }
+    text = json.dumps(fields, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    (out / CARS).write_text(text, encoding="utf-8")
+    (out / PAGE).write_text(several_html(cars, recordings, common), encoding="utf-8")
+
+
+def several_html(
+    cars: Mapping[str, Diagnosis],
+    recordings: Mapping[str, Sequence[str]],
+    common: Sequence[Common],
+) -> str:
+    """Return the page of several cars."""
+    titles = list(dict.fromkeys(title for one in recordings.values() for title in one))
+    word = "recordings" if len(titles) > 1 else "recording"
+    where = f"Cars {joined(list(cars))}, {word} {joined(titles) or 'unnamed'}"
+    sentence = common_sentence(common)
+    head = tag("p", where, "inputs") + tag("h1", sentence)
+    head += "".join(tag("p", f"{capital(title_of(one.name))}: {one.conclusion}") for one in common)
+    if not common:
+        head += tag("p", _NOTHING)
+    kind = "mismatch" if any(one.shared for one in common) else "none"
+    body = around("header", around("div", head, "words"), f"verdict {kind}")
+    body += around("div", "".join(_car_card(*one) for one in cars.items()), "cards")
+    shared = [_common_card(one, cars) for one in common]
+    body += around("div", "".join(shared), "cards") if shared else ""
+    body += "".join(_seen(one) for one in common)
+    return document(f"{joined(list(cars))}: {sentence}", body)
+
+
+def common_sentence(common: Sequence[Common]) -> str:
+    """Return what the cars have in common, in one sentence."""
+    shared = [one for one in common if one.shared]
+    if shared:
+        return f"The cars have in common: {joined([title_of(one.name) for one in shared])}."
+    if common:
+        own = joined([title_of(one.name) for one in common])
+        return f"Nothing that the cars have in common; not shared: {own}."
+    return "Nothing that the cars have in common was found."
+
+
+def several_summary(cars: Mapping[str, Diagnosis], common: Sequence[Common], out: Path) -> str:
+    """Return the last lines of the command: each car's, then what they share."""
+    lines = [line for name, one in cars.items() for line in (f"{name}:", summary(one, out / name))]
+    lines.append(common_sentence(common))
+    for one in common:
+        lines += [f"  {one.name}  {_amounts(one.parameters, '; ')}", f"    {one.conclusion}"]
+    return "\n".join([*lines, f"  {out / PAGE}"])
+
+
+def _car_card(name: str, diagnosis: Diagnosis) -> str:
+    """Return a car's verdict with a link to its report."""
+    kind = "effect" if diagnosis.effects else "clear"
+    kind = "question" if diagnosis.undecided else kind
+    kind = kind if can_judge(diagnosis) else "data"
+    link = f'<a href="{quote(name)}/{PAGE}">The report of {escape(name)}</a>'
+    inner = tag("p", f"Car {name}", "label") + tag("h2", verdict_sentence(diagnosis))
+    return around("article", inner + better(diagnosis) + around("p", link), f"card {kind}")
+
+
+def _common_card(common: Common, cars: Mapping[str, Diagnosis]) -> str:
+    effects = [e for one in cars.values() for e in one.effects if e.name == common.name]
+    rows = [
+        ("What", pretty(common.said)),
+        ("How much", _amounts(common.parameters, "\n")),
+        ("Whose", common.conclusion),
+        ("What to do", advice_of(effects[0]) if effects else ""),
+    ]
+    label = _LABELS[common.cause] if common.shared else "One car's own"
+    label = label if common.shared or _is_told(common) else "Whose is open"
+    return card("effect", label, capital(title_of(common.name)), rows)
+
+
+def _is_told(common: Common) -> bool:
+    return any(c.sight is Sight.OTHERWISE for c in common.cars)
+
+
+def _amounts(parameters: Mapping[str, Estimate], mark: str) -> str:
+    return mark.join(f"{name_of(n, e.unit)} {interval(e)}" for n, e in parameters.items())
+
+
+def _seen(common: Common) -> str:
+    """Return what each car's recordings say of an effect, for experts."""
+    rows = [_row(one) for one in common.cars]
+    head = ("Car", "Its own value", "Says", "Found alone", "Gains", "Needed", "Misses")
+    words = (
+        "Gains: what the shared value explains of the car's recordings, in squared standard "
+        "deviations; needed: what its numbers cost, for nobody searched for them there. Misses: "
+        f"squared deviation of the car's own value from the others'; {count(_knobs(common))} "
+        "would be usual."
+    )
+    picture = seen_picture(common)
+    title = f"Who sees {title_of(common.name)}"
+    body = table(head, rows, (4, 5, 6)) + tag("p", words, "use")
+    return section(f"seen-{common.name.replace(' ', '-')}", title, picture, body)
+
+
+def _row(one: CarSight) -> tuple[str, ...]:
+    alone = "yes" if one.alone else "no"
+    numbers = (f"{value:.0f}" for value in (one.gain, one.needed))
+    own = _amounts(one.own, "\n")
+    return one.car, own, _SAYS[one.sight], alone, *numbers, f"{one.misses:.1f}"
+
+
+def _knobs(common: Common) -> int:
+    return len(common.parameters)

@@ -1,0 +1,165 @@
+"""A diagnosis of several cars: each by itself, then what they have in common."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from scm.clock import Clock, WallClock, seconds
+from scm.mismatch.diagnose import Found, Searched, diagnose_car, told, write
+from scm.mismatch.explain import said
+from scm.mismatch.findings import Diagnosis, Effect
+from scm.mismatch.report.several_page import write_several
+from scm.mismatch.several_common import compared
+from scm.mismatch.several_findings import Common, Sight
+from scm.mismatch.several_verdict import all_alike
+from scm.recorder.drives import SUFFIX, recordings_of
+from scm.recording.read import Recording
+from scm.vehicles.car import load_car
+
+Tell = Callable[[str], None]
+Turn = Callable[[str, int, int], None]
+TOGETHER = "all cars"
+
+
+@dataclass(frozen=True, slots=True)
+class Several:
+    """What was found of several cars.
+
+    Attributes:
+        cars: By name, which is also that of the folder of its report.
+        common: Effects of what the cars share.
+    """
+
+    cars: Mapping[str, Found]
+    common: tuple[Common, ...]
+    runtime_s: float
+
+
+def cars_of(
+    paths: Sequence[Path | str], data: Path | None = None, vehicle: str | None = None
+) -> dict[str, list[Recording]]:
+    """Return the recordings of each car by a name for it, in the order of the recordings.
+
+    In descriptions one `vehicle:` is one car; in runs of a city a car is who the city says. Where
+    nothing given holds several cars and all name one car file, they are of one car.
+
+    Raises:
+        RecordingError: when there is nothing to read.
+    """
+    grouped: dict[tuple[str, str], list[Recording]] = {}
+    read = [(path, recordings_of(path, data, vehicle)) for path in paths]
+    every = [recording for _, recordings in read for recording in recordings]
+    if len(every) == len(read) and len({recording.vehicle for recording in every}) == 1:
+        return {every[0].name or Path(every[0].vehicle).stem: every}
+    for path, recordings in read:
+        for recording in recordings:
+            is_run = Path(path).suffix == SUFFIX
+            name = recording.name if is_run else Path(recording.vehicle).stem
+            grouped.setdefault((name, recording.vehicle), []).append(recording)
+    found: dict[str, list[Recording]] = {}
+    for (name, _), together in grouped.items():
+        number, free = 2, name
+        while free in found:  # two files of one name are two cars
+            free, number = f"{name}_{number}", number + 1
+        found[free] = together
+    return found
+
+
+def diagnose_one(
+    recordings: Sequence[Recording],
+    *,
+    budget_s: float = 120.0,
+    tell: Tell = lambda _: None,
+    clock: Clock | None = None,
+) -> Found:
+    """Return what a simulator lacks to explain one car, by the file that its recordings name.
+
+    Raises:
+        ScmError: when a recording or the car file cannot be used.
+    """
+    car = load_car(recordings[0].vehicle, trusted=False)
+    return diagnose_car(recordings, car, budget_s=budget_s, tell=tell, clock=clock)
+
+
+def diagnose_several(
+    cars: Mapping[str, Sequence[Recording]],
+    *,
+    budget_s: float = 120.0,
+    tell: Tell = lambda _: None,
+    turn: Turn = lambda *_: None,
+    clock: Clock | None = None,
+) -> Several:
+    """Return what a simulator lacks to explain each of several cars, and what they share.
+
+    Args:
+        cars: Recordings by car, as `cars_of` returns them.
+        budget_s: For each car, as in `diagnose`.
+        tell: Is told what is being tried; `turn` for whom, which turn it is, and of how many.
+        turn: None of both matters to the result.
+        clock: For the time it took.
+
+    Raises:
+        ScmError: when a recording or a car file cannot be used.
+    """
+    clock = clock or WallClock()
+    began_ns, turns, found = clock.now_ns(), len(cars) + 1, dict[str, Found]()
+    for number, (name, recordings) in enumerate(cars.items()):
+        turn(name, number, turns)
+        found[name] = diagnose_one(recordings, budget_s=budget_s, tell=tell, clock=clock)
+    turn(TOGETHER, len(cars), turns)
+    searches = {name: one.searched for name, one in found.items() if one.searched is not None}
+    common = list[Common]()
+    if len(searches) > 1:
+        with threadpool_limits(1):
+            common, taken = compared(searches, tell)
+            for name, searched in taken.items():
+                if searched is not searches[name]:
+                    found[name] = _told_anew(name, found[name], searched, common, tell)
+    return Several(found, tuple(common), seconds(clock.now_ns() - began_ns))
+
+
+def write_all(several: Several, out: Path) -> None:
+    """Write each car's report into its folder, and the page and `cars.json` of them all.
+
+    Raises:
+        ScmError: when a folder cannot be written.
+    """
+    for name, found in several.cars.items():
+        write(found, out / name)
+    diagnoses = {name: found.diagnosis for name, found in several.cars.items()}
+    recordings = {name: found.evidence.recordings for name, found in several.cars.items()}
+    write_several(diagnoses, recordings, several.common, several.runtime_s, out)
+
+
+def _told_anew(
+    name: str, found: Found, searched: Searched, common: Sequence[Common], tell: Tell
+) -> Found:
+    """Return a car's diagnosis with the effects that it shares, at the shared estimates."""
+    anew = told(searched, tell)
+    shared = {c.name: c for c in common if c.shared and _sees(c, name)}
+    effects = tuple(
+        _with_shared(effect, shared[effect.name], name, anew) if effect.name in shared else effect
+        for effect in anew.diagnosis.effects
+    )
+    before: Diagnosis = found.diagnosis
+    diagnosis = replace(
+        anew.diagnosis, effects=effects, data=before.data, runtime_s=before.runtime_s
+    )
+    return replace(anew, diagnosis=diagnosis)
+
+
+def _sees(common: Common, name: str) -> bool:
+    mine = next(c for c in common.cars if c.car == name)
+    return mine.sight in (Sight.SEES, Sight.ADDS)
+
+
+def _with_shared(effect: Effect, common: Common, name: str, anew: Found) -> Effect:
+    """Return an effect as all cars together tell it."""
+    if set(effect.parameters) != set(common.parameters) or anew.best is None:
+        return effect
+    estimates = {key: common.parameters[key] for key in effect.parameters}
+    candidate = next(e for e in anew.best.effects if e.name == effect.name)
+    words = f"{said(candidate, estimates)} {all_alike(common.cars, name)}"
+    return replace(effect, parameters=estimates, said=words)

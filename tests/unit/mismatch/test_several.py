@@ -1,0 +1,109 @@
+"""Which recordings are of one car, and what is written of several."""
+
+import argparse
+import json
+import re
+import shutil
+
+import pytest
+
+from scm.commands import mismatch
+from scm.mismatch.findings import Estimate, Verdict
+from scm.mismatch.report.several_page import several_html, several_summary, write_several
+from scm.mismatch.several import cars_of
+from scm.mismatch.several_findings import CarSight, Cause, Common, Sight
+from scm.mismatch.several_verdict import conclusion
+from scm.vehicles.car import load_car
+from tests.reality.several_cars import write_cars
+from tests.unit.mismatch import made_up_findings as made_up
+
+
+def seen(car, sight=Sight.SEES, value=0.03, *, alone=False):
+    own = {"tilt_x": Estimate(value=value, low=value - 0.01, high=value + 0.01, unit="1/m")}
+    return CarSight(car=car, sight=sight, alone=alone, gain=40.0, needed=8.0, misses=0.4, own=own)
+
+
+def common(*cars, shared=True, cause=Cause.CAMERA):
+    told = {"tilt_x": Estimate(value=0.03, low=0.025, high=0.035, unit="1/m")}
+    return Common(
+        name="camera_tilt", cause=cause, shared=shared, parameters=told, cars=cars,
+        said="The camera looks askew.", conclusion=conclusion(cause, cars, shared=shared),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def two(tmp_path):
+    write_cars(tmp_path / "two", 2, 3.0, lambda _: {})
+    return tmp_path / "two"
+
+
+def test_tables_with_vehicles_of_their_own_are_several_cars(two):
+    assert list(cars_of([two])) == ["car_1", "car_2"]
+    assert [len(recordings) for recordings in cars_of([two, two]).values()] == [2, 2]
+
+
+def test_recordings_that_name_one_car_are_of_one(tmp_path):
+    write_cars(tmp_path / "one", 1, 3.0, lambda _: {})
+    cars = cars_of([tmp_path / "one", tmp_path / "one"])
+    assert [len(recordings) for recordings in cars.values()] == [2]
+
+
+def test_two_cars_of_one_name_get_folders_of_their_own(two, tmp_path):
+    shutil.copytree(two, tmp_path / "again")
+    assert list(cars_of([two, tmp_path / "again"])) == ["car_1", "car_2", "car_1_2", "car_2_2"]
+
+
+def test_all_cars_are_diagnosed_each_into_its_own_folder(two, tmp_path, capsys):
+    parser = argparse.ArgumentParser()
+    mismatch.COMMAND.arguments(parser)
+    out = tmp_path / "out"
+    assert mismatch.COMMAND.run(parser.parse_args([str(two), "--out", str(out)])) == 0
+    for car in ("car_1", "car_2"):
+        assert json.loads((out / car / "report.json").read_text(encoding="utf-8"))["data"]
+        assert load_car(str(out / car / "car.toml")).name == "nigel"
+        assert f'href="{car}/report.html"' in (out / "report.html").read_text(encoding="utf-8")
+    cars = json.loads((out / "cars.json").read_text(encoding="utf-8"))
+    assert [one["name"] for one in cars["cars"]] == ["car_1", "car_2"]
+    assert cars["common"] == []
+    assert "Nothing that the cars have in common was found." in capsys.readouterr().out
+
+
+def test_the_page_says_each_verdict_and_what_is_common(tmp_path):
+    cars = {"n1": made_up.diagnosis(), "n2": made_up.diagnosis(verdict=Verdict.NONE, effects=())}
+    found = common(seen("n1", alone=True), seen("n2"))
+    page = several_html(cars, {"n1": ("run",), "n2": ("run",)}, [found])
+    first = page.partition("<section")[0]
+    assert "The cars have in common: camera tilt." in first
+    assert "Both cars see it alike: it is the camera, not the cars." in first
+    assert "Nothing beyond noise" in first
+    assert not re.search(r"(src|href)=.?https?:|<script|@import", page)
+    write_several(cars, {"n1": ("run",), "n2": ("run",)}, [found], 3.0, tmp_path)
+    told = json.loads((tmp_path / "cars.json").read_text(encoding="utf-8"))["common"][0]
+    assert told["shared"] is True
+    assert told["cars"][1]["sight"] == "sees"
+    assert "Both cars see it alike" in several_summary(cars, [found], tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("cars", "shared", "says"),
+    [
+        (
+            (seen("a"), seen("b"), seen("c", Sight.CANNOT_TELL)), True,
+            "a and b see it alike: it is the camera, not the cars. The drive of c cannot tell",
+        ),
+        (
+            (seen("a"), seen("b"), seen("c", Sight.OTHERWISE)), True,
+            "a and b see it alike, c would have to and does not: it is something that only a and b",
+        ),
+        (
+            (seen("a", alone=True), seen("b", Sight.CANNOT_TELL)), False,
+            "Only a sees it; the drive of b cannot tell whether it is the camera",
+        ),
+        (
+            (seen("a"), seen("b", Sight.ADDS), seen("c", Sight.ADDS)), True,
+            "Too weak for one car alone, all 3 cars together show it: it is the camera",
+        ),
+    ],
+)  # fmt: skip
+def test_whose_it_is_in_words(cars, shared, says):
+    assert conclusion(Cause.CAMERA, cars, shared=shared).startswith(says)

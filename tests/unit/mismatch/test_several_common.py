@@ -1,0 +1,93 @@
+"""Cars under one camera: what all see is the camera's, what one sees is its own."""
+
+from functools import cache
+
+import pytest
+
+from scm.mismatch.search import price
+from scm.mismatch.several_common import compared
+from scm.mismatch.several_findings import Cause, Sight
+from tests.unit.mismatch.made_cars import drive_of, searched, tagged, tilted
+
+CARS = ("a", "b", "c")
+TILT, WEAK, TAG_M = 0.03, 0.01, 0.03
+
+
+@cache
+def drives():
+    return {name: drive_of(seed) for seed, name in enumerate(CARS, start=1)}
+
+
+@cache
+def under_one_tilted_camera():
+    """Only the first car's search found the tilt."""
+    cars = {name: searched(tilted(drive, TILT, 0.0)) for name, drive in drives().items()}
+    cars["a"] = searched(tilted(drives()["a"], TILT, 0.0), camera_tilt=(0.02, 0.0))
+    return cars, *compared(cars, lambda _: None)
+
+
+def test_what_all_cars_see_is_the_cameras():
+    _, (tilt,), _ = under_one_tilted_camera()
+    assert (tilt.name, tilt.cause, tilt.shared) == ("camera_tilt", Cause.CAMERA, True)
+    assert [one.sight for one in tilt.cars] == [Sight.SEES] * 3
+    assert [one.alone for one in tilt.cars] == [True, False, False]
+    assert tilt.conclusion == "All 3 cars see it alike: it is the camera, not the cars."
+
+
+def test_all_cars_together_know_the_tilt_better_than_each_alone():
+    _, (tilt,), _ = under_one_tilted_camera()
+    together = tilt.parameters["tilt_x"]
+    assert together.low < TILT < together.high
+    for one in tilt.cars:
+        own = one.own["tilt_x"]
+        assert together.high - together.low < 0.7 * (own.high - own.low)
+
+
+def test_a_car_that_found_nothing_gets_what_all_share_at_the_shared_value():
+    _, (tilt,), taken = under_one_tilted_camera()
+    for searched_again in taken.values():
+        assert searched_again.best.names == ("camera_tilt",)
+        assert searched_again.best.values[0] == pytest.approx(tilt.parameters["tilt_x"].value)
+
+
+def test_a_wrong_tag_is_the_car_s_own():
+    cars = {name: searched(drive) for name, drive in drives().items()}
+    cars["b"] = searched(tagged(drives()["b"], TAG_M, 0.0), pose_point=(0.02, 0.0))
+    (point,), taken = compared(cars, lambda _: None)
+    assert not point.shared
+    assert [one.sight for one in point.cars] == [Sight.OTHERWISE, Sight.SEES, Sight.OTHERWISE]
+    assert point.conclusion == (
+        "Only b sees it, a and c would have to and do not: it is that car's own tag or its "
+        "mounting, not the camera."
+    )
+    assert point.parameters["x_m"].low < TAG_M < point.parameters["x_m"].high
+    assert [one.best.names for one in taken.values()] == [(), ("pose_point",), ()]
+
+
+def test_a_tilt_too_weak_for_one_car_is_found_by_all_together():
+    cars = {name: searched(tilted(drive, WEAK, 0.0)) for name, drive in drives().items()}
+    (tilt,), taken = compared(cars, lambda _: None)
+    for name, one in zip(CARS, tilt.cars, strict=True):
+        search = cars[name].search
+        assert one.gain < price((search.listed[0],), search.events, len(search.listed))
+    assert tilt.shared
+    assert tilt.parameters["tilt_x"].low < WEAK < tilt.parameters["tilt_x"].high
+    assert all(one.best.names == ("camera_tilt",) for one in taken.values())
+    assert tilt.conclusion.startswith("Too weak for one car alone, all 3 cars together show it")
+
+
+def test_healthy_cars_have_nothing_in_common():
+    cars = {name: searched(drive) for name, drive in drives().items()}
+    common, taken = compared(cars, lambda _: None)
+    assert not common
+    assert taken == cars
+
+
+def test_cars_with_tags_wrong_by_unlike_amounts_share_nothing():
+    cars = {
+        name: searched(tagged(drives()[name], ahead, 0.0), pose_point=(ahead, 0.0))
+        for name, ahead in (("a", 0.03), ("b", -0.03))
+    }
+    (point,), _ = compared(cars, lambda _: None)
+    assert not point.shared
+    assert "each by another amount" in point.conclusion
