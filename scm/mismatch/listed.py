@@ -206,7 +206,8 @@ RARE: Mapping[str, float] = {
     "motor_gain": 14.0,
     "drive_curve": 10.0,
     "load_transfer": 6.0,
-    "wind": 6.0,
+    "grade": 4.0,  # of which wheels askew are a twin, for a car that drives one way
+    "wind": 10.0,
     "tyre_grip": 4.0,
 }
 
