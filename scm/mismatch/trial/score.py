@@ -56,7 +56,10 @@ def score(label: Label, diagnosis: Diagnosis) -> Outcome:
         return _control(label, diagnosis, said)
     undecided = {name for group in diagnosis.undecided for name in group.between}
     right = {name for name in label.names if _was_said(name, label, diagnosis)}
-    false_names = tuple(e.name for e in diagnosis.effects if not _belongs(e, label))
+    false_names = tuple(
+        e.name for e in diagnosis.effects
+        if not _belongs(e, label) and not _is_twin(e.name, label, undecided)
+    )  # fmt: skip
     reported = right | {name for name in label.names if name in undecided}
     nothing = diagnosis.verdict == Verdict.NONE and not said and not right
     pairs = [pair for effect in diagnosis.effects for pair in _compared(effect, label)]
@@ -113,6 +116,12 @@ def _belongs(effect: Effect, label: Label) -> bool:
     if label.kind == "unlisted":
         return is_law(effect, label)
     return effect.listed and effect.name in label.names
+
+
+def _is_twin(name: str, label: Label, undecided: set[str]) -> bool:
+    """Say whether an effect is only one name of what was left undecided, and what it is another."""
+    alike = {name for name in label.names if name in undecided}
+    return name in undecided and any(name in TWINS.get(other, set()) for other in alike)
 
 
 def _twins_undecided(label: Label, said: tuple[str, ...], undecided: set[str]) -> bool:

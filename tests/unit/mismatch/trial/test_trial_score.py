@@ -101,6 +101,14 @@ def test_twins_that_no_drive_tells_apart_are_right_when_left_undecided():
     assert not score(label("steer_lag"), diagnosis(undecided=[("steer_lag", "steer_delay")])).exact
 
 
+def test_the_twin_that_gives_an_undecided_effect_its_name_is_no_false_name():
+    either = diagnosis(effect("grade"), undecided=[("grade", "wind")])
+    assert score(label("wind"), either).exact
+    assert not score(label("wind"), diagnosis(effect("grade"))).exact
+    more = diagnosis(effect("grade"), effect("steer_trim"), undecided=[("grade", "wind")])
+    assert score(label("wind"), more).false_names == ("steer_trim",)
+
+
 def test_an_undecided_name_is_among_those_reported():
     got = score(label("steer_lag"), diagnosis(undecided=[("steer_lag", "steer_delay")]))
     assert got.among
