@@ -7,11 +7,12 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock, seconds
-from scm.mismatch.diagnose import Found, Searched, diagnose_car, told, write
+from scm.mismatch.diagnose import Found, diagnose_car, told, write
 from scm.mismatch.explain import said
-from scm.mismatch.findings import Diagnosis, Effect
+from scm.mismatch.findings import Effect, Undecided, Verdict
+from scm.mismatch.law_rivals import TIE
 from scm.mismatch.report.several_page import write_several
-from scm.mismatch.several_common import compared
+from scm.mismatch.several_common import CAUSES, compared
 from scm.mismatch.several_findings import Common, Sight
 from scm.mismatch.several_verdict import all_alike
 from scm.recorder.drives import SUFFIX, recordings_of
@@ -114,9 +115,10 @@ def diagnose_several(
     if len(searches) > 1:
         with threadpool_limits(1):
             common, taken = compared(searches, tell)
-            for name, searched in taken.items():
-                if searched is not searches[name]:
-                    found[name] = _told_anew(name, found[name], searched, common, tell)
+            changed = {n: one for n, one in taken.items() if one is not searches[n]}
+            anew = {name: told(one, tell) for name, one in changed.items()}
+            for name, one in anew.items():
+                found[name] = _sharing(name, found[name], one, common, anew)
     return Several(found, tuple(common), seconds(clock.now_ns() - began_ns))
 
 
@@ -133,33 +135,75 @@ def write_all(several: Several, out: Path) -> None:
     write_several(diagnoses, recordings, several.common, several.runtime_s, out)
 
 
-def _told_anew(
-    name: str, found: Found, searched: Searched, common: Sequence[Common], tell: Tell
+def _sharing(
+    name: str, found: Found, anew: Found, common: Sequence[Common], all_anew: Mapping[str, Found]
 ) -> Found:
     """Return a car's diagnosis with the effects that it shares, at the shared estimates."""
-    anew = told(searched, tell)
     shared = {c.name: c for c in common if c.shared and _sees(c, name)}
     effects = tuple(
-        _with_shared(effect, shared[effect.name], name, anew) if effect.name in shared else effect
+        _with_shared(effect, shared[effect.name], name, all_anew)
+        if effect.name in shared
+        else effect
         for effect in anew.diagnosis.effects
     )
-    before: Diagnosis = found.diagnosis
-    diagnosis = replace(
-        anew.diagnosis, effects=effects, data=before.data, runtime_s=before.runtime_s
+    suggestions = tuple(
+        s for s in anew.suggestions if not _is_settled(s.undecided, shared, all_anew)
     )
-    return replace(anew, diagnosis=diagnosis)
+    undecided = tuple(s.undecided for s in suggestions)
+    verdict = Verdict.UNDECIDED if undecided else anew.diagnosis.verdict
+    if anew.diagnosis.undecided and not undecided:
+        verdict = Verdict.MISMATCH
+    diagnosis = replace(
+        anew.diagnosis, verdict=verdict, effects=effects, undecided=undecided,
+        data=found.diagnosis.data, runtime_s=found.diagnosis.runtime_s,
+    )  # fmt: skip
+    return replace(anew, diagnosis=diagnosis, suggestions=suggestions)
+
+
+def _is_settled(
+    question: Undecided, shared: Mapping[str, Common], all_anew: Mapping[str, Found]
+) -> bool:
+    """Say whether all cars together answer what one leaves open.
+
+    That each has an effect of its own that looks alike would be chance; of effects of what they
+    share, the one found must explain their recordings better by as much as one car's would have to.
+    """
+    asked = [name for name in question.between if name in shared]
+    if not asked:
+        return False
+    seeing = [one for name, one in all_anew.items() if _sees(shared[asked[0]], name)]
+    rivals = [name for name in question.between if name not in shared and name in CAUSES]
+    return all(sum(_ahead(one, asked[0], name) for one in seeing) > TIE for name in rivals)
+
+
+def _ahead(found: Found, name: str, rival: str) -> float:
+    """Return how much better an effect explains a car's recordings than another in its place."""
+    steps = found.searched.search.steps if found.searched is not None else []
+    for step in steps:
+        names = [fitted.names[-1] for fitted in step.rivals]
+        best = dict(zip(names[::-1], step.criteria[::-1], strict=True))  # the first, best, stays
+        if name in best:
+            return best.get(rival, max(step.criteria)) - best[name]
+    return 0.0
 
 
 def _sees(common: Common, name: str) -> bool:
-    mine = next(c for c in common.cars if c.car == name)
-    return mine.sight in (Sight.SEES, Sight.ADDS)
+    return any(c.car == name and c.sight in (Sight.SEES, Sight.ADDS) for c in common.cars)
 
 
-def _with_shared(effect: Effect, common: Common, name: str, anew: Found) -> Effect:
-    """Return an effect as all cars together tell it."""
-    if set(effect.parameters) != set(common.parameters) or anew.best is None:
+def _with_shared(
+    effect: Effect, common: Common, name: str, all_anew: Mapping[str, Found]
+) -> Effect:
+    """Return an effect as all cars together tell it, as sure as the surest of them is."""
+    best = all_anew[name].best
+    if set(effect.parameters) != set(common.parameters) or best is None:
         return effect
     estimates = {key: common.parameters[key] for key in effect.parameters}
-    candidate = next(e for e in anew.best.effects if e.name == effect.name)
-    words = f"{said(candidate, estimates)} {all_alike(common.cars, name)}"
-    return replace(effect, parameters=estimates, said=words)
+    candidate = next(e for e in best.effects if e.name == effect.name)
+    every = [e for one in all_anew.values() for e in one.diagnosis.effects]
+    return replace(
+        effect,
+        parameters=estimates,
+        probability=max(e.probability for e in every if e.name == effect.name),
+        said=f"{said(candidate, estimates)} {all_alike(common, name)}",
+    )

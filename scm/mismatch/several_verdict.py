@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from scm.mismatch.report.wording import capital, joined
-from scm.mismatch.several_findings import CarSight, Cause, Sight
+from scm.mismatch.several_findings import CarSight, Cause, Common, Sight
 
 WHOSE: Mapping[Cause, str] = {
     Cause.CAMERA: "it is the camera, not the cars",
@@ -21,6 +21,10 @@ UNSURE: Mapping[Cause, str] = {
     Cause.TAGS: "whether it is that car's tag or the camera",
     Cause.FLOOR: "whether it is the floor or that car's own",
 }
+ALIKE: Mapping[Cause, str] = {
+    Cause.CAMERA: "seen by the same camera", Cause.TAGS: "seen alike by the same camera",
+    Cause.FLOOR: "on the same floor",
+}  # fmt: skip
 TWO = 2
 VERBS: Mapping[Cause, str] = {Cause.CAMERA: "see", Cause.TAGS: "see", Cause.FLOOR: "feel"}
 
@@ -83,9 +87,10 @@ def _would(names: Sequence[str]) -> str:
     return "would have to and " + ("do not" if len(names) > 1 else "does not")
 
 
-def all_alike(cars: Sequence[CarSight], name: str) -> str:
+def all_alike(common: Common, name: str) -> str:
     """Return in a sentence for one car's report who else sees what it sees."""
-    others = [c.car for c in cars if c.sight in (Sight.SEES, Sight.ADDS) and c.car != name]
-    alone = any(c.alone for c in cars if c.car == name)
+    seeing = (Sight.SEES, Sight.ADDS)
+    others = [c.car for c in common.cars if c.sight in seeing and c.car != name]
+    alone = any(c.alone for c in common.cars if c.car == name)
     found = "" if alone else " This car alone would not have shown it for sure."
-    return f"Estimated together with {joined(others)}, which drove under the same.{found}"
+    return f"Estimated together with {joined(others)}, {ALIKE[common.cause]}.{found}"

@@ -9,17 +9,25 @@ from urllib.parse import quote
 from scm.mismatch.findings import Diagnosis, Estimate
 from scm.mismatch.report.advice import advice_of
 from scm.mismatch.report.as_json import plain
-from scm.mismatch.report.first_screen import better, card, name_of
+from scm.mismatch.report.first_screen import card, name_of
 from scm.mismatch.report.html_text import around, section, table, tag
 from scm.mismatch.report.page import document
 from scm.mismatch.report.several_picture import seen_picture
 from scm.mismatch.report.summary import summary
 from scm.mismatch.report.verdict_text import can_judge, count, verdict_sentence
-from scm.mismatch.report.wording import capital, interval, joined, pretty, title_of
+from scm.mismatch.report.wording import (
+    capital,
+    interval,
+    joined,
+    pretty,
+    quantities,
+    quantity,
+    title_of,
+)
 from scm.mismatch.report.write import PAGE
 from scm.mismatch.several_findings import CarSight, Cause, Common, Sight
 
-CARS = "cars.json"
+CARS, POSITION = "cars.json", "position_m"
 _SAYS: Mapping[Sight, str] = {
     Sight.SEES: "sees it",
     Sight.ADDS: "too weak alone, adds to the others",
@@ -85,7 +93,7 @@ def several_html(
     head += "".join(tag("p", f"{capital(title_of(one.name))}: {one.conclusion}") for one in common)
     if not common:
         head += tag("p", _NOTHING)
-    kind = "mismatch" if any(one.shared for one in common) else "none"
+    kind = "mismatch" if common or any(one.effects for one in cars.values()) else "none"
     body = around("header", around("div", head, "words"), f"verdict {kind}")
     body += around("div", "".join(_car_card(*one) for one in cars.items()), "cards")
     shared = [_common_card(one, cars) for one in common]
@@ -101,7 +109,8 @@ def common_sentence(common: Sequence[Common]) -> str:
         return f"The cars have in common: {joined([title_of(one.name) for one in shared])}."
     if common:
         own = joined([title_of(one.name) for one in common])
-        return f"Nothing that the cars have in common; not shared: {own}."
+        are = "is" if len(common) == 1 else "are"
+        return f"Nothing that the cars have in common was found; {own} {are} not shared."
     return "Nothing that the cars have in common was found."
 
 
@@ -121,7 +130,18 @@ def _car_card(name: str, diagnosis: Diagnosis) -> str:
     kind = kind if can_judge(diagnosis) else "data"
     link = f'<a href="{quote(name)}/{PAGE}">The report of {escape(name)}</a>'
     inner = tag("p", f"Car {name}", "label") + tag("h2", verdict_sentence(diagnosis))
-    return around("article", inner + better(diagnosis) + around("p", link), f"card {kind}")
+    return around("article", inner + _errors(diagnosis) + around("p", link), f"card {kind}")
+
+
+def _errors(diagnosis: Diagnosis) -> str:
+    """Return how far the simulated car strays before and after, where that was judged."""
+    fit = diagnosis.fit
+    if fit is None or POSITION not in fit.confirm.before or POSITION not in fit.confirm.after:
+        return ""
+    sides = fit.confirm.before[POSITION], fit.confirm.after[POSITION]
+    before, after = quantities(sides, "m")
+    what = f"Position error after {quantity(fit.horizon_s, 's')}, on unseen parts"
+    return tag("p", f"{what}: {before} before, {after} after.")
 
 
 def _common_card(common: Common, cars: Mapping[str, Diagnosis]) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from scm.maps.svg import element
 from scm.mismatch.findings import Estimate
+from scm.mismatch.report.first_screen import name_of
 from scm.mismatch.report.html_text import around, figure
 from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text, ticks_across
 from scm.mismatch.report.wording import unit_text
@@ -47,7 +48,7 @@ def _picture(common: Common, name: str, shared: Estimate) -> Picture | None:
         parts += [element("path", d=across, class_="whisker")]
         parts += [element("circle", cx=f"{at(own.value):.1f}", cy=f"{y:.1f}", r="5", class_="dot")]
     unit = f" [{unit_text(shared.unit)}]" if unit_text(shared.unit) else ""
-    words = f"{name.replace('_', ' ')}{unit}"
+    words = f"{name_of(name, shared.unit)}{unit}"
     parts += [text(room.right, height - 8, words, "end", "title")]
     area = "what the cars share" if common.shared else "what the one car shows that sees it"
     return Picture(

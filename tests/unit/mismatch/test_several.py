@@ -4,15 +4,16 @@ import argparse
 import json
 import re
 import shutil
+from types import SimpleNamespace
 
 import pytest
 
 from scm.commands import mismatch
-from scm.mismatch.findings import Estimate, Verdict
+from scm.mismatch.findings import Estimate, Undecided, Verdict
 from scm.mismatch.report.several_page import several_html, several_summary, write_several
-from scm.mismatch.several import cars_of
+from scm.mismatch.several import _is_settled, cars_of
 from scm.mismatch.several_findings import CarSight, Cause, Common, Sight
-from scm.mismatch.several_verdict import conclusion
+from scm.mismatch.several_verdict import all_alike, conclusion
 from scm.vehicles.car import load_car
 from tests.reality.several_cars import write_cars
 from tests.unit.mismatch import made_up_findings as made_up
@@ -107,3 +108,32 @@ def test_the_page_says_each_verdict_and_what_is_common(tmp_path):
 )  # fmt: skip
 def test_whose_it_is_in_words(cars, shared, says):
     assert conclusion(Cause.CAMERA, cars, shared=shared).startswith(says)
+
+
+def asked(**criteria):
+    """A car whose search ranked effects so, the lower the better."""
+    rivals = tuple(SimpleNamespace(names=(name,)) for name in criteria)
+    step = SimpleNamespace(rivals=rivals, criteria=tuple(criteria.values()))
+    return SimpleNamespace(searched=SimpleNamespace(search=SimpleNamespace(steps=[step])))
+
+
+@pytest.mark.parametrize(
+    ("between", "of_b", "settled"),
+    [
+        (("camera_tilt", "steer_trim"), {"camera_tilt": 0.0}, True),
+        (("camera_tilt", "pose_scale"), {"camera_tilt": 0.0, "pose_scale": 30.0}, True),
+        (("camera_tilt", "pose_scale"), {"camera_tilt": 0.0, "pose_scale": 3.0}, False),
+        (("grade", "wind"), {"camera_tilt": 0.0}, False),
+    ],
+)
+def test_other_cars_settle_what_one_leaves_open(between, of_b, settled):
+    tilt = common(seen("a"), seen("b"))
+    cars = {"a": asked(camera_tilt=0.0, pose_scale=1.0), "b": asked(**of_b)}
+    question = Undecided(between=between, drive_this="", expected_separation=0.0)
+    assert _is_settled(question, {"camera_tilt": tilt}, cars) is settled
+
+
+def test_a_car_s_report_says_with_whom_it_shares_an_effect():
+    tilt = common(seen("a", alone=True), seen("b"), seen("c", Sight.CANNOT_TELL))
+    assert all_alike(tilt, "a") == "Estimated together with b, seen by the same camera."
+    assert "This car alone would not have shown it" in all_alike(tilt, "b")
