@@ -120,14 +120,16 @@ def test_replay_takes_a_run_and_one_of_its_cars(
     assert "n1" not in printed
 
 
-def test_mismatch_takes_a_run_of_one_car(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["mismatch", str(run), "--out", str(tmp_path)]) == 2
-    assert (
-        "several cars can be driven again: n1, n2; say which with --vehicle"
-        in capsys.readouterr().err
-    )
+def test_mismatch_takes_a_run_of_several_cars_each_by_itself(run: Path, tmp_path: Path) -> None:
+    assert main(["mismatch", str(run), "--out", str(tmp_path)]) == 0
+    for car in ("n1", "n2"):
+        assert (tmp_path / car / "report.html").is_file()
+        assert f'href="{car}/report.html"' in (tmp_path / "report.html").read_text("utf-8")
+
+
+def test_mismatch_takes_one_car_of_a_run(run: Path) -> None:
+    with pytest.raises(RecordingError, match="cars can be driven again: n1, n2; say which with"):
+        diagnose([run])
     found = diagnose([run], vehicle="n1", budget_s=0.0)
     assert found.car.name == "nigel"
     assert found.evidence.recordings == ("today",)
