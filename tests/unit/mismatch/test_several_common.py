@@ -2,15 +2,17 @@
 
 from functools import cache
 
+import numpy as np
 import pytest
 
 from scm.mismatch.search import price
 from scm.mismatch.several_common import compared
 from scm.mismatch.several_findings import Cause, Sight
+from scm.mismatch.several_witness import Witness
 from tests.unit.mismatch.made_cars import drive_of, searched, tagged, tilted
 
 CARS = ("a", "b", "c")
-TILT, WEAK, TAG_M = 0.03, 0.01, 0.03
+TILT, WEAK, TAG_M = 0.03, 0.013, 0.03
 
 
 @cache
@@ -91,3 +93,16 @@ def test_cars_with_tags_wrong_by_unlike_amounts_share_nothing():
     (point,), _ = compared(cars, lambda _: None)
     assert not point.shared
     assert "each by another amount" in point.conclusion
+
+
+def test_a_car_s_slope_and_precision_are_those_of_its_cost():
+    cars, _, _ = under_one_tilted_camera()
+    effect = cars["a"].best.effects[0]
+    witness = Witness(cars["b"], effect, np.array([TILT, 0.0]))
+    at, step = np.array([TILT - 0.012, 0.0]), effect.knobs[0].step
+    here, (low, high) = witness.at(at), (
+        witness.at(at + np.array([way, 0.0])).cost for way in (-0.5 * step, 0.5 * step)
+    )  # fmt: skip
+    assert high - low == pytest.approx(2.0 * here.slope[0], rel=0.15)
+    assert high + low - 2.0 * here.cost == pytest.approx(0.5 * here.precision[0, 0], rel=0.3)
+    assert witness.gain(witness.free) >= witness.gain(here)
