@@ -112,11 +112,11 @@ class RoughSearch(Search):
         return best
 
     def confirmed(self, best: Fitted, unseen: Floats) -> Fitted:
-        """Return the model without effects that do not help on an unseen part.
+        """Return the model without effects that do not help on an unseen part, or no longer.
 
         Its intervals know how much of what is left comes together.
         """
-        best = super().confirmed(best, unseen)
+        best = self.prune(super().confirmed(best, unseen))
         best.covariance = best.covariance / told_anew(self.model, best.e)
         return best
 
