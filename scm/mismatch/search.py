@@ -19,13 +19,14 @@ from scm.mismatch.listed import Candidate
 from scm.mismatch.noise import Noise, calmed
 
 MOST_EFFECTS = 4
-REFITTED, AFRESH = 16, 10
+REFITTED, AFRESH, AGAIN = 16, 10, 6
 AFRESH_GAIN = 60.0
 TO_THE_END = 5, 8  # rounds of a fit that others are held against, of all starts and of the near
 DEEPER = 5.0
 CHANCES = 3
 FINALISTS, CLOSE = 3, 100.0
 DOUBTFUL = 60.0
+CHANCE = 4.0  # times the root of what is expected of unseen parts: two standard deviations of it
 PLENTY = 10.0  # gained where nothing was fitted, it is enough for any effect
 OFF = 0.125  # two simulators' equations of the same effect differ by as much
 REMAINDER, COVERED = OFF * OFF, 0.2
@@ -210,18 +211,16 @@ class Search:
         ]
         self.tell(f"trying {len(self.listed)} effects from {len(trials)} starts")
         nominal = self.fitter.nominal(base)  # a re-tuned car bends towards what is missing
-        begun = [
-            _best_of_each(
-                self.fitter.begin(start, trials, amplified=self.amplifies),
-                SPOTS if self.amplifies else 1,
-            )
-            for start in (base, nominal)
+        every = [
+            self.fitter.begin(start, trials, amplified=self.amplifies) for start in (base, nominal)
         ]
+        begun = [_best_of_each(fits, SPOTS if self.amplifies else 1) for fits in every]
 
         def cost(fitted: Fitted) -> float:
             return self.criterion(fitted) - self._drifted(fitted.effects[-1], base)
 
         near, far = (sorted(fits, key=cost)[:REFITTED] for fits in begun)
+        near += [f for one in near[:AGAIN] for f in _next_starts(one, every[0])]
         self.tell("refitting " + ", ".join(f.names[-1] for f in near[:4]) + " ...")
         near, far = (self.fitter.refine(fits, rounds=4) for fits in (near, far[:AFRESH]))
         ranked = _preferred(near, far)
@@ -260,10 +259,10 @@ class Search:
         """Return the model without effects that do not help on a part that no fit has seen.
 
         Of what an effect gains where it was fitted, a share must come out there too, by length, or
-        plenty. One that gains next to nothing beside another, and where that one acts, is what that
-        one's equation leaves.
+        plenty; of one that hardly acts there, no more than it can show. One that gains next to
+        nothing beside another, and where that one acts, is what that one's equation leaves.
         """
-        share = self.holds * float(unseen.sum()) / max(self.events, 1)
+        share = float(unseen.sum()) / max(self.events, 1)
         while best.effects:
             others = self._without_each(best)
             fitter = Fitter(self.model, unseen)
@@ -273,7 +272,9 @@ class Search:
             gains = np.array(
                 [float(fitter.score(f.e[:, None], f.z)[0] - f.z @ f.z - seen) for f in others]
             )
-            gains -= np.minimum(share * seen_gains, PLENTY)
+            shown = np.array([float(fitter.weights(best.e) @ (f.e - best.e) ** 2) for f in others])
+            expected = np.minimum(share * seen_gains, shown - CHANCE * np.sqrt(shown))
+            gains -= np.minimum(self.holds * expected, PLENTY)
             gains[self._remainders(best, others, seen_gains)] = -np.inf
             if gains.min() > 0.0:
                 return best
@@ -358,6 +359,20 @@ def _preferred(near: Sequence[Fitted], far: Sequence[Fitted]) -> list[Fitted]:
         if fitted.q < other.q - AFRESH_GAIN:
             best[id(fitted.effects[-1])] = fitted
     return list(best.values())
+
+
+def _next_starts(best: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+    """Return the best fit of the same one number begun quite elsewhere: valleys may be two."""
+    effect, at = best.effects[-1], best.values[-1]
+    if len(effect.knobs) != 1:
+        return []
+    knob = effect.knobs[0]
+    size = abs(at - knob.neutral)
+    far = [
+        f for f in fits
+        if f.effects[-1] is effect and np.isfinite(f.q) and abs(f.values[-1] - at) > 0.5 * size
+    ]  # fmt: skip
+    return sorted(far, key=lambda f: f.q)[:1]
 
 
 def _best_of_each(fits: Sequence[Fitted], spots: int) -> list[Fitted]:

@@ -9,7 +9,7 @@ import pytest
 from scm.mismatch.fit import FARTHEST, Fitted, Fitter
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.noise import CALM, calmed, usual_noise
-from scm.mismatch.search import DRIFTED, PLENTY, REMAINDER, Search
+from scm.mismatch.search import DRIFTED, PLENTY, REMAINDER, Search, _next_starts
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
 
@@ -65,43 +65,61 @@ def test_the_effect_of_a_number_at_its_limit_comes_closer_by_more(model):
     assert search._drifted(found.effects[-1], base) == DRIFTED
 
 
-def losing(seen, unseen, where):
+def losing(seen, unseen, where, shows):
     """A model whose effects each cost so much when left out, where it was fitted and where not.
 
-    `where` says at which innovation each acts where it was fitted.
+    `where` says at which innovation each acts where it was fitted, `shows` how much more each
+    changes unseen ones without being any better there.
     """
     n = len(seen)
-    e = np.zeros(2 + n)
+    e = np.zeros(3 + n)
+    e[2] = -0.5 * np.sqrt(max(shows))
     best = Fitted(tuple(candidate("steer_trim") for _ in range(n)), np.zeros(1), np.zeros(n), e,
-                  0.0, np.zeros((2 + n, 1)))  # fmt: skip
+                  0.0, np.zeros((3 + n, 1)))  # fmt: skip
     others = []
-    for lost, hidden, at in zip(seen, unseen, where, strict=True):
+    for lost, hidden, at, more in zip(seen, unseen, where, shows, strict=True):
         value = np.sqrt(8.0 * np.expm1(hidden / 8.0))  # what the loss makes `hidden` of
         other = e.copy()
-        other[1], other[2 + at] = value, np.sqrt(lost)
+        other[1], other[3 + at] = value, np.sqrt(lost)
+        other[2] = -e[2] if more else e[2]
         others.append(replace(best, effects=best.effects[1:], e=other, q=lost))
     return best, others
 
 
 @pytest.mark.parametrize(
-    ("seen", "unseen", "where", "stays"),
+    ("seen", "unseen", "where", "shows", "stays"),
     [
-        ((100.0,), (20.0,), (0,), True),
-        ((100.0,), (1.0,), (0,), False),
-        ((1500.0,), (PLENTY + 1.0,), (0,), True),
-        ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 0), False),
-        ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 1), True),
+        ((100.0,), (20.0,), (0,), (0.0,), True),
+        ((100.0,), (1.0,), (0,), (100.0,), False),
+        ((100.0,), (1.0,), (0,), (0.0,), True),
+        ((1500.0,), (PLENTY + 1.0,), (0,), (900.0,), True),
+        ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 0), (0.0, 0.0), False),
+        ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 1), (0.0, 0.0), True),
     ],
-    ids=["its share", "less than its share", "plenty", "a remainder of another", "small elsewhere"],
-)
-def test_an_effect_stays_where_its_gain_holds_on_an_unseen_part(model, seen, unseen, where, stays):
-    best, others = losing(seen, unseen, where)
+    ids=["its share", "less than its share", "hardly acts there", "plenty",
+         "a remainder of another", "small elsewhere"],
+)  # fmt: skip
+def test_an_effect_stays_where_its_gain_holds_on_an_unseen_part(
+    model, seen, unseen, where, shows, stays
+):
+    best, others = losing(seen, unseen, where, shows)
     part = np.zeros(len(best.e))
-    part[1] = 1.0
+    part[1:3] = 1.0
     fake = SimpleNamespace(settled=np.ones(len(best.e)))
     search = Search.__new__(Search)
-    search.model, search.events = fake, 4
+    search.model, search.events = fake, 8
     search.fitter = Fitter(fake, 1.0 - part)
     nothing = replace(others[-1], effects=())
     search._without_each = lambda fitted: others if len(fitted.effects) == len(seen) else [nothing]
     assert (search.confirmed(best, part) is best) == stays
+
+
+def test_an_effect_of_two_valleys_is_begun_in_both():
+    begun = [
+        Fitted((candidate("drive_deadband"),), np.zeros(1), np.array([value]), np.zeros(1), q,
+               np.zeros((1, 1)))
+        for value, q in ((0.015, 10.0), (0.02, 11.0), (0.06, 13.0), (0.1, 12.0), (0.2, np.inf))
+    ]  # fmt: skip
+    effect = begun[0].effects[0]
+    begun = [replace(f, effects=(effect,)) for f in begun]
+    assert [f.values[0] for f in _next_starts(begun[0], begun)] == [0.1]
