@@ -60,6 +60,8 @@ class DemoCity:
         self.cars = {f"n{i + 1}": i * self.path.length_m / 7.0 + 0.3 for i in range(cars)}
         self.lost = set()
         self.silent = False
+        self.eye_late_ns = 0
+        self.eye_shut = False
         self.stopped = None
         self.plan = "calm"
         self.fault = None
@@ -157,7 +159,7 @@ class DemoCity:
             if self.tick % 2 == 0:
                 self.say(self.spat(now_ns), now_ns)
             if self.tick % 4 == 0:
-                for message in self.eye(now_ns):
+                for message in () if self.eye_shut else self.eye(now_ns - self.eye_late_ns):
                     self.say(message, now_ns)
                 self._picture_cameras(now_ns)
             if self.tick % 10 == 0:

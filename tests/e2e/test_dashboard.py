@@ -55,9 +55,15 @@ class Watched:
         self.page = page
         self.complaints = []
         self.hosts = set()
+        self.pictures_ns = []  # exposures of the Eye's pictures, as they were served
         page.on("console", self._on_console)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.on("request", lambda request: self.hosts.add(urlsplit(request.url).netloc))
+        page.on("response", self._on_response)
+
+    def _on_response(self, response):
+        if "frame.jpg" in response.url:
+            self.pictures_ns.append(int(response.headers["x-time-ns"]))
 
     def _on_console(self, message):
         if message.type in ("error", "warning"):
@@ -68,11 +74,12 @@ class Watched:
 def open_page(browser, served):
     contexts = []
 
-    def open_at(width=1440, height=900, scheme="dark"):
+    def open_at(width=1440, height=900, scheme="dark", script=""):
         context = browser.new_context(
             viewport={"width": width, "height": height}, color_scheme=scheme
         )
         contexts.append(context)
+        context.add_init_script(script)
         watched = Watched(context.new_page())
         watched.page.goto(served.url)
         watched.page.wait_for_selector('.link-state[data-link="live"]')
@@ -152,6 +159,48 @@ def test_the_picture_of_the_eye_has_tags_drawn_over_it(open_page):
     )
     assert re.search(r"7 tags", page.locator(".eye .facts").inner_text())
     assert re.fullmatch(r"\d+\.\d mm", page.locator(".residuals li span").first.inner_text())
+
+
+HEARS_OF_THE_EYE_WHEN_TOLD = """
+EventSource.prototype.addEventListener = function (name, take) {
+    const hear = (message) => {
+        const { eye, ...others } = JSON.parse(message.data);
+        if (eye?.length) window.heard = eye;
+        const known = name === 'snapshot' ? { eye: [] } : {};
+        take({ data: JSON.stringify({ ...others, ...known }) });
+    };
+    window.tell = (eye) => take({ data: JSON.stringify({ eye }) });
+    EventTarget.prototype.addEventListener.call(this, name, hear);
+};
+"""
+
+
+def test_a_page_that_hears_late_still_fetches_the_newest_picture_of_the_eye(open_page, served):
+    def newest_ns():
+        return served.view.picture().frames["overhead"][-1].message.t_ns
+
+    watched = open_page(script=HEARS_OF_THE_EYE_WHEN_TOLD)
+    page = watched.page
+    wait_for(page, "() => window.heard")
+    named_ns = int(page.evaluate("(window.old = window.heard)[0].frame_t_ns"))
+    wait_until(page, lambda: newest_ns() > named_ns)
+    served.city.eye_shut = True
+    page.evaluate("window.tell(window.old)")
+    wait_until(page, lambda: watched.pictures_ns)
+    assert watched.pictures_ns[0] > named_ns
+    wait_until(page, lambda: page.evaluate("window.heard[0].frame_t_ns") == str(newest_ns()))
+    page.evaluate("window.tell(window.heard)")
+    drawn = "newest => document.querySelector('.picture').dataset.frame === newest"
+    wait_for(page, drawn, str(newest_ns()))
+
+
+def test_how_far_the_eyes_picture_is_behind_the_map_is_said(open_page, served):
+    served.city.eye_late_ns = 20_000_000_000
+    page = open_page().page
+    wait_for(page, "() => document.querySelector('.picture').dataset.frame")
+    behind = "parseFloat(document.querySelector('.eye .facts .warn').textContent)"
+    page.wait_for_selector(".eye .facts .warn")
+    assert page.evaluate(behind) >= 20.0
 
 
 def test_the_red_button_stops_the_city_and_releases_it(open_page, served):

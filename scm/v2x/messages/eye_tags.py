@@ -24,7 +24,7 @@ class TagSeen(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class EyeTags(Message, kw_only=True, frozen=True):
-    """All tags of the frame taken at `t_ns`; `latency_ms` is from exposure to this message."""
+    """All tags of the frame taken at `t_ns`, which the Eye took up `latency_ms` after exposure."""
 
     KEY: ClassVar[str] = "eye/{camera}/tags"
     RATE_HZ: ClassVar[float | None] = 10.0

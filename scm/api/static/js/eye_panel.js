@@ -1,9 +1,10 @@
 /** The Eye: its newest picture with the tags found drawn over it, and how far off each pose is. */
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "./html.js";
+import { EyePicture } from "./eye_picture.js";
 import { byName, fixed, span, UNKNOWN } from "./format.js";
 import { selected } from "./selection.js";
-import { cameras } from "./store.js";
+import { cameras, live } from "./store.js";
 
 const GOOD_MM = 10;
 
@@ -20,26 +21,21 @@ export function EyePanel() {
 
 function Camera({ of: camera }) {
   const canvas = useRef(null);
-  const loading = useRef(false);
+  const picture = useRef(null);
+  const [drawn_t_ns, setDrawn] = useState(null);
   const { frame_t_ns, tags } = camera;
   const seen = camera.seen.toSorted((a, b) => byName(a.vehicle, b.vehicle));
+  const behind = behind_s(camera, drawn_t_ns);
   useEffect(() => {
-    if (frame_t_ns === null || loading.current) return;
-    loading.current = true;
-    const image = new Image();
-    image.onload = () => {
-      loading.current = false;
-      if (canvas.current) draw(canvas.current, image, tags);
-    };
-    image.onerror = () => (loading.current = false);
-    image.src = `/api/v1/eye/${camera.camera}/frame.jpg?t_ns=${frame_t_ns}`;
+    picture.current ??= new EyePicture(camera.camera, canvas.current, setDrawn);
+    picture.current.hear(camera);
   }, [frame_t_ns]);
   return html`
     <div class="panel-head">
       <h2>Eye <small>${camera.camera}</small></h2>
-      <span class="facts">
+      <span class="facts" title="tags found · from exposure to the Eye · how far the picture is behind the map">
         ${`${tags.length} tags · ${fixed(camera.latency_ms, 0, " ms")} · `}
-        <span class=${camera.age_s > 1 ? "warn" : ""}>${span(camera.age_s)}</span>
+        <span class=${behind > 1 ? "warn" : ""}>${span(behind)}</span>
       </span>
     </div>
     <canvas
@@ -49,12 +45,19 @@ function Camera({ of: camera }) {
       height=${camera.height_px ?? 9}
       role="img"
       aria-label="Picture of camera ${camera.camera} with ${tags.length} tags found"
-      data-frame=${frame_t_ns}
+      data-frame=${drawn_t_ns}
     ></canvas>
     <ul class="residuals" aria-label="Pose residual against the world's truth">
       ${seen.map((one) => html`<${Seen} key=${one.vehicle} seen=${one} />`)}
     </ul>
   `;
+}
+
+/** How much older the drawn picture is than the cars on the map [s]; at least since one was heard. */
+function behind_s(camera, drawn_t_ns) {
+  const map_t_ns = live.topic?.t_ns ?? null;
+  if (drawn_t_ns === null || map_t_ns === null) return camera.age_s;
+  return Math.max(camera.age_s, (map_t_ns - Number(drawn_t_ns)) / 1e9);
 }
 
 function Seen({ seen }) {
@@ -69,40 +72,4 @@ function Seen({ seen }) {
       <span>${residual ? `${residual.position_mm.toFixed(1)} mm` : UNKNOWN}</span>
     </li>
   `;
-}
-
-function draw(canvas, image, tags) {
-  canvas.width = image.naturalWidth;
-  canvas.height = image.naturalHeight;
-  const paper = canvas.getContext("2d");
-  paper.drawImage(image, 0, 0);
-  const shown = canvas.clientWidth || canvas.width;
-  const pixel = canvas.width / shown; // one pixel of the screen, in the picture's
-  for (const tag of tags) drawTag(paper, tag, pixel);
-}
-
-function drawTag(paper, tag, pixel) {
-  paper.beginPath();
-  for (const [x, y] of tag.corners_px) paper.lineTo(x + 0.5, y + 0.5);
-  paper.closePath();
-  paper.lineJoin = "round";
-  paper.lineWidth = 4 * pixel;
-  paper.strokeStyle = "rgba(0, 20, 15, 0.65)";
-  paper.stroke();
-  paper.lineWidth = 2 * pixel;
-  paper.strokeStyle = "#38e8b0";
-  paper.stroke();
-  const top = Math.min(...tag.corners_px.map(([, y]) => y));
-  const text = String(tag.tag_id);
-  paper.font = `600 ${11 * pixel}px system-ui, sans-serif`;
-  paper.textAlign = "center";
-  const width = paper.measureText(text).width + 8 * pixel;
-  const [x] = tag.centre_px;
-  const y = Math.max(top - 4 * pixel, 15 * pixel);
-  paper.fillStyle = "rgba(6, 20, 16, 0.85)";
-  paper.beginPath();
-  paper.roundRect(x - width / 2, y - 14 * pixel, width, 15 * pixel, 3 * pixel);
-  paper.fill();
-  paper.fillStyle = "#7ff5d2";
-  paper.fillText(text, x, y - 3 * pixel);
 }
