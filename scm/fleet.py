@@ -7,6 +7,7 @@ The script is the same: in lockstep waiting moves a stepped clock and takes no l
 computation; live it waits for the real city.
 """
 
+import itertools
 import logging
 import math
 import threading
@@ -26,6 +27,7 @@ from scm.traffic.part import TrafficPart
 from scm.v2x.ask import ask
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.exchange import Incoming
 from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.remove_request import RemoveRequest
@@ -35,7 +37,12 @@ from scm.v2x.messages.trip import Trip
 from scm.world.part import WorldPart
 
 R = TypeVar("R", bound=Message)
+Keep = Callable[[Incoming], bool]
 THEN = ("circulate", "stop")
+HEARD_DEPTH = 1000
+KEPT_DEPTH = (
+    1_000_000  # of mailboxes for what is wanted alone: never full, one arrival a car at most
+)
 ASK_S = 15.0  # the first car of a kind may have to be compiled; who is not there is told at once
 
 _log = logging.getLogger(__name__)
@@ -53,8 +60,11 @@ class Link(Protocol):
         """Return the reply to a request, or a `Refused`."""
         ...
 
-    def hear(self, hears: Hears) -> Mailbox:
-        """Return a mailbox that fills from now on."""
+    def hear(self, hears: Hears, keep: Keep | None = None) -> Mailbox:
+        """Return a mailbox that fills from now on, with those messages alone that `keep` wants.
+
+        `keep` may be asked on another thread.
+        """
         ...
 
     def publish(self, message: Message) -> None:
@@ -81,9 +91,9 @@ class LockstepLink:
         """Step the city until the reply is there."""
         return self._lockstep.call(request)
 
-    def hear(self, hears: Hears) -> Mailbox:
+    def hear(self, hears: Hears, keep: Keep | None = None) -> Mailbox:
         """Return a mailbox on the in-memory bus."""
-        return self._lockstep.hear(hears)
+        return self._lockstep.hear(hears, keep)
 
     def publish(self, message: Message) -> None:
         """Send on the in-memory bus."""
@@ -115,9 +125,9 @@ class LiveLink:
         """Wait for the reply."""
         return ask(self._bus, request, ASK_S)
 
-    def hear(self, hears: Hears) -> Mailbox:
+    def hear(self, hears: Hears, keep: Keep | None = None) -> Mailbox:
         """Return a mailbox subscribed on the bus."""
-        mailbox = Mailbox(1000, self._wake)
+        mailbox = Mailbox(HEARD_DEPTH if keep is None else KEPT_DEPTH, self._wake, keep)
         self._bus.subscribe(hears.kind, hears.where, mailbox)
         return mailbox
 
@@ -142,14 +152,15 @@ class Journey:
 
     Attributes:
         route: The lanes it follows.
-        length_m: Of the route.
-        travel_time_s: From start to arrival; None while under way.
+        length_m: Of the route; None: it has no end.
+        travel_time_s: From start to arrival; None while under way, as far as the script knows: it
+            learns of arrivals whenever it lets the city go on or asks it for something.
     """
 
     vehicle: str
     trip_id: str
-    route: tuple[str, ...]
-    length_m: float | None
+    route: tuple[str, ...] = ()
+    length_m: float | None = None
     travel_time_s: float | None = None
 
 
@@ -177,21 +188,18 @@ class FleetCar:
             msg = f"speed_mps: got {speed_mps}, expected above 0"
             raise ScmError(msg)
         request = RouteRequest(
+            request_id=self.city.new_trip_id(self.name),
             vehicle=self.name,
             via=via,
             laps=laps,
             speed_mps=speed_mps,
             then="stop" if then == "stop" else "circulate",
         )
-        reply = self.city.request(request, RouteReply)
-        journey = Journey(self.name, reply.trip_id, reply.route, reply.length_m)
-        self.city.journeys.append(journey)
-        return journey
+        return self.city.send(request)
 
     def remove(self) -> None:
         """Take the car off the map."""
-        self.city.request(RemoveRequest(vehicle=self.name, reason="script"), Message)
-        self.city.cars.remove(self)
+        self.city.remove(self)
 
 
 class City:
@@ -199,9 +207,10 @@ class City:
 
     def __init__(self, link: Link) -> None:
         self._link = link
-        self._trips = link.hear(Hears(Trip))
+        self._trip_numbers = itertools.count(1)
+        self._may_arrive: dict[str, tuple[Journey, ...]] = {}  # by car: its last two journeys
+        self._arrivals = link.hear(Hears(Trip), self._is_arrival)
         self.cars: list[FleetCar] = []
-        self.journeys: list[Journey] = []
 
     @property
     def time_s(self) -> float:
@@ -225,7 +234,7 @@ class City:
     def run_for(self, duration_s: float) -> None:
         """Let the city go on for a while."""
         end = self._link.now_ns + round(duration_s * 1e9)
-        self._link.run_until(lambda: self._link.now_ns >= end, duration_s + 1.0)
+        self._run_until(lambda: self._link.now_ns >= end, duration_s + 1.0)
 
     def wait(self, journeys: Sequence[Journey], timeout_s: float = 120.0) -> None:
         """Let the city go on until all journeys have arrived.
@@ -242,10 +251,13 @@ class City:
                 why = "it was removed" if journey.vehicle not in here else "it circulates"
                 msg = f"{journey.vehicle} will never arrive: {why}"
                 raise RunError(msg)
-        if self._link.run_until(lambda: self._arrived(journeys), timeout_s):
+
+        def late() -> list[str]:
+            return [journey.vehicle for journey in journeys if journey.travel_time_s is None]
+
+        if self._run_until(lambda: not late(), timeout_s):
             return
-        late = [journey.vehicle for journey in journeys if journey.travel_time_s is None]
-        msg = f"after {timeout_s:g} s these cars had not arrived: {', '.join(late)}"
+        msg = f"after {timeout_s:g} s these cars had not arrived: {', '.join(late())}"
         raise RunError(msg)
 
     def request(self, request: Request, kind: type[R]) -> R:
@@ -255,6 +267,7 @@ class City:
             ScmError: with the sentence of whoever refused.
         """
         reply = self._link.ask(request)
+        self._note_arrivals()
         if isinstance(reply, Refused):
             msg = f"{type(request).__name__}: {reply.detail}"
             raise ScmError(msg)
@@ -262,6 +275,34 @@ class City:
             msg = f"{type(request).__name__}: got {type(reply).__name__}, expected {kind.__name__}"
             raise ScmError(msg)
         return reply
+
+    def new_trip_id(self, vehicle: str) -> str:
+        """Return an id that no trip of a car of this name had before, whoever sent that car."""
+        return f"{vehicle}-{self._link.now_ns}-{next(self._trip_numbers)}"
+
+    def send(self, request: RouteRequest) -> Journey:
+        """Send a car on a trip, named by the request's id; see `FleetCar.drive`.
+
+        Raises:
+            ScmError: with the sentence of whoever refused.
+        """
+        journey = Journey(request.vehicle, request.request_id)
+        before = self._may_arrive.get(request.vehicle, ())
+        # The trip before may have ended already, and be on its way to us.
+        self._may_arrive[request.vehicle] = (*before[-1:], journey)
+        try:
+            reply = self.request(request, RouteReply)
+        except ScmError:
+            self._may_arrive[request.vehicle] = before
+            raise
+        journey.route, journey.length_m = reply.route, reply.length_m
+        return journey
+
+    def remove(self, car: FleetCar) -> None:
+        """Take a car that the script has spawned off the map."""
+        self.request(RemoveRequest(vehicle=car.name, reason="script"), Message)
+        self.cars.remove(car)
+        self._may_arrive.pop(car.name, None)
 
     def leave(self) -> None:
         """Remove every car that this script spawned, as far as the city still lets it."""
@@ -271,16 +312,29 @@ class City:
             except ScmError as cause:
                 event(_log, "car_left_behind", level=logging.WARNING, car=car.name, reason=cause)
 
-    def _arrived(self, journeys: Sequence[Journey]) -> bool:
-        known = {(journey.vehicle, journey.trip_id): journey for journey in self.journeys}
-        for item in self._trips.drain():
+    def _run_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
+        def is_done() -> bool:
+            self._note_arrivals()
+            return done()
+
+        return self._link.run_until(is_done, timeout_s)
+
+    def _is_arrival(self, item: Incoming) -> bool:
+        """Return whether a message ends one of the script's journeys; on the bus's thread, live."""
+        trip = item.message
+        return isinstance(trip, Trip) and trip.arrived_ns is not None and self._of(trip) is not None
+
+    def _of(self, trip: Trip) -> Journey | None:
+        journeys = self._may_arrive.get(trip.vehicle, ())
+        return next((one for one in journeys if one.trip_id == trip.trip_id), None)
+
+    def _note_arrivals(self) -> None:
+        for item in self._arrivals.drain():
             trip = item.message
-            if not isinstance(trip, Trip) or trip.arrived_ns is None:
-                continue
-            journey = known.get((trip.vehicle, trip.trip_id))
-            if journey is not None:
-                journey.travel_time_s = seconds(trip.arrived_ns - trip.started_ns)
-        return all(journey.travel_time_s is not None for journey in journeys)
+            if isinstance(trip, Trip) and trip.arrived_ns is not None:
+                journey = self._of(trip)
+                if journey is not None:
+                    journey.travel_time_s = seconds(trip.arrived_ns - trip.started_ns)
 
 
 @contextmanager

@@ -68,9 +68,14 @@ class Lockstep:
         """Send a message from the script."""
         self.bus.publish(message)
 
-    def hear(self, hears: Hears) -> Mailbox:
-        """Return a mailbox that collects what matches from now on, for the script to drain."""
-        mailbox = Mailbox(HEARD_DEPTH)
+    def hear(self, hears: Hears, keep: Callable[[Incoming], bool] | None = None) -> Mailbox:
+        """Return a mailbox that collects what matches from now on, for the script to drain.
+
+        Args:
+            hears: Which messages.
+            keep: Which of these are wanted; None: all.
+        """
+        mailbox = Mailbox(HEARD_DEPTH, keep=keep)
         self.bus.subscribe(hears.kind, hears.where, mailbox)
         return mailbox
 

@@ -56,7 +56,32 @@ class Queue(Generic[T]):
 
 
 class Mailbox(Queue[Incoming]):
-    """A queue of messages, requests and replies."""
+    """A queue of messages, requests and replies.
+
+    Args:
+        depth: How many may wait.
+        wake: Set whenever one is added.
+        keep: Which ones are wanted; others take no room. All are then made as they arrive, on the
+            bus's thread.
+    """
+
+    def __init__(
+        self,
+        depth: int,
+        wake: threading.Event | None = None,
+        keep: Callable[[Incoming], bool] | None = None,
+    ) -> None:
+        super().__init__(depth, wake)
+        self._keep = keep
+
+    def put_later(self, make: Callable[[], Incoming | None]) -> None:
+        """Add an item to be made when it is taken, or made now if not all are wanted."""
+        if self._keep is None:
+            super().put_later(make)
+            return
+        item = make()
+        if item is not None and self._keep(item):
+            super().put_later(lambda: item)
 
 
 class RawMailbox(Queue[RawSample]):

@@ -7,11 +7,15 @@ import pytest
 
 from scm.clock import WallClock
 from scm.errors import LinkError, RunError, ScmError
-from scm.fleet import City, open_city
+from scm.fleet import City, LiveLink, LockstepLink, open_city
 from scm.live import run
+from scm.lockstep import Lockstep
 from scm.maps.load import load_map
+from scm.traffic.part import TrafficPart
 from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.mailbox import Mailbox
 from scm.v2x.messages.remove_request import RemoveRequest
+from scm.v2x.messages.trip import Trip
 from scm.v2x.router import Router, free_endpoint
 from scm.world.part import WorldPart
 
@@ -80,20 +84,26 @@ def test_a_city_that_does_not_run_is_told_within_seconds() -> None:
     assert WallClock().now_ns() - began_ns < 7e9
 
 
-def test_a_live_script_that_fails_takes_all_its_cars_along() -> None:
+@pytest.fixture
+def live() -> Iterator[Router]:
+    """A router with a world that runs."""
     world = WorldPart(load_map("driving_school"))
     stop = threading.Event()
     with Router(free_endpoint()) as router, ZenohBus("city", "world", router.listen) as bus:
         running = threading.Thread(target=run, args=(world, bus, WallClock(), stop))
         running.start()
         try:
-            with pytest.raises(KeyError, match="in the middle"):
-                fail_in_the_middle(router.listen)
-            with open_city(connect=router.listen) as city:
-                names = [city.spawn(name=name).name for name in ("a", "b", "c")]
+            yield router
         finally:
             stop.set()
             running.join()
+
+
+def test_a_live_script_that_fails_takes_all_its_cars_along(live: Router) -> None:
+    with pytest.raises(KeyError, match="in the middle"):
+        fail_in_the_middle(live.listen)
+    with open_city(connect=live.listen) as city:
+        names = [city.spawn(name=name).name for name in ("a", "b", "c")]
     assert names == ["a", "b", "c"]  # none of them is there any more
 
 
@@ -105,3 +115,60 @@ def fail_in_the_middle(endpoint: str) -> None:
         city.request(RemoveRequest(vehicle="a", reason="somebody else"), RemoveRequest.REPLY)
         msg = "in the middle"
         raise KeyError(msg)
+
+
+def test_an_arrival_is_known_without_waiting_for_it() -> None:
+    with open_city("driving_school") as city:
+        journey = city.spawn().drive("east_loop", then="stop")
+        city.run_for(60.0)
+        assert journey.travel_time_s is not None
+        assert 1.0 < journey.travel_time_s < 60.0
+
+
+def test_a_new_car_of_an_old_name_has_not_arrived_yet() -> None:
+    city_map = load_map("driving_school")
+    with Lockstep([WorldPart(city_map), TrafficPart(city_map)]) as lockstep:
+        before, after = City(LockstepLink(lockstep)), City(LockstepLink(lockstep))
+        taxi = before.spawn(name="taxi")
+        before.wait([taxi.drive("east_loop")])
+        taxi.remove()
+        journey = after.spawn(name="taxi").drive("east_loop")
+        after.run_for(1.0)
+        with pytest.raises(RunError, match="had not arrived: taxi"):
+            after.wait([journey], timeout_s=0.1)
+
+
+def test_a_live_script_loses_no_arrival_among_other_cars_reports(live: Router) -> None:
+    with ZenohBus("city", "script", live.listen) as bus, ZenohBus("city", "n", live.listen) as n:
+        link = LiveLink(bus)
+        city = City(link)
+        journeys = [city.spawn(name=name).drive("east_loop") for name in ("a", "b")]
+        others, heard = Mailbox(10_000), 0
+        bus.subscribe(Trip, {"vehicle": "other"}, others)
+        for journey in journeys:
+            n.publish(trip(journey.vehicle, journey.trip_id, arrived_ns=3_000_000_000))
+        for _ in range(1200):
+            n.publish(trip("other", "other-1"))
+
+        def all_heard() -> bool:
+            nonlocal heard
+            heard += len(others.take())
+            return heard >= 1200
+
+        assert link.run_until(all_heard, 20.0)
+        city.wait(journeys, timeout_s=1.0)
+        assert [journey.travel_time_s for journey in journeys] == [2.0, 2.0]
+        city.leave()
+
+
+def trip(vehicle: str, trip_id: str, arrived_ns: int | None = None) -> Trip:
+    return Trip(
+        vehicle=vehicle,
+        trip_id=trip_id,
+        t_ns=0,
+        route=("east_loop",),
+        done_m=0.0,
+        length_m=1.0,
+        started_ns=1_000_000_000,
+        arrived_ns=arrived_ns,
+    )

@@ -36,6 +36,21 @@ def test_a_full_mailbox_keeps_the_newest_and_counts_the_rest():
     assert box.dropped == 3
 
 
+def test_what_is_not_wanted_takes_no_room_and_wakes_nobody():
+    wake = threading.Event()
+    box = Mailbox(2, wake, keep=lambda one: one.t_ns == 7)
+    for n in range(5):
+        box.put(item(n))
+    box.put_later(lambda: None)  # could not be read
+    assert not wake.is_set()
+    box.put(item(7))
+    for n in range(5):
+        box.put(item(n))
+    assert wake.is_set()
+    assert [i.t_ns for i in box.drain()] == [7]
+    assert box.dropped == 0
+
+
 def test_several_mailboxes_are_drained_in_order_of_arrival():
     a, b, raw = Mailbox(10), Mailbox(10), RawMailbox(10)
     first, second, fourth = item(1), item(2), item(4)
