@@ -10,12 +10,12 @@ from scm.arrays import Bools, Floats
 from scm.mismatch.drive import Drive
 from scm.mismatch.noise import Noise, usual_noise
 from scm.mismatch.predict import COMMAND_CLOCK, POSE_CLOCK, Prediction
-from scm.mismatch.rollouts import THROTTLE_CLOCK, Numbers, Rollouts, Tiles
+from scm.mismatch.rollouts import THROTTLE_CLOCK, Motions, Numbers, Rollouts, Tiles
 from scm.mismatch.whiten import Whitener
 from scm.vehicles.car import Car
 from scm.vehicles.param import Param
 
-Recent = OrderedDict[frozenset[tuple[str, float]], tuple[Floats, bool]]
+Key = frozenset[tuple[str, float]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +55,45 @@ def ordinary_numbers(car: Car, params: Sequence[Param]) -> tuple[Ordinary, ...]:
     return (*found.values(), *_CLOCKS)
 
 
+class _Recent:
+    """Residuals of the sets of one drive that were asked for last.
+
+    They share one block: each alone would lie between large arrays that come and go, and leave
+    gaps there that no other array fits into.
+    """
+
+    def __init__(self, events: int) -> None:
+        self._block, self._ok = np.empty((KEPT, events)), np.zeros(KEPT, dtype=np.bool_)
+        self._rows: OrderedDict[Key, int] = OrderedDict()
+
+    def __contains__(self, key: Key) -> bool:
+        return key in self._rows
+
+    def of(self, key: Key) -> tuple[Floats, bool]:
+        """Return a set's residuals, (events,), and whether it stayed physical."""
+        row = self._rows[key]
+        return self._block[row], bool(self._ok[row])
+
+    def remember(self, keys: Sequence[Key], left: Floats, ok: Bools) -> None:
+        """Remember sets, (events, sets), those asked for last the longest."""
+        columns = dict[Key, int]()
+        for column, key in enumerate(keys):
+            columns.pop(key, None)
+            columns[key] = column
+            if key in self._rows:
+                self._rows.move_to_end(key)
+        latest = list(columns)[-KEPT:]
+        more = sum(key not in self._rows for key in latest)
+        while len(self._rows) + more > KEPT:
+            self._rows.popitem(last=False)
+        free = sorted(set(range(KEPT)) - set(self._rows.values()), reverse=True)
+        for key in latest:
+            if key not in self._rows:
+                self._rows[key] = row = free.pop()
+                self._block[row], self._ok[row] = left[:, columns[key]], ok[columns[key]]
+            self._rows.move_to_end(key)
+
+
 class Likelihood:
     """One car's recordings under one belief about noise.
 
@@ -67,7 +106,7 @@ class Likelihood:
         self.car, self.drives = car, drives
         self.tiles = tiles or Tiles(car)
         self._rollouts = [Rollouts(drive, car, self.tiles) for drive in drives]
-        self._recent: list[Recent] = [OrderedDict() for _ in drives]
+        self._recent = [_Recent(sum(len(s.t) for s in drive.streams)) for drive in drives]
         self.ordinary = ordinary_numbers(car, self._rollouts[0].params)
         self._predictions = [Prediction(drive) for drive in drives]
         self.believe(usual_noise(drives))
@@ -104,28 +143,34 @@ class Likelihood:
         A set that was driven lately is not driven again: fits return to their best so far.
         """
         recent, keys = self._recent[i], [frozenset(numbers.items()) for numbers in sets]
-        new = {key: numbers for key, numbers in zip(keys, sets, strict=True) if key not in recent}
-        known = {key: recent[key] for key in keys if key in recent}
-        wanted = list(new)
-        prediction = self._predictions[i]
-        for which, (left, ok) in self._rollouts[i].each(
-            list(new.values()),
-            lambda motions, some: (np.concatenate(prediction.residuals(motions, some)), motions.ok),
-        ):
-            for k, column, fine in zip(which, left.T, ok, strict=True):
-                known[wanted[k]] = recent[wanted[k]] = column.copy(), bool(fine)
-        for key in keys:
-            recent.move_to_end(key)
-        while len(recent) > KEPT:
-            recent.popitem(last=False)
-        left = np.stack([known[key][0] for key in keys], axis=1)
-        cuts = np.cumsum([len(stream.t) for stream in self.drives[i].streams])[:-1]
-        return np.split(left, cuts), np.array([known[key][1] for key in keys])
+        first = dict[Key, int]()
+        for column, key in enumerate(keys):
+            first.setdefault(key, column)
+        new = [column for key, column in first.items() if key not in recent]
+        cuts = np.cumsum([len(stream.t) for stream in self.drives[i].streams])
+        left, ok = np.empty((cuts[-1], len(sets))), np.empty(len(sets), dtype=np.bool_)
+        streams, driven = np.split(left, cuts[:-1]), [sets[column] for column in new]
+
+        def take(motions: Motions, which: Sequence[int]) -> None:
+            mine = [new[k] for k in which]
+            residuals = self._predictions[i].residuals(motions, [driven[k] for k in which])
+            for stream, residual in zip(streams, residuals, strict=True):
+                stream[:, mine] = residual
+            ok[mine] = motions.ok
+
+        self._rollouts[i].each(driven, take)
+        for column, key in enumerate(keys):
+            if key in recent:
+                left[:, column], ok[column] = recent.of(key)
+            elif first[key] != column:
+                left[:, column], ok[column] = left[:, first[key]], ok[first[key]]
+        recent.remember(keys, left, ok)
+        return streams, ok
 
     def weigh(self, residuals: Sequence[Sequence[Floats]]) -> Floats:
         """Return the unit innovations of all drives, (events, sets)."""
         parts = [w.innovations(r) for w, r in zip(self.whiteners, residuals, strict=True)]
-        return np.concatenate(parts, axis=0)
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=0)
 
     def __call__(self, sets: Sequence[Numbers]) -> tuple[Floats, Bools]:
         """Return unit innovations of each set, (events, sets), and which stayed physical."""

@@ -96,18 +96,22 @@ class Rollouts:
 
     def run(self, sets: Sequence[Numbers]) -> Motions:
         """Drive all parameter sets; each is nominal but for the numbers it names by key."""
-        parts = self.each(sets, lambda motions, _: motions)
-        back = np.argsort(np.concatenate([which for which, _ in parts]))
-        together = {n: np.concatenate([p[n] for _, p in parts], axis=1)[:, back] for n in SIGNALS}
-        return Motions(together, np.concatenate([p.ok for _, p in parts])[back])
+        parts = self.each(sets, lambda motions, which: (motions, which))
+        back = np.argsort(np.concatenate([which for _, which in parts]))
+        together = {n: np.concatenate([p[n] for p, _ in parts], axis=1)[:, back] for n in SIGNALS}
+        return Motions(together, np.concatenate([p.ok for p, _ in parts])[back])
 
     def each(
-        self, sets: Sequence[Numbers], use: Callable[[Motions, Sequence[Numbers]], _Used]
-    ) -> list[tuple[list[int], _Used]]:
-        """Drive all parameter sets, a tile at a time; return what `use` makes of each, and which.
+        self, sets: Sequence[Numbers], use: Callable[[Motions, Sequence[int]], _Used]
+    ) -> list[_Used]:
+        """Drive all parameter sets, a tile at a time; return what `use` makes of each.
 
         Motions of many sets are large: what is read of them is better read where they are made.
-        Sets that differ only in faults of measurement share one. `use` is called on all threads.
+        Sets that differ only in faults of measurement share one.
+
+        Args:
+            sets: Numbers by key.
+            use: Is called on all threads, with motions and which sets they are of.
         """
         moving = [self._moving(numbers) for numbers in sets]
         places = {one: k for k, one in enumerate(dict.fromkeys(moving))}
@@ -116,13 +120,12 @@ class Rollouts:
         which = [[i for i, k in enumerate(at) if first <= k < first + ROWS]
                  for first in range(0, len(different), ROWS)]  # fmt: skip
 
-        def share(thread: int) -> list[tuple[list[int], _Used]]:
-            found = list[tuple[list[int], _Used]]()
+        def share(thread: int) -> list[_Used]:
+            found = list[_Used]()
             for tile in range(thread, len(which), THREADS):
                 first, mine = tile * ROWS, which[tile]
                 motions = self._run(thread, different[first : first + ROWS])
-                some = motions.of([at[i] - first for i in mine])
-                found.append((mine, use(some, [sets[i] for i in mine])))
+                found.append(use(motions.of([at[i] - first for i in mine]), mine))
             return found
 
         others = pool(THREADS).map(share, range(1, min(THREADS, len(which))))

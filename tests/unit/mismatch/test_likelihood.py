@@ -1,0 +1,90 @@
+"""What a likelihood remembers of sets that were driven, and how much memory it works in."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from scm.mismatch import likelihood
+from scm.mismatch.drive import Drive
+from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.rollouts import Tiles
+from tests.unit.mismatch.made_drive import big_nigel, made_drive
+
+KEPT = 3
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return Drive(made_drive(seconds=4.0), big_nigel())
+
+
+@pytest.fixture(scope="module")
+def tiles():
+    return Tiles(big_nigel())
+
+
+@pytest.fixture
+def model(drive, tiles, monkeypatch):
+    monkeypatch.setattr(likelihood, "KEPT", KEPT)
+    return Likelihood([drive], big_nigel(), tiles)
+
+
+def trims(*numbers):
+    return [{"steering.trim_rad": 0.01 * n} for n in numbers]
+
+
+def left(model, *numbers):
+    (streams,), ok = model.residuals(trims(*numbers))
+    assert ok.all()
+    return np.concatenate(streams)
+
+
+def remembered(model):
+    every = {n: frozenset(*(s.items() for s in trims(n))) for n in range(9)}
+    return {n for n, key in every.items() if key in model._recent[0]}
+
+
+def test_a_set_has_the_same_residuals_however_often_and_whenever_it_is_asked_for(model):
+    alone = {n: left(model, n)[:, 0] for n in range(6)}
+    for asked in ((0, 1, 2), (2, 2, 0, 4, 4), (5, 4, 3, 2, 1, 0), (1, 5, 1), (3, 0, 3, 1)):
+        expected = np.stack([alone[n] for n in asked], axis=1)
+        np.testing.assert_array_equal(left(model, *asked), expected)
+
+
+def test_what_is_done_to_residuals_is_not_remembered(model):
+    before = left(model, 1)
+    (streams,), _ = model.residuals(trims(1))
+    for stream in streams:
+        stream[:] = 1.0
+    np.testing.assert_array_equal(left(model, 1), before)
+
+
+def test_the_sets_asked_for_last_are_remembered(model):
+    left(model, 1, 2, 3)
+    left(model, 4, 1)
+    assert remembered(model) == {3, 4, 1}
+    left(model, 5)
+    left(model, 6)
+    assert remembered(model) == {1, 5, 6}
+    left(model, 5, 2, 7, 8, 6)
+    assert remembered(model) == {7, 8, 6}
+    left(model, 1, 2, 1, 3)
+    assert remembered(model) == {2, 1, 3}
+
+
+def test_two_cars_that_are_physical_and_one_that_is_not_are_remembered_as_such(model):
+    sets = [*trims(0), {"body.mass_kg": -1.0}, *trims(1)]
+    first, second = (model.residuals(sets)[1].tolist() for _ in range(2))
+    assert first == second == [True, False, True]
+
+
+def test_many_sets_are_weighed_in_the_room_of_residuals_and_innovations(drive, tiles):
+    model = Likelihood([drive], big_nigel(), tiles)
+    model(trims(0))
+    sets = [{"steering.trim_rad": 1e-4 * n} for n in range(480)]
+    tracemalloc.start()
+    e, _ = model(sets)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2.6 * e.nbytes
