@@ -10,8 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from scm.arrays import Floats
+from scm.arrays import Bools, Floats
 from scm.mismatch.commanded import Commanded
+from scm.mismatch.findings import Span
 from scm.mismatch.smooth import Smooth, smooth
 from scm.recording.motion import forward
 from scm.recording.read import Recording
@@ -31,6 +32,8 @@ KNOWN = (
     "velocity.y", "imu.accel_x", "imu.accel_y",
 )  # fmt: skip
 LEAP = 0.3
+BLIND_S, BLIND_STEPS = 1.0, 5.0  # without a pose for longer, and for so many of its usual steps
+POSES = ("pose.x", "pose.y", "pose.yaw")
 _MAD = 1.4826
 
 
@@ -101,11 +104,24 @@ class Drive:
     @cached_property
     def smoothed(self) -> dict[str, Smooth]:
         """The poses, smoothed without a car model, of the point that was measured."""
-        return {
-            name: smooth(s.t, s.values, s.std)
-            for name in ("pose.x", "pose.y", "pose.yaw")
-            for s in (self.stream(name),)
-        }
+        return {name: smooth(s.t, s.values, s.std) for name in POSES for s in (self.stream(name),)}
+
+    @cached_property
+    def blind(self) -> tuple[Span, ...]:
+        """Spans in which a channel of the pose is missing; a smoothed pose is a guess there."""
+        found = list[Span]()
+        for t in (self.stream(name).t for name in POSES):
+            steps = np.diff(t)
+            longest = max(BLIND_S, BLIND_STEPS * float(np.median(steps)))
+            found += [(float(t[i]), float(t[i + 1])) for i in np.flatnonzero(steps > longest)]
+        return tuple(sorted(set(found)))
+
+    def is_blind(self, t: Floats, length_s: float = 0.0) -> Bools:
+        """Return whether a span of this length that begins at each time is partly blind."""
+        blind = np.zeros(t.shape, dtype=np.bool_)
+        for first, last in self.blind:
+            blind |= (t + length_s > first) & (t < last)
+        return blind
 
 
 def _on_grid(first: float, row: float) -> float:

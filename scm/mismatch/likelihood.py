@@ -99,7 +99,8 @@ class Likelihood:
 
     Attributes:
         ordinary: The car's own uncertain numbers, in the order of every `z`.
-        t: Times of all innovations, (events,); `settled`: 0 while the start still matters, else 1.
+        t: Times of all innovations, (events,).
+        settled: 0 while the start still matters and where poses are missing for long, else 1.
     """
 
     def __init__(self, drives: Sequence[Drive], car: Car, tiles: Tiles | None = None) -> None:
@@ -122,7 +123,8 @@ class Likelihood:
         self.whiteners = [Whitener(drive, noise) for drive in self.drives]
         self.t = np.concatenate([w.t for w in self.whiteners])
         begun = [
-            w.t > d.edges[0] + SETTLED_S for w, d in zip(self.whiteners, self.drives, strict=True)
+            (w.t > d.edges[0] + SETTLED_S) & ~d.is_blind(w.t)
+            for w, d in zip(self.whiteners, self.drives, strict=True)
         ]
         self.settled = np.concatenate(begun).astype(np.float64)
 

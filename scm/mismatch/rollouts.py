@@ -93,6 +93,7 @@ class Rollouts:
         self._x = smoothed["pose.x"].at(edges) - c * px + s * py
         self._y = smoothed["pose.y"].at(edges) - s * px - c * py
         self._yaw = psi
+        self._blind = drive.is_blind(edges)
 
     def run(self, sets: Sequence[Numbers]) -> Motions:
         """Drive all parameter sets; each is nominal but for the numbers it names by key."""
@@ -152,7 +153,8 @@ class Rollouts:
                 fleet.battery[:n] = self.drive.battery[a]
             commands = self._commands(changes[parts * a : parts * b + 1], delays)
             tether.rollout(*commands, out[a + 1 : b + 1])
-            tether.carry(n, self._x[b], self._y[b], self._yaw[b])
+            if not self._blind[b]:
+                tether.carry(n, self._x[b], self._y[b], self._yaw[b])
         ok = fleet.status[:n] == VehicleStatus.OK
         return Motions({name: out[:, k, :n] for k, name in enumerate(SIGNALS)}, ok)
 

@@ -259,8 +259,8 @@ class Search:
         """Return the model without effects that do not help on a part that no fit has seen.
 
         Of what an effect gains where it was fitted, a share must come out there too, by length, or
-        plenty; of one that hardly acts there, no more than it can show. One that gains next to
-        nothing beside another, and where that one acts, is what that one's equation leaves.
+        plenty; of one that pays its price and hardly acts there, no more than it can show. One that
+        gains next to nothing beside another, and where that one acts, is what its equation leaves.
         """
         share = float(unseen.sum()) / max(self.events, 1)
         while best.effects:
@@ -273,13 +273,18 @@ class Search:
                 [float(fitter.score(f.e[:, None], f.z)[0] - f.z @ f.z - seen) for f in others]
             )
             shown = np.array([float(fitter.weights(best.e) @ (f.e - best.e) ** 2) for f in others])
-            expected = np.minimum(share * seen_gains, shown - CHANCE * np.sqrt(shown))
-            gains -= np.minimum(self.holds * expected, PLENTY)
+            least = np.where(self._pays(best, seen_gains), shown - CHANCE * np.sqrt(shown), np.inf)
+            gains -= np.minimum(self.holds * np.minimum(share * seen_gains, least), PLENTY)
             gains[self._remainders(best, others, seen_gains)] = -np.inf
             if gains.min() > 0.0:
                 return best
             best = others[int(np.argmin(gains))]
         return best
+
+    def _pays(self, best: Fitted, gains: Floats) -> Bools:
+        """Return which effects gain their price where they were fitted."""
+        prices = [price((effect,), self.events, len(self.listed)) for effect in best.effects]
+        return np.asarray(gains > prices)
 
     def _remainders(self, best: Fitted, others: Sequence[Fitted], gains: Floats) -> Bools:
         """Return which effects are no more than an error in the equation of the largest.

@@ -184,10 +184,11 @@ def length_of(drives: Sequence[Drive]) -> float:
 
 
 def _begins(drive: Drive, cuts: Floats, length_s: float) -> Floats:
-    """Return when strides begin: each within one block, none before the car has settled."""
+    """Return when strides begin: each within one block, in sight, none before a car has settled."""
     begins = [np.arange(a, b - length_s + 1e-6, length_s / OVERLAP) for a, b in pairwise(cuts)]
     every, length = np.concatenate(begins), float(drive.edges[-1] - drive.edges[0])
-    return np.asarray(every[every >= drive.edges[0] + min(SETTLED_S, LEAST_SETTLED * length)])
+    settled = every >= drive.edges[0] + min(SETTLED_S, LEAST_SETTLED * length)
+    return np.asarray(every[settled & ~drive.is_blind(every, length_s)])
 
 
 def _at(t: Floats, values: Floats, when: Floats) -> Floats:

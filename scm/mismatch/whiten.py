@@ -19,6 +19,7 @@ from scm.vehicles.jit import array_kernel
 
 EX, EY, EPSI, DV, DY, DR = range(6)
 BODY = 6
+LOST = 1e5, 100.0  # of a pose that was not seen for long: position by its noise, yaw [rad]
 FELT_S = 0.1
 AT_ONCE = 64  # sets weighed together: what is worked on stays small
 SLOW = 0.12  # of the usual speed: below it dry friction decides, to the moment, when a car halts
@@ -118,7 +119,8 @@ class Whitener:
         unsure = np.concatenate([s.unsure for s in drive.streams])[self._order]
         x, y = drive.smoothed["pose.x"], drive.smoothed["pose.y"]
         speed = np.hypot(x.rate_at(self.t), y.rate_at(self.t))
-        self._halting = (speed < SLOW * np.percentile(speed, 90)).astype(np.float64)
+        slow = (speed < SLOW * np.percentile(speed, 90)) | drive.is_blind(self.t)
+        self._halting = slow.astype(np.float64)
         jolt = np.array([noise.own.get(s.name, 0.0) for s in drive.streams])
         jolt *= [s.name.startswith("imu.") for s in drive.streams]
         unsure = np.hypot(unsure, HALTING * jolt[self.stream] * self._halting)
@@ -138,7 +140,10 @@ class Whitener:
         self.log_size = np.log(self._variance)
 
     def _leaps(self, noise: Noise, size: int) -> Floats:
-        """Return the variance that the commands' leaps add to each state before each event."""
+        """Return the variance that leaps of commands add to each state before each event.
+
+        Of where a car is when it is seen again after long, nothing is known.
+        """
         out = np.zeros((len(self.t), size))
         since = np.diff(self.t, prepend=self.t[0])
         felt = _felt(self.drive.throttle, self.t) + HALT**2 * self._halting
@@ -146,6 +151,10 @@ class Whitener:
         out[:, DV] = launch
         out[:, BODY:] = launch[:, None] * self._system.slips
         out[:, DR] = noise.turn**2 * _felt(self.drive.steering, self.t) * since / FELT_S
+        seen_again = np.searchsorted(self.t, [last for _, last in self.drive.blind])
+        for name, state in (("pose.x", EX), ("pose.y", EY)):
+            out[seen_again, state] = (LOST[0] * self.drive.stream(name).std) ** 2
+        out[seen_again, EPSI] = LOST[1] ** 2
         return out
 
     def innovations(self, residuals: Sequence[Floats]) -> Floats:

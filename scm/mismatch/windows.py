@@ -74,7 +74,7 @@ class Windows:
     """Drives windows of one recording again."""
 
     def __init__(self, drive: Drive, car: Car) -> None:
-        self.drive, self.car = drive, car
+        self.drive, self.car, self._blind = drive, car, drive.is_blind(drive.edges)
 
     def run(self, sides: Sequence[Side], starts: Ints, steps: int) -> Runs:
         """Drive all windows.
@@ -159,7 +159,8 @@ class Windows:
                 fleet.battery[: len(leading)] = self.drive.battery[now]
             self._drive(fleet, [one.commands[:, run_in + now : run_in + then] for one in leading])
             now = then
-            _carry(fleet, [one.moved for one in leading], now)
+            if not self._blind[now]:
+                _carry(fleet, [one.moved for one in leading], now)
         return now
 
     def _start(

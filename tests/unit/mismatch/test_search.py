@@ -92,11 +92,13 @@ def losing(seen, unseen, where, shows):
         ((100.0,), (20.0,), (0,), (0.0,), True),
         ((100.0,), (1.0,), (0,), (100.0,), False),
         ((100.0,), (1.0,), (0,), (0.0,), True),
+        ((9.0,), (0.5,), (0,), (0.0,), False),
         ((1500.0,), (PLENTY + 1.0,), (0,), (900.0,), True),
         ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 0), (0.0, 0.0), False),
         ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 1), (0.0, 0.0), True),
     ],
-    ids=["its share", "less than its share", "hardly acts there", "plenty",
+    ids=["its share", "less than its share", "hardly acts there",
+         "hardly acts anywhere", "plenty",
          "a remainder of another", "small elsewhere"],
 )  # fmt: skip
 def test_an_effect_stays_where_its_gain_holds_on_an_unseen_part(
@@ -107,7 +109,7 @@ def test_an_effect_stays_where_its_gain_holds_on_an_unseen_part(
     part[1:3] = 1.0
     fake = SimpleNamespace(settled=np.ones(len(best.e)))
     search = Search.__new__(Search)
-    search.model, search.events = fake, 8
+    search.model, search.events, search.listed = fake, 8, best.effects
     search.fitter = Fitter(fake, 1.0 - part)
     nothing = replace(others[-1], effects=())
     search._without_each = lambda fitted: others if len(fitted.effects) == len(seen) else [nothing]
