@@ -46,7 +46,7 @@ from scm.mismatch.rollouts import Numbers
 from scm.mismatch.rough import is_far, roughly, strays
 from scm.mismatch.search import Search
 from scm.mismatch.strayed import strayed
-from scm.recorder.drives import recordings_of_one
+from scm.recorder.drives import SUFFIX, recordings_of_one
 from scm.recording.read import Recording
 from scm.vehicles.car import Car, load_car
 
@@ -275,9 +275,14 @@ def _nothing(
 
 
 def _titles(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    return tuple(
-        r.path.parent.name if r.path.name == "recording.yaml" else r.path.stem for r in recordings
-    )
+    return tuple(map(_title, recordings))
+
+
+def _title(recording: Recording) -> str:
+    path = recording.path
+    if path.suffix == SUFFIX:
+        return f"{recording.name} of {path.stem}"
+    return path.parent.name if path.name == "recording.yaml" else path.stem
 
 
 def _searched(

@@ -16,6 +16,7 @@ RESET_S = 1.0
 SLOWEST_POSE_S = 0.1
 UNEVEN = 2.0
 BURST_SHARE = 0.1
+FEW_BURSTS = 0.005  # not worth a word
 SAME_TABLE = 0.5  # of the stamps are a sister's too
 
 
@@ -132,8 +133,7 @@ def _spacing(t: Floats, at: str, names: Sequence[str]) -> Iterator[DataProblem]:
         yield DataProblem(
             channel=at,
             name="gap",
-            said=f"{len(gaps)} gaps, {lost:.1f} s of {span:.1f} s; the longest lasts "
-            f"{max(end - start for start, end in gaps):.2f} s.",
+            said=_gaps_said(gaps, lost, span),
             when_s=gaps,
             corrected="Nothing is compared across a gap.",
         )
@@ -147,15 +147,26 @@ def _spacing(t: Floats, at: str, names: Sequence[str]) -> Iterator[DataProblem]:
     yield from _jitter(step, period, at, command=command)
 
 
+def _gaps_said(gaps: Sequence[Span], lost_s: float, span_s: float) -> str:
+    if len(gaps) == 1:
+        return f"One gap of {lost_s:.2f} s in {span_s:.1f} s."
+    longest_s = max(end - start for start, end in gaps)
+    lost = f"{len(gaps)} gaps, {lost_s:.1f} s of {span_s:.1f} s"
+    return f"{lost}; the longest lasts {longest_s:.2f} s."
+
+
 def _jitter(step: Floats, period: float, at: str, *, command: bool) -> Iterator[DataProblem]:
     high = float(np.percentile(step, 95))
     bursts = float((step < 0.1 * period).mean())
     if not command and (high > UNEVEN * period or bursts > BURST_SHARE):
+        said = f"Rows come every {1e3 * period:.1f} ms as a rule, but one in twenty "
+        said += f"only after {1e3 * high:.0f} ms or more"
+        if bursts > FEW_BURSTS:
+            said += f", and {100.0 * bursts:.0f} % right after another"
         yield DataProblem(
             channel=at,
             name="jitter",
-            said=f"Rows come every {1e3 * period:.1f} ms in the middle, but one in twenty after "
-            f"{1e3 * high:.0f} ms or more, and {100.0 * bursts:.0f} % right after another.",
+            said=f"{said}.",
             record_instead="Stamp a value where it is measured, not where it arrives.",
         )
 

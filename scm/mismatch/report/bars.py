@@ -12,6 +12,7 @@ from scm.mismatch.report.wording import quantities, title_of
 _WIDTH = 440.0
 _ROW, _BETTER_ROW = 25.0, 52.0
 _MOST_TRIED = 14
+_ROOM = 8.0  # between a bar's end or a mark and the words behind it
 _FOUND = (
     " Blue bars are what was found; grey bars beyond their mark explain some of the same, and less "
     "well."
@@ -45,7 +46,8 @@ def better_picture(diagnosis: Diagnosis, retuned_m: float | None = None) -> Pict
         parts += [text(0, y + 14, words, kind="title")]
         parts += [element("rect", x=0, y=y + 20, width=max(2.0, long * value), height=26, rx=3,
                           class_=f"bar-{kind}")]  # fmt: skip
-        parts += [text(8 + long * value, y + 38, said[i], kind="strong")]
+        parts += [text(_label_x(long * value, long * floor, said[i]), y + 38, said[i],
+                       kind="strong")]  # fmt: skip
     if math.isfinite(floor):
         x = long * floor
         marks = "".join(f"M{x:.1f} {_BETTER_ROW * i + 18:.0f}v30" for i in range(len(rows)))
@@ -59,6 +61,12 @@ def better_picture(diagnosis: Diagnosis, retuned_m: float | None = None) -> Pict
             460.0, foot + 24.0, parts, f"Position error {before:.3g} m before, {after:.3g} m after"
         ),
     )
+
+
+def _label_x(end: float, mark: float, words: str) -> float:
+    """Return where a bar's words begin: behind its end, and behind a mark that would cross them."""
+    begin = end + _ROOM
+    return mark + _ROOM if end < mark < begin + TEXT_PX * len(words) + _ROOM else begin
 
 
 def tried_picture(tried: Sequence[Tried], found: Sequence[str]) -> Picture | None:

@@ -74,8 +74,9 @@ def spans(when_s: Sequence[Span]) -> str:
 
 
 def sensors(channels: Sequence[str]) -> str:
-    """Return channels as a person would list them, each sensor once."""
+    """Return channels as a person would list them, each sensor once; one text may name several."""
     named = {channel: words for words, group in _SENSORS.items() for channel in group}
+    channels = [channel for text in channels for channel in text.split(", ")]
     if len(channels) == 1 and channels[0] in _SINGLE:
         return _SINGLE[channels[0]]
     return joined(list(dict.fromkeys(named.get(channel, channel) for channel in channels)))

@@ -1,11 +1,12 @@
 """The few lines that the command line prints at the end."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from scm.mismatch.findings import Diagnosis, Effect
+from scm.mismatch.findings import DataProblem, Diagnosis, Effect
 from scm.mismatch.report.first_screen import name_of
+from scm.mismatch.report.places import sensors
 from scm.mismatch.report.verdict_text import can_judge, verdict_sentence
 from scm.mismatch.report.wording import (
     interval,
@@ -32,13 +33,27 @@ def _lines(diagnosis: Diagnosis, out: Path) -> Iterator[str]:
     for question in diagnosis.undecided:
         yield f"  undecided: {' or '.join(map(title_of, question.between))}"
         yield f"    drive this: {question.drive_this}"
-    for problem in diagnosis.data:
-        mended = f" ({problem.corrected})" if problem.corrected else ""
-        yield f"  recording: {problem.said}{mended}"
-        if problem.record_instead:
-            yield f"    record instead: {problem.record_instead}"
+    yield from _problems(diagnosis.data)
     yield from _better(diagnosis)
     yield f"  {out / PAGE}  ({diagnosis.runtime_s:.0f} s)"
+
+
+def _problems(problems: Sequence[DataProblem]) -> Iterator[str]:
+    """Yield what is wrong with the recording, what is alike in several sensors once."""
+    alike: dict[tuple[str, str, str], list[str]] = {}
+    for problem in problems:
+        key = (problem.said, problem.corrected, problem.record_instead)
+        alike.setdefault(key, []).append(problem.channel)
+    for (said, corrected, instead), channels in alike.items():
+        where = ", ".join(filter(None, ("recording", _sensors(channels))))
+        yield f"  {where}: {said}{f' ({corrected})' if corrected else ''}"
+        if instead:
+            yield f"    record instead: {instead}"
+
+
+def _sensors(channels: Sequence[str]) -> str:
+    """Return whose problem it is; nothing where it is the whole recording's."""
+    return "" if set(channels) <= {"", "*"} else sensors(channels)
 
 
 def _numbers(effect: Effect) -> str:

@@ -239,6 +239,34 @@ def test_what_is_wrong_with_several_channels_alike_is_one_card(tmp_path):
     assert re.findall(r'card data".*?<h2>(.*?)</h2>', first) == ["Too short: poses and IMU"]
 
 
+def test_sensors_of_one_table_are_named_as_a_person_names_them(tmp_path):
+    said = "Rows come every 20 ms as a rule."
+    problems = tuple(
+        DataProblem(channel=channel, name="jitter", said=said, record_instead="Stamp it there.")
+        for channel in ("pose.*", "encoder.*, imu.*")
+    )
+    nigel = load_car("nigel")
+    case = (made_up.diagnosis(data=problems), made_up.evidence(), nigel, nigel)
+    first, _, _ = written(tmp_path, case).partition("<nav>")
+    assert "<h2>Jitter: poses, encoders and IMU</h2>" in first
+    printed = summary(case[0], tmp_path)
+    assert f"recording, poses, encoders and IMU: {said}\n    record instead" in printed
+    assert printed.count(said) == 1
+
+
+def test_a_bars_number_stands_clear_of_the_mark_of_noise(tmp_path):
+    found, shown, car, patched = made_up.one_effect()
+    for after in (0.004, 0.0051, 0.0062, 0.035):
+        barely = replace(found, fit=made_up.fit(before=0.04, after=after))
+        write_report(barely, shown, car, patched, tmp_path)
+        svg = (tmp_path / "pictures" / "better.svg").read_text()
+        mark = float(re.search(r'd="M([\d.]+) ', svg).group(1))
+        texts = re.findall(r'<text x="([\d.]+)"[^>]*class="strong"[^>]*>([^<]*)<', svg)
+        assert len(texts) == 2
+        for x, words in texts:
+            assert not float(x) - 4.0 < mark < float(x) + 7.0 * len(words)
+
+
 def test_what_is_wrong_with_several_recordings_alike_is_one_card(tmp_path):
     problems = tuple(
         DataProblem(channel="speed", name="missing", said=f"{name}: Not there.", record_instead="x")

@@ -1,5 +1,6 @@
 """Files that are broken, incomplete or of another drive: each says so, and none raises."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -76,6 +77,12 @@ def jitter(t: Floats, values: Floats) -> tuple[Floats, Floats]:
     return t + np.where(np.arange(len(t)) % 2 == 0, 0.6, 0.0) / 30.0 * 1.6, values
 
 
+def late(t: Floats, values: Floats) -> tuple[Floats, Floats]:
+    kept = np.arange(len(t)) % 12 != 5
+    kept &= np.arange(len(t)) % 12 != 6
+    return t[kept], values[kept]
+
+
 def rounded(t: Floats, values: Floats) -> tuple[Floats, Floats]:
     return t, np.round(values / 0.05) * 0.05
 
@@ -108,6 +115,18 @@ def test_a_broken_channel_makes_no_sensor_suspicious(
     del problem
     found = doubt(changed(drive(1), names, change), nigel).suspicions
     assert [suspicion for suspicion in found if not suspicion.repaired] == []
+
+
+def test_a_gap_and_uneven_rows_are_said_in_words(drive: Drive, nigel: Car) -> None:
+    def words(change: Change, name: str) -> str:
+        found = doubt(changed(drive(0), POSE, change), nigel).problems
+        return next(one.said for one in found if one.name == name)
+
+    assert re.fullmatch(r"One gap of \d\.\d\d s in \d+\.\d s\.", words(gap, "gap"))
+    assert re.fullmatch(
+        r"Rows come every \d+\.\d ms as a rule, but one in twenty only after \d+ ms or more\.",
+        words(late, "jitter"),
+    )
 
 
 @pytest.mark.parametrize(("change", "end_s"), [(frozen, 20.0), (gap, 40.0)])
