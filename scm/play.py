@@ -120,7 +120,10 @@ def read_drive(path: Path) -> tuple[Drive, list[Row]]:
     """
     try:
         drive = msgspec.convert(yaml.safe_load(path.read_text(encoding="utf-8")), Drive)
-    except (OSError, yaml.YAMLError, msgspec.ValidationError) as cause:
+    except OSError as cause:
+        msg = f"{path}: cannot be read: {cause.strerror or cause}"
+        raise ScmError(msg) from cause
+    except (yaml.YAMLError, msgspec.ValidationError) as cause:
         msg = f"{path}: {cause}"
         raise ScmError(msg) from cause
     table = read_table(path.parent / drive.commands)

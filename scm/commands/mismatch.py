@@ -31,7 +31,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--out", type=Path, metavar="DIR", help=f"the report's folder; default: runs/{FOLDER}-NAME"
     )
     parser.add_argument(
-        "--budget-s", type=float, default=120.0, help="time for the search (%(default)s)"
+        "--budget-s", type=float, default=120.0, help="time for the search [s] (%(default)g)"
     )
 
 

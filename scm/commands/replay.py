@@ -26,7 +26,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--data", type=Path, metavar="DIR", help="where the tables are; default: beside"
     )
     parser.add_argument(
-        "--horizon-s", type=float, default=3.0, help="length of a window (%(default)s)"
+        "--horizon-s", type=float, default=3.0, help="length of a window [s] (%(default)g)"
     )
     parser.add_argument("--save", type=Path, metavar="CSV", help="write every window's poses here")
 
@@ -51,7 +51,7 @@ def _run(arguments: argparse.Namespace) -> int:
             print("free run from the measured state, median and 90th percentile of the error")
             undone = [f.measure.name for f in car.faults if any(map(f.law_of, POSES))]
             if undone:
-                print(f"poses as they are without {', '.join(undone)} of the car file")
+                print(f"measured poses with {', '.join(undone)} of the car file taken out")
             print(_table(run, arguments.horizon_s) + "\n")
             runs.append(run)
     if arguments.save:

@@ -198,6 +198,9 @@ def read_keys(path: Path) -> list[str]:
 def _reading(path: Path) -> Iterator[None]:
     try:
         yield
-    except (OSError, *UNREADABLE) as cause:
+    except OSError as cause:
+        msg = f"{path}: cannot be read: {cause.strerror or cause}"
+        raise RecordingError(msg) from cause
+    except UNREADABLE as cause:
         msg = f"{path}: not a complete recording ({cause}): try `scm recover {path}`"
         raise RecordingError(msg) from cause

@@ -185,8 +185,9 @@ def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
     if path.suffix != ".toml":
         path = TYPES_DIR / f"{name_or_path}.toml"
     if not path.is_file():
-        hint = nearest(str(name_or_path), car_names())
-        msg = f"{name_or_path}: no such car; there are {', '.join(car_names())}{hint}"
+        hint = nearest(Path(name_or_path).stem, car_names())
+        what = "file" if Path(name_or_path).suffix == ".toml" else "car"
+        msg = f"{name_or_path}: no such {what}; cars by name: {', '.join(car_names())}{hint}"
         raise CarError(msg)
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))

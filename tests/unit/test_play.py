@@ -152,5 +152,7 @@ def test_poses_about_a_hit_are_left_out_and_that_is_said(link, tmp_path):
 def test_a_table_without_a_course_of_time_is_refused(tmp_path, rows):
     (tmp_path / "a.csv").write_text(f"t_s,throttle,steering\n{rows}", encoding="utf-8")
     (tmp_path / "drive.yaml").write_text("drive: 1\ncommands: a.csv\n", encoding="utf-8")
+    with pytest.raises(ScmError, match=r"none\.yaml: cannot be read: No such file"):
+        read_drive(tmp_path / "none.yaml")
     with pytest.raises(ScmError, match=r"a\.csv"):
         read_drive(tmp_path / "drive.yaml")

@@ -227,6 +227,14 @@ def test_damage_anywhere_is_told_or_mended_but_never_a_crash(tmp_path: Path) -> 
     assert outcomes == {"mended", "nothing left"}
 
 
+def test_a_run_that_is_not_there_is_not_called_damaged(tmp_path: Path) -> None:
+    with pytest.raises(
+        RecordingError, match=r"missing\.mcap: cannot be read: No such file"
+    ) as told:
+        list(read_run(tmp_path / "missing.mcap"))
+    assert "scm recover" not in str(told.value)
+
+
 def test_a_recovery_that_cannot_begin_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="cannot be read: No such file"):
         recover(tmp_path / "missing.mcap")

@@ -59,6 +59,8 @@ def test_a_file_without_terms_gets_the_standard_ones(tmp_path):
 def test_an_unknown_car_is_refused_with_the_nearest_name():
     with pytest.raises(CarError, match=r"nigle: no such car; .* mean 'nigel'"):
         load_car("nigle")
+    with pytest.raises(CarError, match=r"here/nigle\.toml: no such file; .* mean 'nigel'"):
+        load_car("here/nigle.toml")
 
 
 def test_a_misspelt_key_is_refused_with_file_key_and_nearest_name(tmp_path):
