@@ -19,6 +19,8 @@ LATEST_S = 1.5
 RELATED = 0.35
 HARDLY = 0.2  # a driver who holds the speed against slopes and turns undoes most of it
 VARIED = 0.5  # a speed held steady by its driver says nothing about the throttle
+CLEARLY, CLOSELY = 0.8, 0.6
+QUICK_S, APART_S = 4.0, 3.0
 LONGEST_S, SHORT_S, SHORTEST_S = 20.0, 8.0, 5.0
 RELATED_SHORT = 0.6  # a few seconds of two drives are alike by chance more often
 WHEELBASE_M, TURNED_RAD, STARTS = 0.25, 0.25, 3
@@ -130,7 +132,7 @@ def _without_effect(recording: Recording, movement: Series, poses: Track) -> Ite
         lagged = _lagged(asked, 0.5, STEP_S)
         slope = on.smooth_even(speed, 1)
         answers = ((speed, lagged), (slope, asked), (speed, asked))
-        if not any(_follows(motion, signal, on, HARDLY) for motion, signal in answers):
+        if not any(_belongs(motion, signal, on) for motion, signal in answers):
             yield _unrelated("command.throttle", "The car's speed does not follow its throttle")
 
 
@@ -192,6 +194,29 @@ def _follows(motion: Floats, asked: Floats, on: Grid, related: float) -> bool:
         return True
     near = best_alike(motion, asked, on, LATEST_S)
     return near > related
+
+
+def _belongs(motion: Floats, asked: Floats, on: Grid) -> bool:
+    """Say whether the motion follows clearly, or hardly and its quick changes better than others.
+
+    Two drives of one car, on like routes, are alike in what is slow.
+    """
+    if min(motion.std(), asked.std()) < 1e-6 or _follows(motion, asked, on, CLEARLY):
+        return True
+    if not _follows(motion, asked, on, HARDLY):
+        return False
+    motion, asked = (_quick(values, on.step_s) for values in (motion, asked))
+    near, apart = best_alike(motion, asked, on, LATEST_S), round(APART_S / on.step_s)
+    others = range(apart, len(asked) - apart, 4)
+    far = [abs(float(np.corrcoef(motion, np.roll(asked, d))[0, 1])) for d in others]
+    return near > CLOSELY or near > max(far, default=0.0)
+
+
+def _quick(values: Floats, step_s: float) -> Floats:
+    """Return values without what changes slower than `QUICK_S`."""
+    width = 2 * round(0.5 * QUICK_S / step_s) + 1
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.asarray(values - np.convolve(padded, np.full(width, 1.0 / width), mode="valid"))
 
 
 def best_alike(motion: Floats, asked: Floats, on: Grid, latest_s: float) -> float:
