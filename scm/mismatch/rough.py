@@ -89,7 +89,7 @@ class RoughSearch(Search):
     None is begun as strong as suits it best: it would take what belongs to the others.
     """
 
-    holds, amplifies = 0.0, False
+    holds, amplifies, keeps = 0.0, False, True
 
     def __init__(
         self, model: Likelihood, part: Floats, library: Sequence[Candidate], tell: Tell

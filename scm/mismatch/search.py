@@ -68,9 +68,10 @@ class Search:
         steps: What was tried, round by round.
         holds: Share of an effect's gain that must hold where nothing was fitted.
         amplifies: Whether effects are begun as strong as suits them, and at several places.
+        keeps: Whether alternatives keep their derivatives, of which a fit afresh makes new ones.
     """
 
-    holds, amplifies = 0.4, True
+    holds, amplifies, keeps = 0.4, True, False
 
     def __init__(
         self,
@@ -222,7 +223,10 @@ class Search:
         near, far = (sorted(fits, key=cost)[:REFITTED] for fits in begun)
         near += [f for one in near[:AGAIN] for f in _next_starts(one, every[0])]
         self.tell("refitting " + ", ".join(f.names[-1] for f in near[:4]) + " ...")
-        near, far = (self.fitter.refine(fits, rounds=4) for fits in (near, far[:AFRESH]))
+        del every, begun  # they hold innovations of every start
+        near, far = (
+            self._lighter(self.fitter.refine(fits, rounds=4)) for fits in (near, far[:AFRESH])
+        )
         ranked = _preferred(near, far)
         for f in ranked:
             self._not_worse(f, base)
@@ -231,8 +235,15 @@ class Search:
         if cost(ranked[0]) < self.criterion(base) + NEAR:
             near = self.fitter.refine(near[:6], rounds=3, fresh=True)
         ranked = sorted([*near, *(f for f in ranked if all(f is not n for n in near))], key=cost)
-        ranked = sorted(self._deepened(ranked, base, cost), key=cost)
+        ranked = self._lighter(sorted(self._deepened(ranked, base, cost), key=cost))
         return Step(base, tuple(ranked), tuple(cost(f) for f in ranked))
+
+    def _lighter(self, fits: list[Fitted]) -> list[Fitted]:
+        """Return fits without their derivatives, unless these are kept: they fill memory."""
+        if not self.keeps:
+            for fitted in fits:
+                fitted.jacobian = np.zeros((0, 0))
+        return fits
 
     def _deepened(
         self, ranked: Sequence[Fitted], base: Fitted, cost: Callable[[Fitted], float]

@@ -66,14 +66,15 @@ def _alike(a: Floats, b: Floats) -> float:
 
 def _waves(law: Law, grid: Sequence[Values], cells: Cells, response: Response) -> list[Start]:
     """Return the best waves; amount and phase come from a wave's two halves together."""
-    halves = [
-        np.stack([pushes(law, cells, (*v[:-1], phase)) for v in grid], axis=1)
-        for phase in (0.0, 0.5 * np.pi)
-    ]
-    bent = [response.bend @ half for half in halves]
+    halves = [np.empty((len(cells), len(grid))) for _ in range(2)]  # thousands of waves fill memory
+    for half, phase in zip(halves, (0.0, 0.5 * np.pi), strict=True):
+        for i, v in enumerate(grid):
+            half[:, i] = pushes(law, cells, (*v[:-1], phase))
     top = np.stack([-(response.slope @ half) for half in halves])
-    ss, cc = (np.einsum("ij,ij->j", h, b) for h, b in zip(halves, bent, strict=True))
-    sc = np.einsum("ij,ij->j", halves[0], bent[1])
+    ss = np.einsum("ij,ij->j", halves[0], response.bend @ halves[0])
+    bent = response.bend @ halves[1]
+    cc, sc = (np.einsum("ij,ij->j", half, bent) for half in halves[::-1])
+    del bent
     size = ss * cc - sc * sc
     size = np.maximum(size, 1e-6 * ss * cc + 1e-30)
     a, b = (cc * top[0] - sc * top[1]) / size, (ss * top[1] - sc * top[0]) / size

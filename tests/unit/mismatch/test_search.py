@@ -55,6 +55,14 @@ def test_an_effect_does_not_earn_what_a_fit_without_it_missed(model):
     assert step.criteria[0] > search.criterion(step.base)  # nothing is concealed in this drive
 
 
+def test_a_round_keeps_its_rivals_without_the_derivatives_that_fill_memory(model):
+    search = a_search(model, "steer_trim", "battery_sag")
+    (base,) = search.fitter.refine([search.fitter.null()], rounds=1, fresh=True)
+    step = search.extend(base)
+    assert [f.jacobian.size for f in step.rivals] == [0, 0]
+    assert step.base.jacobian.size > 0  # every further effect is begun from these
+
+
 def test_the_effect_of_a_number_at_its_limit_comes_closer_by_more(model):
     search = a_search(model, "steer_rate")
     keys = [own.key for own in model.ordinary]
