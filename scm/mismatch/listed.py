@@ -161,6 +161,8 @@ _TABLE: tuple[_Row, ...] = (
      "The tyres build up side force only after rolling {length_m}."),
     ("pose_latency", M, ("speed",), _TIMES, (0.01,),
      "The camera's poses are {delay_s} old when they are stamped."),
+    ("clock_offset", M, ("speed",), ((-0.02,), (-0.04,), (-0.1,)), (0.01,),
+     "The poses' clock is {offset_s} against the car's: commands and sensors are stamped late."),
     ("clock_drift", M, ("time",), ((0.003,), (-0.003,)), (0.0005,),
      "The camera's clock runs fast by {rate}."),
     ("pose_scale", M, ("position",), ((1.02,), (0.98,)), (0.005,),
@@ -190,6 +192,7 @@ _TABLE: tuple[_Row, ...] = (
 LIMITS: Mapping[str, tuple[float, float]] = {
     "steering.stop_left": (0.3, 1.0), "steering.stop_right": (0.3, 1.0),
     "tyre_stiffness.scale": (0.2, 4.0), "tyre_grip.scale": (0.2, 2.0),
+    "measure.clock_offset_s": (-0.3, 0.0),  # its other sign is the camera's latency
     "payload.mass_kg": (0.0, 20.0), "wind.force_x_n": (-20.0, 20.0),
 }  # fmt: skip
 

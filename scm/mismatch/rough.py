@@ -26,13 +26,6 @@ MOST_EFFECTS = 10
 CLOSE = 25.0  # two effects that no screening tells apart
 AT_ONCE, MARGIN = 4, 10.0  # effects of one round; what each beside the first gains beyond its price
 MOST_DOUBLINGS, FAR_DOUBLINGS = 9.0, 16.0
-LATE_CAR = Candidate(
-    "clock_offset", Equation.SENSOR, ("speed",),
-    (Knob("offset_s", "measure.clock_offset_s", "s", (-0.3, 0.0), 0.0, 0.01),),
-    ((-0.04,), (-0.1,)),
-    "The poses' clock is {offset_s} against the car's: commands and sensors are stamped late.",
-)  # fmt: skip
-"""Its other sign is the camera's latency, which every search tries."""
 HELD = Candidate(
     "drive_saturation", Equation.DRIVE, ("throttle",),
     (Knob("forward", "drive.limit_forward", "1", (0.02, 1.0), 1.0, 0.02),),
@@ -71,12 +64,12 @@ def roughly(
     Where the measured speed drives the car, neither drive nor tyres are proposed.
     """
     tell("judging by strides: the car differs in many ways")
-    extras, have = [LATE_CAR], {term.name for term in car.terms}
+    extras, have = list[Candidate](), {term.name for term in car.terms}
     if any(is_led(drive) for drive in drives):
         known = (Equation.STEERING, Equation.SENSOR)
         library = [c for c in library if c.equation in known]
     elif "speed_control" in have and HELD.name not in have:
-        car, extras = car.with_terms([HELD.name]), [LATE_CAR, HELD]
+        car, extras = car.with_terms([HELD.name]), [HELD]
     model = Striding(drives, car)
     parts = split(model)
     seen = parts.fit.weight + parts.choose.weight

@@ -11,7 +11,7 @@ from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import big_nigel, made_drive, nigel
 
 PROMISED = (
-    "accel_bias", "aero_drag", "battery_sag", "camera_tilt", "clock_drift", "com_shift",
+    "accel_bias", "aero_drag", "battery_sag", "camera_tilt", "clock_drift", "clock_offset", "com_shift",
     "corner_drag", "drive_asymmetry", "drive_deadband", "drive_delay", "drive_gain",
     "drive_lag", "encoder_loss", "grade", "gyro_bias", "gyro_scale", "imu_misalignment",
     "load_transfer", "motor_fade", "payload", "pose_heading", "pose_latency", "pose_point",
@@ -28,6 +28,12 @@ def test_every_promised_effect_may_be_proposed_for_every_car(car_name):
     known = {c.name for c in candidates(car.with_terms(terms_needed(car)))}
     own = {"drive_deadband", "steer_saturation"} if car_name == "dart" else set()
     assert set(PROMISED) - known <= own
+
+
+def test_poses_may_be_stamped_early_as_well_as_late():
+    early, late = (by_name(candidates(big_nigel()), n) for n in ("clock_offset", "pose_latency"))
+    assert early.knobs[0].bounds[0] < 0.0 == early.knobs[0].bounds[1]
+    assert late.knobs[0].bounds[0] == 0.0
 
 
 def test_starts_lie_within_bounds_and_away_from_neutral():
