@@ -11,8 +11,8 @@ from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import big_nigel, made_drive, nigel
 
 PROMISED = (
-    "accel_bias", "aero_drag", "battery_sag", "camera_tilt", "clock_drift", "clock_offset", "com_shift",
-    "corner_drag", "drive_asymmetry", "drive_deadband", "drive_delay", "drive_gain",
+    "accel_bias", "aero_drag", "battery_sag", "camera_tilt", "clock_drift", "clock_offset",
+    "com_shift", "corner_drag", "drive_asymmetry", "drive_deadband", "drive_delay", "drive_gain",
     "drive_lag", "encoder_loss", "grade", "gyro_bias", "gyro_scale", "imu_misalignment",
     "load_transfer", "motor_fade", "payload", "pose_heading", "pose_latency", "pose_point",
     "pose_scale", "rolling_resistance", "steer_backlash", "steer_compliance", "steer_delay",
