@@ -67,7 +67,7 @@ def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> s
     )  # fmt: skip
     progress.tell("writing the report")
     write(found, out)
-    return summary(found.diagnosis, out)
+    return summary(found.diagnosis, out, found.evidence.retuned_m)
 
 
 def _of_cars(
@@ -84,7 +84,7 @@ def _of_cars(
         found = diagnose_one(recordings, budget_s=budget_s, tell=progress.tell)
         progress.tell("writing the report")
         write(found, out)
-        return summary(found.diagnosis, out)
+        return summary(found.diagnosis, out, found.evidence.retuned_m)
     several = diagnose_several(cars, budget_s=budget_s, tell=progress.tell, turn=progress.turn)
     progress.tell("writing the reports")
     write_all(several, out)

@@ -19,12 +19,18 @@ from scm.mismatch.report.wording import (
 from scm.mismatch.report.write import PAGE
 
 
-def summary(diagnosis: Diagnosis, out: Path) -> str:
-    """Return the verdict, each effect, how much better, and where the page is."""
-    return "\n".join(_lines(diagnosis, out))
+def summary(diagnosis: Diagnosis, out: Path, retuned_m: float | None = None) -> str:
+    """Return the verdict, each effect, how much better, and where the page is.
+
+    Args:
+        diagnosis: To be told.
+        out: Folder of the report.
+        retuned_m: Error of the car with its own numbers refitted alone; None: not said.
+    """
+    return "\n".join(_lines(diagnosis, out, retuned_m))
 
 
-def _lines(diagnosis: Diagnosis, out: Path) -> Iterator[str]:
+def _lines(diagnosis: Diagnosis, out: Path, retuned_m: float | None) -> Iterator[str]:
     verdict = str(diagnosis.verdict) if can_judge(diagnosis) else "no verdict"
     yield f"{verdict}: {verdict_sentence(diagnosis)}"
     for effect in diagnosis.effects:
@@ -34,7 +40,7 @@ def _lines(diagnosis: Diagnosis, out: Path) -> Iterator[str]:
         yield f"  undecided: {' or '.join(map(title_of, question.between))}"
         yield f"    drive this: {question.drive_this}"
     yield from _problems(diagnosis.data)
-    yield from _better(diagnosis)
+    yield from _better(diagnosis, retuned_m)
     yield f"  {out / PAGE}  ({diagnosis.runtime_s:.0f} s)"
 
 
@@ -61,11 +67,13 @@ def _numbers(effect: Effect) -> str:
     return effect.law or "; ".join(listed)
 
 
-def _better(diagnosis: Diagnosis) -> Iterator[str]:
+def _better(diagnosis: Diagnosis, retuned_m: float | None) -> Iterator[str]:
     fit = diagnosis.fit
     if fit is None or "position_m" not in fit.confirm.before:
         return
-    sides = fit.confirm.before["position_m"], fit.confirm.after.get("position_m", math.nan)
-    before, after = quantities(sides, "m")
+    sides = [fit.confirm.before["position_m"], fit.confirm.after.get("position_m", math.nan)]
+    own = math.nan if retuned_m is None else retuned_m
+    before, after, tuned = quantities((*sides, own), "m")
     horizon = quantity(fit.horizon_s, "s")
-    yield f"  position error after {horizon}, on unseen parts: {before} -> {after}"
+    alone = "" if math.isnan(own) else f" (with its own numbers refitted alone: {tuned})"
+    yield f"  position error after {horizon}, on unseen parts: {before} -> {after}{alone}"

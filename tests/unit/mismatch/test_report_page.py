@@ -254,6 +254,13 @@ def test_sensors_of_one_table_are_named_as_a_person_names_them(tmp_path):
     assert printed.count(said) == 1
 
 
+def test_the_command_line_holds_what_was_found_against_refitted_numbers_too(tmp_path):
+    found, *_ = made_up.one_effect()
+    (line,) = [one for one in summary(found, tmp_path, 0.123).splitlines() if "unseen" in one]
+    assert line.endswith("(with its own numbers refitted alone: 12.3 cm)")
+    assert "refitted" not in summary(found, tmp_path)
+
+
 def test_a_bars_number_stands_clear_of_the_mark_of_noise(tmp_path):
     found, shown, car, patched = made_up.one_effect()
     for after in (0.004, 0.0051, 0.0062, 0.035):
