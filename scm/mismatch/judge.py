@@ -14,6 +14,7 @@ from scm.errors import RecordingError
 from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.evidence import FreeRuns
 from scm.mismatch.findings import Fit, PartErrors, Span
+from scm.mismatch.laws.sensed import put_right
 from scm.mismatch.leftover import on_one_axis
 from scm.mismatch.parts import NAMES, Parts
 from scm.mismatch.rollouts import Numbers
@@ -119,8 +120,10 @@ def _judged(
     drive: Drive, car: Car, numbers: tuple[Numbers, Numbers], spans: Sequence[tuple[str, Span]],
     horizon: float,
 ) -> _Judged | None:  # fmt: skip
-    sides = [Side(n, Camera(drive, n)) for n in numbers]
-    cameras = [Camera(drive, numbers[_AFTER], noisy) for noisy in _draws(drive)]
+    right = put_right(drive, numbers[_AFTER]) or drive.smoothed
+    seen = (drive.smoothed, right)
+    sides = [Side(n, Camera(drive, n, poses)) for n, poses in zip(numbers, seen, strict=True)]
+    cameras = [Camera(drive, numbers[_AFTER], noisy) for noisy in _draws(drive, right)]
     sides += [Side(numbers[_AFTER], camera, like=_AFTER) for camera in cameras]
     stamps, part = _starts(drive, sides, spans, horizon)
     if not len(stamps):
@@ -147,13 +150,13 @@ def _judged(
     )
 
 
-def _draws(drive: Drive) -> Iterator[dict[str, Smooth]]:
-    """Yield the smoothed poses as they would be with noise once more."""
+def _draws(drive: Drive, poses: Mapping[str, Smooth]) -> Iterator[dict[str, Smooth]]:
+    """Yield smoothed poses as they would be with noise once more."""
     rng = np.random.default_rng(len(drive.edges))
     for _ in range(DRAWS):
         yield {
             name: smooth(s.t, s.value + std * rng.standard_normal(len(s.t)), std)
-            for name, s in drive.smoothed.items()
+            for name, s in poses.items()
             for std in (drive.stream(name).std,)
         }
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from scm.mismatch.fit import Fitted
 from scm.mismatch.laws.law import Law
-from scm.mismatch.laws.sensed import Sensed
+from scm.mismatch.laws.sensed import LENS, Sensed
 from scm.mismatch.laws.writing import as_term
 from scm.mismatch.likelihood import Likelihood
 from scm.vehicles.car import Car
@@ -17,7 +17,7 @@ def patched(car: Car, model: Likelihood, fitted: Fitted, folder: Path) -> Car:
     """Return the given car with effects found and with the numbers of its own that are known.
 
     A number that the recordings leave as uncertain as the file does keeps the file's value. A
-    sensor's law outside the library has no place in a car file.
+    sensor's law outside the library has no place in a car file, but for the lens of a camera.
 
     Args:
         car: As given.
@@ -45,6 +45,9 @@ def patched(car: Car, model: Likelihood, fitted: Fitted, folder: Path) -> Car:
             numbers |= of_law
             continue
         if isinstance(effect, Sensed):
+            if effect.fault:
+                numbers[effect.fault] = values[0]
+                faults.append(LENS)
             continue
         numbers |= effect.numbers(values)
         if effect.equation == "sensor" and effect.name != "wheel_radius":
@@ -56,4 +59,4 @@ def patched(car: Car, model: Likelihood, fitted: Fitted, folder: Path) -> Car:
     sensed = {key: value for key, value in numbers.items() if key.startswith("measure.")}
     driven = {key: value for key, value in numbers.items() if key not in sensed}
     found = car.with_terms(terms, driven)
-    return found.with_measures(faults, sensed) if faults else found
+    return found.with_measures(list(dict.fromkeys(faults)), sensed) if faults else found

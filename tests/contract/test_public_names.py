@@ -40,6 +40,7 @@ PUBLIC = {
     "pose_latency": {"delay_s"},
     "pose_scale": {"scale"},
     "camera_tilt": {"tilt_x", "tilt_y"},
+    "camera_lens": {"per_x", "per_y", "per_square"},
     "pose_point": {"x_m", "y_m"},
     "pose_heading": {"offset_rad"},
     "wheel_radius": {"scale"},

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Bools, Floats
-from scm.mismatch.drive import STEP_S, Drive
+from scm.mismatch.drive import POSES, STEP_S, Drive
 from scm.mismatch.findings import Equation
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate, Knob
 from scm.mismatch.rollouts import Motions, Numbers, Tiles
+from scm.mismatch.smooth import Smooth, smooth
 from scm.vehicles.car import Car
 
 PREFIX = "sensed."
@@ -35,12 +36,24 @@ class Sensed(Candidate):
     law: str
     reads: Callable[[Known], Reads]
 
+    @property
+    def fault(self) -> str:
+        """The key under which a car file has such a fault of measurement; empty: it has none."""
+        return IN_FILE.get(self.law, "")
+
     def formula(self, values: tuple[float, ...]) -> str:
         """Return the law with its number and unit."""
         unit = "" if self.knobs[0].unit == "1" else f" {self.knobs[0].unit}"
         return self.law.format(f"{values[0]:.3g}{unit}")
 
 
+LENS = "camera_lens"
+IN_FILE: Mapping[str, str] = {
+    "measured = true * (1 + {} * |x|)": "measure.camera_lens_x_per_m",
+    "measured = true * (1 + {} * |y|)": "measure.camera_lens_y_per_m",
+    "measured = true * (1 + {} * (x^2 + y^2))": "measure.camera_lens_per_m2",
+}
+"""Laws of the camera that are numbers of the fault `LENS`."""
 _Row = tuple[str, str, str, str, float, str, str, Callable[[Known], Reads]]
 
 
@@ -122,6 +135,29 @@ def sensor_laws() -> tuple[Sensed, ...]:
         )
         for i, (channel, word, knob, unit, step, said, law, reads) in enumerate(_TABLE)
     )  # fmt: skip
+
+
+def put_right(drive: Drive, numbers: Numbers) -> Mapping[str, Smooth] | None:
+    """Return a drive's smoothed poses without what laws of its camera read too much.
+
+    None where the numbers name no such law. A law is taken at the pose that was measured, as it was
+    when it was fitted.
+    """
+    laws = [law for law in sensor_laws() if numbers.get(law.knobs[0].key)]
+    wrong = dict[str, Floats]()
+    for law in (one for one in laws if one.name.startswith("camera")):
+        for name in POSES:
+            t = drive.stream(name).t
+            seen = {n[-1]: drive.smoothed[n].at(t) for n in POSES[:2]}
+            read = law.reads({**seen, "yaw": drive.smoothed["pose.yaw"].at(t)}).get(name)
+            if read is not None:
+                more = numbers[law.knobs[0].key] * read
+                wrong[name] = wrong.get(name, np.zeros(len(t))) + more
+    if not wrong:
+        return None
+    streams = {name: drive.stream(name) for name in wrong}
+    right = {n: smooth(s.t, s.values - wrong[n], s.std) for n, s in streams.items()}
+    return {**drive.smoothed, **right}
 
 
 class Sensing(Likelihood):

@@ -19,6 +19,7 @@ TRUE = {
 }
 STRONG = [
     ("camera_tilt", {"tilt_x": 0.2, "tilt_y": -0.1}),
+    ("camera_lens", {"per_x": 0.05, "per_y": -0.04, "per_square": -0.02}),
     ("pose_scale", {"scale": 2.5}),
     ("pose_point", {"ahead": 0.15, "aside": -0.05}),
     ("pose_heading", {"offset": 3.0}),
@@ -44,7 +45,7 @@ def measured(faults):
 MILD = [
     ("camera_tilt", {"tilt_x": 0.05, "tilt_y": -0.04}),
     ("pose_scale", {"scale": 1.1}),
-    *STRONG[2:6],
+    *STRONG[3:7],
 ]
 
 
