@@ -23,6 +23,7 @@ from scm.mismatch.trial.reality import Wish, make_cases
 from scm.mismatch.trial.score import score
 from scm.recording.read import read_recordings
 from scm.vehicles.car import load_car
+from scm.vehicles.undone import without_faults
 
 CASES, SEED = 12, 77
 HEALTHY, HEALTHY_SEED = 12, 901
@@ -86,8 +87,10 @@ def _one(case, label, answer, sparse, found, table):
         _count(table["this engine"], label, outcome.exact, outcome.among, bool(outcome.said))
         table["this engine"]["seconds"].append(outcome.runtime_s)
         if (found / case.name / "car.toml").is_file():
-            errors["this engine"] = position_error(again, load_car(found / case.name / "car.toml"),
-                                                   None)  # fmt: skip
+            patched = load_car(found / case.name / "car.toml")
+            errors["this engine"] = position_error(
+                without_faults(again, patched.faults), patched, None
+            )
     began = time.perf_counter()
     data = residuals(recording, car)
     top = float(abs(data.terms["sideways"][:, 0]).max())
