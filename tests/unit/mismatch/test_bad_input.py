@@ -59,7 +59,7 @@ def test_commands_that_belong_to_another_drive_are_no_physics(tmp_path):
 
     report = diagnosed(write(tmp_path, (*POSE, *COMMANDS), shuffled))
     assert report["effects"] == []
-    assert report["verdict"] == "mismatch"
+    assert {"no_verdict", "without_effect"} <= {problem["name"] for problem in report["data"]}
 
 
 def test_a_recording_that_is_not_there_is_bad_input(tmp_path, capsys):

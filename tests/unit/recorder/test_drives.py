@@ -132,7 +132,7 @@ def test_mismatch_takes_one_car_of_a_run(run: Path) -> None:
         diagnose([run])
     found = diagnose([run], vehicle="n1", budget_s=0.0)
     assert found.car.name == "nigel"
-    assert found.evidence.recordings == ("today",)
+    assert found.evidence.recordings == ("n1 of today",)
     assert "too_short" in [problem.name for problem in found.diagnosis.data]
 
 
