@@ -5,7 +5,7 @@ one effect in it. What is left is then judged by strides, and each round takes e
 pays beside those before it, until what the others make needless is taken back.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -98,10 +98,37 @@ class RoughSearch(Search):
                 break
             self.steps += steps
             more = self._joined(best, [step.rivals[0] for step in steps])
-            settled = self.prune(self.settle(more))
+            settled = self._usually(self.prune(self.settle(more)), best.names)
             if set(settled.names) <= set(best.names):
                 break
             best = settled
+        return best
+
+    def _usually(self, best: Fitted, known: Collection[str]) -> Fitted:
+        """Return the model with usual effects in place of a new rare one, where these explain more.
+
+        A rare one may do alone what two usual ones do together: added one by one it comes first,
+        and beside it neither of them pays. Compared are models with the noise that each leaves.
+
+        Args:
+            best: Settled.
+            known: Names of effects that stood already.
+        """
+        for rare in [e for e in best.effects if e.rare and e.name not in known]:
+            if rare not in best.effects:
+                continue
+            noise, listed, cost = self.model.noise, self.listed, self._with_noise(best)
+            base = self._without_each(best)[best.effects.index(rare)]
+            self.tell(f"looking for usual effects in place of {rare.name}")
+            self.listed = tuple(c for c in listed if not c.rare)
+            steps = self._at_once(self._compared(self.extend(base)))
+            self.listed = listed
+            if steps:
+                usual = self._joined(base, [step.rivals[0] for step in steps])
+                usual = self.prune(self.settle(usual))
+                if self._with_noise(usual) < cost:
+                    best, noise, self.steps = usual, self.model.noise, [*self.steps, *steps]
+            self.model.believe(noise)
         return best
 
     def confirmed(self, best: Fitted, unseen: Floats) -> Fitted:
