@@ -107,6 +107,25 @@ class Drive:
         return {name: smooth(s.t, s.values, s.std) for name in POSES for s in (self.stream(name),)}
 
     @cached_property
+    def turned(self) -> Floats:
+        """How far the left and the right wheels have turned, on the edges, (steps + 1, 2) [rad].
+
+        As their encoders count, from where these begin; by the way of the smoothed poses without.
+        """
+        if all(name in self.names for name in WHEELS):
+            counts = self.car.value("encoder.counts_per_revolution") / (2.0 * math.pi)
+            both = (self.stream(name) for name in WHEELS)
+            return np.stack([np.interp(self.edges, s.t, s.values) / counts for s in both], axis=1)
+        x, y, yaw = (self.smoothed[name] for name in POSES)
+        psi = yaw.at(self.edges)
+        along, across = (np.gradient(one.at(self.edges), STEP_S) for one in (x, y))
+        speed = np.cos(psi) * along + np.sin(psi) * across
+        aside = 0.5 * self.car.value("body.track_m") * np.gradient(psi, STEP_S)
+        rates = np.stack((speed - aside, speed + aside), axis=1)
+        way: Floats = np.cumsum(rates * STEP_S, axis=0) / self.car.value("wheel.radius_m")
+        return way
+
+    @cached_property
     def blind(self) -> tuple[Span, ...]:
         """Spans in which a channel of the pose is missing; a smoothed pose is a guess there."""
         found = list[Span]()

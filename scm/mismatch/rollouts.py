@@ -19,6 +19,7 @@ from scm.vehicles.fleet import SUBSTEP_S, Fleet, VehicleStatus
 from scm.vehicles.fleet_rows import COG, WHEELS, pool, whole_steps
 from scm.vehicles.jit import array_kernel
 from scm.vehicles.lanes import LANES
+from scm.vehicles.term import reads
 
 ROWS, THREADS = LANES, 2
 TETHER_STEPS = 50
@@ -28,6 +29,7 @@ SIGNALS = (
     "speed", "lateral_speed", "yaw_rate", "accel_x", "accel_y", "steer_angle",
     "wheel_angle.fl", "wheel_angle.fr", "wheel_angle.rl", "wheel_angle.rr",
 )  # fmt: skip
+WHEEL_ANGLES = slice(6, 10)  # of these
 THROTTLE_DELAY, STEERING_DELAY = "drive.delay_s", "steering.delay_s"
 THROTTLE_CLOCK = "clock.throttle_s"  # the throttle acts so much later than the steering
 _LATE = (THROTTLE_DELAY, STEERING_DELAY, THROTTLE_CLOCK)
@@ -94,6 +96,7 @@ class Rollouts:
         self._y = smoothed["pose.y"].at(edges) - s * px - c * py
         self._yaw = psi
         self._blind = drive.is_blind(edges)
+        self._turned = drive.turned
 
     def run(self, sets: Sequence[Numbers]) -> Motions:
         """Drive all parameter sets; each is nominal but for the numbers it names by key."""
@@ -143,6 +146,7 @@ class Rollouts:
         delays = self._set(fleet, tiles.columns, sets)
         parts = tether.parts
         self._begin(fleet, n, delays, parts)
+        tether.roll(n, np.empty((0, len(SIGNALS), fleet.capacity)), self._turned[0])
         changes = np.linspace(edges[0], edges[-1], parts * (len(edges) - 1) + 1)
         out, first = np.empty((len(edges), len(SIGNALS), fleet.capacity)), _now(fleet)
         for k, name in enumerate(SIGNALS):
@@ -155,6 +159,7 @@ class Rollouts:
             tether.rollout(*commands, out[a + 1 : b + 1])
             if not self._blind[b]:
                 tether.carry(n, self._x[b], self._y[b], self._yaw[b])
+            tether.roll(n, out[a + 1 : b + 1], self._turned[b])
         ok = fleet.status[:n] == VehicleStatus.OK
         return Motions({name: out[:, k, :n] for k, name in enumerate(SIGNALS)}, ok)
 
@@ -210,6 +215,8 @@ class _Tether:
         self._remembers = fleet._past is not None  # noqa: SLF001
         self.parts = REMEMBERED if self._remembers else COMMANDED
         self._steps = whole_steps(STEP_S / self.parts, SUBSTEP_S)
+        self._by_turn = any("wheel_angle" in reads(term.law) for term in fleet.car.terms)
+        self._moved = np.zeros((4, fleet.capacity))
 
     def rollout(self, throttle: Floats, steering: Floats, out: Floats) -> None:
         """Drive all rows through commands, (parts, rows); write steps' signals."""
@@ -228,6 +235,19 @@ class _Tether:
         block, _, _, status = self._state
         _carry(block, status, self._cog, n, x, y, yaw)
         self._kernel.advance(*self._state, 0, self._fleet.capacity, 0, SUBSTEP_S)
+
+    def roll(self, n: int, out: Floats, turned: Floats) -> None:
+        """Turn the first rows' wheels as far as measured, left and right [rad].
+
+        Only where an effect depends on it. Steps' signals, `out`, go on as if nothing had been.
+        """
+        if not self._by_turn:
+            return
+        out[:, WHEEL_ANGLES] -= self._moved
+        angles = self._fleet.wheel_angle[:n]
+        more = turned - angles[:, 2:]
+        angles += np.tile(more, 2)
+        self._moved[:, :n] += np.tile(more, 2).T
 
 
 @array_kernel

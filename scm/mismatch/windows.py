@@ -105,7 +105,7 @@ class Windows:
             like = sides[i].like
             leader = leaders.index(i if like is None else like)
             row = int(rows[i, w])
-            self._start(fleet, leader, row, values[i], moved[i], w)
+            self._start(fleet, leader, row, k, values[i], moved[i], w)
             if any(sides[i].push):
                 self._push(fleet, row, sides[i].push)
         fleet.alive[:] = True
@@ -164,13 +164,16 @@ class Windows:
         return now
 
     def _start(
-        self, fleet: Fleet, leader: int, row: int, values: Floats, moved: Moved, window: int
-    ) -> None:
+        self, fleet: Fleet, leader: int, row: int, now: int, values: Floats, moved: Moved,
+        window: int,
+    ) -> None:  # fmt: skip
         """Let a window's car stand where its leader is, in the measured motion."""
         fleet.copy_row(leader, row)
         fleet.parameters[row] = values
         _place(fleet, row, moved, window)
         fleet.time[row] = fleet.time[leader]
+        turned = fleet.wheel_angle[leader]
+        fleet.wheel_angle[row] = turned + np.tile(self.drive.turned[now] - turned[2:], 2)
         fleet.battery[row] = fleet.battery[leader]
         fleet.alive[row] = False
 

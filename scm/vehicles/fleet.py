@@ -95,7 +95,9 @@ class Fleet:
         accel_x, accel_y, accel_z: Acceleration of the centre of gravity over the last substep, in
             the level body frame, without gravity [m/s^2].
         steer_angle: Mean road-wheel angle, + left [rad].
-        wheel_speed, wheel_angle, wheel_steer: Of each wheel, (capacity, 4) [rad/s, rad, rad].
+        wheel_angle: How far each wheel has turned since the car was placed, (capacity, 4) [rad];
+            may be written.
+        wheel_speed, wheel_steer: Of each wheel, (capacity, 4) [rad/s, rad].
         wheel_load: Floor on tyre, (capacity, 4) [N].
     """
 

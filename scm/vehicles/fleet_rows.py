@@ -16,14 +16,13 @@ WRITTEN = {
     "throttle": "throttle_command", "steering": "steering_command",
     **{name: name for name in (
         "battery", "air_x", "air_y", "floor_height", "floor_slope_x", "floor_slope_y",
-        "floor_grip", "floor_rolling", "time",
+        "floor_grip", "floor_rolling", "time", "wheel_angle",
     )},
 }  # fmt: skip
 READ = (
     "x", "y", "z", "roll", "pitch", "yaw", "speed", "lateral_speed", "yaw_rate",
     "roll_rate", "pitch_rate", "accel_x", "accel_y", "accel_z", "roll_accel", "pitch_accel",
-    "yaw_accel", "steer_angle", "wheel_speed", "wheel_angle", "wheel_steer", "wheel_load",
-    "wheel_x", "wheel_y",
+    "yaw_accel", "steer_angle", "wheel_speed", "wheel_steer", "wheel_load", "wheel_x", "wheel_y",
 )  # fmt: skip
 WHEELS = ("fl", "fr", "rl", "rr")
 SLOT_OF = {"wheel_x": "ground_x", "wheel_y": "ground_y"}

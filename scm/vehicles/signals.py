@@ -132,6 +132,21 @@ _ALL = (
         otherwise="throttle_scaled",
         settles="throttle",
     ),
+    _body(
+        "throttle_memory",
+        "1",
+        Role.CHAIN,
+        "mean of what was asked for lately, which fades",
+        span=(-1.0, 1.0),
+        otherwise="0.0",
+    ),
+    _body(
+        "law_shape",
+        "1",
+        Role.CHAIN,
+        "a learned law's shape over what it depends on",
+        otherwise="0.0",
+    ),
     # the battery: charge drawn, voltage without and with load, ageing within a drive
     _body(
         "charge_drawn",
@@ -293,6 +308,7 @@ _ALL = (
     _wheel("side", "1", Role.GIVEN, "+1 left, -1 right", span=(-1.0, 1.0)),
     _wheel("driven", "1", Role.GIVEN, "1 where a motor turns the wheel, else 0", span=(0.0, 1.0)),
     _wheel("omega", "rad/s", Role.GIVEN, "wheel spin, + rolling forward", span=(-90.0, 90.0)),
+    _wheel("wheel_angle", "rad", Role.GIVEN, "turned since the car was placed", span=(-1e4, 1e4)),
     _wheel("axle_omega", "rad/s", Role.GIVEN, "mean spin of this wheel's axle", span=(-90.0, 90.0)),
     _wheel(
         "v_long",

@@ -74,10 +74,10 @@ def cells_of(model: Likelihood, fitter: Fitter, base: Fitted) -> Cells:
         x, y, yaw = (drive.smoothed[f"pose.{n}"].at(edges[0] + t) for n in ("x", "y", "yaw"))
         throttle = drive.throttle.means(edges, np.zeros(1))[:, 0]
         now = {name: np.interp(t, edges - edges[0], motion[name][:, 0])
-               for name in ("speed", "steer_angle", "yaw_rate")}  # fmt: skip
+               for name in ("speed", "steer_angle", "yaw_rate", "accel_y")}  # fmt: skip
         parts.append({
             "time": t, "x": x, "y": y, "yaw": yaw, "speed": now["speed"],
-            "steer": now["steer_angle"], "rate": now["yaw_rate"],
+            "steer": now["steer_angle"], "rate": now["yaw_rate"], "side": now["accel_y"],
             "throttle": np.interp(t, edges[1:] - edges[0], throttle),
         })  # fmt: skip
         numbers.append(np.full(len(t), i))

@@ -5,6 +5,7 @@ import math
 from scm.mismatch.findings import Equation
 from scm.mismatch.laws.law import Channel, ToNumbers, Values, Written
 from scm.mismatch.listed import Knob
+from scm.vehicles.signals import Per
 
 _FORCE = (-200.0, 200.0)
 
@@ -73,4 +74,12 @@ TWIST = Channel(
     "yaw moment", "moment_nm", Equation.BODY, (_amount("moment_nm", "N*m", 0.02, (-50.0, 50.0)),),
     _only("moment_nm"), "Something turns the car with {moment_nm},", "{moment_nm} * {g}",
     (Written("adds moment_z", (), "moment_nm * g", "Moment about z [N*m]."),),
+)  # fmt: skip
+RIPPLE = Channel(
+    "drive torque", "ripple_nm", Equation.DRIVE,
+    (_amount("torque_nm", "N*m", 0.002, (-10.0, 10.0)),), _only("ripple_nm"),
+    "The torque on each driven wheel swings by {torque_nm} as it turns,",
+    "{torque_nm} * {g}",
+    (Written("adds wheel_torque", ("driven",), "driven * torque_nm * g",
+             "Torque on a driven wheel as it turns, + forward [N*m].", per=Per.WHEEL),),
 )  # fmt: skip

@@ -3,7 +3,7 @@
 import math
 
 from scm.mismatch.findings import Equation
-from scm.mismatch.laws.law import Curve, ToNumbers, Values
+from scm.mismatch.laws.law import Curve, ToNumbers, Values, Written
 from scm.mismatch.listed import Knob
 
 EDGE_S, EDGE_M = 0.2, 0.05  # over which steps in time and on the floor rise
@@ -74,6 +74,14 @@ def _slope(values: Values) -> dict[str, float]:
 
 def _faster(values: Values) -> dict[str, float]:
     return {"by_speed": 1.0, "phase": -values[0], "ramp": 1.0}
+
+
+def _worked(values: Values) -> dict[str, float]:
+    return {"memory_s": values[0], "by_memory": 1.0, "size": 1.0}
+
+
+def _around(values: Values) -> dict[str, float]:
+    return {"per_turn": values[0], "turn_phase": values[1]}
 
 
 _PLACE = "x_cog * cosine_of(way_rad) + y_cog * sine_of(way_rad)"
@@ -191,4 +199,30 @@ REVERSED = Curve(
     "reversed", "throttle", (), _fixed(by_throttle=-20.0, phase=-0.5, step=1.0),
     "while the throttle is reversed", "(throttle < 0)", ("throttle_command",),
     "g = min(max(-20.0 * throttle_command, 0.0), 1.0)",
+)  # fmt: skip
+LOAD = Curve(
+    "load", "load", (), _fixed(by_side=1.0, size=1.0),
+    "for each m/s^2 across, which loads the outer wheels", "|acceleration across| / (1 m/s^2)",
+    ("accel_y",), "g = abs(accel_y)",
+)  # fmt: skip
+TURNING = Curve(
+    "turning", "yaw rate", (), _fixed(by_rate=1.0, size=1.0),
+    "for each radian a second that it turns", "|yaw rate| / (1 rad/s)", ("yaw_rate",),
+    "g = abs(yaw_rate)",
+)  # fmt: skip
+WORKED = Curve(
+    "worked", "throttle's past", (_knob("memory_s", "s", (0.2, 120.0), 0.1),), _worked,
+    "for full throttle over the last {memory_s}", "|mean throttle of the last {memory_s}|",
+    ("throttle_memory",), "g = abs(throttle_memory)",
+    also=Written(
+        "sets throttle_memory", ("throttle_memory", "throttle_command", "dt"),
+        "throttle_memory + (throttle_command - throttle_memory) * (dt / (memory_s + dt))",
+        "Mean throttle of late, which fades.", "_memory", keeps=0.0,
+    ),
+)  # fmt: skip
+PHASE = Curve(
+    "phase", "phase", (_knob("per_turn", "1", (0.2, 40.0), 0.002), _PHASE), _around,
+    "in so many waves a turn: {per_turn}", "sin({per_turn} * wheel turn + {phase_rad})",
+    ("wheel_angle",),
+    "g = sine_of(per_turn * wheel_angle + phase_rad)",
 )  # fmt: skip

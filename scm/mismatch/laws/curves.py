@@ -14,16 +14,19 @@ from scm.mismatch.evidence import Curve
 from scm.mismatch.fit import Fitted, Fitter
 from scm.mismatch.laws.cells import Cells, respond
 from scm.mismatch.laws.law import Law, Values
-from scm.mismatch.laws.pushes import amount, shape
+from scm.mismatch.laws.pushes import amount, shape, variable
 from scm.mismatch.laws.seek import Sought
+from scm.mismatch.laws.turns import WAVES, asked, by_turn
 
 BINS = 16
 NINETY = 1.645
 LEAST_CELLS = 3
+TURN_POINTS = 73
 _AXES = {
     "time": ("time", "s"), "heading": ("yaw", "rad"), "speed": ("speed", "m/s"),
     "steering angle": ("steer", "rad"), "steering sign": ("steer", "rad"),
-    "throttle": ("throttle", "1"),
+    "throttle": ("throttle", "1"), "load": ("side", "m/s^2"), "yaw rate": ("rate", "rad/s"),
+    "throttle's past": ("memory", "1"),
 }  # fmt: skip
 _UNITS = {"along_n": "N", "turn_rad": "rad", "throttle_add": "1", "moment_nm": "N*m"}
 
@@ -33,7 +36,8 @@ def law_curves(fitted: Fitted, sought: Sought) -> tuple[Curve, ...]:
     first = 0
     for effect in fitted.effects:
         if isinstance(effect, Law):
-            return _curves(effect, slice(first, first + len(effect.knobs)), fitted, sought)
+            drawn = _round_a_turn if effect is by_turn() else _curves
+            return drawn(effect, slice(first, first + len(effect.knobs)), fitted, sought)
         first += len(effect.knobs)
     return ()
 
@@ -58,6 +62,25 @@ def _curves(law: Law, mine: slice, fitted: Fitted, sought: Sought) -> tuple[Curv
     return (
         Curve(effect=law.name, x=middle, y=y, low=y - band, high=y + band, **names),
         Curve(effect=law.name, x=x[order], y=fit[order], low=fit[order], high=fit[order], **names),
+    )
+
+
+def _round_a_turn(law: Law, mine: slice, fitted: Fitted, sought: Sought) -> tuple[Curve, Curve]:
+    """Return a torque over a wheel's turn as the sum of all waves asked, and as it was fitted."""
+    torque, waves, phase = (float(v) for v in fitted.values[mine])
+    own = np.arange(len(fitted.z) + mine.start, len(fitted.z) + mine.stop)
+    held = replace(fitted, jacobian=np.delete(fitted.jacobian, own, axis=1))
+    slope, bend = asked(sought.model, Fitter(sought.model, sought.part), held)
+    covariance = np.linalg.inv(bend + 1e-9 * np.trace(bend) * np.eye(len(bend)))
+    x: Floats = np.linspace(0.0, 2.0 * math.pi, TURN_POINTS)
+    shapes = np.stack([f(n * x) for n in WAVES for f in (np.sin, np.cos)], axis=1)
+    fit = torque * np.sin(waves * x + phase)
+    y = fit - shapes @ (covariance @ slope)
+    band = NINETY * np.sqrt(np.einsum("ij,jk,ik->i", shapes, covariance, shapes))
+    names = {"x_name": "wheel turn", "x_unit": "rad", "y_name": law.channel.word, "y_unit": "N*m"}
+    return (
+        Curve(effect=law.name, x=x, y=y, low=y - band, high=y + band, **names),
+        Curve(effect=law.name, x=x, y=fit, low=fit, high=fit, **names),
     )
 
 
@@ -86,7 +109,7 @@ def axis_of(law: Law, values: Values, cells: Cells) -> tuple[Floats, str, str]:
             return x, f"position towards {way:.2f} rad", "m"
         return np.mod(x, length), f"position within a wave towards {way:.2f} rad", "m"
     name, unit = _AXES[law.curve.word]
-    x = cells.driven[name]
+    x = variable(name, law.curve.numbers(values), cells)
     if name == "yaw":  # turns of the same heading fill the same bin
         x = np.arctan2(np.sin(x), np.cos(x))
     period = known.get("period_s")

@@ -14,14 +14,16 @@ _TURNED = (by.TURNED, by.TURNED_SQUARED, by.TURNED_CUBED, by.LEFT, by.RIGHT)
 _ROWS = (
     (at.FLOOR, (by.SWING, by.SINCE)),
     (at.ALONG, (by.SWING,)),
-    (at.DRAG, (*_HEADING, *_FLOOR, by.SINCE, by.DRIFT, by.SPEED_CUBED, by.FASTER, *_TURNED)),
+    (at.DRAG, (*_HEADING, *_FLOOR, by.SINCE, by.DRIFT, by.SPEED_CUBED, by.FASTER, *_TURNED,
+               by.TURNING)),
     (at.ANGLE, (*_TIME, by.ROUND, by.WAVE, by.BEYOND, by.SLOPE, by.SPEED, by.SPEED_SQUARED,
                 by.DRIVEN)),
     (at.DEMAND, (by.SIDE, by.BENT)),
-    (at.STEER_GAIN, (*_TIME, by.ROUND, by.BEYOND, by.SPEED)),
+    (at.STEER_GAIN, (*_TIME, by.ROUND, by.BEYOND, by.SPEED, by.LOAD)),
     (at.THROTTLE, (*_TIME, by.ROUND, by.BEYOND, by.SPEED, by.TURNED, by.LEFT, by.RIGHT,
-                   by.REVERSED)),
+                   by.REVERSED, by.LOAD, by.WORKED)),
     (at.TWIST, (by.SWING, by.SINCE, *_SPEED[:2], by.DRIVEN)),
+    (at.RIPPLE, (by.PHASE,)),
 )  # fmt: skip
 
 

@@ -39,6 +39,7 @@ def _grids(cells: Cells) -> Mapping[str, Floats]:
         "against_rad": np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False),
         "way_rad": np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False),
         "beyond_m": centre_at,
+        "memory_s": np.geomspace(0.5, 0.7 * span, 12),
         "above_mps": np.percentile(speed, [5, 20, 35, 50, 65, 80, 90]),
     }
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from scm.mismatch.findings import Equation
 from scm.mismatch.laws.learned import PREFIX
 from scm.mismatch.listed import Candidate, Knob
+from scm.vehicles.signals import Per
 
 Values = tuple[float, ...]
 ToNumbers = Callable[[Values], Mapping[str, float]]
@@ -45,6 +46,8 @@ class Written:
         returns: The expression.
         about: What it returns.
         suffix: Of the function's name.
+        per: Once a body or once a wheel.
+        keeps: Where the signal starts that it sets from its own last value; None: it has no past.
     """
 
     target: str
@@ -52,6 +55,8 @@ class Written:
     returns: str
     about: str
     suffix: str = ""
+    per: Per = Per.BODY
+    keeps: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +68,7 @@ class Curve:
         numbers: Of the general effect, from the knobs' values.
         text: Line that gives `g` from `signals` and the knobs.
         rare: What it must gain beyond others: it looks like something simpler.
+        also: A signal that it reads and no car has.
     """
 
     name: str
@@ -75,6 +81,7 @@ class Curve:
     text: str
     equation: Equation | None = None
     rare: float = 0.0
+    also: Written | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +94,11 @@ class Law(Candidate):
 
     channel: Channel
     curve: Curve
+
+    @property
+    def written(self) -> tuple[Written, ...]:
+        """The functions that its file holds."""
+        return (*self.channel.text, *filter(None, (self.curve.also,)))
 
     def numbers(self, values: Values) -> dict[str, float]:
         """Return the general effect's numbers, by key, at these values of the knobs."""

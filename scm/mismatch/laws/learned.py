@@ -1,12 +1,14 @@
 """The general effect: one shape of one mix of variables, as a force, wheel angle or throttle.
 
-    q = time, x, y, yaw, speed, wheel angle, throttle, yaw rate, each times its weight, + phase
+    q = time, x, y, yaw, speed, wheel angle, throttle, yaw rate, acceleration across, throttle of
+        late, each times its weight, + phase
     g = sine * sin(q) + cosine * cos(q) + one + line * q + size * |q| + square * q^2 + cube * q^3
         + heavy * |q|^3 + ramp * max(q, 0)
         + step * (0 below q = -0.5, 1 above 0.5, straight between) + comb
 
 One compiled car so serves every law that may be tried: a law is a set of numbers. The comb is a
-hat of time that returns: it asks what a push at each moment would explain.
+hat of time that returns: it asks what a push at each moment would explain. Torque over a wheel's
+turn acts on each driven wheel by its own angle, not through the mix.
 """
 
 import math
@@ -27,7 +29,7 @@ def _number(name: str, about: str, default: float = 0.0) -> Param:
     return Param(name, default, "1", PREFIX + name, _FAR, about)
 
 
-WEIGHTS = ("time", "x", "y", "yaw", "speed", "steer", "throttle", "rate")
+WEIGHTS = ("time", "x", "y", "yaw", "speed", "steer", "throttle", "rate", "side", "memory")
 _WEIGHTS = tuple(_number(f"by_{name}", f"weight of {name} in the mix") for name in WEIGHTS)
 _SHAPES = tuple(
     _number(name, f"share of the shape: {name}")
@@ -50,27 +52,30 @@ _COMB = (
     _number("comb_every", "time between hats", 1000.0),
     _number("comb_wide", "half of a hat's foot", 1.0),
 )
+_MEMORY = _number("memory_s", "how long the throttle is remembered [s]", 1.0)
 _MIX = (*_WEIGHTS, _number("phase", "added to the mix"), *_SHAPES, *_COMB)
+
+
+@law
+def throttle_memory(
+    throttle_memory: float, throttle_command: float, memory_s: float, dt: float
+) -> float:
+    """Mean of what was asked for over the last `memory_s`, which fades, + forward."""
+    return throttle_memory + (throttle_command - throttle_memory) * (dt / (memory_s + dt))
 
 
 @law
 def mixed(
     time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
-    throttle_command: float, yaw_rate: float, by_time: float, by_x: float, by_y: float,
-    by_yaw: float, by_speed: float, by_steer: float, by_throttle: float, by_rate: float,
-    phase: float,
+    throttle_command: float, yaw_rate: float, accel_y: float, throttle_memory: float,
+    by_time: float, by_x: float, by_y: float, by_yaw: float, by_speed: float, by_steer: float,
+    by_throttle: float, by_rate: float, by_side: float, by_memory: float, phase: float,
 ) -> float:  # fmt: skip
     """The mix of variables."""
     place = by_x * x_cog + by_y * y_cog + by_yaw * yaw
-    motion = by_speed * vx + by_rate * yaw_rate
-    return (
-        by_time * time
-        + place
-        + motion
-        + by_steer * linkage_angle
-        + by_throttle * throttle_command
-        + phase
-    )
+    motion = by_speed * vx + by_rate * yaw_rate + by_side * accel_y
+    asked = by_steer * linkage_angle + by_throttle * throttle_command + by_memory * throttle_memory
+    return by_time * time + place + motion + asked + phase
 
 
 @law
@@ -89,89 +94,57 @@ def shaped(
 
 
 @law
-def learned_push(
+def law_shape(
     time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
-    throttle_command: float, yaw_rate: float, cos_yaw: float, sin_yaw: float, by_time: float,
-    by_x: float, by_y: float, by_yaw: float, by_speed: float, by_steer: float, by_throttle: float,
-    by_rate: float, phase: float, sine: float, cosine: float, one: float, line: float,
-    size: float, square: float, cube: float, heavy: float, ramp: float, step: float, comb: float,
-    comb_at: float, comb_every: float, comb_wide: float, along_n: float, drag_n: float,
-    world_x_n: float, world_y_n: float,
+    throttle_command: float, yaw_rate: float, accel_y: float, throttle_memory: float,
+    by_time: float, by_x: float, by_y: float, by_yaw: float, by_speed: float, by_steer: float,
+    by_throttle: float, by_rate: float, by_side: float, by_memory: float, phase: float,
+    sine: float, cosine: float, one: float, line: float, size: float, square: float, cube: float,
+    heavy: float, ramp: float, step: float, comb: float, comb_at: float, comb_every: float,
+    comb_wide: float,
 ) -> float:  # fmt: skip
-    """Force along the body, + forward [N]."""
+    """The shape over the mix of variables here and now."""
     q = mixed(
-        time, x_cog, y_cog, yaw, vx, linkage_angle, throttle_command, yaw_rate, by_time,
-        by_x, by_y, by_yaw, by_speed, by_steer, by_throttle, by_rate, phase,
+        time, x_cog, y_cog, yaw, vx, linkage_angle, throttle_command, yaw_rate, accel_y,
+        throttle_memory, by_time, by_x, by_y, by_yaw, by_speed, by_steer, by_throttle, by_rate,
+        by_side, by_memory, phase,
     )  # fmt: skip
-    g = shaped(
+    return shaped(
         q, time, sine, cosine, one, line, size, square, cube, heavy, ramp, step, comb, comb_at,
         comb_every, comb_wide,
     )  # fmt: skip
+
+
+@law
+def learned_push(
+    law_shape: float, vx: float, cos_yaw: float, sin_yaw: float, along_n: float, drag_n: float,
+    world_x_n: float, world_y_n: float,
+) -> float:  # fmt: skip
+    """Force along the body, + forward [N]."""
     floor = world_x_n * cos_yaw + world_y_n * sin_yaw
-    return g * (along_n - drag_n * soft_sign(vx / SLOW) + floor)
+    return law_shape * (along_n - drag_n * soft_sign(vx / SLOW) + floor)
 
 
 @law
 def learned_push_across(
-    time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
-    throttle_command: float, yaw_rate: float, cos_yaw: float, sin_yaw: float, by_time: float,
-    by_x: float, by_y: float, by_yaw: float, by_speed: float, by_steer: float, by_throttle: float,
-    by_rate: float, phase: float, sine: float, cosine: float, one: float, line: float,
-    size: float, square: float, cube: float, heavy: float, ramp: float, step: float, comb: float,
-    comb_at: float, comb_every: float, comb_wide: float, world_x_n: float, world_y_n: float,
-) -> float:  # fmt: skip
+    law_shape: float, cos_yaw: float, sin_yaw: float, world_x_n: float, world_y_n: float
+) -> float:
     """Force across the body, + to its left [N]."""
-    q = mixed(
-        time, x_cog, y_cog, yaw, vx, linkage_angle, throttle_command, yaw_rate, by_time,
-        by_x, by_y, by_yaw, by_speed, by_steer, by_throttle, by_rate, phase,
-    )  # fmt: skip
-    g = shaped(
-        q, time, sine, cosine, one, line, size, square, cube, heavy, ramp, step, comb, comb_at,
-        comb_every, comb_wide,
-    )  # fmt: skip
-    return g * (world_y_n * cos_yaw - world_x_n * sin_yaw)
+    return law_shape * (world_y_n * cos_yaw - world_x_n * sin_yaw)
 
 
 @law
-def learned_twist(
-    time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
-    throttle_command: float, yaw_rate: float, by_time: float, by_x: float, by_y: float,
-    by_yaw: float, by_speed: float, by_steer: float, by_throttle: float, by_rate: float,
-    phase: float, sine: float, cosine: float, one: float, line: float, size: float, square: float,
-    cube: float, heavy: float, ramp: float, step: float, comb: float, comb_at: float,
-    comb_every: float, comb_wide: float, moment_nm: float,
-) -> float:  # fmt: skip
+def learned_twist(law_shape: float, moment_nm: float) -> float:
     """Moment about z [N*m]."""
-    q = mixed(
-        time, x_cog, y_cog, yaw, vx, linkage_angle, throttle_command, yaw_rate, by_time,
-        by_x, by_y, by_yaw, by_speed, by_steer, by_throttle, by_rate, phase,
-    )  # fmt: skip
-    g = shaped(
-        q, time, sine, cosine, one, line, size, square, cube, heavy, ramp, step, comb, comb_at,
-        comb_every, comb_wide,
-    )  # fmt: skip
-    return g * moment_nm
+    return law_shape * moment_nm
 
 
 @law
 def learned_turn(
-    time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
-    throttle_command: float, yaw_rate: float, by_time: float, by_x: float, by_y: float,
-    by_yaw: float, by_speed: float, by_steer: float, by_throttle: float, by_rate: float,
-    phase: float, sine: float, cosine: float, one: float, line: float, size: float, square: float,
-    cube: float, heavy: float, ramp: float, step: float, comb: float, comb_at: float,
-    comb_every: float, comb_wide: float, turn_rad: float, turn_gain: float, offset: float,
-) -> float:  # fmt: skip
+    law_shape: float, linkage_angle: float, turn_rad: float, turn_gain: float, offset: float
+) -> float:
     """Road-wheel angle with the linkage's misalignment, + left [rad]."""
-    q = mixed(
-        time, x_cog, y_cog, yaw, vx, linkage_angle, throttle_command, yaw_rate, by_time,
-        by_x, by_y, by_yaw, by_speed, by_steer, by_throttle, by_rate, phase,
-    )  # fmt: skip
-    g = shaped(
-        q, time, sine, cosine, one, line, size, square, cube, heavy, ramp, step, comb, comb_at,
-        comb_every, comb_wide,
-    )  # fmt: skip
-    return linkage_angle + offset + g * (turn_rad + turn_gain * linkage_angle)
+    return linkage_angle + offset + law_shape * (turn_rad + turn_gain * linkage_angle)
 
 
 @law
@@ -187,42 +160,35 @@ def learned_demand(
 
 @law
 def learned_throttle(
-    time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
-    throttle_command: float, yaw_rate: float, by_time: float, by_x: float, by_y: float,
-    by_yaw: float, by_speed: float, by_steer: float, by_throttle: float, by_rate: float,
-    phase: float, sine: float, cosine: float, one: float, line: float, size: float, square: float,
-    cube: float, heavy: float, ramp: float, step: float, comb: float, comb_at: float,
-    comb_every: float, comb_wide: float, throttle_add: float, throttle_gain: float,
-) -> float:  # fmt: skip
+    law_shape: float, throttle_command: float, throttle_add: float, throttle_gain: float
+) -> float:
     """Throttle as it reaches the car, + forward."""
-    q = mixed(
-        time, x_cog, y_cog, yaw, vx, linkage_angle, throttle_command, yaw_rate, by_time,
-        by_x, by_y, by_yaw, by_speed, by_steer, by_throttle, by_rate, phase,
-    )  # fmt: skip
-    g = shaped(
-        q, time, sine, cosine, one, line, size, square, cube, heavy, ramp, step, comb, comb_at,
-        comb_every, comb_wide,
-    )  # fmt: skip
-    return throttle_command + g * (throttle_add + throttle_gain * throttle_command)
+    return throttle_command + law_shape * (throttle_add + throttle_gain * throttle_command)
 
 
-_NEUTRAL = dict.fromkeys(
-    ("along_n", "drag_n", "world_x_n", "world_y_n", "moment_nm", "turn_rad", "turn_gain",
-     "asked_rad", "throttle_add", "throttle_gain"),
-    0.0,
-)  # fmt: skip
+@law
+def learned_ripple(
+    driven: float, wheel_angle: float, ripple_nm: float, per_turn: float, turn_phase: float
+) -> float:
+    """Torque on a driven wheel as it turns, + forward [N*m]."""
+    s, _ = sin_cos(per_turn * wheel_angle + turn_phase)
+    return driven * ripple_nm * s
 
 
 def _term(function: Law, *, channels: tuple[str, ...], more: tuple[Param, ...] = (),
           adds: str | None = None, sets: str | None = None) -> Term:  # fmt: skip
     amounts = tuple(_number(name, "how much of the shape acts here") for name in channels)
-    neutral = {name: _NEUTRAL[name] for name in channels}
-    return Term(function, per=Per.BODY, adds=adds, sets=sets, neutral=neutral,
-                params=(*_MIX, *amounts, *more))  # fmt: skip
+    return Term(function, per=Per.BODY, adds=adds, sets=sets, params=(*amounts, *more),
+                neutral=dict.fromkeys(channels, 0.0))  # fmt: skip
 
 
 _OFFSET = Param("offset", 0.0, "rad", TRIM, (-0.3, 0.3), "added to the wheels' angle, + left",
                 report="offset_rad")  # fmt: skip
+MEMORY = Term(throttle_memory, per=Per.BODY, sets="throttle_memory", keeps=0.0, params=(_MEMORY,))
+SHAPE = Term(
+    law_shape, per=Per.BODY, sets="law_shape", params=_MIX,
+    neutral={p.name: 0.0 for p in _SHAPES},
+)  # fmt: skip
 _WORLD = ("world_x_n", "world_y_n")
 PUSH = _term(learned_push, channels=("along_n", "drag_n", *_WORLD), adds="force_x")
 ACROSS = _term(learned_push_across, channels=_WORLD, adds="force_y")
@@ -239,9 +205,17 @@ DEMAND = Term(
 THROTTLE = _term(
     learned_throttle, channels=("throttle_add", "throttle_gain"), sets="throttle_received"
 )
+RIPPLE = Term(
+    learned_ripple, per=Per.WHEEL, adds="wheel_torque", neutral={"ripple_nm": 0.0},
+    params=(
+        _number("ripple_nm", "largest torque on a wheel as it turns"),
+        _number("per_turn", "waves in a turn of the wheel", 1.0),
+        _number("turn_phase", "of those waves where a wheel has not turned"),
+    ),
+)  # fmt: skip
 
 
-TERMS = (PUSH, ACROSS, TWIST, TURN, DEMAND, THROTTLE)
+TERMS = (MEMORY, SHAPE, PUSH, ACROSS, TWIST, TURN, DEMAND, THROTTLE, RIPPLE)
 
 
 def learned_terms(car: Car) -> list[Term]:

@@ -1,13 +1,15 @@
 """Laws as courses of pushes over moments: what the general effect gives where the car was then."""
 
+import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from scm.arrays import Floats
+from scm.arrays import Floats, Ints
 from scm.mismatch.laws.cells import Cells
 from scm.mismatch.laws.law import Law, Values
 from scm.mismatch.laws.learned import SLOW, WEIGHTS
+from scm.vehicles.jit import allocating_kernel
 
 
 def pushes(law: Law, cells: Cells, values: Values) -> Floats:
@@ -22,9 +24,27 @@ def shape(curve: Mapping[str, float], cells: Cells) -> Floats:
     q = np.full(len(cells), curve.get("phase", 0.0))
     for name in WEIGHTS:
         if f"by_{name}" in curve:
-            q += curve[f"by_{name}"] * cells.driven[name]
+            q += curve[f"by_{name}"] * variable(name, curve, cells)
     parts = (curve[name] * part(q) for name, part in _SHAPES.items() if name in curve)
     return sum(parts, np.zeros(len(cells)))
+
+
+def variable(name: str, curve: Mapping[str, float], cells: Cells) -> Floats:
+    """Return one of `learned.WEIGHTS`' variables at each moment, (cells,)."""
+    if name != "memory":
+        return cells.driven[name]
+    share = -math.expm1(-cells.wide / curve["memory_s"])
+    return remembered(cells.driven["throttle"], cells.drive, share)
+
+
+@allocating_kernel
+def remembered(values: Floats, drive: Ints, share: float) -> Floats:
+    """Return what is remembered of values, of which each takes a share; a drive begins with 0."""
+    found = np.zeros(len(values))
+    for i in range(1, len(values)):
+        before = found[i - 1] if drive[i] == drive[i - 1] else 0.0
+        found[i] = before + share * (values[i - 1] - before)
+    return found
 
 
 def amount(channel: Mapping[str, float], cells: Cells) -> Floats:

@@ -19,6 +19,7 @@ from scm.mismatch.laws.learned import THROTTLE, learned_terms
 from scm.mismatch.laws.screen import Start, polished, screen
 from scm.mismatch.laws.sensed import Sensed, Sensing, sensor_laws
 from scm.mismatch.laws.tidy import tidied
+from scm.mismatch.laws.turns import beside, by_turn, ripples
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate
 
@@ -90,6 +91,11 @@ def seek(model: Likelihood, base: Fitted, part: Floats, tell: Tell = lambda _: N
     starts = _worth(screen(laws, cells, responses), part)
     starts = [polished(s, cells, responses[s.law.channel.response]) for s in starts]
     begun = [(s.law, s.values, s.gain) for s in starts] + _of_sensors(model, fitter, base, part)
+    begun += [
+        (by_turn(), values, gain)
+        for values, gain in ripples(model, fitter, base)
+        if gain > _price(by_turn(), part) - UNSURE
+    ]
     begun.sort(key=lambda one: _price(one[0], part) - one[2])
     found = _refitted(fitter, base, begun[:MOST], tell)
     events = int(part.sum())
@@ -120,23 +126,16 @@ def _worth(groups: list[list[Start]], part: Floats) -> list[Start]:
 
 def _of_sensors(model: Sensing, fitter: Fitter, base: Fitted, part: Floats) -> list[_Begun]:
     """Return the sensor laws worth a free run, with amounts and what they would explain."""
-    weights, jacobian = fitter.weights(base.e), base.jacobian
-    weighted = jacobian.T * weights
-    prior = np.full(jacobian.shape[1], 1e-6)
-    prior[: len(base.z)] = 1.0
-    inverse = np.linalg.inv(weighted @ jacobian + np.diag(prior))
-    tilt = weighted @ base.e
-    tilt[: len(base.z)] += base.z
+    laws = [law for law in sensor_laws() if law.knobs[0].key in model.learned]
+    if not laws:
+        return []
+    slope, bend = beside(fitter, base, np.stack([model.felt(law) for law in laws], axis=1))
     found = list[_Begun]()
-    for law in sensor_laws():
-        if law.knobs[0].key in model.learned:
-            felt = model.felt(law)
-            own = weighted @ felt
-            slope = float((weights * felt) @ base.e - own @ inverse @ tilt)
-            bend = max(float((weights * felt) @ felt - own @ inverse @ own), 1e-12)
-            gain = slope * slope / bend
-            if gain > _price(law, part) - UNSURE:
-                found.append((law, (-slope / bend,), gain))
+    for i, law in enumerate(laws):
+        least = max(float(bend[i, i]), 1e-12)
+        gain = float(slope[i]) ** 2 / least
+        if gain > _price(law, part) - UNSURE:
+            found.append((law, (-float(slope[i]) / least,), gain))
     return found
 
 

@@ -56,7 +56,7 @@ def write_law(law: Law, values: Values, path: Path) -> None:
     if path.name != file_name(law) + SUFFIX:
         msg = f"{path.name}: expected {file_name(law) + SUFFIX}, the law's own name"
         raise TermError(msg)
-    parts = [_function(law, part) for part in law.channel.text]
+    parts = [_function(law, part) for part in law.written]
     lines = [_docstring(law, values), "", *_imports(parts), "", _params(law), ""]
     for part in parts:
         lines += ["", "@law", part, ""]
@@ -69,7 +69,7 @@ def _docstring(law: Law, values: Values) -> str:
     said = law.said.format(**{k.name: f"`{k.name}`" for k in law.knobs})
     equations = [
         f"{part.target.split()[1]} {'+=' if _adds(part) else '='} {_plain(part.returns)}"
-        for part in law.channel.text
+        for part in law.written
     ]
     rows = [*equations, _plain(law.curve.text), f"found as {law.formula(values)}"]
     body = [
@@ -110,7 +110,7 @@ def _imports(functions: Sequence[str]) -> list[str]:
 
 def _params(law: Law) -> str:
     rows = [_param(law, knob) for knob in law.knobs]
-    more = [_WITH[part.target] for part in law.channel.text if part.target in _WITH]
+    more = [_WITH[part.target] for part in law.written if part.target in _WITH]
     rows += [f'    Param("{name}", {rest}),' for name, rest in more]
     return "\n".join(["_PARAMS = (", *rows, ")"])
 
@@ -125,7 +125,8 @@ def _param(law: Law, knob: Knob) -> str:
 
 
 def _function(law: Law, part: Written) -> str:
-    body, names = _straight(f"{law.curve.text}\nresult = {part.returns}")
+    curve = f"{law.curve.text}\n" if part.keeps is None else ""
+    body, names = _straight(f"{curve}result = {part.returns}")
     signals = [s for s in dict.fromkeys((*part.signals, *law.curve.signals)) if s in names]
     arguments = [*signals, *(k.name for k in law.knobs if k.name in names)]
     arguments += [_WITH[part.target][0]] if part.target in _WITH else []
@@ -168,14 +169,17 @@ def _straight(text: str) -> tuple[list[str], set[str]]:
 
 
 def _term(law: Law) -> str:
-    amount = law.knobs[0].name
-    rows = []
-    for part in law.channel.text:
-        how, target = part.target.split()
-        rows.append(
-            f'{file_name(law)}{part.suffix}, per=Per.BODY, {how}="{target}", params=_PARAMS,\n'
-            f'    neutral={{"{amount}": 0.0}},'
-        )
-    first, *more = rows
-    also = "".join(f"\n    also=(Term({row}),)," for row in more)
+    first, *more = (_term_of(law, part) for part in law.written)
+    also = "".join(f"\n        Term({row})," for row in more)
+    also = f"\n    also=({also}\n    )," if also else ""
     return f"TERM = Term(\n    {first}{also}\n)  # fmt: skip"
+
+
+def _term_of(law: Law, part: Written) -> str:
+    how, target = part.target.split()
+    still = f'neutral={{"{law.knobs[0].name}": 0.0}},' if part.keeps is None else ""
+    kept = "" if part.keeps is None else f"keeps={part.keeps},"
+    return (
+        f'{file_name(law)}{part.suffix}, per=Per.{part.per.name}, {how}="{target}",\n'
+        f"    params=_PARAMS, {still}{kept}"
+    )

@@ -2,7 +2,7 @@
 
 `scm.replay` starts each window anew, so an effect of time, or one that warms up, begins again with
 every window. Here the car drives through the whole recording; where a window begins, only its pose
-is set to the measured one, its motion and actuators stay.
+is set to the measured one, and how far its wheels have turned; its motion and actuators stay.
 """
 
 import math
@@ -19,6 +19,7 @@ from scm.vehicles.fleet import Fleet
 
 EVERY_S = 0.1
 SETTLED_S = 3.0
+COUNTS, ENCODERS = "encoder.counts_per_revolution", ("encoder.left", "encoder.right")
 
 
 def position_error(recording: Recording, car: Car, horizon_s: float = 3.0) -> float:
@@ -34,6 +35,7 @@ def position_error(recording: Recording, car: Car, horizon_s: float = 3.0) -> fl
     count = int((end - begin) / EVERY_S)
     t: Floats = np.linspace(begin, begin + EVERY_S * count, count + 1)
     measured = poses.motion(t)
+    turned = _turned(recording, car, t)
     per_window = round(horizon_s / EVERY_S)
     fleet = _started(car, commands, first, measured)
     _drive(fleet, commands, first, begin)
@@ -41,6 +43,8 @@ def position_error(recording: Recording, car: Car, horizon_s: float = 3.0) -> fl
     for k, now in enumerate(t):
         if k % per_window == 0 and measured.valid[k]:
             _carry(fleet, measured, k)
+            if turned is not None:
+                fleet.wheel_angle[0] += np.tile(turned[k] - fleet.wheel_angle[0, 2:], 2)
         errors[k] = np.hypot(fleet.x[0] - measured.x[k], fleet.y[0] - measured.y[k])
         _drive(fleet, commands, now, now + EVERY_S)
     counted = (t > begin + SETTLED_S) & measured.valid
@@ -53,6 +57,15 @@ def _started(car: Car, commands: Commands, first: float, measured: Motion) -> Fl
     moving = float(measured.speed[k]) if measured.t[k] - first < 1.0 else 0.0
     fleet.add(Pose2(float(measured.x[k]), float(measured.y[k]), float(measured.yaw[k])), moving)
     return fleet
+
+
+def _turned(recording: Recording, car: Car, t: Floats) -> Floats | None:
+    """Return how far the left and the right wheel have turned, (n, 2) [rad]; None: not counted."""
+    counts = car.value(COUNTS) / (2.0 * math.pi) if car.has(COUNTS) else 0.0
+    if not counts or not all(name in recording.channels for name in ENCODERS):
+        return None
+    both = (recording.channel(name) for name in ENCODERS)
+    return np.stack([np.interp(t, c.t, c.values) / counts for c in both], axis=1)
 
 
 def _drive(fleet: Fleet, commands: Commands, start: float, end: float) -> None:

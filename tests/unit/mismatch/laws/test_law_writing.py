@@ -8,7 +8,7 @@ import pytest
 
 from scm.errors import TermError
 from scm.mismatch.laws.dictionary import dictionary
-from scm.mismatch.laws.learned import PREFIX, TERMS
+from scm.mismatch.laws.learned import PREFIX, SHAPE, TERMS
 from scm.mismatch.laws.writing import as_term, file_name, write_law
 from scm.vehicles.car import load_car
 from scm.vehicles.jit import plain
@@ -18,7 +18,8 @@ from tests.unit.mismatch.laws import made_law
 HERE = {
     "time": 3.0, "x_cog": 0.4, "y_cog": -0.3, "yaw": 0.8, "cos_yaw": math.cos(0.8),
     "sin_yaw": math.sin(0.8), "vx": 0.3, "linkage_angle": -0.2, "throttle_command": 0.6,
-    "yaw_rate": 0.5, "offset": 0.01, "steer_demand": -0.2, "gain": 1.1,
+    "yaw_rate": 0.5, "offset": 0.01, "steer_demand": -0.2, "gain": 1.1, "accel_y": -0.7,
+    "throttle_memory": 0.4, "dt": 0.1, "driven": 1.0, "wheel_angle": 2.1,
 }  # fmt: skip
 
 
@@ -32,6 +33,7 @@ def general(law, values):
     defaults = {p.name: p.default for term in TERMS for p in term.params}
     numbers = {k.removeprefix(PREFIX): v for k, v in law.numbers(values).items()}
     given = defaults | HERE | numbers
+    given["law_shape"] = value(SHAPE.law, given)
     return {term.target: value(term.law, given) for term in TERMS}
 
 
