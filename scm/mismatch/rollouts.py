@@ -81,6 +81,12 @@ class Tiles:
         return self if any(more & numbers.keys() for numbers in sets) else self.lean
 
 
+def _shares(sets: int) -> list[list[range]]:
+    """Return which sets each thread drives, tile by tile."""
+    tiles = [range(first, min(first + ROWS, sets)) for first in range(0, sets, ROWS)]
+    return [tiles[thread::THREADS] for thread in range(THREADS)]
+
+
 class Rollouts:
     """Drives one recording again."""
 
@@ -121,18 +127,17 @@ class Rollouts:
         places = {one: k for k, one in enumerate(dict.fromkeys(moving))}
         at = [places[one] for one in moving]
         different = [dict(one) for one in places]
-        which = [[i for i, k in enumerate(at) if first <= k < first + ROWS]
-                 for first in range(0, len(different), ROWS)]  # fmt: skip
+        shares = _shares(len(different))
 
         def share(thread: int) -> list[_Used]:
             found = list[_Used]()
-            for tile in range(thread, len(which), THREADS):
-                first, mine = tile * ROWS, which[tile]
-                motions = self._run(thread, different[first : first + ROWS])
-                found.append(use(motions.of([at[i] - first for i in mine]), mine))
+            for tile in shares[thread]:
+                mine = [i for i, k in enumerate(at) if k in tile]
+                motions = self._run(thread, different[tile.start : tile.stop])
+                found.append(use(motions.of([at[i] - tile.start for i in mine]), mine))
             return found
 
-        others = pool(THREADS).map(share, range(1, min(THREADS, len(which))))
+        others = pool(THREADS).map(share, [k for k in range(1, THREADS) if shares[k]])
         return [*share(0), *(one for other in others for one in other)]
 
     def _moving(self, numbers: Numbers) -> tuple[tuple[str, float], ...]:

@@ -118,9 +118,10 @@ def rollout_kernel(function: Function) -> Function:
 
 
 def stage(function: Function) -> Function:
-    """Compile a stage of row arithmetic, `(car, wheel, w, dt)`, for use in a fleet kernel.
+    """Compile a stage of row arithmetic, `(car, wheel, w, dt, vectors)`, for use in a fleet kernel.
 
-    Both buffers begin on a cache line; `wheel` holds four wheels of WHEEL_ROWS rows each.
+    Both buffers begin on a cache line; `wheel` holds four wheels of WHEEL_ROWS rows each. Of each
+    row only the first `vectors` registers full are worked on.
     """
     (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
     lines = cast("ast.FunctionDef", tree).body
@@ -133,7 +134,7 @@ def stage(function: Function) -> Function:
         )
         size = ir.Constant(arguments[2].type, LANES * rows["WHEEL_ROWS"])
         at = builder.mul(arguments[2], size)
-        with cgutils.for_range(builder, ir.Constant(arguments[2].type, LANES // WIDTH)) as loop:
+        with cgutils.for_range(builder, arguments[4]) as loop:
             first = builder.mul(loop.index, ir.Constant(arguments[2].type, WIDTH))
             bases = {"car": builder.gep(car, [first]), "wheel": builder.gep(wheel, [first])}
             write = Rows(builder, bases, rows, {"w": at}, {"dt": arguments[3]})
@@ -142,8 +143,8 @@ def stage(function: Function) -> Function:
         return context.get_dummy_value()
 
     @numba.extending.intrinsic
-    def compiled(_: object, car: Any, wheel: Any, w: Any, dt: Any) -> Any:
-        return numba.void(car, wheel, numba.int64, numba.float64), code
+    def compiled(_: object, car: Any, wheel: Any, w: Any, dt: Any, vectors: Any) -> Any:
+        return numba.void(car, wheel, numba.int64, numba.float64, numba.int64), code
 
     return cast("Function", compiled)
 

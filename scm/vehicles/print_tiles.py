@@ -1,7 +1,8 @@
 """A program as loops over lanes: tiles of cars, each in a local buffer of fixed shape.
 
-Every inner loop is straight-line text that runs a fixed number of times over neighbours in memory,
-so the compiler turns it into vector instructions without a question left open.
+Every inner loop is straight-line text over neighbours in memory, a register full at a time, so the
+compiler turns it into vector instructions without a question left open. A tile whose last lanes are
+empty is driven without them.
 """
 
 import ast
@@ -12,7 +13,7 @@ from textwrap import indent
 
 from scm.vehicles import body14
 from scm.vehicles.inline import Line
-from scm.vehicles.lanes import LANES
+from scm.vehicles.lanes import LANES, WIDTH
 from scm.vehicles.past import COMMANDS
 from scm.vehicles.program import Program, Stage, names_in
 from scm.vehicles.signals import Per
@@ -65,11 +66,12 @@ def rollout(
         wheel[w, SIDE] = 1.0 if w % 2 == 0 else -1.0
     going = np.empty({lanes}, np.bool_)
     for start in range(first // {lanes} * {lanes}, last, {lanes}):
-        cars = 0
+        cars = vectors = 0
         for i in range({lanes}):
             row = start + i
             going[i] = row >= first and row < last and alive[row] and status[row] == 0
             cars += going[i]
+            vectors = i // {width} + 1 if going[i] else vectors
         t = stored = 0
         halt = parts
         fresh = True
@@ -151,6 +153,7 @@ def print_tiles(title: str, program: Program, slots: Slots, columns: Sequence[st
     page = _HEAD.format(
         title=title,
         lanes=LANES,
+        width=WIDTH,
         car_rows=_named_rows(rows.car),
         wheel_rows=_named_rows(rows.wheel),
         car_count=len(rows.car),
@@ -204,14 +207,14 @@ class _Rows:
         kept = [n for n in stage.sets if n in self.car or n in self.wheel]
         body += [f"{self._place(n)} = {n}" for n in kept]
         text = indent("\n".join(body), "    ")
-        return f"@stage\ndef {_function_name(stage)}(car, wheel, w, dt):\n{text}"
+        return f"@stage\ndef {_function_name(stage)}(car, wheel, w, dt, vectors):\n{text}"
 
     def call(self, stage: Stage) -> str:
         """Return the call of one stage, for each wheel where it is a wheel's."""
         if stage.per is Per.BODY:
-            return f"{_function_name(stage)}(car, wheel, 0, dt)"
+            return f"{_function_name(stage)}(car, wheel, 0, dt, vectors)"
         wheels = range_text(stage.wheels)
-        return f"for w in {wheels}:\n    {_function_name(stage)}(car, wheel, w, dt)"
+        return f"for w in {wheels}:\n    {_function_name(stage)}(car, wheel, w, dt, vectors)"
 
     def _place(self, name: str) -> str:
         if name[-3:-1] == "__":

@@ -4,7 +4,7 @@ A law alone is held against the best listed model under one belief about noise: 
 better hypothesis by its price and a margin, and explain a part that no fit has seen better too.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,7 @@ from scm.mismatch.search import Search
 
 MARGIN = 10.0  # a law that is hardly better than a known effect is that effect
 MOST_BESIDE, SETTLED = 2, 2
+HOPELESS = 50.0  # no belief about noise makes good so much
 Tell = Callable[[str], None]
 
 
@@ -55,12 +56,17 @@ def lawful(
     model = search.model
     if not isinstance(model, Sensing):
         return best, None
-    best = search.settle(best)  # as often as a law will be
-    listed = _settled(search, best, unseen)
-    model.believe(calmed(model.noise, model.drives))
+    usual = model.noise
+    model.believe(calmed(usual, model.drives))
     sought = seek(model, _bare(search, best), search.fitter.part, tell)
-    calm, laws = model.noise, list[_Settled]()
-    for fitted in sought.found[:SETTLED]:
+    near = _near(search, best, sought.found)
+    calm = model.noise
+    model.believe(usual)
+    if not near:
+        return best, None
+    best = search.settle(best)  # as often as a law will be
+    listed, laws = _settled(search, best, unseen), list[_Settled]()
+    for fitted in near:
         model.believe(calm)
         laws.append(_settled(search, search.settle(fitted), unseen))
     law = min(laws, key=lambda one: one.cost, default=listed)
@@ -69,6 +75,14 @@ def lawful(
         return best, None
     model.believe(law.noise)
     return _with_known(search, law, unseen), sought
+
+
+def _near(search: Search, best: Fitted, laws: Sequence[Fitted]) -> list[Fitted]:
+    """Return the best laws that are not hopelessly worse than the listed model, as noise is now."""
+    fitter = search.fitter
+    e, _ = search.model([fitter.numbers(best.effects, best.z, best.values)])
+    held = float(fitter.score(e, best.z)[0])
+    return [law for law in laws[:SETTLED] if law.q < held + HOPELESS]
 
 
 def _with_known(search: Search, law: _Settled, unseen: Floats) -> Fitted:
