@@ -151,11 +151,11 @@ class Rollouts:
         delays = self._set(fleet, tiles.columns, sets)
         parts = tether.parts
         self._begin(fleet, n, delays, parts)
-        tether.roll(n, np.empty((0, len(SIGNALS), fleet.capacity)), self._turned[0])
         changes = np.linspace(edges[0], edges[-1], parts * (len(edges) - 1) + 1)
         out, first = np.empty((len(edges), len(SIGNALS), fleet.capacity)), _now(fleet)
         for k, name in enumerate(SIGNALS):
             out[0, k] = first[name]
+        tether.roll(n, out[:0], self._turned[0])
         for a in range(0, len(edges) - 1, TETHER_STEPS):
             b = min(a + TETHER_STEPS, len(edges) - 1)
             if self.drive.battery is not None:

@@ -28,7 +28,7 @@ from scm.vehicles.fleet_rows import (
     slots_of_signals,
     steps_of,
     whole_steps,
-)
+)  # fmt: skip
 from scm.vehicles.jit import plain
 from scm.vehicles.kernel_file import compile_kernel
 from scm.vehicles.lanes import LANES
@@ -80,13 +80,13 @@ class Fleet:
             coefficient [1], shape (capacity, 4); write here. Adding or placing a car makes its
             floor level and of grip 1, its air still.
         wheel_x, wheel_y: Contact points in the world, (capacity, 4) [m].
-        time: Since the car was placed [s], shape (capacity,); may be written.
+        time, wheel_angle: Since the car was placed, (capacity,) [s], and how far each wheel has
+            turned since, (capacity, 4) [rad]; may be written.
         impact_x, impact_y, impact_yaw: What contacts added to the acceleration over the last tick,
             level body frame [m/s^2, rad/s^2], shape (capacity,); written by who finds the contacts.
         columns: What each number of a car means, in the order of `parameters`.
         threads: How many threads `advance` uses for big fleets; 1 from the start.
-        alive: Rows in use, shape (capacity,).
-        status: `VehicleStatus` of each row, shape (capacity,).
+        alive, status: Rows in use, and the `VehicleStatus` of each, shape (capacity,).
         x, y, z, roll, pitch, yaw: Rear-axle pose in the world [m, rad]; yaw in (-pi, pi]. The
             point is fixed to the leaning body at floor height: a stopped car that still rocks on
             its springs has stopped.
@@ -95,8 +95,6 @@ class Fleet:
         accel_x, accel_y, accel_z: Acceleration of the centre of gravity over the last substep, in
             the level body frame, without gravity [m/s^2].
         steer_angle: Mean road-wheel angle, + left [rad].
-        wheel_angle: How far each wheel has turned since the car was placed, (capacity, 4) [rad];
-            may be written.
         wheel_speed, wheel_steer: Of each wheel, (capacity, 4) [rad/s, rad].
         wheel_load: Floor on tyre, (capacity, 4) [N].
     """

@@ -8,7 +8,7 @@ from scm.mismatch.fit import Fitter
 from scm.mismatch.laws.cells import Cells, Response, cells_of, respond
 from scm.mismatch.laws.curves import axis_of
 from scm.mismatch.laws.learned import PREFIX
-from scm.mismatch.laws.pushes import pushes
+from scm.mismatch.laws.pushes import pushes, remembered
 from scm.mismatch.laws.screen import polished, screen
 from scm.mismatch.likelihood import Likelihood
 from tests.unit.mismatch.laws import made_law
@@ -51,7 +51,8 @@ def made_cells():
     t = 0.1 * np.arange(600)
     driven = {"time": t, "x": np.cos(0.5 * t), "y": np.sin(0.5 * t), "yaw": 0.5 * t + 1.57,
               "speed": 0.5 + 0.2 * np.sin(1.3 * t), "steer": 0.3 * np.sin(0.9 * t),
-              "throttle": 0.5 + 0.3 * np.cos(1.1 * t), "rate": np.full(600, 0.5)}  # fmt: skip
+              "throttle": 0.5 + 0.3 * np.cos(1.1 * t), "rate": np.full(600, 0.5),
+              "side": 0.2 * np.sin(0.7 * t)}  # fmt: skip
     return Cells(0.1, np.zeros(600, dtype=np.int64), driven)
 
 
@@ -91,3 +92,16 @@ def test_turns_are_laid_over_each_other_so_that_a_heading_fills_one_bin():
     assert (name, unit) == ("heading", "rad")
     assert np.abs(x).max() <= np.pi
     np.testing.assert_allclose(np.cos(x), np.cos(yaw), atol=1e-12)
+
+
+def test_what_is_remembered_of_the_throttle_fades_and_begins_with_every_drive_anew():
+    values = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 1.0])
+    drive = np.array([0, 0, 0, 0, 1, 1])
+    np.testing.assert_allclose(remembered(values, drive, 0.5), [0.0, 0.5, 0.75, 0.875, 0.0, 0.0])
+
+
+def test_a_law_of_the_throttle_s_past_begins_near_how_long_it_is_remembered():
+    worked = made_law.law("throttle against throttle's past", "worked")
+    start, _, _ = best_of(worked, (-0.2, 8.0))
+    assert start.law is worked
+    np.testing.assert_allclose(start.values, (-0.2, 8.0), rtol=0.1)

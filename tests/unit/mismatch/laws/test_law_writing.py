@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from scm.errors import TermError
+from scm.geometry import Pose2
 from scm.mismatch.laws.dictionary import dictionary
 from scm.mismatch.laws.learned import PREFIX, SHAPE, TERMS
 from scm.mismatch.laws.writing import as_term, file_name, write_law
 from scm.vehicles.car import load_car
+from scm.vehicles.fleet import Fleet
 from scm.vehicles.jit import plain
 from scm.vehicles.term import flat
 from tests.unit.mismatch.laws import made_law
@@ -50,6 +52,28 @@ def test_a_car_takes_a_written_law(tmp_path):
     term, numbers = as_term(made_law.gust(), made_law.GUST, tmp_path)
     car = load_car("nigel").with_terms([term], numbers)
     assert car.value("floor_force_against_time.period_s") == 4.0
+
+
+def test_a_written_law_of_the_throttle_s_past_remembers_it_in_a_car(tmp_path):
+    worked = made_law.law("throttle against throttle's past", "worked")
+    term, numbers = as_term(worked, (-0.5, 0.5), tmp_path)
+    fleet = Fleet(load_car("nigel").with_terms([term], numbers), 1)
+    fleet.add(Pose2(0.0, 0.0, 0.0))
+    fleet.throttle[0] = 1.0
+    speeds = []
+    for _ in range(40):
+        fleet.advance(0.1)
+        speeds.append(float(fleet.speed[0]))
+    tired, fresh = speeds[-1], max(speeds)
+    assert tired < 0.9 * fresh  # it forgets within half a second how strong it was
+    fleet.throttle[0] = 0.0
+    fleet.advance(5.0)
+    fleet.throttle[0] = 1.0
+    again = []
+    for _ in range(40):
+        fleet.advance(0.1)
+        again.append(float(fleet.speed[0]))
+    np.testing.assert_allclose(max(again), fresh, rtol=0.02)
 
 
 def test_a_file_says_its_equation_and_what_was_found(tmp_path):
