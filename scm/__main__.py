@@ -1,4 +1,7 @@
-"""The command line: `scm <command> ...`, one file of `scm/commands` a command."""
+"""The command line: `scm <command> ...`, one file of `scm/commands` a command.
+
+A command of two words, `scm eye detect`, is the file `eye_detect`.
+"""
 
 import argparse
 import errno
@@ -6,6 +9,7 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 
 from scm import __version__
 from scm.errors import ScmError
@@ -32,7 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
     for name in names("scm.commands"):
         command = load("scm.commands", name, "COMMAND", Command)
         sub = commands.add_parser(
-            name,
+            name.replace("_", " "),
             help=command.help,
             description=command.help,
             epilog=f"example: {command.example}",
@@ -43,9 +47,14 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def parse(argv: Sequence[str]) -> argparse.Namespace:
+    """Return what the words after `scm` ask for."""
+    return build_parser().parse_args(_joined(argv))
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return 0 done, 2 bad input, 1 our fault, 130 ended by Ctrl-C."""
-    arguments = build_parser().parse_args(argv)
+    arguments = parse(sys.argv[1:] if argv is None else argv)
     logging.basicConfig(
         level=arguments.log.upper(), format="%(asctime)s %(levelname)s %(name)s %(message)s"
     )
@@ -60,6 +69,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     except Exception as error:  # noqa: BLE001  the edge of the process
         return _said(arguments.command, error)
     return code
+
+
+def _joined(argv: Sequence[str]) -> list[str]:
+    """Return the arguments with the two words of a command as one."""
+    from scm.registry import names
+
+    known = set(names("scm.commands"))
+    for i, (first, second) in enumerate(pairwise(argv)):
+        if f"{first}_{second}" in known:
+            return [*argv[:i], f"{first} {second}", *argv[i + 2 :]]
+        if first in known:
+            break
+    return list(argv)
 
 
 def _said(command: str, error: Exception) -> int:

@@ -16,6 +16,7 @@ import numpy as np
 import pupil_apriltags
 
 from scm.arrays import Image
+from scm.eye.picture import LEAST_PX
 from scm.v2x.messages.eye_tags import TagSeen
 
 PIXEL_ORIGIN_PX = 0.5
@@ -55,6 +56,8 @@ class Settings:
 def detect_tags(grey: Image, settings: Settings | None = None) -> tuple[TagSeen, ...]:
     """Return the tags in a grey frame (height, width), sorted by id; of twins the clearer one."""
     settings = settings or Settings()
+    if min(grey.shape) < LEAST_PX:
+        return ()
     with _lock:
         rough = _look(grey, settings, settings.quad_decimate, settings.quad_sigma)
         found = {tag_id: _measure(grey, settings, tag) for tag_id, tag in rough.items()}

@@ -10,6 +10,13 @@ from scm.arrays import Image
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 
+def grey_of(image: Image) -> Image:
+    """Return a picture in grey, (height, width), of one in grey or blue, green, red."""
+    if image.ndim == 2:
+        return image
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """One picture.
@@ -24,9 +31,7 @@ class Frame:
 
     def grey(self) -> Image:
         """Return it in grey, (height, width)."""
-        if self.image.ndim == 2:
-            return self.image
-        return np.asarray(cv2.cvtColor(self.image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        return grey_of(self.image)
 
 
 class Source(Protocol):

@@ -7,6 +7,7 @@ import numpy as np
 
 from scm.clock import NS_PER_S
 from scm.errors import EyeError
+from scm.eye.picture import read_picture
 from scm.eye.source import Frame
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
@@ -20,14 +21,14 @@ class FileSource:
         path: Any picture or film that OpenCV reads; a picture is one frame.
 
     Raises:
-        EyeError: The file is missing or cannot be read.
+        EyeError: The file is missing, cut short or cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         if not path.is_file():
             raise EyeError(f"{path}: expected a picture or film, found no file")
-        self._still = cv2.imread(str(path)) if path.suffix.lower() in STILLS else None
+        self._still = read_picture(path) if path.suffix.lower() in STILLS else None
         self._film = None if self._still is not None else cv2.VideoCapture(str(path))
         self._rate_hz = self._film.get(cv2.CAP_PROP_FPS) if self._film is not None else 1.0
         if self._film is not None and (not self._film.isOpened() or self._rate_hz <= 0.0):
@@ -56,4 +57,4 @@ class FileSource:
         if self._still is None or self._played:
             return None
         self._played = 1
-        return Frame(now_ns, np.asarray(self._still, dtype=np.uint8))
+        return Frame(now_ns, self._still)

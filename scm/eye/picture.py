@@ -1,0 +1,46 @@
+"""A picture file, or a JPEG that came over the network, as an image; damaged ones are refused."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from scm.arrays import Image
+from scm.errors import EyeError
+
+LEAST_PX = 16
+_JPEG, _SCAN, _END = b"\xff\xd8", b"\xff\xda", b"\xff\xd9"
+
+
+def read_picture(path: Path) -> Image:
+    """Return a picture file, (height, width, 3) blue, green, red.
+
+    Raises:
+        EyeError: The file is missing, no picture, cut short or smaller than any tag.
+    """
+    if not path.is_file():
+        raise EyeError(f"{path}: expected a picture, found no file")
+    return decode_picture(path.read_bytes(), str(path))
+
+
+def decode_picture(data: bytes, name: str) -> Image:
+    """Return an encoded picture, (height, width, 3) blue, green, red.
+
+    Args:
+        data: The file's content: JPEG, PNG, or whatever else OpenCV reads.
+        name: For errors: where it came from.
+
+    Raises:
+        EyeError: It is no picture, cut short or smaller than any tag.
+    """
+    # OpenCV fills what is missing of a JPEG with grey, and says so on stderr at most
+    if data.startswith(_JPEG) and data.rfind(_END) < data.rfind(_SCAN):
+        raise EyeError(f"{name}: expected a whole JPEG, got one cut short after {len(data)} bytes")
+    image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR) if data else None
+    if image is None:
+        raise EyeError(f"{name}: expected a picture that OpenCV reads, got {len(data)} bytes")
+    height, width = image.shape[:2]
+    if min(height, width) < LEAST_PX:
+        least = f"{LEAST_PX} x {LEAST_PX}"
+        raise EyeError(f"{name}: expected at least {least} px, got {width} x {height}")
+    return np.asarray(image, dtype=np.uint8)
