@@ -328,13 +328,14 @@ class Spawn(Record, kw_only=True, frozen=True):
 
 
 class Camera(Record, kw_only=True, frozen=True):
-    """An overhead camera: pinhole with OpenCV's five-term distortion, looking down.
+    """An overhead camera, looking down: a pinhole with OpenCV's distortion, or a fisheye.
 
     Attributes:
         x_m, y_m, z_m: Optical centre in the map frame.
         yaw_rad: Direction of the image's right edge over the floor (x of the picture).
         tilt_x_rad, tilt_y_rad: Small rotations about the picture's x and y away from straight down.
-        distortion: k1, k2, p1, p2, k3.
+        lens: `fisheye` is OpenCV's model of wide lenses (angle, not tangent, over the picture).
+        distortion: k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4, 0.
     """
 
     name: str
@@ -350,6 +351,7 @@ class Camera(Record, kw_only=True, frozen=True):
     fy_px: float
     cx_px: float
     cy_px: float
+    lens: Literal["pinhole", "fisheye"] = "pinhole"
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
     rate_hz: float = 10.0
     noise_sigma: float = 2.0
