@@ -1,22 +1,25 @@
-"""Where the camera really is: the calibration of the map file, corrected by the map's own tag.
+"""Where the camera really is: the calibration of the map file, corrected by the map's own tags.
 
 One small tag in a corner of the frame tells the camera's shift well, its turn poorly (a tenth of a
 pixel at the tag is millimetres at the far end) and its height and tilt hardly. A plain
 perspective-n-point solution trusts it for all six at once and jumps between two solutions. Here the
-calibration is a prior with a stated tolerance and the tag's eight corner coordinates are the
-measurement: Gauss-Newton on
+calibration is a prior with a stated tolerance and the corners of the tags are the measurement:
+Gauss-Newton on
 
-    sum ((extrinsics - calibrated) / tolerance)^2 + sum ((seen - projected) / corner_std)^2
+    (p - calibrated)' tolerance^-1 (p - calibrated)  +  (seen - projected)' noise^-1 (same)
 
-lets the tag correct exactly what it can see better than the calibrator did. The tag lies still, so
-its corners are averaged over the last frames, which calms the poses; the doubt stays that of one
-frame, because a still tag's corners are off by nearly the same in every frame. A camera that was
-knocked shows the tag far outside the tolerance: then the tolerance is widened and the tag believed.
+lets the tags correct exactly what they can see better than the calibrator did. `p` is the camera's
+place, and its lens too where the calibration doubts it. A tag lies still, so its corners are
+averaged over the last frames, which calms the poses; the doubt stays that of one frame, because a
+still tag's corners are off by nearly the same in every frame. A camera that was knocked shows a tag
+far outside the tolerance: then the tolerance is widened and the tags are believed.
 """
 
 import logging
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
+import msgspec
 import numpy as np
 
 from scm.arrays import Floats
@@ -31,10 +34,22 @@ from scm.scenery.tags import tag_corners
 LOGGER = logging.getLogger(__name__)
 AVERAGED_FRAMES = 20
 MOVED_PX = 1.0
+STILL_PX = 0.003
+"""Averages that changed by less are not worth another solution."""
 KNOCKED_SIGMAS = 5.0
 KNOCKED_TOLERANCE = 30.0
 ITERATIONS = 3
-STEPS = np.array([1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5])
+PLACE = 6
+STEPS = np.array(
+    [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-2, 1e-2, 1e-2, 1e-2, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6]
+)
+"""Of the differences: camera's place (6), then fx, fy, cx, cy and distortion (9)."""
+SURVEY_M = 0.001
+"""Doubt of where every tag but the first lies, east and north: the first defines the map."""
+BUMP = np.array([0.05, 0.05, 0.02, 0.05, 0.02, 0.02])
+"""How far a bump may have moved a camera that is still on its mount, [m] and [rad]."""
+ROOF_M = 0.13
+GRID = np.linspace(0.1, 0.9, 4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,18 +68,27 @@ class Tolerance:
 
 
 @dataclass(slots=True, eq=False)
+class Average:
+    """Corners of a still tag, (4, 2) [px], the mean of so many frames."""
+
+    corners: Floats
+    frames: int = 1
+
+
+@dataclass(slots=True, eq=False)
 class Anchor:
     """The corrected camera, frame after frame.
 
     Attributes:
+        tags: Of the map; the first defines its frame. One tag alone may be given bare.
         model: The camera where it now seems to be.
-        covariance: Of its extrinsics, (6, 6).
-        probes: The camera moved by plus and minus `STEPS` in each of its extrinsics.
-        seen_ns: When the map's tag was last seen; None before.
+        covariance: Of its extrinsics, (6, 6), followed by its lens if that is in doubt, (15, 15).
+        probes: The camera changed by plus and minus `STEPS` in each of these.
+        seen_ns: When a tag of the map was last seen; None before.
     """
 
     calibrated: CameraModel
-    tag: MapTag
+    tags: tuple[MapTag, ...] | MapTag
     tolerance: Tolerance = field(default_factory=Tolerance)
     corner_std_px: float = CORNER_STD_PX
     model: CameraModel = field(init=False)
@@ -72,84 +96,192 @@ class Anchor:
     probes: tuple[tuple[CameraModel, CameraModel], ...] = field(init=False)
     seen_ns: int | None = field(init=False, default=None)
     _first_ns: int | None = field(init=False, default=None)
-    _corners: Floats | None = field(init=False, default=None)
-    _averaged: int = field(init=False, default=0)
+    _averages: dict[int, Average] = field(init=False, default_factory=dict)
+    _solved: dict[int, Floats] = field(init=False, default_factory=dict)
     _knocked: bool = field(init=False, default=False)
+    _base: tuple[Floats, Floats] = field(init=False)
 
     def __post_init__(self) -> None:
         """Start from the calibration alone."""
+        if isinstance(self.tags, MapTag):
+            self.tags = (self.tags,)
         self.model = self.calibrated
-        self.covariance = np.diag(self.tolerance.deviations() ** 2)
-        self.probes = _probes(self.model)
+        count = PLACE if self.calibrated.lens_covariance is None else len(STEPS)
+        self.covariance = np.zeros((count, count))
+        self.covariance[:PLACE, :PLACE] = np.diag(self.tolerance.deviations() ** 2)
+        if self.calibrated.lens_covariance is not None:
+            self.covariance[PLACE:, PLACE:] = self.calibrated.lens_covariance
+        self._base = parameters(self.model)[:count], self.covariance
+        self.probes = self._probes()
 
-    def see(self, corners: Floats | None, t_ns: int) -> None:
-        """Take the map tag's corners in a frame, (4, 2) [px]; None keeps the last correction."""
+    @property
+    def tag(self) -> MapTag:
+        """The tag that defines the map's frame."""
+        return self.map_tags[0]
+
+    @property
+    def map_tags(self) -> tuple[MapTag, ...]:
+        """All tags of the map."""
+        return (self.tags,) if isinstance(self.tags, MapTag) else self.tags
+
+    def see(self, seen: Mapping[int, Floats] | Floats | None, t_ns: int) -> None:
+        """Take the corners of the map's tags in a frame, (4, 2) [px] by tag id.
+
+        Corners without an id are the first tag's; without any the last correction is kept.
+        """
         if self._first_ns is None:
             self._first_ns = t_ns
-        if corners is None:
+        if isinstance(seen, np.ndarray):
+            seen = {self.tag.tag_id: seen}
+        ours = {one.tag_id for one in self.map_tags}
+        known = {tag_id: corners for tag_id, corners in (seen or {}).items() if tag_id in ours}
+        if not known:
             return
         self.seen_ns = t_ns
-        self._average(corners)
-        self._solve()
+        self._average(known)
+        if self._has_moved():
+            self._solve()
+
+    def bumped(self) -> None:
+        """Believe the tags from here on: the camera was moved, nobody knows how far."""
+        mean, covariance = parameters(self.model)[: len(self.covariance)], self.covariance.copy()
+        covariance[:PLACE, :PLACE] += np.diag(BUMP**2)
+        self._base = mean, covariance
+        self.covariance = covariance
+        self._averages.clear()
+        self._solved.clear()
 
     def age_ms(self, t_ns: int) -> float:
-        """Return how long the map's tag has not been seen; never seen: since the first frame."""
+        """Return how long no tag of the map has been seen; never seen: since the first frame."""
         since = self.seen_ns if self.seen_ns is not None else self._first_ns
         return (t_ns - since) / NS_PER_MS if since is not None else 0.0
 
-    def _average(self, corners: Floats) -> None:
-        if self._corners is None or np.abs(corners - self._corners).max() > MOVED_PX:
-            self._corners, self._averaged = corners.copy(), 0
-        self._averaged = min(self._averaged + 1, AVERAGED_FRAMES)
-        self._corners = self._corners + (corners - self._corners) / self._averaged
+    def expected(self, tag: MapTag, model: CameraModel | None = None) -> Floats:
+        """Return where the corners of a map tag should be, (4, 2) [px]; by default from now."""
+        return (model or self.model).project(_on_floor(tag))
+
+    def doubt_m(self) -> float:
+        """Return the largest deviation of a roof's place over the frame, from the camera alone."""
+        camera = self.model.camera
+        across, down = np.meshgrid(GRID * camera.width_px, GRID * camera.height_px)
+        pixels = np.stack((across.ravel(), down.ravel()), axis=-1)
+        at = _lifted(self.model.on_plane(self.model.undistort(pixels), ROOF_M), ROOF_M)
+        moved = -np.linalg.inv(by_place(self.model, at)) @ self.by_parameter(at)
+        spread = moved @ self.covariance @ np.swapaxes(moved, -1, -2)
+        return float(np.sqrt(np.linalg.eigvalsh(spread)[:, -1].max()))
+
+    def by_parameter(self, points: Floats) -> Floats:
+        """Return the change of pixels by each doubted parameter: (..., 3) to (..., 2, p)."""
+        changes = [up.project(points) - down.project(points) for up, down in self.probes]
+        return np.stack(changes, axis=-1) / (2.0 * STEPS[: len(changes)])
+
+    def _average(self, seen: Mapping[int, Floats]) -> None:
+        for tag_id, corners in seen.items():
+            old = self._averages.get(tag_id)
+            if old is not None and np.abs(corners - old.corners).max() > MOVED_PX:
+                self._averages.clear()  # what is hidden now was seen from another place
+                old = None
+            if old is None:
+                self._averages[tag_id] = Average(corners.copy())
+                continue
+            old.frames = min(old.frames + 1, AVERAGED_FRAMES)
+            old.corners = old.corners + (corners - old.corners) / old.frames
+
+    def _has_moved(self) -> bool:
+        if self._averages.keys() != self._solved.keys():
+            return True
+        pairs = ((one.corners, self._solved[tag_id]) for tag_id, one in self._averages.items())
+        return any(np.abs(now - then).max() > STILL_PX for now, then in pairs)
 
     def _solve(self) -> None:
-        at = self.calibrated.extrinsics
-        jacobian, tolerated = self._jacobian(at), self.tolerance.deviations() ** 2
-        surprise = self._surprise(jacobian, tolerated)
-        knocked = surprise > KNOCKED_SIGMAS
-        if knocked:
-            tolerated = tolerated * KNOCKED_TOLERANCE**2
+        tags = [one for one in self.map_tags if one.tag_id in self._averages]
+        corners = np.array([self._averages[one.tag_id].corners for one in tags])
+        points = np.array([_on_floor(one) for one in tags])
+        start, prior = self._base
+        noise = self._noise(tags, points)
+        prior = self._if_knocked(corners, points, prior, noise)
+        at = start
+        for _ in range(ITERATIONS):
+            self.model = _changed(self.calibrated, at)
+            self.probes = self._probes()
+            jacobian = self.by_parameter(points).reshape(-1, len(at))
+            off = (corners - self.model.project(points)).ravel()
+            gain = np.linalg.solve(jacobian @ prior @ jacobian.T + noise, jacobian @ prior).T
+            at = start + gain @ (off + jacobian @ (at - start))
+        covariance = prior - gain @ jacobian @ prior
+        self.covariance = (covariance + covariance.T) / 2.0
+        self.model = _changed(self.calibrated, at)
+        self.probes = self._probes()
+        self._solved = {tag_id: one.corners.copy() for tag_id, one in self._averages.items()}
+
+    def _noise(self, tags: list[MapTag], points: Floats) -> Floats:
+        """Return the covariance of all corner coordinates, (8 n, 8 n) [px^2]."""
+        noise = self.corner_std_px**2 * np.eye(8 * len(tags))
+        for index, one in enumerate(tags):
+            if one is not self.tag:
+                shift = by_place(self.model, points[index]).reshape(8, 2)
+                block = slice(8 * index, 8 * index + 8)
+                noise[block, block] += SURVEY_M**2 * shift @ shift.T
+        return noise
+
+    def _if_knocked(self, corners: Floats, points: Floats, prior: Floats, noise: Floats) -> Floats:
+        """Return the prior, wide if a tag is where its tolerance cannot have put it.
+
+        Judged by tags' middles, which hardly depend on how well this camera's corners are found.
+        """
+        self.model = _changed(self.calibrated, self._base[0])
+        self.probes = self._probes()
+        off = (corners - self.model.project(points)).mean(axis=1)
+        by_camera = self.by_parameter(points).mean(axis=1)
+        floor = noise[:8, :8].max() * np.eye(2)
+        doubt = by_camera @ prior @ np.swapaxes(by_camera, -1, -2) + floor
+        squared = (off[:, None] @ np.linalg.solve(doubt, off[..., None])).max()
+        knocked = bool(squared > KNOCKED_SIGMAS**2)
         if knocked and not self._knocked:
-            facts = {"camera": self.model.camera.name, "surprise_sigmas": round(surprise, 1)}
+            sigmas = round(float(np.sqrt(squared)), 1)
+            facts = {"camera": self.model.camera.name, "surprise_sigmas": sigmas}
             event(LOGGER, "eye_camera_moved", level=logging.WARNING, **facts)
         self._knocked = knocked
-        prior, weight = np.diag(1.0 / tolerated), self.corner_std_px**-2
-        covariance = np.linalg.inv(prior + weight * jacobian.T @ jacobian).astype(np.float64)
-        for _ in range(ITERATIONS):
-            downhill = weight * jacobian.T @ self._residual(at)
-            at = at + covariance @ (downhill - prior @ (at - self.calibrated.extrinsics))
-        self.model, self.covariance = self.calibrated.moved_to(at), covariance
-        self.probes = _probes(self.model)
+        return prior * KNOCKED_TOLERANCE**2 if knocked else prior
 
-    def _surprise(self, jacobian: Floats, tolerated: Floats) -> float:
-        """Return how far the tag's middle is from where calibration puts it, in deviations.
-
-        The middle, because it hardly depends on how well this camera's corners are found.
-        """
-        off = self._residual(self.calibrated.extrinsics).reshape(4, 2).mean(axis=0)
-        by_camera = jacobian.reshape(4, 2, 6).mean(axis=0)
-        doubt = (by_camera * tolerated) @ by_camera.T + self.corner_std_px**2 * np.eye(2)
-        return float(np.sqrt(off @ np.linalg.solve(doubt, off)))
-
-    def _residual(self, extrinsics: Floats) -> Floats:
-        pose = Pose2(self.tag.x_m, self.tag.y_m, self.tag.yaw_rad)
-        on_floor = [(*pose.apply(x, y), 0.0) for x, y in tag_corners(self.tag.size_m)]
-        expected = self.calibrated.moved_to(extrinsics).project(np.array(on_floor))
-        if self._corners is None:
-            return np.zeros(8)
-        return (self._corners - expected).ravel()
-
-    def _jacobian(self, extrinsics: Floats) -> Floats:
-        """Return the change of the projected corners by each of the extrinsics, (8, 6)."""
-        shifts = np.diag(STEPS)
-        columns = [
-            (self._residual(extrinsics - shift) - self._residual(extrinsics + shift)) / (2.0 * step)
-            for shift, step in zip(shifts, STEPS, strict=True)
-        ]
-        return np.column_stack(columns)
+    def _probes(self) -> tuple[tuple[CameraModel, CameraModel], ...]:
+        at = parameters(self.model)[: len(self.covariance)]
+        shifts = np.diag(STEPS[: len(at)])
+        return tuple((_changed(self.model, at + d), _changed(self.model, at - d)) for d in shifts)
 
 
-def _probes(model: CameraModel) -> tuple[tuple[CameraModel, CameraModel], ...]:
-    at = model.extrinsics
-    return tuple((model.moved_to(at + d), model.moved_to(at - d)) for d in np.diag(STEPS))
+def by_place(model: CameraModel, points: Floats) -> Floats:
+    """Return the change of pixels by a level step of map points: (..., 3) to (..., 2, 2)."""
+    steps = np.eye(3)[:2] * 1e-5
+    changes = [model.project(points + step) - model.project(points - step) for step in steps]
+    return np.stack(changes, axis=-1) / 2e-5
+
+
+def parameters(model: CameraModel) -> Floats:
+    """Return the camera's place, fx, fy, cx, cy and distortion, (15,)."""
+    camera = model.camera
+    lens = [camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, *model.distortion]
+    return np.concatenate((model.extrinsics, lens))
+
+
+def _changed(model: CameraModel, values: Floats) -> CameraModel:
+    """Return the model with other extrinsics (6,), or with another lens too, (15,)."""
+    moved = model.moved_to(values[:PLACE])
+    if len(values) == PLACE:
+        return moved
+    fx, fy, cx, cy = (float(value) for value in values[PLACE : PLACE + 4])
+    k1, k2, p1, p2, k3 = (float(value) for value in values[PLACE + 4 :])
+    camera = msgspec.structs.replace(
+        moved.camera, fx_px=fx, fy_px=fy, cx_px=cx, cy_px=cy, distortion=(k1, k2, p1, p2, k3)
+    )
+    matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    return replace(moved, camera=camera, matrix=matrix, distortion=np.array(camera.distortion))
+
+
+def _on_floor(tag: MapTag) -> Floats:
+    pose = Pose2(tag.x_m, tag.y_m, tag.yaw_rad)
+    return np.array([(*pose.apply(x, y), 0.0) for x, y in tag_corners(tag.size_m)])
+
+
+def _lifted(places: Floats, height: float) -> Floats:
+    return np.concatenate((places, np.full((*places.shape[:-1], 1), height)), axis=-1)

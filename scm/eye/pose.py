@@ -3,82 +3,176 @@
 The roof's height is known, so nothing has to be guessed from the tag's few pixels in depth: the
 rays of the four corners are cut with the level plane at that height, and a square of the tag's size
 is laid onto the four points by least squares. The rear axle is then the tag's offset away, behind
-it along the car's own axis.
+it along the car's own axis. So a camera may be tilted, and a square cannot be taken for its mirror
+image as in a free perspective-n-point solution.
 
     yaw = atan2(sum c x q, sum c . q)      c: corners of the tag, q: points on the plane, middle off
     axle = middle - R(yaw) offset
 
-The covariance is carried through by differences: doubt of the corners, doubt of the camera's place
-(shared by all cars of a frame), and the lean of the body, which moves the roof but cannot be seen.
+The covariance is carried through: doubt of the corners, doubt of the camera's place and lens
+(shared by all cars of a frame, and by all frames), and the lean of the body, which moves the roof
+but cannot be seen. What the four points are off the square, over what corner noise explains, is the
+misfit. One corner that spoils an else good square is left out; a misfit that stays widens the
+doubt; beyond `REFUSED` it is no tag of this size on this roof.
 """
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from scm.arrays import Floats
-from scm.eye.anchor import STEPS, Anchor
+from scm.arrays import Floats, Ints
+from scm.eye.anchor import Anchor, by_place
 from scm.eye.camera import CameraModel
 from scm.geometry import Pose2, wrap_angle
 from scm.scenery.bodies import CarBody
-from scm.scenery.tags import tag_corners
+from scm.scenery.tags import CORNERS
 
 LEAN_RAD = 0.003
 """Standard deviation of roll and of pitch that a scaled car is trusted to stay within."""
-PROBE_PX = 0.01
+MISFIT = 2.0
+"""Deviations, root mean square, that corner noise passes once in 1000 squares."""
+REFUSED = 20.0
+CLEARLY = 3.0
+"""A corner is to blame if the square without it fits so many times better than without others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseEstimate:
-    """Pose of the rear axle in the map frame, and covariance over x, y, yaw, (3, 3)."""
+    """Pose of the rear axle in the map frame, and covariance over x, y, yaw, (3, 3).
+
+    Attributes:
+        shared: The part of it that all sightings by this camera have in common, (3, 3).
+        lean: The part of it that all cameras have in common while the body leans so, (3, 3).
+        misfit: How far the corners are from a square, over the noise of corners: about 1.
+    """
 
     pose: Pose2
     covariance: Floats
+    shared: Floats
+    lean: Floats
+    misfit: float
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether these corners are no square of this size."""
+        return not self.misfit < REFUSED
 
 
 def car_pose(anchor: Anchor, body: CarBody, corners: Floats) -> PoseEstimate:
     """Return where the car is whose roof tag has these corners, (4, 2) [px]."""
-    model = anchor.model
-    ideal = model.undistort(corners)[None]
-    x, y, yaw = (float(value) for value in _fit(model, body, ideal)[0])
-    by_corner = _by_corner(model, body, corners)
-    by_camera = _by_camera(anchor, body, ideal)
-    covariance = anchor.corner_std_px**2 * by_corner @ by_corner.T
-    covariance += by_camera @ anchor.covariance @ by_camera.T
-    covariance[[0, 1], [0, 1]] += (body.tag_position[2] * LEAN_RAD) ** 2
-    return PoseEstimate(Pose2(x, y, wrap_angle(yaw)), (covariance + covariance.T) / 2.0)
+    return car_poses(anchor, [body], corners[None])[0]
 
 
-def _fit(model: CameraModel, body: CarBody, ideal: Floats) -> Floats:
-    """Return x, y, yaw of the rear axle for sets of undistorted corners, (n, 4, 2) to (n, 3)."""
-    x, y, height = body.tag_position
-    points = model.on_plane(ideal, height)
-    middle = points.mean(axis=1)
-    spread = points - middle[:, None]
-    square = tag_corners(body.tag_size)
-    turned = square[:, 0] * spread[..., 1] - square[:, 1] * spread[..., 0]
-    yaw = np.arctan2(turned.sum(axis=1), (square * spread).sum(axis=(1, 2)))
+def car_poses(
+    anchor: Anchor, bodies: Sequence[CarBody], corners: Floats
+) -> tuple[PoseEstimate, ...]:
+    """Return where the cars of a frame are, whose roof tags have these corners, (n, 4, 2) [px]."""
+    if not bodies:
+        return ()
+    model, std = anchor.model, anchor.corner_std_px
+    offsets = np.array([body.tag_position for body in bodies])
+    square = CORNERS * np.array([body.tag_size for body in bodies])[:, None, None]
+    points = _on_roofs(model, model.undistort(corners), offsets[:, 2])
+    by_metre = by_place(model, points)
+    by_pixel = np.linalg.inv(by_metre)
+    fit = _patched(_Square(points[..., :2], by_metre, square, offsets[:, :2], std))
+    by_corner = np.einsum("nkij,nijp->nkip", fit.slopes, by_pixel).reshape(-1, 3, 8)
+    widened = std * np.maximum(1.0, fit.misfit / MISFIT)
+    by_corner *= widened[:, None, None]
+    moved = -by_pixel @ anchor.by_parameter(points)
+    by_camera = np.einsum("nkij,nijp->nkp", fit.slopes, moved)
+    shared = by_camera @ anchor.covariance @ by_camera.swapaxes(1, 2)
+    lean = np.zeros((len(bodies), 3, 3))
+    lean[:, [0, 1], [0, 1]] = ((offsets[:, 2] * LEAN_RAD) ** 2)[:, None]
+    covariance = by_corner @ by_corner.swapaxes(1, 2) + shared + lean
+    covariance = (covariance + covariance.swapaxes(1, 2)) / 2.0
+    return tuple(
+        PoseEstimate(Pose2(float(x), float(y), wrap_angle(float(yaw))), *rest)
+        for (x, y, yaw), *rest in zip(
+            fit.poses, covariance, shared, lean, fit.misfit.tolist(), strict=True
+        )
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Square:
+    """What squares are laid onto.
+
+    Attributes:
+        points: On the level plane, (n, 4, 2) [m].
+        by_metre: Change of pixels by a step of these, (n, 4, 2, 2).
+        square: Corners of the tags in their own frames, (n, 4, 2) [m].
+        offsets: Of the tags before and left of the rear axle, (n, 2) [m].
+        std: Of a corner coordinate [px].
+    """
+
+    points: Floats
+    by_metre: Floats
+    square: Floats
+    offsets: Floats
+    std: float
+
+    def of(self, cars: Ints) -> "_Square":
+        """Return some of them."""
+        found = self.points[cars], self.by_metre[cars], self.square[cars], self.offsets[cars]
+        return _Square(*found, self.std)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """Poses (n, 3) of rear axles, their change by each point (n, 3, 4, 2), and misfits (n,)."""
+
+    poses: Floats
+    slopes: Floats
+    misfit: Floats
+
+
+def _patched(on: _Square) -> _Fit:
+    """Return the fits, each without the one corner that spoils it, if there is such a one."""
+    fit = _fitted(on, np.ones(4))
+    bad = np.flatnonzero(fit.misfit > MISFIT)
+    if not len(bad):
+        return fit
+    without = [_fitted(on.of(bad), weights) for weights in 1.0 - np.eye(4)]
+    misfits = np.array([one.misfit for one in without])
+    best, second = np.sort(misfits, axis=0)[:2]
+    for index in np.flatnonzero((best < MISFIT) & (second > CLEARLY * best)):
+        car, one = bad[index], without[int(misfits[:, index].argmin())]
+        fit.poses[car], fit.slopes[car] = one.poses[index], one.slopes[index]
+        fit.misfit[car] = one.misfit[index]
+    return fit
+
+
+def _fitted(on: _Square, weights: Floats) -> _Fit:
+    """Lay the squares onto their points, each corner counting as its weight says, (4,)."""
+    share = weights / weights.sum()
+    centre = np.einsum("i,nij->nj", share, on.square)
+    middle = np.einsum("i,nij->nj", share, on.points)
+    spokes = on.square - centre[:, None]
+    spread = on.points - middle[:, None]
+    heavy = weights[:, None] * spokes
+    across = np.stack((-heavy[..., 1], heavy[..., 0]), axis=-1)
+    sine, cosine = (across * spread).sum((1, 2)), (heavy * spread).sum((1, 2))
+    yaw = np.arctan2(sine, cosine)
     c, s = np.cos(yaw), np.sin(yaw)
-    return np.column_stack((middle[:, 0] - c * x + s * y, middle[:, 1] - s * x - c * y, yaw))
+    turn = np.stack((np.stack((c, -s), axis=-1), np.stack((s, c), axis=-1)), axis=1)
+    to_axle = (turn @ (centre + on.offsets)[..., None])[..., 0]
+    poses = np.column_stack((middle - to_axle, yaw))
+    size = (sine**2 + cosine**2)[:, None, None]
+    by_yaw = (cosine[:, None, None] * across - sine[:, None, None] * heavy) / size
+    sideways = np.stack((-to_axle[:, 1], to_axle[:, 0]), axis=-1)
+    place = np.eye(2)[None, :, None, :] * share[None, None, :, None]
+    place = place - sideways[:, :, None, None] * by_yaw[:, None]
+    slopes = np.concatenate((place, by_yaw[:, None]), axis=1)
+    off = on.by_metre @ (spread - spokes @ turn.swapaxes(1, 2))[..., None]
+    squared = np.einsum("i,nijk->n", weights, off**2) / (2.0 * weights.sum() - 3.0)
+    return _Fit(poses, slopes, np.sqrt(squared) / on.std)
 
 
-def _by_corner(model: CameraModel, body: CarBody, corners: Floats) -> Floats:
-    """Return the change of the pose by each corner coordinate, (3, 8)."""
-    probes = (np.eye(8) * PROBE_PX).reshape(8, 4, 2)
-    ideal = model.undistort(np.concatenate((corners + probes, corners - probes)))
-    both = _fit(model, body, ideal)
-    return _difference(both[:8], both[8:]).T / (2.0 * PROBE_PX)
-
-
-def _by_camera(anchor: Anchor, body: CarBody, ideal: Floats) -> Floats:
-    """Return the change of the pose by each of the camera's extrinsics, (3, 6)."""
-    ups = np.concatenate([_fit(up, body, ideal) for up, _ in anchor.probes])
-    downs = np.concatenate([_fit(down, body, ideal) for _, down in anchor.probes])
-    return _difference(ups, downs).T / (2.0 * STEPS)
-
-
-def _difference(up: Floats, down: Floats) -> Floats:
-    found = up - down
-    found[:, 2] = np.remainder(found[:, 2] + math.pi, 2.0 * math.pi) - math.pi
-    return found
+def _on_roofs(model: CameraModel, ideal: Floats, heights: Floats) -> Floats:
+    """Return where rays (n, 4, 2) meet the levels of n roofs, (n, 4, 3) [m]."""
+    rays = np.concatenate((ideal, np.ones((*ideal.shape[:-1], 1))), axis=-1) @ model.camera_R_map
+    reach = (heights - model.position[2])[:, None, None] / rays[..., 2:]
+    met: Floats = model.position + reach * rays
+    return met
