@@ -1,13 +1,18 @@
-"""The contract of a source of frames: a camera, a file, or the emulated overhead camera."""
+"""The contract of a source of frames: a camera, a file, the bus or the emulated camera."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import cv2
 import numpy as np
 
 from scm.arrays import Image
+from scm.part import Hears
+from scm.v2x.exchange import Incoming
 from scm.v2x.messages.world_snapshot import WorldSnapshot
+
+Stamped = Literal["exposed", "arrived"]
 
 
 def grey_of(image: Image) -> Image:
@@ -22,12 +27,14 @@ class Frame:
     """One picture.
 
     Attributes:
-        t_ns: When it was exposed.
+        t_ns: When it was exposed, as well as the source knows.
         image: (height, width, 3) blue, green, red, or (height, width) grey.
+        stamped: What `t_ns` rests on: the camera's own time stamp, or only when the frame arrived.
     """
 
     t_ns: int
     image: Image
+    stamped: Stamped = "exposed"
 
     def grey(self) -> Image:
         """Return it in grey, (height, width)."""
@@ -35,13 +42,42 @@ class Frame:
 
 
 class Source(Protocol):
-    """Where frames come from."""
+    """Where frames come from.
+
+    What cannot work at all is refused when a source is made. From the first `take` on nothing is
+    raised any more: a source says its trouble and comes back by itself.
+    """
+
+    @property
+    def trouble(self) -> str | None:
+        """What is wrong now, in words for a person; None: nothing."""
+        ...
 
     def take(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
-        """Return the newest frame not yet taken, None if there is none.
+        """Return the newest frame not yet taken, None if there is none; times ascend.
+
+        It does not wait for a camera.
 
         Args:
             now_ns: The present time.
             light: What there is to see, for a source that has no lens of its own.
         """
+        ...
+
+    def close(self) -> None:
+        """Let go of the camera or file; safe to call twice. Nothing can be taken any more."""
+        ...
+
+
+@runtime_checkable
+class Listener(Source, Protocol):
+    """A source whose frames come over the bus: its part hears for it."""
+
+    @property
+    def hears(self) -> Sequence[Hears]:
+        """What the part must hear besides."""
+        ...
+
+    def hear(self, item: Incoming) -> None:
+        """Look at one thing of the part's inbox; what is not for this source is left alone."""
         ...

@@ -5,56 +5,112 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from scm.clock import NS_PER_S
+from scm.arrays import Image
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import EyeError
 from scm.eye.picture import read_picture
-from scm.eye.source import Frame
-from scm.v2x.messages.world_snapshot import WorldSnapshot
-
-STILLS = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff")
+from scm.eye.sources.folder import STILLS, FolderReel
+from scm.eye.sources.player import Player, Reel
 
 
-class FileSource:
-    """Plays a file once: a film's frames are exposed at its own rate from the first `take` on.
+class FileSource(Player):
+    """Plays a file: a film's frames are exposed by its own time stamps from the first `take` on.
 
     Args:
         path: Any picture or film that OpenCV reads; a picture is one frame.
+        loop: Begin again when it is over, time going on.
 
     Raises:
         EyeError: The file is missing, cut short or cannot be read.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, path: Path, loop: bool = False) -> None:
         if not path.is_file():
             raise EyeError(f"{path}: expected a picture or film, found no file")
-        self._still = read_picture(path) if path.suffix.lower() in STILLS else None
-        self._film = None if self._still is not None else cv2.VideoCapture(str(path))
-        self._rate_hz = self._film.get(cv2.CAP_PROP_FPS) if self._film is not None else 1.0
-        if self._film is not None and (not self._film.isOpened() or self._rate_hz <= 0.0):
+        super().__init__(str(path), _reel(path), loop)
+
+
+def _reel(path: Path) -> Reel:
+    if path.suffix.lower() not in STILLS:
+        return FilmReel(path)
+    read_picture(path)
+    return FolderReel([path], [0])
+
+
+class FilmReel:
+    """A film, one frame read ahead: its time is known only then.
+
+    Args:
+        path: Any film that OpenCV reads.
+
+    Raises:
+        EyeError: It cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._film = cv2.VideoCapture(str(path))
+        rate_hz = self._film.get(cv2.CAP_PROP_FPS)
+        self._period_ns = round(NS_PER_S / rate_hz) if rate_hz > 0.0 else 0
+        self._first_ns = 0
+        self._last_ns = 0
+        self._next_ns = self._ahead(None)
+        if self._next_ns is None or self._period_ns == 0:
+            self._film.release()
             raise EyeError(f"{path}: expected a picture or film that OpenCV reads")
-        self._started_ns: int | None = None
-        self._played = 0
 
-    def take(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
-        """Return the film's frame that is due, leaving out those already late; None when over."""
-        del light
-        if self._started_ns is None:
-            self._started_ns = now_ns
-        if self._film is None:
-            return self._take_still(now_ns)
-        due = int((now_ns - self._started_ns) * self._rate_hz // NS_PER_S)
-        if self._played > due:
-            return None
-        while self._played < due and self._film.grab():
-            self._played += 1
-        good, image = self._film.read()
-        exposed_ns = self._started_ns + round(self._played * NS_PER_S / self._rate_hz)
-        self._played += 1
-        return Frame(exposed_ns, np.asarray(image, dtype=np.uint8)) if good else None
+    def next_ns(self) -> int | None:
+        """Return the time of the next frame [ns], None at the end."""
+        return self._next_ns
 
-    def _take_still(self, now_ns: int) -> Frame | None:
-        if self._still is None or self._played:
+    def following_ns(self) -> int | None:
+        """Return when the frame after the next is due [ns], by the film's rate."""
+        return None if self._next_ns is None else self._next_ns + self._period_ns
+
+    def skip(self) -> None:
+        """Leave the next frame out."""
+        self._next_ns = self._ahead(self._next_ns)
+
+    def show(self) -> Image:
+        """Return the next frame; raises an `EyeError` where it cannot be decoded."""
+        try:
+            good, image = self._film.retrieve()
+        except cv2.error:
+            good, image = False, None
+        self._next_ns = self._ahead(self._next_ns)
+        if not good or image is None:
+            raise EyeError(f"{self._path}: a frame that cannot be decoded")
+        return np.asarray(image, dtype=np.uint8)
+
+    def rewind(self) -> int:
+        """Go back to the first frame; return how long after the first one this was [ns]."""
+        length_ns = self._last_ns + self._period_ns
+        self._film.release()
+        self._film = cv2.VideoCapture(str(self._path))
+        self._next_ns = self._ahead(None)
+        return length_ns
+
+    def close(self) -> None:
+        """Close the file."""
+        self._film.release()
+
+    def _ahead(self, before_ns: int | None) -> int | None:
+        """Read one frame and return its time [ns]; where times do not ascend, by the film's rate.
+
+        Args:
+            before_ns: The time of the frame before, None if this is the first.
+        """
+        try:
+            good = self._film.grab()
+        except cv2.error:
+            good = False
+        if not good:
             return None
-        self._played = 1
-        return Frame(now_ns, self._still)
+        t_ns = round(self._film.get(cv2.CAP_PROP_POS_MSEC) * NS_PER_MS)
+        if before_ns is None:
+            self._first_ns = t_ns
+        t_ns -= self._first_ns
+        if before_ns is not None and t_ns <= before_ns:
+            t_ns = before_ns + self._period_ns
+        self._last_ns = t_ns
+        return t_ns
