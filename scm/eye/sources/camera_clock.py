@@ -1,0 +1,101 @@
+"""A camera's own time stamps on our clock, by the least delay seen.
+
+A frame that was exposed at `stamp` on the camera's clock arrives at `arrival` on ours. Their
+difference is the clocks' offset and the frame's delay together; delays vary, the offset hardly
+does, so the least difference lately seen is taken as the offset. The least delay itself cannot be
+told from it and stays in: frames seem that much younger than they are.
+
+Clocks drift: the least differences of 5 s each, over 5 minutes, give the slope (Theil and Sen's
+median of all slopes, deaf to a few slow spans). Used after a minute, when it beats the jitter.
+"""
+
+from collections import deque
+
+import numpy as np
+
+from scm.clock import NS_PER_S, seconds
+
+SPAN_NS = 5 * NS_PER_S
+SPANS, SPANS_RECENT, SPANS_LEAST = 60, 6, 12
+JUMP_NS = NS_PER_S // 2
+LATE_NS = NS_PER_S // 2
+DRIFT_LARGEST = 1e-3
+DRIFT_ODD = 2e-4
+HOLD_NS = 2 * NS_PER_S
+
+
+class CameraClock:
+    """The mapping of one camera's clock, from when it was opened on.
+
+    Attributes:
+        drift: How much slower than ours the camera's clock runs, a share; 0 until known.
+    """
+
+    def __init__(self) -> None:
+        self.drift = 0.0
+        self._spans: deque[tuple[int, int]] = deque(maxlen=SPANS)
+        self._span = 0
+        self._stamp_ns: int | None = None
+        self._late_ns = 0
+        self._jump: tuple[int, str] | None = None
+
+    def exposed(self, stamp_ns: int, arrival_ns: int) -> int | None:
+        """Return when a frame was exposed [ns, our clock], at most its arrival.
+
+        None: it has the stamp of the frame before, so it is the same frame.
+        """
+        last_ns, self._stamp_ns = self._stamp_ns, stamp_ns
+        if stamp_ns == last_ns:
+            return None
+        difference_ns = arrival_ns - stamp_ns
+        if last_ns is not None and stamp_ns < last_ns:
+            back_s = seconds(last_ns - stamp_ns)
+            self._restart(arrival_ns, f"the camera's clock went back by {back_s:.3g} s")
+        elif self._spans and difference_ns < self._offset_ns(arrival_ns) - JUMP_NS:
+            ahead_s = seconds(self._offset_ns(arrival_ns) - difference_ns)
+            self._restart(arrival_ns, f"the camera's clock jumped ahead by {ahead_s:.3g} s")
+        self._note(arrival_ns, difference_ns)
+        exposed_ns = min(stamp_ns + self._offset_ns(arrival_ns), arrival_ns)
+        self._late_ns = arrival_ns - exposed_ns
+        return exposed_ns
+
+    def trouble(self, now_ns: int) -> list[str]:
+        """Return what is wrong with the camera's time stamps, in words."""
+        said = []
+        if self._jump is not None and now_ns - self._jump[0] < HOLD_NS:
+            said.append(self._jump[1])
+        if self._late_ns > LATE_NS:
+            said.append(f"frames come {seconds(self._late_ns):.1f} s later than the quickest")
+        if abs(self.drift) > DRIFT_ODD:
+            how = "slow" if self.drift > 0.0 else "fast"
+            said.append(f"the camera's clock runs {abs(self.drift) * 1e6:.0f} ppm {how}")
+        return said
+
+    def _restart(self, now_ns: int, said: str) -> None:
+        self._spans.clear()
+        self.drift = 0.0
+        self._jump = (now_ns, said)
+
+    def _note(self, arrival_ns: int, difference_ns: int) -> None:
+        """Keep the least difference of each span of time."""
+        span = arrival_ns // SPAN_NS
+        if not self._spans or span != self._span:
+            self._span = span
+            self.drift = self._slope()
+            self._spans.append((arrival_ns, difference_ns))
+        elif difference_ns < self._spans[-1][1]:
+            self._spans[-1] = (arrival_ns, difference_ns)
+
+    def _slope(self) -> float:
+        if len(self._spans) < SPANS_LEAST:
+            return 0.0
+        first_ns, first_difference_ns = self._spans[0]
+        t = np.array([t_ns - first_ns for t_ns, _ in self._spans], dtype=float)
+        d = np.array([d_ns - first_difference_ns for _, d_ns in self._spans], dtype=float)
+        i, j = np.triu_indices(len(t), 1)
+        slope = float(np.median((d[j] - d[i]) / (t[j] - t[i])))
+        return min(max(slope, -DRIFT_LARGEST), DRIFT_LARGEST)
+
+    def _offset_ns(self, now_ns: int) -> int:
+        recent = list(self._spans)[-SPANS_RECENT:]
+        return min(d_ns + round(self.drift * (now_ns - t_ns)) for t_ns, d_ns in recent)
