@@ -16,11 +16,15 @@ def read_picture(path: Path) -> Image:
     """Return a picture file, (height, width, 3) blue, green, red.
 
     Raises:
-        EyeError: The file is missing, no picture, cut short or smaller than any tag.
+        EyeError: The file is missing, unreadable, no picture, cut short or smaller than any tag.
     """
     if not path.is_file():
         raise EyeError(f"{path}: expected a picture, found no file")
-    return decode_picture(path.read_bytes(), str(path))
+    try:
+        data = path.read_bytes()
+    except OSError as cause:
+        raise EyeError(f"{path}: expected a picture, got {cause.strerror}") from cause
+    return decode_picture(data, str(path))
 
 
 def decode_picture(data: bytes, name: str) -> Image:
@@ -36,11 +40,21 @@ def decode_picture(data: bytes, name: str) -> Image:
     # OpenCV fills what is missing of a JPEG with grey, and says so on stderr at most
     if data.startswith(_JPEG) and data.rfind(_END) < data.rfind(_SCAN):
         raise EyeError(f"{name}: expected a whole JPEG, got one cut short after {len(data)} bytes")
-    image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR) if data else None
+    image = _decoded(data)
     if image is None:
         raise EyeError(f"{name}: expected a picture that OpenCV reads, got {len(data)} bytes")
     height, width = image.shape[:2]
     if min(height, width) < LEAST_PX:
         least = f"{LEAST_PX} x {LEAST_PX}"
         raise EyeError(f"{name}: expected at least {least} px, got {width} x {height}")
-    return np.asarray(image, dtype=np.uint8)
+    return image
+
+
+def _decoded(data: bytes) -> Image | None:
+    if not data:
+        return None
+    try:
+        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error:  # its header claims more pixels than OpenCV makes room for
+        return None
+    return None if image is None else np.asarray(image, dtype=np.uint8)

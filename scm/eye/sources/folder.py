@@ -74,10 +74,7 @@ class FolderReel:
     def show(self) -> Image:
         """Return the next picture; raises an `EyeError` where it cannot be read."""
         self._at += 1
-        try:
-            return read_picture(self._files[self._at - 1])
-        except OSError as cause:
-            raise EyeError(f"{self._files[self._at - 1]}: {cause.strerror}") from cause
+        return read_picture(self._files[self._at - 1])
 
     def rewind(self) -> int:
         """Go back to the first picture; return how long after the first one this was [ns]."""

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from scm.clock import NS_PER_S, Clock, WallClock, nanoseconds
+from scm.clock import Clock, WallClock, nanoseconds
 from scm.eye.source import Frame
 from scm.eye.sources.capture import Capture, DamagedFrameError
 from scm.eye.sources.watch import Tally, Watch
@@ -16,7 +16,6 @@ from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 PAUSES_S = (0.5, 5.0)
 CLOSE_S = 3.5
-SLACK_NS = NS_PER_S // 10
 
 
 class LiveSource:
@@ -103,8 +102,7 @@ class LiveSource:
 
     def _follow(self, lead_ns: int) -> None:
         """Learn how far the caller's clock is ahead of ours: he read his before he called."""
-        last_ns = self._lead_ns
-        if last_ns is None or lead_ns > last_ns or lead_ns < last_ns - SLACK_NS:
+        if self._lead_ns is None or lead_ns > self._lead_ns:
             self._lead_ns = lead_ns
 
     def _run(self) -> None:

@@ -1,5 +1,8 @@
 """Frames over the bus: only the newest counts, damaged ones are counted, clocks are minded."""
 
+import struct
+import zlib
+
 import cv2
 import numpy as np
 import pytest
@@ -19,6 +22,13 @@ NOW_NS = 1000 * NS_PER_S
 def jpeg(number=0):
     image = np.random.default_rng(number).integers(40, 200, (48, 64, 3), dtype=np.uint8)
     return cv2.imencode(".jpg", image)[1].tobytes()
+
+
+def png_of(width, height):
+    """Return the beginning of a PNG that claims a size."""
+    head = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    size, check = struct.pack(">I", 13), struct.pack(">I", zlib.crc32(head))
+    return b"\x89PNG\r\n\x1a\n" + size + head + check
 
 
 def arrive(source, arrival_ns, t_ns, payload=None, camera="roof", shares_clock=True):
@@ -58,8 +68,8 @@ def test_only_the_newest_counts_and_another_camera_is_not_ours():
     assert (source.tally.good, source.tally.passed_over) == (1, 1)
 
 
-@pytest.mark.parametrize("payload", [b"", b"\xff\xd8\xff", jpeg()[:-30]])
-def test_a_picture_cut_short_is_counted_and_said_and_the_next_one_is_good(payload):
+@pytest.mark.parametrize("payload", [b"", b"\xff\xd8\xff", jpeg()[:-30], png_of(60_000, 60_000)])
+def test_a_damaged_picture_is_counted_and_said_and_the_next_one_is_good(payload):
     source = BusSource("roof")
     arrive(source, NOW_NS, NOW_NS, payload)
     assert source.take(NOW_NS, None) is None

@@ -33,6 +33,8 @@ class FakeCamera:
         self.opened = 0
         self.closed = 0
         self.stopped = threading.Event()
+        self.may_send = threading.Event()
+        self.may_send.set()
         self.count = 0
 
     def open(self):
@@ -52,6 +54,7 @@ class FakeCamera:
             raise EyeError("interrupted")
         if self.event == "gone":
             raise EyeError("it gives no frames any more")
+        assert self.may_send.wait(DEADLINE_S)
         time.sleep(0.0005)
 
     def fetch(self):
@@ -106,6 +109,13 @@ def until(condition, source=None):
     return frames
 
 
+def begin(source, camera, ahead_ns=0):
+    """Make the first `take`, which begins all, before the camera sends anything."""
+    camera.may_send.clear()
+    assert source.take(WallClock().now_ns() + ahead_ns, None) is None
+    camera.may_send.set()
+
+
 def test_nothing_is_opened_before_the_first_take(live):
     camera = FakeCamera(["unstamped"])
     source = live(camera)
@@ -127,7 +137,7 @@ def test_take_never_waits_for_a_camera_that_stalls_and_close_ends_it(live):
 def test_a_slow_consumer_gets_the_newest_frame_and_the_others_are_counted(live):
     camera = FakeCamera([*["unstamped"] * 9, "stall"])
     source = live(camera)
-    source.take(WallClock().now_ns(), None)
+    begin(source, camera)
     until(lambda: source.tally.good == 9)
     frame = source.take(WallClock().now_ns(), None)
     np.testing.assert_array_equal(frame.image, picture(9))
@@ -191,11 +201,23 @@ def test_frames_are_on_the_callers_clock_whatever_ours_says(live):
     camera = FakeCamera(["unstamped", "stall"])
     source = live(camera)
     ahead_ns = 5000 * NS_PER_S
-    source.take(WallClock().now_ns() + ahead_ns, None)
+    begin(source, camera, ahead_ns)
     until(lambda: source.tally.good == 1)
     arrived_ns = source._newest.t_ns
     frame = source.take(WallClock().now_ns() + ahead_ns, None)
     assert frame.t_ns - arrived_ns == pytest.approx(ahead_ns, abs=50 * NS_PER_MS)
+
+
+def test_a_caller_that_is_slow_to_call_does_not_move_frames(live):
+    camera = FakeCamera(["unstamped", "stall"])
+    source = live(camera)
+    begin(source, camera)
+    until(lambda: source.tally.good == 1)
+    arrived_ns = source._newest.t_ns
+    late_ns = WallClock().now_ns() + NS_PER_S // 5
+    until(lambda: WallClock().now_ns() > late_ns)
+    frame = source.take(late_ns - NS_PER_S // 5, None)
+    assert frame.t_ns == pytest.approx(arrived_ns, abs=50 * NS_PER_MS)
 
 
 EVENTS = st.sampled_from(
