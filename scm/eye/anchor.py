@@ -124,6 +124,11 @@ class Anchor:
         """All tags of the map."""
         return (self.tags,) if isinstance(self.tags, MapTag) else self.tags
 
+    @property
+    def is_knocked(self) -> bool:
+        """Whether the tags are further from the calibration than its tolerance explains."""
+        return self._knocked
+
     def see(self, seen: Mapping[int, Floats] | Floats | None, t_ns: int) -> None:
         """Take the corners of the map's tags in a frame, (4, 2) [px] by tag id.
 

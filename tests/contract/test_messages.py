@@ -47,7 +47,7 @@ UNITS = tuple(
         *("id", "number"),
     )
 )
-ETSI = ("scm.v2x.etsi",)
+ETSI = ("scm.v2x.etsi", "scm.v2x.etsi_cpm")
 
 
 def message_classes():

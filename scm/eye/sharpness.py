@@ -1,0 +1,52 @@
+"""How sharp a tag is: the width of the step from its black square to its white margin."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from scm.arrays import Floats, Image
+
+ALONG = np.linspace(0.2, 0.8, 12)
+REACH = 0.11
+"""How far to either side is looked, in sides of the tag: a little less than one of its cells."""
+SAMPLES = 41
+
+
+class EdgeWidth(NamedTuple):
+    """Width of the step from 20 % to 80 % of it [px], and its height [grey levels]."""
+
+    px: float
+    contrast: float
+
+
+def edge_width(grey: Image, corners: Floats) -> EdgeWidth:
+    """Measure a tag's four outer edges in a grey frame; corners (4, 2) [px].
+
+    An edge with no step in it, or out of the frame, counts as wide as what was looked at.
+    """
+    ends = np.roll(corners, -1, axis=0)
+    along = ends - corners
+    side = float(np.hypot(*along.T).mean())
+    outward = corners + along / 2.0 - corners.mean(axis=0)
+    outward /= np.maximum(np.hypot(*outward.T), 1e-9)[:, None]
+    steps = np.linspace(-REACH * side, REACH * side, SAMPLES)
+    feet = corners[:, None] + along[:, None] * ALONG[:, None]
+    at = feet[:, :, None] + steps[:, None] * outward[:, None, None]
+    flat = at.reshape(4, -1, 2).astype(np.float32)
+    values = cv2.remap(grey, flat[..., 0], flat[..., 1], cv2.INTER_LINEAR)
+    profiles = values.reshape(4, len(ALONG), SAMPLES).mean(axis=1)
+    few = SAMPLES // 8
+    low, high = profiles[:, :few].mean(axis=1), profiles[:, -few:].mean(axis=1)
+    contrast = high - low
+    widths = [_rise(one, a, b, steps) for one, a, b in zip(profiles, low, high, strict=True)]
+    return EdgeWidth(float(np.median(widths)), float(np.median(contrast)))
+
+
+def _rise(profile: Floats, low: float, high: float, steps: Floats) -> float:
+    whole = float(steps[-1] - steps[0])
+    if high - low < 1.0:
+        return whole
+    share = np.maximum.accumulate((profile - low) / (high - low))
+    first, last = np.interp((0.2, 0.8), share, steps)
+    return float(last - first)

@@ -1,0 +1,131 @@
+"""Tracks as a collective perception message: what a roadside unit with cameras tells cars."""
+
+import math
+from collections.abc import Sequence
+
+from scm.clock import NS_PER_MS
+from scm.eye.track.sighting import Track
+from scm.scenery.bodies import NIGEL, CarBody
+from scm.v2x.etsi import REFERENCE_LATITUDE_DEG, REFERENCE_LONGITUDE_DEG, SCALE
+from scm.v2x.etsi_convert import station_id
+from scm.v2x.etsi_cpm import (
+    MOST_OBJECTS,
+    Altitude,
+    Angle,
+    Angles,
+    AngularVelocity,
+    CartesianVelocity,
+    Classification,
+    Coordinate,
+    CpmBody,
+    Dimension,
+    Ellipse,
+    ManagementContainer,
+    ObjectClass,
+    PerceivedObject,
+    Position,
+    ReferencePosition,
+    SensorInformation,
+    Velocity,
+    VelocityComponent,
+)
+from scm.v2x.messages.cpm_tx import CpmTx
+
+SURELY = 1.96
+"""Deviations within which 95 % lie."""
+ITS_EPOCH_MS = 1_072_915_200_000
+LEAP_MS = 5_000
+TURN_CLASSES_DEG = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+COORDINATE_MOST, COORDINATE_BEYOND = 131_071, 4095
+VELOCITY_MOST, BEYOND, TURN_MOST, LENGTH_MOST = 16_382, 126, 255, 255
+
+
+def collective_perception(
+    tracks: Sequence[Track], station: str, t_ns: int, body: CarBody = NIGEL
+) -> CpmTx:
+    """Return what a roadside unit sends of its tracks; stale and tentative ones are left out.
+
+    Args:
+        tracks: As `Tracks.at` gives them; the surest 255 of them.
+        station: Of the roadside unit, as on the bus.
+        t_ns: The reference time.
+        body: The measures of the cars.
+    """
+    told = [one for one in tracks if not one.stale and "tentative" not in one.flags]
+    told = sorted(told, key=lambda one: one.age_s)[:MOST_OBJECTS]
+    cameras = sorted({name for one in told for name in one.cameras})
+    sensors = tuple(SensorInformation(sensor_id=index) for index in range(len(cameras)))
+    objects = (_perceived(one, cameras, t_ns, body) for one in told)
+    container = ManagementContainer(
+        reference_time=max(0, t_ns // NS_PER_MS - ITS_EPOCH_MS + LEAP_MS),
+        reference_position=ReferencePosition(
+            latitude=round(REFERENCE_LATITUDE_DEG * 1e7),
+            longitude=round(REFERENCE_LONGITUDE_DEG * 1e7),
+            position_confidence_ellipse=Ellipse(),
+            altitude=Altitude(),
+        ),
+    )
+    filled = CpmBody(
+        station_id=station_id(station),
+        management_container=container,
+        sensor_information_container=sensors or None,
+        perceived_object_container=tuple(objects),
+    )
+    return CpmTx(station=station, t_ns=t_ns, body=filled)
+
+
+def _perceived(track: Track, cameras: list[str], t_ns: int, body: CarBody) -> PerceivedObject:
+    c, s = math.cos(track.yaw_rad), math.sin(track.yaw_rad)
+    ahead, left = sum(body.x_span) / 2.0, sum(body.y_span) / 2.0
+    std = track.covariance.diagonal() ** 0.5
+    along, across = track.speed_mps, track.lateral_speed_mps
+    speed_std = float(max(std[3], std[4]))
+    turn = math.degrees(track.yaw_rate_rad_s)
+    return PerceivedObject(
+        measurement_delta_time=_within((track.t_ns - t_ns) / NS_PER_MS, -2048, 2047),
+        object_id=track.tag_id,
+        position=Position(
+            x_coordinate=_coordinate(track.x_m + c * ahead - s * left, float(std[0])),
+            y_coordinate=_coordinate(track.y_m + s * ahead + c * left, float(std[1])),
+        ),
+        velocity=Velocity(
+            cartesian_velocity=CartesianVelocity(
+                x_velocity=_velocity(c * along - s * across, speed_std),
+                y_velocity=_velocity(s * along + c * across, speed_std),
+            )
+        ),
+        angles=Angles(
+            z_angle=Angle(
+                value=round((90.0 - math.degrees(track.yaw_rad)) * 10.0) % 3600,
+                confidence=_within(math.degrees(SURELY * std[2]) * 10.0, 1, BEYOND),
+            )
+        ),
+        z_angular_velocity=AngularVelocity(
+            value=_within(turn, -TURN_MOST, TURN_MOST),
+            confidence=sum(math.degrees(SURELY * std[5]) > most for most in TURN_CLASSES_DEG),
+        ),
+        object_dimension_x=_dimension(body.x_span),
+        object_dimension_y=_dimension(body.y_span),
+        sensor_id_list=tuple(cameras.index(name) for name in track.cameras) or None,
+        classification=(Classification(object_class=ObjectClass()),),
+    )
+
+
+def _within(value: float, low: int, high: int) -> int:
+    return max(low, min(high, round(value)))
+
+
+def _coordinate(value_m: float, std_m: float) -> Coordinate:
+    value = _within(value_m * SCALE * 100.0, -COORDINATE_MOST, COORDINATE_MOST)
+    confidence = _within(SURELY * std_m * SCALE * 100.0, 1, COORDINATE_BEYOND)
+    return Coordinate(value=value, confidence=confidence)
+
+
+def _velocity(value_mps: float, std_mps: float) -> VelocityComponent:
+    value = _within(value_mps * SCALE * 100.0, -VELOCITY_MOST, VELOCITY_MOST)
+    confidence = _within(SURELY * std_mps * SCALE * 100.0, 1, BEYOND)
+    return VelocityComponent(value=value, confidence=confidence)
+
+
+def _dimension(span: tuple[float, float]) -> Dimension:
+    return Dimension(value=_within((span[1] - span[0]) * SCALE * 10.0, 1, LENGTH_MOST))

@@ -1,0 +1,127 @@
+"""One estimate per car: sightings in, in any order; tracks out, at any time.
+
+Frames of several cameras come late and out of order. The tracks after each of the last frames are
+kept for `LATE_NS`: a frame that belongs before some of them is put there, and they are taken in
+again.
+"""
+
+from collections.abc import Iterable
+from itertools import groupby
+
+import numpy as np
+
+from scm.arrays import Bools, Floats, Ints
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.eye.track.fleet import KINDS, Fleet
+from scm.eye.track.motion import STATES
+from scm.eye.track.sighting import Sighting, Track
+from scm.eye.track.update import taken_in
+from scm.geometry import wrap_angle
+
+STALE_NS = NS_PER_S // 2
+DROPPED_NS = 5 * NS_PER_S
+LATE_NS = 100 * NS_PER_MS
+AHEAD_NS = 50 * NS_PER_MS
+"""Frames further in the future are of a clock that is wrong."""
+SURE_COUNT = 3
+OVERLAP_M = 0.05
+"""The rear axles of two cars cannot be nearer than this."""
+
+
+class Tracks:
+    """Where all cars are.
+
+    Attributes:
+        refused: How many sightings were not taken: too late, from the future, or not numbers.
+    """
+
+    def __init__(self) -> None:
+        self.refused = 0
+        self._before = Fleet()
+        self._recent: list[tuple[int, tuple[Sighting, ...], Fleet]] = []
+
+    def see(self, sightings: Iterable[Sighting], now_ns: int) -> None:
+        """Take in sightings of one or several frames, not later than `now_ns`."""
+        good = []
+        for one in sightings:
+            fit = one.t_ns <= now_ns + AHEAD_NS and np.isfinite(one.covariance).all()
+            if fit and np.isfinite(one.pose).all():
+                good.append(one)
+            else:
+                self.refused += 1
+        good.sort(key=lambda one: (one.t_ns, one.camera))
+        for (t_ns, _), frame in groupby(good, key=lambda one: (one.t_ns, one.camera)):
+            self._take(t_ns, tuple(frame))
+        self._forget(now_ns)
+
+    def at(self, t_ns: int) -> tuple[Track, ...]:
+        """Return every track as it is at a time, those out of sight included."""
+        fleet = self._fleet()
+        rows = np.flatnonzero(fleet.t_ns >= t_ns - DROPPED_NS)
+        if not len(rows):
+            return ()
+        times = np.full(len(rows), t_ns)
+        mean, covariance = fleet.predicted(rows, times)
+        covariance = covariance[:, :STATES, :STATES]
+        covariance[:, :3, :3] += fleet.lean[rows]
+        wrong = _intruders(mean, fleet.came_ns[rows])
+        return tuple(
+            _track(fleet, int(row), t_ns, mean[i], covariance[i], bool(wrong[i]))
+            for i, row in enumerate(rows)
+        )
+
+    def _fleet(self) -> Fleet:
+        return self._recent[-1][2] if self._recent else self._before
+
+    def _take(self, t_ns: int, frame: tuple[Sighting, ...]) -> None:
+        newest = self._recent[-1][0] if self._recent else t_ns
+        if t_ns < newest - LATE_NS:
+            self.refused += len(frame)
+            return
+        later = [one for one in self._recent if one[0] > t_ns]
+        del self._recent[len(self._recent) - len(later) :]
+        for then_ns, seen in [(t_ns, frame), *((one[0], one[1]) for one in later)]:
+            self._recent.append((then_ns, seen, taken_in(self._fleet(), seen)))
+
+    def _forget(self, now_ns: int) -> None:
+        """Keep what a late frame may still change, and drop cars long out of sight."""
+        if not self._recent:
+            return
+        newest, seen, fleet = self._recent[-1]
+        self._recent[-1] = newest, seen, fleet.without(now_ns - DROPPED_NS)
+        old = sum(one[0] < newest - LATE_NS for one in self._recent)
+        if old:
+            self._before = self._recent[old - 1][2]
+            del self._recent[:old]
+
+
+def _intruders(mean: Floats, came_ns: Ints) -> Bools:
+    """Return which tracks came to where another was before them, (n,)."""
+    x, y = mean[:, 0], mean[:, 1]
+    apart = np.hypot(x[:, None] - x, y[:, None] - y)
+    after = came_ns[:, None] > came_ns
+    return np.asarray(((apart < OVERLAP_M) & after).any(axis=1), dtype=np.bool_)
+
+
+def _track(
+    fleet: Fleet, row: int, t_ns: int, mean: Floats, covariance: Floats, intrudes: bool
+) -> Track:
+    age_ns = max(0, t_ns - int(fleet.t_ns[row]))
+    recent = fleet.seen_ns[row] >= fleet.t_ns[row] - STALE_NS
+    cameras = [index for index in np.flatnonzero(recent) if fleet.seen_ns[row, index]]
+    vehicle, tag_id = fleet.vehicles[row], fleet.tag_ids[row]
+    flags = {kind for kind, until in zip(KINDS, fleet.said_ns[row], strict=True) if until >= t_ns}
+    flags.update(flag for index in cameras for flag in fleet.flags[index])
+    if fleet.count[row] < SURE_COUNT:
+        flags.add("tentative")
+    if vehicle == f"tag-{tag_id}":
+        flags.add("unknown")
+    if intrudes:
+        flags.add("wrong_id")
+    x, y, yaw, speed, lateral, turn = (float(value) for value in mean[:STATES])
+    return Track(
+        vehicle=vehicle, tag_id=tag_id, t_ns=t_ns, x_m=x, y_m=y, yaw_rad=wrap_angle(yaw),
+        speed_mps=speed, lateral_speed_mps=lateral, yaw_rate_rad_s=turn, covariance=covariance,
+        age_s=age_ns / NS_PER_S, stale=age_ns > STALE_NS, flags=tuple(sorted(flags)),
+        cameras=tuple(fleet.cameras[index] for index in cameras),
+    )  # fmt: skip

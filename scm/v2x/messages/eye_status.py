@@ -1,0 +1,34 @@
+"""What an overhead camera says of itself: whether its poses can be trusted, and why not."""
+
+from typing import ClassVar
+
+import msgspec
+
+from scm.v2x.message import Message
+
+
+class Complaint(msgspec.Struct, kw_only=True, frozen=True):
+    """One thing that is wrong.
+
+    Attributes:
+        code: A short machine word: `bumped`, `focus`, `stalled`.
+        said: One sentence with numbers, for a person.
+    """
+
+    code: str
+    said: str
+
+
+class EyeStatus(Message, kw_only=True, frozen=True):
+    """The self check of one camera; `good`: nothing that spoils poses."""
+
+    KEY: ClassVar[str] = "eye/{camera}/status"
+    RATE_HZ: ClassVar[float | None] = 2.0
+
+    camera: str
+    t_ns: int
+    good: bool
+    complaints: tuple[Complaint, ...] = ()
+
+
+MESSAGE = EyeStatus
