@@ -1,0 +1,108 @@
+"""`scm eye calibrate`: measure a camera's lens with a printed board."""
+
+import argparse
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scm.command import Command
+
+if TYPE_CHECKING:  # the command line starts without what finds boards
+    from scm.maps.model import Camera
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "image", nargs="*", type=Path, metavar="IMAGE", help="pictures of the board, or one film"
+    )
+    parser.add_argument("--camera", type=int, metavar="N", help="live from this camera instead")
+    parser.add_argument("--views", type=int, default=25, help="from a live camera (%(default)s)")
+    parser.add_argument(
+        "--board", choices=("chessboard", "charuco", "tags"), default="chessboard",
+        help="what was printed (%(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--squares", type=_squares, required=True, metavar="9x6",
+        help="squares (not inner corners) across and down; or tags",
+    )  # fmt: skip
+    parser.add_argument(
+        "--square-m", type=float, required=True, metavar="M",
+        help="edge of a square; of tags from middle to middle",
+    )  # fmt: skip
+    parser.add_argument("--marker-m", type=float, metavar="M", help="black edge of a marker or tag")
+    parser.add_argument(
+        "--dictionary", default="DICT_4X4_50", help="markers of a ChArUco board (%(default)s)"
+    )
+    parser.add_argument(
+        "--first-id", type=int, default=0, metavar="ID", help="of the tag at the lower left"
+    )
+    parser.add_argument("--fisheye", action="store_true", help="a lens of more than about 100 deg")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="lens.toml")
+    parser.add_argument("--map", metavar="MAP", help="whose camera it is: checks the frame's size")
+    parser.add_argument("--camera-name", metavar="NAME", help="which; default: the map's first")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.errors import EyeError
+    from scm.eye.calibrate.board import Board
+    from scm.eye.calibrate.gather import from_camera, from_files
+    from scm.eye.calibrate.judge import judge
+    from scm.eye.calibrate.say import report
+    from scm.eye.calibrate.solve import solve
+    from scm.eye.calibration import calibrated
+
+    if bool(arguments.image) == (arguments.camera is not None):
+        raise EyeError("expected pictures, or a film, or --camera N, and only one of these")
+    owner = _owner(arguments)
+    columns, rows = arguments.squares
+    board = Board(
+        arguments.board, columns, rows, arguments.square_m, arguments.marker_m,
+        arguments.dictionary, arguments.first_id,
+    )  # fmt: skip
+    if arguments.camera is not None:
+        gathered = from_camera(board, arguments.camera, arguments.views, _progress)
+    else:
+        gathered = from_files(board, arguments.image, _progress)
+    solution = solve(gathered.views, gathered.size, arguments.fisheye, _progress)
+    verdict = judge(solution)
+    _progress("")
+    for line in gathered.said:
+        print(line)
+    print(report(solution, verdict))
+    if verdict.refused:
+        reasons = "".join(f"\n  {one}" for one in verdict.refused)
+        raise EyeError(f"refused, nothing written: these views do not tell the lens{reasons}")
+    calibration = solution.calibration()
+    if owner is not None:
+        calibrated(owner, calibration)
+    calibration.save(arguments.out)
+    print(f"\nwritten to {arguments.out}")
+    return 0
+
+
+def _owner(arguments: argparse.Namespace) -> "Camera | None":
+    from scm.eye.calibrate.locate import camera_of
+    from scm.maps.load import load_map
+
+    return camera_of(load_map(arguments.map), arguments.camera_name) if arguments.map else None
+
+
+def _squares(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,3})[xX](\d{1,3})", text)
+    if found is None:
+        raise argparse.ArgumentTypeError(f"expected two numbers as 9x6, got {text!r}")
+    return int(found[1]), int(found[2])
+
+
+def _progress(text: str) -> None:
+    if sys.stderr.isatty():
+        print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+
+
+COMMAND = Command(
+    help="Measure a camera's lens with a printed board; refuses views that cannot tell it.",
+    example="scm eye calibrate shots/*.jpg --squares 10x7 --square-m 0.025 --out lens.toml",
+    arguments=_arguments,
+    run=_run,
+)

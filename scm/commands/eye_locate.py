@@ -1,0 +1,116 @@
+"""`scm eye locate`: where a camera hangs, from tags on the map."""
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scm.command import Command
+
+if TYPE_CHECKING:  # the command line starts without what finds tags
+    from scm.eye.calibrate.locate import Located, Place
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("image", type=Path, metavar="IMAGE", help="a frame of the camera")
+    parser.add_argument("--map", required=True, metavar="MAP", help="map name or file")
+    parser.add_argument(
+        "--calibration", type=Path, metavar="FILE", help="of `scm eye calibrate`; else the map's"
+    )
+    parser.add_argument("--camera", metavar="NAME", help="which of the map; default: its first")
+    parser.add_argument(
+        "--tags",
+        type=Path,
+        metavar="FILE",
+        help="more tags: [[tags]] id, x_m, y_m, yaw_rad, size_m",
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    import numpy as np
+
+    from scm.errors import EyeError
+    from scm.eye.calibrate.locate import camera_of, known_tags, locate, off_px
+    from scm.eye.calibration import calibrated, load_calibration
+    from scm.eye.detect import Settings, detect_tags
+    from scm.eye.picture import read_picture
+    from scm.eye.source import grey_of
+    from scm.maps.load import load_map
+
+    city_map = load_map(arguments.map)
+    lens = load_calibration(arguments.calibration) if arguments.calibration else None
+    if lens is not None and not city_map.cameras:
+        camera = lens.camera(arguments.camera or "overhead")
+    else:
+        camera = camera_of(city_map, arguments.camera)
+        camera = camera if lens is None else calibrated(camera, lens)
+    grey = grey_of(read_picture(arguments.image))
+    if grey.shape != (camera.height_px, camera.width_px):
+        wanted = f"{camera.width_px} x {camera.height_px} px"
+        got = f"{grey.shape[1]} x {grey.shape[0]}"
+        raise EyeError(f"{arguments.image}: camera {camera.name!r} has {wanted}, got {got}")
+    tags = known_tags(city_map, arguments.tags)
+    seen = detect_tags(grey, Settings(quad_decimate=1.0))
+    doubt = None if lens is None else lens.lens_covariance
+    located = locate(camera, tags, seen, doubt)
+    model = located.places[0].model
+    for tag in seen:
+        if tag.tag_id in tags:
+            off = off_px(model, tags[tag.tag_id], np.array(tag.corners_px))
+            left = float((off**2).sum(axis=1).mean()) ** 0.5
+            note = "  left out: not where it was said to be" * (tag.tag_id in located.wrong)
+            print(f"# tag {tag.tag_id}: {left:.3f} px off{note}")
+    print("\n".join(_said(located)))
+    if lens is None:
+        print("# the lens is taken as exact: with --calibration its doubt is in the numbers below")
+    print(_block(located.places[0]))
+    return 0
+
+
+def _said(located: "Located") -> list[str]:
+    lines = [
+        f"# solution {'AB'[i]}: {place.rms_px:.3f} px RMS left, leans "
+        f"{math.degrees(place.tilt_rad):.2f} deg, weight {place.weight:.3g}"
+        for i, place in enumerate(located.places)
+    ]
+    if len(located.places) == 1:
+        lines.append("# no other camera that looks down sees these tags so")
+    elif not located.is_sure:
+        other = located.places[1].model.camera
+        lines.append(
+            "# WARNING: the two cannot be told apart; the other is "
+            + ", ".join(
+                f"{name} = {getattr(other, name):.4f}"
+                for name in ("x_m", "y_m", "z_m", "yaw_rad", "tilt_x_rad", "tilt_y_rad")
+            )
+            + ". Lay out a second tag, far from the first (--tags)."
+        )
+    return lines
+
+
+def _block(place: "Place") -> str:
+    from scm.eye.calibrate.locate import NAMES
+
+    camera = place.model.camera
+    stated = [
+        f"{name} = {getattr(camera, name):.6f}".ljust(28) + f"# +-{deviation:.6f}"
+        for name, deviation in zip(NAMES, place.deviations, strict=True)
+    ]
+    lens = [f'lens = "{camera.lens}"'] if camera.lens != "pinhole" else []
+    numbers = [
+        f"{name} = {getattr(camera, name)!r}"
+        for name in ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px")
+    ]
+    rest = [f"{name} = {getattr(camera, name)!r}" for name in ("rate_hz", "noise_sigma")]
+    bent = f"distortion = [{', '.join(repr(value) for value in camera.distortion)}]"
+    return "\n".join(
+        ["[[cameras]]", f'name = "{camera.name}"', *stated, *numbers, *lens, bent, *rest]
+    )
+
+
+COMMAND = Command(
+    help="Where a camera hangs, from tags on the map; prints its [[cameras]] block.",
+    example="scm eye locate frame.png --map driving_school --calibration lens.toml",
+    arguments=_arguments,
+    run=_run,
+)
