@@ -1,5 +1,6 @@
 """A car from above: body, glass, lamps, turned front wheels, shadow, and the tag on its roof."""
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import cv2
@@ -42,44 +43,101 @@ def tag_on_roof(car: SnapshotVehicle, scale: float = 1.0) -> Floats:
     return corners
 
 
-def draw_car(frame: Image, model: CameraModel, scenery: Scenery, car: SnapshotVehicle) -> None:
-    """Paint one car into a frame, and over it whatever stands between it and the camera."""
+@dataclass(frozen=True, slots=True, eq=False)
+class LaidOut:
+    """A car where the lens sees it; pixels as `CameraModel.project` has them.
+
+    Attributes:
+        car: At its pose.
+        shape: Its solids in the map frame.
+        solid: Their points, (n, 2) [px].
+        shade: Outline of its shadow, (m, 2) [px].
+        tag: Corners of the roof's whole print, (4, 2) [px].
+        foot: Middle of the rear axle on the floor, (2,) [px].
+        outline: Around its wheels on the floor, (k, 2) [m].
+    """
+
+    car: SnapshotVehicle
+    shape: Shape
+    solid: Floats
+    shade: Floats
+    tag: Floats
+    foot: Floats
+    outline: Floats
+
+
+def lay_out(model: CameraModel, car: SnapshotVehicle) -> LaidOut:
+    """Return where the lens sees a car's parts."""
     rotation, origin = car_rotation(car), np.array([car.x_m, car.y_m, 0.0])
     body = car_body(car.car)
-    colour = colour_of_car(car)
-    shape = _shape(body, colour, round(car.steering_rad, 2), frozenset(car.lights))
+    shape = _shape(body, colour_of_car(car), round(car.steering_rad, 2), frozenset(car.lights))
     shape = shape.placed(rotation, origin)
-    shadow = _shadow(body) @ rotation.T + origin + _shadow_offset(body)
+    outline = _shadow(body) @ rotation.T + origin
+    shadow = outline + _shadow_offset(body)
     points = np.concatenate((shape.points, shadow, tag_on_roof(car, PRINT_SCALE), origin[None]))
     pixels = model.project(points)
     solid, shade, tag = np.split(pixels[:-1], (len(shape.points), len(points) - 5))
-    ground = Canvas(frame, pixels, scale=1, margin=SHADOW_BLUR_PX)
+    return LaidOut(car, shape, solid, shade, tag, pixels[-1], outline[:, :2])
+
+
+def draw_car(frame: Image, model: CameraModel, scenery: Scenery, car: SnapshotVehicle) -> None:
+    """Paint one car into a frame, and over it whatever stands between it and the camera."""
+    placed = lay_out(model, car)
+    canvas = paint_car(frame, placed, gain_at(scenery, placed.foot))
+    if canvas is not None:
+        hide_behind(canvas.window, canvas.corner, scenery, placed.outline, model)
+
+
+def paint_car(frame: Image, placed: LaidOut, gain: float) -> Canvas | None:
+    """Paint a car with its shadow; return the window around its solids, None if it is outside.
+
+    Args:
+        frame: (height, width, 3); changed.
+        placed: The car.
+        gain: Brightness of the light there.
+    """
+    whole = np.concatenate((placed.solid, placed.shade, placed.tag, placed.foot[None]))
+    ground = Canvas(frame, whole, scale=1, margin=SHADOW_BLUR_PX)
     if ground.is_empty:
-        return
-    _cast(ground, shade)
-    gain = round(_gain(scenery, pixels[-1]), 2)
-    canvas = Canvas(frame, np.concatenate((solid, tag)))
+        return None
+    _cast(ground, placed.shade)
+    canvas = Canvas(frame, np.concatenate((placed.solid, placed.tag)))
     if canvas.is_empty:
-        return
-    draw_shape(canvas, shape, solid, gain)
-    if body.has_tag:
-        canvas.picture(_roof_print(car.tag_id, gain), tag)
+        return None
+    draw_shape(canvas, placed.shape, placed.solid, gain)
+    if car_body(placed.car.car).has_tag:
+        canvas.picture(_roof_print(placed.car.tag_id, gain), placed.tag)
     canvas.put_back()
-    outline = (_shadow(body) @ rotation.T + origin)[:, :2]
+    return canvas
+
+
+def gain_at(scenery: Scenery, pixel: Floats) -> float:
+    """Return how bright the light is at a pixel (2,), to two digits; outside: at the edge."""
+    height, width = scenery.light.shape
+    x = min(width - 1, max(0, round(float(pixel[0]))))
+    y = min(height - 1, max(0, round(float(pixel[1]))))
+    return round(float(scenery.light[y, x]), 2)
+
+
+def hide_behind(
+    window: Image, corner: Floats, scenery: Scenery, outline: Floats, model: CameraModel
+) -> None:
+    """Put back over a car what stands between it and the camera.
+
+    Args:
+        window: Part of a frame; changed.
+        corner: Its first column and row in the frame, (2,).
+        scenery: What stands.
+        outline: Of the car on the floor, (n, 2) [m].
+        model: The camera.
+    """
     for obstacle in scenery.obstacles:
-        _hide_behind(canvas, obstacle, scenery.picture, outline, model)
+        _hide_behind(window, corner, obstacle, scenery.picture, outline, model)
 
 
 @lru_cache(maxsize=256)
 def _roof_print(tag_id: int, gain: float) -> Image:
     return printed_tag(tag_id, gain)
-
-
-def _gain(scenery: Scenery, pixel: Floats) -> float:
-    height, width = scenery.light.shape
-    x = min(width - 1, max(0, round(float(pixel[0]))))
-    y = min(height - 1, max(0, round(float(pixel[1]))))
-    return float(scenery.light[y, x])
 
 
 def _cast(canvas: Canvas, outline: Floats) -> None:
@@ -93,11 +151,15 @@ def _cast(canvas: Canvas, outline: Floats) -> None:
 
 
 def _hide_behind(
-    canvas: Canvas, obstacle: Obstacle, picture: Image, outline: Floats, model: CameraModel
+    window: Image,
+    corner: Floats,
+    obstacle: Obstacle,
+    picture: Image,
+    outline: Floats,
+    model: CameraModel,
 ) -> None:
-    """Put an obstacle back over a car of that outline (n, 2), if it stands before it."""
-    height, width = canvas.window.shape[:2]
-    x0, y0 = (int(value) for value in canvas.corner)
+    height, width = window.shape[:2]
+    x0, y0 = (int(value) for value in corner)
     ox, oy = obstacle.corner
     left, top = max(x0, ox), max(y0, oy)
     right = min(x0 + width, ox + obstacle.mask.shape[1])
@@ -105,8 +167,8 @@ def _hide_behind(
     if right <= left or bottom <= top or not obstacle.is_before(outline, model.position[:2]):
         return
     mask = obstacle.mask[top - oy : bottom - oy, left - ox : right - ox]
-    window = canvas.window[top - y0 : bottom - y0, left - x0 : right - x0]
-    window[mask] = picture[top:bottom, left:right][mask]
+    part = window[top - y0 : bottom - y0, left - x0 : right - x0]
+    part[mask] = picture[top:bottom, left:right][mask]
 
 
 @lru_cache(maxsize=64)

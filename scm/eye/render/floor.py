@@ -16,6 +16,11 @@ from scm.scenery.tags import PRINT_SCALE, tag_corners
 
 FINER = 2
 GRID_PX = 8
+STRIP_PX = 128
+AROUND_M = 3.0
+"""So much is drawn of what lies around a map's floor."""
+LEAST_FALL = 0.02
+"""Rays that sink less than this for a length of 1 ahead are not followed down to the floor."""
 LOW_M = 0.1
 """What is lower than this hides no roof."""
 
@@ -75,7 +80,7 @@ def draw_scenery(city_map: CityMap, model: CameraModel, rng: np.random.Generator
     camera = model.camera
     picture = _through_lens(city_map, model, rng)
     light = _light(camera.width_px, camera.height_px)
-    lit = np.clip(picture * light[..., None], 0.0, 255.0).astype(np.uint8)
+    lit = _lit(picture, light)
     draw_map_tag(lit, model, city_map.tag)
     far_first = sorted(_standing(city_map), key=lambda one: -_distance(one, model))
     drawn = [(_draw_obstacle(lit, model, solid), solid.top[0, 2]) for solid in far_first]
@@ -103,21 +108,43 @@ def _through_lens(city_map: CityMap, model: CameraModel, rng: np.random.Generato
     width, height = model.camera.width_px, model.camera.height_px
     columns = np.arange(-GRID_PX, width + 2 * GRID_PX, GRID_PX, dtype=np.float64)
     rows = np.arange(-GRID_PX, height + 2 * GRID_PX, GRID_PX, dtype=np.float64)
-    grid = np.stack(np.meshgrid(columns, rows), axis=-1)
-    seen = model.on_plane(model.undistort(grid), 0.0)
+    seen = _on_floor(city_map, model, np.stack(np.meshgrid(columns, rows), axis=-1))
     corner = seen.reshape(-1, 2).min(axis=0)
     extent = seen.reshape(-1, 2).max(axis=0) - corner
     sheet = FloorSheet(float(corner[0]), float(corner[1] + extent[1]), extent, rng)
     paint_floor(sheet, city_map)
     over, down = _interpolation(columns, width), _interpolation(rows, height)
-    x = (down @ seen[..., 0] @ over.T - sheet.left) * sheet.texels_per_m - 0.5
-    y = (sheet.upper - down @ seen[..., 1] @ over.T) * sheet.texels_per_m - 0.5
-    fine = cv2.remap(
-        sheet.picture, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )  # fmt: skip
-    small = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
-    return np.asarray(small, dtype=np.uint8)
+    across, along = seen[..., 0] @ over.T, seen[..., 1] @ over.T
+    picture = np.empty((height, width, 3), dtype=np.uint8)
+    for top in range(0, height, STRIP_PX):
+        part = down[top * FINER : (top + STRIP_PX) * FINER]
+        x = (part @ across - sheet.left) * sheet.texels_per_m - 0.5
+        y = (sheet.upper - part @ along) * sheet.texels_per_m - 0.5
+        fine = cv2.remap(
+            sheet.picture, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )  # fmt: skip
+        size = width, len(part) // FINER
+        picture[top : top + STRIP_PX] = cv2.resize(fine, size, interpolation=cv2.INTER_AREA)
+    return picture
+
+
+def _on_floor(city_map: CityMap, model: CameraModel, pixels: Floats) -> Floats:
+    """Return where pixels see the floor, (..., 2) [m]; what is far off or sky, at the far edge.
+
+    A tilted camera sees the floor out to its horizon: a sheet of all that would have no end.
+    """
+    ideal = model.undistort(pixels)
+    ahead = np.ones((*ideal.shape[:-1], 1))
+    down = -(np.concatenate((ideal, ahead), axis=-1) @ model.camera_R_map)[..., 2:]
+    flat = np.where(down > LEAST_FALL, model.on_plane(ideal, 0.0), np.nan)
+    away = ideal @ model.camera_R_map[:2, :2] + model.camera_R_map[2, :2]
+    seen = np.where(np.isnan(flat), model.position[:2] + 1e3 * away, flat)
+    floor = city_map.floor
+    low = np.array([floor.x_m[0], floor.y_m[0]]) - AROUND_M
+    high = np.array([floor.x_m[1], floor.y_m[1]]) + AROUND_M
+    held: Floats = np.clip(seen, low, high)
+    return held
 
 
 def _interpolation(knots: Floats, count: int) -> Floats:
@@ -129,6 +156,14 @@ def _interpolation(knots: Floats, count: int) -> Floats:
     weights[rows, left] = 1.0 - (at - left)
     weights[rows, left + 1] = at - left
     return weights
+
+
+def _lit(picture: Image, light: Floats) -> Image:
+    lit = np.empty_like(picture)
+    for top in range(0, len(picture), STRIP_PX):
+        strip = slice(top, top + STRIP_PX)
+        lit[strip] = np.clip(picture[strip] * light[strip, :, None], 0.0, 255.0).astype(np.uint8)
+    return lit
 
 
 def _light(width: int, height: int) -> Floats:
