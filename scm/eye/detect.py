@@ -9,13 +9,15 @@ changed in place.
 """
 
 import atexit
+import math
 import threading
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 import pupil_apriltags
 
-from scm.arrays import Image
+from scm.arrays import Floats, Image
 from scm.eye.picture import LEAST_PX
 from scm.v2x.messages.eye_tags import TagSeen
 
@@ -53,47 +55,87 @@ class Settings:
     min_margin: float = 15.0
 
 
-def detect_tags(grey: Image, settings: Settings | None = None) -> tuple[TagSeen, ...]:
-    """Return the tags in a grey frame (height, width), sorted by id; of twins the clearer one."""
+def detect_tags(
+    grey: Image, settings: Settings | None = None, *, twins: bool = False
+) -> tuple[TagSeen, ...]:
+    """Return the tags in a grey frame (height, width), sorted by id, the clearer of twins first.
+
+    Args:
+        grey: The frame.
+        settings: How to look.
+        twins: Whether an id seen at several places is told of each, not of the clearest alone.
+    """
     settings = settings or Settings()
+    rough = look(grey, settings, settings.quad_decimate, settings.quad_sigma)
+    if not twins:
+        rough = list({tag.tag_id: tag for tag in reversed(rough)}.values())
+    return in_order(measure_again(grey, settings, tag) for tag in rough)
+
+
+def in_order(tags: Iterable[TagSeen]) -> tuple[TagSeen, ...]:
+    """Return tags sorted by id, the clearer of twins first."""
+    return tuple(sorted(tags, key=lambda tag: (tag.tag_id, -tag.margin)))
+
+
+def look(grey: Image, settings: Settings, decimate: float, sigma: float) -> list[TagSeen]:
+    """Return what the library finds in a grey picture, clearest first, twins among them."""
     if min(grey.shape) < LEAST_PX:
-        return ()
+        return []
     with _lock:
-        rough = _look(grey, settings, settings.quad_decimate, settings.quad_sigma)
-        found = {tag_id: _measure(grey, settings, tag) for tag_id, tag in rough.items()}
-    return tuple(found[tag_id] for tag_id in sorted(found))
+        detector = _detector()
+        options = detector.tag_detector_ptr.contents
+        options.quad_decimate = decimate
+        options.quad_sigma = sigma
+        found = detector.detect(np.ascontiguousarray(grey))
+    good = [
+        one for one in found
+        if one.hamming <= settings.max_hamming and one.decision_margin >= settings.min_margin
+    ]  # fmt: skip
+    return [_seen(one) for one in sorted(good, key=lambda one: -one.decision_margin)]
 
 
-def _look(grey: Image, settings: Settings, decimate: float, sigma: float) -> dict[int, TagSeen]:
-    detector = _detector()
-    options = detector.tag_detector_ptr.contents
-    options.quad_decimate = decimate
-    options.quad_sigma = sigma
-    found = detector.detect(np.ascontiguousarray(grey))
-    best: dict[int, TagSeen] = {}
-    for one in sorted(found, key=lambda one: one.decision_margin):
-        if one.hamming <= settings.max_hamming and one.decision_margin >= settings.min_margin:
-            best[one.tag_id] = _seen(one)
-    return best
-
-
-def _measure(grey: Image, settings: Settings, rough: TagSeen) -> TagSeen:
+def measure_again(grey: Image, settings: Settings, rough: TagSeen) -> TagSeen:
     """Return a tag measured in a full-size cut-out, or as it was if it is not found there."""
-    corners = np.array(rough.corners_px)
-    margin = CUT_MARGIN * float(np.ptp(corners, axis=0).max())
-    left, top = (max(0, int(value)) for value in corners.min(axis=0) - margin)
-    right, bottom = (int(value) + 2 for value in corners.max(axis=0) + margin)
-    fine = _look(grey[top:bottom, left:right], settings, 1.0, MEASURE_SIGMA).get(rough.tag_id)
-    if fine is None:
-        return rough
-    a, b, c, d = ((x + left, y + top) for x, y in fine.corners_px)
-    x, y = fine.centre_px
+    near = look_around(grey, settings, np.array(rough.corners_px), CUT_MARGIN)
+    return next((tag for tag in near if is_same(tag, rough)), rough)
+
+
+def look_around(grey: Image, settings: Settings, corners: Floats, margin: float) -> list[TagSeen]:
+    """Return what the library finds in a full-size cut-out, clearest first.
+
+    Args:
+        grey: The frame.
+        settings: How to look.
+        corners: Around what, (4, 2) [px].
+        margin: How far around, in parts of the larger side of the corners' box.
+    """
+    reach = margin * float(np.ptp(corners, axis=0).max())
+    left, top = (max(0, int(value)) for value in corners.min(axis=0) - reach)
+    right, bottom = (max(0, int(value) + 2) for value in corners.max(axis=0) + reach)
+    cut = grey[top:bottom, left:right]
+    if cut.size == 0 or int(cut.max()) - int(cut.min()) < 2.0 * settings.min_margin:
+        return []
+    return [moved(tag, left, top) for tag in look(cut, settings, 1.0, MEASURE_SIGMA)]
+
+
+def moved(tag: TagSeen, right: float, down: float) -> TagSeen:
+    """Return a tag seen in a cut-out as one of the frame that it was cut from, so far off [px]."""
+    a, b, c, d = ((x + right, y + down) for x, y in tag.corners_px)
+    x, y = tag.centre_px
     return TagSeen(
-        tag_id=fine.tag_id,
-        centre_px=(x + left, y + top),
+        tag_id=tag.tag_id,
+        centre_px=(x + right, y + down),
         corners_px=(a, b, c, d),
-        margin=fine.margin,
+        margin=tag.margin,
     )
+
+
+def is_same(one: TagSeen, other: TagSeen) -> bool:
+    """Return whether two sightings in a frame are of one tag: its id, less than half a side off."""
+    if one.tag_id != other.tag_id:
+        return False
+    side = math.dist(one.corners_px[0], one.corners_px[2]) / math.sqrt(2.0)
+    return math.dist(one.centre_px, other.centre_px) < 0.5 * side
 
 
 def _seen(one: pupil_apriltags.Detection) -> TagSeen:

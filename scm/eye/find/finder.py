@@ -1,0 +1,217 @@
+"""Tags frame after frame: fast where they are known, and nothing new missed for long.
+
+A tag whose place is expected is measured there, without a search. The library searches one upright
+strip of the frame each time, so that the whole frame passes within `scan_frames`. The first frame
+is searched whole, and one where most tags are lost. Two tags with the same id at two places are
+both told.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import cv2
+import numpy as np
+
+from scm.arrays import Floats, Image
+from scm.eye.detect import (
+    Settings,
+    in_order,
+    is_same,
+    look,
+    look_around,
+    measure_again,
+    moved,
+)
+from scm.eye.find.codes import tag_cells
+from scm.eye.find.measure import BITS, BORDER, MARGIN, measure
+from scm.eye.picture import LEAST_PX
+from scm.scenery.tags import TAG_COUNT
+from scm.v2x.messages.eye_tags import TagSeen
+
+DECIMATED_ROWS = 1080
+"""A taller frame is searched in a picture that is smaller by as much more."""
+ENOUGH_PX = 14.0
+"""Side of a tag that is enough for the search: strips are made coarser by half at most, for it."""
+SEARCH_BLUR_PX = (3, 3)
+"""Mean taken before pixels are left out of the picture searched: a quarter of the time saved."""
+RESCUES = 6
+"""Cut-outs of lost tags that the library searches in one frame."""
+_RESCUE_MARGIN = 0.75
+_MAX_BORDER = 2
+_STRIP_OVERLAP = 1.9
+"""Columns that strips share, in sides of the largest tag: its diagonal, and a margin."""
+_USUAL_SIDE = 1.0 / 18.0
+"""Least side of a tag that strips are ready for, in heights of the frame."""
+_NOTHING: Mapping[int, Floats] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Place:
+    """Where a tag should be.
+
+    Attributes:
+        tag_id: Which.
+        corners: (4, 2) [px].
+        step: How the corners moved since the frame before, (4, 2) [px].
+        middle: Mean of the corners [px].
+        side: Of the tag [px].
+    """
+
+    tag_id: int
+    corners: Floats
+    step: Floats
+    middle: tuple[float, float]
+    side: float
+
+    def is_near(self, other: "_Place") -> bool:
+        """Return whether it is the same id, less than a side away."""
+        return self.tag_id == other.tag_id and math.dist(self.middle, other.middle) < self.side
+
+
+def _place(tag_id: int, corners: Floats, step: Floats | None = None) -> _Place:
+    (ax, ay), (bx, by), (cx, cy), (dx, dy) = corners.tolist()
+    middle = (0.25 * (ax + bx + cx + dx), 0.25 * (ay + by + cy + dy))
+    side = math.hypot(cx - ax, cy - ay) / math.sqrt(2.0)
+    return _Place(tag_id, corners, np.zeros((4, 2)) if step is None else step, middle, side)
+
+
+class TagFinder:
+    """Finds the tags of one camera's frames, given in order.
+
+    Args:
+        settings: What counts as a tag, and how fine the search is at up to 1080 rows.
+        scan_frames: Within so many frames every part of the picture is searched.
+    """
+
+    def __init__(self, settings: Settings | None = None, scan_frames: int = 8) -> None:
+        self._settings = settings or Settings()
+        self._scan_frames = max(1, scan_frames)
+        self._shape: tuple[int, ...] = ()
+        self._strip = 0
+        self._since_whole = 0
+        self._turn = 0
+        self._seen: list[_Place] = []
+
+    def find(self, grey: Image, expected: Mapping[int, Floats] = _NOTHING) -> tuple[TagSeen, ...]:
+        """Return the tags in a frame, sorted by id, the clearer of twins first.
+
+        Args:
+            grey: The frame, (height, width).
+            expected: Where known tags should be: id to corners (4, 2) [px], in the order of
+                `TagSeen.corners_px`. Up to one and a half of a tag's cells off will do. Tags seen
+                in the frame before are looked for anyway.
+        """
+        if min(grey.shape) < LEAST_PX:
+            return ()
+        frame = np.require(grey, np.uint8, ["C", "W"])
+        first = frame.shape != self._shape
+        if first:
+            self._shape, self._seen, self._since_whole = frame.shape, [], self._scan_frames
+        places = self._places(expected)
+        seen, lost = self._measured(frame, places)
+        most_lost = len(places) > 0 and 2 * len(lost) >= len(places)
+        whole = first or (most_lost and self._since_whole >= self._scan_frames)
+        rough = self._search(frame, places, whole=whole)
+        if not whole:
+            ids = {tag.tag_id for tag in seen}
+            rough += self._rescue(frame, [place for place in lost if place.tag_id not in ids])
+        for tag in rough:
+            if not any(is_same(tag, other) for other in seen):
+                seen.append(self._exact(frame, tag))
+        self._remember(seen)
+        return in_order(seen)
+
+    def _places(self, expected: Mapping[int, Floats]) -> list[_Place]:
+        known = [
+            _place(tag_id, np.asarray(corners, dtype=np.float64))
+            for tag_id, corners in expected.items()
+            if 0 <= tag_id < TAG_COUNT and np.isfinite(corners).all()
+        ]
+        for place in self._seen:
+            now = _place(place.tag_id, place.corners + place.step, place.step)
+            if not any(now.is_near(other) for other in known):
+                known.append(now)
+        return known
+
+    def _measured(self, frame: Image, places: list[_Place]) -> tuple[list[TagSeen], list[_Place]]:
+        """Return what was measured where it should be, and what was not found there."""
+        if not places:
+            return [], []
+        white = tag_cells()[[place.tag_id for place in places]]
+        found, verdicts = measure(frame, np.array([place.corners for place in places]), white)
+        settings = self._settings
+        good = (
+            (verdicts[:, BITS] <= settings.max_hamming)
+            & (verdicts[:, BORDER] <= _MAX_BORDER)
+            & (verdicts[:, MARGIN] >= settings.min_margin)
+        )
+        seen: list[TagSeen] = []
+        lost: list[_Place] = []
+        for place, corners, verdict, is_good in zip(places, found, verdicts, good, strict=True):
+            if not is_good:
+                lost.append(place)
+                continue
+            tag = _sighting(place.tag_id, corners, float(verdict[MARGIN]))
+            if not any(is_same(tag, other) for other in seen):
+                seen.append(tag)
+        return seen, lost
+
+    def _search(self, frame: Image, places: list[_Place], *, whole: bool) -> list[TagSeen]:
+        height, width = frame.shape
+        decimate = self._settings.quad_decimate * max(1.0, round(height / DECIMATED_ROWS))
+        if places and not whole:
+            smallest = min(place.side for place in places)
+            decimate = max(decimate, min(1.5 * decimate, smallest / ENOUGH_PX))
+        self._since_whole += 1
+        left, right = 0, width
+        if whole:
+            self._since_whole, self._strip = 0, 0
+        elif self._scan_frames > 1:
+            side = max([height * _USUAL_SIDE, *(place.side for place in places)])
+            left = self._strip * width // self._scan_frames
+            end = (self._strip + 1) * width / self._scan_frames
+            right = min(width, math.ceil(end + _STRIP_OVERLAP * side))
+            self._strip = (self._strip + 1) % self._scan_frames
+        strip = frame[:, left:right]
+        if decimate > 1.0:
+            strip = np.asarray(cv2.blur(strip, SEARCH_BLUR_PX), dtype=np.uint8)
+        found = look(strip, self._settings, decimate, self._settings.quad_sigma)
+        return [moved(tag, left, 0.0) for tag in found]
+
+    def _rescue(self, frame: Image, lost: list[_Place]) -> list[TagSeen]:
+        """Return what the library finds around lost tags; of many, some in each frame."""
+        count = min(RESCUES, len(lost))
+        chosen = [lost[(self._turn + k) % len(lost)] for k in range(count)]
+        self._turn += count
+        cuts = (
+            look_around(frame, self._settings, place.corners, _RESCUE_MARGIN) for place in chosen
+        )
+        return [tag for cut in cuts for tag in cut]
+
+    def _exact(self, frame: Image, rough: TagSeen) -> TagSeen:
+        """Return a tag that the library found, measured as the others are if it can be."""
+        place = _place(rough.tag_id, np.array(rough.corners_px))
+        seen, _ = self._measured(frame, [place])
+        if seen and is_same(seen[0], rough):
+            return seen[0]
+        return measure_again(frame, self._settings, rough)
+
+    def _remember(self, seen: Iterable[TagSeen]) -> None:
+        places = []
+        for tag in seen:
+            corners = np.array(tag.corners_px)
+            now = _place(tag.tag_id, corners)
+            before = next((old for old in self._seen if old.is_near(now)), now)
+            places.append(_place(tag.tag_id, corners, corners - before.corners))
+        self._seen = places
+
+
+def _sighting(tag_id: int, corners: Floats, margin: float) -> TagSeen:
+    """Return a tag of measured corners; its centre is where their diagonals meet."""
+    a, b, c, d = ((float(x), float(y)) for x, y in corners)
+    ux, uy, vx, vy = c[0] - a[0], c[1] - a[1], d[0] - b[0], d[1] - b[1]
+    share = ((b[0] - a[0]) * vy - (b[1] - a[1]) * vx) / (ux * vy - uy * vx)
+    centre = (a[0] + share * ux, a[1] + share * uy)
+    return TagSeen(tag_id=tag_id, centre_px=centre, corners_px=(a, b, c, d), margin=margin)
