@@ -28,7 +28,8 @@ def png_of(width, height):
     """Return the beginning of a PNG that claims a size."""
     head = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     size, check = struct.pack(">I", 13), struct.pack(">I", zlib.crc32(head))
-    return b"\x89PNG\r\n\x1a\n" + size + head + check
+    data = bytes(4) + b"IDAT" + struct.pack(">I", zlib.crc32(b"IDAT"))
+    return b"\x89PNG\r\n\x1a\n" + size + head + check + data
 
 
 def arrive(source, arrival_ns, t_ns, payload=None, camera="roof", shares_clock=True):
@@ -84,7 +85,7 @@ def test_a_sender_with_another_clock_is_mapped_to_ours():
     times = []
     for i in range(20):
         arrival_ns = NOW_NS + i * 50 * NS_PER_MS + (i % 5) * 4 * NS_PER_MS
-        arrive(source, arrival_ns, 7 + i * 50 * NS_PER_MS, shares_clock=False)
+        arrive(source, arrival_ns, NOW_NS + (50 * i - 900) * NS_PER_MS, shares_clock=False)
         times.append(source.take(arrival_ns, None).t_ns)
     assert times == [NOW_NS + i * 50 * NS_PER_MS for i in range(20)]
 
