@@ -34,11 +34,11 @@ from scm.scenery.tags import tag_corners
 LOGGER = logging.getLogger(__name__)
 AVERAGED_FRAMES = 20
 MOVED_PX = 1.0
-STILL_PX = 0.003
+STILL_PX = 0.006
 """Averages that changed by less are not worth another solution."""
 KNOCKED_SIGMAS = 5.0
 KNOCKED_TOLERANCE = 30.0
-ITERATIONS = 3
+ITERATIONS = 4
 PLACE = 6
 STEPS = np.array(
     [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-2, 1e-2, 1e-2, 1e-2, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6]
@@ -205,13 +205,11 @@ class Anchor:
         start, prior = self._base
         noise = self._noise(tags, points)
         prior = self._if_knocked(corners, points, prior, noise)
+        jacobian = self.by_parameter(points).reshape(-1, len(start))
+        gain = np.linalg.solve(jacobian @ prior @ jacobian.T + noise, jacobian @ prior).T
         at = start
         for _ in range(ITERATIONS):
-            self.model = _changed(self.calibrated, at)
-            self.probes = self._probes()
-            jacobian = self.by_parameter(points).reshape(-1, len(at))
-            off = (corners - self.model.project(points)).ravel()
-            gain = np.linalg.solve(jacobian @ prior @ jacobian.T + noise, jacobian @ prior).T
+            off = (corners - _changed(self.calibrated, at).project(points)).ravel()
             at = start + gain @ (off + jacobian @ (at - start))
         covariance = prior - gain @ jacobian @ prior
         self.covariance = (covariance + covariance.T) / 2.0

@@ -83,6 +83,9 @@ def car_poses(
     moved = -by_pixel @ anchor.by_parameter(points)
     by_camera = np.einsum("nkij,nijp->nkp", fit.slopes, moved)
     shared = by_camera @ anchor.covariance @ by_camera.swapaxes(1, 2)
+    from_above = model.position - points.mean(axis=1)
+    slant = np.hypot(from_above[:, 0], from_above[:, 1]) / from_above[:, 2]
+    shared[:, 2, 2] += (LEAN_RAD * slant / 2.0) ** 2  # a leaning square, seen aslant, looks turned
     lean = np.zeros((len(bodies), 3, 3))
     lean[:, [0, 1], [0, 1]] = ((offsets[:, 2] * LEAN_RAD) ** 2)[:, None]
     covariance = by_corner @ by_corner.swapaxes(1, 2) + shared + lean

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from scm.eye.anchor import Anchor, Tolerance
 from scm.eye.camera import camera_model
-from scm.eye.pose import car_pose
+from scm.eye.pose import car_pose, car_poses
 from scm.eye.render.car import tag_on_roof
 from scm.maps.load import load_map
 from scm.scenery.bodies import NIGEL
@@ -109,3 +109,33 @@ def test_noise_of_a_still_tag_is_averaged_away():
         anchor.see(TRUE.project(FLOOR_TAG) + 0.05 * rng.standard_normal((4, 2)), tick)
         places.append(anchor.model.position[:2])
     assert np.std(places[40:], axis=0).max() < 0.5 * np.std(places[:5], axis=0).max()
+
+
+def test_a_corner_far_off_the_square_is_left_out():
+    corners = TRUE.project(tag_on_roof(car(1.0, 0.5, 0.4)))
+    corners[2] += (3.0, -2.0)
+    found = car_pose(Anchor(TRUE, CITY.tag), NIGEL, corners)
+    assert (found.pose.x, found.pose.y) == pytest.approx((1.0, 0.5), abs=1e-6)
+    assert found.misfit < 0.1
+
+
+def test_corners_that_are_no_square_are_doubted_or_refused():
+    exact = TRUE.project(tag_on_roof(car(1.0, 0.5, 0.4)))
+    middle = exact.mean(axis=0)
+    anchor = Anchor(TRUE, CITY.tag)
+    good, large, huge = (
+        car_pose(anchor, NIGEL, middle + scale * (exact - middle)) for scale in (1.0, 1.02, 1.2)
+    )
+    assert large.covariance[2, 2] - large.shared[2, 2] > 4.0 * (
+        good.covariance[2, 2] - good.shared[2, 2]
+    )
+    assert (good.is_refused, large.is_refused, huge.is_refused) == (False, False, True)
+
+
+def test_cars_solved_together_are_those_solved_one_by_one():
+    corners = np.array([TRUE.project(tag_on_roof(car(x, 0.5, x))) for x in (0.4, 1.4, 2.4)])
+    anchor = Anchor(TRUE, CITY.tag)
+    for one, found in zip(corners, car_poses(anchor, [NIGEL] * 3, corners), strict=True):
+        alone = car_pose(anchor, NIGEL, one)
+        assert found.pose == pytest.approx(alone.pose)
+        np.testing.assert_allclose(found.covariance, alone.covariance)
