@@ -1,0 +1,212 @@
+"""Calibrating on drawn pictures: boards seen through a known lens, with noise and blur."""
+
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+
+from scm.__main__ import main
+from scm.errors import EyeError
+from scm.eye.calibrate.board import Board, find_board
+from scm.eye.calibrate.gather import from_files
+from scm.eye.calibration import load_calibration
+from scm.eye.camera import camera_model
+from scm.maps.model import Camera
+from scm.scenery.tags import tag_picture
+
+LENS = Camera(
+    name="lab", x_m=0.0, y_m=0.0, z_m=1.0, width_px=800, height_px=500,
+    fx_px=660.0, fy_px=663.0, cx_px=404.0, cy_px=246.0, distortion=(-0.15, 0.05, 5e-4, -4e-4, 0.0),
+)  # fmt: skip
+SQUARE_M, CELL_PX, MARGIN_PX = 0.03, 48, 48
+BOARDS = {
+    "chessboard": Board("chessboard", 9, 6, SQUARE_M),
+    "charuco": Board("charuco", 9, 6, SQUARE_M, 0.022),
+    "tags": Board("tags", 6, 4, SQUARE_M * 1.5, SQUARE_M * 1.5 * 8 / 12),
+}
+
+
+def page_of(kind):
+    """Return the print with a white margin, and its texels a metre."""
+    board = BOARDS[kind]
+    if kind == "chessboard":
+        cells = np.add.outer(np.arange(board.rows), np.arange(board.columns)) % 2
+        page = (cells * 255).astype(np.uint8).repeat(CELL_PX, 0).repeat(CELL_PX, 1)
+    elif kind == "charuco":
+        dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+        made = cv2.aruco.CharucoBoard((9, 6), SQUARE_M, 0.022, dictionary)
+        page = made.generateImage((9 * CELL_PX, 6 * CELL_PX))
+    else:
+        cell = CELL_PX * 3 // 2 // 12
+        rows = [
+            np.hstack([np.pad(tag_picture(6 * row + i, cell), cell, constant_values=255)
+                       for i in range(6)])
+            for row in reversed(range(4))
+        ]  # fmt: skip
+        page = np.vstack(rows)
+    return np.pad(page, MARGIN_PX, constant_values=255), CELL_PX / SQUARE_M
+
+
+@cache
+def rays_of(camera, fine):
+    rows, columns = camera.height_px * fine, camera.width_px * fine
+    pixels = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1)
+    model, pixels = camera_model(camera), (pixels + 0.5) / fine - 0.5
+    # a few of the model's own rounds do for a picture, and it has a million of them
+    few = (cv2.TERM_CRITERIA_COUNT, 12, 0.0)
+    flat = pixels.reshape(-1, 1, 2)
+    ideal = cv2.undistortPoints(flat, model.matrix, model.distortion, None, None, None, few)
+    ideal = ideal.reshape(pixels.shape)
+    return np.concatenate((ideal, np.ones((rows, columns, 1))), axis=-1)
+
+
+def picture(kind, camera, turn, middle, rng):
+    """Return a grey frame (height, width) of a board whose middle is there in the camera's axes."""
+    page, scale = page_of(kind)
+    fine = 2
+    rays = rays_of(camera, fine)
+    rotation = cv2.Rodrigues(np.array(turn, dtype=float))[0]
+    reach = (rotation[:, 2] @ middle) / (rays @ rotation[:, 2])
+    flat = (rays * reach[..., None] - middle) @ rotation[:, :2] * scale
+    at = flat + np.array(page.shape[::-1]) / 2.0 - 0.5
+    at = np.where(reach[..., None] > 0.0, at, -1e4).astype(np.float32)
+    seen = cv2.remap(page, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderValue=120)
+    small = cv2.resize(seen, None, fx=1 / fine, fy=1 / fine, interpolation=cv2.INTER_AREA)
+    return np.clip(small + rng.normal(0.0, 2.0, small.shape), 0, 255).astype(np.uint8)
+
+
+def stances(count, lean, rng, camera):
+    """Turns and middles of boards over the frame, in OpenCV's camera axes."""
+    places = [(0.3, 0.3), (0.7, 0.3), (0.5, 0.5), (0.3, 0.7), (0.7, 0.7), (0.5, 0.3), (0.5, 0.7)]
+    for i in range(count):
+        across, down = places[i % len(places)]
+        side = 2.4 * i
+        far = camera.fx_px * 0.27 / camera.width_px / (0.5 if i % 3 else 0.7)
+        x = (across * camera.width_px - camera.cx_px) / camera.fx_px
+        y = (down * camera.height_px - camera.cy_px) / camera.fy_px
+        ray = np.array([x, y, 1.0])
+        middle = ray * far
+        tilt = lean * rng.uniform(0.7, 1.0)
+        yield (np.cos(side) * tilt, np.sin(side) * tilt, rng.uniform(-0.3, 0.3)), middle
+
+
+@pytest.fixture(scope="module")
+def shots(tmp_path_factory):
+    """Return a function that draws a set of pictures once and returns their paths."""
+    made = {}
+
+    def draw(kind, camera, count, lean):
+        key = (kind, camera.lens, count, lean)
+        if key not in made:
+            folder, rng = tmp_path_factory.mktemp("shots"), np.random.default_rng(7)
+            made[key] = []
+            for i, (turn, middle) in enumerate(stances(count, lean, rng, camera)):
+                path = folder / f"{i:02}.png"
+                cv2.imwrite(str(path), picture(kind, camera, turn, middle, rng))
+                made[key].append(path)
+        return made[key]
+
+    return draw
+
+
+def words(kind, paths, out, *more):
+    board = BOARDS[kind]
+    marker = ["--marker-m", str(board.marker_m)] if board.marker_m else []
+    return [
+        "eye", "calibrate", *map(str, paths), "--board", kind, "--squares",
+        f"{board.columns}x{board.rows}", "--square-m", str(board.square_m), *marker,
+        "--out", str(out), *more,
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "camera"), [("chessboard", LENS), ("charuco", LENS), ("tags", LENS)]
+)
+def test_a_lens_is_recovered_from_pictures_within_its_doubt(shots, tmp_path, kind, camera, capsys):
+    out = tmp_path / "lens.toml"
+    said = main(words(kind, shots(kind, camera, 14, 0.6), out)), capsys.readouterr()
+    assert said[0] == 0, said[1]
+    found = load_calibration(out)
+    truth = np.array([camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, *camera.distortion])
+    known = found.deviations > 0.0
+    off = np.abs(found.values - truth)[known] / found.deviations[known]
+    assert off.max() < 5.0, off
+    assert found.deviations[0] < 0.01 * camera.fx_px
+    assert found.rms_px < 0.35
+    assert found.views >= 9  # in some the board is cut by the frame
+
+
+def test_boards_parallel_to_the_picture_are_refused_with_2_and_nothing_is_written(
+    shots, tmp_path, capsys
+):
+    out = tmp_path / "lens.toml"
+    assert main(words("chessboard", shots("chessboard", LENS, 14, 0.02), out)) == 2
+    said = capsys.readouterr()
+    assert "focal length and distance cannot be told apart" in said.err
+    assert "to add, the most telling first:" in said.out
+    assert not out.exists()
+
+
+def test_inner_corners_given_as_squares_are_named_as_the_likely_mistake(shots):
+    board = Board("chessboard", 8, 5, SQUARE_M)
+    with pytest.raises(EyeError, match=r"counts squares: a board of 8 x 5 inner corners is 9x6"):
+        from_files(board, shots("chessboard", LENS, 14, 0.6)[:2], lambda _: None)
+
+
+def test_pictures_of_two_sizes_are_refused_by_name(shots, tmp_path):
+    first = shots("chessboard", LENS, 14, 0.6)[0]
+    small = tmp_path / "small.png"
+    cv2.imwrite(str(small), cv2.imread(str(first))[:400])
+    with pytest.raises(EyeError, match=r"small\.png: expected 800 x 500 px as .*, got 800 x 400"):
+        from_files(BOARDS["chessboard"], [first, small], lambda _: None)
+
+
+def test_of_a_film_each_new_place_where_the_board_is_held_still_is_one_view(shots, tmp_path):
+    path = tmp_path / "film.avi"
+    film = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (800, 500))
+    paths = shots("chessboard", LENS, 14, 0.6)
+    for shown in (1, 1, 1, 2, 4, 4, 1, 1):  # 2 is gone before it was held still, 1 is not new again
+        film.write(cv2.imread(str(paths[shown])))
+    film.release()
+    gathered = from_files(BOARDS["chessboard"], [path], lambda _: None)
+    assert [view.name for view in gathered.views] == ["frame 1", "frame 5"]
+    assert gathered.size == (800, 500)
+
+
+def test_a_tag_grid_counts_from_its_lower_left():
+    page, _ = page_of("tags")
+    view = find_board(BOARDS["tags"], page, "page")
+    low, right = view.pixels[0], view.pixels[4]
+    assert low[1] > page.shape[0] * 0.7
+    assert right[0] > low[0]
+    np.testing.assert_allclose(view.points[4] - view.points[0], [SQUARE_M * 1.5, 0, 0], atol=1e-12)
+
+
+def test_a_sliver_of_the_board_is_no_view():
+    page, _ = page_of("tags")
+    one_tag = np.ascontiguousarray(page[-MARGIN_PX - 76 :, : MARGIN_PX + 76])
+    assert find_board(BOARDS["tags"], one_tag, "x") is None
+    assert find_board(BOARDS["tags"], np.full((200, 300), 90, dtype=np.uint8), "x") is None
+
+
+@pytest.mark.parametrize(
+    ("board", "said"),
+    [
+        (("chessboard", 2, 6, 0.03), "squares: expected 3 to 60"),
+        (("chessboard", 9, 6, 0.0), "square_m: expected above 0, got 0.0"),
+        (("tags", 6, 4, 0.03), "marker_m: expected above 0 and below"),
+        (("charuco", 9, 6, 0.03, 0.03), "marker_m: expected above 0 and below"),
+        (("tags", 30, 20, 0.03, 0.02), "got up to 599"),
+        (("charuco", 9, 6, 0.03, 0.02, "DICT_9X9"), "expected a name as DICT_4X4_50"),
+        (("charuco", 12, 10, 0.03, 0.02), "holds 50 markers, the board has 60"),
+    ],
+)
+def test_a_board_that_cannot_be_is_refused(board, said):
+    with pytest.raises(EyeError, match=said):
+        Board(*board)
+
+
+def test_neither_pictures_nor_camera_is_bad_input(tmp_path, capsys):
+    assert main(words("chessboard", [], tmp_path / "lens.toml")) == 2
+    assert "only one of these" in capsys.readouterr().err
