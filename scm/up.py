@@ -11,6 +11,7 @@ from pathlib import Path
 from scm.clock import NS_PER_MS, WallClock, seconds
 from scm.crew import Crew, Job, Say
 from scm.errors import RunError
+from scm.eye.station import eye_station
 from scm.latched import HEARD, Latched
 from scm.live import stop_on_signal
 from scm.maps.load import load_map
@@ -70,7 +71,7 @@ def run_city(
             port=port,
             recording=record_dir / f"{city}-{_stamp()}.mcap",
             seed=seed,
-            has_camera=bool(city_map.cameras),
+            cameras=tuple(camera.name for camera in city_map.cameras),
         )
         say(f"scm: city {city!r} on map {map_name!r}, bus {router.listen}")
         _watch(plan, bus, say)
@@ -91,7 +92,7 @@ class _Plan:
     port: int
     recording: Path
     seed: int
-    has_camera: bool
+    cameras: tuple[str, ...]
 
 
 def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
@@ -141,13 +142,17 @@ def _parts(plan: _Plan, latched: Latched) -> list[Job]:
 
     folder = plan.recording.parent
     cars = f"cars, walls, sensors, radio; {plan.hosted} hosted"
-    eye = [part("eye", "overhead camera: frames, tags, poses")] if plan.has_camera else []
+    eyes = [
+        Job(eye_station(camera, first=camera == plan.cameras[0]), "part",
+            f"camera {camera!r} overhead: tags, poses", partial(scm, "eye", "--camera", camera))
+        for camera in plan.cameras
+    ]  # fmt: skip
     return [
         Job("record", "part", f"everything on the bus into {folder}/", record, last=True),
         part("traffic", "signals: safe kernel, plans"),
         Job("monitor", "part", "second channel: doubts the signals, latches flash", monitor),
         Job("world", "part", cars, world),
-        *eye,
+        *eyes,
         part("camera", "cars' own cameras, rendered while somebody looks"),
         part("camera", "cars' own cameras, rendered while somebody looks"),
         part("api", "REST, event stream, dashboard", "--host", HOST, "--port", str(plan.port)),

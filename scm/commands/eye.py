@@ -11,22 +11,55 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--camera", help="which camera of the map; default: its first")
     parser.add_argument(
         "--frames",
+        metavar="SOURCE",
+        help="0 or /dev/video0, csi:0, rtsp://..., http://..., a film, a picture, a folder, "
+        "bus:CAMERA; default: emulated",
+    )
+    parser.add_argument("--loop", action="store_true", help="begin a film or folder again")
+    parser.add_argument(
+        "--delay-ms",
+        type=float,
+        default=0.0,
+        metavar="MS",
+        help="from exposure to arrival at the least, where the camera's stamps cannot tell",
+    )
+    parser.add_argument(
+        "--calibration",
         type=Path,
         metavar="FILE",
-        help="a film or picture of the real camera; default: emulated",
+        help="lens, by `scm eye calibrate`",
+    )
+    parser.add_argument(
+        "--tags", type=Path, metavar="FILE", help="more tags on the floor, as for `scm eye locate`"
     )
 
 
 def _run(arguments: argparse.Namespace) -> int:
     import cv2
 
+    from scm.eye.calibrate.locate import known_tags
+    from scm.eye.calibration import load_calibration
+    from scm.eye.camera import camera_of
     from scm.eye.part import EyePart
-    from scm.eye.sources.file import FileSource
+    from scm.eye.sources.choose import source_of
     from scm.maps.load import load_map
 
     cv2.setNumThreads(1)  # the city needs the other cores, and one frame at a time is fast enough
-    source = FileSource(arguments.frames) if arguments.frames else None
-    part = EyePart(load_map(arguments.map), arguments.camera, arguments.seed, source)
+    city_map = load_map(arguments.map)
+    camera = camera_of(city_map, arguments.camera)
+    source = arguments.frames and source_of(
+        arguments.frames,
+        size_px=(camera.width_px, camera.height_px),
+        rate_hz=camera.rate_hz,
+        loop=arguments.loop,
+        delay_s=arguments.delay_ms / 1e3,
+    )
+    lens = load_calibration(arguments.calibration) if arguments.calibration else None
+    more = known_tags(city_map, arguments.tags)
+    more.pop(city_map.tag.tag_id)
+    part = EyePart(
+        city_map, camera.name, arguments.seed, source or None, lens=lens, tags=tuple(more.values())
+    )
     return run_part(part, arguments)
 
 

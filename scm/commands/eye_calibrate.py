@@ -82,7 +82,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _owner(arguments: argparse.Namespace) -> "Camera | None":
-    from scm.eye.calibrate.locate import camera_of
+    from scm.eye.camera import camera_of
     from scm.maps.load import load_map
 
     return camera_of(load_map(arguments.map), arguments.camera_name) if arguments.map else None

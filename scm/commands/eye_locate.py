@@ -30,8 +30,9 @@ def _run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from scm.errors import EyeError
-    from scm.eye.calibrate.locate import camera_of, known_tags, locate, off_px
+    from scm.eye.calibrate.locate import known_tags, locate, off_px
     from scm.eye.calibration import calibrated, load_calibration
+    from scm.eye.camera import camera_of
     from scm.eye.detect import Settings, detect_tags
     from scm.eye.picture import read_picture
     from scm.eye.source import grey_of

@@ -18,8 +18,8 @@ import msgspec
 import numpy as np
 
 from scm.arrays import Floats
-from scm.errors import EyeError
-from scm.maps.model import Camera
+from scm.errors import EyeError, nearest
+from scm.maps.model import Camera, CityMap
 
 LARGEST_TILT_RAD = math.radians(45.0)
 LENS_PARAMETERS = 9
@@ -116,6 +116,23 @@ class CameraModel:
         camera = self.camera
         across = margin - 0.5 <= x <= camera.width_px - 0.5 - margin
         return across and margin - 0.5 <= y <= camera.height_px - 0.5 - margin
+
+
+def camera_of(city_map: CityMap, name: str | None) -> Camera:
+    """Return a camera of a map by its name; None: its first.
+
+    Raises:
+        EyeError: There is none, or none of that name.
+    """
+    names = [camera.name for camera in city_map.cameras]
+    if not names:
+        raise EyeError(f"map {city_map.name}: [[cameras]]: expected at least one")
+    if name is not None and name not in names:
+        raise EyeError(
+            f"map {city_map.name}: no camera {name!r}, expected one of {', '.join(names)}"
+            f"{nearest(name, names)}"
+        )
+    return city_map.cameras[names.index(name) if name is not None else 0]
 
 
 def camera_model(camera: Camera, lens_covariance: Floats | None = None) -> CameraModel:

@@ -1,36 +1,52 @@
-"""The eye of the city: a frame in, the tags in it and the poses of its cars out.
+"""The eye of the city: a frame in; the tags in it, the poses and tracks of its cars out.
 
 With the emulated camera the world's snapshot is the light: it is rendered and then only looked at.
 Two things are taken from the snapshot besides: which tag id belongs to which vehicle, and which car
 file a vehicle is (so where its tag sits). A city with real cars only knows these from a list, too;
 no pose is ever read from it.
+
+Each camera has a part of its own, which tells what it sees. The one of the map's first camera hears
+the others and tells where cars are by all of them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-import cv2
 import numpy as np
 
-from scm.arrays import Image
+from scm.arrays import Floats
 from scm.clock import NS_PER_MS, NS_PER_S
-from scm.errors import EyeError, nearest
 from scm.eye.anchor import Anchor
-from scm.eye.camera import CameraModel, camera_model
-from scm.eye.detect import Settings, detect_tags
-from scm.eye.pose import car_pose
-from scm.eye.source import Frame, Source
+from scm.eye.calibration import Calibration, calibrated
+from scm.eye.camera import CameraModel, camera_model, camera_of
+from scm.eye.detect import Settings
+from scm.eye.find.finder import TagFinder
+from scm.eye.overlay import jpeg, preview
+from scm.eye.pose import car_poses
+from scm.eye.roofs import expected_tags
+from scm.eye.source import Frame, Listener, Source
 from scm.eye.sources.synthetic import SyntheticSource
-from scm.maps.model import Camera, CityMap
-from scm.part import Hears
+from scm.eye.station import eye_station
+from scm.eye.telling import pose_message, sighting, sighting_of, track_message
+from scm.eye.track.perception import collective_perception
+from scm.eye.track.sighting import Sighting
+from scm.eye.track.tracks import Tracks
+from scm.eye.watch import Watch
+from scm.maps.model import Camera, CityMap, MapTag
+from scm.part import Hears, IsWanted
 from scm.scenery.bodies import NIGEL, CarBody, car_body
 from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.message import Message
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.eye_preview import EyePreview
+from scm.v2x.messages.eye_status import Complaint, EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags, TagSeen
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 FRAME_PERIOD_NS = NS_PER_S // 5
-JPEG_QUALITY = 80
+STATUS_PERIOD_NS = NS_PER_S // 2
+CPM_PERIOD_NS = NS_PER_S // 5
+SOURCE = "source"
 
 
 class EyePart:
@@ -41,15 +57,15 @@ class EyePart:
         camera: Name of one of the map's cameras; None: the first.
         seed: Of the sensor's noise and the floor's grain.
         source: Where frames come from; None: the emulated camera.
-        settings: Of the detector.
+        settings: Of the search for tags.
+        lens: Takes the place of the map's lens.
+        tags: That lie on the floor beside the map's own.
 
     Raises:
         EyeError: The map has no such camera, or it cannot be one.
     """
 
-    name = "eye"
     role = "part"
-    hears = (Hears(WorldSnapshot),)
     serves = ()
 
     def __init__(
@@ -59,115 +75,149 @@ class EyePart:
         seed: int = 0,
         source: Source | None = None,
         settings: Settings | None = None,
+        lens: Calibration | None = None,
+        tags: Sequence[MapTag] = (),
     ) -> None:
-        model = camera_model(_choose(city_map, camera))
+        chosen = camera_of(city_map, camera)
+        model = _model(chosen, lens)
         self.camera = model.camera.name
         self.period_ns = round(NS_PER_S / model.camera.rate_hz)
-        self.anchor = Anchor(model, city_map.tag)
-        self._settings = settings or Settings()
+        self.watch = Watch(Anchor(model, (city_map.tag, *tags)))
+        self.tracks = Tracks()
+        self.tells_tracks = chosen is city_map.cameras[0]
+        self.name = eye_station(self.camera, first=self.tells_tracks)
+        self._finder = TagFinder(settings)
         self._source = source or _emulated(city_map, model, seed)
         self._light: WorldSnapshot | None = None
-        self._pictured_ns: int | None = None
+        self._is_wanted: IsWanted = _nobody
+        self._due_ns = {EyeFrame: 0, EyeStatus: 0, type(self): 0}
+        self.hears = (
+            Hears(WorldSnapshot),
+            *([Hears(EyePose)] if self.tells_tracks and len(city_map.cameras) > 1 else []),
+            *(self._source.hears if isinstance(self._source, Listener) else ()),
+        )
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Take the newest frame, if there is one, and say what is in it."""
+        """Take the newest frame, if there is one, and say what is in it; tell where cars are."""
         for item in inbox:
-            if isinstance(item.message, WorldSnapshot):
-                self._light = item.message
+            self._hear(item, now_ns)
         frame = self._source.take(now_ns, self._light)
-        if frame is None:
-            return []
-        self._check_size(frame)
-        tags = detect_tags(frame.grey(), self._settings)
-        latency_ms = (now_ns - frame.t_ns) / NS_PER_MS
-        seen = EyeTags(camera=self.camera, t_ns=frame.t_ns, tags=tags, latency_ms=latency_ms)
-        return [seen, *self._poses(frame.t_ns, tags), *self._picture(frame)]
+        out = [] if frame is None else self._look(frame, now_ns)
+        if self.tells_tracks:
+            out += self._tracked(now_ns)
+        if self._is_due(EyeStatus, now_ns, STATUS_PERIOD_NS):
+            out.append(self._status(now_ns))
+        return out
+
+    def learn_wishes(self, is_wanted: IsWanted) -> None:
+        """Draw over pictures only while somebody looks."""
+        self._is_wanted = is_wanted
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """Leave without a word."""
+        """Let go of the camera, without a word."""
         del now_ns
+        self._source.close()
         return []
 
-    def _check_size(self, frame: Frame) -> None:
-        """Refuse pictures that the camera of the map cannot have taken."""
-        camera = self.anchor.model.camera
-        got = (frame.image.shape[1], frame.image.shape[0])
-        if got != (camera.width_px, camera.height_px):
-            wanted = f"{camera.width_px} x {camera.height_px}"
-            msg = (
-                f"camera {camera.name!r}: got a frame of {got[0]} x {got[1]} px, expected {wanted}"
-            )
-            raise EyeError(msg)
+    def _hear(self, item: Incoming, now_ns: int) -> None:
+        if isinstance(item.message, WorldSnapshot):
+            self._light = item.message
+        elif isinstance(item.message, EyePose):
+            if item.message.camera != self.camera:
+                self.tracks.see([sighting_of(item.message)], now_ns)
+        elif isinstance(self._source, Listener):
+            self._source.hear(item)
 
-    def _poses(self, t_ns: int, tags: tuple[TagSeen, ...]) -> list[EyePose]:
-        map_tag = self.anchor.tag.tag_id
-        ours = next((np.array(tag.corners_px) for tag in tags if tag.tag_id == map_tag), None)
-        self.anchor.see(ours, t_ns)
-        known = self._known()
-        poses = []
-        for tag in tags:
-            if tag.tag_id != map_tag:
-                vehicle, body = known.get(tag.tag_id, (f"tag-{tag.tag_id}", NIGEL))
-                poses.append(self._pose(t_ns, vehicle, body, tag))
-        return poses
+    def _look(self, frame: Frame, now_ns: int) -> list[Outgoing]:
+        grey, known = frame.grey(), self._known()
+        bodies = dict(known.values())
+        tags = self._finder.find(grey, self._expected(frame.t_ns, bodies))
+        corners = {tag.tag_id: np.array(tag.corners_px) for tag in reversed(tags)}
+        self.watch.see(frame.t_ns, grey, corners)
+        flags = self.watch.flags(now_ns)
+        sightings = [] if "frame_size" in flags else self._sightings(frame, tags, known, flags)
+        self.tracks.see(sightings, now_ns)
+        age_ms = self.watch.anchor.age_ms(frame.t_ns)
+        late_ms = (now_ns - frame.t_ns) / NS_PER_MS
+        seen = EyeTags(camera=self.camera, t_ns=frame.t_ns, tags=tags, latency_ms=late_ms)
+        return [seen, *(pose_message(one, age_ms) for one in sightings),
+                *self._picture(frame, tags, known, now_ns)]  # fmt: skip
+
+    def _expected(self, t_ns: int, bodies: dict[str, CarBody]) -> dict[int, Floats]:
+        anchor = self.watch.anchor
+        ours = {tag.tag_id: anchor.expected(tag) for tag in anchor.map_tags}
+        return {**expected_tags(anchor.model, self.tracks.at(t_ns), bodies), **ours}
 
     def _known(self) -> dict[int, tuple[str, CarBody]]:
         """Return whose tag is whose: the only facts taken from the snapshot."""
         vehicles = self._light.vehicles if self._light else ()
         return {car.tag_id: (car.vehicle, car_body(car.car)) for car in vehicles}
 
-    def _pose(self, t_ns: int, vehicle: str, body: CarBody, tag: TagSeen) -> EyePose:
-        estimate = car_pose(self.anchor, body, np.array(tag.corners_px))
-        a, b, c, d, e, f, g, h, i = (float(value) for value in estimate.covariance.flat)
-        return EyePose(
-            camera=self.camera,
-            vehicle=vehicle,
-            tag_id=tag.tag_id,
-            t_ns=t_ns,
-            x_m=estimate.pose.x,
-            y_m=estimate.pose.y,
-            yaw_rad=estimate.pose.yaw,
-            covariance=(a, b, c, d, e, f, g, h, i),
-            map_tag_age_ms=self.anchor.age_ms(t_ns),
-        )
+    def _sightings(
+        self, frame: Frame, tags: Sequence[TagSeen], known: dict[int, tuple[str, CarBody]],
+        flags: tuple[str, ...],
+    ) -> list[Sighting]:  # fmt: skip
+        ours = {tag.tag_id for tag in self.watch.anchor.map_tags}
+        cars = [tag for tag in tags if tag.tag_id not in ours]
+        whose = [known.get(tag.tag_id, (f"tag-{tag.tag_id}", NIGEL)) for tag in cars]
+        corners = np.array([tag.corners_px for tag in cars]).reshape(-1, 4, 2)
+        found = car_poses(self.watch.anchor, [body for _, body in whose], corners)
+        return [
+            sighting(self.camera, frame.t_ns, tag.tag_id, vehicle, pose, flags)
+            for tag, (vehicle, _), pose in zip(cars, whose, found, strict=True)
+            if not pose.is_refused
+        ]
 
-    def _picture(self, frame: Frame) -> list[EyeFrame]:
-        early_ns = self.period_ns // 2
-        last_ns = self._pictured_ns
-        if last_ns is not None and frame.t_ns - last_ns < FRAME_PERIOD_NS - early_ns:
+    def _tracked(self, now_ns: int) -> list[Outgoing]:
+        tracks = self.tracks.at(now_ns)
+        told: list[Outgoing] = [track_message(track) for track in tracks]
+        if tracks and self._is_due(type(self), now_ns, CPM_PERIOD_NS):
+            told.append(collective_perception(tracks, self.name, now_ns))
+        return told
+
+    def _status(self, now_ns: int) -> EyeStatus:
+        trouble, spoiled = self._source.trouble, self.watch.flags(now_ns)
+        said = self.watch.complaints(now_ns)
+        if trouble:
+            said = (*said, Complaint(code=SOURCE, said=trouble))
+        good = not trouble and not spoiled
+        return EyeStatus(camera=self.camera, t_ns=now_ns, good=good, complaints=said)
+
+    def _picture(
+        self, frame: Frame, tags: Sequence[TagSeen], known: dict[int, tuple[str, CarBody]],
+        now_ns: int,
+    ) -> list[EyeFrame | EyePreview]:  # fmt: skip
+        if not self._is_due(EyeFrame, frame.t_ns, FRAME_PERIOD_NS):
             return []
-        self._pictured_ns = frame.t_ns
         height, width = frame.image.shape[:2]
-        picture = EyeFrame(
-            camera=self.camera,
-            t_ns=frame.t_ns,
-            width_px=width,
-            height_px=height,
-            payload=_jpeg(frame.image),
-        )
-        return [picture]
+        size = {"camera": self.camera, "t_ns": frame.t_ns, "width_px": width, "height_px": height}
+        told: list[EyeFrame | EyePreview] = [EyeFrame(payload=jpeg(frame.image), **size)]
+        if self._is_wanted(EyePreview, {"camera": self.camera}):
+            names = {tag_id: vehicle for tag_id, (vehicle, _) in known.items()}
+            names |= {tag.tag_id: f"map {tag.tag_id}" for tag in self.watch.anchor.map_tags}
+            said = [one.said for one in self.watch.complaints(now_ns)]
+            told.append(EyePreview(payload=preview(frame.image, tags, names, said), **size))
+        return told
+
+    def _is_due(self, kind: type, now_ns: int, period_ns: int) -> bool:
+        """Say whether something is to be told now, once a period, half a step early at most."""
+        if now_ns < self._due_ns[kind] - self.period_ns // 2:
+            return False
+        self._due_ns[kind] = now_ns + period_ns
+        return True
 
 
-def _choose(city_map: CityMap, camera: str | None) -> Camera:
-    names = [one.name for one in city_map.cameras]
-    if not names:
-        raise EyeError(f"map {city_map.name}: [[cameras]]: expected at least one for the eye")
-    if camera is None:
-        return city_map.cameras[0]
-    if camera not in names:
-        raise EyeError(
-            f"map {city_map.name}: no camera {camera!r}, expected one of {', '.join(names)}"
-            f"{nearest(camera, names)}"
-        )
-    return city_map.cameras[names.index(camera)]
+def _nobody(kind: type[Message], where: Mapping[str, str]) -> bool:
+    """Say that nobody asked: on a bus without wishes."""
+    del kind, where
+    return False
+
+
+def _model(camera: Camera, lens: Calibration | None) -> CameraModel:
+    if lens is None:
+        return camera_model(camera)
+    return camera_model(calibrated(camera, lens), lens.lens_covariance)
 
 
 def _emulated(city_map: CityMap, model: CameraModel, seed: int) -> SyntheticSource:
     return SyntheticSource(city_map, model, np.random.default_rng([seed, *b"eye"]))
-
-
-def _jpeg(image: Image) -> bytes:
-    good, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    if not good:
-        raise EyeError(f"cannot encode a frame of shape {image.shape} as JPEG")
-    return data.tobytes()

@@ -36,6 +36,8 @@ PLAIN_NUMBERS = {
     "steering": "a share of the greatest",
     "margin": "of the tag detector, in its own measure",
     "covariance": "mixed, see the docstring",
+    "shared_covariance": "mixed, see the docstring",
+    "lean_covariance": "mixed, see the docstring",
     "real_time_factor": "a ratio",
     "start": "a pose of the map, see its docstring",
 }

@@ -21,7 +21,7 @@ import msgspec
 import numpy as np
 
 from scm.arrays import Floats
-from scm.errors import EyeError, nearest
+from scm.errors import EyeError
 from scm.eye.camera import LARGEST_TILT_RAD, LENS_PARAMETERS, CameraModel, camera_model
 from scm.eye.detect import CORNER_STD_PX
 from scm.geometry import Pose2, wrap_angle
@@ -96,23 +96,6 @@ class Located:
     def is_sure(self) -> bool:
         """Whether one pose outweighs the other."""
         return self.places[0].weight >= SURE
-
-
-def camera_of(city_map: CityMap, name: str | None) -> Camera:
-    """Return a camera of a map by its name; None: its first.
-
-    Raises:
-        EyeError: There is none, or none of that name.
-    """
-    names = [camera.name for camera in city_map.cameras]
-    if not names:
-        raise EyeError(f"map {city_map.name}: [[cameras]]: expected at least one")
-    if name is not None and name not in names:
-        raise EyeError(
-            f"map {city_map.name}: no camera {name!r}, expected one of {', '.join(names)}"
-            f"{nearest(name, names)}"
-        )
-    return city_map.cameras[names.index(name) if name is not None else 0]
 
 
 def known_tags(city_map: CityMap, more: Path | None = None) -> dict[int, MapTag]:

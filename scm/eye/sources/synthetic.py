@@ -23,7 +23,13 @@ NOISE_SHEETS = 2
 
 
 class SyntheticSource:
-    """Frames of the world as `model` sees it; the model is the true camera, not a guess of it."""
+    """Frames of the world as `model` sees it; the model is the true camera, not a guess of it.
+
+    Attributes:
+        trouble: None: nothing can go wrong.
+    """
+
+    trouble: str | None = None
 
     def __init__(self, city_map: CityMap, model: CameraModel, rng: np.random.Generator) -> None:
         self._model = model
@@ -41,6 +47,9 @@ class SyntheticSource:
             return None
         self._taken_ns = light.t_ns
         return Frame(light.t_ns, self.render(light))
+
+    def close(self) -> None:
+        """Nothing to let go of."""
 
     def render(self, light: WorldSnapshot) -> Image:
         """Return the picture of a snapshot, (height, width, 3); it is valid until the next one."""

@@ -4,6 +4,8 @@ from typing import ClassVar
 
 from scm.v2x.message import Message
 
+Rows = tuple[float, float, float, float, float, float, float, float, float]
+
 
 class EyePose(Message, kw_only=True, frozen=True):
     """Pose of the rear axle's centre in the map frame, with doubt.
@@ -13,6 +15,9 @@ class EyePose(Message, kw_only=True, frozen=True):
         t_ns: When the frame was exposed.
         covariance: Row by row, 3 x 3 over x [m], y [m], yaw [rad].
         map_tag_age_ms: Since the camera last saw the map's tag: its frame may have moved since.
+        shared_covariance: The part of it that all poses by this camera have in common.
+        lean_covariance: The part that all cameras have in common: a body that leans.
+        flags: What is wrong with the camera, by the codes of its `EyeStatus`: do not trust it.
     """
 
     KEY: ClassVar[str] = "eye/{camera}/pose/{vehicle}"
@@ -25,8 +30,11 @@ class EyePose(Message, kw_only=True, frozen=True):
     x_m: float
     y_m: float
     yaw_rad: float
-    covariance: tuple[float, float, float, float, float, float, float, float, float]
+    covariance: Rows
     map_tag_age_ms: float = 0.0
+    shared_covariance: Rows | None = None
+    lean_covariance: Rows | None = None
+    flags: tuple[str, ...] = ()
 
 
 MESSAGE = EyePose

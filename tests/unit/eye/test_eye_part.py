@@ -10,9 +10,13 @@ from scm.eye.part import EyePart
 from scm.eye.sources.file import FileSource
 from scm.maps.load import load_map
 from scm.v2x.exchange import Incoming
+from scm.v2x.messages.cpm_tx import CpmTx
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.eye_preview import EyePreview
+from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags
+from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 CITY = load_map("driving_school")
@@ -47,13 +51,14 @@ def test_it_steps_at_the_cameras_rate_and_hears_the_snapshot(eye):
 
 
 def test_a_step_without_a_snapshot_is_silent():
-    assert EyePart(CITY).step(0, []) == []
+    (status,) = EyePart(CITY).step(0, [])
+    assert isinstance(status, EyeStatus)
 
 
 def test_the_same_snapshot_is_not_pictured_twice():
     eye = EyePart(CITY)
     assert see(eye, light(1, CAR))
-    assert eye.step(2 * PERIOD_NS, []) == []
+    assert of(EyeTags, eye.step(2 * PERIOD_NS, [])) == []
 
 
 def test_a_car_is_reported_where_it_stands_by_its_vehicle_name(eye):
@@ -81,6 +86,8 @@ def test_a_pose_comes_from_the_picture_and_not_from_the_snapshot(eye):
     class Elsewhere:
         """A source whose picture shows the car half a metre from where the snapshot says."""
 
+        trouble = None
+
         def __init__(self, real):
             self.real = real
 
@@ -95,6 +102,8 @@ def test_a_pose_comes_from_the_picture_and_not_from_the_snapshot(eye):
 
 def test_a_tag_that_belongs_to_nobody_is_named_after_itself():
     class Stranger:
+        trouble = None
+
         def __init__(self, real):
             self.real = real
 
@@ -143,7 +152,79 @@ def test_a_picture_of_the_cameras_size_is_read_without_any_world(eye, tmp_path):
     assert np.hypot(pose.x_m - CAR.x_m, pose.y_m - CAR.y_m) < 0.003
 
 
-def test_a_picture_of_another_size_is_refused(tmp_path):
+def test_a_picture_of_another_size_is_said_and_gives_no_poses(tmp_path):
     cv2.imwrite(str(tmp_path / "small.png"), np.zeros((480, 640, 3), np.uint8))
-    with pytest.raises(EyeError, match="640 x 480 px, expected 1280 x 720"):
-        EyePart(CITY, source=FileSource(tmp_path / "small.png")).step(0, [])
+    out = EyePart(CITY, source=FileSource(tmp_path / "small.png")).step(0, [])
+    (status,) = of(EyeStatus, out)
+    assert not status.good
+    assert "frames are 640 x 480 px, the calibration is for 1280 x 720 px" in [
+        one.said for one in status.complaints
+    ]
+    assert of(EyePose, out) == []
+
+
+def test_a_healthy_camera_says_so_twice_a_second():
+    eye = EyePart(CITY, seed=3)
+    said = [status for tick in range(30) for status in of(EyeStatus, see(eye, light(tick, CAR)))]
+    assert [status.t_ns // PERIOD_NS for status in said] == [0, 5, 10, 15, 20, 25]
+    assert all(status.good for status in said[1:])
+
+
+def test_tracks_are_told_for_now_though_the_frame_is_older():
+    eye = EyePart(CITY, seed=3)
+    step = CAR.speed_mps * PERIOD_NS / 1e9
+    for tick in range(1, 15):
+        x, y = (
+            CAR.x_m + tick * step * np.cos(CAR.yaw_rad),
+            CAR.y_m + tick * step * np.sin(CAR.yaw_rad),
+        )
+        out = see(eye, light(tick, msgspec.structs.replace(CAR, x_m=x, y_m=y)), late_ns=PERIOD_NS)
+    (track,) = of(EyeTrack, out)
+    assert (track.vehicle, track.flags, track.stale) == ("n7", (), False)
+    assert track.t_ns == 15 * PERIOD_NS
+    x, y = x + step * np.cos(CAR.yaw_rad), y + step * np.sin(CAR.yaw_rad)
+    assert np.hypot(track.x_m - x, track.y_m - y) < 0.003
+    assert track.speed_mps == pytest.approx(CAR.speed_mps, abs=0.02)
+    assert track.age_s == pytest.approx(0.1)
+
+
+def test_a_car_out_of_sight_is_foretold_and_then_stale():
+    eye = EyePart(CITY, seed=3)
+    for tick in range(1, 6):
+        see(eye, light(tick, CAR))
+    tracks = [of(EyeTrack, see(eye, light(tick)))[0] for tick in range(6, 16)]
+    assert [track.stale for track in tracks] == [False] * 5 + [True] * 5
+    doubts = [track.covariance[0][0] for track in tracks]
+    assert doubts == sorted(doubts)
+
+
+def test_what_tracks_say_is_sent_on_the_air():
+    eye = EyePart(CITY, seed=3)
+    out = [message for tick in range(1, 12) for message in see(eye, light(tick, CAR))]
+    last = of(CpmTx, out)[-1]
+    assert len(last.body.perceived_object_container) == 1
+
+
+def test_pictures_are_drawn_over_only_for_who_asks():
+    eye = EyePart(CITY, seed=3)
+    assert of(EyePreview, see(eye, light(1, CAR))) == []
+    eye.learn_wishes(lambda kind, where: (kind, where) == (EyePreview, {"camera": "overhead"}))
+    out = see(eye, light(10, CAR))
+    (bare,), (drawn,) = of(EyeFrame, out), of(EyePreview, out)
+    assert drawn.payload != bare.payload
+    assert (drawn.t_ns, drawn.width_px, drawn.height_px) == (bare.t_ns, 1280, 720)
+
+
+def test_only_the_first_camera_of_a_map_tells_tracks_and_hears_the_others():
+    other = msgspec.structs.replace(CITY.cameras[0], name="side")
+    both = msgspec.structs.replace(CITY, cameras=(*CITY.cameras, other))
+    first, second = EyePart(both, seed=3), EyePart(both, "side", seed=4)
+    assert EyePose in [hears.kind for hears in first.hears]
+    assert EyePose not in [hears.kind for hears in second.hears]
+    for tick in range(1, 6):
+        snapshot = light(tick, CAR)
+        out = see(second, snapshot)
+        assert of(EyeTrack, out) == []
+        heard = [Incoming(pose, snapshot.t_ns) for pose in of(EyePose, out)]
+        told = first.step(snapshot.t_ns, [Incoming(snapshot, snapshot.t_ns), *heard])
+    assert set(of(EyeTrack, told)[0].cameras) == {"overhead", "side"}

@@ -1,0 +1,44 @@
+"""Where the roof tags of cars should be in a frame, from where their tracks say that they are."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.eye.camera import CameraModel
+from scm.eye.track.sighting import Track
+from scm.scenery.bodies import NIGEL, CarBody
+from scm.scenery.tags import CORNERS
+
+NEAR_PX = 20.0
+"""A tag's middle may be so far outside the frame: part of it may still be in."""
+
+
+def expected_tags(
+    model: CameraModel, tracks: Sequence[Track], bodies: Mapping[str, CarBody]
+) -> dict[int, Floats]:
+    """Return where tags should be, (4, 2) [px] by id, of the tracks that this camera may see.
+
+    Args:
+        model: The camera.
+        tracks: As they are when the frame is exposed.
+        bodies: Of the vehicles that are known; others are taken for Nigels.
+    """
+    if not tracks:
+        return {}
+    known = [bodies.get(track.vehicle, NIGEL) for track in tracks]
+    offsets = np.array([body.tag_position for body in known])
+    sizes = np.array([body.tag_size for body in known])
+    pose = np.array([(track.x_m, track.y_m, track.yaw_rad) for track in tracks])
+    on_car = CORNERS * sizes[:, None, None] + offsets[:, None, :2]
+    c, s = np.cos(pose[:, 2])[:, None], np.sin(pose[:, 2])[:, None]
+    points = np.empty((len(tracks), 4, 3))
+    points[..., 0] = pose[:, :1] + c * on_car[..., 0] - s * on_car[..., 1]
+    points[..., 1] = pose[:, 1:2] + s * on_car[..., 0] + c * on_car[..., 1]
+    points[..., 2] = offsets[:, 2:]
+    corners = model.project(points)
+    return {
+        track.tag_id: found
+        for track, found in zip(tracks, corners, strict=True)
+        if np.isfinite(found).all() and model.sees(found.mean(axis=0), -NEAR_PX)
+    }
