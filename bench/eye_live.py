@@ -80,7 +80,7 @@ def film_of(tilt_deg: float, seed: int) -> list[Shot]:
     """Return a film; the camera is the true one."""
     rng = np.random.default_rng([seed, 7])
     model = camera_over(CITY, (1920, 1080), 2.5, math.radians(tilt_deg))
-    cars = tours(CITY, CARS, SPEED_MPS, FRAMES / RATE_HZ, rng)
+    cars = tours(CITY, CARS, SPEED_MPS, FRAMES / RATE_HZ, rng, on_lanes=False)
     studio = Studio(CITY, model, LOOK, seed)
     times = [k / RATE_HZ for k in range(FRAMES)]
     return [studio.shoot([tour.at(t) for tour in cars], round(t * 1e9)) for t in times]
