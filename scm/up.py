@@ -144,7 +144,8 @@ def _parts(plan: _Plan, latched: Latched) -> list[Job]:
     cars = f"cars, walls, sensors, radio; {plan.hosted} hosted"
     eyes = [
         Job(eye_station(camera, first=camera == plan.cameras[0]), "part",
-            f"overhead camera {camera}: tags, poses, tracks", partial(scm, "eye", "--camera", camera))
+            f"overhead camera {camera}: tags, poses, tracks",
+            partial(scm, "eye", "--camera", camera))
         for camera in plan.cameras
     ]  # fmt: skip
     return [

@@ -29,6 +29,8 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
         frame_t_ns: Exposure of the newest frame, as text: it names the picture exactly, and is
             too long for a number in a browser. None: no frame yet.
         tags: Those of that frame, or of the newest detection when that frame was skipped.
+        good: Whether its poses can be trusted, by its own account; None: not said.
+        complaints: What is wrong, in sentences.
     """
 
     camera: str
@@ -39,11 +41,13 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
     latency_ms: float | None
     tags: tuple[TagSeen, ...]
     seen: tuple[SeenRow, ...]
+    good: bool | None
+    complaints: tuple[str, ...]
 
 
 def camera_rows(picture: Picture) -> tuple[CameraRow, ...]:
     """Return all cameras that were heard, by name."""
-    names = sorted({*picture.frames, *picture.tags})
+    names = sorted({*picture.frames, *picture.tags, *picture.eye_statuses})
     return tuple(_row(name, picture) for name in names)
 
 
@@ -67,6 +71,7 @@ def tags_of(picture: Picture, camera: str) -> Held[EyeTags] | None:
 
 def _row(camera: str, picture: Picture) -> CameraRow:
     frame, tags = frame_of(picture, camera), tags_of(picture, camera)
+    said = picture.eye_statuses.get(camera)
     return CameraRow(
         camera=camera,
         frame_t_ns=None if frame is None else str(frame.message.t_ns),
@@ -76,6 +81,8 @@ def _row(camera: str, picture: Picture) -> CameraRow:
         latency_ms=None if tags is None else round(tags.message.latency_ms, 1),
         tags=() if tags is None else tags.message.tags,
         seen=tuple(_seen(camera, picture)),
+        good=None if said is None else said.message.good,
+        complaints=() if said is None else tuple(one.said for one in said.message.complaints),
     )
 
 

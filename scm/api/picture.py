@@ -10,6 +10,7 @@ from scm.v2x.message import Message
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Spat
@@ -47,7 +48,7 @@ class Picture:
     Attributes:
         spats, monitors: By junction.
         trips: By vehicle.
-        frames, tags: By camera, the last few, oldest first.
+        frames, tags: By camera, the last few, oldest first; `eye_statuses` the newest.
         poses: By (camera, vehicle).
         stations: Everybody who is there, and who was lost lately.
         event_seq: Number of the newest event in the log; 0: none yet.
@@ -62,6 +63,7 @@ class Picture:
     trips: dict[str, Held[Trip]] = field(default_factory=dict)
     frames: dict[str, tuple[Held[EyeFrame], ...]] = field(default_factory=dict)
     tags: dict[str, tuple[Held[EyeTags], ...]] = field(default_factory=dict)
+    eye_statuses: dict[str, Held[EyeStatus]] = field(default_factory=dict)
     poses: dict[tuple[str, str], SeenPose] = field(default_factory=dict)
     stations: tuple[StationRow, ...] = ()
     event_seq: int = 0

@@ -24,6 +24,7 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
@@ -59,6 +60,7 @@ class CityView:
         self._trips: dict[str, Held[Trip]] = {}
         self._frames: dict[str, deque[Held[EyeFrame]]] = {}
         self._tags: dict[str, deque[Held[EyeTags]]] = {}
+        self._eye_statuses: dict[str, Held[EyeStatus]] = {}
         self._watched: Counter[tuple[str, str]] = Counter()
         self._camera_frames: dict[tuple[str, str], Held[CameraFrame]] = {}
         self._poses: dict[tuple[str, str], SeenPose] = {}
@@ -72,6 +74,7 @@ class CityView:
             EyeFrame: self._take_frame,
             EyeTags: self._take_tags,
             EyePose: self._take_pose,
+            EyeStatus: lambda m, t: self._eye_statuses.update({m.camera: Held(m, t)}),
             Presence: self._stations.presence,
             PartStatus: self._stations.status,
             CityEvent: lambda m, _: self._log.add(m),
@@ -113,6 +116,7 @@ class CityView:
                 trips=dict(self._trips),
                 frames={camera: tuple(frames) for camera, frames in self._frames.items()},
                 tags={camera: tuple(tags) for camera, tags in self._tags.items()},
+                eye_statuses=dict(self._eye_statuses),
                 poses=dict(self._poses),
                 stations=self._stations.rows(self._now_ns),
                 event_seq=self._log.newest_seq,

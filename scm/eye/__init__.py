@@ -1,8 +1,12 @@
-"""Overhead camera: a picture of the city becomes the poses of its cars.
+"""Overhead cameras: pictures of the city become the poses and tracks of its cars.
 
-camera      the lens: pixels to rays and back; source: where frames come from (sources/ has each)
-detect      finding tag36h11 tags in a frame
-anchor, pose    the floor's tag corrects the camera; each car's tag gives its pose with covariance
-render/     the city as seen from above
-part        EyePart: a snapshot's light in; tags, poses and frames out
+camera      the lens: pixels to rays and back; calibration: one that was measured
+source      the contract of what gives frames; sources/ has each; picture: files that may be damaged
+detect      finding tag36h11 tags in any frame; find/ the quick way for tags that are known
+anchor, pose    the floor's tags correct the camera; a roof's tag gives a car's pose with covariance
+watch       what is wrong with a camera, in words, while it runs
+track/      one estimate per car over all cameras; roofs: where its tag should be next
+calibrate/  `scm eye calibrate` and `scm eye locate`
+render/     the city as seen from above, with truth: `scm eye render`
+part        EyePart: a frame in; tags, poses, tracks, status and pictures out
 """

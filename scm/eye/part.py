@@ -43,6 +43,7 @@ from scm.v2x.messages.eye_status import Complaint, EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags, TagSeen
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
+TRACKS_PERIOD_NS = NS_PER_S // 20
 FRAME_PERIOD_NS = NS_PER_S // 5
 STATUS_PERIOD_NS = NS_PER_S // 2
 CPM_PERIOD_NS = NS_PER_S // 5
@@ -81,7 +82,7 @@ class EyePart:
         chosen = camera_of(city_map, camera)
         model = _model(chosen, lens)
         self.camera = model.camera.name
-        self.period_ns = round(NS_PER_S / model.camera.rate_hz)
+        self.period_ns = min(round(NS_PER_S / model.camera.rate_hz), TRACKS_PERIOD_NS)
         self.watch = Watch(Anchor(model, (city_map.tag, *tags)))
         self.tracks = Tracks()
         self.tells_tracks = chosen is city_map.cameras[0]

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from scm.arrays import Image
+from scm.clock import NS_PER_S
 from scm.eye.camera import CameraModel
 from scm.eye.render.car import draw_car
 from scm.eye.render.floor import draw_box, draw_scenery
@@ -20,6 +21,8 @@ from scm.maps.model import CityMap
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 NOISE_SHEETS = 2
+EARLY = 0.7
+"""Of its period, a picture may come so soon after the one before."""
 
 
 class SyntheticSource:
@@ -41,12 +44,18 @@ class SyntheticSource:
         self._taken_ns: int | None = None
 
     def take(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
-        """Return the picture at the snapshot's time, None if it was taken already."""
+        """Return the picture at the snapshot's time, None if the camera took one just before."""
         del now_ns
-        if light is None or light.t_ns == self._taken_ns:
+        if light is None or not self._is_due(light.t_ns):
             return None
         self._taken_ns = light.t_ns
         return Frame(light.t_ns, self.render(light))
+
+    def _is_due(self, t_ns: int) -> bool:
+        """Say whether a camera of this rate takes a picture now; snapshots come as they like."""
+        if self._taken_ns is None or t_ns < self._taken_ns:
+            return True
+        return (t_ns - self._taken_ns) * self._model.camera.rate_hz > EARLY * NS_PER_S
 
     def close(self) -> None:
         """Nothing to let go of."""

@@ -5,6 +5,7 @@ from scm.api.eye_rows import camera_rows, frame_of, tags_of
 from scm.api.signal_rows import junction_rows
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.eye_status import Complaint, EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags, TagSeen
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.trip import Trip
@@ -140,6 +141,15 @@ class TestEye:
         hear(1.0, tags(10, 1))
         (row,) = camera_rows(view.picture())
         assert (row.frame_t_ns, row.tags[0].tag_id) == (None, 1)
+
+    def test_what_a_camera_complains_of_is_told_even_without_a_frame(self, view, hear):
+        lens_cap = Complaint(code="black", said="the picture is black: lens cap on, or no light")
+        hear(1.0, EyeStatus(camera="overhead", t_ns=1, good=False, complaints=(lens_cap,)))
+        (row,) = camera_rows(view.picture())
+        assert (row.good, row.complaints) == (False, (lens_cap.said,))
+        hear(1.5, EyeStatus(camera="overhead", t_ns=2, good=True))
+        (row,) = camera_rows(view.picture())
+        assert (row.good, row.complaints) == (True, ())
 
     @pytest.mark.parametrize(("later_s", "count"), [(1.0, 1), (3.0, 0)])
     def test_poses_not_seen_for_two_seconds_go(self, view, hear, later_s, count):

@@ -45,8 +45,10 @@ def eye():
     return EyePart(CITY, seed=3)
 
 
-def test_it_steps_at_the_cameras_rate_and_hears_the_snapshot(eye):
-    assert eye.period_ns == PERIOD_NS
+def test_it_steps_often_enough_for_tracks_and_hears_the_snapshot(eye):
+    assert eye.period_ns == PERIOD_NS // 2
+    fast = msgspec.structs.replace(CITY.cameras[0], rate_hz=40.0)
+    assert EyePart(msgspec.structs.replace(CITY, cameras=(fast,))).period_ns == PERIOD_NS // 4
     assert [hears.kind for hears in eye.hears] == [WorldSnapshot]
 
 
@@ -59,6 +61,17 @@ def test_the_same_snapshot_is_not_pictured_twice():
     eye = EyePart(CITY)
     assert see(eye, light(1, CAR))
     assert of(EyeTags, eye.step(2 * PERIOD_NS, [])) == []
+
+
+def test_between_frames_tracks_go_on():
+    eye = EyePart(CITY, seed=3)
+    for tick in range(1, 6):
+        see(eye, light(tick, CAR))
+    soon = light(5, CAR).t_ns + PERIOD_NS // 2
+    out = eye.step(soon, [Incoming(msgspec.structs.replace(light(5, CAR), t_ns=soon), soon)])
+    assert of(EyeTags, out) == []
+    (track,) = of(EyeTrack, out)
+    assert (track.t_ns, track.age_s) == (soon, pytest.approx(0.05))
 
 
 def test_a_car_is_reported_where_it_stands_by_its_vehicle_name(eye):

@@ -38,6 +38,9 @@ function Camera({ of: camera }) {
         <span class=${behind > 1 ? "warn" : ""}>${span(behind)}</span>
       </span>
     </div>
+    ${camera.complaints.map(
+      (said) => html`<p key=${said} class="complaint ${camera.good ? "" : "warn"}" role="status">${said}</p>`,
+    )}
     <canvas
       ref=${canvas}
       class="picture"
