@@ -39,7 +39,8 @@ SEARCH_BLUR_PX = (3, 3)
 RESCUES = 6
 """Cut-outs of lost tags that the library searches in one frame."""
 _RESCUE_MARGIN = 0.75
-_MAX_BORDER = 2
+MAX_BORDER = 2
+"""Wrong cells put up with in the border of a tag, of 28."""
 _STRIP_OVERLAP = 1.9
 """Columns that strips share, in sides of the largest tag: its diagonal, and a margin."""
 _USUAL_SIDE = 1.0 / 18.0
@@ -144,7 +145,7 @@ class TagFinder:
         settings = self._settings
         good = (
             (verdicts[:, BITS] <= settings.max_hamming)
-            & (verdicts[:, BORDER] <= _MAX_BORDER)
+            & (verdicts[:, BORDER] <= MAX_BORDER)
             & (verdicts[:, MARGIN] >= settings.min_margin)
         )
         seen: list[TagSeen] = []
