@@ -7,6 +7,7 @@ both told.
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -130,9 +131,10 @@ class TagFinder:
             for tag_id, corners in expected.items()
             if 0 <= tag_id < TAG_COUNT and np.isfinite(corners).all()
         ]
+        told = {place.tag_id: place for place in known}
         for place in self._seen:
             now = _place(place.tag_id, place.corners + place.step, place.step)
-            if not any(now.is_near(other) for other in known):
+            if place.tag_id not in told or not now.is_near(told[place.tag_id]):
                 known.append(now)
         return known
 
@@ -201,18 +203,22 @@ class TagFinder:
         return measure_again(frame, self._settings, rough)
 
     def _remember(self, seen: Iterable[TagSeen]) -> None:
-        places = []
+        places: list[_Place] = []
+        before_by_id = defaultdict[int, list[_Place]](list)
+        for place in self._seen:
+            before_by_id[place.tag_id].append(place)
         for tag in seen:
             corners = np.array(tag.corners_px)
             now = _place(tag.tag_id, corners)
-            before = next((old for old in self._seen if old.is_near(now)), now)
-            places.append(_place(tag.tag_id, corners, corners - before.corners))
+            before = next((old for old in before_by_id[tag.tag_id] if old.is_near(now)), now)
+            step = corners - before.corners
+            places.append(_Place(tag.tag_id, corners, step, now.middle, now.side))
         self._seen = places
 
 
 def _sighting(tag_id: int, corners: Floats, margin: float) -> TagSeen:
     """Return a tag of measured corners; its centre is where their diagonals meet."""
-    a, b, c, d = ((float(x), float(y)) for x, y in corners)
+    a, b, c, d = ((x, y) for x, y in corners.tolist())
     ux, uy, vx, vy = c[0] - a[0], c[1] - a[1], d[0] - b[0], d[1] - b[1]
     share = ((b[0] - a[0]) * vy - (b[1] - a[1]) * vx) / (ux * vy - uy * vx)
     centre = (a[0] + share * ux, a[1] + share * uy)

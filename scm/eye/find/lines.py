@@ -7,8 +7,12 @@ corner i to the next; `offsets[i]` says how far its two ends are to be moved out
 
 import math
 
+import numpy as np
+
 from scm.arrays import Floats, Image
 from scm.vehicles.jit import array_kernel, inlined
+
+_ROUNDING = 1e-6
 
 
 @inlined
@@ -23,6 +27,16 @@ def grey_at(grey: Image, x: float, y: float) -> float:
     upper = (1.0 - u) * grey[top, left] + u * grey[top, right]
     lower = (1.0 - u) * grey[bottom, left] + u * grey[bottom, right]
     return float((1.0 - v) * upper + v * lower)
+
+
+@inlined
+def _grey_within(grey: Image, x: float, y: float) -> float:
+    """Return the grey between four pixels that are all in the frame."""
+    left, top = np.uint32(x), np.uint32(y)
+    u, v = x - left, y - top
+    upper = grey[top, left] + u * (grey[top, left + 1] - float(grey[top, left]))
+    lower = grey[top + 1, left] + u * (grey[top + 1, left + 1] - float(grey[top + 1, left]))
+    return float(upper + v * (lower - upper))
 
 
 @array_kernel
@@ -45,6 +59,13 @@ def look_across(
     nx, ny = -dy / length, dx / length
     x, y = quad[side, 0] + along * dx, quad[side, 1] + along * dy
     step = 2.0 * reach / (len(out) - 1)
+    height, width = grey.shape
+    margin_x, margin_y = reach * abs(nx) + _ROUNDING, reach * abs(ny) + _ROUNDING
+    if margin_x <= x < width - 1.0 - margin_x and margin_y <= y < height - 1.0 - margin_y:
+        for m in range(len(out)):
+            s = m * step - reach
+            out[m] = _grey_within(grey, x + s * nx, y + s * ny)
+        return
     for m in range(len(out)):
         s = m * step - reach
         out[m] = grey_at(grey, x + s * nx, y + s * ny)
