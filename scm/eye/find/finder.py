@@ -152,12 +152,15 @@ class TagFinder:
         )
         seen: list[TagSeen] = []
         lost: list[_Place] = []
+        by_id: dict[int, list[TagSeen]] = {}
         for place, corners, verdict, is_good in zip(places, found, verdicts, good, strict=True):
             if not is_good:
                 lost.append(place)
                 continue
             tag = _sighting(place.tag_id, corners, float(verdict[MARGIN]))
-            if not any(is_same(tag, other) for other in seen):
+            twins = by_id.setdefault(place.tag_id, [])
+            if not any(is_same(tag, other) for other in twins):
+                twins.append(tag)
                 seen.append(tag)
         return seen, lost
 
