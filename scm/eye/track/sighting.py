@@ -1,9 +1,18 @@
 """What a camera says of a car, and what is told of a track."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scm.arrays import Floats
+import numpy as np
+
+from scm.arrays import Bools, Floats
 from scm.geometry import Pose2
+from scm.scenery.tags import TAG_COUNT
+
+FARTHEST_M = 1e4
+LARGEST_STD = 100.0
+LEAST_STD = 1e-6
+"""Of a sighting's own noise, [m] and [rad]: with less, two that differ cannot both be true."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,6 +39,30 @@ class Sighting:
     shared: Floats | None = None
     lean: Floats | None = None
     flags: tuple[str, ...] = ()
+
+    def doubts(self) -> tuple[Floats, Floats, Floats]:
+        """Return what the covariance is made of, (3, 3) each: own noise, `shared` and `lean`.
+
+        A camera that does not tell its part is taken to have nearly all of it in common.
+        """
+        lean = np.zeros((3, 3)) if self.lean is None else self.lean
+        shared = 0.98 * (self.covariance - lean) if self.shared is None else self.shared
+        return self.covariance - shared - lean, shared, lean
+
+
+def usable(sightings: Sequence[Sighting]) -> Bools:
+    """Return which sightings are numbers that a filter can take, (n,); any may come over a bus."""
+    if not sightings:
+        return np.zeros(0, dtype=np.bool_)
+    poses = np.array([one.pose for one in sightings], dtype=np.float64)
+    with np.errstate(invalid="ignore", over="ignore"):
+        doubts = np.array([one.doubts() for one in sightings])
+        doubts = (doubts + doubts.swapaxes(2, 3)) / 2.0
+    good = np.isfinite(poses).all(axis=1) & (np.abs(poses) < FARTHEST_M).all(axis=1)
+    good &= (np.abs(doubts) < LARGEST_STD**2).all(axis=(1, 2, 3))
+    good &= np.array([0 <= one.tag_id < TAG_COUNT for one in sightings])
+    least = np.linalg.eigvalsh(np.where(good[:, None, None, None], doubts, 0.0))[..., 0]
+    return np.asarray(good & (least > (LEAST_STD**2, -(LEAST_STD**2), -(LEAST_STD**2))).all(axis=1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,7 +5,7 @@ kept for `LATE_NS`: a frame that belongs before some of them is put there, and t
 again.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from itertools import groupby
 
 import numpy as np
@@ -14,7 +14,7 @@ from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.eye.track.fleet import KINDS, Fleet
 from scm.eye.track.motion import STATES
-from scm.eye.track.sighting import Sighting, Track
+from scm.eye.track.sighting import Sighting, Track, usable
 from scm.eye.track.update import taken_in
 from scm.geometry import wrap_angle
 
@@ -24,6 +24,7 @@ LATE_NS = 100 * NS_PER_MS
 AHEAD_NS = 50 * NS_PER_MS
 """Frames further in the future are of a clock that is wrong."""
 SURE_COUNT = 3
+MOST_CAMERAS, MOST_CARS = 8, 1000
 OVERLAP_M = 0.05
 """The rear axles of two cars cannot be nearer than this."""
 
@@ -32,26 +33,32 @@ class Tracks:
     """Where all cars are.
 
     Attributes:
-        refused: How many sightings were not taken: too late, from the future, or not numbers.
+        refused: How many sightings were not taken: too late, from the future, no usable numbers,
+            of a camera that is none of ours, or of one car too many.
+
+    Args:
+        cameras: Whose sightings are taken; None: of the first `MOST_CAMERAS` that come.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, cameras: Collection[str] | None = None) -> None:
+        self._cameras = None if cameras is None else frozenset(cameras)
         self.refused = 0
         self._before = Fleet()
         self._recent: list[tuple[int, tuple[Sighting, ...], Fleet]] = []
 
     def see(self, sightings: Iterable[Sighting], now_ns: int) -> None:
         """Take in sightings of one or several frames, not later than `now_ns`."""
-        good = []
-        for one in sightings:
-            fit = one.t_ns <= now_ns + AHEAD_NS and np.isfinite(one.covariance).all()
-            if fit and np.isfinite(one.pose).all():
-                good.append(one)
-            else:
-                self.refused += 1
+        told = list(sightings)
+        good = [one for one, can in zip(told, usable(told), strict=True)
+                if can and self._is_ours(one, now_ns)]  # fmt: skip
+        self.refused += len(told) - len(good)
         good.sort(key=lambda one: (one.t_ns, one.camera))
         for (t_ns, _), frame in groupby(good, key=lambda one: (one.t_ns, one.camera)):
-            self._take(t_ns, tuple(frame))
+            one_frame = tuple(frame)
+            taken = self._with_room(one_frame)
+            self.refused += len(one_frame) - len(taken)
+            if taken:
+                self._take(t_ns, taken)
         self._forget(now_ns)
 
     def at(self, t_ns: int) -> tuple[Track, ...]:
@@ -69,6 +76,20 @@ class Tracks:
             _track(fleet, int(row), t_ns, mean[i], covariance[i], bool(wrong[i]))
             for i, row in enumerate(rows)
         )
+
+    def _is_ours(self, one: Sighting, now_ns: int) -> bool:
+        """Say whether a sighting is of now, and of a camera of ours."""
+        ours = self._cameras is None or one.camera in self._cameras
+        return ours and now_ns - DROPPED_NS <= one.t_ns <= now_ns + AHEAD_NS
+
+    def _with_room(self, frame: tuple[Sighting, ...]) -> tuple[Sighting, ...]:
+        """Return the sightings of a frame that are of known cars, or of new ones with room left."""
+        fleet = self._fleet()
+        if frame[0].camera not in fleet.cameras and len(fleet.cameras) >= MOST_CAMERAS:
+            return ()
+        new = {one.vehicle: None for one in frame if one.vehicle not in fleet.vehicles}
+        over = set(list(new)[max(0, MOST_CARS - len(fleet.vehicles)) :])
+        return tuple(one for one in frame if one.vehicle not in over) if over else frame
 
     def _fleet(self) -> Fleet:
         return self._recent[-1][2] if self._recent else self._before

@@ -61,32 +61,22 @@ def _say(fleet: Fleet, row: int, kind: str, t_ns: int) -> None:
     fleet.said_ns[row, KINDS.index(kind)] = t_ns + SAID_NS
 
 
-def _shared(sighting: Sighting) -> Floats:
-    """Return the camera's part of the doubt, (3, 3), by default nearly all of it."""
-    lean = np.zeros((3, 3)) if sighting.lean is None else sighting.lean
-    return 0.98 * (sighting.covariance - lean) if sighting.shared is None else sighting.shared
-
-
-def _white(sighting: Sighting) -> Floats:
-    lean = 0.0 if sighting.lean is None else sighting.lean
-    return sighting.covariance - _shared(sighting) - lean
-
-
 def _begin(fleet: Fleet, row: int, sighting: Sighting) -> None:
     """Start a track, or start it anew elsewhere."""
     camera = fleet.cameras.index(sighting.camera)
-    place, shared = fleet.place(camera), _shared(sighting)
+    place = fleet.place(camera)
+    white, shared, lean = sighting.doubts()
     fleet.mean[row] = 0.0
     fleet.mean[row, :3] = sighting.pose
     fleet.covariance[row] = 0.0
-    fleet.covariance[row, :STATES, :STATES] = first_covariance(_white(sighting) + shared)
+    fleet.covariance[row, :STATES, :STATES] = first_covariance(white + shared)
     fleet.covariance[row, place, place] = shared
     fleet.covariance[row, :3, place] = -shared
     fleet.covariance[row, place, :3] = -shared
     fleet.shared[row, camera] = shared
     fleet.seen_ns[row] = 0
     fleet.seen_ns[row, camera] = fleet.t_ns[row] = fleet.came_ns[row] = sighting.t_ns
-    fleet.lean[row] = 0.0 if sighting.lean is None else sighting.lean
+    fleet.lean[row] = lean
     fleet.count[row], fleet.rival[row] = 1, 0
 
 
@@ -108,13 +98,13 @@ def _measure(fleet: Fleet, rows: Ints, frame: list[Sighting]) -> None:
     camera = fleet.cameras.index(frame[0].camera)
     times = np.array([one.t_ns for one in frame])
     mean, covariance = fleet.predicted(rows, times)
-    shared = np.array([_shared(one) for one in frame])
+    white, shared, lean = np.array([one.doubts() for one in frame]).swapaxes(0, 1)
     _doubt_camera(fleet, rows, camera, covariance, shared)
     place = fleet.place(camera)
     seen = np.array([one.pose for one in frame])
     moved = np.hypot(*(mean[:, :2] - fleet.mean[rows, :2]).T) / STILL_M
     still = 1.0 + 1.0 / (1.0 + moved**2)
-    noise = np.array([_white(one) for one in frame]) * still[:, None, None]
+    noise = white * still[:, None, None]
     off = seen - mean[:, :3] - mean[:, place]
     off[:, 2] = np.remainder(off[:, 2] + math.pi, 2.0 * math.pi) - math.pi
     spread = covariance[:, :, :3] + covariance[:, :, place]
@@ -136,10 +126,7 @@ def _measure(fleet: Fleet, rows: Ints, frame: list[Sighting]) -> None:
     fleet.seen_ns[good, camera] = times[fits]
     fleet.count[good] += 1
     fleet.rival[good, 2] = 1
-    for row, one in zip(good, np.flatnonzero(fits), strict=True):
-        lean = frame[one].lean
-        if lean is not None:
-            fleet.lean[row] = lean
+    fleet.lean[good] = lean[fits]
     _put_aside(fleet, rows, frame, fits)
 
 

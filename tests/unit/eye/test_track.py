@@ -1,6 +1,7 @@
 """Tracks: motion between sightings, order, gates, identity, hand-over, age."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from scm.eye.track.motion import predict
 from scm.eye.track.perception import collective_perception
 from scm.eye.track.sighting import Sighting
-from scm.eye.track.tracks import DROPPED_NS, Tracks
+from scm.eye.track.tracks import DROPPED_NS, MOST_CAMERAS, MOST_CARS, Tracks
 from scm.geometry import Pose2
 from scm.v2x.message import decode, encode
 from scm.v2x.messages.cpm_tx import CpmTx
@@ -21,8 +22,8 @@ SHARED = np.diag([1e-3, 1e-3, 1e-3]) ** 2
 
 def saw(x, y, frame, yaw=0.0, camera="a", vehicle="n1", tag_id=1, **more):
     return Sighting(
-        camera, tag_id, vehicle, START_NS + frame * FRAME_NS, Pose2(x, y, yaw), WHITE + SHARED,
-        SHARED, **more,
+        camera, tag_id, vehicle, START_NS + frame * FRAME_NS, Pose2(x, y, yaw),
+        WHITE + SHARED + more.get("lean", 0.0), SHARED, **more,
     )  # fmt: skip
 
 
@@ -231,7 +232,7 @@ def test_a_car_passes_from_one_camera_to_another_without_a_jump():
 def test_lean_that_all_cameras_share_is_never_less_than_itself():
     tracks, lean = Tracks(), np.diag([4e-4, 4e-4, 0.0]) ** 2
     last = drive(tracks, 60, lean=lean)
-    assert only(tracks, last).covariance[0, 0] > lean[0, 0] + 0.8 * (SHARED - lean)[0, 0]
+    assert only(tracks, last).covariance[0, 0] > lean[0, 0] + 0.8 * SHARED[0, 0]
 
 
 def test_fifty_cars_keep_their_own_names():
@@ -260,3 +261,49 @@ def test_tracks_are_told_as_collective_perception_in_its_own_units():
 
 def only_named(tracks, t_ns, name):
     return next(track for track in tracks.at(t_ns) if track.vehicle == name)
+
+
+HUGE, NOUGHT = np.full((3, 3), 1e300), np.zeros((3, 3))
+HOSTILE = {
+    "not a number": {"covariance": np.full((3, 3), np.nan)},
+    "huge": {"covariance": HUGE},
+    "negative": {"covariance": -WHITE},
+    "without doubt": {"covariance": NOUGHT, "shared": NOUGHT, "lean": NOUGHT},
+    "endless shared": {"shared": np.full((3, 3), np.inf)},
+    "lean not a number": {"lean": np.full((3, 3), np.nan)},
+    "more shared than all": {"shared": 2.0 * (WHITE + SHARED)},
+    "far away": {"pose": Pose2(1e300, 0.0, 0.0)},
+    "no such tag": {"tag_id": 2**60},
+    "long ago": {"t_ns": -(2**80)},
+    "far in the future": {"t_ns": 2**80},
+}
+
+
+@pytest.mark.parametrize("changed", HOSTILE.values(), ids=HOSTILE)
+@pytest.mark.parametrize("first", [False, True])
+def test_a_sighting_that_cannot_be_is_refused_and_harms_no_track(changed, first):
+    tracks = Tracks()
+    last = START_NS if first else drive(tracks, 5)
+    bad = replace(saw(0.0, 0.5, 5, camera="b"), t_ns=last, vehicle="n2")
+    told = [replace(bad, **{"vehicle": name, **changed}) for name in ("n1", "n1", "n2", "n2")]
+    for one in told:
+        tracks.see([one], last)
+    assert tracks.refused == len(told)
+    if not first:
+        assert only(tracks, last).x_m == pytest.approx(0.26 * 4 * FRAME_NS * 1e-9, abs=1e-3)
+
+
+def test_names_that_never_end_fill_neither_cameras_nor_cars():
+    tracks = Tracks()
+    tracks.see([saw(0.0, 0.5, 0, camera=f"c{i}") for i in range(MOST_CAMERAS + 9)], START_NS)
+    cars = [saw(0.0, 0.5, 1, camera="c0", vehicle=f"v{i}") for i in range(MOST_CARS + 9)]
+    tracks.see(cars[: MOST_CARS + 5], START_NS + FRAME_NS)
+    tracks.see(cars[MOST_CARS + 5 :], START_NS + FRAME_NS)
+    assert tracks.refused == 9 + 10
+    assert len(tracks.at(START_NS + FRAME_NS)) == MOST_CARS
+
+
+def test_only_cameras_of_the_city_are_heard_where_they_are_known():
+    tracks = Tracks(cameras=("a", "b"))
+    tracks.see([saw(0.0, 0.5, 0, camera="z")], START_NS)
+    assert (tracks.refused, tracks.at(START_NS)) == (1, ())
