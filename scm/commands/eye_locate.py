@@ -97,6 +97,7 @@ def _block(place: "Place") -> str:
         f"{name} = {getattr(camera, name):.6f}".ljust(28) + f"# +-{deviation:.6f}"
         for name, deviation in zip(NAMES, place.deviations, strict=True)
     ]
+    place_std = ", ".join(f"{deviation:.3g}" for deviation in place.deviations)
     lens = [f'lens = "{camera.lens}"'] if camera.lens != "pinhole" else []
     numbers = [
         f"{name} = {getattr(camera, name)!r}"
@@ -105,7 +106,10 @@ def _block(place: "Place") -> str:
     rest = [f"{name} = {getattr(camera, name)!r}" for name in ("rate_hz", "noise_sigma")]
     bent = f"distortion = [{', '.join(repr(value) for value in camera.distortion)}]"
     return "\n".join(
-        ["[[cameras]]", f'name = "{camera.name}"', *stated, *numbers, *lens, bent, *rest]
+        [
+            *("[[cameras]]", f'name = "{camera.name}"', *stated, f"place_std = [{place_std}]"),
+            *(*numbers, *lens, bent, *rest),
+        ]
     )
 
 

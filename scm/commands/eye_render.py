@@ -56,6 +56,7 @@ def _size(text: str) -> tuple[int, int]:
 
 def _run(arguments: argparse.Namespace) -> int:
     import cv2
+    import msgspec
     import numpy as np
 
     from scm.eye.render.scene import camera_over, camera_toml
@@ -69,6 +70,8 @@ def _run(arguments: argparse.Namespace) -> int:
         city_map, arguments.size, arguments.height_m, math.radians(arguments.tilt_deg),
         arguments.focal_px, fisheye=arguments.fisheye,
     )  # fmt: skip
+    taken = {"rate_hz": arguments.rate_hz, "noise_sigma": arguments.noise_sigma}
+    camera = msgspec.structs.replace(model.camera, **taken)
     rng = np.random.default_rng([arguments.seed, *b"traffic"])
     cars = tours(
         city_map, arguments.cars, arguments.speed_mps, arguments.frames / arguments.rate_hz, rng,
@@ -76,7 +79,7 @@ def _run(arguments: argparse.Namespace) -> int:
     )  # fmt: skip
     studio = Studio(city_map, model, _look(arguments), arguments.seed)
     arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / CAMERA).write_text(camera_toml(model.camera), encoding="utf-8")
+    (arguments.out / CAMERA).write_text(camera_toml(camera), encoding="utf-8")
     kind = "png" if arguments.jpeg is None else "jpg"
     how = [] if arguments.jpeg is None else [cv2.IMWRITE_JPEG_QUALITY, arguments.jpeg]
     with (arguments.out / TRUTH).open("w", encoding="utf-8") as truth:

@@ -80,6 +80,7 @@ class Anchor:
     """The corrected camera, frame after frame.
 
     Attributes:
+        tolerance: Of the calibration; None: what the camera says of it, else the usual.
         tags: Of the map; the first defines its frame. One tag alone may be given bare.
         model: The camera where it now seems to be.
         covariance: Of its extrinsics, (6, 6), followed by its lens if that is in doubt, (15, 15).
@@ -89,7 +90,7 @@ class Anchor:
 
     calibrated: CameraModel
     tags: tuple[MapTag, ...] | MapTag
-    tolerance: Tolerance = field(default_factory=Tolerance)
+    tolerance: Tolerance | None = None
     corner_std_px: float = CORNER_STD_PX
     model: CameraModel = field(init=False)
     covariance: Floats = field(init=False)
@@ -108,11 +109,18 @@ class Anchor:
         self.model = self.calibrated
         count = PLACE if self.calibrated.lens_covariance is None else len(STEPS)
         self.covariance = np.zeros((count, count))
-        self.covariance[:PLACE, :PLACE] = np.diag(self.tolerance.deviations() ** 2)
+        self.covariance[:PLACE, :PLACE] = np.diag(self._deviations() ** 2)
         if self.calibrated.lens_covariance is not None:
             self.covariance[PLACE:, PLACE:] = self.calibrated.lens_covariance
         self._base = parameters(self.model)[:count], self.covariance
         self.probes = self._probes()
+
+    def _deviations(self) -> Floats:
+        """Return the standard deviations of the calibration's place, (6,) [m] and [rad]."""
+        stated = self.calibrated.camera.place_std
+        if self.tolerance is None and stated is not None:
+            return np.array(stated)
+        return (self.tolerance or Tolerance()).deviations()
 
     @property
     def tag(self) -> MapTag:

@@ -231,6 +231,10 @@ def _faults(camera: Camera, lens_covariance: Floats | None) -> list[str]:
         "cy_px": (camera.cy_px, 0 <= camera.cy_px < camera.height_px, "inside the frame"),
         "z_m": (camera.z_m, camera.z_m > 0.0, "above the floor"),
         "rate_hz": (camera.rate_hz, camera.rate_hz > 0.0, "above 0"),
+        "place_std": (
+            camera.place_std, all(0.0 < std < math.inf for std in camera.place_std or ()),
+            "six above 0",
+        ),
         "noise_sigma": (camera.noise_sigma, camera.noise_sigma >= 0.0, "at least 0"),
         "distortion[4]": (fifth, camera.lens == "pinhole" or fifth == 0.0, "0 for a fisheye"),
         "lens_covariance": (shape, shape in {None, square}, f"shape {square}"),

@@ -19,6 +19,7 @@ import numpy as np
 from scm.arrays import Floats, Image
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.eye.anchor import Anchor
+from scm.eye.camera import CameraModel
 from scm.eye.sharpness import EdgeWidth, edge_width
 from scm.maps.model import MapTag
 from scm.v2x.messages.eye_status import Complaint
@@ -76,6 +77,8 @@ class Watch:
         self._changed_ns = 0
         self._bump: str | None = None
         self._anchored_ns: int | None = None
+        self._doubted: CameraModel | None = None
+        self._doubt_m = 0.0
 
     def see(self, t_ns: int, grey: Image, corners: Mapping[int, Floats]) -> None:
         """Take a frame, (height, width), and the corners of the tags found in it, (4, 2) [px]."""
@@ -94,6 +97,7 @@ class Watch:
             self._judge_blur(tag_id, grey, found)
         self._judge_place(ours)
         self._judge_bump(t_ns)
+        self._judge_doubt()
 
     def complaints(self, now_ns: int) -> tuple[Complaint, ...]:
         """Return all that is wrong now, sorted by code."""
@@ -200,6 +204,17 @@ class Watch:
             self._bump, self._anchored_ns = None, None
             return
         self._said["re_anchored"] = f"{self._bump}; {anchored}"
+
+    def _judge_doubt(self) -> None:
+        """Say when poses may be off by more than may pass unsaid, without anything having moved."""
+        if self.anchor.model is not self._doubted:
+            self._doubted, self._doubt_m = self.anchor.model, self.anchor.doubt_m()
+        seen = self.anchor.seen_ns is not None
+        if seen and self._bump is None and self._doubt_m > WORTH_M:
+            self._said["unsure"] = (
+                f"the camera's place is known so that poses are good to {2e3 * self._doubt_m:.1f} "
+                "mm only: locate it with more tags, far apart"
+            )
 
     def _judge_place(self, ours: Mapping[int, Floats]) -> None:
         """Say when tags are of another size, or elsewhere, than the calibration has them."""

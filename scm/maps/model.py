@@ -336,6 +336,8 @@ class Camera(Record, kw_only=True, frozen=True):
         tilt_x_rad, tilt_y_rad: Small rotations about the picture's x and y away from straight down.
         lens: `fisheye` is OpenCV's model of wide lenses (angle, not tangent, over the picture).
         distortion: k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4, 0.
+        place_std: Standard deviations of x, y, z [m], yaw, tilt x, tilt y [rad], as `scm eye
+            locate` found them; without, the Eye takes millimetres and half a milliradian.
     """
 
     name: str
@@ -355,6 +357,7 @@ class Camera(Record, kw_only=True, frozen=True):
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
     rate_hz: float = 10.0
     noise_sigma: float = 2.0
+    place_std: tuple[float, float, float, float, float, float] | None = None
 
 
 class CityMap(Record, kw_only=True, frozen=True):

@@ -86,6 +86,8 @@ def camera_toml(camera: Camera) -> str:
     lines = ["[[cameras]]"]
     for name in camera.__struct_fields__:
         value = getattr(camera, name)
+        if value is None:
+            continue
         if isinstance(value, str):
             said = f'"{value}"'
         elif isinstance(value, tuple):

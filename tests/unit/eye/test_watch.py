@@ -3,6 +3,7 @@
 import math
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 
@@ -227,3 +228,22 @@ def test_a_tag_that_moves_back_and_forth_once_stays_suspect_with_one_tag(picture
     camera.see(1)
     camera.bump(*(-value for value in BUMPS["3 mm aside"]))
     assert camera.see(20) == ["bumped"]
+
+
+def test_a_camera_whose_place_is_known_poorly_is_said_to_be_unsure_until_more_tags_are_seen():
+    std = (0.015, 0.018, 0.015, 0.0027, 0.0065, 0.0065)
+    doubted = camera_model(msgspec.structs.replace(CITY.cameras[0], place_std=std))
+    watch = Watch(Anchor(doubted, FOUR))
+    grey = np.full((720, 1280), 128, dtype=np.uint8)
+    one = {CITY.tag.tag_id: watch.anchor.expected(CITY.tag)}
+    for frame in range(3):
+        watch.see(frame * PERIOD_NS, grey, one)
+    assert "unsure" in watch.flags(0)
+    watch.see(3 * PERIOD_NS, grey, {tag.tag_id: watch.anchor.expected(tag) for tag in FOUR})
+    assert "unsure" not in watch.flags(0)
+
+
+def test_a_camera_without_stated_doubt_is_sure_with_one_tag():
+    watch = Watch(Anchor(TRUE, (CITY.tag,)))
+    watch.see(0, np.full((720, 1280), 128, dtype=np.uint8), {0: watch.anchor.expected(CITY.tag)})
+    assert "unsure" not in watch.flags(0)
