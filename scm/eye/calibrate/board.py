@@ -88,11 +88,13 @@ class View:
         name: Of the picture, for reports.
         points: Places on the board, (n, 3) [m], z 0.
         pixels: Where they were found, (n, 2) [px].
+        tags: Whether each four are where straight lines through the sides of a tag meet.
     """
 
     name: str
     points: Floats
     pixels: Floats
+    tags: bool = False
 
 
 def find_board(board: Board, grey: Image, name: str) -> View | None:
@@ -109,7 +111,8 @@ def find_board(board: Board, grey: Image, name: str) -> View | None:
     straight = np.linalg.matrix_rank(flat - flat.mean(axis=0), tol=1e-6 * board.square_m) < 2
     if straight:
         return None
-    return View(name, np.column_stack((flat, np.zeros(len(flat)))), pixels)
+    points = np.column_stack((flat, np.zeros(len(flat))))
+    return View(name, points, pixels, tags=board.kind == "tags")
 
 
 def chessboard_corners(board: Board) -> Floats:

@@ -7,7 +7,8 @@ left is the information about the lens alone,
     I = sum over views of  A^T A - A^T B (B^T B)^-1 B^T A      A: by lens, B: by pose
 
 and s^2 I^-1 its covariance, where s is the noise of a corner's coordinate as the residuals show.
-Points and views far off the rest are taken out, the worst first. A distortion term that the views
+Points and views far off the rest are taken out, the worst first. Corners of tags are then put right
+for the bow of their sides, and all is done once more. A distortion term that the views
 cannot tell better than +-1 is left out: no lens has one that large, and it would run wild outside.
 """
 
@@ -20,6 +21,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats
 from scm.errors import EyeError
+from scm.eye.calibrate.bend import along_sides, unbent
 from scm.eye.calibrate.board import LEAST_POINTS, View
 from scm.eye.calibration import LENS_NAMES, Calibration
 from scm.eye.camera import LENS_PARAMETERS
@@ -152,8 +154,17 @@ def solve(
     Raises:
         EyeError: No lens fits, or far too many views do not fit the same one.
     """
+    solution = _solved(tuple(views), size, fisheye, progress)
+    if not any(view.tags for view in views):
+        return solution
+    return _solved(_unbent(views, solution), size, fisheye, progress)
+
+
+def _solved(
+    views: tuple[View, ...], size: tuple[int, int], fisheye: bool, progress: Callable[[str], None]
+) -> Solution:
     progress("solving")
-    solution = _settle(_start(tuple(views), size, fisheye))
+    solution = _settle(_start(views, size, fisheye))
     for term in _OPTIONAL[solution.lens.kind]:
         progress("solving")
         solution = _without_blunders(solution, len(views))
@@ -162,6 +173,24 @@ def solve(
         solution = _settle(_without(solution, term))
     solution = _without_blunders(solution, len(views))
     return replace(solution, said=(*solution.said, *_points_out(solution, views)))
+
+
+def _unbent(views: Sequence[View], solution: Solution) -> tuple[View, ...]:
+    """Return the views with the corners of tags where the lens shows them, as far as it is known.
+
+    A view that was taken out as a whole stays as it is.
+    """
+    poses = dict(zip((view.name for view in solution.views), solution.poses, strict=True))
+    changed = []
+    for view in views:
+        if view.tags and view.name in poses:
+            pose, sides = poses[view.name], along_sides(view.points.reshape(-1, 4, 3))
+            corners = solution.lens.see(view.points, pose)[0]
+            seen = solution.lens.see(sides.reshape(-1, 3), pose)[0]
+            changed.append(unbent(view, corners, seen.reshape(*sides.shape[:3], 2)))
+        else:
+            changed.append(view)
+    return tuple(changed)
 
 
 def inverse(information: Floats, free: Bools) -> Floats:

@@ -19,6 +19,10 @@ LENS = Camera(
     name="lab", x_m=0.0, y_m=0.0, z_m=1.0, width_px=800, height_px=500,
     fx_px=660.0, fy_px=663.0, cx_px=404.0, cy_px=246.0, distortion=(-0.15, 0.05, 5e-4, -4e-4, 0.0),
 )  # fmt: skip
+WIDE = Camera(
+    name="lab", x_m=0.0, y_m=0.0, z_m=1.0, width_px=800, height_px=500, lens="fisheye",
+    fx_px=330.0, fy_px=331.0, cx_px=404.0, cy_px=246.0, distortion=(-0.03, 0.01, -0.004, 5e-4, 0.0),
+)  # fmt: skip
 SQUARE_M, CELL_PX, MARGIN_PX = 0.03, 48, 48
 BOARDS = {
     "chessboard": Board("chessboard", 9, 6, SQUARE_M),
@@ -52,11 +56,14 @@ def page_of(kind):
 def rays_of(camera, fine):
     rows, columns = camera.height_px * fine, camera.width_px * fine
     pixels = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1)
-    model, pixels = camera_model(camera), (pixels + 0.5) / fine - 0.5
+    model, flat = camera_model(camera), ((pixels + 0.5) / fine - 0.5).reshape(-1, 1, 2)
     # a few of the model's own rounds do for a picture, and it has a million of them
     few = (cv2.TERM_CRITERIA_COUNT, 12, 0.0)
-    flat = pixels.reshape(-1, 1, 2)
-    ideal = cv2.undistortPoints(flat, model.matrix, model.distortion, None, None, None, few)
+    if camera.lens == "fisheye":
+        bent = model.distortion[:4]
+        ideal = cv2.fisheye.undistortPoints(flat, model.matrix, bent, criteria=few)
+    else:
+        ideal = cv2.undistortPoints(flat, model.matrix, model.distortion, None, None, None, few)
     ideal = ideal.reshape(pixels.shape)
     return np.concatenate((ideal, np.ones((rows, columns, 1))), axis=-1)
 
@@ -79,16 +86,23 @@ def picture(kind, camera, turn, middle, rng):
 def stances(count, lean, rng, camera):
     """Turns and middles of boards over the frame, in OpenCV's camera axes."""
     places = [(0.3, 0.3), (0.7, 0.3), (0.5, 0.5), (0.3, 0.7), (0.7, 0.7), (0.5, 0.3), (0.5, 0.7)]
+    wide = camera.lens == "fisheye"
+    if wide:
+        places += [(0.15, 0.15), (0.85, 0.15), (0.85, 0.85), (0.15, 0.85)]
     for i in range(count):
         across, down = places[i % len(places)]
         side = 2.4 * i
         far = camera.fx_px * 0.27 / camera.width_px / (0.5 if i % 3 else 0.7)
-        x = (across * camera.width_px - camera.cx_px) / camera.fx_px
-        y = (down * camera.height_px - camera.cy_px) / camera.fy_px
-        ray = np.array([x, y, 1.0])
-        middle = ray * far
+        pixel = np.array([[across * camera.width_px, down * camera.height_px]])
+        ray = np.append(camera_model(camera).undistort(pixel)[0], 1.0)
         tilt = lean * rng.uniform(0.7, 1.0)
-        yield (np.cos(side) * tilt, np.sin(side) * tilt, rng.uniform(-0.3, 0.3)), middle
+        turn = np.array([np.cos(side) * tilt, np.sin(side) * tilt, rng.uniform(-0.3, 0.3)])
+        if wide:  # the board faces the camera from there, but for its lean
+            angle = np.arctan(np.hypot(*ray[:2]))
+            ray /= np.linalg.norm(ray)
+            aside = angle * np.array([-ray[1], ray[0], 0.0]) / np.hypot(*ray[:2])
+            turn = cv2.Rodrigues(cv2.Rodrigues(aside)[0] @ cv2.Rodrigues(turn)[0])[0].ravel()
+        yield turn, ray * far
 
 
 @pytest.fixture(scope="module")
@@ -121,11 +135,13 @@ def words(kind, paths, out, *more):
 
 
 @pytest.mark.parametrize(
-    ("kind", "camera"), [("chessboard", LENS), ("charuco", LENS), ("tags", LENS)]
+    ("kind", "camera"),
+    [("chessboard", LENS), ("charuco", LENS), ("tags", LENS), ("charuco", WIDE), ("tags", WIDE)],
 )
 def test_a_lens_is_recovered_from_pictures_within_its_doubt(shots, tmp_path, kind, camera, capsys):
     out = tmp_path / "lens.toml"
-    said = main(words(kind, shots(kind, camera, 14, 0.6), out)), capsys.readouterr()
+    more, count = (["--fisheye"], 22) if camera.lens == "fisheye" else ([], 14)
+    said = main(words(kind, shots(kind, camera, count, 0.6), out, *more)), capsys.readouterr()
     assert said[0] == 0, said[1]
     found = load_calibration(out)
     truth = np.array([camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, *camera.distortion])
