@@ -26,10 +26,9 @@ from scm.arrays import Floats
 from scm.clock import NS_PER_MS
 from scm.eye.camera import CameraModel
 from scm.eye.detect import CORNER_STD_PX
-from scm.geometry import Pose2
 from scm.log import event
 from scm.maps.model import MapTag
-from scm.scenery.tags import tag_corners
+from scm.scenery.tags import floor_corners
 
 LOGGER = logging.getLogger(__name__)
 AVERAGED_FRAMES = 20
@@ -171,7 +170,7 @@ class Anchor:
 
     def expected(self, tag: MapTag, model: CameraModel | None = None) -> Floats:
         """Return where the corners of a map tag should be, (4, 2) [px]; by default from now."""
-        return (model or self.model).project(_on_floor(tag))
+        return (model or self.model).project(floor_corners(tag))
 
     def doubt_m(self) -> float:
         """Return the largest deviation of a roof's place over the frame, from the camera alone."""
@@ -209,7 +208,7 @@ class Anchor:
     def _solve(self) -> None:
         tags = [one for one in self.map_tags if one.tag_id in self._averages]
         corners = np.array([self._averages[one.tag_id].corners for one in tags])
-        points = np.array([_on_floor(one) for one in tags])
+        points = np.array([floor_corners(one) for one in tags])
         start, prior = self._base
         noise = self._noise(tags, points)
         prior = self._if_knocked(corners, points, prior, noise)
@@ -287,11 +286,6 @@ def _changed(model: CameraModel, values: Floats) -> CameraModel:
     )
     matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     return replace(moved, camera=camera, matrix=matrix, distortion=np.array(camera.distortion))
-
-
-def _on_floor(tag: MapTag) -> Floats:
-    pose = Pose2(tag.x_m, tag.y_m, tag.yaw_rad)
-    return np.array([(*pose.apply(x, y), 0.0) for x, y in tag_corners(tag.size_m)])
 
 
 def _lifted(places: Floats, height: float) -> Floats:

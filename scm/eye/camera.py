@@ -232,7 +232,8 @@ def _faults(camera: Camera, lens_covariance: Floats | None) -> list[str]:
         "z_m": (camera.z_m, camera.z_m > 0.0, "above the floor"),
         "rate_hz": (camera.rate_hz, camera.rate_hz > 0.0, "above 0"),
         "place_std": (
-            camera.place_std, all(0.0 < std < math.inf for std in camera.place_std or ()),
+            camera.place_std,
+            all(0.0 < std < math.inf for std in camera.place_std or ()),
             "six above 0",
         ),
         "noise_sigma": (camera.noise_sigma, camera.noise_sigma >= 0.0, "at least 0"),

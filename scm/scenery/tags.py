@@ -12,6 +12,8 @@ import numpy as np
 
 from scm.arrays import Floats, Image
 from scm.errors import EyeError
+from scm.geometry import Pose2
+from scm.maps.model import MapTag
 
 CELLS = 8
 MARGIN_CELLS = 1
@@ -25,6 +27,12 @@ PRINT_SCALE = (CELLS + 2 * MARGIN_CELLS) / CELLS
 def tag_corners(size: float) -> Floats:
     """Return the corners of the black square in the tag's frame, (4, 2) [m]."""
     return CORNERS * size
+
+
+def floor_corners(tag: MapTag) -> Floats:
+    """Return the corners of a tag that lies on the floor, in the map frame, (4, 3) [m]."""
+    pose = Pose2(tag.x_m, tag.y_m, tag.yaw_rad)
+    return np.array([(*pose.apply(x, y), 0.0) for x, y in tag_corners(tag.size_m)])
 
 
 @lru_cache(maxsize=64)

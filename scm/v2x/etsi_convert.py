@@ -107,9 +107,14 @@ def _clamp(value: float, low: int, high: int) -> int:
     return max(low, min(high, round(value)))
 
 
+def its_ms(t_ns: int) -> int:
+    """Return TimestampIts: milliseconds since 2004, leap seconds counted."""
+    return t_ns // NS_PER_MS - _ITS_EPOCH_MS + _LEAP_MS
+
+
 def delta_time(t_ns: int) -> int:
-    """Return generationDeltaTime: ITS milliseconds (since 2004, leap seconds counted) mod 65536."""
-    return (t_ns // NS_PER_MS - _ITS_EPOCH_MS + _LEAP_MS) % _DELTA_TIMES
+    """Return generationDeltaTime: `its_ms` mod 65536."""
+    return its_ms(t_ns) % _DELTA_TIMES
 
 
 def generated_ns(body: CamBody, near_ns: int) -> int:

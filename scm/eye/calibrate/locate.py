@@ -24,9 +24,9 @@ from scm.arrays import Floats
 from scm.errors import EyeError
 from scm.eye.camera import LARGEST_TILT_RAD, LENS_PARAMETERS, CameraModel, camera_model
 from scm.eye.detect import CORNER_STD_PX
-from scm.geometry import Pose2, wrap_angle
+from scm.geometry import wrap_angle
 from scm.maps.model import Camera, CityMap, MapTag, Record
-from scm.scenery.tags import tag_corners
+from scm.scenery.tags import TAG_COUNT, floor_corners
 from scm.v2x.messages.eye_tags import TagSeen
 
 NAMES = ("x_m", "y_m", "z_m", "yaw_rad", "tilt_x_rad", "tilt_y_rad")
@@ -118,12 +118,27 @@ def known_tags(city_map: CityMap, more: Path | None = None) -> dict[int, MapTag]
             raise EyeError(
                 f"{more}: tag {tag.id}: expected each once, got it again or as the map's"
             )
-        if not tag.size_m > 0.0:
-            raise EyeError(f"{more}: tag {tag.id}: size_m: expected above 0, got {tag.size_m}")
+        faults = _faults(tag)
+        if faults:
+            raise EyeError(f"{more}: tag {tag.id}: {'; '.join(faults)}")
         tags[tag.id] = MapTag(
             tag_id=tag.id, x_m=tag.x_m, y_m=tag.y_m, yaw_rad=tag.yaw_rad, size_m=tag.size_m
         )
     return tags
+
+
+def _faults(tag: _Tag) -> list[str]:
+    numbers = {"x_m": tag.x_m, "y_m": tag.y_m, "yaw_rad": tag.yaw_rad}
+    faults = [
+        f"{name}: expected a number, got {got}"
+        for name, got in numbers.items()
+        if not math.isfinite(got)
+    ]
+    if not 0 <= tag.id < TAG_COUNT:
+        faults.append(f"id: expected 0 to {TAG_COUNT - 1}")
+    if not 0.0 < tag.size_m < math.inf:
+        faults.append(f"size_m: expected above 0, got {tag.size_m}")
+    return faults
 
 
 def locate(
@@ -163,7 +178,7 @@ def locate(
 
 def off_px(model: CameraModel, tag: MapTag, corners: Floats) -> Floats:
     """Return how far a tag's corners are from where a camera should see them, (4, 2) [px]."""
-    return corners - model.project(_on_floor(tag))
+    return corners - model.project(floor_corners(tag))
 
 
 def _levelled(camera: Camera) -> Camera:
@@ -173,15 +188,10 @@ def _levelled(camera: Camera) -> Camera:
     return msgspec.structs.replace(camera, **place, **turn)
 
 
-def _on_floor(tag: MapTag) -> Floats:
-    pose = Pose2(tag.x_m, tag.y_m, tag.yaw_rad)
-    return np.array([(*pose.apply(x, y), 0.0) for x, y in tag_corners(tag.size_m)])
-
-
 def _places(
     model: CameraModel, tags: Mapping[int, MapTag], known: Mapping[int, Floats], noise: float
 ) -> list[Place]:
-    points = np.concatenate([_on_floor(tags[tag_id]) for tag_id in known])
+    points = np.concatenate([floor_corners(tags[tag_id]) for tag_id in known])
     pixels = np.concatenate(list(known.values()))
     settled: list[Floats] = []
     for start in _starts(model, points, pixels):

@@ -21,6 +21,7 @@ from scm.eye.sources.folder import RATE_HZ, FolderSource
 from scm.eye.sources.live import LiveSource
 from scm.eye.sources.mjpeg import MjpegCapture
 
+LONGEST_DELAY_S = 10.0
 FORMS = (
     "0 or /dev/video0 (USB), csi:0, rtsp://..., http://... (MJPEG), "
     "a film, a picture, a folder of pictures, bus:CAMERA"
@@ -48,6 +49,9 @@ def source_of(
         EyeError: It names nothing that can be one, now or later.
         MessageError: `bus:` and a name that may not stand in a key.
     """
+    if not 0.0 <= delay_s < LONGEST_DELAY_S:
+        longest = round(LONGEST_DELAY_S * 1e3)
+        raise EyeError(f"--delay-ms: expected 0 to {longest}, got {delay_s * 1e3:g}")
     live = _live(text, size_px, rate_hz, delay_s)
     if live is not None:
         return live

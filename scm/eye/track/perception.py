@@ -7,7 +7,7 @@ from scm.clock import NS_PER_MS
 from scm.eye.track.sighting import Track
 from scm.scenery.bodies import NIGEL, CarBody
 from scm.v2x.etsi import REFERENCE_LATITUDE_DEG, REFERENCE_LONGITUDE_DEG, SCALE
-from scm.v2x.etsi_convert import station_id
+from scm.v2x.etsi_convert import its_ms, station_id
 from scm.v2x.etsi_cpm import (
     MOST_OBJECTS,
     Altitude,
@@ -33,8 +33,6 @@ from scm.v2x.messages.cpm_tx import CpmTx
 
 SURELY = 1.96
 """Deviations within which 95 % lie."""
-ITS_EPOCH_MS = 1_072_915_200_000
-LEAP_MS = 5_000
 TURN_CLASSES_DEG = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 COORDINATE_MOST, COORDINATE_BEYOND = 131_071, 4095
 VELOCITY_MOST, BEYOND, TURN_MOST, LENGTH_MOST = 16_382, 126, 255, 255
@@ -57,7 +55,7 @@ def collective_perception(
     sensors = tuple(SensorInformation(sensor_id=index) for index in range(len(cameras)))
     objects = (_perceived(one, cameras, t_ns, body) for one in told)
     container = ManagementContainer(
-        reference_time=max(0, t_ns // NS_PER_MS - ITS_EPOCH_MS + LEAP_MS),
+        reference_time=max(0, its_ms(t_ns)),
         reference_position=ReferencePosition(
             latitude=round(REFERENCE_LATITUDE_DEG * 1e7),
             longitude=round(REFERENCE_LONGITUDE_DEG * 1e7),

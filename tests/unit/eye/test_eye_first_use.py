@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from scm.__main__ import main
+from scm.errors import EyeError
+from scm.eye.calibrate.locate import known_tags
 from scm.eye.part import EyePart
 from scm.eye.sources.choose import source_of
 from scm.maps.load import load_map
@@ -74,3 +76,10 @@ def test_a_camera_located_by_one_small_tag_is_believed_no_more_than_it_may_be(
     status, off = played(city_map, film)
     assert "unsure" in [one.code for one in status.complaints]
     assert np.mean(off[:, :2] ** 2 / off[:, 2:]) < 2.0
+
+
+def test_tags_that_cannot_lie_on_a_floor_are_refused_each_with_its_reason(tmp_path):
+    told = tmp_path / "tags.toml"
+    told.write_text("[[tags]]\nid = 999\nx_m = nan\ny_m = 0.0\nsize_m = inf\n", encoding="utf-8")
+    with pytest.raises(EyeError, match=r"tag 999: x_m: .*got nan; id: .* 586; size_m: .*got inf"):
+        known_tags(load_map("driving_school"), told)

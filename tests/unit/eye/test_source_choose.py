@@ -77,3 +77,9 @@ def test_a_camera_that_is_not_there_yet_is_waited_for():
         assert source.take(0, None) is None
     finally:
         source.close()
+
+
+@pytest.mark.parametrize("delay_s", [float("nan"), -0.1, float("inf")])
+def test_a_delay_that_cannot_be_is_refused(delay_s):
+    with pytest.raises(EyeError, match="--delay-ms: expected 0 to 10000, got"):
+        source_of("bus:roof", delay_s=delay_s)
