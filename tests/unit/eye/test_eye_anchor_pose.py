@@ -119,6 +119,17 @@ def test_a_corner_far_off_the_square_is_left_out():
     assert found.misfit < 0.1
 
 
+def test_a_spoiled_corner_among_noisy_ones_is_left_out_too():
+    rng, anchor = np.random.default_rng(5), Anchor(TRUE, CITY.tag)
+    for spoiled in range(4):
+        corners = TRUE.project(tag_on_roof(car(1.0, 0.5, 0.4)))
+        corners += 0.02 * rng.standard_normal((4, 2))
+        corners[spoiled] += (1.5, -1.0)
+        found = car_pose(anchor, NIGEL, corners)
+        assert (found.pose.x, found.pose.y) == pytest.approx((1.0, 0.5), abs=2e-4)
+        assert found.misfit < 2.0
+
+
 def test_corners_that_are_no_square_are_doubted_or_refused():
     exact = TRUE.project(tag_on_roof(car(1.0, 0.5, 0.4)))
     middle = exact.mean(axis=0)
