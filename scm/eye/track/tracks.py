@@ -20,11 +20,12 @@ from scm.geometry import wrap_angle
 
 STALE_NS = NS_PER_S // 2
 DROPPED_NS = 5 * NS_PER_S
-LATE_NS = 100 * NS_PER_MS
+LATE_NS = 300 * NS_PER_MS
+"""A network camera's frames come so much later than another's; what is older is refused."""
 AHEAD_NS = 50 * NS_PER_MS
 """Frames further in the future are of a clock that is wrong."""
 SURE_COUNT = 3
-MOST_CAMERAS, MOST_CARS = 8, 1000
+MOST_CAMERAS, MOST_CARS, MOST_TOLD = 8, 1000, 2000
 OVERLAP_M = 0.05
 """The rear axles of two cars cannot be nearer than this."""
 
@@ -32,37 +33,56 @@ OVERLAP_M = 0.05
 class Tracks:
     """Where all cars are.
 
-    Attributes:
-        refused: How many sightings were not taken: too late, from the future, no usable numbers,
-            of a camera that is none of ours, or of one car too many.
-
     Args:
         cameras: Whose sightings are taken; None: of the first `MOST_CAMERAS` that come.
     """
 
     def __init__(self, cameras: Collection[str] | None = None) -> None:
         self._cameras = None if cameras is None else frozenset(cameras)
-        self.refused = 0
+        self._refused = 0
+        self._told: list[Sighting] = []
+        self._now_ns = 0
         self._before = Fleet()
         self._recent: list[tuple[int, tuple[Sighting, ...], Fleet]] = []
 
     def see(self, sightings: Iterable[Sighting], now_ns: int) -> None:
-        """Take in sightings of one or several frames, not later than `now_ns`."""
+        """Take sightings of one or several frames, not later than `now_ns`.
+
+        A frame may be told in several calls: it is taken in when somebody asks.
+        """
         told = list(sightings)
         good = [one for one, can in zip(told, usable(told), strict=True)
                 if can and self._is_ours(one, now_ns)]  # fmt: skip
-        self.refused += len(told) - len(good)
+        self._refused += len(told) - len(good)
+        self._told += good
+        self._now_ns = now_ns
+        if len(self._told) > MOST_TOLD:
+            self._catch_up()
+
+    @property
+    def refused(self) -> int:
+        """How many sightings were not taken: too late, from the future, no usable numbers.
+
+        Also those of a camera that is none of ours, or of one camera or car too many.
+        """
+        self._catch_up()
+        return self._refused
+
+    def _catch_up(self) -> None:
+        """Take in what was told since the last time: of a frame, all at once."""
+        good, self._told = self._told, []
         good.sort(key=lambda one: (one.t_ns, one.camera))
         for (t_ns, _), frame in groupby(good, key=lambda one: (one.t_ns, one.camera)):
             one_frame = tuple(frame)
             taken = self._with_room(one_frame)
-            self.refused += len(one_frame) - len(taken)
+            self._refused += len(one_frame) - len(taken)
             if taken:
                 self._take(t_ns, taken)
-        self._forget(now_ns)
+        self._forget(self._now_ns)
 
     def at(self, t_ns: int) -> tuple[Track, ...]:
         """Return every track as it is at a time, those out of sight included."""
+        self._catch_up()
         fleet = self._fleet()
         rows = np.flatnonzero(fleet.t_ns >= t_ns - DROPPED_NS)
         if not len(rows):
@@ -97,7 +117,7 @@ class Tracks:
     def _take(self, t_ns: int, frame: tuple[Sighting, ...]) -> None:
         newest = self._recent[-1][0] if self._recent else t_ns
         if t_ns < newest - LATE_NS:
-            self.refused += len(frame)
+            self._refused += len(frame)
             return
         later = [one for one in self._recent if one[0] > t_ns]
         del self._recent[len(self._recent) - len(later) :]

@@ -121,7 +121,7 @@ def test_late_frames_of_another_camera_give_what_they_would_have_given_in_time()
 
 def test_a_frame_that_comes_too_late_or_from_the_future_is_refused_and_counted():
     tracks = Tracks()
-    last = drive(tracks, 10)
+    last = drive(tracks, 15)
     tracks.see([saw(0.0, 0.5, 1)], last)
     tracks.see([saw(0.0, 0.5, 30)], last)
     tracks.see([saw(math.nan, 0.5, 10)], last)
@@ -307,3 +307,33 @@ def test_only_cameras_of_the_city_are_heard_where_they_are_known():
     tracks = Tracks(cameras=("a", "b"))
     tracks.see([saw(0.0, 0.5, 0, camera="z")], START_NS)
     assert (tracks.refused, tracks.at(START_NS)) == (1, ())
+
+
+def told_late(tracks, late_ns, apart):
+    """Two cameras see ten cars stand; the second tells each car by itself, and later."""
+    for frame in range(12):
+        seen = [saw(0.2 * i, 0.5, frame, vehicle=f"n{i}", tag_id=i) for i in range(10)]
+        now = seen[0].t_ns
+        tracks.see(seen, now)
+        late = [replace(one, camera="b", t_ns=one.t_ns - late_ns) for one in seen]
+        for some in [[one] for one in late] if apart else [late]:
+            tracks.see(some, now)
+    return now
+
+
+def test_a_frame_that_is_told_car_by_car_is_taken_in_as_one(monkeypatch):
+    frames = []
+    monkeypatch.setattr(
+        "scm.eye.track.tracks.taken_in", lambda fleet, frame: frames.append(len(frame)) or fleet
+    )
+    tracks = Tracks()
+    now = told_late(tracks, 0, apart=True)
+    tracks.at(now)
+    assert set(frames) == {10}
+
+
+def test_a_network_camera_that_is_a_fifth_of_a_second_late_is_heard():
+    tracks = Tracks()
+    now = told_late(tracks, 200_000_000, apart=False)
+    assert tracks.refused == 0
+    assert {frozenset(track.cameras) for track in tracks.at(now)} == {frozenset("ab")}
