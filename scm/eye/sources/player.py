@@ -3,11 +3,14 @@
 from typing import Protocol
 
 from scm.arrays import Image
+from scm.clock import NS_PER_S
 from scm.errors import EyeError
 from scm.eye.source import Frame
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 MOST_LEFT_OUT = 30
+HOLD_NS = NS_PER_S
+"""A picture that cannot be used is told of so long, or nobody would hear of a single one."""
 
 
 class Reel(Protocol):
@@ -64,6 +67,7 @@ class Player:
         self._loop = loop
         self._started_ns: int | None = None
         self._size: tuple[int, int] | None = None
+        self._spoiled_ns: int | None = None
         self._closed = False
 
     def take(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
@@ -99,17 +103,22 @@ class Player:
             self.trouble = f"{self._name}: over"
         return started_ns, next_ns
 
+    def _spoil(self, said: str, t_ns: int) -> None:
+        self.trouble, self._spoiled_ns = said, t_ns
+
     def _show(self, t_ns: int) -> Frame | None:
         try:
             image = self._reel.show()
         except EyeError as cause:
-            self.trouble = str(cause)
+            self._spoil(str(cause), t_ns)
             return None
         size = (image.shape[1], image.shape[0])
         self._size = self._size or size
         if size != self._size:
             was, now = (f"{width} x {height}" for width, height in (self._size, size))
-            self.trouble = f"{self._name}: size changed from {was} to {now} px: frames left out"
+            said = f"{self._name}: size changed from {was} to {now} px: frames left out"
+            self._spoil(said, t_ns)
             return None
-        self.trouble = None
+        if self._spoiled_ns is None or t_ns - self._spoiled_ns >= HOLD_NS:
+            self.trouble = None
         return Frame(t_ns, image)

@@ -69,13 +69,15 @@ def test_a_loop_goes_on_with_the_mean_pace(folder):
 
 
 def test_a_damaged_picture_is_said_and_the_next_one_is_shown(folder):
-    path = folder("0.jpg", "1.jpg", "2.jpg")
+    path = folder(*(f"{i}.jpg" for i in range(12)))
     (path / "1.jpg").write_bytes((path / "1.jpg").read_bytes()[:-30])
     source = FolderSource(path, rate_hz=10.0)
     assert source.take(0, None)
     assert source.take(100 * NS_PER_MS, None) is None
     assert source.trouble.startswith(f"{path / '1.jpg'}: expected a whole JPEG, got one cut short")
     assert source.take(200 * NS_PER_MS, None)
+    assert "cut short" in source.trouble  # long enough for a status that is told twice a second
+    assert source.take(1_100 * NS_PER_MS, None)
     assert source.trouble is None
 
 
