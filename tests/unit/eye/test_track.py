@@ -122,6 +122,7 @@ def test_late_frames_of_another_camera_give_what_they_would_have_given_in_time()
 def test_a_frame_that_comes_too_late_or_from_the_future_is_refused_and_counted():
     tracks = Tracks()
     last = drive(tracks, 15)
+    tracks.at(last)
     tracks.see([saw(0.0, 0.5, 1)], last)
     tracks.see([saw(0.0, 0.5, 30)], last)
     tracks.see([saw(math.nan, 0.5, 10)], last)
