@@ -18,8 +18,9 @@ import msgspec
 import numpy as np
 
 from scm.arrays import Floats
-from scm.errors import EyeError, nearest
+from scm.errors import EyeError, MessageError, nearest
 from scm.maps.model import Camera, CityMap
+from scm.v2x.key import check_name
 
 LARGEST_TILT_RAD = math.radians(45.0)
 LENS_PARAMETERS = 9
@@ -223,6 +224,7 @@ def _faults(camera: Camera, lens_covariance: Floats | None) -> list[str]:
     fifth, shape = camera.distortion[4], None if lens_covariance is None else lens_covariance.shape
     square = (LENS_PARAMETERS, LENS_PARAMETERS)
     checks: dict[str, tuple[object, bool, str]] = {
+        "name": (camera.name, _may_be_told(camera.name), "1 to 32 of a-z 0-9 _ -, and not pose"),
         "width_px": (camera.width_px, camera.width_px >= 16, "at least 16"),
         "height_px": (camera.height_px, camera.height_px >= 16, "at least 16"),
         "fx_px": (camera.fx_px, camera.fx_px > 0.0, "above 0"),
@@ -246,6 +248,14 @@ def _faults(camera: Camera, lens_covariance: Floats | None) -> list[str]:
     return [
         f"{k}: expected {want}, got {got}" for k, (got, good, want) in checks.items() if not good
     ]
+
+
+def _may_be_told(name: str) -> bool:
+    """Return whether a camera of that name has keys of its own: `eye/pose/...` is the tracks'."""
+    try:
+        return check_name(name, "camera") != "pose"
+    except MessageError:
+        return False
 
 
 def _refuse_folding(model: CameraModel) -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from scm.errors import EyeError
 from scm.eye.camera import camera_model
+from scm.maps.load import load_map
 from scm.maps.model import Camera
 
 PLAIN = Camera(
@@ -93,3 +94,10 @@ def test_all_faults_of_a_camera_are_named_at_once():
 def test_a_lens_whose_picture_folds_back_is_refused():
     with pytest.raises(EyeError, match=r"distortion: expected .* grows outwards .* folds back"):
         camera_model(msgspec.structs.replace(PLAIN, distortion=(-1.2, 0.0, 0.0, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize("name", ["Over Head", "", "pose", "a/b"])
+def test_a_camera_whose_name_cannot_stand_in_a_key_is_refused(name):
+    camera = msgspec.structs.replace(load_map("driving_school").cameras[0], name=name)
+    with pytest.raises(EyeError, match=r"name: expected 1 to 32 of a-z 0-9 _ -, and not pose, got"):
+        camera_model(camera)
