@@ -1,17 +1,20 @@
 """What the Eye finds, how exactly and how soon, beside the AprilTag library and OpenCV's detector.
 
-The finder alone (`eye_find`), then the whole Eye on films with known truth (`eye_live`).
+The finder alone (`eye_find`), then the whole Eye on films with known truth (`eye_live`), then what
+the finder's memory grows by (`eye_memory`).
 `python -m bench.eye_wrong_ids` looks for tags where there are none, for minutes.
 """
 
-from bench import eye_find, eye_live
+from bench import eye_find, eye_live, eye_memory
 
 
 def main() -> None:
-    """Print both."""
+    """Print all three."""
     eye_find.main()
     print()
     eye_live.main()
+    print()
+    eye_memory.main()
 
 
 if __name__ == "__main__":

@@ -139,6 +139,18 @@ def row(name: str, judged: Judged) -> str:
     return "".join(cells)
 
 
+def verdicts(judged: Judged) -> list[tuple[str, float, float]]:
+    """Return what is asked of tracks and steps: its name, what was measured, and the limit."""
+    place, turn = np.array(judged.place["track"]) * 1e3, np.degrees(judged.turn["track"])
+    return [
+        ("position rms mm", float(np.sqrt((place**2).mean())), 1.5),
+        ("position 95 % mm", float(np.percentile(place, 95)), 3.0),
+        ("yaw rms deg", float(np.sqrt((turn**2).mean())), 0.25),
+        ("yaw 95 % deg", float(np.percentile(np.abs(turn), 95)), 0.5),
+        ("step ms", float(np.median(judged.step_ms)), 15.0),
+    ]
+
+
 def main() -> None:
     """Print the tables."""
     cv2.setNumThreads(1)
@@ -147,6 +159,7 @@ def main() -> None:
     heads = "tilt", "pose rms", "pose 95", "track rms", "track 95", "square", "within 95"
     print("| " + " | ".join((*heads, "found", "step ms")) + " |")
     print("|---|---|---|---|---|---|---|---|---|")
+    good = []
     for tilt in (0.0, 10.0, 20.0):
         judged = Judged()
         for draw in range(DRAWS):
@@ -154,6 +167,11 @@ def main() -> None:
             rng = np.random.default_rng([draw, 11])
             watch(shots, guessed(shots[0], rng), judged)
         print(row(f"{tilt:.0f} deg", judged), flush=True)
+        good.append((tilt, verdicts(judged)))
+    for tilt, each in good:
+        for name, value, most in each:
+            verdict = "pass" if value < most else "FAIL"
+            print(f"bar: tilted {tilt:.0f} deg, {name}: {value:.2f} (below {most:g}): {verdict}")
 
 
 if __name__ == "__main__":

@@ -41,8 +41,7 @@ def growth(step: Callable[[int], None], count: int) -> tuple[float, float]:
     return (marks[1] - marks[0]) / half, (marks[2] - marks[1]) / half
 
 
-def main() -> None:
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+def main(count: int = 1000) -> None:
     cv2.setNumThreads(1)
     ((grey, true),) = frames(1920, 1)
     part = np.ascontiguousarray(grey[PART])
@@ -74,4 +73,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(*(int(word) for word in sys.argv[1:]))
