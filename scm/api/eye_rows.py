@@ -1,13 +1,22 @@
 """The overhead cameras as they are shown: which frame is newest, its tags, and pose residuals."""
 
+from typing import TypedDict
+
 import msgspec
 
 from scm.api.picture import Held, Picture
 from scm.api.residual import Residual
 from scm.v2x.messages.eye_frame import EyeFrame
+from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags, TagSeen
 
 POSE_SHOWN_S = 2.0
+SILENT_S = 2.0
+
+
+class _Status(TypedDict):
+    good: bool | None
+    complaints: tuple[str, ...]
 
 
 class SeenRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -81,9 +90,18 @@ def _row(camera: str, picture: Picture) -> CameraRow:
         latency_ms=None if tags is None else round(tags.message.latency_ms, 1),
         tags=() if tags is None else tags.message.tags,
         seen=tuple(_seen(camera, picture)),
-        good=None if said is None else said.message.good,
-        complaints=() if said is None else tuple(one.said for one in said.message.complaints),
+        **_status(said, picture.now_ns),
     )
+
+
+def _status(said: Held[EyeStatus] | None, now_ns: int) -> _Status:
+    """Return what a camera says of itself; one that says nothing any more is not good."""
+    if said is None:
+        return {"good": None, "complaints": ()}
+    age_s, complaints = said.age_s(now_ns), tuple(one.said for one in said.message.complaints)
+    if age_s > SILENT_S:
+        return {"good": False, "complaints": (f"no word from this camera for {age_s:.0f} s",)}
+    return {"good": said.message.good, "complaints": complaints}
 
 
 def _seen(camera: str, picture: Picture) -> list[SeenRow]:

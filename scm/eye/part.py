@@ -36,22 +36,31 @@ from scm.part import Hears, IsWanted
 from scm.scenery.bodies import NIGEL, CarBody, car_body
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
+from scm.v2x.messages.cpm_tx import CpmTx
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_preview import EyePreview
 from scm.v2x.messages.eye_status import Complaint, EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags, TagSeen
+from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 TRACKS_PERIOD_NS = NS_PER_S // 20
 FRAME_PERIOD_NS = NS_PER_S // 5
 STATUS_PERIOD_NS = NS_PER_S // 2
 CPM_PERIOD_NS = NS_PER_S // 5
+EARLY_NS, AWAIT_NS = 4 * NS_PER_MS, 2 * NS_PER_MS
+LOST_PERIODS, LOST_NS = 3, 20 * NS_PER_MS
+"""After so many periods without a frame it is looked for less often."""
 SOURCE = "source"
 
 
 class EyePart:
     """One overhead camera.
+
+    Attributes:
+        period_ns: Until its next step; where frames come from outside, they are awaited closely
+            once they are due, so that a pose does not wait for the clock.
 
     Args:
         city_map: The city it looks at.
@@ -82,16 +91,19 @@ class EyePart:
         chosen = camera_of(city_map, camera)
         model = _model(chosen, lens)
         self.camera = model.camera.name
-        self.period_ns = min(round(NS_PER_S / model.camera.rate_hz), TRACKS_PERIOD_NS)
+        self._camera_ns = round(NS_PER_S / model.camera.rate_hz)
+        self.period_ns = min(self._camera_ns, TRACKS_PERIOD_NS)
         self.watch = Watch(Anchor(model, (city_map.tag, *tags)))
-        self.tracks = Tracks()
+        self.tracks = Tracks([one.name for one in city_map.cameras])
         self.tells_tracks = chosen is city_map.cameras[0]
         self.name = eye_station(self.camera, first=self.tells_tracks)
         self._finder = TagFinder(settings)
         self._source = source or _emulated(city_map, model, seed)
+        self._is_awaited = source is not None
+        self._came_ns = 0
         self._light: WorldSnapshot | None = None
         self._is_wanted: IsWanted = _nobody
-        self._due_ns = {EyeFrame: 0, EyeStatus: 0, type(self): 0}
+        self._due_ns: dict[type[Message], int] = {EyeFrame: 0, EyeStatus: 0, EyeTrack: 0, CpmTx: 0}
         self.hears = (
             Hears(WorldSnapshot),
             *([Hears(EyePose)] if self.tells_tracks and len(city_map.cameras) > 1 else []),
@@ -104,10 +116,12 @@ class EyePart:
             self._hear(item, now_ns)
         frame = self._source.take(now_ns, self._light)
         out = [] if frame is None else self._look(frame, now_ns)
-        if self.tells_tracks:
+        if self.tells_tracks and (self._is_due(EyeTrack, now_ns, TRACKS_PERIOD_NS) or out):
             out += self._tracked(now_ns)
         if self._is_due(EyeStatus, now_ns, STATUS_PERIOD_NS):
             out.append(self._status(now_ns))
+        if self._is_awaited:
+            self.period_ns = self._pause_ns(now_ns, came=frame is not None)
         return out
 
     def learn_wishes(self, is_wanted: IsWanted) -> None:
@@ -119,6 +133,16 @@ class EyePart:
         del now_ns
         self._source.close()
         return []
+
+    def _pause_ns(self, now_ns: int, *, came: bool) -> int:
+        """Return how long to rest: until a camera's next frame is nearly due, then hardly."""
+        if came:
+            self._came_ns = now_ns
+        since_ns = now_ns - self._came_ns
+        rest_ns = self._camera_ns - EARLY_NS - since_ns
+        if rest_ns > AWAIT_NS:
+            return min(rest_ns, TRACKS_PERIOD_NS)
+        return AWAIT_NS if since_ns < LOST_PERIODS * self._camera_ns else LOST_NS
 
     def _hear(self, item: Incoming, now_ns: int) -> None:
         if isinstance(item.message, WorldSnapshot):
@@ -172,7 +196,7 @@ class EyePart:
     def _tracked(self, now_ns: int) -> list[Outgoing]:
         tracks = self.tracks.at(now_ns)
         told: list[Outgoing] = [track_message(track) for track in tracks]
-        if tracks and self._is_due(type(self), now_ns, CPM_PERIOD_NS):
+        if tracks and self._is_due(CpmTx, now_ns, CPM_PERIOD_NS):
             told.append(collective_perception(tracks, self.name, now_ns))
         return told
 
@@ -200,9 +224,9 @@ class EyePart:
             told.append(EyePreview(payload=preview(frame.image, tags, names, said), **size))
         return told
 
-    def _is_due(self, kind: type, now_ns: int, period_ns: int) -> bool:
+    def _is_due(self, kind: type[Message], now_ns: int, period_ns: int) -> bool:
         """Say whether something is to be told now, once a period, half a step early at most."""
-        if now_ns < self._due_ns[kind] - self.period_ns // 2:
+        if now_ns < self._due_ns[kind] - min(self._camera_ns, TRACKS_PERIOD_NS) // 2:
             return False
         self._due_ns[kind] = now_ns + period_ns
         return True

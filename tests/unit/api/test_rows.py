@@ -150,6 +150,9 @@ class TestEye:
         hear(1.5, EyeStatus(camera="overhead", t_ns=2, good=True))
         (row,) = camera_rows(view.picture())
         assert (row.good, row.complaints) == (True, ())
+        hear(4.5)
+        (row,) = camera_rows(view.picture())
+        assert (row.good, row.complaints) == (False, ("no word from this camera for 3 s",))
 
     @pytest.mark.parametrize(("later_s", "count"), [(1.0, 1), (3.0, 0)])
     def test_poses_not_seen_for_two_seconds_go(self, view, hear, later_s, count):

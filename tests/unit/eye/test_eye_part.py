@@ -7,6 +7,7 @@ import pytest
 
 from scm.errors import EyeError
 from scm.eye.part import EyePart
+from scm.eye.source import Frame
 from scm.eye.sources.file import FileSource
 from scm.maps.load import load_map
 from scm.v2x.exchange import Incoming
@@ -61,6 +62,38 @@ def test_the_same_snapshot_is_not_pictured_twice():
     eye = EyePart(CITY)
     assert see(eye, light(1, CAR))
     assert of(EyeTags, eye.step(2 * PERIOD_NS, [])) == []
+
+
+class Given:
+    """A camera that gives a frame when it is told to."""
+
+    trouble = None
+
+    def __init__(self):
+        self.frame = None
+
+    def take(self, now_ns, light):
+        frame, self.frame = self.frame, None
+        return frame
+
+    def close(self):
+        self.frame = None
+
+
+def test_a_camera_s_next_frame_is_awaited_closely_and_a_lost_one_less():
+    camera = Given()
+    eye = EyePart(CITY, source=camera)
+    now, rests = PERIOD_NS, []
+    camera.frame = Frame(now, np.zeros((720, 1280), dtype=np.uint8))
+    while now < 6 * PERIOD_NS:
+        eye.step(now, [])
+        rests.append((now - PERIOD_NS, eye.period_ns))
+        now += eye.period_ns
+    ms = 1_000_000
+    assert rests[0] == (0, 50 * ms)  # tracks go on between frames
+    near = [rest for since, rest in rests if 96 * ms <= since < 300 * ms]
+    assert set(near) == {2 * ms}
+    assert rests[-1][1] == 20 * ms
 
 
 def test_between_frames_tracks_go_on():
