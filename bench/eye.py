@@ -5,7 +5,7 @@ the finder's memory grows by (`eye_memory`).
 `python -m bench.eye_wrong_ids` looks for tags where there are none, for minutes.
 """
 
-from bench import eye_find, eye_live, eye_memory
+from bench import eye_find, eye_live, eye_soon, eye_memory
 
 
 def main() -> None:
@@ -13,6 +13,8 @@ def main() -> None:
     eye_find.main()
     print()
     eye_live.main()
+    print()
+    eye_soon.main()
     print()
     eye_memory.main()
 
