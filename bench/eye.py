@@ -1,7 +1,7 @@
 """What the Eye finds, how exactly and how soon, beside the AprilTag library and OpenCV's detector.
 
-The finder alone (`eye_find`), then the whole Eye on films with known truth (`eye_live`), as a process
-over the bus (`eye_soon`), and what the finder's memory grows by (`eye_memory`).
+The finder alone (`eye_find`), then the whole Eye on films with known truth (`eye_live`), as a
+process over the bus (`eye_soon`), and what the finder's memory grows by (`eye_memory`).
 `python -m bench.eye_wrong_ids` looks for tags where there are none, for minutes.
 """
 
