@@ -95,7 +95,10 @@ def guessed(shot: Shot, rng):
     model = shot.camera
     off = Tolerance().deviations() * rng.standard_normal(6)
     return msgspec.structs.replace(
-        model.moved_to(model.extrinsics + off).camera, rate_hz=RATE_HZ, noise_sigma=2.0
+        model.moved_to(model.extrinsics + off).camera,
+        rate_hz=RATE_HZ,
+        noise_sigma=2.0,
+        rolling_s=LOOK.rolling_s,
     )
 
 

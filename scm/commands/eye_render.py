@@ -70,7 +70,11 @@ def _run(arguments: argparse.Namespace) -> int:
         city_map, arguments.size, arguments.height_m, math.radians(arguments.tilt_deg),
         arguments.focal_px, fisheye=arguments.fisheye,
     )  # fmt: skip
-    taken = {"rate_hz": arguments.rate_hz, "noise_sigma": arguments.noise_sigma}
+    taken = {
+        "rate_hz": arguments.rate_hz,
+        "noise_sigma": arguments.noise_sigma,
+        "rolling_s": arguments.rolling_ms * 1e-3,
+    }
     camera = msgspec.structs.replace(model.camera, **taken)
     rng = np.random.default_rng([arguments.seed, *b"traffic"])
     cars = tours(

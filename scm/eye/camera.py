@@ -239,6 +239,7 @@ def _faults(camera: Camera, lens_covariance: Floats | None) -> list[str]:
             "six above 0",
         ),
         "noise_sigma": (camera.noise_sigma, camera.noise_sigma >= 0.0, "at least 0"),
+        "rolling_s": (camera.rolling_s, 0.0 <= camera.rolling_s < 1.0, "from 0 to below 1"),
         "distortion[4]": (fifth, camera.lens == "pinhole" or fifth == 0.0, "0 for a fisheye"),
         "lens_covariance": (shape, shape in {None, square}, f"shape {square}"),
     }

@@ -22,7 +22,7 @@ from scm.eye.detect import Settings
 from scm.eye.find.finder import TagFinder
 from scm.eye.overlay import jpeg, preview
 from scm.eye.pose import car_poses
-from scm.eye.roofs import expected_tags
+from scm.eye.roofs import at_middle_row, expected_tags
 from scm.eye.source import Frame, Listener, Source
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.eye.station import eye_station
@@ -52,6 +52,8 @@ CPM_PERIOD_NS = NS_PER_S // 5
 EARLY_NS, AWAIT_NS = 4 * NS_PER_MS, 2 * NS_PER_MS
 LOST_PERIODS, LOST_NS = 3, 20 * NS_PER_MS
 """After so many periods without a frame it is looked for less often."""
+SOON_NS = 5 * NS_PER_MS
+"""Over which a tag's way across the picture is foretold."""
 SOURCE = "source"
 
 
@@ -186,12 +188,29 @@ class EyePart:
         cars = [tag for tag in tags if tag.tag_id not in ours]
         whose = [known.get(tag.tag_id, (f"tag-{tag.tag_id}", NIGEL)) for tag in cars]
         corners = np.array([tag.corners_px for tag in cars]).reshape(-1, 4, 2)
+        corners = self._unrolled(frame.t_ns, [tag.tag_id for tag in cars], corners, dict(whose))
         found = car_poses(self.watch.anchor, [body for _, body in whose], corners)
         return [
             sighting(self.camera, frame.t_ns, tag.tag_id, vehicle, pose, flags)
             for tag, (vehicle, _), pose in zip(cars, whose, found, strict=True)
             if not pose.is_refused
         ]
+
+    def _unrolled(
+        self, t_ns: int, ids: Sequence[int], corners: Floats, bodies: dict[str, CarBody]
+    ) -> Floats:
+        """Return corners, (n, 4, 2) [px], as a shutter that takes all rows at once had them."""
+        model = self.watch.anchor.model
+        if not model.camera.rolling_s:
+            return corners
+        now, later = (
+            expected_tags(model, self.tracks.at(at), bodies) for at in (t_ns, t_ns + SOON_NS)
+        )
+        return np.array([
+            at_middle_row(found, (later[tag_id] - now[tag_id]) * (NS_PER_S / SOON_NS), model.camera)
+            if tag_id in now and tag_id in later else found
+            for tag_id, found in zip(ids, corners, strict=True)
+        ]).reshape(-1, 4, 2)  # fmt: skip
 
     def _tracked(self, now_ns: int) -> list[Outgoing]:
         tracks = self.tracks.at(now_ns)

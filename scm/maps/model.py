@@ -338,6 +338,7 @@ class Camera(Record, kw_only=True, frozen=True):
         distortion: k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4, 0.
         place_std: Standard deviations of x, y, z [m], yaw, tilt x, tilt y [rad], as `scm eye
             locate` found them; without, the Eye takes millimetres and half a milliradian.
+        rolling_s: From the exposure of the first row to that of the last; 0: all at once.
     """
 
     name: str
@@ -358,6 +359,7 @@ class Camera(Record, kw_only=True, frozen=True):
     rate_hz: float = 10.0
     noise_sigma: float = 2.0
     place_std: tuple[float, float, float, float, float, float] | None = None
+    rolling_s: float = 0.0
 
 
 class CityMap(Record, kw_only=True, frozen=True):

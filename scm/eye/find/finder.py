@@ -87,7 +87,7 @@ class TagFinder:
         scan_frames: Within so many frames every part of the picture is searched.
     """
 
-    def __init__(self, settings: Settings | None = None, scan_frames: int = 8) -> None:
+    def __init__(self, settings: Settings | None = None, scan_frames: int = 12) -> None:
         self._settings = settings or Settings()
         self._scan_frames = max(1, scan_frames)
         self._shape: tuple[int, ...] = ()
