@@ -110,6 +110,7 @@ class Likelihood:
         self._recent = [_Recent(sum(len(s.t) for s in drive.streams)) for drive in drives]
         self.ordinary = ordinary_numbers(car, self._rollouts[0].params)
         self._predictions = [Prediction(drive) for drive in drives]
+        self.whiteners = [Whitener(drive, usual_noise(drives)) for drive in drives]
         self.believe(usual_noise(drives))
         self.runs = 0
 
@@ -120,13 +121,17 @@ class Likelihood:
     def believe(self, noise: Noise) -> None:
         """Take another belief about noise."""
         self.noise = noise
-        self.whiteners = [Whitener(drive, noise) for drive in self.drives]
+        self.whiteners = self.under(noise)
         self.t = np.concatenate([w.t for w in self.whiteners])
         begun = [
             (w.t > d.edges[0] + SETTLED_S) & ~d.is_blind(w.t)
             for w, d in zip(self.whiteners, self.drives, strict=True)
         ]
         self.settled = np.concatenate(begun).astype(np.float64)
+
+    def under(self, noise: Noise) -> list[Whitener]:
+        """Return what weighs residuals of every drive under some belief about noise."""
+        return [whitener.under(noise) for whitener in self.whiteners]
 
     @property
     def log_size(self) -> Floats:
@@ -169,9 +174,12 @@ class Likelihood:
         recent.remember(keys, left, ok)
         return streams, ok
 
-    def weigh(self, residuals: Sequence[Sequence[Floats]]) -> Floats:
-        """Return the unit innovations of all drives, (events, sets)."""
-        parts = [w.innovations(r) for w, r in zip(self.whiteners, residuals, strict=True)]
+    def weigh(
+        self, residuals: Sequence[Sequence[Floats]], whiteners: Sequence[Whitener] | None = None
+    ) -> Floats:
+        """Return the unit innovations of all drives, (events, sets), under another belief too."""
+        by = self.whiteners if whiteners is None else whiteners
+        parts = [w.innovations(r) for w, r in zip(by, residuals, strict=True)]
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=0)
 
     def __call__(self, sets: Sequence[Numbers]) -> tuple[Floats, Bools]:

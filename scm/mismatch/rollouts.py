@@ -18,7 +18,7 @@ from scm.vehicles.car import Car
 from scm.vehicles.fleet import SUBSTEP_S, Fleet, VehicleStatus
 from scm.vehicles.fleet_rows import COG, WHEELS, pool, whole_steps
 from scm.vehicles.jit import array_kernel
-from scm.vehicles.lanes import LANES
+from scm.vehicles.lanes import LANES, WIDTH
 from scm.vehicles.term import reads
 
 ROWS, THREADS = LANES, 2
@@ -82,8 +82,14 @@ class Tiles:
 
 
 def _shares(sets: int) -> list[list[range]]:
-    """Return which sets each thread drives, tile by tile."""
+    """Return which sets each thread drives, tile by tile.
+
+    A last tile without another beside it is cut in two, where each half is one vector of it.
+    """
     tiles = [range(first, min(first + ROWS, sets)) for first in range(0, sets, ROWS)]
+    if len(tiles) % THREADS == 1 and len(tiles[-1]) > WIDTH:
+        last = tiles.pop()
+        tiles += [last[:WIDTH], last[WIDTH:]]
     return [tiles[thread::THREADS] for thread in range(THREADS)]
 
 

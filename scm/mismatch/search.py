@@ -171,19 +171,23 @@ class Search:
         return self._to_the_end(fitted, [fitted.z, np.zeros_like(fitted.z)])
 
     def _to_the_end(self, fitted: Fitted, starts: Sequence[Floats]) -> Fitted:
-        """Return a hypothesis fitted from several values of the car's own numbers, the best one.
+        """Return a hypothesis fitted from several values of the car's own numbers, the best one."""
+        return self._all_to_the_end([(fitted, starts)])[0]
+
+    def _all_to_the_end(self, every: Sequence[tuple[Fitted, Sequence[Floats]]]) -> list[Fitted]:
+        """Return the best of each hypothesis, together: rollouts are cheap in large batches.
 
         Valleys are long, and some are dead ends: a comparison is fair only between the deepest.
         """
-        unlike = {np.round(z, 3).tobytes(): z for z in starts}
-        begun = [
-            replace(fitted, z=z.copy(), values=fitted.values.copy(), done=False)
-            for z in unlike.values()
-        ]
-        begun = self.fitter.refine(begun, rounds=TO_THE_END[0], fresh=True)
-        least = min(f.q for f in begun)
-        near = [f for f in begun if f.q < least + NEAR]
-        return min(self.fitter.refine(near, rounds=TO_THE_END[1], fresh=True), key=lambda f: f.q)
+        groups = [_from_each(fitted, starts) for fitted, starts in every]
+        begun = [f for group in groups for f in group]
+        self.fitter.refine(begun, rounds=TO_THE_END[0], fresh=True)
+        near = list[list[Fitted]]()
+        for group in groups:
+            least = min(f.q for f in group)
+            near.append([f for f in group if f.q < least + NEAR])
+        self.fitter.refine([f for g in near for f in g], rounds=TO_THE_END[1], fresh=True)
+        return [min(group, key=lambda f: f.q) for group in near]
 
     def extend(self, base: Fitted) -> Step:
         """Try every effect beside those of `base`, but none that undoes one of them.
@@ -253,7 +257,7 @@ class Search:
         first = [f for f in ranked[:FINALISTS] if cost(f) < most]
         if len(first) > 1:
             self.tell("fitting to the end: " + ", ".join(f.names[-1] for f in first))
-            deep = [self._to_the_end(f, [f.z, np.zeros_like(f.z)]) for f in first]
+            deep = self._all_to_the_end([(f, [f.z, np.zeros_like(f.z)]) for f in first])
             return [*deep, *ranked[len(first) :]]
         return list(ranked)
 
@@ -365,6 +369,15 @@ class Search:
         """
         start = self.fitter.null(self.retuned.z)
         return self._to_the_end(start, [start.z, *others])
+
+
+def _from_each(fitted: Fitted, starts: Sequence[Floats]) -> list[Fitted]:
+    """Return copies of a hypothesis, each at other values of the car's own numbers."""
+    unlike = {np.round(z, 3).tobytes(): z for z in starts}
+    return [
+        replace(fitted, z=z.copy(), values=fitted.values.copy(), done=False)
+        for z in unlike.values()
+    ]
 
 
 def _preferred(near: Sequence[Fitted], far: Sequence[Fitted]) -> list[Fitted]:

@@ -100,6 +100,37 @@ def _system(drive: Drive, noise: Noise) -> _System:
     )  # fmt: skip
 
 
+class _Events:
+    """What a drive's innovations are, whatever is believed of noise.
+
+    Attributes:
+        order: Of the streams' samples, one stream after the other, by their time.
+        t, stream, unsure: Of each innovation, (events,).
+        halting: 1 where the car hardly moves or is not seen, else 0, (events,).
+        cos, sin: Of the measured heading; `since`: time from the one before [s].
+        launched, turned: Squared leaps of throttle and steering as they are still felt.
+        seen_again: Numbers of the first ones after the camera lost the car.
+    """
+
+    def __init__(self, drive: Drive) -> None:
+        counts = [len(s.t) for s in drive.streams]
+        t = np.concatenate([s.t for s in drive.streams])
+        self.order = np.argsort(t, kind="stable")
+        self.t: Floats = t[self.order]
+        self.stream: Ints = np.repeat(np.arange(len(counts)), counts)[self.order]
+        self.unsure = np.concatenate([s.unsure for s in drive.streams])[self.order]
+        x, y = drive.smoothed["pose.x"], drive.smoothed["pose.y"]
+        speed = np.hypot(x.rate_at(self.t), y.rate_at(self.t))
+        slow = (speed < SLOW * np.percentile(speed, 90)) | drive.is_blind(self.t)
+        self.halting = slow.astype(np.float64)
+        psi = drive.smoothed["pose.yaw"].at(self.t)
+        self.cos, self.sin = np.cos(psi), np.sin(psi)
+        self.since = np.diff(self.t, prepend=self.t[0])
+        self.launched = _felt(drive.throttle, self.t) + HALT**2 * self.halting
+        self.turned = _felt(drive.steering, self.t)
+        self.seen_again = np.searchsorted(self.t, [last for _, last in drive.blind])
+
+
 class Whitener:
     """Weighs residuals of one drive under one belief about noise.
 
@@ -108,64 +139,54 @@ class Whitener:
         log_size: Sum of the logarithms of the innovations' variances.
     """
 
-    def __init__(self, drive: Drive, noise: Noise) -> None:
+    def __init__(self, drive: Drive, noise: Noise, events: _Events | None = None) -> None:
         self.drive, self.noise = drive, noise
-        counts = [len(s.t) for s in drive.streams]
-        t = np.concatenate([s.t for s in drive.streams])
-        stream = np.repeat(np.arange(len(counts)), counts)
-        self._order = np.argsort(t, kind="stable")
-        self.t: Floats = t[self._order]
-        self.stream: Ints = stream[self._order]
-        unsure = np.concatenate([s.unsure for s in drive.streams])[self._order]
-        x, y = drive.smoothed["pose.x"], drive.smoothed["pose.y"]
-        speed = np.hypot(x.rate_at(self.t), y.rate_at(self.t))
-        slow = (speed < SLOW * np.percentile(speed, 90)) | drive.is_blind(self.t)
-        self._halting = slow.astype(np.float64)
+        self._events = its = events or _Events(drive)
+        self.t, self.stream = its.t, its.stream
         jolt = np.array([noise.own.get(s.name, 0.0) for s in drive.streams])
         jolt *= [s.name.startswith("imu.") for s in drive.streams]
-        unsure = np.hypot(unsure, HALTING * jolt[self.stream] * self._halting)
-        psi = drive.smoothed["pose.yaw"].at(self.t)
-        self._cos, self._sin = np.cos(psi), np.sin(psi)
+        unsure = np.hypot(its.unsure, HALTING * jolt[self.stream] * its.halting)
         self._system = system = _system(drive, noise)
         leaps = self._leaps(noise, system.size)
-        n, events = system.size, len(self.t)
-        self._gain, self._variance = np.zeros((events, n)), np.zeros(events)
-        self._keep = np.zeros((events, n))
+        n, count = system.size, len(self.t)
+        self._gain, self._variance = np.zeros((count, n)), np.zeros(count)
+        self._keep = np.zeros((count, n))
         p = np.diag(system.start**2)
         _gains(
-            self.t, self.stream, self._cos, self._sin, system.rows, system.columns,
+            self.t, self.stream, its.cos, its.sin, system.rows, system.columns,
             system.factors, system.lasts, system.spread, system.see, system.variance, unsure,
             leaps, p, self._gain, self._variance, self._keep,
         )  # fmt: skip
         self.log_size = np.log(self._variance)
+
+    def under(self, noise: Noise) -> "Whitener":
+        """Return what weighs residuals of the same drive under another belief about noise."""
+        return Whitener(self.drive, noise, self._events)
 
     def _leaps(self, noise: Noise, size: int) -> Floats:
         """Return the variance that leaps of commands add to each state before each event.
 
         Of where a car is when it is seen again after long, nothing is known.
         """
-        out = np.zeros((len(self.t), size))
-        since = np.diff(self.t, prepend=self.t[0])
-        felt = _felt(self.drive.throttle, self.t) + HALT**2 * self._halting
-        launch = noise.launch**2 * felt * since / FELT_S
+        its, out = self._events, np.zeros((len(self.t), size))
+        launch = noise.launch**2 * its.launched * its.since / FELT_S
         out[:, DV] = launch
         out[:, BODY:] = launch[:, None] * self._system.slips
-        out[:, DR] = noise.turn**2 * _felt(self.drive.steering, self.t) * since / FELT_S
-        seen_again = np.searchsorted(self.t, [last for _, last in self.drive.blind])
+        out[:, DR] = noise.turn**2 * its.turned * its.since / FELT_S
         for name, state in (("pose.x", EX), ("pose.y", EY)):
-            out[seen_again, state] = (LOST[0] * self.drive.stream(name).std) ** 2
-        out[seen_again, EPSI] = LOST[1] ** 2
+            out[its.seen_again, state] = (LOST[0] * self.drive.stream(name).std) ** 2
+        out[its.seen_again, EPSI] = LOST[1] ** 2
         return out
 
     def innovations(self, residuals: Sequence[Floats]) -> Floats:
         """Return unit innovations, (events, sets), of measured minus predicted of each stream."""
-        sets, system = residuals[0].shape[1], self._system
+        sets, system, its = residuals[0].shape[1], self._system, self._events
         found = np.empty((len(self.t), sets))
         for first in range(0, sets, AT_ONCE):
             some = slice(first, first + AT_ONCE)
-            stacked = np.concatenate([r[:, some] for r in residuals], axis=0)[self._order]
+            stacked = np.concatenate([r[:, some] for r in residuals], axis=0)[its.order]
             _innovations(
-                self.t, self.stream, self._cos, self._sin, system.rows, system.columns,
+                self.t, self.stream, its.cos, its.sin, system.rows, system.columns,
                 system.factors, system.see, self._gain, self._variance, self._keep,
                 np.zeros((system.size, stacked.shape[1])), stacked,
             )  # fmt: skip
@@ -202,6 +223,13 @@ def _gains(
     n = p.shape[0]
     for k in range(len(t)):
         dt = t[k] - t[k - 1] if k > 0 else 0.0
+        if dt == 0.0:  # sampled with the one before: nothing has moved
+            for i in range(n):
+                keep[k, i] = 1.0
+                p[i, i] += leaps[k, i]
+            total[k] = variance[stream[k]] + unsure[k] * unsure[k]
+            total[k] = _seen(p, see[stream[k]], total[k], gain[k])
+            continue
         for i in range(n):
             if i > 0 and lasts[i] == lasts[i - 1]:
                 keep[k, i] = keep[k, i - 1]
@@ -261,7 +289,8 @@ def _innovations(
     n, sets = x.shape
     for k in range(len(t)):
         dt = t[k] - t[k - 1] if k > 0 else 0.0
-        _move(x, cos[k] * dt, sin[k] * dt, rows, columns, factors, dt, keep[k])
+        if dt != 0.0:
+            _move(x, cos[k] * dt, sin[k] * dt, rows, columns, factors, dt, keep[k])
         _add(out[k], see[stream[k]], x)
         size = 1.0 / np.sqrt(variance[k])
         for i in range(n):

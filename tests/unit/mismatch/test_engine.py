@@ -10,9 +10,11 @@ from scm.mismatch.fit import Fitter, _bounded
 from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
+from scm.mismatch.noise import usual_noise
 from scm.mismatch.predict import COMMAND_CLOCK
-from scm.mismatch.rollouts import THROTTLE_CLOCK, Rollouts
+from scm.mismatch.rollouts import THROTTLE_CLOCK, Rollouts, _shares
 from scm.mismatch.search import Search
+from scm.mismatch.whiten import Whitener, _Events
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
 
@@ -31,6 +33,27 @@ def test_rows_do_not_feel_each_other(healthy):
     sets = [{"steering.trim_rad": 0.002 * i} for i in range(40)]
     together, alone = rollouts.run(sets), rollouts.run([sets[37]])
     np.testing.assert_array_equal(together["speed"][:, 37], alone["speed"][:, 0])
+
+
+@pytest.mark.parametrize(
+    ("sets", "longest"), [(5, [5]), (16, [8]), (17, [16]), (40, [16, 8]), (48, [16, 8]), (64, [32])]
+)
+def test_both_threads_drive_about_as_much(sets, longest):
+    shares = _shares(sets)
+    driven = [k for share in shares for tile in share for k in tile]
+    assert sorted(driven) == list(range(sets))
+    assert max(sum(map(len, share)) for share in shares) == sum(longest)
+
+
+def test_samples_of_one_moment_are_weighed_as_if_one_followed_at_once(healthy):
+    noise, apart = usual_noise([healthy]), _Events(healthy)
+    same = np.diff(apart.t, prepend=-1.0) == 0.0
+    assert same.any()
+    apart.t = apart.t + 1e-9 * np.where(same, np.arange(len(same)) % 3, 0)
+    together = Whitener(healthy, noise)
+    np.testing.assert_allclose(
+        together.log_size, Whitener(healthy, noise, apart).log_size, rtol=0.0, atol=1e-4
+    )
 
 
 def test_a_delay_is_the_command_later(healthy):
@@ -174,6 +197,18 @@ def test_noise_that_a_poor_model_raised_is_taken_back(healthy):
     learnt = learn_noise(model, residuals, rounds=1)
     assert learnt.speed <= 2 * least.speed
     assert learnt.launch <= 2 * least.launch
+
+
+def test_no_belief_about_noise_is_weighed_twice(healthy, monkeypatch):
+    model, asked = Likelihood([healthy], big_nigel()), []
+    under = model.under
+    monkeypatch.setattr(model, "under", lambda noise: (asked.append(repr(noise)), under(noise))[1])
+    residuals, _ = model.residuals([{}])
+    model.believe(replace(model.noise, speed=4 * model.noise.speed))
+    asked.clear()
+    learnt = learn_noise(model, residuals, rounds=2)
+    assert asked.pop() == repr(learnt)  # it is believed in the end
+    assert len(asked) == len(set(asked)) > 20
 
 
 def test_no_effect_is_tried_beside_its_twin(healthy):

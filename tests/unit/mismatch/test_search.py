@@ -43,6 +43,15 @@ def test_a_fit_ends_as_deep_wherever_it_begins(model):
     assert alone.q == pytest.approx(best.q, abs=1.0)
 
 
+def test_hypotheses_fitted_together_end_where_each_alone_does(model):
+    search = a_search(model)
+    far = np.full(len(model.ordinary), 1.5)
+    every = [(search.fitter.null(), [far, -far]), (search.fitter.null(far), [far])]
+    together = search._all_to_the_end(every)
+    for fitted, (start, places) in zip(together, every, strict=True):
+        assert fitted.q == search._to_the_end(start, places).q
+
+
 def test_an_effect_does_not_earn_what_a_fit_without_it_missed(model):
     search = a_search(model, "steer_trim", "battery_sag")
     poor = search.fitter.null()
