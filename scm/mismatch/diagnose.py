@@ -33,7 +33,7 @@ from scm.mismatch.fit import Fitted
 from scm.mismatch.judge import judge, nothing_got_worse
 from scm.mismatch.law_rivals import Standing, standing
 from scm.mismatch.laws.curves import law_curves
-from scm.mismatch.laws.decide import is_law, lawful
+from scm.mismatch.laws.decide import Lawful, is_law
 from scm.mismatch.laws.seek import Sought, with_laws
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import candidates, placed, shown_by, terms_needed
@@ -298,9 +298,12 @@ def _searched(
     held: Standing | None = None
     tried: tuple[Tried, ...] = ()
     if not rough:
-        listed, unseen = search.run(is_over), parts.confirm.weight
+        unseen = parts.confirm.weight
+        laws = Lawful(search, unseen, tell)
+        search.explained = laws.explains_all
+        listed = search.run(is_over)
         held, tried = standing(search, listed, unseen=bool(unseen.any())), tried_of(search)
-        best, sought = lawful(search, listed, unseen, tell)
+        best, sought = laws.decide(listed)
         rough = strays(model)
     if rough:
         model, parts, search = roughly(drives, big, library, tell)

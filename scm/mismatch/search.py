@@ -68,6 +68,8 @@ class Search:
         steps: What was tried, round by round.
         holds: Share of an effect's gain that must hold where nothing was fitted.
         amplifies: Whether effects are begun as strong as suits them, and at several places.
+        explained: Says of a model whose last effect hardly paid its price whether something else
+            explains so much more that no further effect need be looked for.
         keeps: Whether alternatives keep their derivatives, of which a fit afresh makes new ones.
     """
 
@@ -86,6 +88,7 @@ class Search:
         self.fitter = Fitter(model, part)
         self.events = int(part.sum())
         self.steps: list[Step] = []
+        self.explained: Callable[[Fitted], bool] = lambda _: False
 
     def criterion(self, fitted: Fitted) -> float:
         """Return Q and the price of its effects."""
@@ -107,6 +110,8 @@ class Search:
             margin = self.criterion(before) - step.criteria[0] if step.rivals else -math.inf
             if margin >= 0.0:
                 best = self.prune(self.settle(step.rivals[0]))
+            if margin < DOUBTFUL and (margin >= 0.0 or not before.effects) and self.explained(best):
+                break
             if not before.effects and margin < DOUBTFUL:
                 best = self._calmly(best, noise)
             if len(best.effects) == len(before.effects):

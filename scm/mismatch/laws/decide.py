@@ -20,6 +20,7 @@ from scm.mismatch.search import Search
 MARGIN = 10.0  # a law that is hardly better than a known effect is that effect
 MOST_BESIDE, SETTLED = 2, 2
 HOPELESS = 50.0  # no belief about noise makes good so much
+BY_FAR = 300.0  # what a listed effect more that hardly pays its price never makes good
 Tell = Callable[[str], None]
 
 
@@ -42,47 +43,108 @@ class _Settled:
     unseen: float
 
 
-def lawful(
-    search: Search, best: Fitted, unseen: Floats, tell: Tell = lambda _: None
-) -> tuple[Fitted, Sought | None]:
-    """Return the better of a listed model and a law, with known effects beside the law, settled.
+class Lawful:
+    """Holds laws outside the library against what a search finds.
 
     Args:
-        search: That found `best`; its model comes from `with_laws`.
-        best: The listed model, or the car with its own numbers refitted.
+        search: Its model comes from `with_laws`.
         unseen: Weight of each innovation that no fit has seen, (events,); may be all zero.
         tell: Is told what is being tried.
     """
-    model = search.model
-    if not isinstance(model, Sensing):
-        return best, None
-    usual = model.noise
-    model.believe(calmed(usual, model.drives))
-    sought = seek(model, _bare(search, best), search.fitter.part, tell)
-    near = _near(search, best, sought.found)
-    calm = model.noise
-    model.believe(usual)
-    if not near:
-        return best, None
-    best = search.settle(best)  # as often as a law will be
-    listed, laws = _settled(search, best, unseen), list[_Settled]()
-    for fitted in near:
-        model.believe(calm)
-        laws.append(_settled(search, search.settle(fitted), unseen))
-    law = min(laws, key=lambda one: one.cost, default=listed)
-    if law.cost > listed.cost - MARGIN or (unseen.any() and law.unseen > listed.unseen):
-        model.believe(listed.noise)
-        return best, None
-    model.believe(law.noise)
-    return _with_known(search, law, unseen), sought
+
+    def __init__(self, search: Search, unseen: Floats, tell: Tell = lambda _: None) -> None:
+        self._search, self._unseen, self._tell = search, unseen, tell
+        self._asked = False
+        self._won: tuple[_Settled, Sought] | None = None
+        self._in_vain: tuple[Noise, tuple[str, ...], bytes] | None = None
+
+    def explains_all(self, listed: Fitted) -> bool:
+        """Say whether a law alone leaves nothing that listed effects could explain.
+
+        Then no further ones need be looked for: it is better than the listed model by far, on what
+        no fit has seen too, and no listed effect beside it is worth its price. It is asked once.
+
+        Args:
+            listed: The best listed model so far, settled under the noise believed now.
+        """
+        search, usual = self._search, self._search.model.noise
+        if self._asked or not isinstance(search.model, Sensing):
+            return False
+        self._asked = True
+        held = _settled(search, listed, self._unseen)
+        near, sought, calm = self._sought(listed)
+        if near:
+            law = self._best(near, calm)
+            if law.cost < held.cost - BY_FAR and not self._worse(law, held):
+                search.model.believe(law.noise)
+                step = search.extend(law.fitted)
+                if not step.rivals or _price(search, step.rivals[0]) > _price(search, law.fitted):
+                    self._won = law, sought
+        else:
+            self._in_vain = calm, listed.names, listed.z.tobytes()
+        search.model.believe(usual)
+        return self._won is not None
+
+    def decide(self, best: Fitted) -> tuple[Fitted, Sought | None]:
+        """Return the better of a listed model and a law, with known effects beside it, settled.
+
+        Args:
+            best: The listed model, or the car with its own numbers refitted.
+        """
+        search = self._search
+        model = search.model
+        if self._won is not None:
+            law, sought = self._won
+            model.believe(law.noise)
+            return law.fitted, sought
+        now = calmed(model.noise, model.drives), best.names, best.z.tobytes()
+        if not isinstance(model, Sensing) or now == self._in_vain:
+            return best, None
+        near, sought, calm = self._sought(best)
+        if not near:
+            return best, None
+        best = search.settle(best)  # as often as a law will be
+        listed = _settled(search, best, self._unseen)
+        law = self._best(near, calm)
+        if law.cost > listed.cost - MARGIN or self._worse(law, listed):
+            model.believe(listed.noise)
+            return best, None
+        model.believe(law.noise)
+        return _with_known(search, law, self._unseen), sought
+
+    def _sought(self, best: Fitted) -> tuple[list[Fitted], Sought, Noise]:
+        """Return the laws worth settling, all that were tried, and the calm belief they need."""
+        search, usual = self._search, self._search.model.noise
+        calm = calmed(usual, search.model.drives)
+        search.model.believe(calm)
+        sought = seek(search.model, _bare(search, best), search.fitter.part, self._tell)
+        near = _near(search, best, sought.found)
+        search.model.believe(usual)
+        return near, sought, calm
+
+    def _best(self, laws: Sequence[Fitted], calm: Noise) -> _Settled:
+        """Return the best of some laws, each settled from a calm belief."""
+        settled = list[_Settled]()
+        for fitted in laws:
+            self._search.model.believe(calm)
+            settled.append(_settled(self._search, self._search.settle(fitted), self._unseen))
+        return min(settled, key=lambda one: one.cost)
+
+    def _worse(self, law: _Settled, listed: _Settled) -> bool:
+        """Say whether a law explains what no fit has seen worse than the listed model."""
+        return bool(self._unseen.any()) and law.unseen > listed.unseen
 
 
 def _near(search: Search, best: Fitted, laws: Sequence[Fitted]) -> list[Fitted]:
-    """Return the best laws that are not hopelessly worse than the listed model, as noise is now."""
+    """Return the best laws that are not hopelessly worse, as noise is now.
+
+    Neither than the listed model nor than the best law.
+    """
     fitter = search.fitter
     e, _ = search.model([fitter.numbers(best.effects, best.z, best.values)])
     held = float(fitter.score(e, best.z)[0])
-    return [law for law in laws[:SETTLED] if law.q < held + HOPELESS]
+    least = min([held, *(law.q for law in laws[:1])])
+    return [law for law in laws[:SETTLED] if law.q < least + HOPELESS]
 
 
 def _with_known(search: Search, law: _Settled, unseen: Floats) -> Fitted:

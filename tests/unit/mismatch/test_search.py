@@ -64,6 +64,14 @@ def test_an_effect_does_not_earn_what_a_fit_without_it_missed(model):
     assert step.criteria[0] > search.criterion(step.base)  # nothing is concealed in this drive
 
 
+def test_a_search_ends_where_something_else_explains_all(model, monkeypatch):
+    search, asked = a_search(model, "steer_trim", "battery_sag"), []
+    search.explained = lambda fitted: not asked.append(fitted.names)
+    monkeypatch.setattr(search, "_calmly", None)
+    assert search.run().names == ()
+    assert asked == [()]
+
+
 def test_a_round_keeps_its_rivals_without_the_derivatives_that_fill_memory(model):
     search = a_search(model, "steer_trim", "battery_sag")
     (base,) = search.fitter.refine([search.fitter.null()], rounds=1, fresh=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from scm.mismatch.drive import Drive
 from scm.mismatch.fit import Fitter
-from scm.mismatch.laws.decide import lawful
+from scm.mismatch.laws.decide import Lawful
 from scm.mismatch.laws.dictionary import dictionary
 from scm.mismatch.laws.learned import learned_terms
 from scm.mismatch.laws.seek import seek, with_laws
@@ -51,16 +51,24 @@ def sought(drive):
     return seek(model, base, np.ones(len(model.t)))
 
 
-@cache
-def gusty():
-    """The listed model, what was taken in its place, and the laws that were tried."""
-    drive = lawful_drive(gust().numbers(GUST))
+def searched(drive):
+    """A search with two effects through a drive, and the part that it may not see."""
     model = with_laws(Likelihood([drive], lawful_nigel()))
     part = np.where(np.arange(len(model.t)) % 1000 < 800, 1.0, 0.0)
     library = tuple(by_name(candidates(lawful_nigel()), n) for n in ("wind", "rolling_resistance"))
-    search = Search(model, part, library, lambda _: None)
+    return Search(model, part, library, lambda _: None), 1.0 - part
+
+
+def gusty_drive():
+    return lawful_drive(gust().numbers(GUST))
+
+
+@cache
+def gusty():
+    """The listed model, what was taken in its place, and the laws that were tried."""
+    search, unseen = searched(gusty_drive())
     best = search.run()
-    return best, *lawful(search, best, 1.0 - part)
+    return best, *Lawful(search, unseen).decide(best)
 
 
 @cache

@@ -6,7 +6,7 @@ import numpy as np
 
 from scm.mismatch.explain import effect_of
 from scm.mismatch.law_rivals import standing
-from scm.mismatch.laws.decide import lawful
+from scm.mismatch.laws.decide import Lawful
 from scm.mismatch.laws.seek import with_laws
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
@@ -23,7 +23,7 @@ def gust_told():
     search = Search(model, part, library, lambda _: None)
     listed = search.run()
     held = standing(search, listed, unseen=True)
-    best, sought = lawful(search, listed, 1.0 - part)
+    best, sought = Lawful(search, 1.0 - part).decide(listed)
     return effect_of(search, best, 0, held, sought)
 
 

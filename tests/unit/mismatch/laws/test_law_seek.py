@@ -1,9 +1,11 @@
 """Laws outside the library are found by what they depend on, and healthy drives give none."""
 
 import numpy as np
+import pytest
 
+from scm.mismatch.laws import decide
 from scm.mismatch.laws.curves import law_curves
-from scm.mismatch.laws.decide import is_law
+from scm.mismatch.laws.decide import Lawful, is_law
 from scm.mismatch.laws.seek import criterion
 from tests.unit.mismatch.laws import made_law
 
@@ -55,3 +57,34 @@ def test_a_law_takes_the_place_of_known_effects_only_by_a_margin():
     assert all(is_law(e) for e in found.effects[:1])
     assert not any(is_law(e) for e in listed.effects)
     assert sought is not None
+
+
+@pytest.mark.parametrize(("by_far", "ends"), [(100.0, True), (1e4, False)])
+def test_only_a_law_that_is_better_by_far_ends_a_search(by_far, ends, monkeypatch):
+    monkeypatch.setattr(decide, "BY_FAR", by_far)
+    search, unseen = made_law.searched(made_law.gusty_drive())
+    laws, listed = Lawful(search, unseen), search.retuned
+    noise = search.model.noise
+    assert laws.explains_all(listed) is ends
+    assert search.model.noise == noise
+    found, sought = laws.decide(listed)
+    assert found.names == (made_law.GUST_NAME,)
+    assert sought is not None
+
+
+def test_a_law_that_leaves_something_to_a_listed_effect_does_not_end_a_search(monkeypatch):
+    monkeypatch.setattr(decide, "BY_FAR", 100.0)
+    search, unseen = made_law.searched(made_law.gusty_drive())
+    listed = search.retuned
+    monkeypatch.setattr(decide, "_price", lambda _, fitted: -float(len(fitted.effects)))
+    assert not Lawful(search, unseen).explains_all(listed)
+
+
+def test_laws_that_were_sought_in_vain_are_not_sought_again(monkeypatch):
+    search, unseen = made_law.searched(made_law.lawful_drive())
+    laws, listed, seeks = Lawful(search, unseen), search.retuned, []
+    seek = decide.seek
+    monkeypatch.setattr(decide, "seek", lambda *given: (seeks.append(1), seek(*given))[1])
+    assert not any(laws.explains_all(listed) for _ in range(2))
+    assert laws.decide(listed) == (listed, None)
+    assert len(seeks) == 1
