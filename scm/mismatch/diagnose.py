@@ -43,7 +43,7 @@ from scm.mismatch.patch import patched
 from scm.mismatch.report.car_file import write_car
 from scm.mismatch.report.write import write_report
 from scm.mismatch.rollouts import Numbers
-from scm.mismatch.rough import is_far, roughly, strays
+from scm.mismatch.rough import SETTLES_FAR, is_far, roughly, strays
 from scm.mismatch.search import Search
 from scm.mismatch.strayed import strayed
 from scm.recorder.drives import SUFFIX, recordings_of_one
@@ -294,16 +294,18 @@ def _searched(
     parts = split(model)
     library = placed(shown_by(candidates(big), drives), drives)
     search = Search(model, parts.fit.weight + parts.choose.weight, library, tell)
-    rough, sought, best = is_far(search), None, search.retuned
-    held: Standing | None = None
-    tried: tuple[Tried, ...] = ()
-    if not rough:
-        unseen = parts.confirm.weight
-        laws = Lawful(search, unseen, tell)
+    far, unseen = is_far(search), parts.confirm.weight
+    held, sought = None, None
+    laws = Lawful(search, unseen, tell)
+    if far:  # maybe for one large effect, which the re-tuned car takes for disturbances
+        search.settles, search.explained = SETTLES_FAR, lambda _: strays(model)
+    else:
         search.explained = laws.explains_all
-        listed = search.run(is_over)
-        held, tried = standing(search, listed, unseen=bool(unseen.any())), tried_of(search)
-        best, sought = laws.decide(listed)
+    best = search.run(lambda: is_over() or (far and bool(search.steps) and strays(search.model)))
+    rough = far and strays(model)
+    if not rough:
+        held, tried = standing(search, best, unseen=bool(unseen.any())), tried_of(search)
+        best, sought = laws.decide(best)
         rough = strays(model)
     if rough:
         model, parts, search = roughly(drives, big, library, tell)

@@ -26,6 +26,7 @@ MOST_EFFECTS = 10
 CLOSE = 25.0  # two effects that no screening tells apart
 AT_ONCE, MARGIN = 4, 10.0  # effects of one round; what each beside the first gains beyond its price
 MOST_DOUBLINGS, FAR_DOUBLINGS = 9.0, 16.0
+SETTLES_FAR = 2
 HELD = Candidate(
     "drive_saturation", Equation.DRIVE, ("throttle",),
     (Knob("forward", "drive.limit_forward", "1", (0.02, 1.0), 1.0, 0.02),),

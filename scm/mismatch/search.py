@@ -32,7 +32,7 @@ OFF = 0.125  # two simulators' equations of the same effect differ by as much
 REMAINDER, COVERED = OFF * OFF, 0.2
 FALSE_ALARMS = 0.02
 NEAR = 40.0
-DRIFTED = 8.0
+DRIFTED, BACK = 8.0, 1.0  # what a number at its limit counts; within its scatter again
 TWINS: Mapping[str, str] = {
     "payload": "motor_gain", "motor_gain": "payload", "grade": "wind", "wind": "grade",
 }  # fmt: skip
@@ -71,9 +71,11 @@ class Search:
         explained: Says of a model whose last effect hardly paid its price whether something else
             explains so much more that no further effect need be looked for.
         keeps: Whether alternatives keep their derivatives, of which a fit afresh makes new ones.
+        settles: How often a hypothesis is settled: disturbances that were believed to be huge leave
+            it in the wrong valley the first time.
     """
 
-    holds, amplifies, keeps = 0.4, True, False
+    holds, amplifies, keeps, settles = 0.4, True, False, 1
 
     def __init__(
         self,
@@ -167,13 +169,15 @@ class Search:
         return chosen[0] if chosen else None
 
     def settle(self, fitted: Fitted) -> Fitted:
-        """Fit a hypothesis and the noise, one after the other, twice."""
-        for _ in range(2):
-            (fitted,) = self.fitter.refine([fitted], rounds=4, fresh=True)
-            numbers = self.fitter.numbers(fitted.effects, fitted.z, fitted.values)
-            residuals, _ = self.model.residuals([numbers])
-            self._learn(self.model, residuals, 1)
-        return self._to_the_end(fitted, [fitted.z, np.zeros_like(fitted.z)])
+        """Fit a hypothesis and the noise, one after the other, twice; so often as `settles`."""
+        for _ in range(self.settles):
+            for _ in range(2):
+                (fitted,) = self.fitter.refine([fitted], rounds=4, fresh=True)
+                numbers = self.fitter.numbers(fitted.effects, fitted.z, fitted.values)
+                residuals, _ = self.model.residuals([numbers])
+                self._learn(self.model, residuals, 1)
+            fitted = self._to_the_end(fitted, [fitted.z, np.zeros_like(fitted.z)])
+        return fitted
 
     def _to_the_end(self, fitted: Fitted, starts: Sequence[Floats]) -> Fitted:
         """Return a hypothesis fitted from several values of the car's own numbers, the best one."""
@@ -244,8 +248,10 @@ class Search:
         if cost(ranked[0]) < self.criterion(base) + NEAR:
             near = self.fitter.refine(near[:6], rounds=3, fresh=True)
         ranked = sorted([*near, *(f for f in ranked if all(f is not n for n in near))], key=cost)
-        ranked = self._lighter(sorted(self._deepened(ranked, base, cost), key=cost))
-        return Step(base, tuple(ranked), tuple(cost(f) for f in ranked))
+        ranked = self._lighter(self._deepened(ranked, base, cost))
+        costs = {id(f): cost(f) + self._let_go(f, ranked, base) for f in ranked}
+        ranked = sorted(ranked, key=lambda f: costs[id(f)])
+        return Step(base, tuple(ranked), tuple(costs[id(f)] for f in ranked))
 
     def _lighter(self, fits: list[Fitted]) -> list[Fitted]:
         """Return fits without their derivatives, unless these are kept: they fill memory."""
@@ -271,9 +277,23 @@ class Search:
 
         A number that the recording pulls as far as its scatter allows is most likely the cause.
         """
+        return DRIFTED * bool(self._pulled(effect, base))
+
+    def _let_go(self, fitted: Fitted, rivals: Sequence[Fitted], base: Fitted) -> float:
+        """Return what does not speak for an effect after all: another may have pulled its number.
+
+        That is so where one that explains the recordings better brings the number back.
+        """
+        pulled = self._pulled(fitted.effects[-1], base)
+        mine = self.criterion(fitted)
+        gone = (self.criterion(f) < mine and np.all(np.abs(f.z[pulled]) < BACK) for f in rivals)
+        return DRIFTED * (bool(pulled) and any(gone))
+
+    def _pulled(self, effect: Candidate, base: Fitted) -> list[int]:
+        """Return which of the car's own numbers that an effect means are at their limit."""
         keys = {OF_OWN.get(knob.key, knob.key) for knob in effect.knobs}
-        own = zip(self.model.ordinary, base.z, strict=True)
-        return DRIFTED * any(o.key in keys and abs(z) > 0.85 * FARTHEST for o, z in own)
+        own = enumerate(zip(self.model.ordinary, base.z, strict=True))
+        return [j for j, (o, z) in own if o.key in keys and abs(z) > 0.85 * FARTHEST]
 
     def confirmed(self, best: Fitted, unseen: Floats) -> Fitted:
         """Return the model without effects that do not help on a part that no fit has seen.

@@ -9,6 +9,7 @@ import pytest
 from scm.mismatch.fit import FARTHEST, Fitted, Fitter
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.noise import CALM, calmed, usual_noise
+from scm.mismatch.rough import SETTLES_FAR
 from scm.mismatch.search import DRIFTED, PLENTY, REMAINDER, Search, _next_starts
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
@@ -88,6 +89,35 @@ def test_the_effect_of_a_number_at_its_limit_comes_closer_by_more(model):
     base = replace(search.fitter.null(), z=z)
     found = Fitted((candidate("steer_rate"),), 0.0 * z, np.array([0.7]), base.e, 0.0, base.jacobian)
     assert search._drifted(found.effects[-1], base) == DRIFTED
+
+
+@pytest.mark.parametrize(
+    ("better_by", "still_at", "taken"),
+    [(5.0, 0.3, DRIFTED), (-5.0, 0.3, 0.0), (5.0, -FARTHEST, 0.0)],
+    ids=["it explains more and frees the number", "it explains less", "the number stays"],
+)
+def test_a_number_at_its_limit_speaks_for_no_effect_where_a_better_one_pulled_it(
+    model, better_by, still_at, taken
+):
+    search = a_search(model, "steer_rate", "steer_lag")
+    at = [own.key for own in model.ordinary].index("steering.rate_rad_s")
+    z, rest = np.zeros(len(model.ordinary)), np.zeros(len(model.ordinary))
+    z[at], rest[at] = -FARTHEST, still_at
+    base = replace(search.fitter.null(), z=z)
+    mine = Fitted((candidate("steer_rate"),), 0.0 * z, np.array([0.7]), base.e, 0.0, base.jacobian)
+    other = replace(mine, effects=(candidate("steer_lag"),), z=rest, q=-better_by)
+    assert search._let_go(mine, [mine, other], base) == taken
+    assert search._let_go(other, [mine, other], base) == 0.0
+
+
+def test_a_far_cars_hypothesis_is_settled_from_where_the_first_time_left_it(model):
+    search, beliefs = a_search(model, "steer_trim"), []
+    learn = search._learn
+    search._learn = lambda *given: beliefs.append(1) or learn(*given)
+    search.settle(search.fitter.null())
+    once, search.settles = len(beliefs), SETTLES_FAR
+    search.settle(search.fitter.null())
+    assert len(beliefs) - once == SETTLES_FAR * once
 
 
 def losing(seen, unseen, where, shows):
