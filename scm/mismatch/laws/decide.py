@@ -43,6 +43,15 @@ class _Settled:
     unseen: float
 
 
+@dataclass(frozen=True, slots=True)
+class _Best:
+    """The best law that was settled, None where none was near; what was asked, and all tried."""
+
+    asked: tuple[Noise, tuple[str, ...], bytes, bytes]
+    law: _Settled | None
+    sought: Sought
+
+
 class Lawful:
     """Holds laws outside the library against what a search finds.
 
@@ -55,8 +64,8 @@ class Lawful:
     def __init__(self, search: Search, unseen: Floats, tell: Tell = lambda _: None) -> None:
         self._search, self._unseen, self._tell = search, unseen, tell
         self._asked = False
-        self._won: tuple[_Settled, Sought] | None = None
-        self._in_vain: tuple[Noise, tuple[str, ...], bytes] | None = None
+        self._last: _Best | None = None
+        self._won: _Best | None = None
 
     def explains_all(self, listed: Fitted) -> bool:
         """Say whether a law alone leaves nothing that listed effects could explain.
@@ -72,16 +81,13 @@ class Lawful:
             return False
         self._asked = True
         held = _settled(search, listed, self._unseen)
-        near, sought, calm = self._sought(listed)
-        if near:
-            law = self._best(near, calm)
-            if law.cost < held.cost - BY_FAR and not self._worse(law, held):
-                search.model.believe(law.noise)
-                step = search.extend(law.fitted)
-                if not step.rivals or _price(search, step.rivals[0]) > _price(search, law.fitted):
-                    self._won = law, sought
-        else:
-            self._in_vain = calm, listed.names, listed.z.tobytes()
+        found = self._best(listed)
+        law = found.law
+        if law and law.cost < held.cost - BY_FAR and not self._worse(law, held):
+            search.model.believe(law.noise)
+            step = search.extend(law.fitted)
+            if not step.rivals or _price(search, step.rivals[0]) > _price(search, law.fitted):
+                self._won = found
         search.model.believe(usual)
         return self._won is not None
 
@@ -93,42 +99,42 @@ class Lawful:
         """
         search = self._search
         model = search.model
-        if self._won is not None:
-            law, sought = self._won
+        if not isinstance(model, Sensing):
+            return best, None
+        found = self._won or self._best(best)
+        law = found.law
+        if law is None:
+            return best, None
+        if self._won:
             model.believe(law.noise)
-            return law.fitted, sought
-        now = calmed(model.noise, model.drives), best.names, best.z.tobytes()
-        if not isinstance(model, Sensing) or now == self._in_vain:
-            return best, None
-        near, sought, calm = self._sought(best)
-        if not near:
-            return best, None
+            return law.fitted, found.sought
         best = search.settle(best)  # as often as a law will be
         listed = _settled(search, best, self._unseen)
-        law = self._best(near, calm)
         if law.cost > listed.cost - MARGIN or self._worse(law, listed):
             model.believe(listed.noise)
             return best, None
         model.believe(law.noise)
-        return _with_known(search, law, self._unseen), sought
+        return _with_known(search, law, self._unseen), found.sought
 
-    def _sought(self, best: Fitted) -> tuple[list[Fitted], Sought, Noise]:
-        """Return the laws worth settling, all that were tried, and the calm belief they need."""
-        search, usual = self._search, self._search.model.noise
-        calm = calmed(usual, search.model.drives)
-        search.model.believe(calm)
-        sought = seek(search.model, _bare(search, best), search.fitter.part, self._tell)
-        near = _near(search, best, sought.found)
-        search.model.believe(usual)
-        return near, sought, calm
+    def _best(self, listed: Fitted) -> _Best:
+        """Return the best law beside the car without effects, sought under a calm belief.
 
-    def _best(self, laws: Sequence[Fitted], calm: Noise) -> _Settled:
-        """Return the best of some laws, each settled from a calm belief."""
-        settled = list[_Settled]()
-        for fitted in laws:
-            self._search.model.believe(calm)
-            settled.append(_settled(self._search, self._search.settle(fitted), self._unseen))
-        return min(settled, key=lambda one: one.cost)
+        Asked again of the same model under the same belief, it is what was found then.
+        """
+        search, model, usual = self._search, self._search.model, self._search.model.noise
+        calm = calmed(usual, model.drives)
+        asked = calm, listed.names, listed.z.tobytes(), listed.values.tobytes()
+        if self._last is None or self._last.asked != asked:
+            model.believe(calm)
+            sought = seek(model, _bare(search, listed), search.fitter.part, self._tell)
+            settled = list[_Settled]()
+            for fitted in _near(search, listed, sought.found):
+                model.believe(calm)
+                settled.append(_settled(search, search.settle(fitted), self._unseen))
+            model.believe(usual)
+            law = min(settled, key=lambda one: one.cost, default=None)
+            self._last = _Best(asked, law, sought)
+        return self._last
 
     def _worse(self, law: _Settled, listed: _Settled) -> bool:
         """Say whether a law explains what no fit has seen worse than the listed model."""

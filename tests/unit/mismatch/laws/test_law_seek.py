@@ -1,5 +1,7 @@
 """Laws outside the library are found by what they depend on, and healthy drives give none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,7 +63,9 @@ def test_a_law_takes_the_place_of_known_effects_only_by_a_margin():
 
 @pytest.mark.parametrize(("by_far", "ends"), [(100.0, True), (1e4, False)])
 def test_only_a_law_that_is_better_by_far_ends_a_search(by_far, ends, monkeypatch):
+    seek, seeks = decide.seek, []
     monkeypatch.setattr(decide, "BY_FAR", by_far)
+    monkeypatch.setattr(decide, "seek", lambda *given: (seeks.append(1), seek(*given))[1])
     search, unseen = made_law.searched(made_law.gusty_drive())
     laws, listed = Lawful(search, unseen), search.retuned
     noise = search.model.noise
@@ -70,6 +74,7 @@ def test_only_a_law_that_is_better_by_far_ends_a_search(by_far, ends, monkeypatc
     found, sought = laws.decide(listed)
     assert found.names == (made_law.GUST_NAME,)
     assert sought is not None
+    assert len(seeks) == 1
 
 
 def test_a_law_that_leaves_something_to_a_listed_effect_does_not_end_a_search(monkeypatch):
@@ -85,6 +90,7 @@ def test_laws_that_were_sought_in_vain_are_not_sought_again(monkeypatch):
     laws, listed, seeks = Lawful(search, unseen), search.retuned, []
     seek = decide.seek
     monkeypatch.setattr(decide, "seek", lambda *given: (seeks.append(1), seek(*given))[1])
-    assert not any(laws.explains_all(listed) for _ in range(2))
+    assert not laws.explains_all(listed)
+    assert not laws.explains_all(replace(listed, z=listed.z + 0.1))  # it is asked once
     assert laws.decide(listed) == (listed, None)
     assert len(seeks) == 1
