@@ -136,7 +136,8 @@ class Whitener:
 
     Attributes:
         t: Time of each innovation, (events,) [s]; `stream`: the number of its stream.
-        log_size: Sum of the logarithms of the innovations' variances.
+        log_size: Logarithms of the innovations' variances, (events,); NaN where a belief is beyond
+            what numbers can hold: nobody may hold it.
     """
 
     def __init__(self, drive: Drive, noise: Noise, events: _Events | None = None) -> None:
@@ -157,7 +158,7 @@ class Whitener:
             system.factors, system.lasts, system.spread, system.see, system.variance, unsure,
             leaps, p, self._gain, self._variance, self._keep,
         )  # fmt: skip
-        self.log_size = np.log(self._variance)
+        self.log_size = np.log(np.where(self._variance > 0.0, self._variance, np.nan))
 
     def under(self, noise: Noise) -> "Whitener":
         """Return what weighs residuals of the same drive under another belief about noise."""

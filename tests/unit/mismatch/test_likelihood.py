@@ -1,6 +1,7 @@
 """What a likelihood remembers of sets that were driven, and how much memory it works in."""
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,9 @@ import pytest
 from scm.mismatch import likelihood
 from scm.mismatch.drive import Drive
 from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.noise import usual_noise
 from scm.mismatch.rollouts import Tiles
+from scm.mismatch.whiten import Whitener
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
 KEPT = 3
@@ -88,3 +91,10 @@ def test_many_sets_are_weighed_in_the_room_of_residuals_and_innovations(drive, t
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 2.6 * e.nbytes
+
+
+def test_a_belief_beyond_what_numbers_can_hold_has_no_size_and_raises_no_warning(drive):
+    usual = usual_noise([drive])
+    wild = replace(usual, speed=2.0**49 * usual.speed)
+    assert np.isfinite(Whitener(drive, usual).log_size).all()
+    assert not np.isfinite(Whitener(drive, wild).log_size).all()
