@@ -49,7 +49,7 @@ UNITS = tuple(
         *("id", "number"),
     )
 )
-ETSI = ("scm.v2x.etsi", "scm.v2x.etsi_cpm")
+ETSI = "scm.v2x.etsi"  # modules whose numbers are in the units of the standards
 
 
 def message_classes():
@@ -91,12 +91,26 @@ def values(of):
     if origin is Literal:
         return st.sampled_from(inner)
     if origin is Annotated:
-        return st.integers(inner[1].ge, inner[1].le)
+        return annotated(*inner)
     if origin is tuple and inner[-1] is Ellipsis:
         return st.lists(values(inner[0]), max_size=3).map(tuple)
     if origin is tuple:
         return st.tuples(*(values(t) for t in inner))
     return OF_TYPE[of]
+
+
+def annotated(of, meta):
+    """Return a strategy for a type with limits."""
+    if of is int:
+        return st.integers(meta.ge, meta.le)
+    if of is not str:
+        few = (meta.min_length or 0) + 2
+        items = st.lists(values(get_args(of)[0]), min_size=meta.min_length or 0, max_size=few)
+        return items.map(tuple)
+    if meta.pattern:
+        return st.from_regex(meta.pattern.replace("$", r"\Z"))
+    characters = st.characters(codec="ascii")
+    return st.text(characters, min_size=meta.min_length or 0, max_size=meta.max_length)
 
 
 def structs(kind):
@@ -168,7 +182,7 @@ def numeric_fields(kind):
 
 def _numeric(path, name, of):
     if isinstance(of, type) and issubclass(of, msgspec.Struct):
-        if of.__module__ not in ETSI and of.__module__ != "scm.maps.model":
+        if not of.__module__.startswith(ETSI) and of.__module__ != "scm.maps.model":
             yield from numeric_fields(of)
     elif of in (int, float):
         yield path, name
