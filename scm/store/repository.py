@@ -1,16 +1,20 @@
 """The contract of a store: named tables of small values, and logs that only grow.
 
-Two keep it: `sqlite.py`, a file beside the recordings, and `postgres.py`, a server. The same tests
-run over both. A store is used by one process at a time for writing; values are bytes, mostly JSON
-of a message or a record, and the typed views of them stand with those who own them.
+Three keep it: `memory.py` inside one process, `sqlite.py`, a file beside the recordings, and
+`postgres.py`, a server. The same tests run over all of them. Several processes may use one store;
+each transaction of one excludes those of the others. Values are bytes, mostly JSON of a record;
+what the records mean stands in `records.py` and with those who own them.
 """
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol, get_args
 
-Table = Literal["leases", "plans", "answers", "credentials"]
+Table = Literal["leases", "plans", "answers", "credentials", "latches", "marks"]
 Log = Literal["audit"]
+
+TABLES: tuple[Table, ...] = get_args(Table)
+LOGS: tuple[Log, ...] = get_args(Log)
 
 
 class Entry(NamedTuple):
@@ -47,8 +51,12 @@ class Repository(Protocol):
         """Return entries after a number, in order."""
         ...
 
+    def last(self, log: Log) -> Entry | None:
+        """Return the newest entry; None: there is none."""
+        ...
+
     def transaction(self) -> AbstractContextManager[None]:
-        """Let everything inside happen at once, or not at all."""
+        """Let everything inside happen at once, or not at all; inside another one it joins it."""
         ...
 
     def close(self) -> None:
