@@ -2,11 +2,12 @@
 
 import argparse
 
-from scm.command import Command, part_arguments, run_part
+from scm.command import Command, part_arguments, run_part, state_argument, state_of
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
+    state_argument(parser)
     parser.add_argument(
         "--fault",
         action="append",
@@ -18,11 +19,16 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
+    from scm.store.records import FaultRecord, records
     from scm.traffic.monitor_part import MonitorPart
 
     faults = dict(fault.partition("=")[::2] for fault in arguments.fault)
-    part = MonitorPart(load_map(arguments.map), faults)
-    return run_part(part, arguments)
+    with state_of(arguments) as state:
+        if state is not None:  # it knows best: what it does not hold was reset
+            stored = records(state, "latches", "monitor", FaultRecord)
+            faults = {junction: record.fault for junction, record in stored.items()}
+        part = MonitorPart(load_map(arguments.map), faults)
+        return run_part(part, arguments, state)
 
 
 COMMAND = Command(

@@ -2,11 +2,12 @@
 
 import argparse
 
-from scm.command import Command, part_arguments, run_part
+from scm.command import Command, part_arguments, run_part, state_argument, state_of
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
+    state_argument(parser)
     parser.add_argument("--plan", help="signal plan at the start; default: the one of the map")
 
 
@@ -14,8 +15,9 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
     from scm.traffic.part import TrafficPart
 
-    part = TrafficPart(load_map(arguments.map), arguments.plan)
-    return run_part(part, arguments)
+    with state_of(arguments) as state:
+        part = TrafficPart(load_map(arguments.map), arguments.plan)
+        return run_part(part, arguments, state)
 
 
 COMMAND = Command(

@@ -3,11 +3,12 @@
 import argparse
 from functools import partial
 
-from scm.command import Command, part_arguments, run_part
+from scm.command import Command, part_arguments, run_part, state_argument, state_of
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
+    state_argument(parser)
     parser.add_argument(
         "--hosted",
         type=int,
@@ -25,19 +26,27 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
     from scm.vehicles.car import car_names
     from scm.vehicles.drivers.early import compile_later, is_first_start
+    from scm.world.kept import read_kept
     from scm.world.part import WorldPart
 
     hosted = tuple((f"n{i + 1}", arguments.car) for i in range(arguments.hosted))
     is_first = is_first_start()
-    part = WorldPart(load_map(arguments.map), arguments.seed, hosted, arguments.stopped_by)
-    # Compiled when its first car comes, a car file would stop the city for 2.5 s.
-    others = [partial(part.world.garage.prepare, car) for car in car_names()]
-    if is_first:
-        compile_later(others)
-    else:
-        for load in others:
-            load()
-    return run_part(part, arguments)
+    with state_of(arguments) as state:
+        part = WorldPart(
+            load_map(arguments.map),
+            arguments.seed,
+            hosted,
+            arguments.stopped_by,
+            kept=None if state is None else read_kept(state),
+        )
+        # Compiled when its first car comes, a car file would stop the city for 2.5 s.
+        others = [partial(part.world.garage.prepare, car) for car in car_names()]
+        if is_first:
+            compile_later(others)
+        else:
+            for load in others:
+                load()
+        return run_part(part, arguments, state)
 
 
 COMMAND = Command(

@@ -16,7 +16,8 @@ from scm.geometry import Pose2
 from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.maps.segments import wall_segments
-from scm.v2x.exchange import Outgoing
+from scm.store.records import CarRecord, EpochRecord
+from scm.v2x.exchange import Keep, Outgoing
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
@@ -79,6 +80,7 @@ class World:
         outbox: What the tick under way sends.
         ignored: Messages that fitted nothing: unknown cars, commands without the lease.
         last_hit_ns: When a car's contact was last told.
+        highest_epoch: Of any car that left: a newcomer's is higher, whatever its name.
     """
 
     def __init__(
@@ -126,6 +128,7 @@ class World:
         self.tick = 0
         self.ignored = 0
         self.last_hit_ns: dict[str, int] = {}
+        self.highest_epoch = 0
         self._tags = Numbers(city_map.first_vehicle_tag_id, never=city_map.tag.tag_id)
         self._unnamed = 0
         self._came = 0
@@ -206,8 +209,9 @@ class World:
             slots=self.slots,
             fleet=fleet,
             row=row,
-            lease=rules.grant(NAME, first_epoch(now_ns)),
+            lease=rules.grant(NAME, self._first_epoch(now_ns)),
         )
+        self.keep(self.hosted[name])
         return self.hosted[name]
 
     def admit(
@@ -231,10 +235,11 @@ class World:
             car_file=car_name,
             tag_id=self._tags.take(),
             slot=slot,
-            lease=rules.grant(name, first_epoch(now_ns)),
+            lease=rules.grant(name, self._first_epoch(now_ns)),
             pose=pose,
             heard_ns=now_ns,
         )
+        self.keep(self.remote[name])
         return self.remote[name]
 
     def remove(self, name: str) -> None:
@@ -246,6 +251,23 @@ class World:
             self._forget(car)
         elif name in self.remote:
             self._forget(self.remote.pop(name))
+
+    def keep(self, car: AnyCar) -> None:
+        """Have a car and its lease stored."""
+        x, y, yaw = car.pose
+        lease = car.lease
+        record = CarRecord(
+            car_file=car.car_file,
+            hosted=isinstance(car, HostedCar),
+            x_m=x,
+            y_m=y,
+            yaw_rad=yaw,
+            home=lease.home,
+            owner=lease.owner,
+            epoch=lease.epoch,
+            ttl_ms=lease.ttl_ms,
+        )
+        self.outbox.append(Keep("leases", car.name, record))
 
     def free_name(self) -> str:
         """Return a name for a car that has none."""
@@ -287,8 +309,17 @@ class World:
         _, self.front[slot] = self.garage.car(car_name).vector("body.footprint_x_m")
         return slot
 
+    def _first_epoch(self, now_ns: int) -> int:
+        """Return an epoch above all that any car of this city has had so far."""
+        return max(now_ns // NS_PER_MS, self.highest_epoch + 1)
+
     def _forget(self, car: AnyCar) -> None:
         slot = car.slot
+        self.highest_epoch = max(self.highest_epoch, car.lease.epoch)
+        self.outbox += [
+            Keep("leases", car.name, None),
+            Keep("latches", "epochs", EpochRecord(highest=self.highest_epoch)),
+        ]
         self.contacts.remove(slot)
         self.errands.forget(slot)
         self.crowd.leave(slot)
@@ -306,8 +337,3 @@ class World:
         # The golden ratio spreads the cars' first scans evenly over a period, however many come.
         self._came += kind == SCANNER
         return self._came * 0.618034 % 1.0 if kind == SCANNER else 0.0
-
-
-def first_epoch(now_ns: int) -> int:
-    """Return an epoch above all that an earlier run of this city can have given out."""
-    return max(1, now_ns // NS_PER_MS)
