@@ -15,10 +15,11 @@ from typing import Any, NamedTuple, Protocol, Self
 import zenoh
 from zenoh import ext
 
-from scm.errors import LinkError, MessageError, RunError
+from scm.errors import AccessError, LinkError, MessageError, RunError
 from scm.log import event
 from scm.ros2 import names, types
 from scm.v2x import zenoh_config
+from scm.v2x.access import is_local
 from scm.v2x.yielding import yielding
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7448"
@@ -83,6 +84,7 @@ class Wire:
         node: The node's name.
 
     Raises:
+        AccessError: when other computers could reach where it listens.
         RunError: when the endpoint cannot be listened at, or rosbags is missing.
         LinkError: when there is no router to connect to.
     """
@@ -91,6 +93,12 @@ class Wire:
         self, endpoint: str, domain: int = 0, *, listen: bool = True, node: str = "scm"
     ) -> None:
         types.store()
+        if listen and not is_local(endpoint):
+            msg = (
+                f"ROS: got {endpoint!r} to listen at, where everybody on the network could drive "
+                "cars; expected tcp/127.0.0.1:PORT, or to connect to an rmw_zenohd of yours"
+            )
+            raise AccessError(msg)
         self._lock = threading.Lock()
         self._heard: deque[tuple[str, str, bytes]] = deque(maxlen=HEARD_DEPTH)
         self._endpoints: list[_End] = []

@@ -8,8 +8,6 @@ from scm.ros2.part import RosPart
 from scm.ros2.wire import Heard
 from scm.world.part import WorldPart
 
-pytest.importorskip("rosbags", reason="ROS 2 messages are made by rosbags: scm[ros2]")
-
 
 class NotedTopic:
     def __init__(self, graph, topic, kind, latched):

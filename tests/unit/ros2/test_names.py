@@ -1,5 +1,8 @@
 """The bytes and keys that rmw_zenoh puts on Zenoh."""
 
+import struct
+import sys
+
 import pytest
 
 from scm.errors import MessageError, RunError
@@ -88,7 +91,29 @@ def test_bytes_that_make_no_message_are_refused():
 
 
 def test_without_its_library_it_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "rosbags.typesys", None)
+    monkeypatch.setitem(sys.modules, "rosbags.typesys", None)
     types.store.cache_clear()
     with pytest.raises(RunError, match=r"scm\[ros2\]"):
         types.store()
+
+
+def test_a_twist_is_six_doubles_after_the_header():
+    def vector(x, y, z):
+        return types.ros("geometry_msgs/Vector3", x=x, y=y, z=z)
+
+    twist = types.ros("geometry_msgs/Twist", linear=vector(1, 2, 3), angular=vector(4, 5, 6))
+    expected = bytes((0, 1, 0, 0)) + struct.pack("<6d", 1, 2, 3, 4, 5, 6)
+    assert types.to_cdr("geometry_msgs/Twist", twist) == expected
+
+
+def test_text_is_counted_with_its_end_and_padded_to_the_next_number():
+    stamp = types.ros("builtin_interfaces/Time", sec=1, nanosec=2)
+    header = types.ros("std_msgs/Header", stamp=stamp, frame_id="map")
+    point = types.ros("geometry_msgs/Point", x=1.0, y=2.0, z=3.0)
+    raw = types.to_cdr(
+        "geometry_msgs/PointStamped",
+        types.ros("geometry_msgs/PointStamped", header=header, point=point),
+    )
+    # 16 bytes of time, length and "map" with its zero: doubles can follow at once.
+    expected = struct.pack("<iII4s3d", 1, 2, 4, b"map\0", 1.0, 2.0, 3.0)
+    assert raw == bytes((0, 1, 0, 0)) + expected

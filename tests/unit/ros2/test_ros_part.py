@@ -6,18 +6,24 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from scm.maps.load import load_map
 from scm.part import Hears
+from scm.ros2 import markers
 from scm.ros2.frames import vector
+from scm.ros2.part import RosPart
 from scm.ros2.types import ros, to_cdr
 from scm.traffic.part import TrafficPart
+from scm.v2x.exchange import Incoming
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.remove_request import RemoveRequest
+from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.v2x.messages.stop_request import StopRequest
-from scm.v2x.messages.world_snapshot import WorldSnapshot
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
+from scm.vehicles.car import load_car
 from tests.unit.ros2.conftest import RosCity
 
 SPEED = 0.15
@@ -139,6 +145,7 @@ def test_the_chain_of_frames_ends_at_the_cars_pose(driven):
 def test_a_twist_drives_the_car_at_its_speed_and_rate(driven):
     car = driven.drive(3.0, rate=0.3)
     assert (car.owner, car.mode) == ("ros2", "drive")
+    assert {item.message.vehicle for item in driven.commands.drain()} == {"n1"}
     assert car.speed_mps == pytest.approx(SPEED, rel=0.03)
     # Wheelbase 0.14154 m, 2 rad/m.
     assert car.steering_rad == pytest.approx(math.atan(0.14154 * 0.3 / SPEED), abs=0.01)
@@ -260,3 +267,46 @@ def test_the_roads_are_drawn_once_for_all(city):
     assert np.hypot(*(points[1::2] - points[::2]).T).max() < 0.5
     assert points[:, 0].min() >= floor.x_m[0]
     assert points[:, 0].max() <= floor.x_m[1]
+
+
+def row(vehicle, car="nigel"):
+    return SnapshotVehicle(
+        vehicle=vehicle, kind="real", car=car, tag_id=1, x_m=1.0, y_m=0.0, yaw_rad=math.pi / 2,
+        speed_mps=0.0, steering_rad=0.0,
+    )  # fmt: skip
+
+
+def snapshot(*rows, t_ns=0):
+    return WorldSnapshot(t_ns=t_ns, tick=0, vehicles=rows)
+
+
+@pytest.mark.parametrize("other", [row("a_b"), row("stranger", car="spaceship")])
+def test_a_car_that_ros_cannot_show_is_left_out_and_told_of(graph, caplog, other):
+    part = RosPart(load_map("driving_school"), graph)
+    for _ in range(2):
+        part.step(0, [Incoming(snapshot(row("a-b"), other), 0)])
+    shown = [topic for topic in graph.topics if topic.endswith("/odom")]
+    assert shown == ["/a_b/odom"]
+    assert caplog.text.count("ros_car_not_shown") == 1
+    assert other.vehicle in caplog.text
+
+
+def test_a_car_is_drawn_about_its_middle():
+    city_map = load_map("driving_school")
+    drawn = markers.moving(city_map, snapshot(row("n1")), {}, {"nigel": load_car("nigel")})
+    at = next(m for m in drawn.markers if m.ns == "cars").pose.position
+    # 8 cm ahead of the rear axle at (1, 0), looking along y.
+    assert_allclose((at.x, at.y), (1.0, 0.08), atol=1e-9)
+
+
+@pytest.mark.parametrize(("t_ns", "are_lit"), [(0, True), (500_000_000, False)])
+def test_flashing_lamps_flash(t_ns, are_lit):
+    city_map = load_map("driving_school")
+    light = city_map.lights[0]
+    flashing = SignalGroup(group=light.group, colour="flashing_red", since_ns=0, min_end_ns=0)
+    spat = Spat(
+        junction=light.junction, t_ns=0, seq=0, mode="flash", plan="calm", groups=(flashing,)
+    )
+    drawn = markers.moving(city_map, snapshot(t_ns=t_ns), {spat.junction: spat}, {})
+    lamps = {m.id for m in drawn.markers if m.ns == "signals"}
+    assert (light.light_id in lamps) == are_lit
