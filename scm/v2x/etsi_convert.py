@@ -61,6 +61,7 @@ REVISIONS = 128
 _ITS_EPOCH_MS = 1_072_915_200_000
 _LEAP_MS = 5_000  # leap seconds from 2004 to now: the ITS time scale does not skip them
 _DELTA_TIMES = 65_536
+_ITS_TIMES = 2**42
 _MARK_NS = NS_PER_S // 10
 _MARKS_PER_HOUR = 36_000
 _HOUR_NS = 3_600 * NS_PER_S
@@ -131,6 +132,11 @@ def _clamp(value: float, low: int, high: int) -> int:
 def its_ms(t_ns: int) -> int:
     """Return TimestampIts: milliseconds since 2004, leap seconds counted."""
     return t_ns // NS_PER_MS - _ITS_EPOCH_MS + _LEAP_MS
+
+
+def its_time(t_ns: int) -> int:
+    """Return `its_ms` as it is written on the air; a clock before 2004 counts up to the wrap."""
+    return its_ms(t_ns) % _ITS_TIMES
 
 
 def delta_time(t_ns: int) -> int:

@@ -79,10 +79,16 @@ def _tell_others(world: World, due: Ints, x: Floats, y: Floats, now_ns: int) -> 
 
 
 def _cam(world: World, state: VehicleState, now_ns: int) -> CamTx:
-    car = world.hosted[state.vehicle].car
-    rear, front = car.vector("body.footprint_x_m")
-    right, left = car.vector("body.footprint_y_m")
-    body = cam_of(state, length_m=front - rear, width_m=left - right, front_m=front)
+    hosted = world.hosted[state.vehicle]
+    rear, front = hosted.car.vector("body.footprint_x_m")
+    right, left = hosted.car.vector("body.footprint_y_m")
+    body = cam_of(
+        state,
+        length_m=front - rear,
+        width_m=left - right,
+        front_m=front,
+        low_frequency=hosted.slow_news.due(state, front),
+    )
     return CamTx(station=state.vehicle, t_ns=now_ns, body=body)
 
 
