@@ -15,6 +15,7 @@ BENCHMARKS = (
     "camera",
     "lidar",
     "sensors",
+    "signing",
 )
 
 
