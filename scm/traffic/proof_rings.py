@@ -13,11 +13,15 @@ from typing import NamedTuple, Protocol
 from scm.errors import PlanError
 from scm.traffic import kernel
 from scm.traffic.kernel import GroupTimes, Phase, Program, State
-from scm.traffic.rings import Inputs, Layout, PhaseTimes, Rings, green_in, layout_of
+from scm.traffic.rings import Inputs, Layout, PhaseTimes, Rings, green_in
 
 
 class RingLogic(Protocol):
     """What is proven: `scm.traffic.rings`, or a mutant of it."""
+
+    def layout_of(self, program: Program, phases: tuple[PhaseTimes, ...]) -> Layout:
+        """See `scm.traffic.rings.layout_of`."""
+        ...
 
     def start(self, layout: Layout) -> Rings:
         """See `scm.traffic.rings.start`."""
@@ -75,7 +79,7 @@ def prove_service(
     Raises:
         PlanError: saying who conflicts, or waits for ever or too long.
     """
-    layout = layout_of(program, phases)
+    layout = logic.layout_of(program, phases)
     everyone = frozenset(range(len(program.groups)))
     sets = [frozenset(c) for c in chain(*(combinations(everyone, n) for n in range(9)))]
     explored = _explore(logic, program, layout, sets)

@@ -164,7 +164,7 @@ def green_in(state: State) -> frozenset[int]:
 
 def step(layout: Layout, state: Rings, told: Inputs, green: frozenset[int], dt: int) -> Rings:
     """Return the state `dt` later, with `green` the phases that the kernel shows green."""
-    called = _called(layout, state, told, green)
+    called = _called(layout, state, told)
     locked = {i for i in told.calls if layout.phases[i].locking}
     calls = frozenset((state.calls | locked) - green)
     rings = tuple(
@@ -176,11 +176,11 @@ def step(layout: Layout, state: Rings, told: Inputs, green: frozenset[int], dt: 
     return _go_on(layout, state, told, called)
 
 
-def _called(layout: Layout, state: Rings, told: Inputs, green: frozenset[int]) -> frozenset[int]:
+def _called(layout: Layout, state: Rings, told: Inputs) -> frozenset[int]:
     """Return who is called: by vehicles, by memory, by recall; not who is left out."""
     always = {i for i, p in enumerate(layout.phases) if p.recall in (Recall.MIN, Recall.MAX)}
     called = (told.calls | state.calls | always) - told.omit
-    if not called - green:
+    if not called:
         soft = {i for i, p in enumerate(layout.phases) if p.recall is Recall.SOFT}
         called |= soft - told.omit
     return frozenset(called)
