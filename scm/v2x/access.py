@@ -10,18 +10,75 @@ for, and may only ask for what its rights name.
 
 import ipaddress
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
 from scm.errors import AccessError
-from scm.v2x.fleet_file import Fleet, Member, complete
+from scm.v2x.credentials import Credentials, read_credentials
+from scm.v2x.fleet_file import Fleet, Member, complete, load_fleet
 from scm.v2x.key import prefix
 from scm.v2x.rights import presence_of, rights_of
 
 ADVANCED = "/@adv/**"
-CITY_PARTS = ("up", "world", "traffic", "monitor", "record", "camera", "api", "eye")
+CITY_PARTS = ("up", "world", "traffic", "monitor", "record", "camera", "api")
 
 _Rule = dict[str, object]
+
+
+@dataclass(frozen=True, slots=True)
+class Guard:
+    """How a city that runs on this machine keeps its router.
+
+    Attributes:
+        listen: The router's endpoint.
+        connect: The one that the city's own stations reach it by.
+        settings: For `Router`; None: everybody on this machine may enter.
+        files: Credentials of the city's own stations.
+    """
+
+    listen: str
+    connect: str
+    settings: Mapping[str, object] | None = None
+    files: Mapping[str, Path] = field(default_factory=dict)
+
+    def arguments(self, station: str) -> tuple[str, ...]:
+        """Return what the program of a station has to be given."""
+        return ("--credentials", str(self.files[station])) if station in self.files else ()
+
+    def credentials(self, station: str) -> Credentials | None:
+        """Return who a station in this process is."""
+        return read_credentials(self.files[station], station) if station in self.files else None
+
+
+def guard_of(
+    fleet_file: Path | None, city: str, listen: str, stations: Mapping[str, str], now: datetime
+) -> Guard:
+    """Return the guard of a city with a fleet file, or with none.
+
+    Args:
+        fleet_file: None: everybody on this machine may enter.
+        city: Chunk of all keys.
+        listen: The router's endpoint, with a port.
+        stations: The city's own (name -> role), see `own_stations`; added where missing.
+        now: For certificates.
+
+    Raises:
+        AccessError: when the file is wrong, or does not suit the endpoint.
+    """
+    if fleet_file is None:
+        return Guard(listen, listen)
+    fleet = load_fleet(fleet_file)
+    settings_first = router_settings(fleet, city, listen)  # refuse before anything is written
+    files = credentials_of(fleet, stations, now)
+    settings = {**settings_first, "access_control": access_control(fleet, city)}
+    connect = listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
+    return Guard(listen, connect, settings, files)
+
+
+def own_stations(eyes: Iterable[str], agents: Iterable[str]) -> dict[str, str]:
+    """Return the stations that a whole city starts itself, with their roles."""
+    return dict.fromkeys((*CITY_PARTS, *eyes), "part") | dict.fromkeys(agents, "vehicle")
 
 
 def router_settings(fleet: Fleet, city: str, listen: str) -> dict[str, object]:

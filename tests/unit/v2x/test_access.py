@@ -13,7 +13,7 @@ import zenoh
 from scm.clock import WallClock, seconds
 from scm.errors import AccessError, LinkError
 from scm.v2x import zenoh_config
-from scm.v2x.access import is_local, router_settings
+from scm.v2x.access import guard_of, is_local, own_stations, router_settings
 from scm.v2x.ask import ask
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
@@ -469,3 +469,29 @@ def test_a_router_is_reached_at_the_addresses_of_its_certificate_alone(tmp_path)
     ):
         assert bus.connected
     assert encode(state())[0]
+
+
+def test_a_city_without_a_fleet_file_is_open_to_this_machine(tmp_path):
+    guard = guard_of(None, "city", "tcp/127.0.0.1:7447", {"up": "part"}, NOW)
+    assert (guard.connect, guard.settings) == ("tcp/127.0.0.1:7447", None)
+    assert (guard.arguments("up"), guard.credentials("up")) == ((), None)
+
+
+def test_a_city_with_a_fleet_file_brings_its_own_stations_along(tmp_path):
+    add(Fleet(tmp_path / "fleet.toml", "mtls"), "n9", "vehicle", NOW)
+    stations = own_stations(("eye", "eye-north"), ("n5",))
+    guard = guard_of(tmp_path / "fleet.toml", "city", "tls/0.0.0.0:7447", stations, NOW)
+    assert guard.connect == "tls/127.0.0.1:7447"
+    assert guard.credentials("eye-north").station == "eye-north"
+    assert guard.arguments("n5")[0] == "--credentials"
+    known = {subject["id"] for subject in guard.settings["access_control"]["subjects"]}
+    assert known == {"n9", *stations}
+
+
+def test_a_fleet_that_does_not_suit_the_endpoint_is_left_as_it_was(tmp_path):
+    path = tmp_path / "fleet.toml"
+    add(Fleet(path, "password"), "n9", "vehicle", NOW)
+    before = path.read_text()
+    with pytest.raises(AccessError, match="expected tcp/127"):
+        guard_of(path, "city", "tcp/0.0.0.0:7447", {"up": "part"}, NOW)
+    assert path.read_text() == before
