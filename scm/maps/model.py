@@ -236,6 +236,22 @@ class Junction(Record, kw_only=True, frozen=True):
     plan: str
 
 
+class Approach(Record, kw_only=True, frozen=True):
+    """A way into a crossing: the line where a car's front gives way, and the ways from there."""
+
+    name: str
+    lane: str
+    at_m: float
+    ways: tuple[Conflict, ...]
+
+
+class Crossing(Record, kw_only=True, frozen=True):
+    """Where lanes cross without lights: signs say who goes first, else right before left."""
+
+    name: str
+    approaches: tuple[Approach, ...]
+
+
 class Light(Record, kw_only=True, frozen=True):
     """A three-lamp head on a pole; it shows its group's colour.
 
@@ -273,8 +289,11 @@ class Sign(Record, kw_only=True, frozen=True):
     """A traffic sign on a pole.
 
     Attributes:
-        kind: `left_curve`, `right_curve`, `stop` or `give_way`.
+        kind: `stop`, `give_way`, `speed_limit`, `no_left`, `only_right`, ...; see `maps.signs`.
         yaw_rad: Where its face looks: towards the cars it is meant for.
+        lane: The lane it holds for; without, that of the cars that its face looks at.
+        at_m: Where on the lane it begins to hold, or where the line is that it means.
+        value_mps: Of a speed limit.
     """
 
     sign_id: int
@@ -282,6 +301,9 @@ class Sign(Record, kw_only=True, frozen=True):
     x_m: float
     y_m: float
     yaw_rad: float
+    lane: str | None = None
+    at_m: float | None = None
+    value_mps: float | None = None
 
 
 class Wall(Record, kw_only=True, frozen=True):
@@ -377,6 +399,7 @@ class CityMap(Record, kw_only=True, frozen=True):
     lanes: tuple[Lane, ...] = ()
     areas: tuple[Area, ...] = ()
     junctions: tuple[Junction, ...] = ()
+    crossings: tuple[Crossing, ...] = ()
     stop_lines: tuple[StopLine, ...] = ()
     lights: tuple[Light, ...] = ()
     crosswalks: tuple[Crosswalk, ...] = ()
