@@ -185,7 +185,7 @@ class Crowd:
         ints[m.ROUTE], ints[m.COUNT], ints[m.INDEX] = at, len(numbers), first
         ints[m.AFTER] = m.AFTERS.index(after)
         ints[m.GOAL] = m.NO_GOAL if after == "loop" else len(numbers) - 1
-        ints[m.GOING_LINE], ints[m.ARRIVED] = -1, 0
+        ints[m.GOING_LINE], ints[m.RULE_LINE], ints[m.ARRIVED] = -1, -1, 0
         floats[m.S], floats[m.DONE] = s, 0.0
         floats[m.TOLD] = np.inf if speed is None else speed
         look_from(self.streets.ways, self._memory, slot, numbers[first])

@@ -14,6 +14,7 @@ from scm.vehicles.drivers.ahead import (
     cars_ahead,
 )
 from scm.vehicles.drivers.exits import has_room
+from scm.vehicles.drivers.giving_way import gives_way
 from scm.vehicles.drivers.memory import (
     ARRIVED,
     DECEL,
@@ -26,15 +27,18 @@ from scm.vehicles.drivers.memory import (
     LAST_NS,
     LATERAL_ACCEL,
     ORDER,
+    SIGN,
     SWING,
     TOLD,
     TURN,
     VEHICLE,
     WAITING,
+    WAS_FREE,
     Memory,
     S,
 )
 from scm.vehicles.drivers.pace import STANDSTILL, braking, free_speed, stopping_speed, throttle
+from scm.vehicles.drivers.rules import LIT
 from scm.vehicles.drivers.signal_table import Told
 from scm.vehicles.drivers.stations import Heard
 from scm.vehicles.drivers.steering import LEAST_HALF, steer
@@ -147,13 +151,24 @@ def hold(
     brake = braking(max(0.0, speed), kind[DECEL], REACTION)
     can_stop = distance - kind[FRONT] >= brake + NEAREST
     index = ints[INDEX] + at - HERE
-    held = signal_says(told, ways.line_links, ints, line, index, can_stop, car, now_ns, loss, seed)
+    held = SIGN
+    is_lit = ways.rules.kind[line] == LIT
+    if is_lit:
+        held = signal_says(
+            told, ways.line_links, ints, line, index, can_stop, car, now_ns, loss, seed
+        )
+    if held == SIGN:
+        held = gives_way(
+            ways, memory, heard, kind, car, line, at, distance, speed, can_stop, is_lit, now_ns,
+            loss, seed,
+        )  # fmt: skip
     if held != VEHICLE:
         return held
     if has_room(
         ways, heard, room, kind, sight, found, car, line, at, distance, s, speed, now_ns, loss, seed
     ):
         return FREE
+    ints[WAS_FREE] = 0
     if at == HERE and speed < STANDSTILL and is_turn(now_ns, passed):
         choose_again(ways, memory, car)
     return VEHICLE

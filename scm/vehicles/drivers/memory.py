@@ -25,11 +25,15 @@ S, BESIDE, DONE, TOLD, ANGLE, STEER, PACE, SUM = range(8)
 
 # Of a car, whole numbers: its kind; which lane of its way it is on; where its route begins among
 # all routes, how many lanes it has, and what comes after them; its own seed; the line it decided
-# to cross and on which lane of its way; when it last decided; what holds it; which way it turns.
+# to cross and on which lane of its way; when it last decided; what holds it; which way it turns;
+# whether it has arrived. Of the line without lights before it: which it is and on which lane of
+# its way, since when it rests there, when cars in motion last kept it, when one was last in the
+# junction, who stood there first (a bit for each of its lines), whether it was free the last time.
 (
     KIND, INDEX, ROUTE, COUNT, AFTER, GOAL, SEED, GOING_LINE, GOING_INDEX, LAST_NS, WAITING, TURN,
-    ARRIVED,
-) = range(13)  # fmt: skip
+    ARRIVED, RULE_LINE, RULE_INDEX, REST_NS, KEPT_NS, BUSY_NS, FIRST, WAS_FREE,
+) = range(20)  # fmt: skip
+INTS = 20
 NEVER_NS = -(2**62)
 NO_GOAL = 2**62
 
@@ -40,8 +44,8 @@ AFTERS = ("stop", "loop", "circulate")
 # Lanes of a way in sight: one behind, the one it is on, those ahead; -1 where there is none.
 BEHIND, HERE, IN_SIGHT = 0, 1, 8
 
-WAITING_FOR = (None, "signal", "vehicle", "stop")
-FREE, SIGNAL, VEHICLE, ORDER = range(4)
+WAITING_FOR = (None, "signal", "vehicle", "stop", "sign")
+FREE, SIGNAL, VEHICLE, ORDER, SIGN = range(5)
 
 
 class Memory(NamedTuple):
@@ -49,7 +53,7 @@ class Memory(NamedTuple):
 
     Attributes:
         kinds: (k, 32) of the kinds of cars.
-        floats: (capacity, 8); `ints` (capacity, 13).
+        floats: (capacity, 8); `ints` (capacity, 20).
         sight: (capacity, 8) lanes of each car's way, by number.
         routes: All routes, one behind the other.
     """
@@ -80,7 +84,7 @@ def kind_row(limits: CarLimits, sharpest: float) -> Floats:
 
 def empty_memory(capacity: int) -> Memory:
     """Return the memory of a crowd that nobody has entered yet."""
-    ints = np.zeros((capacity, 13), np.int64)
+    ints = np.zeros((capacity, INTS), np.int64)
     ints[:, LAST_NS] = NEVER_NS
     return Memory(
         kinds=np.zeros((0, SPEEDS + MOST_SPEEDS)),

@@ -2,7 +2,7 @@
 
 A yellow light, or a green one whose promised end has passed, stops a car that can stop with
 comfortable deceleration before the line, and lets the others clear the junction. Whoever went on
-for that reason goes on. Red, flashing red and silence stop everybody.
+for that reason goes on. Red and silence stop everybody. Flashing red is a stop sign for all.
 """
 
 from scm.arrays import Floats, Ints
@@ -12,10 +12,11 @@ from scm.vehicles.drivers.memory import (
     GOING_LINE,
     HERE,
     IN_SIGHT,
+    SIGN,
     SIGNAL,
     VEHICLE,
 )
-from scm.vehicles.drivers.signal_table import GREEN, YELLOW, Told, believed, frame_for
+from scm.vehicles.drivers.signal_table import FLASHING, GREEN, YELLOW, Told, believed, frame_for
 from scm.vehicles.drivers.streets import GROUP, JUNCTION
 from scm.vehicles.jit import law
 
@@ -67,7 +68,9 @@ def signal_says(
     loss: float,
     seed: int,
 ) -> int:
-    """Return what holds a car at a line: SIGNAL; FREE; or VEHICLE, unless there is room behind it.
+    """Return what holds a car at a line: SIGNAL, or nothing: FREE.
+
+    VEHICLE: the others, unless there is room behind it. SIGN: the junction has no signals now.
 
     Args:
         told: The signals.
@@ -89,4 +92,4 @@ def signal_says(
     if colour == GREEN or (colour == YELLOW and (is_going or not can_stop)):
         ints[GOING_LINE], ints[GOING_INDEX] = line, index
         return FREE
-    return SIGNAL
+    return SIGN if colour == FLASHING else SIGNAL
