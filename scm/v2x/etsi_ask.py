@@ -44,6 +44,7 @@ _VERBS: dict[int, Verb] = {number: verb for verb, number in _TYPES.items()}
 _MOST_SPEED = 8190
 _MOST_LASTS_MS = 60_999
 _FORWARD, _REVERSE = 2, 3
+_STANDSTILL_MPS = 0.02
 
 
 class Wish(NamedTuple):
@@ -123,7 +124,8 @@ def _requestor(wish: Wish, state: VehicleState) -> Requestor:
             position=Position3d(latitude=place.latitude, longitude=place.longitude),
             heading=round((90.0 - math.degrees(state.yaw_rad)) * 80.0) % 28_800,
             speed=TransmissionAndSpeed(
-                transmission=_REVERSE if state.speed_mps < 0.0 else _FORWARD, speed=speed
+                transmission=_REVERSE if state.speed_mps < -_STANDSTILL_MPS else _FORWARD,
+                speed=speed,
             ),
         ),
         name=state.vehicle,

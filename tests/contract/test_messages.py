@@ -104,8 +104,8 @@ def annotated(of, meta):
     if of is int:
         return st.integers(meta.ge, meta.le)
     if of is not str:
-        few = (meta.min_length or 0) + 2
-        items = st.lists(values(get_args(of)[0]), min_size=meta.min_length or 0, max_size=few)
+        least = meta.min_length or 0
+        items = st.lists(values(get_args(of)[0]), min_size=least, max_size=max(2, least))
         return items.map(tuple)
     if meta.pattern:
         return st.from_regex(meta.pattern.replace("$", r"\Z"))

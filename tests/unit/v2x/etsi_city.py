@@ -17,6 +17,7 @@ from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.part import Hears
+from scm.recorder.mcap_file import RunFile
 from scm.traffic.part import TrafficPart
 from scm.v2x.etsi_ask import Answered, Wish, srem_of, ssem_of
 from scm.v2x.etsi_convert import roadside_station, station_id
@@ -24,12 +25,16 @@ from scm.v2x.etsi_events import DenmSender, accident, city_stop
 from scm.v2x.etsi_json import Body
 from scm.v2x.etsi_priority import STATUSES
 from scm.v2x.etsi_topology import mapem_at, mapem_of, topology_of
+from scm.v2x.exchange import RawSample
+from scm.v2x.key import key_of
+from scm.v2x.message import encode
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.cpm_tx import CpmTx
 from scm.v2x.messages.denm_tx import DenmTx
 from scm.v2x.messages.mapem_tx import MapemTx
 from scm.v2x.messages.plan_request import PlanRequest
+from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spatem_tx import SpatemTx
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.srem_tx import SremTx
@@ -66,6 +71,7 @@ def city_says() -> dict[str, tuple[Said, ...]]:
         states = city.hear(Hears(VehicleState))
         for name in ("n1", "n2"):
             city.call(SpawnRequest(vehicle=name))
+            city.call(RouteRequest(request_id=name, vehicle=name))
         city.run_for(8.0)
         city.call(PlanRequest(junction="crossing", plan="flash", by="test"))
         city.run_for(4.0)
@@ -145,6 +151,16 @@ def a_track(t_ns):
         "covariance": np.eye(6) * 1e-6, "cameras": ("a",), "flags": (), "stale": False,
     }  # fmt: skip
     return Track(**{n: v for n, v in fields.items() if n in Track.__annotations__})
+
+
+def record_city(path, late_ns=0):
+    """Write all of it as a run that was heard a little later than it was sent; return the path."""
+    with RunFile(path, "city") as run:
+        for kind, said in sorted(everything(), key=lambda one: one[1].t_ns):
+            message = TX[kind](station=said.station, t_ns=said.t_ns, body=said.body)
+            key, (body, _) = key_of("city", message), encode(message)
+            run.write(RawSample(key, body, None, said.t_ns + late_ns))
+    return path
 
 
 def everything():
