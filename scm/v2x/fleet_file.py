@@ -10,12 +10,12 @@ import secrets
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from scm.errors import AccessError, nearest
-from scm.v2x.credentials import Credentials, write_credentials, write_secret
+from scm.v2x.credentials import Credentials, read_credentials, write_credentials, write_secret
 from scm.v2x.key import check_name
 from scm.v2x.rights import rights_of
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 Auth = Literal["password", "mtls"]
 HERE = ("127.0.0.1", "::1", "localhost")
 PASSWORD_BYTES = 32
+RENEW_BEFORE = timedelta(days=30)
 
 _HEAD = (
     "# Who may enter the city. Written by `scm fleet add`; secrets lie in the folder beside it.\n"
@@ -164,26 +165,40 @@ def remove(fleet: Fleet, name: str) -> None:
 
 
 def complete(fleet: Fleet, stations: Mapping[str, str], now: datetime) -> None:
-    """Add those of a city's own stations (name -> role) that the file does not have yet."""
+    """Give a city's own stations (name -> role) what they lack, and renew what ends soon."""
     for name, role in stations.items():
-        if name not in fleet.members or not fleet.credentials(name).is_file():
+        if _lacks_credentials(fleet, name, now):
             add(fleet, name, role, now)
+    name_hosts(fleet, (), now)
 
 
 def name_hosts(fleet: Fleet, hosts: Iterable[str], now: datetime) -> None:
-    """Make the router's certificate good at more addresses."""
+    """Make the router's certificate good at more addresses, and renew it when it ends soon."""
     wished = (*fleet.hosts, *(host for host in hosts if host not in fleet.hosts))
     is_new = wished != fleet.hosts
     fleet.hosts = wished
     if fleet.auth == "mtls":
         from scm.v2x.certificates import issue_router  # noqa: PLC0415  slow to load, rarely needed
 
-        authority = _authority(fleet, now)
-        if is_new or not fleet.pem("router.crt").is_file():
+        authority, old = _authority(fleet, now), fleet.pem("router.crt")
+        if is_new or not old.is_file() or _ends_soon(old.read_text(), now):
             pair = issue_router(authority, fleet.hosts, now)
             write_secret(fleet.pem("router.key"), pair.private_key)
             write_secret(fleet.pem("router.crt"), pair.certificate)
     save_fleet(fleet)
+
+
+def _lacks_credentials(fleet: Fleet, name: str, now: datetime) -> bool:
+    path = fleet.credentials(name)
+    if name not in fleet.members or not path.is_file():
+        return True
+    return fleet.auth == "mtls" and _ends_soon(read_credentials(path).certificate, now)
+
+
+def _ends_soon(certificate: str, now: datetime) -> bool:
+    from scm.v2x.certificates import expiry_of  # noqa: PLC0415  slow to load, rarely needed
+
+    return expiry_of(certificate) - now < RENEW_BEFORE
 
 
 def _with_password(member: Member) -> Credentials:

@@ -182,6 +182,18 @@ class TestCertificates:
         assert found == {"127.0.0.1", "::1", "localhost", "192.168.1.5", "city.example"}
         assert "192.168.1.5" in load_fleet(fleet.path).hosts
 
+    @pytest.mark.parametrize(("days", "renewed"), [(300, False), (340, True)])
+    def test_what_ends_soon_is_renewed_for_the_city_s_own(self, made, days, renewed):
+        fleet, _ = made
+        before = self.at(fleet, NOW)
+        after = self.at(fleet, NOW + timedelta(days=days))
+        assert [old != new for old, new in zip(before, after, strict=True)] == [renewed] * 2
+
+    @staticmethod
+    def at(fleet, now):
+        files = credentials_of(fleet, {"world": "part"}, now)
+        return files["world"].read_text(), fleet.pem("router.crt").read_text()
+
 
 class TestCommands:
     def test_a_password_is_shown_once(self, tmp_path, capsys):
