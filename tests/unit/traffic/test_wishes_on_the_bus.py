@@ -69,7 +69,7 @@ def test_a_wish_is_answered_with_what_is_in_force_and_told(city):
 
 def test_a_wish_for_what_is_not_there_is_refused(city):
     city.run_for(1.0)
-    refusal = wish(city, "hold", "south_eest")
+    refusal = wish(city, "hold", "south_eastt")
     assert isinstance(refusal, Refused)
     assert "did you mean 'south_east'" in refusal.detail
     assert wish(city, "clear", junction="crosing").code == "not_found"
