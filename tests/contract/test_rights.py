@@ -14,9 +14,9 @@ from scm.recorder.part import RecorderPart
 from scm.registry import names
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
-from scm.v2x.exchange import Answer, Call
+from scm.v2x.exchange import Call
 from scm.v2x.key import key_of, prefix, selector
-from scm.v2x.message import Request
+from scm.v2x.message import Message, Request
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.rights import EVERY_REQUEST, rights_of
@@ -58,7 +58,7 @@ class Noted:
         for item in outbox:
             if isinstance(item, Call):
                 self.asked.add(self._below(key_of("city", item.request)))
-            elif not isinstance(item, Answer):
+            elif isinstance(item, Message):
                 self.said.add(self._below(key_of("city", item)))
 
     def step(self, now_ns, inbox):
