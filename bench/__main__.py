@@ -11,6 +11,7 @@ BENCHMARKS = (
     "city",
     "start",
     "bus",
+    "codec",
     "eye",
     "camera",
     "lidar",

@@ -127,7 +127,8 @@ def test_a_car_hears_its_own_answer_alone():
 def test_slow_news_comes_every_half_second_and_tells_the_way_back():
     news, told = SlowNews(role="emergency"), []
     for step in range(200):
-        state = a_state(t_ns=NOW + step * 100 * NS_PER_MS, x_m=0.026 * step, lights=("left",))
+        t_ns, x_m = NOW + step * 100 * NS_PER_MS, 0.026 * step
+        state = a_state(t_ns=t_ns, x_m=x_m, y_m=0.5 * x_m, lights=("left",))
         container = news.due(state, 0.2)
         if container is not None:
             told.append((state, container.basic_vehicle_container_low_frequency))
@@ -137,8 +138,10 @@ def test_slow_news_comes_every_half_second_and_tells_the_way_back():
     assert last.exterior_lights.left_turn_signal_on
     assert not last.exterior_lights.low_beam_headlights_on
     assert len(last.path_history) <= MOST_POINTS
-    back = sum(point.path_position.delta_longitude for point in last.path_history)
-    x_m, _ = place_of(0, -back)
+    west = sum(point.path_position.delta_longitude for point in last.path_history)
+    south = sum(point.path_position.delta_latitude for point in last.path_history)
+    x_m, y_m = place_of(-south, -west)
+    assert y_m == pytest.approx(0.5 * x_m, abs=0.01)
     spent_s = sum(point.path_delta_time for point in last.path_history) / 100.0
     assert x_m == pytest.approx(0.26 * spent_s, abs=0.01)
     assert x_m == pytest.approx(state.x_m, abs=0.35), "the whole way so far"
