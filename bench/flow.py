@@ -6,6 +6,7 @@ that touched, simulated over elapsed time. `--loss 0.2` lets each driver miss so
 """
 
 import argparse
+import math
 import time
 
 import numpy as np
@@ -74,8 +75,10 @@ def behind_red(crowd: Crowd) -> Bools:
     return found
 
 
-def flow(name: str, cars: int, span_s: float, loss: float = 0.0) -> dict[str, float]:
-    """Run a city; return what there is to tell of it."""
+def flow(
+    name: str, cars: int, span_s: float, loss: float = 0.0, wall_s: float = math.inf
+) -> dict[str, float]:
+    """Run a city for a time, or until so much real time is over; return what there is to tell."""
     city_map = load_map(name)
     part = WorldPart(city_map, room=cars)
     if loss:
@@ -88,10 +91,13 @@ def flow(name: str, cars: int, span_s: float, loss: float = 0.0) -> dict[str, fl
     with Lockstep([part, TrafficPart(city_map), MonitorPart(city_map)]) as city:
         city.run_for(1.0)
         before, began = crowd.passed.copy(), time.perf_counter()
-        for _ in range(round(span_s / LOOK_S)):
+        for look in range(1, 1 + round(span_s / LOOK_S)):
             city.run_for(LOOK_S)
             standing.look(crowd, world.slots.speed, LOOK_S)
-        took = time.perf_counter() - began
+            took = time.perf_counter() - began
+            if took > wall_s:
+                span_s = look * LOOK_S
+                break
     passed = float((crowd.passed - before).sum()) / 2.0
     return {
         "cars": cars,
@@ -109,6 +115,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench.flow", description=__doc__)
     parser.add_argument("cities", nargs="*", default=list(MAPS), help="lights, signs, or a map")
     parser.add_argument("--seconds", type=float, default=600.0)
+    parser.add_argument("--wall", type=float, default=math.inf, help="s of real time at most")
     parser.add_argument("--cars", type=int, default=200)
     parser.add_argument("--loss", type=float, default=0.0)
     given = parser.parse_args()
@@ -116,9 +123,9 @@ def main() -> None:
           "| contacts | x real time |")  # fmt: skip
     print("|---|---:|---:|---:|---:|---:|---:|---:|")
     for city in given.cities:
-        row = flow(MAPS.get(city, city), given.cars, given.seconds, given.loss)
+        row = flow(MAPS.get(city, city), given.cars, given.seconds, given.loss, given.wall)
         print(
-            f"| {city} | {row['cars']:.0f} | {row['hours']:.2f} | {row['passages_per_h']:.0f} "
+            f"| {city} | {row['cars']:.0f} | {row['hours']:.3f} | {row['passages_per_h']:.0f} "
             f"| {row['least']:.0f} | {row['longest_s']:.1f} | {row['contacts']:.0f} "
             f"| {row['ratio']:.1f} |",
             flush=True,

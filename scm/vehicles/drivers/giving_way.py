@@ -66,10 +66,11 @@ GAP = 0.7
 BEHIND = 0.4
 REST_FOR_NS = 700_000_000
 PATIENCE_NS = 1_500_000_000
+LONG_PATIENCE_NS = 500_000_000
 STAGGER_NS = 250_000_000
 LONG_NS = 12_000_000_000
 NOTICE_S = 1.0
-NOBODY, SOMEBODY, INSIDE = 0, 1 << 40, 1 << 41
+NOBODY, SOMEBODY, INSIDE, ROLLS = 0, 1 << 40, 1 << 41, 16
 NOWHERE = -1e9
 LEFT, LOW, RIGHT, HIGH = range(4)
 
@@ -142,7 +143,8 @@ def waits(
         ints: Its memory.
         order: The line's place in its junction.
         standing: Whether SOMEBODY in motion is in the way, or only INSIDE, and a bit for each line
-            where one stands that has the right of way; where all must stop: whose way crosses.
+            where one stands that has the right of way, or ROLLS higher one that still rolls
+            there; where all must stop: whose way crosses.
         is_new: Whether it has come to rest at the line just now.
         all_stop: Whether all must stop.
         must_rest: Whether it must.
@@ -150,8 +152,9 @@ def waits(
     """
     if standing & (SOMEBODY | INSIDE):
         ints[BUSY_NS] = now_ns
-    moving, standing = standing & SOMEBODY, standing & ~(SOMEBODY | INSIDE)
-    ints[FIRST] = standing if is_new else ints[FIRST] & standing
+    moving, resting = standing & SOMEBODY, standing & ((1 << ROLLS) - 1)
+    standing = resting | ((standing & ~(SOMEBODY | INSIDE)) >> ROLLS)
+    ints[FIRST] = resting if is_new else ints[FIRST] & standing
     if moving:
         ints[KEPT_NS] = now_ns
         return True
@@ -165,7 +168,8 @@ def waits(
         return False
     if all_stop and ints[FIRST] == 0:
         return bool(now_ns - max(rest_ns + REST_FOR_NS, ints[KEPT_NS]) < turn_ns)
-    return bool(now_ns - max(rest_ns, ints[BUSY_NS]) < PATIENCE_NS + turn_ns)
+    patience_ns = LONG_PATIENCE_NS if now_ns - rest_ns >= LONG_NS else PATIENCE_NS
+    return bool(now_ns - max(rest_ns, ints[BUSY_NS]) < patience_ns + turn_ns)
 
 
 @law
@@ -323,7 +327,8 @@ def judge_before(
     is_going = away < 0.0 or v > stopping_speed(away - SHORT_OF_LINE, decel) + HASTE
     if not is_going and (v < STANDS or away <= AT_LINE):
         is_due = away <= AT_LINE and meets(rules, way, peer, notice == 0.0)
-        return 1 << rules.order[peer] if is_due else NOBODY
+        bit = rules.order[peer] + (ROLLS if v >= STANDS else 0)
+        return 1 << bit if is_due else NOBODY
     can_let_pass = away > v * notice + braking(v, decel, REACTION) + SHORT_OF_LINE
     if not is_going and (notice == 0.0 or can_let_pass):
         return NOBODY
