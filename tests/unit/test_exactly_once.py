@@ -257,3 +257,19 @@ def test_an_id_is_given_to_what_has_none_and_to_nothing_else():
 
 def test_the_network_without_faults_is_the_one_it_was():
     assert MemoryNetwork(Lockstep([]).clock).faults is None
+
+
+def test_no_answer_leaves_before_it_is_stored_and_nothing_new_begins_meanwhile():
+    store = Fragile()
+    city, shop = Lockstep([]), Shop(store)
+    city.add(shop, store)
+    store.sick = True
+    assert city.call(request(), timeout_s=0.5).code == "timeout"
+    refused_one = city.call(request("r2"), timeout_s=0.5)
+    assert refused_one.code == "offline"
+    assert "cannot store its state" in refused_one.detail
+    store.sick = False
+    assert city.call(request()).plan == "calm"
+    assert city.call(request("r2")).plan == "calm"
+    assert shop.done == {"r1": 1, "r2": 1}
+    city.close()
