@@ -56,7 +56,7 @@ class Answer:
     reply: Message
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Keep:
     """State that must outlive the process: stored before any answer of the same step leaves.
 
