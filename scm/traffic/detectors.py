@@ -24,8 +24,8 @@ from scm.maps.route import Roads
 REACH_M = 1.6
 AHEAD_M = 0.9
 PRESENCE_M = 0.25
-EXTEND_S = 2.0
-CLOSE_M = 0.12
+EXTEND_S = 3.0
+CLOSE_M = 0.5
 STANDS_MPS = 0.04
 NEXT_IN_QUEUE_M = 0.6
 BESIDE_M = 0.2

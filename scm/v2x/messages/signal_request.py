@@ -1,9 +1,8 @@
 """A wish for a junction's signals in a traffic engineer's words; nobody ever sets a colour."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import msgspec
-from msgspec import Meta
 
 from scm.v2x.message import Message, Request
 
@@ -52,7 +51,7 @@ class SignalRequest(Request, kw_only=True, frozen=True):
             to this one group and stay. `policy`: run the one named. `clear`: take back all
             wishes, or those for these groups.
         by: Who wishes; `reason`: why. Both are told.
-        expires_s: When the wish lapses, from now.
+        expires_s: When the wish lapses, from now; `LONGEST_S` at most.
     """
 
     KEY: ClassVar[str] = "tl/{junction}/wish"
@@ -63,7 +62,7 @@ class SignalRequest(Request, kw_only=True, frozen=True):
     groups: tuple[str, ...] = ()
     by: str
     reason: str = ""
-    expires_s: Annotated[float, Meta(gt=0.0, le=LONGEST_S)] = 60.0
+    expires_s: float = 60.0
     policy: str = ""
 
 

@@ -78,7 +78,7 @@ def test_a_queue_ends_where_a_car_still_drives_or_a_gap_is(watcher):
 
 
 def test_a_moving_car_is_brought_forward_and_keeps_a_green_when_it_is_near(watcher):
-    show(watcher, at(0.7, speed=0.25))
+    show(watcher, at(0.9, speed=0.25))
     assert not read(watcher, 0.0).extend
     assert read(watcher, 1.0).extend
     assert read(watcher, 1.0).gap_s == 0.0

@@ -11,7 +11,7 @@ from scm.part import Hears
 from scm.traffic.part import TrafficPart
 from scm.v2x.etsi_ask import Wish, answers_of, srem_of
 from scm.v2x.etsi_convert import cam_of, station_id
-from scm.v2x.message import Refused, decode
+from scm.v2x.message import Refused
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.signal_request import SignalReply, SignalRequest
@@ -75,9 +75,12 @@ def test_a_wish_for_what_is_not_there_is_refused(city):
     assert wish(city, "clear", junction="crosing").code == "not_found"
 
 
-def test_no_wish_outlasts_fifteen_minutes():
-    with pytest.raises(Exception, match=r"expires_s"):
-        decode(SignalRequest, b'{"junction":"x","verb":"call","by":"me","expires_s":901}')
+@pytest.mark.parametrize("expires_s", [901.0, 0.0, -1.0])
+def test_no_wish_outlasts_fifteen_minutes(city, expires_s):
+    city.run_for(1.0)
+    refusal = wish(city, "hold", "south_east", expires_s=expires_s)
+    assert refusal.code == "invalid"
+    assert "900 at most" in refusal.detail
 
 
 def test_a_car_heard_at_the_roadside_gets_its_green(city):
