@@ -168,8 +168,10 @@ def waits(
         return False
     if all_stop and ints[FIRST] == 0:
         return bool(now_ns - max(rest_ns + REST_FOR_NS, ints[KEPT_NS]) < turn_ns)
-    patience_ns = LONG_PATIENCE_NS if now_ns - rest_ns >= LONG_NS else PATIENCE_NS
-    return bool(now_ns - max(rest_ns, ints[BUSY_NS]) < patience_ns + turn_ns)
+    is_long = now_ns - rest_ns >= LONG_NS
+    since_ns = ints[KEPT_NS] if is_long else max(rest_ns, ints[BUSY_NS])
+    patience_ns = LONG_PATIENCE_NS if is_long else PATIENCE_NS
+    return bool(now_ns - since_ns < patience_ns + turn_ns)
 
 
 @law
@@ -298,7 +300,8 @@ def judge(
             )  # fmt: skip
             if middle == NOWHERE:
                 continue
-            found = INSIDE
+            if v >= STANDS:  # one that stands behind the junction is part of a queue
+                found = INSIDE
             if is_in_way(
                 rules, kind, way, other, before, speed, v_most, middle, v, half, True,
                 rules.limit[peer],
@@ -338,7 +341,7 @@ def judge_before(
             rules.limit[peer],
         ):  # fmt: skip
             return SOMEBODY
-    return INSIDE if is_going else NOBODY
+    return INSIDE if v >= STANDS else NOBODY
 
 
 @law
