@@ -16,11 +16,15 @@ BENCHMARKS = (
     "camera",
     "lidar",
     "sensors",
+    "signals",
     "signing",
 )
 
 
-LONG = ("mismatch",)  # takes minutes: only where it is asked for, alone, with its own arguments
+LONG = (
+    "flow",
+    "mismatch",
+)  # takes minutes: only where it is asked for, alone, with its own arguments
 
 
 def main(names: list[str]) -> None:

@@ -8,13 +8,6 @@ from scm.command import Command, part_arguments, run_part, state_argument, state
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
     state_argument(parser)
-    parser.add_argument(
-        "--fault",
-        action="append",
-        default=[],
-        metavar="JUNCTION=FAULT",
-        help="a fault that was latched before and is not reset yet; may be repeated",
-    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -22,11 +15,9 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.store.records import FaultRecord, records
     from scm.traffic.monitor_part import MonitorPart
 
-    faults = dict(fault.partition("=")[::2] for fault in arguments.fault)
     with state_of(arguments) as state:
-        if state is not None:  # it knows best: what it does not hold was reset
-            stored = records(state, "latches", "monitor", FaultRecord)
-            faults = {junction: record.fault for junction, record in stored.items()}
+        stored = {} if state is None else records(state, "latches", "monitor", FaultRecord)
+        faults = {junction: record.fault for junction, record in stored.items()}
         part = MonitorPart(load_map(arguments.map), faults)
         return run_part(part, arguments, state)
 

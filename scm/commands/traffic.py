@@ -24,6 +24,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
+    from scm.store.records import PlanRecord, records
     from scm.traffic.cars import facts_of, slowest_of
     from scm.traffic.part import TrafficPart
     from scm.traffic.policies.learned import load_learned
@@ -36,6 +37,7 @@ def _run(arguments: argparse.Namespace) -> int:
             policy=arguments.policy,
             car=slowest_of(map(facts_of, arguments.car)) if arguments.car else NIGEL,
             learned=load_learned(arguments.learned) if arguments.learned else None,
+            kept={} if state is None else records(state, "plans", "traffic", PlanRecord),
         )
         return run_part(part, arguments, state)
 

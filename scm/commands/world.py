@@ -17,9 +17,6 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="cars to spawn at the start (%(default)s)",
     )
     parser.add_argument("--car", default="nigel", help="their car file (%(default)s)")
-    parser.add_argument(
-        "--stopped-by", metavar="WHO", help="start with the city stop that WHO engaged before"
-    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -36,7 +33,6 @@ def _run(arguments: argparse.Namespace) -> int:
             load_map(arguments.map),
             arguments.seed,
             hosted,
-            arguments.stopped_by,
             kept=None if state is None else read_kept(state),
         )
         # Compiled when its first car comes, a car file would stop the city for 2.5 s.

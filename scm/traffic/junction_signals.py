@@ -2,16 +2,22 @@
 
 from typing import Literal
 
+from msgspec.structs import replace
+
 from scm.clock import NS_PER_MS
 from scm.maps.model import Junction
+from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller, Heard
 from scm.traffic.detectors import Watcher
 from scm.traffic.plan import FLASH
 from scm.traffic.priority_air import PriorityDesk
 from scm.traffic.program import STEP_NS
 from scm.v2x.etsi_convert import roadside_station, spatem_of
+from scm.v2x.etsi_mapem import MapemBody
+from scm.v2x.etsi_topology import mapem_at
 from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.mapem_tx import MapemTx
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.signal_request import SignalReply, SignalRequest, SignalWish
@@ -20,6 +26,7 @@ from scm.v2x.messages.spatem_tx import SpatemTx
 
 MONITOR_SILENT_NS = 3_000 * NS_PER_MS
 SPATEM_EVERY_NS = 500 * NS_PER_MS
+MAPEM_EVERY_NS = 1_000 * NS_PER_MS
 EARLY_NS = STEP_NS // 2
 
 Severity = Literal["info", "warning"]
@@ -29,9 +36,17 @@ class JunctionSignals:
     """Steps one controller; hears the monitor, people and vehicles for it."""
 
     def __init__(
-        self, junction: Junction, controller: Controller, watcher: Watcher, desk: PriorityDesk
+        self,
+        junction: Junction,
+        controller: Controller,
+        watcher: Watcher,
+        desk: PriorityDesk,
+        mapem: MapemBody,
     ) -> None:
         self.junction = junction
+        self._mapem = mapem
+        self._mapem_ns: int | None = None
+        self.record = PlanRecord(plan="")
         self.desk = desk
         self.controller = controller
         self.watcher = watcher
@@ -52,8 +67,18 @@ class JunctionSignals:
             on=status.fault is not None,
         )
 
+    def go_on(self, record: PlanRecord) -> None:
+        """Take what was asked for in an earlier run, as if it were asked now.
+
+        Raises:
+            PlanError: when there is no such plan any more.
+        """
+        for plan in (record.plan, FLASH if record.flash else ""):
+            if plan:
+                self.serve_plan(PlanRequest(junction=self.junction.name, plan=plan, by=record.by))
+
     def serve_plan(self, request: PlanRequest) -> PlanReply:
-        """Take a wish for a plan, or for flash.
+        """Take a wish for a plan, or for flash; `record` is what should outlive the process.
 
         Raises:
             PlanError: when there is no such plan.
@@ -62,8 +87,10 @@ class JunctionSignals:
         who = f"{request.by} asked" + (f": {request.reason}" if request.reason else "")
         if request.plan == FLASH:
             self._flash("person", who, on=True)
+            self.record = replace(self.record, flash=True, by=request.by)
             return PlanReply(junction=request.junction, plan=FLASH)
         controller.ask(request.plan)
+        self.record = PlanRecord(plan=request.plan, by=request.by)
         self._asked = who
         self._flash("person", who, on=False)
         plan = FLASH if controller.is_flashing else controller.running
@@ -130,12 +157,17 @@ class JunctionSignals:
         self.controller.flash(reason, on=on)
 
     def _on_air(self, spat: Spat) -> list[Outgoing]:
-        due = self._sent_ns is None or spat.t_ns - self._sent_ns >= SPATEM_EVERY_NS - EARLY_NS
-        if not due and not self.controller.changed:
-            return []
-        self._sent_ns = spat.t_ns
-        body = spatem_of(spat, self.junction)
-        return [SpatemTx(station=roadside_station(spat.junction), t_ns=spat.t_ns, body=body)]
+        station, now_ns = roadside_station(spat.junction), spat.t_ns
+        sent: list[Outgoing] = []
+        if self.controller.changed or _is_due(self._sent_ns, now_ns, SPATEM_EVERY_NS):
+            self._sent_ns = now_ns
+            body = spatem_of(spat, self.junction)
+            sent.append(SpatemTx(station=station, t_ns=now_ns, body=body))
+        if _is_due(self._mapem_ns, now_ns, MAPEM_EVERY_NS):
+            self._mapem_ns = now_ns
+            lanes = mapem_at(self._mapem, now_ns)
+            sent.append(MapemTx(station=station, t_ns=now_ns, body=lanes))
+        return sent
 
     def _lapses(self, now_ns: int) -> None:
         """Tell wishes that ended by themselves."""
@@ -176,3 +208,7 @@ class JunctionSignals:
         self._news.append(
             CityEvent(severity=severity, source="traffic", t_ns=now_ns, name=name, text=text)
         )
+
+
+def _is_due(sent_ns: int | None, now_ns: int, every_ns: int) -> bool:
+    return sent_ns is None or now_ns - sent_ns >= every_ns - EARLY_NS

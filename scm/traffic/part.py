@@ -3,12 +3,13 @@
 It serves wishes and hears the monitor. A fault that the monitor reports, or a monitor that was
 there and fell silent, makes the junction flash red until the monitor says that all is well. What
 the controller shows goes out as `Spat` at every step, and over the roadside station's antenna as
-SPATEM twice a second and at once when a colour changes. Under a policy that needs detectors it
-listens to the CAMs that the roadside unit hears, and to what the overhead cameras see.
+SPATEM twice a second and at once when a colour changes, with the lanes as MAPEM once a second.
+Under a policy that needs detectors it listens to the CAMs that the roadside unit hears, and to what
+the overhead cameras see.
 """
 
 import logging
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from scm.errors import PlanError, nearest
@@ -16,6 +17,7 @@ from scm.log import event
 from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.part import Hears, Serves
+from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller
 from scm.traffic.detectors import Seen, Watcher
 from scm.traffic.junction_signals import JunctionSignals
@@ -29,8 +31,9 @@ from scm.traffic.timetables import Tables
 from scm.traffic.timing import NIGEL, CarFacts
 from scm.traffic.wave import links_of, waves_of
 from scm.v2x.etsi_convert import roadside_station
-from scm.v2x.exchange import Answer, Incoming, Outgoing
-from scm.v2x.message import Message, Refused
+from scm.v2x.etsi_topology import mapem_of
+from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
+from scm.v2x.message import Refused
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.monitor_status import MonitorStatus
@@ -52,6 +55,7 @@ class TrafficPart:
         policy: str = FIXED,
         car: CarFacts = NIGEL,
         learned: Callable[[Any], Any] | None = None,
+        kept: Mapping[str, PlanRecord] | None = None,
     ) -> None:
         """Take the map.
 
@@ -61,6 +65,7 @@ class TrafficPart:
             policy: Of all junctions while nobody wishes another one.
             car: As bad as the worst of the fleet; all least times follow from it.
             learned: For the policy `learned`.
+            kept: What junctions were asked for in an earlier run, by name.
 
         Raises:
             PlanError: when a plan or policy is unknown, or not safe for a junction.
@@ -87,9 +92,13 @@ class TrafficPart:
                 ),
                 Watcher(junction, roads),
                 PriorityDesk(junction, roads),
+                mapem_of(roads, junction),
             )
             for junction in city_map.junctions
         }
+        for name, record in (kept or {}).items():
+            if name in self._junctions:
+                self._junctions[name].go_on(record)
         self._by_station = {roadside_station(name): s for name, s in self._junctions.items()}
 
     @property
@@ -117,7 +126,7 @@ class TrafficPart:
             elif isinstance(message, EyeTrack):
                 self._show(self._by_station, self._sightings.of_track(message), item.t_ns)
             elif isinstance(message, PlanRequest | SignalRequest):
-                outbox.append(Answer(item, self._serve(message, now_ns)))
+                outbox += self._serve(item, message, now_ns)
         for signals in self._junctions.values():
             outbox += signals.step(now_ns)
         return outbox
@@ -143,20 +152,23 @@ class TrafficPart:
         if signals:
             signals.hear_monitor(status, arrived_ns)
 
-    def _serve(self, request: PlanRequest | SignalRequest, now_ns: int) -> Message:
+    def _serve(
+        self, item: Incoming, request: PlanRequest | SignalRequest, now_ns: int
+    ) -> list[Outgoing]:
         signals = self._junctions.get(request.junction)
         if signals is None:
             known = list(self._junctions)
             hint = nearest(request.junction, known)
             detail = f"no junction {request.junction!r}{hint}, only {known}"
-            return Refused(code="not_found", detail=detail)
+            return [Answer(item, Refused(code="not_found", detail=detail))]
         try:
             if isinstance(request, SignalRequest):
-                return signals.serve_wish(request, now_ns)
-            return signals.serve_plan(request)
+                return [Answer(item, signals.serve_wish(request, now_ns))]
+            reply = signals.serve_plan(request)
+            return [Keep("plans", request.junction, signals.record), Answer(item, reply)]
         except PlanError as refusal:
             code = "invalid" if isinstance(request, SignalRequest) else "not_found"
-            return Refused(code=code, detail=str(refusal))
+            return [Answer(item, Refused(code=code, detail=str(refusal)))]
 
 
 def tables_of(

@@ -85,6 +85,9 @@ _STATE_OF: dict[Colour, str] = {
 _COLOUR_OF: dict[str, Colour] = {state: colour for colour, state in _STATE_OF.items()}
 _STATUS_OF = {
     "plan": ("fixedTimeOperation",),
+    "adaptive": ("trafficDependentOperation",),
+    "priority": ("signalPriorityIsActive",),
+    "preempt": ("preemptIsActive",),
     "start": ("standbyOperation",),
     "flash": ("failureFlash",),
 }

@@ -29,7 +29,6 @@ class WorldPart:
         city_map: The city.
         seed: Of all noise and of lost radio frames.
         hosted: (name, car file) of cars to spawn at the start; they circulate.
-        stopped_by: Who engaged the city stop in a run before this one; None: nobody.
         room: How many more cars may come.
         kept: What a run before this one left behind: its cars are there instead of `hosted`, of
             which those circulate again that are still there.
@@ -45,7 +44,6 @@ class WorldPart:
         city_map: CityMap,
         seed: int = 0,
         hosted: tuple[tuple[str, str], ...] = (),
-        stopped_by: str | None = None,
         room: int = ROOM,
         kept: Kept | None = None,
     ) -> None:
@@ -56,7 +54,6 @@ class WorldPart:
         self.world = World(city_map, seed, capacity=capacity, prepare=sorted(cars))
         self.hears: Sequence[Hears] = hears_of(())
         self._to_spawn = hosted
-        self._stopped_by = stopped_by
         self._is_open = False
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -81,9 +78,10 @@ class WorldPart:
 
     def _open(self, now_ns: int) -> list[Outgoing]:
         world = self.world
-        if (by := self._who_stopped()) is not None:
+        stop = self._kept.stop
+        if stop is not None and stop.engaged:
             reason = "still engaged when the world was started again"
-            reply_to(world, StopRequest(engaged=True, by=by, reason=reason), now_ns)
+            reply_to(world, StopRequest(engaged=True, by=stop.by, reason=reason), now_ns)
         bring_back(world, self._kept, now_ns)
         if self._kept.is_first:
             self._spawn_all(now_ns)
@@ -93,13 +91,6 @@ class WorldPart:
                 self._circulate(car, now_ns)
         definition = WorldDefinition(t_ns=now_ns, seed=world.seed, map=world.city_map)
         return [definition, *world.outbox]
-
-    def _who_stopped(self) -> str | None:
-        """Return who engaged the city stop that is still in force; what is stored comes first."""
-        stop = self._kept.stop
-        if stop is None:
-            return self._stopped_by
-        return stop.by if stop.engaged else None
 
     def _spawn_all(self, now_ns: int) -> None:
         places = iter(self.world.city_map.spawns)

@@ -193,14 +193,6 @@ def test_the_red_button_stops_cars_and_releasing_it_lets_them_drive(city):
     assert city.shown("n1").speed_mps > 0.1
 
 
-def test_a_world_that_is_started_again_under_the_stop_keeps_it(make_city):
-    city = make_city(hosted=(("n1", "nigel"),), stopped_by="ann")
-    city.run_for(2.0)
-    first = city.heard(CityStop)[0]
-    assert (first.engaged, first.by) == (True, "ann")
-    assert city.shown("n1").speed_mps == pytest.approx(0.0, abs=1e-3)
-
-
 def test_the_red_button_is_repeated_every_second_while_engaged(city):
     city.ask(StopRequest(engaged=True, by="ann"))
     city.run_for(3.0)
