@@ -1,8 +1,11 @@
 """`scm up --fleet`: only who has credentials enters the city, and a plan outlives its process."""
 
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -34,17 +37,18 @@ def test_who_has_no_credentials_stays_outside(running: CityProcess) -> None:
 
 
 def test_the_plan_asked_for_is_still_in_force_when_traffic_dies(running: CityProcess) -> None:
-    def plan() -> str:
-        return str(running.get("/signals/crossing")["plan"])
+    def signals() -> dict[str, Any]:
+        return dict(running.get("/signals/crossing"))
 
-    before = plan()
-    other = {"brisk": "calm", "calm": "brisk"}[before]
+    other = {"brisk": "calm", "calm": "brisk"}[signals()["plan"]]
     body = {"plan": other, "by": "ann"}
     running.web.put("/signals/crossing/plan", json=body).raise_for_status()
-    wait_for(lambda: plan() == other, 60.0, "the other plan runs")
-    running.kill("traffic")
-    wait_for(lambda: plan() == other and mode(running) == "plan", 40.0, "it runs again")
-
-
-def mode(running: CityProcess) -> str:
-    return str(running.get("/signals/crossing")["mode"])
+    wait_for(lambda: signals()["plan"] == other, 60.0, "the other plan runs")
+    with running.frozen("traffic"):  # so that the monitor surely sees it fall silent
+        wait_for(lambda: signals()["monitor"]["fault"] == "stale", 5.0, "the monitor has seen it")
+        os.kill(running.pid("traffic"), signal.SIGKILL)
+    wait_for(lambda: signals()["mode"] == "flash", 20.0, "the new one flashes")
+    body = {"by": "ann", "reason": "traffic was killed"}
+    running.web.post("/signals/crossing/monitor/reset", json=body).raise_for_status()
+    wait_for(lambda: signals()["mode"] == "plan", 20.0, "the new one runs a plan")
+    assert signals()["plan"] == other
