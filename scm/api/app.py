@@ -25,6 +25,7 @@ from scm.api.routes import (
     health,
     live,
     map,  # noqa: A004  named for its noun
+    misbehaviour,
     session,
     signals,
     stations,
@@ -82,7 +83,7 @@ def create_app(
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
     app.add_middleware(Gate, keys=keys, policy=policy)
     api = APIRouter(prefix="/api/v1")
-    for noun in (cars, signals, stations, events, map, boxes, eye, stop):
+    for noun in (cars, signals, stations, events, map, boxes, eye, stop, misbehaviour):
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)

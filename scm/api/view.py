@@ -26,6 +26,8 @@ from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags
+from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
+from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
@@ -38,6 +40,7 @@ TRUTH_DEPTH = 80  # snapshots: 4 s, longer than any camera's latency
 FRAME_DEPTH = 4
 TAGS_DEPTH = 8
 FORGET_NS = 60 * NS_PER_S
+MOST_REPORTED = 500
 
 
 class CityView:
@@ -64,6 +67,8 @@ class CityView:
         self._watched: Counter[tuple[str, str]] = Counter()
         self._camera_frames: dict[tuple[str, str], Held[CameraFrame]] = {}
         self._poses: dict[tuple[str, str], SeenPose] = {}
+        self._scores: Held[MisbehaviourScores] | None = None
+        self._reports: dict[str, MisbehaviourReport] = {}
         self._stations = StationTable()
         self._log = EventLog()
         self._takers: dict[type[Message], Callable[[Any, int], None]] = {
@@ -80,6 +85,8 @@ class CityView:
             CityEvent: lambda m, _: self._log.add(m),
             Trip: lambda m, t: self._trips.update({m.vehicle: Held(m, t)}),
             CityStop: self._take_stop,
+            MisbehaviourScores: self._take_scores,
+            MisbehaviourReport: self._take_report,
         }
         self._always = tuple(Hears(kind) for kind in self._takers)
         self._takers[CameraFrame] = self._take_camera_frame
@@ -126,6 +133,13 @@ class CityView:
         """Return up to `limit` events numbered above `seq`, oldest first; safe from any thread."""
         with self._lock:
             return self._log.after(seq, limit)
+
+    def misbehaviour(
+        self,
+    ) -> tuple[Held[MisbehaviourScores] | None, dict[str, MisbehaviourReport]]:
+        """Return all stations' scores, and the newest report by station; safe from any thread."""
+        with self._lock:
+            return self._scores, dict(self._reports)
 
     @contextmanager
     def watching(self, vehicle: str, camera: str) -> Iterator[None]:
@@ -187,6 +201,15 @@ class CityView:
         measured = Pose2(pose.x_m, pose.y_m, pose.yaw_rad)
         residual = residual_of(measured, truth) if truth is not None else None
         self._poses[pose.camera, pose.vehicle] = SeenPose(Held(pose, t_ns), residual)
+
+    def _take_scores(self, scores: MisbehaviourScores, t_ns: int) -> None:
+        self._scores = Held(scores, t_ns)
+
+    def _take_report(self, report: MisbehaviourReport, _t_ns: int) -> None:
+        self._reports.pop(report.suspect, None)
+        self._reports[report.suspect] = report
+        if len(self._reports) > MOST_REPORTED:
+            self._reports.pop(next(iter(self._reports)))
 
     def _forget(self, now_ns: int) -> None:
         self._stations.forget(now_ns)

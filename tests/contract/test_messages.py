@@ -51,6 +51,9 @@ PLAIN_NUMBERS = {
     "shared_covariance": "mixed, see the docstring",
     "lean_covariance": "mixed, see the docstring",
     "real_time_factor": "a ratio",
+    "score": "a sum of doubts, see its docstring",
+    "plausibility": "a probability",
+    "claims": "a count",
     "start": "a pose of the map, see its docstring",
 }
 UNITS = tuple(
