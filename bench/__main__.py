@@ -23,6 +23,7 @@ BENCHMARKS = (
 
 LONG = (
     "flow",
+    "misbehaviour",
     "mismatch",
 )  # takes minutes: only where it is asked for, alone, with its own arguments
 

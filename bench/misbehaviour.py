@@ -1,18 +1,20 @@
 """Misbehaviour: how many liars are found, how soon, how many honest cars are blamed, and the cost.
 
 Run with `python -m bench misbehaviour`, or `python -m bench.misbehaviour [school | grid | cost]
-[--seeds 11 12 13] [--attacks NAME ...] [--healthy] [--own-eye]`. A city is run in lockstep with
-honest cars; what they said, made noisy, is told again with some of them lying, and judged.
+[--seeds 11 12 13] [--attacks NAME ...] [--healthy] [--own-eye] [--keep FOLDER]`. A city is run in
+lockstep with honest cars; what they said, made noisy, is told again with some lying, and judged.
 Thresholds were set on healthy runs of the seeds 1..5; the seeds judged are others.
 """
 
 import argparse
 import math
+import pickle
 import random
 import time
 from collections import defaultdict, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple
 
 from scm.lockstep import Lockstep
@@ -98,6 +100,17 @@ def tell(town: Town, seed: int, *, own_eye: bool = False) -> Story:
             story.tracks = list(drained(tracks))
         else:
             story.tracks = [one for m in drained(truths) for one in stand_in(m, rng)]
+    return story
+
+
+def kept(town: Town, seed: int, folder: Path | None, *, own_eye: bool) -> Story:
+    """Return a story, from a folder where it was told before."""
+    if folder is None:
+        return tell(town, seed, own_eye=own_eye)
+    path = folder / f"{town.map.replace(':', '_')}-{seed}-{own_eye}.story"
+    if not path.exists():
+        path.write_bytes(pickle.dumps(tell(town, seed, own_eye=own_eye)))
+    story: Story = pickle.loads(path.read_bytes())
     return story
 
 
@@ -240,10 +253,18 @@ def groups_of(town: Town, seed: int) -> Iterator[set[str]]:
         yield set(names[k * town.liars : (k + 1) * town.liars])
 
 
-def table(town: Town, seeds: list[int], attacks: list[str], *, own_eye: bool, why: bool) -> None:
+def table(
+    town: Town,
+    seeds: list[int],
+    attacks: list[str],
+    folder: Path | None,
+    *,
+    own_eye: bool,
+    why: bool,
+) -> None:
     """Print a table, a row an attack."""
     ground = Ground(load_map(town.map), None if own_eye else lambda _x, _y: True)
-    stories = {seed: tell(town, seed, own_eye=own_eye) for seed in seeds}
+    stories = {seed: kept(town, seed, folder, own_eye=own_eye) for seed in seeds}
     print(f"\n### {town.title}, seeds {seeds}{', the real Eye' if own_eye else ''}\n")
     healthy(stories, ground)
     print(
@@ -319,6 +340,7 @@ def main() -> None:
     parser.add_argument("--attacks", nargs="*", default=attack_names())
     parser.add_argument("--healthy", action="store_true", help="only the honest city")
     parser.add_argument("--own-eye", action="store_true", help="render and find tags, slowly")
+    parser.add_argument("--keep", type=Path, help="folder of the honest runs, told once")
     parser.add_argument("--why", action="store_true", help="name the checks that found them")
     given = parser.parse_args()
     for what in given.what or ("school", "grid", "cost"):
@@ -326,7 +348,7 @@ def main() -> None:
             cost()
             continue
         attacks = [] if given.healthy else given.attacks
-        table(TOWNS[what], given.seeds, attacks, own_eye=given.own_eye, why=given.why)
+        table(TOWNS[what], given.seeds, attacks, given.keep, own_eye=given.own_eye, why=given.why)
 
 
 if __name__ == "__main__":

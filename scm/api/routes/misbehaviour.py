@@ -1,4 +1,4 @@
-"""Misbehaviour: what is held against each station that speaks, and the reports with their evidence."""
+"""Misbehaviour: what is held against each station that speaks, and reports with evidence."""
 
 from fastapi import APIRouter, Response
 

@@ -54,8 +54,8 @@ class Memory:
     """
 
     __slots__ = (
-        "evidence", "first_ns", "idle", "kalman", "newest", "noted", "score", "since_ns", "station", "strayed",
-        "told_ns", "worst", "is_news",
+        "evidence", "first_ns", "idle", "is_news", "kalman", "newest", "noted", "score", "since_ns",
+        "station", "strayed", "told_ns", "worst",
     )  # fmt: skip
 
     def __init__(self, station: str, first_ns: int) -> None:

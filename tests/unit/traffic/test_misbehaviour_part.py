@@ -1,5 +1,7 @@
 """The misbehaviour part in a city on a stepped clock, with cars that lie and cars that do not."""
 
+import itertools
+
 import pytest
 
 from scm.lockstep import Lockstep
@@ -19,15 +21,14 @@ from vehicle_agent.agent import AgentPart
 MAP = load_map("driving_school")
 START_NS = 1_795_000_000_000_000_000
 CARS = (("n1", "nigel"), ("n2", "nigel"), ("n3", "nigel"))
+KINDS = (MisbehaviourReport, MisbehaviourScores, CityEvent, CamTx)
 
 
 def run(attacks, span_s=25.0, *more, **options):
     """Return reports, the last scores, events and CAMs of a city in which some lie."""
     world = Attacker(WorldPart(MAP, 1, hosted=CARS), attacks, MAP, **options)
     with Lockstep([world, TrafficPart(MAP), MisbehaviourPart(MAP), *more], start_ns=START_NS) as c:
-        boxes = [
-            c.hear(Hears(k)) for k in (MisbehaviourReport, MisbehaviourScores, CityEvent, CamTx)
-        ]
+        boxes = [c.hear(Hears(kind)) for kind in KINDS]
         c.run_for(span_s)
         reports, scores, events, cams = (
             [item.message for item in box.drain()] for box in boxes
@@ -53,9 +54,8 @@ def test_a_liar_is_reported_and_nobody_else(lying):
 def test_a_report_names_class_check_and_plausibility(lying):
     first = lying[0][0]
     assert first.suspect_id == station_id("n2")
-    kinds = {one.check: one for one in first.observations}
-    assert kinds["position_speed_consistency"].kind == "speed"
-    assert kinds["position_speed_consistency"].plausibility < 0.05
+    assert "speed" in {one.kind for one in first.observations}
+    assert first.observations[0].plausibility < 0.01
     worst = [one.plausibility for one in first.observations]
     assert worst == sorted(worst)
 
@@ -74,7 +74,7 @@ def test_people_are_told_once_though_reports_go_on(lying):
     reports, _, events, _ = lying
     assert len(reports) >= 2
     assert [one.vehicle for one in events] == ["n2"]
-    gaps = [b.t_ns - a.t_ns for a, b in zip(reports, reports[1:], strict=False)]
+    gaps = [b.t_ns - a.t_ns for a, b in itertools.pairwise(reports)]
     assert min(gaps) >= 10_000_000_000
 
 
