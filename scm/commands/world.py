@@ -17,10 +17,18 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="cars to spawn at the start (%(default)s)",
     )
     parser.add_argument("--car", default="nigel", help="their car file (%(default)s)")
+    parser.add_argument(
+        "--radio",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="what the air does, instead of what the map says: loss=0.3; see docs/radio.md",
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
+    from scm.maps.radio import with_radio
     from scm.vehicles.car import car_names
     from scm.vehicles.drivers.early import compile_later, is_first_start
     from scm.world.kept import read_kept
@@ -30,7 +38,7 @@ def _run(arguments: argparse.Namespace) -> int:
     is_first = is_first_start()
     with state_of(arguments) as state:
         part = WorldPart(
-            load_map(arguments.map),
+            with_radio(load_map(arguments.map), arguments.radio),
             arguments.seed,
             hosted,
             kept=None if state is None else read_kept(state),

@@ -10,6 +10,7 @@ from scm.errors import nearest
 from scm.geometry import wrap_angle
 from scm.maps.floor_check import floor_problems
 from scm.maps.model import CityMap, Conflict, Group, Segment
+from scm.maps.radio_check import radio_problems
 from scm.maps.route import LanePath
 from scm.maps.rules_check import rule_problems
 
@@ -19,9 +20,12 @@ JOIN_RAD = math.radians(0.1)
 _POSITIVE = {
     "width_m", "length_m", "radius_m", "height_m", "size_m", "speed_limit_mps", "radio_range_m",
     "z_m", "width_px", "height_px", "fx_px", "fy_px", "rate_hz", "mass_kg", "gust_s", "m_per_grey",
-    "value_mps",
+    "value_mps", "range_m", "path_loss_exponent",
 }  # fmt: skip
-_NOT_NEGATIVE = {"thickness_m", "noise_sigma", "tag_id", "first_vehicle_tag_id", "friction"}
+_NOT_NEGATIVE = {
+    "thickness_m", "noise_sigma", "tag_id", "first_vehicle_tag_id", "friction", "loss", "fading_db",
+    "wall_db", "delay_ms", "jitter_ms", "data_rate_mbps", "hidden_share",
+}  # fmt: skip
 
 
 def problems_of(city_map: CityMap) -> list[str]:
@@ -30,7 +34,7 @@ def problems_of(city_map: CityMap) -> list[str]:
     Checks that need the lanes' geometry are made only if the numbers and segments are right.
     """
     found = [*_numbers(city_map, ""), *_segments(city_map)]
-    for check in (_unique, _outlines, floor_problems, _references, _spawns):
+    for check in (_unique, _outlines, floor_problems, radio_problems, _references, _spawns):
         found += check(city_map)
     if not any(".segments" in problem for problem in found):
         found += rule_problems(city_map)

@@ -384,6 +384,34 @@ class Camera(Record, kw_only=True, frozen=True):
     rolling_s: float = 0.0
 
 
+class RadioChannel(Record, kw_only=True, frozen=True):
+    """What the air does to frames; as it stands, nothing. See docs/radio.md.
+
+    Attributes:
+        range_m: How far frames reach; None: the map's `radio_range_m`, and hosted drivers hear all.
+        loss: Share of frames that each receiver misses whatever the distance.
+        fading_db: Standard deviation of the strength at a distance; 0: a sharp edge at the range.
+        path_loss_exponent: How the strength falls with distance: 2 in the open.
+        wall_db: What each wall between two stations takes.
+        delay_ms: From antenna to reader; `jitter_ms` more at most, evenly spread.
+        data_rate_mbps: Of the one channel; 0: endless.
+        hidden_share: How much of the load at a receiver its senders do not hear themselves: these
+            frames collide.
+        congestion_control: Whether cars speak less on a busy channel.
+    """
+
+    range_m: float | None = None
+    loss: float = 0.0
+    fading_db: float = 0.0
+    path_loss_exponent: float = 2.0
+    wall_db: float = 0.0
+    delay_ms: float = 0.0
+    jitter_ms: float = 0.0
+    data_rate_mbps: float = 0.0
+    hidden_share: float = 0.0
+    congestion_control: bool = False
+
+
 class CityMap(Record, kw_only=True, frozen=True):
     """One city. `revision` counts changes of the lanes that cars must know of."""
 
@@ -409,3 +437,4 @@ class CityMap(Record, kw_only=True, frozen=True):
     spawns: tuple[Spawn, ...] = ()
     cameras: tuple[Camera, ...] = ()
     radio_range_m: float = 20.0
+    radio: RadioChannel = RadioChannel()

@@ -9,11 +9,12 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
+from msgspec.structs import replace
 
 from scm import registry
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
-from scm.maps.model import CityMap
+from scm.maps.model import CityMap, Point
 from scm.maps.route import Roads
 from scm.maps.segments import wall_segments
 from scm.store.records import CarRecord, EpochRecord
@@ -21,6 +22,7 @@ from scm.v2x.exchange import Keep, Outgoing
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
+from scm.vehicles.drivers.channel import RANGE
 from scm.vehicles.drivers.crowd import Crowd
 from scm.vehicles.drivers.early import compile_together
 from scm.vehicles.drivers.errands import Errands
@@ -32,13 +34,15 @@ from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sensor
 from scm.world import lease as rules
+from scm.world.busy import Busy
 from scm.world.cams import CamTriggers
 from scm.world.contacts import Contacts
 from scm.world.garage import Garage
 from scm.world.hosted import HostedCar
 from scm.world.impacts import Impacts
+from scm.world.late import Late
 from scm.world.pace import Every, Pace
-from scm.world.radio import Radio, Receivers, roadside_places
+from scm.world.radio import Radio, RadioCounts, Receivers, roadside_places
 from scm.world.remote import RemoteCar
 from scm.world.seeds import generator, number
 from scm.world.slots import Numbers, Slots
@@ -49,6 +53,7 @@ PERIOD_NS = 20 * NS_PER_MS
 SENSORS = "scm.vehicles.sensors"
 SCANNER = "lidar"
 DEFAULT_CAR = "nigel"
+EYE = "eye"
 
 AnyCar = HostedCar | RemoteCar
 
@@ -60,7 +65,7 @@ class World:
         city_map: The city.
         seed: Of all noise and of lost radio frames.
         capacity: Most cars at a time.
-        loss: Share of radio frames that get lost.
+        loss: Share of radio frames that get lost; 0: as the map says.
         prepare: Car files whose kernels are compiled now and not when their first car comes.
 
     Attributes:
@@ -75,6 +80,10 @@ class World:
         placed: Where the remote cars are, for their LIDARs: only the world can see for them.
         banks: The devices of all cars, by kind of sensor.
         readings: By kind and slot the newest reading, NaN before the first; not of LIDARs.
+        radio: How frames come to everybody but the drivers of hosted cars.
+        radio_before: What had become of frames when that was last told.
+        busy: How full the channel is.
+        late: Frames on their way.
         wishes: What anybody would hear.
         stop: The red button as it stands.
         outbox: What the tick under way sends.
@@ -100,9 +109,14 @@ class World:
         self.garage = Garage(capacity, self.ground.fit)
         self.contacts = Contacts(city_map)
         self.impacts = Impacts()
-        self.crowd = Crowd(streets_of(self.roads), capacity, seed=seed, loss=loss)
+        radio = replace(city_map.radio, loss=loss) if loss else city_map.radio
+        self.crowd = Crowd(streets_of(self.roads), capacity, seed=seed, radio=radio)
         self.errands = Errands(self.crowd, spread=True)
-        self.radio = Radio(city_map.radio_range_m, generator(seed, NAME, "radio"), loss)
+        channel = self.crowd.channel
+        self.radio = Radio(channel, generator(seed, NAME, "radio"))
+        self.radio_before = RadioCounts()
+        self.busy = Busy(radio, float(channel.numbers[RANGE]), channel.load)
+        self.late = Late()
         self.roadside = roadside_places(city_map)
         self.cams = CamTriggers(capacity)
         self.front = np.zeros(capacity)
@@ -122,7 +136,7 @@ class World:
         self.remote: dict[str, RemoteCar] = {}
         self.leased: dict[str, HostedCar] = {}
         self.pace = Pace(PERIOD_NS)
-        self.every = {"snapshot": Every(20.0), "second": Every(1.0)}
+        self.every = {"snapshot": Every(20.0), "second": Every(1.0), "radio": Every(1.0)}
         self.stop = CityStop(t_ns=0, engaged=False)
         self.outbox: list[Outgoing] = []
         self.tick = 0
@@ -158,6 +172,15 @@ class World:
             return self._receivers
         cars = {car.name: (car.pose.x, car.pose.y) for car in self.remote.values()}
         return Receivers({**self.roadside, **cars})
+
+    def antenna(self, station: str) -> Point | None:
+        """Return where a station that is no hosted car sends from; None: nobody knows."""
+        if (car := self.remote.get(station)) is not None:
+            return car.pose.x, car.pose.y
+        if station == EYE or station.startswith(f"{EYE}-"):
+            (left, right), (low, high) = self.city_map.floor.x_m, self.city_map.floor.y_m
+            return 0.5 * (left + right), 0.5 * (low + high)
+        return self.roadside.get(station)
 
     def locate(self) -> None:
         """Note where all cars are and how they move."""

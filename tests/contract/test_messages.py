@@ -54,6 +54,18 @@ PLAIN_NUMBERS = {
     "score": "a sum of doubts, see its docstring",
     "plausibility": "a probability",
     "claims": "a count",
+    "sent": "a count of frames",
+    "delivered": "a count of frames",
+    "out_of_range": "a count of frames",
+    "by_chance": "a count of frames",
+    "by_distance": "a count of frames",
+    "by_load": "a count of frames",
+    "unknown": "a count of frames",
+    "late": "a count of frames",
+    "waiting": "a count of frames",
+    "busy": "a share of time",
+    "busy_mean": "a share of time",
+    "busy_most": "a share of time",
     "start": "a pose of the map, see its docstring",
 }
 UNITS = tuple(

@@ -11,15 +11,16 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import MapError
+from scm.maps.model import RadioChannel
+from scm.maps.segments import wall_segments
 from scm.v2x.etsi import SpatemBody
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers import memory as m
 from scm.vehicles.drivers.ahead import Scratch, scratch
+from scm.vehicles.drivers.channel import channel_of, frames_kept
 from scm.vehicles.drivers.law import decide
-from scm.vehicles.drivers.signal_table import KEPT_WHEN_LOSSY as FRAMES_KEPT
 from scm.vehicles.drivers.signal_table import SignalTable
-from scm.vehicles.drivers.stations import KEPT_WHEN_LOSSY as CAMS_KEPT
 from scm.vehicles.drivers.stations import find_cells, hear_cams, nobody
 from scm.vehicles.drivers.streets import Streets
 from scm.vehicles.drivers.way import look_from
@@ -35,28 +36,34 @@ class Crowd:
         streets: The lanes of the map.
         capacity: How many slots there are.
         seed: Of the luck of radio frames.
-        loss: Share of radio frames that each receiver misses.
+        radio: What the air does to frames; None: nothing.
 
     Attributes:
         throttle: (capacity,) last decided, -1 to 1; likewise `steering`, + = left.
+        channel: What the air does to frames on their way to the drivers.
         signals: What is told of the signals.
         threads: How many work on large crowds; what is decided does not depend on it.
     """
 
     def __init__(
-        self, streets: Streets, capacity: int, *, seed: int = 0, loss: float = 0.0
+        self, streets: Streets, capacity: int, *, seed: int = 0, radio: RadioChannel | None = None
     ) -> None:
         city_map = streets.roads.city_map
         self.streets = streets
         self.capacity = capacity
-        self._seed, self._loss = seed, float(loss)
+        self._seed = seed
         self._memory = m.empty_memory(capacity)
-        self._heard = nobody(city_map, capacity, CAMS_KEPT if loss else 1)
-        self.signals = SignalTable(city_map, FRAMES_KEPT if loss else 1)
+        radio = radio or RadioChannel()
+        self.channel = channel_of(
+            radio, radio.range_m or city_map.radio_range_m, capacity, wall_segments(city_map)
+        )
+        kept = frames_kept(radio)
+        self._heard = nobody(city_map, capacity, kept, self.channel)
+        self.signals = SignalTable(city_map, kept, self.channel)
         self.threads = 1
         self._rooms = [scratch()]
         self._pool: ThreadPoolExecutor | None = None
-        self._poses = np.zeros((capacity, 4))
+        self._poses = self.channel.poses
         self._commands = np.zeros((2, capacity))
         self._kinds: dict[CarLimits, int] = {}
         self._entered = np.zeros(capacity, np.bool_)
@@ -313,7 +320,6 @@ class Crowd:
                 self._commands,
                 now_ns,
                 bool(stop),
-                self._loss,
                 self._seed,
             )
 

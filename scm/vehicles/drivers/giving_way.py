@@ -89,7 +89,6 @@ def gives_way(
     can_stop: bool,
     is_flashing: bool,
     now_ns: int,
-    loss: float,
     seed: int,
 ) -> int:
     """Return what holds a car at a line: SIGN; FREE; or VEHICLE, unless there is room behind it.
@@ -119,7 +118,7 @@ def gives_way(
     notice = 0.0 if all_stop else (NOTICE_S if is_long else math.inf)
     standing = look_around(
         rules, ways.segments, heard, kind, car, line, way, before, max(0.0, speed), v_most,
-        notice, now_ns, loss, seed,
+        notice, now_ns, seed,
     )  # fmt: skip
     must_rest = all_stop or rules.kind[line] == STOP_SIGN
     held = waits(ints, rules.order[line], standing, is_new, all_stop, must_rest, now_ns)
@@ -222,7 +221,6 @@ def look_around(
     v_most: float,
     notice: float,
     now_ns: int,
-    loss: float,
     seed: int,
 ) -> int:
     """Return who is in the way of a car: SOMEBODY in motion, or bits of lines where one stands.
@@ -245,7 +243,7 @@ def look_around(
             other = heard.in_cell[at]
             if other == car or is_outside(window, heard.at[other]):
                 continue
-            known, x, y, cos, sin, v = known_to(heard, other, car, now_ns, loss, seed)
+            known, x, y, cos, sin, v = known_to(heard, other, car, now_ns, seed)
             if not known:
                 continue
             found = judge(

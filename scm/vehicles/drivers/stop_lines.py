@@ -65,7 +65,6 @@ def signal_says(
     can_stop: bool,
     car: int,
     now_ns: int,
-    loss: float,
     seed: int,
 ) -> int:
     """Return what holds a car at a line: SIGNAL, or nothing: FREE.
@@ -81,11 +80,10 @@ def signal_says(
         can_stop: Whether the car would come to rest before it without haste.
         car: The car's number.
         now_ns: The present time [ns].
-        loss: Share of radio frames that get lost.
         seed: Of the luck.
     """
     is_going = ints[GOING_LINE] == line and ints[GOING_INDEX] == index
-    place = frame_for(told, links[line, JUNCTION], car, loss, seed)
+    place = frame_for(told, links[line, JUNCTION], car, now_ns, seed)
     colour = believed(told, links[line, GROUP], links[line, JUNCTION], place, now_ns)
     if colour == GREEN and can_stop and not is_going:
         return VEHICLE

@@ -8,7 +8,7 @@ import pytest
 
 from scm.clock import NS_PER_MS
 from scm.maps.grid_city import grid_city
-from scm.maps.model import Sign
+from scm.maps.model import RadioChannel, Sign
 from scm.maps.route import Roads
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers.crowd import Crowd
@@ -204,7 +204,8 @@ def test_a_car_with_the_right_of_way_is_remembered_while_its_cams_are_lost():
 def test_nobody_touches_where_a_third_of_all_frames_is_lost(seed):
     kinds = ("e stop", "n stop", "w stop", "s stop")
     cars = [("e", "e", 0.6), ("n", "w", 0.6), ("w", "s", 0.6), ("s", "s", 0.6)]
-    drive = Drive(crossing(*kinds), cars, loss=0.3, seed=seed).run(25.0)
+    air = RadioChannel(loss=0.3)
+    drive = Drive(crossing(*kinds), cars, radio=air, seed=seed).run(25.0)
     assert sum(s is not None for s in drive.crossed_s) >= 2
 
 
