@@ -22,6 +22,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "fault", nargs="*", metavar="FAULT", help="only these; default: one after the other, all"
     )
+    parser.add_argument(
+        "--faults",
+        action="store_true",
+        help="hurt processes, router, disk and bus of a whole city of one's own instead",
+    )
     parser.add_argument("--map", default="driving_school", help="map name or file (%(default)s)")
     parser.add_argument(
         "--connect",
@@ -37,11 +42,14 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.registry import names
+    from scm.selftest.harms import HARMS, harm_city
     from scm.selftest.signals import FAULTS, faults_of
 
     if arguments.list:
-        print(*names(FAULTS), sep="\n")
+        print(*(HARMS if arguments.faults else names(FAULTS)), sep="\n")
         return 0
+    if arguments.faults:
+        return harm_city(arguments.map, arguments.fault, print, arguments.out)
     faults_of(arguments.fault)
     if arguments.connect and not (arguments.yes or _agreed(arguments.connect)):
         print("nothing was disturbed")

@@ -15,6 +15,7 @@ from scm.errors import LinkError, RunError
 from scm.eye.station import eye_station
 from scm.maps.load import load_map
 from scm.parent_watch import with_parent
+from scm.selftest.proxy import FaultyProxy
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.presence import Presence
@@ -33,7 +34,9 @@ class City:
     Attributes:
         endpoint: Of its router.
         said: What its crew told, line by line.
-        port: Of its web address; 0: it has none.
+        port: Of its web address; 0: any.
+        folder: Where it records.
+        proxies: Of those who stand behind one, to be stalled and cut.
     """
 
     def __init__(
@@ -45,7 +48,7 @@ class City:
         hosted: int = 2,
         agents: Sequence[str] = (),
         port: int = 0,
-        front: str | None = None,
+        behind: Sequence[str] = (),
     ) -> None:
         """Prepare.
 
@@ -56,13 +59,13 @@ class City:
             hosted: Cars of the world's own.
             agents: Names of cars that are processes of their own.
             port: Of the web address.
-            front: Endpoint that all parts use instead of the router's own: a proxy's.
+            behind: Those that reach the router through a proxy of their own.
         """
         self.endpoint = free_endpoint()
         self.said: list[str] = []
         self.port = port
-        self._map, self._folder, self._hosted = map_name, folder, hosted
-        self._front = front
+        self._map, self.folder, self._hosted = map_name, folder, hosted
+        self.proxies = {name: FaultyProxy(self.endpoint) for name in behind}
         self._number = 0
         jobs = [job for job in self._jobs() if parts is None or job.name in parts]
         self._crew = Crew(
@@ -108,6 +111,8 @@ class City:
 
     def __enter__(self) -> "City":
         self.start_router()
+        for proxy in self.proxies.values():
+            proxy.__enter__()
         self._thread.start()
         if not self._ready.wait(START_S):
             self.__exit__()
@@ -118,6 +123,8 @@ class City:
     def __exit__(self, *exc: object) -> None:
         self._over.set()
         self._thread.join()
+        for proxy in self.proxies.values():
+            proxy.__exit__()
         self.stop_router()
 
     def _keep(self) -> None:
@@ -148,7 +155,7 @@ class City:
 
     def _jobs(self) -> list[Job]:
         cameras = [camera.name for camera in load_map(self._map).cameras]
-        state = ("--state", f"sqlite:{self._folder / 'state.db'}")
+        state = ("--state", f"sqlite:{self.folder / 'state.db'}")
         web = ("--host", "127.0.0.1", "--port", str(self.port))
         makes: dict[str, Callable[[], Sequence[str]]] = {
             "record": lambda: self._scm("record", "--out", self._recording()),
@@ -170,13 +177,22 @@ class City:
 
     def _agent(self, name: str) -> Job:
         program = [sys.executable, "-m", "vehicle_agent", "--log", "error", "join", "--name", name]
-        command = [*program, "--connect", self._front or self.endpoint, "--city", CITY]
+        command = [*program, "--connect", self._door(name), "--city", CITY]
         return Job(name, "v", "vehicle agent", lambda: command, after="world")
 
     def _scm(self, part: str, *more: str) -> list[str]:
-        shared = ("--connect", self._front or self.endpoint, "--city", CITY)
+        shared = ("--connect", self._door(part), "--city", CITY)
         return [sys.executable, "-m", "scm", part, self._map, *shared, *more]
+
+    def _door(self, name: str) -> str:
+        proxy = self.proxies.get(name)
+        return self.endpoint if proxy is None else proxy.listen
 
     def _recording(self) -> str:
         self._number += 1
-        return str(self._folder / f"run-{self._number}.mcap")
+        return str(self.recording)
+
+    @property
+    def recording(self) -> Path:
+        """The file that is written now."""
+        return self.folder / f"run-{self._number}.mcap"

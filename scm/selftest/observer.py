@@ -13,6 +13,7 @@ from scm.v2x.exchange import Call, Incoming
 from scm.v2x.message import Message, Request
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx
@@ -22,6 +23,7 @@ from scm.vehicles.signal_view import SignalView
 
 KINDS: tuple[type[Message], ...] = (
     *(Spat, MonitorStatus, SpatemTx, WorldSnapshot, CityEvent, Presence, VehicleState),
+    PartStatus,
 )
 DEPTH = 100_000
 LOOK_NS = 5 * NS_PER_MS
