@@ -30,6 +30,7 @@ from scm.api.routes import (
     signals,
     stations,
     stop,
+    traffic,
 )
 from scm.api.routes import keys as key_routes
 from scm.api.stream import Stream
@@ -83,7 +84,7 @@ def create_app(
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
     app.add_middleware(Gate, keys=keys, policy=policy)
     api = APIRouter(prefix="/api/v1")
-    for noun in (cars, signals, stations, events, map, boxes, eye, stop, misbehaviour):
+    for noun in (cars, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic):
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)

@@ -32,7 +32,9 @@ from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.violation import Violation
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
@@ -40,6 +42,7 @@ TRUTH_DEPTH = 80  # snapshots: 4 s, longer than any camera's latency
 FRAME_DEPTH = 4
 TAGS_DEPTH = 8
 FORGET_NS = 60 * NS_PER_S
+VIOLATIONS_DEPTH = 500
 MOST_REPORTED = 500
 
 
@@ -61,6 +64,8 @@ class CityView:
         self._spats: dict[str, Held[Spat]] = {}
         self._monitors: dict[str, Held[MonitorStatus]] = {}
         self._trips: dict[str, Held[Trip]] = {}
+        self._traffic: Held[TrafficCounts] | None = None
+        self._violations: deque[Violation] = deque(maxlen=VIOLATIONS_DEPTH)
         self._frames: dict[str, deque[Held[EyeFrame]]] = {}
         self._tags: dict[str, deque[Held[EyeTags]]] = {}
         self._eye_statuses: dict[str, Held[EyeStatus]] = {}
@@ -85,6 +90,8 @@ class CityView:
             CityEvent: lambda m, _: self._log.add(m),
             Trip: lambda m, t: self._trips.update({m.vehicle: Held(m, t)}),
             CityStop: self._take_stop,
+            TrafficCounts: self._take_counts,
+            Violation: lambda m, _: self._violations.append(m),
             MisbehaviourScores: self._take_scores,
             MisbehaviourReport: self._take_report,
         }
@@ -121,6 +128,8 @@ class CityView:
                 spats=dict(self._spats),
                 monitors=dict(self._monitors),
                 trips=dict(self._trips),
+                traffic=self._traffic,
+                violations=tuple(self._violations),
                 frames={camera: tuple(frames) for camera, frames in self._frames.items()},
                 tags={camera: tuple(tags) for camera, tags in self._tags.items()},
                 eye_statuses=dict(self._eye_statuses),
@@ -189,6 +198,9 @@ class CityView:
 
     def _take_stop(self, stop: CityStop, _t_ns: int) -> None:
         self._stop = stop
+
+    def _take_counts(self, counts: TrafficCounts, t_ns: int) -> None:
+        self._traffic = Held(counts, t_ns)
 
     def _take_frame(self, frame: EyeFrame, t_ns: int) -> None:
         self._frames.setdefault(frame.camera, deque(maxlen=FRAME_DEPTH)).append(Held(frame, t_ns))
