@@ -91,17 +91,17 @@ def commander(city: City, watch: Watch) -> Iterator[Harm]:
         stop_ns = watch.wait(lambda: _mode_ns(watch, vehicle, began_ns, ("stop",)), 3.0)
         hold_ns = _mode_ns(watch, vehicle, began_ns, ("hold", "stop"))
     led = driver.epoch is not None and driver.epoch in before
-    back_ns = watch.wait(lambda: _mode_ns(watch, vehicle, stop_ns or began_ns, ("drive",)), BACK_S)
+    observer.listen(3.0)
+    resumed = _mode_ns(watch, vehicle, stop_ns or began_ns, ("drive",)) is not None
     stop_s = "never" if stop_ns is None else f"{(stop_ns - began_ns) / NS_PER_S:.2f} s"
     yield Harm(
         what=f"cable of the commander of {vehicle} pulled",
         noticed_ns=None if hold_ns is None else hold_ns - began_ns,
-        back_ns=None if back_ns is None else back_ns - (stop_ns or began_ns),
         silence_ns=watch.silence_ns(vehicle, began_ns),
         lost=watch.lost(began_ns),
-        said=f"no throttle, then full stop from {stop_s}",
-        missed="" if led else "the commander drove the car before",
-    ).short_of(noticed_s=BRAKES_S, back_s=BACK_S)
+        said=f"no throttle, then brakes after {stop_s}; stands until told anew",
+        missed="it stands until told anew" if resumed else "" if led else "driven from afar before",
+    ).short_of(noticed_s=BRAKES_S)
 
 
 def _mode_ns(watch: Watch, vehicle: str, since_ns: int, modes: tuple[str, ...]) -> int | None:

@@ -20,10 +20,10 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def in_ms(span_ns: int | None) -> str:
-    """Return a span for a person; None: it never ended."""
-    return "never" if span_ns is None else f"{span_ns / 1e6:.0f} ms"
+    """Return a span for a person; None: there was none."""
+    return "-" if span_ns is None else f"{span_ns / 1e6:.0f} ms"
 
 
 def in_s(span_ns: int | None) -> str:
-    """Return a longer span for a person; None: it never ended."""
-    return "never" if span_ns is None else f"{span_ns / 1e9:.1f} s"
+    """Return a longer span for a person; None: there was none."""
+    return "-" if span_ns is None else f"{span_ns / 1e9:.1f} s"
