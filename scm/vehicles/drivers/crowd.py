@@ -20,6 +20,7 @@ from scm.vehicles.drivers import memory as m
 from scm.vehicles.drivers.ahead import Scratch, scratch
 from scm.vehicles.drivers.channel import channel_of, frames_kept
 from scm.vehicles.drivers.law import decide
+from scm.vehicles.drivers.order import note_standing
 from scm.vehicles.drivers.signal_table import SignalTable
 from scm.vehicles.drivers.stations import find_cells, hear_cams, nobody
 from scm.vehicles.drivers.streets import Streets
@@ -159,6 +160,7 @@ class Crowd:
         self._entered[slot] = self._sent[slot] = False
         self._heard.size[slot] = 0.0
         self._heard.number[:, slot] = -1
+        self._memory.stood[slot] = m.NEVER_NS
         self._memory.sight[slot] = -1
         self._memory.ints[slot, m.COUNT] = 0
         self._commands[:, slot] = 0.0
@@ -246,7 +248,9 @@ class Crowd:
     ) -> None:
         """Take what cars tell on the air now, shape (k,): of the middle of their front bumpers."""
         cams = np.column_stack((x, y, yaw, speed, yaw_rate))
-        hear_cams(self._heard, np.asarray(slots, np.int64), now_ns, cams)
+        stations = np.asarray(slots, np.int64)
+        note_standing(self._memory.stood, self._memory.stood_at, stations, now_ns, cams)
+        hear_cams(self._heard, stations, now_ns, cams)
 
     def hear_spatem(self, body: SpatemBody, now_ns: int) -> None:
         """Take a SPATEM that is on the air now."""

@@ -3,8 +3,8 @@
 A car goes when its way over the junction is free: nobody in the junction is in it or will come
 into it before it is through, and whoever has the right of way arrives later than it leaves, with a
 margin. Where all must stop, those go first who stood there first. Who sees only others that stand
-and wait goes after a while, the lines of a junction in their order; who has waited long goes when
-those that come can easily stop, and they do: so nobody waits for ever.
+and wait goes after a while, the lines of a junction in their order; who has stood long has its
+turn, and the others stay behind their lines (see `order.py`): so nobody waits for ever.
 Who crosses is told from who stops by speed: faster than a car that will stop at its line.
 
     t(d) = (sqrt(v^2 + 2 a d) - v) / a, then at the highest speed      time for a distance d
@@ -18,7 +18,6 @@ from scm.vehicles.drivers.memory import (
     ACCEL,
     BUSY_NS,
     DECEL,
-    FIRST,
     FREE,
     FRONT,
     GOING_INDEX,
@@ -40,6 +39,7 @@ from scm.vehicles.drivers.memory import (
     WAS_FREE,
     Memory,
 )
+from scm.vehicles.drivers.order import STANDS, has_turn, is_earlier, since_told
 from scm.vehicles.drivers.pace import STANDSTILL, braking, stopping_speed
 from scm.vehicles.drivers.rules import STOP_SIGN, Rules
 from scm.vehicles.drivers.stations import (
@@ -59,7 +59,6 @@ from scm.vehicles.jit import law
 AT_LINE = 0.12
 BESIDE = 0.11
 SAME_WAY = 0.8
-STANDS = 0.03
 HASTE = 0.03
 HURRY = 0.6
 GAP = 0.7
@@ -70,7 +69,7 @@ LONG_PATIENCE_NS = 500_000_000
 STAGGER_NS = 250_000_000
 LONG_NS = 12_000_000_000
 NOTICE_S = 1.0
-NOBODY, SOMEBODY, INSIDE, ROLLS = 0, 1 << 40, 1 << 41, 16
+NOBODY, SOMEBODY, INSIDE, WAITS, EARLIER, THEIR_TURN = 0, 1, 2, 4, 8, 16
 NOWHERE = -1e9
 LEFT, LOW, RIGHT, HIGH = range(4)
 
@@ -103,25 +102,26 @@ def gives_way(
     if ints[RULE_LINE] != line or ints[RULE_INDEX] != index:
         ints[RULE_LINE], ints[RULE_INDEX] = line, index
         ints[REST_NS] = ints[KEPT_NS] = ints[BUSY_NS] = NEVER_NS
-        ints[FIRST] = ints[WAS_FREE] = 0
+        ints[WAS_FREE] = 0
     elif ints[WAS_FREE] and not can_stop:
         ints[GOING_LINE], ints[GOING_INDEX] = line, index
         return FREE
     before = distance - kind[FRONT]
     all_stop = is_flashing or rules.all_stop[line]
-    is_new = ints[REST_NS] < 0 and speed < STANDSTILL and before < AT_LINE
-    if is_new:
+    if ints[REST_NS] < 0 and speed < STANDSTILL and before < AT_LINE:
         ints[REST_NS] = now_ns
+    since = since_told(memory.stood, heard, car, ints[REST_NS], now_ns)
+    is_turn = has_turn(since, rules.order[line], now_ns)
     way = way_taken(rules, memory.sight[car], line, at)
     v_most = fastest(rules, kind, memory.floats[car, TOLD], line)
     is_long = ints[REST_NS] >= 0 and now_ns - ints[REST_NS] >= LONG_NS
     notice = 0.0 if all_stop else (NOTICE_S if is_long else math.inf)
-    standing = look_around(
-        rules, ways.segments, heard, kind, car, line, way, before, max(0.0, speed), v_most,
-        notice, now_ns, seed,
+    around = look_around(
+        rules, ways.segments, heard, memory.stood, kind, car, line, way, before, max(0.0, speed),
+        v_most, notice, since, now_ns, seed,
     )  # fmt: skip
     must_rest = all_stop or rules.kind[line] == STOP_SIGN
-    held = waits(ints, rules.order[line], standing, is_new, all_stop, must_rest, now_ns)
+    held = waits(ints, rules.order[line], around, is_turn, all_stop, must_rest, now_ns)
     ints[WAS_FREE] = 0 if held else 1
     return SIGN if held else VEHICLE
 
@@ -130,8 +130,8 @@ def gives_way(
 def waits(
     ints: Ints,
     order: int,
-    standing: int,
-    is_new: bool,
+    around: int,
+    is_turn: bool,
     all_stop: bool,
     must_rest: bool,
     now_ns: int,
@@ -141,36 +141,34 @@ def waits(
     Args:
         ints: Its memory.
         order: The line's place in its junction.
-        standing: Whether SOMEBODY in motion is in the way, or only INSIDE, and a bit for each line
-            where one stands that has the right of way, or ROLLS higher one that still rolls
-            there; where all must stop: whose way crosses.
-        is_new: Whether it has come to rest at the line just now.
+        around: Whether SOMEBODY in motion is in the way, or only INSIDE; whether one WAITS at its
+            line that has the right of way, where all must stop: whose way crosses; whether one of
+            these stood there EARLIER; whether it is THEIR_TURN.
+        is_turn: Whether it is its own turn.
         all_stop: Whether all must stop.
         must_rest: Whether it must.
         now_ns: The present time [ns].
     """
-    if standing & (SOMEBODY | INSIDE):
+    if around & (SOMEBODY | INSIDE):
         ints[BUSY_NS] = now_ns
-    moving, resting = standing & SOMEBODY, standing & ((1 << ROLLS) - 1)
-    standing = resting | ((standing & ~(SOMEBODY | INSIDE)) >> ROLLS)
-    ints[FIRST] = resting if is_new else ints[FIRST] & standing
-    if moving:
+    if around & SOMEBODY:
         ints[KEPT_NS] = now_ns
+    if around & (SOMEBODY | THEIR_TURN):
         return True
     rest_ns = ints[REST_NS]
     if rest_ns < 0:
-        return must_rest or standing != 0
+        return must_rest or around & WAITS != 0
     if must_rest and now_ns - rest_ns < REST_FOR_NS:
         return True
-    turn_ns = order * STAGGER_NS
-    if standing == 0:
+    if is_turn or around & WAITS == 0:
         return False
-    if all_stop and ints[FIRST] == 0:
-        return bool(now_ns - max(rest_ns + REST_FOR_NS, ints[KEPT_NS]) < turn_ns)
+    later_ns = order * STAGGER_NS
+    if all_stop and around & EARLIER == 0:
+        return bool(now_ns - max(rest_ns + REST_FOR_NS, ints[KEPT_NS]) < later_ns)
     is_long = now_ns - rest_ns >= LONG_NS
     since_ns = ints[KEPT_NS] if is_long else max(rest_ns, ints[BUSY_NS])
     patience_ns = LONG_PATIENCE_NS if is_long else PATIENCE_NS
-    return bool(now_ns - since_ns < patience_ns + turn_ns)
+    return bool(now_ns - since_ns < patience_ns + later_ns)
 
 
 @law
@@ -212,6 +210,7 @@ def look_around(
     rules: Rules,
     segments: Floats,
     heard: Heard,
+    stood: Ints,
     kind: Floats,
     car: int,
     line: int,
@@ -220,17 +219,19 @@ def look_around(
     speed: float,
     v_most: float,
     notice: float,
+    since: int,
     now_ns: int,
     seed: int,
 ) -> int:
-    """Return who is in the way of a car: SOMEBODY in motion, or bits of lines where one stands.
+    """Return who is in the way of a car, all together, see `waits`.
 
     `notice` is how long before they must brake those with the right of way are shown that the car
-    goes [s]; infinite: they are not made to brake; 0: all must stop anyway.
+    goes [s]; infinite: they are not made to brake; 0: all must stop anyway. `since` is since when
+    the car rests at its line, `stood` since when each other one has stood.
     """
     if way < 0:
         return NOBODY
-    floor, window, standing = heard.floor, rules.window[line], 0
+    floor, window, around = heard.floor, rules.window[line], NOBODY
     across = int(floor[CELLS_X])
     left = cell_number(floor, window[LEFT], LOW_X, CELLS_X)
     right = cell_number(floor, window[RIGHT], LOW_X, CELLS_X)
@@ -247,13 +248,13 @@ def look_around(
             if not known:
                 continue
             found = judge(
-                rules, segments, kind, line, way, before, speed, v_most, notice,
-                x, y, cos, sin, max(0.0, v), 0.5 * heard.size[other, 0],
+                rules, segments, kind, line, way, before, speed, v_most, notice, since,
+                stood[other], now_ns, x, y, cos, sin, max(0.0, v), 0.5 * heard.size[other, 0],
             )  # fmt: skip
-            if found == SOMEBODY and notice > 0.0:
+            if found == SOMEBODY:
                 return SOMEBODY
-            standing |= found
-    return standing
+            around |= found
+    return around
 
 
 @law
@@ -267,6 +268,9 @@ def judge(
     speed: float,
     v_most: float,
     notice: float,
+    since: int,
+    stood: int,
+    now_ns: int,
     x: float,
     y: float,
     cos: float,
@@ -274,9 +278,9 @@ def judge(
     v: float,
     half: float,
 ) -> int:
-    """Return what one other car is to a car at a line: NOBODY, SOMEBODY in motion, or its bit.
+    """Return what one other car is to a car at a line, see `waits`; INSIDE: not in the way.
 
-    INSIDE: it is in the junction, and not in the way.
+    `since` is since when the car rests at its line, `stood` since when the other one stands.
     """
     for at in range(rules.peer_first[line], rules.peer_first[line + 1]):
         peer = rules.peers[at]
@@ -286,8 +290,9 @@ def judge(
         )  # fmt: skip
         if middle != NOWHERE:
             return judge_before(
-                rules, kind, way, peer, before, speed, v_most, notice, middle, v, half
-            )
+                rules, kind, line, way, peer, before, speed, v_most, notice, since, stood, now_ns,
+                middle, v, half,
+            )  # fmt: skip
     found = NOBODY
     for at in range(rules.peer_first[line], rules.peer_first[line + 1]):
         peer = rules.peers[at]
@@ -312,12 +317,16 @@ def judge(
 def judge_before(
     rules: Rules,
     kind: Floats,
+    line: int,
     way: int,
     peer: int,
     before: float,
     speed: float,
     v_most: float,
     notice: float,
+    since: int,
+    stood: int,
+    now_ns: int,
     middle: float,
     v: float,
     half: float,
@@ -327,9 +336,10 @@ def judge_before(
     decel = kind[DECEL]
     is_going = away < 0.0 or v > stopping_speed(away - SHORT_OF_LINE, decel) + HASTE
     if not is_going and (v < STANDS or away <= AT_LINE):
-        is_due = away <= AT_LINE and meets(rules, way, peer, notice == 0.0)
-        bit = rules.order[peer] + (ROLLS if v >= STANDS else 0)
-        return 1 << bit if is_due else NOBODY
+        if away > AT_LINE:
+            return NOBODY
+        stood = stood if v < STANDS else NEVER_NS
+        return judge_waiting(rules, line, way, peer, notice == 0.0, since, stood, now_ns)
     can_let_pass = away > v * notice + braking(v, decel, REACTION) + SHORT_OF_LINE
     if not is_going and (notice == 0.0 or can_let_pass):
         return NOBODY
@@ -340,6 +350,28 @@ def judge_before(
         ):  # fmt: skip
             return SOMEBODY
     return INSIDE if v >= STANDS else NOBODY
+
+
+@law
+def judge_waiting(
+    rules: Rules,
+    line: int,
+    way: int,
+    peer: int,
+    all_stop: bool,
+    since: int,
+    stood: int,
+    now_ns: int,
+) -> int:
+    """Return what a car is that waits at its own line, see `judge`."""
+    order, theirs = rules.order[line], rules.order[peer]
+    is_first = is_earlier(stood, theirs, since, order)
+    found = NOBODY
+    if meets(rules, way, peer, all_stop):
+        found = WAITS | EARLIER if is_first else WAITS
+    if has_turn(stood, theirs, now_ns) and meets(rules, way, peer, True):
+        found |= THEIR_TURN if is_first or not has_turn(since, order, now_ns) else NOBODY
+    return found
 
 
 @law

@@ -28,12 +28,12 @@ S, BESIDE, DONE, TOLD, ANGLE, STEER, PACE, SUM = range(8)
 # to cross and on which lane of its way; when it last decided; what holds it; which way it turns;
 # whether it has arrived. Of the line without lights before it: which it is and on which lane of
 # its way, since when it rests there, when cars in motion last kept it, when one was last in the
-# junction, who stood there first (a bit for each of its lines), whether it was free the last time.
+# junction, whether it was free the last time.
 (
     KIND, INDEX, ROUTE, COUNT, AFTER, GOAL, SEED, GOING_LINE, GOING_INDEX, LAST_NS, WAITING, TURN,
-    ARRIVED, RULE_LINE, RULE_INDEX, REST_NS, KEPT_NS, BUSY_NS, FIRST, WAS_FREE,
-) = range(20)  # fmt: skip
-INTS = 20
+    ARRIVED, RULE_LINE, RULE_INDEX, REST_NS, KEPT_NS, BUSY_NS, WAS_FREE,
+) = range(19)  # fmt: skip
+INTS = 19
 NEVER_NS = -(2**62)
 NO_GOAL = 2**62
 
@@ -53,9 +53,11 @@ class Memory(NamedTuple):
 
     Attributes:
         kinds: (k, 32) of the kinds of cars.
-        floats: (capacity, 8); `ints` (capacity, 20).
+        floats: (capacity, 8); `ints` (capacity, 19).
         sight: (capacity, 8) lanes of each car's way, by number.
         routes: All routes, one behind the other.
+        stood: (capacity,) since when each station has told that it stands; NEVER_NS: it does not.
+        stood_at: (capacity, 2) where [m].
     """
 
     kinds: Floats
@@ -63,6 +65,8 @@ class Memory(NamedTuple):
     ints: Ints
     sight: Ints
     routes: Ints
+    stood: Ints
+    stood_at: Floats
 
 
 def kind_row(limits: CarLimits, sharpest: float) -> Floats:
@@ -92,4 +96,6 @@ def empty_memory(capacity: int) -> Memory:
         ints=ints,
         sight=np.full((capacity, IN_SIGHT), -1, np.int64),
         routes=np.zeros(0, np.int64),
+        stood=np.full(capacity, NEVER_NS, np.int64),
+        stood_at=np.zeros((capacity, 2)),
     )

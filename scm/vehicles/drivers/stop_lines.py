@@ -2,7 +2,8 @@
 
 A yellow light, or a green one whose promised end has passed, stops a car that can stop with
 comfortable deceleration before the line, and lets the others clear the junction. Whoever went on
-for that reason goes on. Red and silence stop everybody. Flashing red is a stop sign for all.
+for that reason goes on. Red and silence stop everybody. Flashing red is a stop sign for all; where
+the monitor tells of a fault and the lights do not flash, everybody stands.
 """
 
 from scm.arrays import Floats, Ints
@@ -90,4 +91,6 @@ def signal_says(
     if colour == GREEN or (colour == YELLOW and (is_going or not can_stop)):
         ints[GOING_LINE], ints[GOING_INDEX] = line, index
         return FREE
-    return SIGN if colour == FLASHING else SIGNAL
+    is_flashing = told.flashing[place, links[line, JUNCTION]]
+    shows_flash = is_flashing or told.colour[place, links[line, GROUP]] == FLASHING
+    return SIGN if colour == FLASHING and shows_flash else SIGNAL

@@ -205,8 +205,19 @@ def test_nobody_touches_where_a_third_of_all_frames_is_lost(seed):
     kinds = ("e stop", "n stop", "w stop", "s stop")
     cars = [("e", "e", 0.6), ("n", "w", 0.6), ("w", "s", 0.6), ("s", "s", 0.6)]
     air = RadioChannel(loss=0.3)
-    drive = Drive(crossing(*kinds), cars, radio=air, seed=seed).run(25.0)
-    assert sum(s is not None for s in drive.crossed_s) >= 2
+    drive = Drive(crossing(*kinds), cars, radio=air, seed=seed).run(45.0)
+    assert None not in drive.crossed_s
+
+
+def test_who_stood_for_long_has_its_turn_before_those_with_the_right_of_way():
+    drive = Drive(crossing("n give_way", "s give_way"), [("n", "n", 0.05), ("e", "e", 0.8)])
+    drive.driven[:] = False
+    drive.run(19.0)
+    drive.driven[1] = True
+    drive.run(13.0)
+    # the turn ends 27 s after the first CAM: by then who does not go has lost it
+    assert drive.stood_s[1] > 19.0 + 2.0
+    assert 27.0 < drive.crossed_s[1] < 31.0
 
 
 def test_a_car_that_stays_before_its_line_does_not_block_the_junction_for_ever():
