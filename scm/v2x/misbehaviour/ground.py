@@ -11,6 +11,7 @@ import numpy as np
 
 from scm.geometry import wrap_angle
 from scm.maps.model import Camera, CityMap, Point
+from scm.maps.roadside import roadside_place
 from scm.maps.route import Roads
 from scm.v2x.etsi_convert import roadside_station
 
@@ -42,7 +43,7 @@ class Ground:
         roads = Roads(city_map)
         self.range_m = city_map.radio_range_m
         self.receivers = {
-            roadside_station(junction.name): _middle(city_map, junction.name)
+            roadside_station(junction.name): roadside_place(city_map, junction.name)
             for junction in city_map.junctions
         }
         poses = [roads.spawn_pose(spawn.name) for spawn in city_map.spawns]
@@ -112,15 +113,6 @@ def inside(x: float, y: float, polygon: tuple[Point, ...]) -> bool:
 
 def _cell(x: float, y: float, size: float) -> tuple[int, int]:
     return math.floor(x / size), math.floor(y / size)
-
-
-def _middle(city_map: CityMap, junction: str) -> Point:
-    """Return the middle of a junction's lights, where its unit stands, or that of the floor."""
-    lights = [light for light in city_map.lights if light.junction == junction]
-    if not lights:
-        return sum(city_map.floor.x_m) / 2.0, sum(city_map.floor.y_m) / 2.0
-    count = len(lights)
-    return sum(light.x_m for light in lights) / count, sum(light.y_m for light in lights) / count
 
 
 def _view(camera: Camera) -> Sees:
