@@ -12,6 +12,7 @@ SAME_WAY_RAD = math.radians(60.0)
 NEAR_M = 0.06
 STAYS_M = 0.02
 ROOM_M = 0.03
+END_M = 0.005
 
 
 class Lines(NamedTuple):
@@ -62,7 +63,8 @@ class Follower:
         """Return the place on the same lane if it is plainly still there."""
         lane = self._roads.lanes[known.place.lane]
         s, lateral = lane.project(belief.x, belief.y, known.place.s)
-        if not 0.0 < s < lane.length_m or abs(lateral) > NEAR_M:
+        # beyond an end `project` answers the end itself, give or take the last digit
+        if not END_M < s < lane.length_m - END_M or abs(lateral) > NEAR_M:
             return None
         if abs(wrap_angle(lane.at(s).yaw - belief.yaw)) > SAME_WAY_RAD:
             return None
