@@ -26,7 +26,7 @@ from scm.maps.sumo_read import Net, NetLane, NetLink, read_net
 LEAST_RADIUS_M = 0.38  # a Nigel turns on 0.245 m; at 0.35 m drivers swing 40 mm wide, here 8 mm
 LEAST_WIDTH_M = 0.20  # a Nigel is 0.175 m wide
 ERROR_M = 0.03
-WORST_ERROR_M = 0.25  # a right angle in the middle of a street is cut by 0.12 m
+WORST_ERROR_M = 0.25  # a right angle in the middle of a street is cut by 0.16 m
 LEAST_LANE_M = 0.40
 CUT_M = 0.02
 ROUNDS = 120
