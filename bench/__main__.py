@@ -11,6 +11,7 @@ BENCHMARKS = (
     "city",
     "start",
     "bus",
+    "agents",
     "codec",
     "eye",
     "camera",
