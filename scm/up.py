@@ -21,6 +21,7 @@ from scm.v2x.messages.presence import Presence
 from scm.v2x.router import DEFAULT_ENDPOINT, Router, free_endpoint
 
 HOST = "127.0.0.1"
+SCM = (sys.executable, "-m", "scm")
 MOST_RECORDED = 50  # hosted cars whose own messages are recorded: more would be nearly all of it
 LOOK_EVERY_NS = 50 * NS_PER_MS
 
@@ -42,6 +43,7 @@ def run_city(
     host: str = HOST,
     keys: str | None = None,
     ros2: bool = False,
+    demand: Path | None = None,
     say: Say = _say_now,
 ) -> int:
     """Run a city until SIGINT or SIGTERM; return the exit code.
@@ -61,6 +63,7 @@ def run_city(
         host: Address that the dashboard is bound to.
         keys: Store of API keys; None: everybody on this machine.
         ros2: Whether ROS 2 nodes shall see the city.
+        demand: Table of who wants to drive from where to where; None: nobody else comes.
         say: Tells a person one line.
 
     Raises:
@@ -95,6 +98,7 @@ def run_city(
             port=port,
             keys=keys,
             ros2=ros2,
+            demand=demand,
             recording=recording,
             state=state or f"sqlite:{recording.with_suffix('.db')}",
             seed=seed,
@@ -120,6 +124,7 @@ class _Plan:
     port: int
     keys: str | None
     ros2: bool
+    demand: Path | None
     recording: Path
     state: str
     seed: int
@@ -149,9 +154,8 @@ def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
 
 def _parts(plan: _Plan) -> list[Job]:
     def scm(name: str, *more: str, station: str = "") -> Sequence[str]:
-        shared = ("--connect", plan.guard.connect, "--city", plan.city, "--seed", str(plan.seed))
-        let_in = plan.guard.arguments(station or name)
-        return [sys.executable, "-m", "scm", name, plan.map_name, *shared, *let_in, *more]
+        shared = (*_at_bus(plan, station or name), "--seed", str(plan.seed))
+        return [*SCM, name, plan.map_name, *shared, *more]
 
     def record() -> Sequence[str]:
         """Name another file when a recorder died: a recording is never written over."""
@@ -171,6 +175,11 @@ def _parts(plan: _Plan) -> list[Job]:
     kept = ("--state", plan.state)
     keys = () if plan.keys is None else ("--keys", plan.keys)
     web = ("--host", plan.host, "--port", str(plan.port), *keys)
+
+    def demand(table: Path) -> Job:
+        command = [*SCM, "demand", str(table), plan.map_name, *_at_bus(plan, "demand")]
+        return Job("demand", "part", f"cars that come and go as in {table}", lambda: command)
+
     jobs = [
         Job(
             "record",
@@ -184,18 +193,27 @@ def _parts(plan: _Plan) -> list[Job]:
         part("world", cars, "--hosted", str(plan.hosted), *kept),
         *(eye(station, camera) for station, camera in plan.eyes.items()),
         part("camera", "cars' own cameras, rendered while somebody looks"),
+        part("observer", "counts, delays, and who breaks the rules"),
+        part("misbehaviour", "doubts what cars claim on the air"),
         part("api", "REST, event stream, dashboard", *web),
     ]
+    if plan.demand is not None:
+        jobs.append(demand(plan.demand))
     if plan.ros2:
         jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))
     return jobs
 
 
+def _at_bus(plan: _Plan, station: str) -> Sequence[str]:
+    """Return how a station's program finds the bus, and what it is let in by."""
+    shared = ("--connect", plan.guard.connect, "--city", plan.city)
+    return (*shared, *plan.guard.arguments(station))
+
+
 def _agents(plan: _Plan) -> list[Job]:
     def join(name: str) -> Sequence[str]:
         program = (sys.executable, "-m", "vehicle_agent", "--log", "warning", "join")
-        shared = ("--connect", plan.guard.connect, "--city", plan.city)
-        return [*program, "--name", name, *shared, *plan.guard.arguments(name)]
+        return [*program, "--name", name, *_at_bus(plan, name)]
 
     # After the world: it compiles the physics, and they find it compiled.
     return [

@@ -41,6 +41,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keys", metavar="STORE", help="API keys of `scm key add`; needed for another --host"
     )
+    parser.add_argument(
+        "--demand", type=Path, metavar="TABLE", help="who wants to drive from where to where"
+    )
     parser.add_argument("--ros2", action="store_true", help="let ROS 2 nodes see the city")
 
 
@@ -61,6 +64,7 @@ def _run(arguments: argparse.Namespace) -> int:
         host=arguments.host,
         keys=arguments.keys,
         ros2=arguments.ros2,
+        demand=arguments.demand,
     )
 
 

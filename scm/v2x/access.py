@@ -21,7 +21,19 @@ from scm.v2x.key import prefix
 from scm.v2x.rights import presence_of, rights_of
 
 ADVANCED = "/@adv/**"
-CITY_PARTS = ("up", "world", "traffic", "monitor", "record", "camera", "api")
+CITY_PARTS = (
+    "up",
+    "world",
+    "traffic",
+    "monitor",
+    "observer",
+    "misbehaviour",
+    "demand",
+    "record",
+    "camera",
+    "api",
+    "ros2",
+)
 
 _Rule = dict[str, object]
 

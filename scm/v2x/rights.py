@@ -140,7 +140,19 @@ _OF_PART: dict[str, Rights] = {
     "api": _WATCHES + Rights(asks=EVERY_REQUEST),
     "up": _WATCHES,
     "selftest": _WATCHES + Rights(says=("**",), asks=("**",)),
-    "misbehaviour": Rights(hears=("v2x/**", "eye/pose/*", "world/def", "*/*/alive/*")),
+    "observer": Rights(
+        says=("traffic/counts", "violation/*"),
+        hears=("eye/pose/*", "v/*/state", "v/*/contact", "tl/*/spat"),
+    ),
+    "misbehaviour": Rights(
+        says=("misbehaviour/scores", "misbehaviour/*/report"),
+        hears=("v2x/rx/*/*/*", "eye/pose/*"),
+    ),
+    "demand": Rights(
+        says=("demand/status",),
+        hears=("v/*/trip",),
+        asks=("world/spawn", "v/*/cmd/route", "v/*/remove"),
+    ),
     "ros2": _WATCHES + Rights(says=("v/*/cmd/drive",), asks=("v/*/lease",)),
 }
 """By the part's name; `eye-<camera>` has the rights of `eye`."""

@@ -12,7 +12,11 @@ from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.recorder.part import RecorderPart
 from scm.registry import names
+from scm.traffic.demand import DemandPart
+from scm.traffic.demand_table import load_demand
+from scm.traffic.misbehaviour_part import MisbehaviourPart
 from scm.traffic.monitor_part import MonitorPart
+from scm.traffic.observer_part import ObserverPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.exchange import Call
 from scm.v2x.key import key_of, prefix, selector
@@ -76,7 +80,10 @@ class Noted:
 def city(tmp_path_factory):
     """All parts of a city after some of its time, with a car's agent among them."""
     city_map = load_map("driving_school")
-    record = RecorderPart(tmp_path_factory.mktemp("rights") / "all.mcap", "city")
+    folder = tmp_path_factory.mktemp("rights")
+    record = RecorderPart(folder / "all.mcap", "city")
+    table = folder / "rush.csv"
+    table.write_text("from,to,vehicles_per_hour\neast_loop,west_loop,3600\n")
     parts = [
         Noted(part)
         for part in (
@@ -87,6 +94,9 @@ def city(tmp_path_factory):
             CityView(),
             record,
             CameraPart(city_map, 0, clock=StepClock()),
+            ObserverPart(city_map),
+            MisbehaviourPart(city_map),
+            DemandPart(city_map, load_demand(table), 0.0),
             AgentPart("n2", session="s1"),
         )
     ]
@@ -98,7 +108,10 @@ def city(tmp_path_factory):
     return {part.name: part for part in parts}
 
 
-NAMES = ("world", "traffic", "monitor", "eye", "api", "record", "camera", "n2")
+NAMES = (
+    *("world", "traffic", "monitor", "eye", "api", "record", "camera"),
+    *("observer", "misbehaviour", "demand", "n2"),
+)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -120,6 +133,9 @@ def test_the_city_of_this_test_really_did_something(city):
     assert {"v/n2/join", "v/n2/remove"} <= city["n2"].asked
     assert "v/n2/cmd/*" not in city["n2"].served
     assert any(key.startswith("eye/pose/") for key in city["eye"].said)
+    assert "world/spawn" in city["demand"].asked
+    assert "traffic/counts" in city["observer"].said
+    assert "misbehaviour/scores" in city["misbehaviour"].said
 
 
 def test_an_operator_may_ask_every_request_that_is_no_car_s_own():
