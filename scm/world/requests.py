@@ -31,6 +31,7 @@ from scm.world.world import NAME, AnyCar, World
 
 KINDS = ("remote", "real")
 CLEARANCE_M = 0.45  # between rear axles: half a Nigel stays free between two of them
+AHEAD_S = 1.5  # until a car that comes has heard of the new one and stands
 
 
 class _RefusedError(ScmError):
@@ -200,7 +201,7 @@ def _place(world: World, spawn: str) -> Pose2:
 
 def is_free(world: World, pose: Pose2) -> bool:
     """Return whether a car can be put there."""
-    return world.slots.nearest_m(pose) >= CLEARANCE_M
+    return world.slots.nearest_m(pose, ahead_s=AHEAD_S) >= CLEARANCE_M
 
 
 def _boxes(world: World, request: BoxesRequest, now_ns: int) -> BoxesReply:
