@@ -11,14 +11,22 @@ BENCHMARKS = (
     "city",
     "start",
     "bus",
+    "agents",
+    "codec",
     "eye",
     "camera",
     "lidar",
     "sensors",
+    "signals",
+    "signing",
 )
 
 
-LONG = ("mismatch",)  # takes minutes: only where it is asked for, alone, with its own arguments
+LONG = (
+    "flow",
+    "misbehaviour",
+    "mismatch",
+)  # takes minutes: only where it is asked for, alone, with its own arguments
 
 
 def main(names: list[str]) -> None:

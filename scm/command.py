@@ -2,11 +2,18 @@
 
 import argparse
 import gc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scm.part import Part
+from scm.store.repository import Repository
 from scm.v2x.router import DEFAULT_ENDPOINT
+
+if TYPE_CHECKING:
+    from scm.v2x.credentials import Credentials
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +33,31 @@ class Command:
     run: Callable[[argparse.Namespace], int]
 
 
+def credentials_argument(parser: argparse.ArgumentParser) -> None:
+    """Add who a station is, for a city that lets in nobody else."""
+    parser.add_argument(
+        "--credentials",
+        type=Path,
+        metavar="FILE",
+        help="who this station is, from `scm fleet add`; not needed where anybody may enter",
+    )
+
+
+def credentials_of(
+    arguments: argparse.Namespace, station: str | None = None
+) -> "Credentials | None":
+    """Return the credentials that were given, of this station; None: none were.
+
+    Raises:
+        AccessError: when they cannot be read, or are another station's.
+    """
+    if arguments.credentials is None:
+        return None
+    from scm.v2x.credentials import read_credentials
+
+    return read_credentials(arguments.credentials, station)
+
+
 def part_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what every part of the city needs to know: its map and where the bus is."""
     parser.add_argument(
@@ -34,18 +66,48 @@ def part_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router (%(default)s)"
     )
+    credentials_argument(parser)
     parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of all randomness (%(default)s)")
 
 
-def run_part(part: Part, arguments: argparse.Namespace) -> int:
+def state_argument(parser: argparse.ArgumentParser) -> None:
+    """Add where a part stores what must outlive it."""
+    parser.add_argument(
+        "--state",
+        metavar="URL",
+        help="where to store what must outlive this process: sqlite:PATH or postgresql://...",
+    )
+
+
+@contextmanager
+def state_of(arguments: argparse.Namespace) -> Iterator[Repository | None]:
+    """Open the store that was asked for; None: nothing outlives the process.
+
+    Raises:
+        StoreError: when it cannot be opened.
+    """
+    if arguments.state is None:
+        yield None
+        return
+    from scm.store.open import open_store
+
+    store = open_store(arguments.state)
+    try:
+        yield store
+    finally:
+        store.close()
+
+
+def run_part(part: Part, arguments: argparse.Namespace, state: Repository | None = None) -> int:
     """Run one part on the real bus and clock until Ctrl-C or SIGTERM."""
     from scm.clock import WallClock
     from scm.live import run, stop_on_signal
     from scm.v2x.bus_zenoh import ZenohBus
 
     stop = stop_on_signal()
-    with ZenohBus(arguments.city, part.name, arguments.connect) as bus:
-        run(part, bus, WallClock(), stop)
+    credentials = credentials_of(arguments, part.name)
+    with ZenohBus(arguments.city, part.name, arguments.connect, credentials=credentials) as bus:
+        run(part, bus, WallClock(), stop, state)
     gc.freeze()  # taking the compiler's objects apart one by one would take a third of a second
     return 0

@@ -2,7 +2,8 @@
 
 A member is up when its presence appears. What dies is started again, later each time, until it has
 died too often; what ends by itself without complaint (exit code 0) or says that its input is bad
-(exit code 2) is left alone. Nothing here prints: what a person should know goes through `say`.
+(exit code 2) is left alone. A part that was up had good input: what it found bad later, a full
+disk, may be mended. Nothing here prints: what a person should know goes through `say`.
 """
 
 import os
@@ -157,8 +158,9 @@ class Crew:
         how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
         member.died_ns.append(now_ns)
         recent = sum(now_ns - t < 60 * NS_PER_S for t in member.died_ns)
-        if code == BAD_INPUT or recent > RESTARTS_A_MINUTE:
-            why = "its input is bad" if code == BAD_INPUT else f"{recent} times within a minute"
+        is_bad = code == BAD_INPUT and not (member.was_up and member.job.role == "part")
+        if is_bad or recent > RESTARTS_A_MINUTE:
+            why = "its input is bad" if is_bad else f"{recent} times within a minute"
             self._say(f"  {name:<9} died {how}: {why}; it is not started again")
             return
         pause_ns = FIRST_PAUSE_NS * 2 ** (recent - 1)

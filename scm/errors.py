@@ -54,6 +54,14 @@ class LinkError(ScmError, ConnectionError):
     """The bus, a serial line, or a peer that does not answer."""
 
 
+class StoreError(ScmError, OSError):
+    """State that must survive, and cannot be read or written."""
+
+
+class AccessError(ScmError, PermissionError):
+    """Credentials: a fleet file, a certificate, a key, or what somebody may not do."""
+
+
 class LeaseError(ScmError, PermissionError):
     """A command for a car that somebody else owns."""
 

@@ -14,6 +14,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Protocol, TypeVar
 
 from scm.clock import WallClock, seconds
@@ -27,6 +28,7 @@ from scm.traffic.part import TrafficPart
 from scm.v2x.ask import ask
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.credentials import read_credentials
 from scm.v2x.exchange import Incoming
 from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
@@ -344,6 +346,7 @@ def open_city(
     connect: str | None = None,
     city: str = "city",
     seed: int = 0,
+    credentials: Path | None = None,
 ) -> Iterator[City]:
     """Open a city for a script.
 
@@ -352,12 +355,14 @@ def open_city(
         connect: Router of a running city; None: a city of its own, in lockstep.
         city: Whose keys to use.
         seed: Of all randomness in lockstep.
+        credentials: File of an operator, where the running city lets in nobody else.
     """
     if connect is None:
         with _lockstep_city(map_name, city, seed) as lockstep:
             yield City(LockstepLink(lockstep))
         return
-    with ZenohBus(city, "script", connect) as bus:
+    who = read_credentials(credentials) if credentials is not None else None
+    with ZenohBus(city, "script", connect, credentials=who) as bus:
         live = City(LiveLink(bus))
         try:
             yield live

@@ -17,22 +17,29 @@ from scm.errors import LinkError, ScmError
 from scm.log import event
 from scm.part import Part
 from scm.station import Station
+from scm.store.repository import Repository
 from scm.v2x.bus import Bus
 from scm.v2x.exchange import Outgoing
+from scm.v2x.keeping import KeeperBehind
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.part_status import PartStatus
 
 _log = logging.getLogger(__name__)
 
 
-def run(part: Part, bus: Bus, clock: Clock, stop: threading.Event) -> None:
+def run(
+    part: Part, bus: Bus, clock: Clock, stop: threading.Event, state: Repository | None = None
+) -> None:
     """Step a part until `stop` is set, then let it say its last words and close the bus.
+
+    With a store, answers leave only when they and what they promise are in it.
 
     Its vital signs (`PartStatus`) go out once a second, filled into its own ones when it sends
     such. An exception of the part is logged, told to the city and raised: the process should die.
     """
     with bus:
-        loop = _Loop(part, Station(part, bus), clock)
+        keeper = None if state is None else KeeperBehind(state, part.name, bus.session)
+        loop = _Loop(part, Station(part, bus, keeper), clock)
         try:
             while not clock.wait_until(loop.due_ns, stop):
                 loop.step()
@@ -92,6 +99,7 @@ class _Loop:
     def finish(self) -> None:
         """Send the part's last words."""
         self._station.send(self._part.finish(self._clock.now_ns()))
+        self._station.close()
 
     def _with_vital_signs(self, outbox: list[Outgoing], now_ns: int) -> list[Outgoing]:
         own = [item for item in outbox if isinstance(item, PartStatus)]

@@ -13,9 +13,12 @@ from scm.clock import StepClock, nanoseconds, seconds
 from scm.errors import RunError
 from scm.part import Hears, Part
 from scm.station import Station
+from scm.store.repository import Repository
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_memory import MemoryBus, MemoryNetwork
 from scm.v2x.exchange import Call, Incoming
+from scm.v2x.faults import Faults
+from scm.v2x.keeping import Keeper
 from scm.v2x.message import Message, Request
 
 HEARD_DEPTH = 1_000_000
@@ -24,15 +27,27 @@ HEARD_DEPTH = 1_000_000
 class Lockstep:
     """A city of parts on a memory bus; a context manager that lets everybody finish.
 
+    Args:
+        parts: In the order of their steps.
+        city: Chunk of all keys.
+        start_ns: Of its clock.
+        faults: Of the network between the parts; None: nothing is lost or late.
+
     Attributes:
         clock: The time of the city.
         bus: The script's own connection, station `script`: to publish, or to ask without waiting.
     """
 
-    def __init__(self, parts: Iterable[Part], city: str = "city", start_ns: int = 0) -> None:
+    def __init__(
+        self,
+        parts: Iterable[Part],
+        city: str = "city",
+        start_ns: int = 0,
+        faults: Faults | None = None,
+    ) -> None:
         self.clock = StepClock(start_ns)
         self._city = city
-        self._network = MemoryNetwork(self.clock)
+        self._network = MemoryNetwork(self.clock, faults)
         self.bus: MemoryBus = self._network.bus(city, "script")
         self._running: dict[int, _Running] = {}
         self._due: list[tuple[int, int]] = []
@@ -45,10 +60,11 @@ class Lockstep:
         """The time of the city [ns]."""
         return self.clock.now_ns()
 
-    def add(self, part: Part) -> None:
-        """Let a part join; its first step is due now."""
+    def add(self, part: Part, state: Repository | None = None) -> None:
+        """Let a part join; its first step is due now. What must outlive it goes into `state`."""
         bus = self._network.bus(self._city, part.name)
-        self._running[self._added] = _Running(part, bus, Station(part, bus))
+        keeper = None if state is None else Keeper(state, part.name, bus.session)
+        self._running[self._added] = _Running(part, bus, Station(part, bus, keeper))
         heapq.heappush(self._due, (self.now_ns, self._added))
         self._added += 1
 
@@ -58,11 +74,22 @@ class Lockstep:
         Raises:
             RunError: when it is not running.
         """
+        self._take(part).leave(self.now_ns)
+
+    def kill(self, part: Part) -> None:
+        """End a part without its last words, as a SIGKILL would.
+
+        Raises:
+            RunError: when it is not running.
+        """
+        self._take(part).die()
+
+    def _take(self, part: Part) -> "_Running":
         order = next((n for n, running in self._running.items() if running.part is part), None)
         if order is None:
             msg = f"{part.name} is not running: it was removed already, or never added"
             raise RunError(msg)
-        self._running.pop(order).leave(self.now_ns)
+        return self._running.pop(order)
 
     def publish(self, message: Message) -> None:
         """Send a message from the script."""
@@ -167,3 +194,7 @@ class _Running:
     def leave(self, now_ns: int) -> None:
         with self._bus:
             self._station.send(self.part.finish(now_ns))
+            self._station.close()
+
+    def die(self) -> None:
+        self._bus.close()

@@ -1,18 +1,25 @@
 """A part at its bus: what it hears is collected, what it sends goes out, retries get one answer.
 
 Both runners use it. Whoever asks again with the `request_id` of an answered request gets the
-stored answer: the effect happens once, however often the network makes people ask.
+stored answer: the effect happens once, however often the network makes people ask. With a keeper
+this holds across restarts too: an answer leaves only when it, the state behind it and its entry in
+the audit log are stored.
 """
 
-from collections import OrderedDict
 from collections.abc import Iterable, Sequence
-from typing import TypeVar, cast
+from typing import cast
+
+import msgspec
 
 from scm.part import Hears, Part
-from scm.v2x.bus import Bus, Mailbox, RawMailbox
-from scm.v2x.exchange import Answer, Call, Incoming, Outgoing, RawSample
+from scm.store.audit import Deed
+from scm.store.repository import Table
+from scm.v2x.answers import AnswerBook
+from scm.v2x.bus import Bus, Mailbox, RawMailbox, check_reply
+from scm.v2x.exchange import Answer, Call, Incoming, Keep, Outgoing, RawSample
+from scm.v2x.keeping import Batch, Keeps
 from scm.v2x.mailbox import drain_all
-from scm.v2x.message import Delivery, Message, Refused, Request, encode
+from scm.v2x.message import Delivery, Refused, Request, encode
 
 DEPTH = {
     Delivery.STREAM: 1024,
@@ -22,20 +29,24 @@ DEPTH = {
     Delivery.PRESENCE: 1024,
 }
 RAW_DEPTH = 16384
-ANSWERS_KEPT = 1024
-
-V = TypeVar("V")
 
 
 class Station:
-    """One part, tied to one bus: subscribed, serving and announced from the start."""
+    """One part, tied to one bus: subscribed, serving and announced from the start.
 
-    def __init__(self, part: Part, bus: Bus) -> None:
+    Args:
+        part: The part.
+        bus: Its connection.
+        keeper: Of what must outlive this process; None: nothing must.
+    """
+
+    def __init__(self, part: Part, bus: Bus, keeper: Keeps | None = None) -> None:
         self._part = part
         self._bus = bus
         self._boxes: list[Mailbox | RawMailbox] = []
         self._replies = self._mailbox(Delivery.RPC)
-        self._answers = _Answers()
+        self._keeper = keeper
+        self._answers = AnswerBook(None if keeper is None else keeper.stored_answers())
         self._heard: Sequence[Hears] = ()
         self._ears: list[tuple[Hears, Mailbox]] = []
         self._follow()
@@ -87,80 +98,103 @@ class Station:
     def inbox(self) -> list[Incoming]:
         """Return what arrived since the last time, without requests that are answered already."""
         self._follow()
+        self._release()
         fresh: list[Incoming | RawSample] = []
         for item in drain_all(self._boxes):
             if isinstance(item, Incoming) and _is_request(item):
-                stored = self._answers.recall(item)
-                if stored is not None:
-                    self._bus.answer(stored)
-                    continue
-                if not self._answers.is_first(item):
+                met = self._answers.meet(item, self._closed_for(item))
+                if isinstance(met, Answer):
+                    self._bus.answer(met)
+                if met != "do":
                     continue
             fresh.append(item)
         # A part that asks for raw samples declares that its inbox holds them too.
         return cast("list[Incoming]", fresh)
 
     def send(self, outgoing: Iterable[Outgoing]) -> None:
-        """Deliver what a step returned, in its order."""
+        """Deliver what a step returned, in its order; answers wait until they are stored."""
+        kept: list[Keep] = []
+        answers: list[Answer] = []
         for item in outgoing:
             if isinstance(item, Call):
                 self._bus.call(item, self._replies.put)
             elif isinstance(item, Answer):
-                for answer in self._answers.store(item):
-                    self._bus.answer(answer)
+                if self._keeper is None:
+                    self._settle(item)
+                else:
+                    check_reply(item)
+                    answers.append(item)
+            elif isinstance(item, Keep):
+                kept.append(item)
             else:
                 self._bus.publish(item)
+        if self._keeper is not None and (kept or answers):
+            self._store(self._keeper, kept, answers)
+
+    def close(self) -> None:
+        """Let what must be stored be stored, and its answers go; the bus stays open."""
+        if self._keeper is not None:
+            self._keeper.close()
+            self._release()
+
+    def _closed_for(self, item: Incoming) -> str:
+        """Return why a request cannot be done now: what it does could not be stored."""
+        if self._keeper is None or not _has_effect(item):
+            return ""
+        return self._keeper.stuck
+
+    def _store(self, keeper: Keeps, kept: Sequence[Keep], answers: Sequence[Answer]) -> None:
+        values: list[tuple[Table, str, bytes | None]] = [
+            (item.table, item.key, None if item.value is None else msgspec.json.encode(item.value))
+            for item in kept
+        ]
+        for answer in answers:
+            record = self._answers.record(answer)
+            if record is not None:
+                values.append(("answers", record[0], msgspec.json.encode(record[1])))
+        forgotten, self._answers.forgotten = self._answers.forgotten, []
+        values += [("answers", key, None) for key in forgotten]
+        deeds = [
+            self._deed(answer)
+            for answer in answers
+            if not isinstance(answer.reply, Refused) and _has_effect(answer.to)
+        ]
+        if values or deeds:
+            keeper.write(Batch(values, deeds, answers))
+            self._release()
+        else:
+            for answer in answers:
+                self._settle(answer)
+
+    def _deed(self, answer: Answer) -> Deed:
+        request = cast("Request", answer.to.message)
+        by = getattr(request, "by", "") or getattr(request, "owner", "")
+        return Deed(
+            t_ns=answer.to.t_ns,
+            station=self._part.name,
+            kind=type(request).__name__,
+            by=str(by),
+            request_id=request.request_id,
+            request=msgspec.Raw(encode(request)[0]),
+            reply=msgspec.Raw(encode(answer.reply)[0]),
+        )
+
+    def _release(self) -> None:
+        """Let the answers go whose state is safe by now."""
+        if self._keeper is not None:
+            for batch in self._keeper.written():
+                for answer in batch.answers:
+                    self._settle(answer)
+
+    def _settle(self, answer: Answer) -> None:
+        for ready in self._answers.settle(answer):
+            self._bus.answer(ready)
 
 
 def _is_request(item: Incoming) -> bool:
     return isinstance(item.message, Request) and item.call is None
 
 
-class _Answers:
-    """The last answers by request id, and who else waits for one that is not given yet."""
-
-    def __init__(self) -> None:
-        self._given: OrderedDict[tuple[type[Message], str], tuple[bytes, Message]] = OrderedDict()
-        self._waiting: OrderedDict[tuple[type[Message], str], list[Incoming]] = OrderedDict()
-
-    def recall(self, item: Incoming) -> Answer | None:
-        """Return the stored answer to a retry, or a refusal when its id was used otherwise."""
-        request = _request(item)
-        stored = self._given.get((type(request), request.request_id))
-        if stored is None:
-            return None
-        body, reply = stored
-        if encode(request)[0] != body:
-            detail = f"request_id: {request.request_id!r} was used for another request already"
-            return Answer(item, Refused(code="invalid", detail=detail))
-        return Answer(item, reply)
-
-    def is_first(self, item: Incoming) -> bool:
-        """Return whether the part must see it; a retry waits for the first one's answer."""
-        request = _request(item)
-        if not request.request_id:
-            return True
-        waiting = self._waiting.setdefault((type(request), request.request_id), [])
-        waiting.append(item)
-        _shorten(self._waiting)
-        return len(waiting) == 1
-
-    def store(self, answer: Answer) -> Sequence[Answer]:
-        """Keep an answer; return it for everybody who waits for it."""
-        request = _request(answer.to)
-        if not request.request_id:
-            return [answer]
-        key = (type(request), request.request_id)
-        self._given[key] = (encode(request)[0], answer.reply)
-        _shorten(self._given)
-        others = [item for item in self._waiting.pop(key, []) if item is not answer.to]
-        return [answer, *(Answer(item, answer.reply) for item in others)]
-
-
-def _request(item: Incoming) -> Request:
-    return cast("Request", item.message)
-
-
-def _shorten(store: "OrderedDict[tuple[type[Message], str], V]") -> None:
-    while len(store) > ANSWERS_KEPT:
-        store.popitem(last=False)
+def _has_effect(item: Incoming) -> bool:
+    """Return whether a request does more than to say that its owner is still there."""
+    return getattr(item.message, "verb", "") != "renew"

@@ -2,7 +2,7 @@
 
 import socket
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
@@ -12,15 +12,16 @@ from scm.clock import NS_PER_MS, WallClock, seconds
 from scm.crew import Crew, Job, Say
 from scm.errors import RunError
 from scm.eye.station import eye_station
-from scm.latched import HEARD, Latched
 from scm.live import stop_on_signal
 from scm.maps.load import load_map
+from scm.v2x.access import Guard, guard_of, is_loopback, own_stations
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.router import DEFAULT_ENDPOINT, Router, free_endpoint
 
 HOST = "127.0.0.1"
+SCM = (sys.executable, "-m", "scm")
 MOST_RECORDED = 50  # hosted cars whose own messages are recorded: more would be nearly all of it
 LOOK_EVERY_NS = 50 * NS_PER_MS
 
@@ -37,6 +38,12 @@ def run_city(
     listen: str = DEFAULT_ENDPOINT,
     record_dir: Path = Path("runs"),
     seed: int = 0,
+    fleet: Path | None = None,
+    state: str | None = None,
+    host: str = HOST,
+    keys: str | None = None,
+    ros2: bool = False,
+    demand: Path | None = None,
     say: Say = _say_now,
 ) -> int:
     """Run a city until SIGINT or SIGTERM; return the exit code.
@@ -50,28 +57,52 @@ def run_city(
         listen: Endpoint of the router; one that ends in `:0` takes a free one.
         record_dir: Where the recording goes; made when missing.
         seed: Of all randomness.
+        fleet: Fleet file of those who may enter; None: everybody on this machine.
+        state: Store of what must outlive a part's process, and this city when it is named; None: a
+            new file beside the recording.
+        host: Address that the dashboard is bound to.
+        keys: Store of API keys; None: everybody on this machine.
+        ros2: Whether ROS 2 nodes shall see the city.
+        demand: Table of who wants to drive from where to where; None: nobody else comes.
         say: Tells a person one line.
 
     Raises:
         ScmError: when the map, the port or the endpoint is not to be had.
     """
+    if keys is None and not is_loopback(host):
+        msg = (
+            f"host: got {host!r} without API keys, expected 127.0.0.1, or a store of `scm key add`"
+        )
+        raise RunError(msg)
     city_map = load_map(map_name)
     port = _free_port(port)
     record_dir.mkdir(parents=True, exist_ok=True)
+    recording = record_dir / f"{city}-{_stamp()}.mcap"
+    eyes = {
+        eye_station(camera.name, first=i == 0): camera.name
+        for i, camera in enumerate(city_map.cameras)
+    }
+    agent_names = tuple(f"n{hosted + i + 1}" for i in range(agents))
+    guard = guard_of(fleet, city, _free(listen), own_stations(eyes, agent_names), _now())
     with (
-        Router(free_endpoint() if listen.endswith(":0") else listen) as router,
-        ZenohBus(city, "up", router.listen) as bus,
+        Router(guard.listen, guard.settings) as router,
+        ZenohBus(city, "up", guard.connect, credentials=guard.credentials("up")) as bus,
     ):
         plan = _Plan(
             map_name=map_name,
             city=city,
-            endpoint=router.listen,
+            guard=guard,
             hosted=hosted,
-            agents=agents,
+            agents=agent_names,
+            host=host,
             port=port,
-            recording=record_dir / f"{city}-{_stamp()}.mcap",
+            keys=keys,
+            ros2=ros2,
+            demand=demand,
+            recording=recording,
+            state=state or f"sqlite:{recording.with_suffix('.db')}",
             seed=seed,
-            cameras=tuple(camera.name for camera in city_map.cameras),
+            eyes=eyes,
         )
         say(f"scm: city {city!r} on map {map_name!r}, bus {router.listen}")
         _watch(plan, bus, say)
@@ -86,22 +117,26 @@ class _Plan:
 
     map_name: str
     city: str
-    endpoint: str
+    guard: Guard
     hosted: int
-    agents: int
+    agents: tuple[str, ...]
+    host: str
     port: int
+    keys: str | None
+    ros2: bool
+    demand: Path | None
     recording: Path
+    state: str
     seed: int
-    cameras: tuple[str, ...]
+    eyes: Mapping[str, str]
 
 
 def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
     """Keep all processes of the city alive until told to stop."""
-    clock, latched, heard = WallClock(), Latched(), Mailbox(1000)
-    crew = Crew([*_parts(plan, latched), *_agents(plan)], clock, say)
+    clock, heard = WallClock(), Mailbox(1000)
+    crew = Crew([*_parts(plan), *_agents(plan)], clock, say)
     stop = stop_on_signal()
-    for kind in (Presence, *HEARD):
-        bus.subscribe(kind, {}, heard)
+    bus.subscribe(Presence, {}, heard)
     told = False
     try:
         while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, stop):
@@ -109,8 +144,6 @@ def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
             for item in heard.drain():
                 if isinstance(item.message, Presence):
                     crew.heard(item.message)
-                else:
-                    latched.heard(item.message)
             if crew.settled and not told:
                 told = True
                 _tell_next(plan, say)
@@ -119,10 +152,10 @@ def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
         crew.stop()
 
 
-def _parts(plan: _Plan, latched: Latched) -> list[Job]:
-    def scm(part: str, *more: str) -> Sequence[str]:
-        shared = ("--connect", plan.endpoint, "--city", plan.city, "--seed", str(plan.seed))
-        return [sys.executable, "-m", "scm", part, plan.map_name, *shared, *more]
+def _parts(plan: _Plan) -> list[Job]:
+    def scm(name: str, *more: str, station: str = "") -> Sequence[str]:
+        shared = (*_at_bus(plan, station or name), "--seed", str(plan.seed))
+        return [*SCM, name, plan.map_name, *shared, *more]
 
     def record() -> Sequence[str]:
         """Name another file when a recorder died: a recording is never written over."""
@@ -131,65 +164,93 @@ def _parts(plan: _Plan, latched: Latched) -> list[Job]:
         sparse = ["--sparse"] if plan.hosted > MOST_RECORDED else []
         return scm("record", "--out", str(out), *sparse)
 
-    def monitor() -> Sequence[str]:
-        return scm("monitor", *latched.monitor_arguments())
-
-    def world() -> Sequence[str]:
-        return scm("world", "--hosted", str(plan.hosted), *latched.world_arguments())
-
     def part(name: str, what: str, *more: str) -> Job:
         return Job(name, "part", what, lambda: scm(name, *more))
 
-    folder = plan.recording.parent
+    def eye(station: str, camera: str) -> Job:
+        command = partial(scm, "eye", "--camera", camera, station=station)
+        return Job(station, "part", f"overhead camera {camera}: tags, poses, tracks", command)
+
     cars = f"cars, walls, sensors, radio; {plan.hosted} hosted"
-    eyes = [
-        Job(eye_station(camera, first=camera == plan.cameras[0]), "part",
-            f"overhead camera {camera}: tags, poses, tracks",
-            partial(scm, "eye", "--camera", camera))
-        for camera in plan.cameras
-    ]  # fmt: skip
-    return [
-        Job("record", "part", f"everything on the bus into {folder}/", record, last=True),
-        part("traffic", "signals: safe kernel, plans"),
-        Job("monitor", "part", "second channel: doubts the signals, latches flash", monitor),
-        Job("world", "part", cars, world),
-        *eyes,
+    kept = ("--state", plan.state)
+    keys = () if plan.keys is None else ("--keys", plan.keys)
+    web = ("--host", plan.host, "--port", str(plan.port), *keys)
+
+    def demand(table: Path) -> Job:
+        command = [*SCM, "demand", str(table), plan.map_name, *_at_bus(plan, "demand")]
+        return Job("demand", "part", f"cars that come and go as in {table}", lambda: command)
+
+    jobs = [
+        Job(
+            "record",
+            "part",
+            f"everything on the bus into {plan.recording.parent}/",
+            record,
+            last=True,
+        ),
+        part("traffic", "signals: safe kernel, policies, plans", *kept),
+        part("monitor", "second channel: doubts the signals, latches flash", *kept),
+        part("world", cars, "--hosted", str(plan.hosted), *kept),
+        *(eye(station, camera) for station, camera in plan.eyes.items()),
         part("camera", "cars' own cameras, rendered while somebody looks"),
-        part("camera", "cars' own cameras, rendered while somebody looks"),
-        part("api", "REST, event stream, dashboard", "--host", HOST, "--port", str(plan.port)),
+        part("observer", "counts, delays, and who breaks the rules"),
+        part("misbehaviour", "doubts what cars claim on the air"),
+        part("api", "REST, event stream, dashboard", *web),
     ]
+    if plan.demand is not None:
+        jobs.append(demand(plan.demand))
+    if plan.ros2:
+        jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))
+    return jobs
+
+
+def _at_bus(plan: _Plan, station: str) -> Sequence[str]:
+    """Return how a station's program finds the bus, and what it is let in by."""
+    shared = ("--connect", plan.guard.connect, "--city", plan.city)
+    return (*shared, *plan.guard.arguments(station))
 
 
 def _agents(plan: _Plan) -> list[Job]:
     def join(name: str) -> Sequence[str]:
         program = (sys.executable, "-m", "vehicle_agent", "--log", "warning", "join")
-        return [*program, "--name", name, "--connect", plan.endpoint, "--city", plan.city]
+        return [*program, "--name", name, *_at_bus(plan, name)]
 
     # After the world: it compiles the physics, and they find it compiled.
     return [
         Job(name, "v", "vehicle agent: a car of its own", partial(join, name), after="world")
-        for name in (f"n{plan.hosted + i + 1}" for i in range(plan.agents))
+        for name in plan.agents
     ]
 
 
 def _tell_next(plan: _Plan, say: Say) -> None:
-    script = f"--connect {plan.endpoint}"
+    script = f"--connect {plan.guard.connect}"
     at = script + ("" if plan.city == "city" else f" --city {plan.city}")
     programs = Path(sys.executable).parent
     if programs.is_relative_to(Path.cwd()):
         programs = programs.relative_to(Path.cwd())
-    car = f"n{plan.hosted + plan.agents + 1}"
-    say(f"dashboard: http://{HOST}:{plan.port}")
+    car = f"n{plan.hosted + len(plan.agents) + 1}"
+    say(f"dashboard: http://{plan.host}:{plan.port}")
     say("try next, in another shell:")
     say(f"  {programs}/vehicle-agent join --name {car} {at}      another car")
     say(f"  {programs}/python examples/travel_times.py --live {script}      a fleet script")
     say("Ctrl-C stops the city and names its recording")
 
 
+def _now() -> datetime:
+    return datetime.fromtimestamp(seconds(WallClock().now_ns()), UTC)
+
+
 def _stamp() -> str:
     """Return the time of day for a file's name, UTC."""
-    now = datetime.fromtimestamp(seconds(WallClock().now_ns()), UTC)
-    return f"{now:%Y%m%d-%H%M%S-%f}"
+    return f"{_now():%Y%m%d-%H%M%S-%f}"
+
+
+def _free(listen: str) -> str:
+    """Return an endpoint, with a free port instead of 0."""
+    if not listen.endswith(":0"):
+        return listen
+    link = listen.partition("/")[0]
+    return free_endpoint().replace("tcp/", f"{link}/")
 
 
 def _free_port(port: int) -> int:

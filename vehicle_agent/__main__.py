@@ -6,6 +6,7 @@ import logging
 import sys
 import threading
 from collections.abc import Sequence
+from pathlib import Path
 
 from scm import __version__
 from scm.errors import ScmError
@@ -35,6 +36,12 @@ def build_parser() -> argparse.ArgumentParser:
     )
     join.add_argument("--name", required=True, help="of the vehicle: a-z 0-9 _ -")
     join.add_argument("--connect", required=True, metavar="ENDPOINT", help="the city's router")
+    join.add_argument(
+        "--credentials",
+        type=Path,
+        metavar="FILE",
+        help="who this car is, from `scm fleet add`; not needed where anybody may enter",
+    )
     join.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
     join.add_argument("--car", default="nigel", help="car file (%(default)s)")
     join.add_argument("--spawn", default="", help="place to start at; default: any free one")
@@ -61,14 +68,19 @@ def _join(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
     from scm.live import run, stop_on_signal
     from scm.v2x.bus_zenoh import ZenohBus
+    from scm.v2x.credentials import read_credentials
     from scm.v2x.key import check_name
     from vehicle_agent.agent import AgentPart
     from vehicle_agent.leaving import Leaving
 
     check_name(arguments.name, "--name")
     check_name(arguments.city, "--city")
+    who = arguments.credentials
+    credentials = read_credentials(who, arguments.name) if who is not None else None
     wish, done, clock = stop_on_signal(), threading.Event(), WallClock()
-    with ZenohBus(arguments.city, arguments.name, arguments.connect, clock=clock) as bus:
+    with ZenohBus(
+        arguments.city, arguments.name, arguments.connect, clock=clock, credentials=credentials
+    ) as bus:
         part = AgentPart(
             arguments.name, arguments.car, arguments.spawn, bus.session, arguments.seed
         )

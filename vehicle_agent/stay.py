@@ -7,9 +7,12 @@ from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.v2x.cam_trigger import CamTrigger
 from scm.v2x.etsi_convert import cam_of
+from scm.v2x.etsi_events import CarWarnings
+from scm.v2x.etsi_path import SlowNews
 from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.denm_tx import DenmTx
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.vehicle_state import VehicleState
@@ -49,6 +52,9 @@ class Stay:
         self.trips = Trips(vehicle, Roads(city_map), body.limits, body.motion().pose, now_ns)
         self.switches = OFF
         self._cam = CamTrigger()
+        self._slow_news = SlowNews()
+        self._warnings = CarWarnings(vehicle)
+        self._hits: list[Contact] = []
         self._seq = self._felt = 0
         self._commanded = 0.0, 0.0
         self._turn: Indicators = "off"
@@ -56,6 +62,7 @@ class Stay:
     def push(self, contact: Contact) -> None:
         """Let the body feel a contact; the next report says so."""
         self._body.push(contact)
+        self._hits.append(contact)
         self._felt = contact.number
 
     def begin(self, request: RouteRequest, now_ns: int) -> RouteReply:
@@ -110,8 +117,19 @@ class Stay:
         outbox: list[Outgoing] = [state, *self._body.sensors(self._vehicle, now_ns)]
         if self._cam.due(state, now_ns):
             limits = self._body.limits
-            body = cam_of(state, length_m=limits.length, width_m=limits.width, front_m=limits.front)
+            body = cam_of(
+                state,
+                length_m=limits.length,
+                width_m=limits.width,
+                front_m=limits.front,
+                low_frequency=self._slow_news.due(state, limits.front),
+            )
             outbox.append(CamTx(station=self._vehicle, t_ns=now_ns, body=body))
+        hits, self._hits = tuple(self._hits), []
+        outbox += [
+            DenmTx(station=self._vehicle, t_ns=now_ns, body=body)
+            for body in self._warnings.step(state, hits)
+        ]
         return [*outbox, *self.trips.reports(now_ns)]
 
     def _state(self, guarded: Guarded, led_here: tuple[float, float], now_ns: int) -> VehicleState:

@@ -15,6 +15,7 @@ from starlette.types import Scope
 from scm.api import problem
 from scm.api.city import Ask, City
 from scm.api.gate import Gate, content_policy
+from scm.api.keys import KeyRing
 from scm.api.routes import (
     boxes,
     cameras,
@@ -24,10 +25,14 @@ from scm.api.routes import (
     health,
     live,
     map,  # noqa: A004  named for its noun
+    misbehaviour,
+    session,
     signals,
     stations,
     stop,
+    traffic,
 )
+from scm.api.routes import keys as key_routes
 from scm.api.stream import Stream
 from scm.api.view import CityView
 from scm.maps.model import CityMap
@@ -50,7 +55,7 @@ def create_app(
     ask: Ask,
     city_map: CityMap,
     *,
-    api_key: str | None = None,
+    keys: KeyRing | None = None,
     plans: Mapping[str, Sequence[str]] | None = None,
 ) -> FastAPI:
     """Build the application.
@@ -59,8 +64,8 @@ def create_app(
         view: What is shown; stepped by its runner on another thread.
         ask: Sends a request on the bus and waits for the reply, at most so many seconds.
         city_map: Of the city that `view` hears.
-        api_key: When given, every change needs it as a bearer token; without it only this machine
-            may call.
+        keys: Who may call, and what each may do; without it only this machine may call, and may do
+            everything.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
     """
     city = City(view, ask, city_map, plans or {})
@@ -74,15 +79,17 @@ def create_app(
         lifespan=_lifespan_of(stream),
     )
     app.state.stream = stream
-    app.state.api_key = api_key
+    app.state.keys = keys
     problem.install(app)
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
-    app.add_middleware(Gate, api_key=api_key, policy=policy)
+    app.add_middleware(Gate, keys=keys, policy=policy)
     api = APIRouter(prefix="/api/v1")
-    for noun in (cars, signals, stations, events, map, boxes, eye, stop):
+    for noun in (cars, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic):
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)
+    api.include_router(session.router(), responses=problem.RESPONSES)
+    api.include_router(key_routes.router(keys), responses=problem.RESPONSES)
     app.include_router(api)
     app.include_router(health.router(city), responses=problem.RESPONSES)
     _add_pages(app)

@@ -1,51 +1,50 @@
-"""What is checked before any route runs: where a request comes from, and who may change things.
+"""What is checked before any route runs: where a request comes from, and whose it is.
 
-Without a key the interface is for this machine only: the bind address must be loopback, and the
-Host header must name it, so that a web page elsewhere cannot reach it by renaming itself (DNS
-rebinding). Changes must come from our own pages or from programs: a browser tells its origin.
+Without keys the interface is for this machine only, and whoever calls is its admin: the bind
+address must be loopback, and the Host header must name it, so that a web page elsewhere cannot
+reach it by renaming itself (DNS rebinding). With keys, everything below `/api` needs one. Changes
+must come from our own pages or from programs: a browser tells its origin; and they must carry
+their key in the header: the cookie, which pages have for streams and pictures, is for reading.
 """
 
 import base64
 import hashlib
-import hmac
-import ipaddress
+import math
 import re
 from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from scm.api.brake import Brake
+from scm.api.keys import KeyRing
 from scm.api.problem import problem
+from scm.clock import WallClock
 from scm.errors import RunError
+from scm.v2x.access import is_loopback
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
+COOKIE = "scm_key"
+GUARDED = "/api/"
+OPEN = frozenset({"/api/v1/openapi.json"})
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _INLINE_SCRIPT = re.compile(r"<script(?![^>]*\bsrc=)[^>]*>(.*?)</script>", re.DOTALL)
 
 _Refusal = tuple[int, str, str]
 
 
-def is_loopback(host: str) -> bool:
-    """Return whether only this machine can reach what is bound to `host`."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
-
-
-def check_bind(host: str, api_key: str | None) -> None:
-    """Refuse to serve the network without a key.
+def check_bind(host: str, keys: KeyRing | None) -> None:
+    """Refuse to serve the network to everybody.
 
     Raises:
-        RunError: when `host` is not loopback and there is no key.
+        RunError: when `host` is not loopback and there is no key that anybody could have.
     """
-    if not api_key and not is_loopback(host):
+    if not is_loopback(host) and (keys is None or next(keys.records(), None) is None):
         msg = (
             f"api host: got {host!r} without an API key, which would let everybody on the network "
-            "drive the city; expected 127.0.0.1, or an API key"
+            "drive the city; expected 127.0.0.1, or a store of keys (`scm key add`, --keys)"
         )
         raise RunError(msg)
 
@@ -65,11 +64,17 @@ def content_policy(page: str) -> str:
 
 
 class Gate:
-    """ASGI middleware: host, origin and key on the way in, security headers on the way out."""
+    """ASGI middleware: host, origin and key on the way in, security headers on the way out.
 
-    def __init__(self, app: ASGIApp, *, api_key: str | None, policy: str) -> None:
+    A route finds in the scope whose request it is: `scm_role`, `scm_owner`, `scm_key`.
+    """
+
+    def __init__(
+        self, app: ASGIApp, *, keys: KeyRing | None, policy: str, brake: Brake | None = None
+    ) -> None:
         self._app = app
-        self._api_key = api_key
+        self._keys = keys
+        self._brake = brake or Brake(WallClock())
         self._headers = {
             "Content-Security-Policy": policy,
             "X-Content-Type-Options": "nosniff",
@@ -88,17 +93,20 @@ class Gate:
                 MutableHeaders(scope=message).update(self._headers)
             await send(message)
 
-        refusal = self._refusal(scope["method"], Headers(scope=scope))
+        headers = Headers(scope=scope)
+        refusal = self._refusal(scope["method"], headers) or self._admit(scope, headers)
         if refusal is None:
             await self._app(scope, receive, send_guarded)
             return
         status, code, detail = refusal
         response = problem(status, code, detail, instance=scope["path"])
+        if status == HTTPStatus.TOO_MANY_REQUESTS:
+            response.headers["Retry-After"] = str(math.ceil(self._brake.wait_s(_address(scope))))
         await response(scope, receive, send_guarded)
 
     def _refusal(self, method: str, headers: Headers) -> _Refusal | None:
         host = headers.get("host", "")
-        if not self._api_key and _name_of(host) not in LOOPBACK_NAMES:
+        if self._keys is None and _name_of(host) not in LOOPBACK_NAMES:
             detail = f"Host: got {host!r}, expected one of {sorted(LOOPBACK_NAMES)}"
             return HTTPStatus.FORBIDDEN, "host", detail
         if method in _SAFE_METHODS:
@@ -108,15 +116,48 @@ class Gate:
         if foreign or headers.get("sec-fetch-site") == "cross-site":
             detail = f"Origin: got {origin!r}, expected this site ({host}) or none"
             return HTTPStatus.FORBIDDEN, "origin", detail
-        if self._api_key and not self._has_key(headers):
-            detail = "changes need the API key: send `Authorization: Bearer <key>`"
-            return HTTPStatus.UNAUTHORIZED, "unauthorised", detail
         return None
 
-    def _has_key(self, headers: Headers) -> bool:
-        scheme, _, given = headers.get("authorization", "").partition(" ")
-        wanted = (self._api_key or "").encode()
-        return scheme.lower() == "bearer" and hmac.compare_digest(given.strip().encode(), wanted)
+    def _admit(self, scope: Scope, headers: Headers) -> _Refusal | None:
+        """Note whose request it is, or refuse it."""
+        if self._keys is None:
+            scope.update(scm_role="admin", scm_owner="this machine", scm_key="")
+            return None
+        path = str(scope["path"])
+        if not path.startswith(GUARDED) or path in OPEN:
+            return None
+        key = _key_of(headers, with_cookie=scope["method"] in _SAFE_METHODS)
+        address = _address(scope)
+        if key and self._brake.wait_s(address) > 0.0:
+            detail = f"too many wrong keys from {address}; wait a little"
+            return HTTPStatus.TOO_MANY_REQUESTS, "too_many", detail
+        record = self._keys.find(key)
+        if record is None:
+            if key:
+                self._brake.note_wrong(address)
+            detail = "this needs an API key: send `Authorization: Bearer <key>`"
+            return HTTPStatus.UNAUTHORIZED, "unauthorised", detail
+        scope.update(scm_role=record.role, scm_owner=record.owner, scm_key=key)
+        return None
+
+
+def _key_of(headers: Headers, *, with_cookie: bool) -> str:
+    """Return the key a request carries; empty: none."""
+    scheme, _, given = headers.get("authorization", "").partition(" ")
+    if scheme.lower() == "bearer":
+        return given.strip()
+    if not with_cookie:
+        return ""
+    try:
+        cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+    except CookieError:
+        return ""
+    return cookie.value if cookie is not None else ""
+
+
+def _address(scope: Scope) -> str:
+    client = scope.get("client")
+    return str(client[0]) if client else ""
 
 
 def _name_of(host: str) -> str:

@@ -14,7 +14,9 @@ from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.violation import Violation
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
@@ -48,6 +50,7 @@ class Picture:
     Attributes:
         spats, monitors: By junction.
         trips: By vehicle.
+        traffic: The observer's newest counts; `violations` the last it told, oldest first.
         frames, tags: By camera, the last few, oldest first; `eye_statuses` the newest.
         poses: By (camera, vehicle).
         stations: Everybody who is there, and who was lost lately.
@@ -61,6 +64,8 @@ class Picture:
     spats: dict[str, Held[Spat]] = field(default_factory=dict)
     monitors: dict[str, Held[MonitorStatus]] = field(default_factory=dict)
     trips: dict[str, Held[Trip]] = field(default_factory=dict)
+    traffic: Held[TrafficCounts] | None = None
+    violations: tuple[Violation, ...] = ()
     frames: dict[str, tuple[Held[EyeFrame], ...]] = field(default_factory=dict)
     tags: dict[str, tuple[Held[EyeTags], ...]] = field(default_factory=dict)
     eye_statuses: dict[str, Held[EyeStatus]] = field(default_factory=dict)

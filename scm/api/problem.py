@@ -28,11 +28,12 @@ _CODE_OF_STATUS = {
     404: "not_found",
     405: "method_not_allowed",
     422: "invalid",
+    429: "too_many",
     500: "internal",
 }
 
 
-_STATUSES = (400, 401, 403, 404, 409, 422, 500, 503, 504)
+_STATUSES = (400, 401, 403, 404, 409, 422, 429, 500, 503, 504)
 
 
 class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):

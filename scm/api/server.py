@@ -35,7 +35,7 @@ def serve(
 
     Args:
         app: From `create_app`.
-        host: Loopback, unless the application has an API key.
+        host: Loopback, unless the application has API keys.
         port: 0 takes a free one.
         stop_event: Set by anybody, from any thread.
         on_ready: Called once with the address (`http://127.0.0.1:8000`) when pages are served.
@@ -43,7 +43,7 @@ def serve(
     Raises:
         RunError: when the host may not be bound, or the address is taken.
     """
-    check_bind(host, app.state.api_key)
+    check_bind(host, app.state.keys)
     listener = _bind(host, port)
     config = uvicorn.Config(
         app,

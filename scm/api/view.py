@@ -26,11 +26,15 @@ from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags
+from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
+from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.violation import Violation
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
@@ -38,6 +42,8 @@ TRUTH_DEPTH = 80  # snapshots: 4 s, longer than any camera's latency
 FRAME_DEPTH = 4
 TAGS_DEPTH = 8
 FORGET_NS = 60 * NS_PER_S
+VIOLATIONS_DEPTH = 500
+MOST_REPORTED = 500
 
 
 class CityView:
@@ -58,12 +64,16 @@ class CityView:
         self._spats: dict[str, Held[Spat]] = {}
         self._monitors: dict[str, Held[MonitorStatus]] = {}
         self._trips: dict[str, Held[Trip]] = {}
+        self._traffic: Held[TrafficCounts] | None = None
+        self._violations: deque[Violation] = deque(maxlen=VIOLATIONS_DEPTH)
         self._frames: dict[str, deque[Held[EyeFrame]]] = {}
         self._tags: dict[str, deque[Held[EyeTags]]] = {}
         self._eye_statuses: dict[str, Held[EyeStatus]] = {}
         self._watched: Counter[tuple[str, str]] = Counter()
         self._camera_frames: dict[tuple[str, str], Held[CameraFrame]] = {}
         self._poses: dict[tuple[str, str], SeenPose] = {}
+        self._scores: Held[MisbehaviourScores] | None = None
+        self._reports: dict[str, MisbehaviourReport] = {}
         self._stations = StationTable()
         self._log = EventLog()
         self._takers: dict[type[Message], Callable[[Any, int], None]] = {
@@ -80,6 +90,10 @@ class CityView:
             CityEvent: lambda m, _: self._log.add(m),
             Trip: lambda m, t: self._trips.update({m.vehicle: Held(m, t)}),
             CityStop: self._take_stop,
+            TrafficCounts: self._take_counts,
+            Violation: lambda m, _: self._violations.append(m),
+            MisbehaviourScores: self._take_scores,
+            MisbehaviourReport: self._take_report,
         }
         self._always = tuple(Hears(kind) for kind in self._takers)
         self._takers[CameraFrame] = self._take_camera_frame
@@ -114,6 +128,8 @@ class CityView:
                 spats=dict(self._spats),
                 monitors=dict(self._monitors),
                 trips=dict(self._trips),
+                traffic=self._traffic,
+                violations=tuple(self._violations),
                 frames={camera: tuple(frames) for camera, frames in self._frames.items()},
                 tags={camera: tuple(tags) for camera, tags in self._tags.items()},
                 eye_statuses=dict(self._eye_statuses),
@@ -126,6 +142,13 @@ class CityView:
         """Return up to `limit` events numbered above `seq`, oldest first; safe from any thread."""
         with self._lock:
             return self._log.after(seq, limit)
+
+    def misbehaviour(
+        self,
+    ) -> tuple[Held[MisbehaviourScores] | None, dict[str, MisbehaviourReport]]:
+        """Return all stations' scores, and the newest report by station; safe from any thread."""
+        with self._lock:
+            return self._scores, dict(self._reports)
 
     @contextmanager
     def watching(self, vehicle: str, camera: str) -> Iterator[None]:
@@ -176,6 +199,9 @@ class CityView:
     def _take_stop(self, stop: CityStop, _t_ns: int) -> None:
         self._stop = stop
 
+    def _take_counts(self, counts: TrafficCounts, t_ns: int) -> None:
+        self._traffic = Held(counts, t_ns)
+
     def _take_frame(self, frame: EyeFrame, t_ns: int) -> None:
         self._frames.setdefault(frame.camera, deque(maxlen=FRAME_DEPTH)).append(Held(frame, t_ns))
 
@@ -187,6 +213,15 @@ class CityView:
         measured = Pose2(pose.x_m, pose.y_m, pose.yaw_rad)
         residual = residual_of(measured, truth) if truth is not None else None
         self._poses[pose.camera, pose.vehicle] = SeenPose(Held(pose, t_ns), residual)
+
+    def _take_scores(self, scores: MisbehaviourScores, t_ns: int) -> None:
+        self._scores = Held(scores, t_ns)
+
+    def _take_report(self, report: MisbehaviourReport, _t_ns: int) -> None:
+        self._reports.pop(report.suspect, None)
+        self._reports[report.suspect] = report
+        if len(self._reports) > MOST_REPORTED:
+            self._reports.pop(next(iter(self._reports)))
 
     def _forget(self, now_ns: int) -> None:
         self._stations.forget(now_ns)

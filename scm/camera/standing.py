@@ -11,6 +11,7 @@ from scm.arrays import Floats
 from scm.camera.mesh import Behind, Face, Mesh, mesh_of, part_of
 from scm.camera.painter import Thing
 from scm.maps.model import Box, CityMap, Light, Sign, Wall
+from scm.maps.signs import SPEED_LIMIT, TURNS
 from scm.scenery.canvas import Colour, colour_of, dimmed
 from scm.scenery.sheet import BRICK, CARD, wall_pieces
 from scm.scenery.solids import prism, rectangle
@@ -34,6 +35,7 @@ LAMPS: tuple[tuple[str, float, Colour, Colour], ...] = (
 )
 SIGN_M = 0.17
 RIM, PAPER, INK = colour_of("#c62f35"), colour_of("#fbfbf8"), colour_of("#23272e")
+BLUE = colour_of("#2b5ea8")
 UPRIGHT = np.eye(3)
 MIDDLE = np.array([0.0, 0.0, 0.1])
 
@@ -149,6 +151,8 @@ def _sign_face(kind: str) -> tuple[Face, ...]:
         bar = np.array([[-0.03, -0.008], [0.03, -0.008], [0.03, 0.008], [-0.03, 0.008]])
         octagon = np.column_stack((np.cos(angles), np.sin(angles)))
         return _layers((octagon * 0.052, PAPER), (octagon * 0.046, RIM), (bar, PAPER))
+    if kind in TURNS or kind == SPEED_LIMIT:
+        return _round_face(kind)
     up = -1.0 if kind == "give_way" else 1.0
     triangle = np.array([[-0.052, -0.036], [0.052, -0.036], [0.0, 0.054]]) * (1.0, up)
     triangle = triangle if up > 0 else triangle[::-1]
@@ -164,6 +168,24 @@ def _sign_face(kind: str) -> tuple[Face, ...]:
     if side > 0:
         arm, tip = arm[::-1] * (-1.0, 1.0), tip[::-1] * (-1.0, 1.0)
     return _layers((triangle, RIM), (inside, PAPER), (shaft, INK), (arm, INK), (tip, INK))
+
+
+def _round_face(kind: str) -> tuple[Face, ...]:
+    """Return a round sign: a red rim, or blue where it says which way to turn, with its arrow."""
+    angles = np.arange(16) * math.pi / 8.0
+    circle = np.column_stack((np.cos(angles), np.sin(angles)))
+    if kind == SPEED_LIMIT:
+        bar = np.array([[-0.02, -0.006], [0.02, -0.006], [0.02, 0.006], [-0.02, 0.006]])
+        return _layers((circle * 0.052, RIM), (circle * 0.038, PAPER), (bar, INK))
+    rule, way = kind.split("_")
+    rim, ground, ink = (PAPER, BLUE, PAPER) if rule == "only" else (RIM, PAPER, INK)
+    shaft = np.array([[-0.005, -0.026], [0.005, -0.026], [0.005, 0.01], [-0.005, 0.01]])
+    tip = np.array([[-0.016, 0.008], [0.016, 0.008], [0.0, 0.03]])
+    turn = {"left": math.pi / 2.0, "right": -math.pi / 2.0, "straight": 0.0}[way]
+    cos, sin = math.cos(turn), math.sin(turn)
+    matrix = np.array([[cos, sin], [-sin, cos]])
+    arrow = [(shaft @ matrix, ink), (tip @ matrix, ink)]
+    return _layers((circle * 0.052, rim), (circle * 0.044, ground), *arrow)
 
 
 def _layers(*flat: tuple[Floats, Colour]) -> tuple[Face, ...]:

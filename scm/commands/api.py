@@ -3,37 +3,46 @@
 import argparse
 import threading
 
-from scm.command import Command, part_arguments
+from scm.command import Command, credentials_of, part_arguments
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
     parser.add_argument("--host", default="127.0.0.1", help="address to bind (%(default)s)")
     parser.add_argument("--port", type=int, default=8000, help="port to bind (%(default)s)")
-    parser.add_argument("--api-key", help="needed to bind any address but this machine's own")
+    parser.add_argument(
+        "--keys",
+        metavar="STORE",
+        help="API keys of `scm key add`, sqlite:PATH or postgresql://...: needed to bind any "
+        "address but this machine's own",
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.api.app import create_app
     from scm.api.gate import check_bind
+    from scm.api.keys import KeyRing
     from scm.api.server import serve
     from scm.api.view import CityView
     from scm.clock import WallClock
     from scm.live import run, stop_on_signal
     from scm.maps.load import load_map
     from scm.registry import names
+    from scm.store.open import open_store
     from scm.v2x.ask import ask
     from scm.v2x.bus_zenoh import ZenohBus
 
-    check_bind(arguments.host, arguments.api_key)
+    keys = KeyRing(open_store(arguments.keys)) if arguments.keys else None
+    check_bind(arguments.host, keys)
     stop = stop_on_signal()
     view, city_map = CityView(), load_map(arguments.map)
-    with ZenohBus(arguments.city, view.name, arguments.connect) as bus:
+    credentials = credentials_of(arguments, view.name)
+    with ZenohBus(arguments.city, view.name, arguments.connect, credentials=credentials) as bus:
         app = create_app(
             view,
             lambda request, timeout_s: ask(bus, request, timeout_s),
             city_map,
-            api_key=arguments.api_key,
+            keys=keys,
             plans={junction.name: names("scm.traffic.plans") for junction in city_map.junctions},
         )
 

@@ -2,27 +2,24 @@
 
 import argparse
 
-from scm.command import Command, part_arguments, run_part
+from scm.command import Command, part_arguments, run_part, state_argument, state_of
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
-    parser.add_argument(
-        "--fault",
-        action="append",
-        default=[],
-        metavar="JUNCTION=FAULT",
-        help="a fault that was latched before and is not reset yet; may be repeated",
-    )
+    state_argument(parser)
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
+    from scm.store.records import FaultRecord, records
     from scm.traffic.monitor_part import MonitorPart
 
-    faults = dict(fault.partition("=")[::2] for fault in arguments.fault)
-    part = MonitorPart(load_map(arguments.map), faults)
-    return run_part(part, arguments)
+    with state_of(arguments) as state:
+        stored = {} if state is None else records(state, "latches", "monitor", FaultRecord)
+        faults = {junction: record.fault for junction, record in stored.items()}
+        part = MonitorPart(load_map(arguments.map), faults)
+        return run_part(part, arguments, state)
 
 
 COMMAND = Command(

@@ -4,7 +4,7 @@ import argparse
 import os
 from pathlib import Path
 
-from scm.command import Command
+from scm.command import Command, credentials_argument, credentials_of
 
 NAME = "played"
 
@@ -18,6 +18,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--connect", metavar="ROUTER", help="of a running city; default: one of its own"
     )
+    credentials_argument(parser)
     parser.add_argument(
         "--vehicle", metavar="NAME", help="a car of the running city that stands at the start"
     )
@@ -36,7 +37,9 @@ def _run(arguments: argparse.Namespace) -> int:
     car = arguments.car or (str(beside) if beside.is_file() else drive.car)
     print(drive.say)
     if arguments.connect:
-        with ZenohBus("city", "script", arguments.connect) as bus:
+        with ZenohBus(
+            "city", "script", arguments.connect, credentials=credentials_of(arguments)
+        ) as bus:
             played = play(LiveLink(bus), arguments.vehicle or "n1", rows)
     else:
         floor = arguments.drive.parent / drive.map

@@ -2,20 +2,44 @@
 
 import argparse
 
-from scm.command import Command, part_arguments, run_part
+from scm.command import Command, part_arguments, run_part, state_argument, state_of
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
+    state_argument(parser)
     parser.add_argument("--plan", help="signal plan at the start; default: the one of the map")
+    parser.add_argument("--policy", default="fixed", help="of all junctions (%(default)s)")
+    parser.add_argument(
+        "--car",
+        action="append",
+        metavar="CAR",
+        help="name or file of a car that drives here, as often as there are kinds; least times are "
+        "safe for the worst of them (nigel)",
+    )
+    parser.add_argument(
+        "--learned", metavar="MODULE:FUNCTION", help="your own code, for the policy `learned`"
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
+    from scm.store.records import PlanRecord, records
+    from scm.traffic.cars import facts_of, slowest_of
     from scm.traffic.part import TrafficPart
+    from scm.traffic.policies.learned import load_learned
+    from scm.traffic.timing import NIGEL
 
-    part = TrafficPart(load_map(arguments.map), arguments.plan)
-    return run_part(part, arguments)
+    with state_of(arguments) as state:
+        part = TrafficPart(
+            load_map(arguments.map),
+            arguments.plan,
+            policy=arguments.policy,
+            car=slowest_of(map(facts_of, arguments.car)) if arguments.car else NIGEL,
+            learned=load_learned(arguments.learned) if arguments.learned else None,
+            kept={} if state is None else records(state, "plans", "traffic", PlanRecord),
+        )
+        return run_part(part, arguments, state)
 
 
 COMMAND = Command(

@@ -25,6 +25,26 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--record-dir", type=Path, default=Path("runs"), help="recordings (%(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="of all randomness (%(default)s)")
+    parser.add_argument(
+        "--fleet",
+        type=Path,
+        metavar="FILE",
+        help="who may enter, from `scm fleet add`; without: everybody on this machine, nobody else",
+    )
+    parser.add_argument(
+        "--state",
+        metavar="URL",
+        help="store of what must outlive a restart, sqlite:PATH or postgresql://...; default: a "
+        "new file beside the recording",
+    )
+    parser.add_argument("--host", default="127.0.0.1", help="of the dashboard (%(default)s)")
+    parser.add_argument(
+        "--keys", metavar="STORE", help="API keys of `scm key add`; needed for another --host"
+    )
+    parser.add_argument(
+        "--demand", type=Path, metavar="TABLE", help="who wants to drive from where to where"
+    )
+    parser.add_argument("--ros2", action="store_true", help="let ROS 2 nodes see the city")
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -39,6 +59,12 @@ def _run(arguments: argparse.Namespace) -> int:
         listen=arguments.listen,
         record_dir=arguments.record_dir,
         seed=arguments.seed,
+        fleet=arguments.fleet,
+        state=arguments.state,
+        host=arguments.host,
+        keys=arguments.keys,
+        ros2=arguments.ros2,
+        demand=arguments.demand,
     )
 
 

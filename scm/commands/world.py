@@ -3,11 +3,12 @@
 import argparse
 from functools import partial
 
-from scm.command import Command, part_arguments, run_part
+from scm.command import Command, part_arguments, run_part, state_argument, state_of
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
+    state_argument(parser)
     parser.add_argument(
         "--hosted",
         type=int,
@@ -17,27 +18,39 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--car", default="nigel", help="their car file (%(default)s)")
     parser.add_argument(
-        "--stopped-by", metavar="WHO", help="start with the city stop that WHO engaged before"
+        "--radio",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="what the air does, instead of what the map says: loss=0.3; see docs/radio.md",
     )
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
+    from scm.maps.radio import with_radio
     from scm.vehicles.car import car_names
     from scm.vehicles.drivers.early import compile_later, is_first_start
+    from scm.world.kept import read_kept
     from scm.world.part import WorldPart
 
     hosted = tuple((f"n{i + 1}", arguments.car) for i in range(arguments.hosted))
     is_first = is_first_start()
-    part = WorldPart(load_map(arguments.map), arguments.seed, hosted, arguments.stopped_by)
-    # Compiled when its first car comes, a car file would stop the city for 2.5 s.
-    others = [partial(part.world.garage.prepare, car) for car in car_names()]
-    if is_first:
-        compile_later(others)
-    else:
-        for load in others:
-            load()
-    return run_part(part, arguments)
+    with state_of(arguments) as state:
+        part = WorldPart(
+            with_radio(load_map(arguments.map), arguments.radio),
+            arguments.seed,
+            hosted,
+            kept=None if state is None else read_kept(state),
+        )
+        # Compiled when its first car comes, a car file would stop the city for 2.5 s.
+        others = [partial(part.world.garage.prepare, car) for car in car_names()]
+        if is_first:
+            compile_later(others)
+        else:
+            for load in others:
+                load()
+        return run_part(part, arguments, state)
 
 
 COMMAND = Command(

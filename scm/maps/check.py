@@ -10,17 +10,22 @@ from scm.errors import nearest
 from scm.geometry import wrap_angle
 from scm.maps.floor_check import floor_problems
 from scm.maps.model import CityMap, Conflict, Group, Segment
+from scm.maps.radio_check import radio_problems
 from scm.maps.route import LanePath
+from scm.maps.rules_check import rule_problems
 
 JOIN_M = 0.001
 JOIN_RAD = math.radians(0.1)
-SIGN_KINDS = ("left_curve", "right_curve", "stop", "give_way")
 
 _POSITIVE = {
     "width_m", "length_m", "radius_m", "height_m", "size_m", "speed_limit_mps", "radio_range_m",
     "z_m", "width_px", "height_px", "fx_px", "fy_px", "rate_hz", "mass_kg", "gust_s", "m_per_grey",
+    "value_mps", "range_m", "path_loss_exponent",
 }  # fmt: skip
-_NOT_NEGATIVE = {"thickness_m", "noise_sigma", "tag_id", "first_vehicle_tag_id", "friction"}
+_NOT_NEGATIVE = {
+    "thickness_m", "noise_sigma", "tag_id", "first_vehicle_tag_id", "friction", "loss", "fading_db",
+    "wall_db", "delay_ms", "jitter_ms", "data_rate_mbps", "hidden_share",
+}  # fmt: skip
 
 
 def problems_of(city_map: CityMap) -> list[str]:
@@ -29,8 +34,10 @@ def problems_of(city_map: CityMap) -> list[str]:
     Checks that need the lanes' geometry are made only if the numbers and segments are right.
     """
     found = [*_numbers(city_map, ""), *_segments(city_map)]
-    for check in (_unique, _outlines, floor_problems, _references, _spawns, _signs):
+    for check in (_unique, _outlines, floor_problems, radio_problems, _references, _spawns):
         found += check(city_map)
+    if not any(".segments" in problem for problem in found):
+        found += rule_problems(city_map)
     if not found:
         paths = {lane.name: LanePath(lane) for lane in city_map.lanes}
         for geometric in (_connections, _places):
@@ -89,8 +96,11 @@ def _unique(city_map: CityMap) -> Iterator[str]:
     junctions = city_map.junctions
     named: list[tuple[str, str, Sequence[Any]]] = [
         (key, "name", getattr(city_map, key))
-        for key in ("lanes", "areas", "junctions", "stop_lines", "crosswalks", "boxes", "spawns")
-    ]
+        for key in (
+            "lanes", "areas", "junctions", "crossings", "stop_lines", "crosswalks", "boxes",
+            "spawns",
+        )
+    ]  # fmt: skip
     named += [
         ("cameras", "name", city_map.cameras),
         ("junctions", "number", junctions),
@@ -104,6 +114,8 @@ def _unique(city_map: CityMap) -> Iterator[str]:
     for index, junction in enumerate(junctions):
         for attribute in ("name", "number"):
             named.append((f"junctions[{index}].groups", attribute, junction.groups))
+    for index, crossing in enumerate(city_map.crossings):
+        named.append((f"crossings[{index}].approaches", "name", crossing.approaches))
     for key, attribute, records in named:
         seen: dict[object, int] = {}
         for index, record in enumerate(records):
@@ -185,12 +197,6 @@ def _spawns(city_map: CityMap) -> Iterator[str]:
                 f"spawns[{index}] ({spawn.name}): expected lane and at_m, or pose alone; "
                 f"got {' and '.join(given) or 'none of them'}"
             )
-
-
-def _signs(city_map: CityMap) -> Iterator[str]:
-    """Doubt the signs' kinds."""
-    for index, sign in enumerate(city_map.signs):
-        yield from _known(f"signs[{index}] ({sign.sign_id}).kind", "kind", sign.kind, SIGN_KINDS)
 
 
 def _connections(city_map: CityMap, paths: dict[str, LanePath]) -> Iterator[str]:

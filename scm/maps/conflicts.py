@@ -1,12 +1,22 @@
-"""Which signal groups of a junction may never be green together: read off their geometry."""
+"""Where the ways of a junction meet, and which groups may never be green together: geometry."""
 
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
 from scm.arrays import Floats
 from scm.maps.model import Conflict, Junction
 from scm.maps.route import Roads
+
+
+class Meeting(NamedTuple):
+    """Where two movements come closer than a lane is wide, along the lane of each [m]."""
+
+    from_m: float
+    to_m: float
+    other_from_m: float
+    other_to_m: float
 
 
 def conflicting_groups(junction: Junction, roads: Roads) -> frozenset[frozenset[str]]:
@@ -18,16 +28,17 @@ def conflicting_groups(junction: Junction, roads: Roads) -> frozenset[frozenset[
     return frozenset(
         frozenset((one.name, other.name))
         for one, other in combinations(junction.groups, 2)
-        if any(_meet(a, b, roads) for a in one.movements for b in other.movements)
+        if any(meeting(a, b, roads) for a in one.movements for b in other.movements)
     )
 
 
-def _meet(one: Conflict, other: Conflict, roads: Roads) -> bool:
-    """Return whether two movements overlap; a pair that looks like an earlier one is known."""
+def meeting(one: Conflict, other: Conflict, roads: Roads) -> Meeting | None:
+    """Return where two movements meet, None if they do not; a pair of a known shape is known."""
     shape = _shape(one, other, roads)
-    if shape not in roads.overlaps:
-        roads.overlaps[shape] = _overlap(one, other, roads)
-    return roads.overlaps[shape]
+    if shape not in roads.meetings:
+        roads.meetings[shape] = _measure(one, other, roads)
+    found: Meeting | None = roads.meetings[shape]
+    return found
 
 
 def _shape(one: Conflict, other: Conflict, roads: Roads) -> tuple[object, ...]:
@@ -38,16 +49,23 @@ def _shape(one: Conflict, other: Conflict, roads: Roads) -> tuple[object, ...]:
     return (first, apart, b.start[2], b.segments, b.width_m, other.from_m, other.to_m)
 
 
-def _overlap(one: Conflict, other: Conflict, roads: Roads) -> bool:
+def _measure(one: Conflict, other: Conflict, roads: Roads) -> Meeting | None:
     first, second = roads.lane(one.lane), roads.lane(other.lane)
-    a, b = _stretch(one, roads), _stretch(other, roads)
+    (a, at_a), (b, at_b) = _stretch(one, roads), _stretch(other, roads)
     squared = ((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2)
-    return bool(squared.min() < ((first.width_m + second.width_m) / 2.0) ** 2)
+    near = squared < ((first.width_m + second.width_m) / 2.0) ** 2
+    if not near.any():
+        return None
+    along_a, along_b = at_a[near.any(axis=1)], at_b[near.any(axis=0)]
+    return Meeting(
+        float(along_a.min()), float(along_a.max()), float(along_b.min()), float(along_b.max())
+    )
 
 
-def _stretch(movement: Conflict, roads: Roads) -> Floats:
-    """Return the points of the movement's lane between its ends, shape (n, 2) [m]."""
+def _stretch(movement: Conflict, roads: Roads) -> tuple[Floats, Floats]:
+    """Return the points of the movement's lane between its ends, (n, 2), and where each is [m]."""
     lane = roads.lane(movement.lane)
     inside = (lane.s > movement.from_m) & (lane.s < movement.to_m)
     ends = [lane.at(s)[:2] for s in (movement.from_m, movement.to_m)]
-    return np.vstack([lane.points[inside], np.array(ends)])
+    at = np.concatenate((lane.s[inside], (movement.from_m, movement.to_m)))
+    return np.vstack([lane.points[inside], np.array(ends)]), at

@@ -14,9 +14,10 @@ from scm.arrays import Floats
 from scm.geometry import Pose2
 from scm.maps import furniture
 from scm.maps.floor_draw import floor_layers, wind_arrow
-from scm.maps.model import CityMap, Crosswalk, Wall
+from scm.maps.model import Approach, CityMap, Crosswalk, Wall
 from scm.maps.route import LanePath, Roads
 from scm.maps.segments import box_outline, wall_outlines
+from scm.maps.signs import precedence_at
 from scm.maps.svg import element, label, lane_data, layer, number, outline, placed
 
 MARGIN_M = 0.06
@@ -146,11 +147,33 @@ def _paint(city_map: CityMap, roads: Roads) -> str:
                 stroke_width=0.022,
             )
         )
+    stops += [
+        _give_way_line(f"{crossing.name}-{approach.name}", roads, approach)
+        for crossing in city_map.crossings
+        for approach in crossing.approaches
+    ]
     return (
         layer("movements", _movements(roads))
         + layer("direction", arrows)
         + layer("crosswalks", map(_crosswalk, city_map.crosswalks))
         + layer("stop-lines", stops)
+    )
+
+
+def _give_way_line(name: str, roads: Roads, approach: Approach) -> str:
+    """Return a line without lights: unbroken where one must stop, else dashed."""
+    lane = roads.lanes[approach.lane]
+    half = lane.width_m / 2.0 - EDGE_M
+    must_stop = precedence_at(roads.signs.get(approach.lane, ()), approach.at_m) == "stop"
+    return element(
+        "path",
+        id=f"line-{name}",
+        class_="stop-line" if must_stop else "give-way-line",
+        d=f"M0 {-half:.4f}V{half:.4f}",
+        transform=placed(lane.at(approach.at_m)),
+        stroke=PAINT,
+        stroke_width=0.022,
+        stroke_dasharray=None if must_stop else "0.025 0.018",
     )
 
 

@@ -5,10 +5,11 @@ from collections.abc import Callable
 
 from scm.geometry import Pose2
 from scm.maps.model import Light, Sign
+from scm.maps.signs import SPEED_LIMIT, TURNS
 from scm.maps.svg import element, label, placed
 
 LAMPS = (("red", 0.046, "#5c2a2a"), ("yellow", 0.0, "#5a4a22"), ("green", -0.046, "#234a33"))
-RED, INK, PAPER = "#c62f35", "#23272e", "#fbfbf8"
+RED, BLUE, INK, PAPER = "#c62f35", "#2b5ea8", "#23272e", "#fbfbf8"
 
 
 def light(head: Light) -> str:
@@ -76,12 +77,17 @@ def sign(post: Sign) -> str:
         class_="beam",
         transform=f"rotate({-math.degrees(post.yaw_rad):.2f})",
     )
-    face = _FACES.get(post.kind, _unknown)
+    if post.kind in TURNS:
+        face = _turn_plate(post.kind)
+    elif post.kind == SPEED_LIMIT:
+        face = _limit(post.value_mps or 0.0)
+    else:
+        face = _FACES.get(post.kind, _unknown)()
     return element(
         "g",
         element("title", f"Sign {post.sign_id}: {post.kind.replace('_', ' ')}"),
         beam,
-        face(),
+        face,
         id=f"sign-{post.sign_id}",
         class_=f"sign {post.kind}",
         transform=placed(Pose2(post.x_m, post.y_m, 0.0)),
@@ -123,6 +129,28 @@ def _stop() -> str:
     points = " ".join(f"{0.05 * math.cos(a):.4f},{0.05 * math.sin(a):.4f}" for a in corners)
     plate = element("polygon", points=points, fill=RED, stroke=PAPER, stroke_width=0.006)
     return plate + label("STOP", 0.0, 0.0, 0.026, fill=PAPER, font_weight="700")
+
+
+def _limit(value_mps: float) -> str:
+    """Return a speed limit in metres a second."""
+    plate = element("circle", r=0.044, fill=PAPER, stroke=RED, stroke_width=0.013)
+    text = f"{value_mps:.2f}".rstrip("0").rstrip(".").removeprefix("0")
+    return plate + label(text, 0.0, 0.0, 0.034, fill=INK, font_weight="700")
+
+
+def _turn_plate(kind: str) -> str:
+    """Return an arrow: white on blue where one must turn so, black and crossed out where not."""
+    rule, way = kind.split("_")
+    only = rule == "only"
+    ring = {"fill": BLUE, "stroke": PAPER} if only else {"fill": PAPER, "stroke": RED}
+    ink = PAPER if only else INK
+    plate = element("circle", r=0.046, stroke_width=0.008, **ring)
+    shaft = element("path", d="M0 0.028V-0.012", fill="none", stroke=ink, stroke_width=0.01)
+    tip = element("path", d="M-0.016 -0.01L0 -0.032L0.016 -0.01Z", fill=ink)
+    turned = {"left": "rotate(-90)", "right": "rotate(90)", "straight": None}[way]
+    arrow = element("g", shaft, tip, transform=turned)
+    bar = element("path", d="M-0.032 -0.032L0.032 0.032", stroke=RED, stroke_width=0.009)
+    return plate + arrow + ("" if only else bar)
 
 
 def _unknown() -> str:

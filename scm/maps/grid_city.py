@@ -1,4 +1,4 @@
-"""A city made to measure: straight two-way streets in a grid, a signal at every junction.
+"""A city made to measure: straight two-way streets in a grid, signals or signs at each junction.
 
     north                       Heading k of 4: east, north, west, south. One keeps to the right.
       |v|^|                     Lane middles lie OFFSET beside the street's middle. A junction is
@@ -10,17 +10,24 @@
 
 The proportions fit Nigel (turning radius 0.245 m, width 0.175 m, front 0.23 m before its rear
 axle): its front corner swings 0.055 m out of a right turn, and 0.10 m lie between lanes' cars.
+
+With signs, three kinds of junctions take turns: all stop; who comes from north or south gives way;
+no signs, right before left.
 """
 
 import math
 import re
 from collections.abc import Iterator
 
+import msgspec
+
 from scm.errors import MapError
 from scm.maps.model import (
+    Approach,
     Area,
     CityMap,
     Conflict,
+    Crossing,
     Crosswalk,
     Floor,
     Group,
@@ -30,6 +37,7 @@ from scm.maps.model import (
     MapTag,
     Point,
     Segment,
+    Sign,
     Spawn,
     StopLine,
     Wall,
@@ -49,15 +57,19 @@ LEAST_BLOCK_M = 2.2
 MOST_JUNCTIONS = 2500
 SPAWN_EVERY = 0.7
 PLAN = "calm"
+STOP, GIVE_WAY = "stop", "give_way"
 
-_NAME = re.compile(r"grid:(\d+)x(\d+)(?::(\d+(?:\.\d+)?))?")
+_NAME = re.compile(r"grid:(\d+)x(\d+)(?::(\d+(?:\.\d+)?))?(:signs)?")
 _HEADINGS = "enws"
 _STEPS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 Place = tuple[int, int]
 
 
 def named_city(name: str) -> CityMap | None:
-    """Return the city that `grid:6x4` (or `grid:6x4:8`, blocks of 8 m) names; None: another name.
+    """Return the city that a name means; None: another name.
+
+    `grid:6x4` has signals, `grid:6x4:8` blocks of 8 m, `grid:6x4:signs` and `grid:6x4:8:signs`
+    have signs instead.
 
     Raises:
         MapError: when there can be no city of this size.
@@ -67,18 +79,21 @@ def named_city(name: str) -> CityMap | None:
     found = _NAME.fullmatch(name)
     if found is None:
         msg = f"map {name!r}: expected grid:COLUMNSxROWS or grid:COLUMNSxROWS:BLOCK_M"
-        raise MapError(f"{msg}, as in grid:6x4 or grid:6x4:8")
-    columns, rows, block = found.groups()
-    return grid_city(int(columns), int(rows), block_m=float(block or BLOCK_M))
+        raise MapError(f"{msg}, as in grid:6x4, grid:6x4:8 or, with signs, grid:6x4:signs")
+    columns, rows, block, signs = found.groups()
+    return grid_city(
+        int(columns), int(rows), block_m=float(block or BLOCK_M), signs=signs is not None
+    )
 
 
-def grid_city(columns: int, rows: int, *, block_m: float = BLOCK_M) -> CityMap:
+def grid_city(columns: int, rows: int, *, block_m: float = BLOCK_M, signs: bool = False) -> CityMap:
     """Return a city of columns x rows junctions.
 
     Args:
         columns: Junctions from west to east, at least 2.
         rows: Junctions from south to north, at least 2.
         block_m: From the middle of a junction to the middle of the next [m].
+        signs: Whether it has signs instead of signals.
 
     Raises:
         MapError: when there can be no city of this size.
@@ -88,7 +103,8 @@ def grid_city(columns: int, rows: int, *, block_m: float = BLOCK_M) -> CityMap:
         raise MapError(f"{msg}, got {columns} x {rows}")
     if not LEAST_BLOCK_M <= block_m <= 1000.0:
         raise MapError(f"grid city: block_m: expected {LEAST_BLOCK_M} to 1000, got {block_m}")
-    return _Grid(columns, rows, block_m).city()
+    city = _Grid(columns, rows, block_m)
+    return city.signed() if signs else city.city()
 
 
 class _Grid:
@@ -122,6 +138,21 @@ class _Grid:
             crosswalks=tuple(walk for place in crossings for walk in self.crosswalks(place)),
             walls=(*self.buildings(), _ring(low - 0.1, high_x + 0.1, low - 0.1, high_y + 0.1, 0.2)),
             spawns=tuple(self.spawns()),
+        )
+
+    def signed(self) -> CityMap:
+        """Return the city with signs instead of signals."""
+        lit = self.city()
+        crossings = [place for place in self.places if len(self.arms(place)) > 2]
+        return msgspec.structs.replace(
+            lit,
+            name=f"{lit.name}_signs",
+            title=f"{lit.title}, without lights",
+            junctions=(),
+            stop_lines=(),
+            lights=(),
+            crossings=tuple(self.crossing(place) for place in crossings),
+            signs=tuple(self.signs(crossings)),
         )
 
     def arms(self, place: Place) -> list[int]:
@@ -172,29 +203,67 @@ class _Grid:
                         speed_limit_mps=SPEED_MPS,
                     )
 
+    def movements(self, place: Place, heading: int) -> tuple[Conflict, ...]:
+        """Return the ways over a junction from the arm where cars arrive with a heading."""
+        return tuple(
+            Conflict(
+                lane=_way(place, heading, to),
+                from_m=0.0,
+                to_m=math.floor(_bend_length(heading, to) * 1e3) / 1e3,
+            )
+            for to in self.exits(place, heading)
+        )
+
     def junction(self, place: Place, number: int) -> Junction:
         groups = []
         for count, heading in enumerate(self.approaches(place), start=1):
-            first, *more = (
-                Conflict(
-                    lane=_way(place, heading, to),
-                    from_m=0.0,
-                    to_m=math.floor(_bend_length(heading, to) * 1e3) / 1e3,
-                )
-                for to in self.exits(place, heading)
-            )
+            first, *more = self.movements(place, heading)
             name = _HEADINGS[heading]
             groups.append(Group(name=name, number=count, movement=first, more=tuple(more)))
         return Junction(name=_name(place), number=number, groups=tuple(groups), plan=PLAN)
 
+    def crossing(self, place: Place) -> Crossing:
+        approaches = (
+            Approach(
+                name=f"{_name(place)}_{_HEADINGS[heading]}",
+                lane=self.street_to(place, heading),
+                at_m=_mm(self.street_m - LINE_BEFORE),
+                ways=self.movements(place, heading),
+            )
+            for heading in self.approaches(place)
+        )
+        return Crossing(name=_name(place), approaches=tuple(approaches))
+
+    def signs(self, crossings: list[Place]) -> Iterator[Sign]:
+        number = 0
+        for place in crossings:
+            kind = (STOP, GIVE_WAY, None)[sum(place) % 3]
+            for heading in self.approaches(place):
+                if kind is None or (kind == GIVE_WAY and heading % 2 == 0):
+                    continue
+                number += 1
+                x, y = self.at(place, heading, -HALF - 0.05, EDGE + 0.07)
+                yield Sign(
+                    sign_id=number,
+                    kind=kind,
+                    x_m=x,
+                    y_m=y,
+                    yaw_rad=_yaw((heading + 2) % 4),
+                    lane=self.street_to(place, heading),
+                    at_m=_mm(self.street_m - LINE_BEFORE),
+                )
+
+    def street_to(self, place: Place, heading: int) -> str:
+        """Return the lane on which cars arrive at a place with a heading."""
+        before = self.beyond(place, (heading + 2) % 4)
+        assert before is not None  # noqa: S101 cars arrive from there
+        return _street(before, heading)
+
     def stop_lines(self, place: Place) -> Iterator[StopLine]:
         for heading in self.approaches(place):
-            back = (heading + 2) % 4
-            before = self.beyond(place, back)
-            assert before is not None  # noqa: S101 cars arrive from there
             yield StopLine(
                 name=f"{_name(place)}_{_HEADINGS[heading]}",
-                lane=_street(before, heading),
+                lane=self.street_to(place, heading),
                 at_m=_mm(self.street_m - LINE_BEFORE),
                 junction=_name(place),
                 group=_HEADINGS[heading],

@@ -236,6 +236,22 @@ class Junction(Record, kw_only=True, frozen=True):
     plan: str
 
 
+class Approach(Record, kw_only=True, frozen=True):
+    """A way into a crossing: the line where a car's front gives way, and the ways from there."""
+
+    name: str
+    lane: str
+    at_m: float
+    ways: tuple[Conflict, ...]
+
+
+class Crossing(Record, kw_only=True, frozen=True):
+    """Where lanes cross without lights: signs say who goes first, else right before left."""
+
+    name: str
+    approaches: tuple[Approach, ...]
+
+
 class Light(Record, kw_only=True, frozen=True):
     """A three-lamp head on a pole; it shows its group's colour.
 
@@ -273,8 +289,11 @@ class Sign(Record, kw_only=True, frozen=True):
     """A traffic sign on a pole.
 
     Attributes:
-        kind: `left_curve`, `right_curve`, `stop` or `give_way`.
+        kind: `stop`, `give_way`, `speed_limit`, `no_left`, `only_right`, ...; see `maps.signs`.
         yaw_rad: Where its face looks: towards the cars it is meant for.
+        lane: The lane it holds for; without, that of the cars that its face looks at.
+        at_m: Where on the lane it begins to hold, or where the line is that it means.
+        value_mps: Of a speed limit.
     """
 
     sign_id: int
@@ -282,6 +301,9 @@ class Sign(Record, kw_only=True, frozen=True):
     x_m: float
     y_m: float
     yaw_rad: float
+    lane: str | None = None
+    at_m: float | None = None
+    value_mps: float | None = None
 
 
 class Wall(Record, kw_only=True, frozen=True):
@@ -362,6 +384,34 @@ class Camera(Record, kw_only=True, frozen=True):
     rolling_s: float = 0.0
 
 
+class RadioChannel(Record, kw_only=True, frozen=True):
+    """What the air does to frames; as it stands, nothing. See docs/radio.md.
+
+    Attributes:
+        range_m: How far frames reach; None: the map's `radio_range_m`, and hosted drivers hear all.
+        loss: Share of frames that each receiver misses whatever the distance.
+        fading_db: Standard deviation of the strength at a distance; 0: a sharp edge at the range.
+        path_loss_exponent: How the strength falls with distance: 2 in the open.
+        wall_db: What each wall between two stations takes.
+        delay_ms: From antenna to reader; `jitter_ms` more at most, evenly spread.
+        data_rate_mbps: Of the one channel; 0: endless.
+        hidden_share: How much of the load at a receiver its senders do not hear themselves: these
+            frames collide.
+        congestion_control: Whether cars speak less on a busy channel.
+    """
+
+    range_m: float | None = None
+    loss: float = 0.0
+    fading_db: float = 0.0
+    path_loss_exponent: float = 2.0
+    wall_db: float = 0.0
+    delay_ms: float = 0.0
+    jitter_ms: float = 0.0
+    data_rate_mbps: float = 0.0
+    hidden_share: float = 0.0
+    congestion_control: bool = False
+
+
 class CityMap(Record, kw_only=True, frozen=True):
     """One city. `revision` counts changes of the lanes that cars must know of."""
 
@@ -377,6 +427,7 @@ class CityMap(Record, kw_only=True, frozen=True):
     lanes: tuple[Lane, ...] = ()
     areas: tuple[Area, ...] = ()
     junctions: tuple[Junction, ...] = ()
+    crossings: tuple[Crossing, ...] = ()
     stop_lines: tuple[StopLine, ...] = ()
     lights: tuple[Light, ...] = ()
     crosswalks: tuple[Crosswalk, ...] = ()
@@ -386,3 +437,4 @@ class CityMap(Record, kw_only=True, frozen=True):
     spawns: tuple[Spawn, ...] = ()
     cameras: tuple[Camera, ...] = ()
     radio_range_m: float = 20.0
+    radio: RadioChannel = RadioChannel()

@@ -10,8 +10,9 @@ import numpy as np
 from scm.arrays import Floats
 from scm.errors import MapError, nearest
 from scm.geometry import Pose2, wrap_angle
-from scm.maps.model import CityMap, Conflict, Lane, Spawn, StopLine
+from scm.maps.model import Approach, CityMap, Conflict, Lane, Spawn, StopLine
 from scm.maps.polyline import Polyline, advance, extent, join, sample
+from scm.maps.signs import SPEED_LIMIT, Held, allowed_next, is_obeyed, looks_along
 
 SAME_WAY_RAD = math.radians(60.0)
 MOST_PASSES = 400
@@ -69,7 +70,8 @@ class Roads:
     Attributes:
         city_map: The map they come from.
         lanes: By name, in the order of the file; each is laid when it is first asked for.
-        overlaps: Which shapes of movements are known to overlap, for `maps.conflicts`.
+        meetings: Where movements of known shapes meet, for `maps.conflicts`.
+        signs: Those that cars obey, by lane.
         streets: The same lanes for compiled drivers, once somebody has made them.
     """
 
@@ -77,7 +79,7 @@ class Roads:
         self.city_map = city_map
         self.lanes: Mapping[str, LanePath] = _Lanes(city_map.lanes)
         self.streets: Any = None
-        self.overlaps: dict[tuple[object, ...], bool] = {}
+        self.meetings: dict[tuple[object, ...], Any] = {}
         self._definitions = {lane.name: lane for lane in city_map.lanes}
         self._length = {
             lane.name: sum(extent(segment)[0] for segment in lane.segments)
@@ -95,7 +97,18 @@ class Roads:
             for group in junction.groups:
                 for move in group.movements:
                     self._movements.setdefault(move.lane, []).append((junction.name, move))
+        self._approaches: dict[str, list[tuple[str, Approach]]] = {}
+        for crossing in city_map.crossings:
+            for approach in crossing.approaches:
+                self._approaches.setdefault(approach.lane, []).append((crossing.name, approach))
+                for move in approach.ways:
+                    self._movements.setdefault(move.lane, []).append((crossing.name, move))
         self._boxes: Floats | None = None
+        self.signs = self._held_signs()
+        self._next = {name: lane.next for name, lane in self._definitions.items()}
+        for name, held in self.signs.items():
+            signs = tuple(one.sign for one in held)
+            self._next[name] = allowed_next(self._definitions[name], self._definitions, signs)
 
     def lane(self, name: str) -> LanePath:
         """Return a lane; MapError names the nearest one if there is none of that name."""
@@ -119,8 +132,8 @@ class Roads:
         return self._length[self.check_lane(lane)]
 
     def successors(self, lane: str) -> tuple[str, ...]:
-        """Return the lanes that begin where this one ends."""
-        return self.definition(lane).next
+        """Return the lanes that begin where this one ends, as far as its turn signs allow."""
+        return self._next[self.check_lane(lane)]
 
     def nearest(self, pose: Pose2) -> OnLane | None:
         """Return the closest lane that runs within 60 degrees of the pose's direction.
@@ -149,6 +162,18 @@ class Roads:
     def movements_on(self, lane: str) -> tuple[tuple[str, Conflict], ...]:
         """Return (junction, stretch) of every movement on a lane, in the order of the file."""
         return tuple(self._movements.get(lane, ()))
+
+    def approaches_on(self, lane: str) -> tuple[tuple[str, Approach], ...]:
+        """Return (crossing, approach) of every line without lights on a lane."""
+        return tuple(self._approaches.get(lane, ()))
+
+    def limits_on(self, lane: str) -> list[tuple[float, float]]:
+        """Return (from [m], speed limit [m/s]) along a lane: its own, then those of its signs."""
+        limits = [(0.0, self.definition(lane).speed_limit_mps)]
+        for held in self.signs.get(lane, ()):
+            if held.sign.kind == SPEED_LIMIT and held.sign.value_mps is not None:
+                limits.append((held.at_m, min(limits[0][1], held.sign.value_mps)))
+        return limits
 
     def spawn_pose(self, name: str) -> Pose2:
         """Return the pose of a spawn place (rear axle of the car put there)."""
@@ -204,7 +229,7 @@ class Roads:
         lane = self.check_lane(start_lane)
         while True:
             yield lane
-            following = self._definitions[lane].next
+            following = self._next[lane]
             if not following:
                 return
             lane = following[0]
@@ -231,12 +256,23 @@ class Roads:
             length, lanes = heapq.heappop(queue)
             if lanes[-1] == goal and len(lanes) > 1:
                 return lanes[1:]
-            for following in self._definitions[lanes[-1]].next:
+            for following in self._next[lanes[-1]]:
                 if following not in done:
                     done.add(following)
                     way = length + self._length[following]
                     heapq.heappush(queue, (way, [*lanes, following]))
         raise MapError(f"map {self.city_map.name}: no way from lane {start!r} to {goal!r}")
+
+    def _held_signs(self) -> dict[str, tuple[Held, ...]]:
+        """Return the signs that cars obey by lane, in driving order."""
+        found: dict[str, list[Held]] = {}
+        for sign in filter(is_obeyed, self.city_map.signs):
+            place = self.nearest(looks_along(sign)) if sign.lane is None else None
+            lane = place.lane if place is not None else sign.lane
+            if lane is not None:
+                at_m = sign.at_m if sign.at_m is not None else place.s if place is not None else 0.0
+                found.setdefault(lane, []).append(Held(sign, lane, at_m))
+        return {lane: tuple(sorted(row, key=lambda h: h.at_m)) for lane, row in found.items()}
 
     def _lanes_near(self, x: float, y: float) -> list[LanePath]:
         """Return the lanes that may come within reach of a point, in the order of the file."""
@@ -282,7 +318,7 @@ class Path:
         self._starts = [0.0]
         for piece in pieces:
             self._starts.append(self._starts[-1] + piece.length_m)
-        self._limits = [piece.speed_limit_mps for piece in pieces]
+        self._limits = [roads.limits_on(name) for name in lanes]
         self.stop_lines = [
             (start + line.at_m, line)
             for start, name in zip(self._starts, lanes, strict=False)
@@ -329,8 +365,9 @@ class Path:
         return index, self._inside(s) - self._starts[index]
 
     def speed_limit_mps(self, s: float) -> float:
-        """Return the limit of the lane at a distance."""
-        return self._limits[self._lane_index(s)]
+        """Return the limit at a distance: of the lane, or of the last sign on it."""
+        index, on_lane = self.index_at(s)
+        return next(limit for at, limit in reversed(self._limits[index]) if at <= on_lane)
 
     def next_stop_line(self, s: float) -> tuple[float, StopLine] | None:
         """Return the first stop line at or after a distance; of a closed path, round for ever."""

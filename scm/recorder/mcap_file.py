@@ -156,7 +156,7 @@ def _as_json(body: bytes, attachment: bytes | None) -> bytes:
             msgspec.json.decode(body, type=msgspec.Raw)
             return body
         fields = msgspec.json.decode(attachment, type=dict[str, Any])
-    except (msgspec.MsgspecError, RecursionError):
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         if attachment is None:
             return msgspec.json.encode({"unreadable": body})
         fields = {"unreadable": attachment}

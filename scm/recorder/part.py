@@ -13,16 +13,27 @@ from scm.v2x.message import Delivery, Message
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.cpm_rx import CpmRx
+from scm.v2x.messages.denm_rx import DenmRx
+from scm.v2x.messages.denm_tx import DenmTx
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.mapem_rx import MapemRx
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.spatem_rx import SpatemRx
+from scm.v2x.messages.srem_rx import SremRx
+from scm.v2x.messages.srem_tx import SremTx
+from scm.v2x.messages.ssem_rx import SsemRx
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 
 FLUSH_NS = 250 * NS_PER_MS
 FRAMES_HZ = 1.0
-OF_EACH_CAR = (VehicleState, VehicleSensors, LidarScan, CameraFrame, CamTx, CamRx, SpatemRx)
+OF_EACH_CAR = (
+    *(VehicleState, VehicleSensors, LidarScan, CameraFrame),
+    *(CamTx, DenmTx, SremTx),
+    *(CamRx, CpmRx, DenmRx, MapemRx, SpatemRx, SremRx, SsemRx),
+)
 
 
 class RecorderPart:

@@ -1,7 +1,7 @@
 """Traffic signals: what a junction shows, and a second channel that doubts it.
 
-`kernel.py` decides colours and `proof.py` proves it; `timing.py`, `program.py` derive times and
-conflicts from the map; `plans/` wish, `controller.py` runs them, `promise.py` tells ends, `part.py`
-talks. `card.py`, `monitor.py`, `monitor_part.py` are the second channel and share no code with the
-first. May import v2x, maps. To add a plan: one file in `plans/`.
+`kernel.py` decides colours, `proof*.py` and `flood.py` prove it; `policies/` wish through
+`rings.py` or the timetables of `plans/`; `controller.py` runs them and keeps promises,
+`detectors.py` sees cars, `part.py` talks. `card.py`, `monitor.py`, `monitor_part.py` are the second
+channel and share no code with the first. May import v2x, maps. To add a policy or plan: one file.
 """

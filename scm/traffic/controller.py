@@ -1,20 +1,48 @@
-"""One junction's controller: the kernel, the plan that wishes, and what is told of both.
+"""One junction's controller: kernel, policy and wishes in force, and what is told of all of them.
 
-It starts all red, runs cycles of a plan, and takes another plan when a cycle ends. As long as
-anybody has a reason for flash it flashes red; then it starts again through all red.
+It starts all red. Under a timetable it runs cycles of a plan and takes another plan, or another
+policy, when a cycle ends and no red has a promised end any more; from any other policy it goes back
+to the timetable through a clearance. Between policy and kernel stands the gate: no wish begins or
+ends a colour against what Spat has promised. As long as anybody has a reason for flash it flashes
+red; then it starts again through all red.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from scm.errors import PlanError, nearest
-from scm.traffic import kernel
+from scm.traffic import asked, kernel
+from scm.traffic.asked import NEED_RINGS, Asked
+from scm.traffic.detectors import Detector
 from scm.traffic.kernel import Phase, Program
 from scm.traffic.plan import FLASH, load_timetable, plan_names
+from scm.traffic.policy import (
+    FIXED,
+    Answer,
+    JunctionView,
+    PriorityCall,
+    Status,
+    load_policy,
+    policy_names,
+    site_of,
+)
 from scm.traffic.program import STEP_NS
-from scm.traffic.promise import Cycle, Promise, end_after, green_end, red_end
+from scm.traffic.promise import (
+    Promise,
+    earliest_green,
+    end_after,
+    green_end,
+    red_end,
+    still_ns,
+    wished_green,
+)
+from scm.traffic.timetables import Tables, Timetables
+from scm.v2x.messages.signal_request import SignalRequest
 from scm.v2x.messages.spat import Colour, SignalGroup, Spat
 
 LATE_NS = 3 * STEP_NS
+BY_HAND = "actuated"
 
 _COLOUR: dict[Phase, Colour] = {
     Phase.RED: "red",
@@ -33,54 +61,142 @@ _NEXT: dict[Colour, Colour] = {
 
 @dataclass(slots=True)
 class _Shown:
-    """What one group shows, since when, and what was promised when it began."""
+    """What one group shows, since when, and what was promised of it."""
 
     colour: Colour
     since_ns: int
     promise: Promise
 
 
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What detectors and vehicles tell a policy at one step; see `JunctionView`."""
+
+    detectors: Mapping[str, Detector]
+    sees: bool = False
+    priority: tuple[PriorityCall, ...] = ()
+
+
+UNHEARD = Heard({})
+
+
 class Controller:
     """The signals of one junction; step it with the time, it never asks for it.
 
     Attributes:
-        plan: In force, also while flashing.
-        pending: Asked for, to come with the next cycle; empty: none.
-        mode: `start`, `plan` or `flash`.
+        mode: `start`, `plan`, `flash`, or what a policy says: `adaptive`, `priority`, `preempt`.
+        policy: In force, also while flashing.
+        asked: Wishes of operators and scripts in force.
+        priority: What became of each vehicle's request, by its key.
+        failure: Why a policy was given up for fixed time; empty: none was.
         changed: Whether the last step changed a colour.
         late_steps: How often time came in too large a piece, and the cycle was put off by it.
     """
 
-    def __init__(self, junction: str, program: Program, plan: str, revision: int = 1) -> None:
+    def __init__(
+        self,
+        junction: str,
+        program: Program,
+        plan: str,
+        revision: int = 1,
+        *,
+        policy: str = FIXED,
+        tables: Tables | None = None,
+        learned: Callable[[Any], Any] | None = None,
+    ) -> None:
+        """Take a junction.
+
+        Args:
+            junction: Its name.
+            program: What its kernel must keep.
+            plan: Of the timetable to begin with.
+            revision: Of the map.
+            policy: To run while nobody wishes another one.
+            tables: Timetables by plan, in step with the neighbours; None: all plans, alone.
+            learned: For the policy `learned`.
+
+        Raises:
+            PlanError: when there is no such plan or policy, or a plan is not safe.
+        """
         self.junction = junction
         self._program = program
         self._revision = revision
-        self._tables = {name: load_timetable(name, program) for name in plan_names()}
-        self.plan = self._known(plan)
-        self.pending = ""
+        tables = tables or {name: (load_timetable(name, program), None) for name in plan_names()}
+        self._plans = list(tables)
+        self._timetables = Timetables(tables, self._known(plan))
+        self._site = site_of(junction, program, learned)
+        self._policies = {name: load_policy(name) for name in policy_names()}
+        self._usual = self._known_policy(policy)
+        self.policy = FIXED
+        self._memory: Any = None
+        self.asked: tuple[Asked, ...] = ()
+        self.priority: Mapping[tuple[int, int], Status] = {}
+        self.failure = ""
+        self._failed = ""
         self.mode = "start"
         self.changed = False
         self.late_steps = 0
         self._flash_reasons: set[str] = set()
         self._state = kernel.start(program)
         self._shown: dict[str, _Shown] = {}
-        self._cycle = Cycle(None, 0, 0)
+        self._wished: frozenset[str] = frozenset()
         self._last_ns: int | None = None
+        self._shown_ns: int | None = None
+        self._is_late = False
         self._seq = 0
         self._restart_ns = max(times.clearance for times in program.times) + STEP_NS
 
     @property
+    def plan(self) -> str:
+        """The plan in force, also while flashing or under another policy."""
+        return self._timetables.plan
+
+    @property
+    def running(self) -> str:
+        """What is in force, in one word: the plan of a timetable, or the policy."""
+        return self.plan if self._policies[self.policy].is_timed else self.policy
+
+    @property
+    def pending(self) -> str:
+        """What was asked for and is to come at the next safe moment; empty: nothing."""
+        wanted = self._wanted()
+        if wanted == self.policy:
+            return self._timetables.pending if wanted == FIXED else ""
+        return (self._timetables.pending or self.plan) if wanted == FIXED else wanted
+
+    @property
     def is_flashing(self) -> bool:
         """Whether there is a reason to flash, from the next step on."""
-        return bool(self._flash_reasons)
+        return bool(self._flash_reasons) or self._policies[self._wanted()].is_flash
+
+    @property
+    def needs_detectors(self) -> bool:
+        """Whether cars must be listened to, for what runs or for what is to come."""
+        names = (self.policy, self._wanted())
+        return any(self._policies[name].needs_detectors for name in names)
 
     def ask(self, plan: str) -> None:
-        """Wish for a plan from the next cycle on.
+        """Wish for a plan, and thereby for fixed time, or for a policy, until further notice.
 
         Raises:
-            PlanError: when there is no such plan.
+            PlanError: when there is no such plan or policy.
         """
-        self.pending = "" if self._known(plan) == self.plan else plan
+        if plan not in self._plans and plan in self._policies:
+            self._usual = plan
+        else:
+            self._timetables.pending = "" if self._known(plan) == self.plan else plan
+            self._usual = FIXED
+        self.failure = self._failed = ""
+
+    def take(self, request: SignalRequest, now_ns: int) -> None:
+        """Take a wish of an operator or a script.
+
+        Raises:
+            PlanError: saying in words why it cannot be taken.
+        """
+        self.asked = asked.take(self.asked, request, self._program, self._policies, now_ns)
+        if request.verb == "policy":
+            self.failure = self._failed = ""
 
     def flash(self, reason: str, *, on: bool) -> None:
         """Give or take back a reason to flash; it ends when the last reason is gone."""
@@ -89,14 +205,17 @@ class Controller:
         else:
             self._flash_reasons.discard(reason)
 
-    def step(self, now_ns: int) -> None:
+    def step(self, now_ns: int, heard: Heard = UNHEARD) -> None:
         """Go on to `now_ns`."""
         dt_ns = self._take_time(now_ns)
-        if self._flash_reasons:
+        self.asked = asked.lapse(self.asked, now_ns, *self._just_changed())
+        if self.is_flashing:
             self.mode = FLASH
+            self.priority = {one.key: "rejected" for one in heard.priority}
             wishes: frozenset[str] = frozenset()
         else:
-            wishes = self._wishes(now_ns)
+            self._wished = self._wishes(now_ns, dt_ns, heard)
+            wishes = self._gate(self._wished, now_ns)
         self._state = kernel.step(
             self._program, self._state, wishes, dt_ns, flash=self.mode == FLASH
         )
@@ -110,17 +229,33 @@ class Controller:
             t_ns=now_ns,
             seq=self._seq,
             mode=self.mode,
-            plan=self.plan,
+            plan=self.running,
             groups=tuple(self._tell(name, shown) for name, shown in self._shown.items()),
             revision=self._revision,
         )
 
     def _known(self, plan: str) -> str:
-        if plan not in self._tables:
-            names = [*self._tables, FLASH]
+        if plan not in self._plans:
+            names = [*self._plans, *policy_names(), FLASH]
             msg = f"junction {self.junction}: no plan {plan!r}{nearest(plan, names)}, only {names}"
             raise PlanError(msg)
         return plan
+
+    def _known_policy(self, policy: str) -> str:
+        if policy not in self._policies:
+            names = list(self._policies)
+            hint = nearest(policy, names)
+            msg = f"junction {self.junction}: no policy {policy!r}{hint}, only {names}"
+            raise PlanError(msg)
+        return policy
+
+    def _wanted(self) -> str:
+        """Return the policy that should run: wished, or usual; rings, where wishes need them."""
+        wished = next((one.policy for one in self.asked if one.verb == "policy"), self._usual)
+        policy = FIXED if wished == self._failed else wished
+        needs_rings = any(one.verb in NEED_RINGS for one in self.asked)
+        by_hand = needs_rings and self._policies[policy].is_timed and self._failed != BY_HAND
+        return BY_HAND if by_hand else policy
 
     def _take_time(self, now_ns: int) -> int:
         """Return the time since the last step; what is far too much of it puts the cycle off."""
@@ -129,51 +264,146 @@ class Controller:
             self._begin_again(now_ns)
         dt_ns = now_ns - self._last_ns
         self._last_ns = now_ns
-        if dt_ns > LATE_NS:
+        self._is_late = dt_ns > LATE_NS
+        if self._is_late:
             self.late_steps += 1
-            off_ns = dt_ns - STEP_NS
-            cycle = self._cycle
-            self._cycle = Cycle(cycle.timetable, cycle.began_ns + off_ns, cycle.ends_ns + off_ns)
+            self._timetables.put_off(dt_ns - STEP_NS)
         return dt_ns
 
     def _begin_again(self, now_ns: int) -> None:
         self.mode = "start"
-        self._cycle = Cycle(None, now_ns, now_ns + self._restart_ns)
+        self.policy = FIXED
+        self._timetables.clear(now_ns, now_ns + self._restart_ns)
 
-    def _wishes(self, now_ns: int) -> frozenset[str]:
+    def _wishes(self, now_ns: int, dt_ns: int, heard: Heard) -> frozenset[str]:
+        """Return what timetable or policy wishes now, after a change between them if it is time."""
         if self.mode == FLASH:
             self._begin_again(now_ns)
-        if now_ns >= self._cycle.ends_ns:
-            self._next_cycle()
-        table = self._cycle.timetable
-        return table.wishes(now_ns - self._cycle.began_ns) if table else frozenset()
+        wanted = self._wanted()
+        if self.policy != FIXED:
+            if wanted == FIXED:
+                self._return_to_timetable(now_ns)
+            elif wanted != self.policy:
+                self._begin_policy(wanted)
+        elif now_ns >= self._timetables.cycle.ends_ns:
+            if wanted != FIXED and not self._has_promised_greens():
+                self._begin_policy(wanted)
+            else:
+                self._timetables.next_cycle()
+                self.mode = "plan"
+        if self.policy == FIXED:
+            self.priority = {one.key: "rejected" for one in heard.priority}
+            return self._timetables.wishes(now_ns)
+        return self._ask_policy(now_ns, dt_ns, heard)
 
-    def _next_cycle(self) -> None:
-        self.mode = "plan"
-        self.plan, self.pending = self.pending or self.plan, ""
-        table = self._tables[self.plan]
-        began_ns = self._cycle.ends_ns
-        self._cycle = Cycle(table, began_ns, began_ns + table.length_ns)
+    def _has_promised_greens(self) -> bool:
+        """Return whether a red's end has been promised: only the timetable can keep that."""
+        return any(
+            shown.colour == "red" and shown.promise.max_end_ns is not None
+            for shown in self._shown.values()
+        )
+
+    def _begin_policy(self, name: str) -> None:
+        self.policy = name
+        self._memory = self._policies[name].start(self._site)
+
+    def _return_to_timetable(self, now_ns: int) -> None:
+        """Clear the junction, then begin a cycle."""
+        self.mode, self.policy = "start", FIXED
+        ends = self._promises()
+        left = [
+            still_ns(self._state, i, times, ends[i], now_ns)
+            for i, times in enumerate(self._program.times)
+        ]
+        self._timetables.clear(now_ns, now_ns + max(left) + 3 * STEP_NS)
+
+    def _ask_policy(self, now_ns: int, dt_ns: int, heard: Heard) -> frozenset[str]:
+        view = JunctionView(
+            now_ns,
+            dt_ns,
+            self._state,
+            heard.detectors,
+            heard.sees,
+            self.asked,
+            heard.priority,
+            self._timetables.wishes(now_ns),
+        )
+        try:
+            self._memory, answer = self._policies[self.policy].step(self._site, self._memory, view)
+            self._check(answer)
+        except Exception as cause:  # noqa: BLE001 a policy is a plug-in: whatever it does, cars go on
+            self._failed = self.policy
+            self.failure = f"policy {self.policy}: {type(cause).__name__}: {cause}"
+            self._return_to_timetable(now_ns)
+            return frozenset()
+        self.mode, self.priority = answer.mode, answer.priority
+        return self._as_asked(answer.groups)
+
+    def _as_asked(self, wishes: frozenset[str]) -> frozenset[str]:
+        """Return a policy's wishes with those of people in them, which it may have overlooked."""
+        green = {name for name, shown in self._shown.items() if shown.colour == "green"}
+        held = asked.groups_of(self.asked, "hold") & green
+        return (wishes - (asked.groups_of(self.asked, "omit") - green)) | held
+
+    def _check(self, answer: Answer) -> None:
+        unknown = [group for group in answer.groups if group not in self._program.groups]
+        if unknown:
+            msg = f"wishes {unknown}, expected groups of {list(self._program.groups)}"
+            raise PlanError(msg)
+
+    def _gate(self, wishes: frozenset[str], now_ns: int) -> frozenset[str]:
+        """Return the wishes as far as they keep what was promised."""
+        passed = set(wishes)
+        for name, shown in self._shown.items():
+            is_green = shown.colour == "green"
+            if now_ns < shown.promise.min_end_ns:
+                (passed.add if is_green else passed.discard)(name)
+            elif is_green and shown.promise.max_end_ns is not None:
+                passed.discard(name)
+        return frozenset(passed)
+
+    def _just_changed(self) -> tuple[list[str], list[str]]:
+        """Return whose green began, and whose ended, at the last step."""
+        new = {n: s.colour for n, s in self._shown.items() if s.since_ns == self._shown_ns}
+        return [n for n in new if new[n] == "green"], [n for n in new if new[n] == "yellow"]
+
+    def _promises(self) -> list[Promise | None]:
+        shown = [self._shown.get(name) for name in self._program.groups]
+        return [one.promise if one is not None else None for one in shown]
 
     def _show(self, now_ns: int) -> None:
         self.changed = False
+        self._shown_ns = now_ns
+        before = self._promises()
         for index, name in enumerate(self._program.groups):
             colour = _COLOUR[self._state[index].phase]
-            before = self._shown.get(name)
-            if before is None or before.colour != colour:
+            shown = self._shown.get(name)
+            if shown is None or shown.colour != colour:
                 self.changed = True
-                promise = self._promise(index, colour, now_ns)
+                promise = self._promise(index, colour, now_ns, before)
                 self._shown[name] = _Shown(colour, now_ns, promise)
             elif colour == "red":
-                before.promise = self._promise(index, colour, now_ns)
+                promise = self._promise(index, colour, now_ns, before)
+                shown.promise = promise if self._is_late else shown.promise.narrowed(promise)
+            elif colour == "green" and shown.promise.max_end_ns is None:
+                least_ns, wished = self._program.times[index].min_green, name in self._wished
+                shown.promise = wished_green(shown.promise, now_ns, least_ns, wished=wished)
 
-    def _promise(self, index: int, colour: Colour, now_ns: int) -> Promise:
+    def _promise(
+        self, index: int, colour: Colour, now_ns: int, before: list[Promise | None]
+    ) -> Promise:
         name, times = self._program.groups[index], self._program.times[index]
+        is_timed = self.policy == FIXED
         match colour:
+            case "red" if is_timed:
+                plans = self._timetables.coming if self._wanted() == FIXED else ()
+                return red_end(name, self._timetables.cycle, now_ns, plans)
             case "red":
-                return red_end(name, self._cycle, now_ns, self._tables.values())
+                return earliest_green(self._program, self._state, index, before, now_ns)
+            case "green" if is_timed:
+                return green_end(name, self._timetables.cycle, now_ns, times.min_green)
             case "green":
-                return green_end(name, self._cycle, now_ns, times.min_green)
+                return wished_green(None, now_ns, times.min_green, wished=True)
             case "yellow":
                 return end_after(now_ns + times.yellow)
             case _:

@@ -3,7 +3,7 @@
     conflict, dual, dark, card   on 2 samples, the second within 666 ms of the first: latched after
                                  0.1 s at 10 Hz; one sample alone may be a broken message
     short_green, short_yellow, short_clearance, skipped_yellow, sequence    at once
-    stale                        no sample for more than 500 ms
+    stale                        no new sample for more than 500 ms; the same again is none
     clock_jump                   time stamps that go back, or run ahead by more than 500 ms
 
 `dual` is two colours for one group, `dark` none or dark, `card` a group that is not on the card. A
@@ -98,12 +98,12 @@ class Monitor:
 
     def see(self, spat: Spat, arrived_ns: int) -> None:
         """Judge one sample that arrived at `arrived_ns` on the monitor's own clock."""
+        if spat.t_ns == self._stamp_ns:
+            return  # nothing new: an output that hangs says the same for ever
         self._heard_ns = max(self._heard_ns, arrived_ns)
         if self._is_new and self.fault == "stale":
             self.fault, self.detail, self.since_ns = None, "", arrived_ns
         self._is_new = False
-        if spat.t_ns == self._stamp_ns:
-            return
         self._judge_clock(spat.t_ns, arrived_ns)
         self._judge_sample(spat, arrived_ns)
         self._judge_changes(spat, arrived_ns)

@@ -13,9 +13,10 @@ from scm.errors import nearest
 from scm.log import event
 from scm.maps.model import CityMap
 from scm.part import Hears, Serves
+from scm.store.records import FaultRecord
 from scm.traffic.card import Card, card_hash, card_of
 from scm.traffic.monitor import Monitor
-from scm.v2x.exchange import Answer, Incoming, Outgoing
+from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.monitor_reset import MonitorReset
@@ -115,6 +116,8 @@ class _Watch:
         news: list[Outgoing] = []
         fault = self.monitor.fault
         if fault != self._told:
+            record = None if fault is None else FaultRecord(fault=fault)
+            news.append(Keep("latches", self.monitor.card.junction, record))
             news += self._event_of(fault, now_ns)
         due = self._told_ns is None or now_ns - self._told_ns >= STATUS_EVERY_NS - PERIOD_NS // 2
         if not due and fault == self._told:

@@ -1,36 +1,45 @@
 """The traffic part: every junction of the map under its controller, and what the city hears of it.
 
-It serves wishes for plans and hears the monitor. A fault that the monitor reports, or a monitor
-that was there and fell silent, makes the junction flash red until the monitor says that all is
-well. What the controller shows goes out as `Spat` at every step, and over the roadside station's
-antenna as SPATEM twice a second and at once when a colour changes.
+It serves wishes and hears the monitor. A fault that the monitor reports, or a monitor that was
+there and fell silent, makes the junction flash red until the monitor says that all is well. What
+the controller shows goes out as `Spat` at every step, and over the roadside station's antenna as
+SPATEM twice a second and at once when a colour changes, with the lanes as MAPEM once a second.
+Under a policy that needs detectors it listens to the CAMs that the roadside unit hears, and to what
+the overhead cameras see.
 """
 
 import logging
-from collections.abc import Sequence
-from typing import Literal
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
-from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import PlanError, nearest
 from scm.log import event
-from scm.maps.model import CityMap, Junction
+from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.part import Hears, Serves
+from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller
-from scm.traffic.plan import FLASH
+from scm.traffic.detectors import Seen, Watcher
+from scm.traffic.junction_signals import JunctionSignals
+from scm.traffic.kernel import Program
+from scm.traffic.plan import load_timetable, plan_names
+from scm.traffic.policy import FIXED
+from scm.traffic.priority_air import PriorityDesk
 from scm.traffic.program import STEP_NS, program_of
-from scm.v2x.etsi_convert import roadside_station, spatem_of
-from scm.v2x.exchange import Answer, Incoming, Outgoing
-from scm.v2x.message import Message, Refused
-from scm.v2x.messages.city_event import CityEvent
+from scm.traffic.sightings import Sightings
+from scm.traffic.timetables import Tables
+from scm.traffic.timing import NIGEL, CarFacts
+from scm.traffic.wave import links_of, waves_of
+from scm.v2x.etsi_convert import roadside_station
+from scm.v2x.etsi_topology import mapem_of
+from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
+from scm.v2x.message import Refused
+from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.monitor_status import MonitorStatus
-from scm.v2x.messages.plan_request import PlanReply, PlanRequest
-from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.spatem_tx import SpatemTx
-
-MONITOR_SILENT_NS = 3 * NS_PER_S
-SPATEM_EVERY_NS = 500 * NS_PER_MS
-_EARLY_NS = STEP_NS // 2
+from scm.v2x.messages.plan_request import PlanRequest
+from scm.v2x.messages.signal_request import SignalRequest
+from scm.v2x.messages.srem_rx import SremRx
 
 _log = logging.getLogger(__name__)
 
@@ -38,30 +47,86 @@ _log = logging.getLogger(__name__)
 class TrafficPart:
     """Controls the signals of all junctions of a map; see `scm.part.Part`."""
 
-    def __init__(self, city_map: CityMap, plan: str | None = None) -> None:
-        """Take the map; `plan` replaces the plans that the map names.
+    def __init__(
+        self,
+        city_map: CityMap,
+        plan: str | None = None,
+        *,
+        policy: str = FIXED,
+        car: CarFacts = NIGEL,
+        learned: Callable[[Any], Any] | None = None,
+        kept: Mapping[str, PlanRecord] | None = None,
+    ) -> None:
+        """Take the map.
+
+        Args:
+            city_map: Whose junctions.
+            plan: Replaces the plans that the map names.
+            policy: Of all junctions while nobody wishes another one.
+            car: As bad as the worst of the fleet; all least times follow from it.
+            learned: For the policy `learned`.
+            kept: What junctions were asked for in an earlier run, by name.
 
         Raises:
-            PlanError: when a plan is unknown, or not safe for a junction.
+            PlanError: when a plan or policy is unknown, or not safe for a junction.
         """
         self.name = "traffic"
         self.role = "part"
         self.period_ns = STEP_NS
-        self.hears = (Hears(MonitorStatus),)
-        self.serves = (Serves(PlanRequest),)
+        self.serves = (Serves(PlanRequest), Serves(SignalRequest))
         roads = Roads(city_map)
+        programs = {j.name: program_of(j, roads, car) for j in city_map.junctions}
+        tables = tables_of(city_map, roads, programs, car)
+        self._sightings = Sightings()
         self._junctions = {
-            junction.name: _Signals(junction, roads, plan) for junction in city_map.junctions
+            junction.name: JunctionSignals(
+                junction,
+                Controller(
+                    junction.name,
+                    programs[junction.name],
+                    plan or junction.plan,
+                    city_map.revision,
+                    policy=policy,
+                    tables=tables[junction.name],
+                    learned=learned,
+                ),
+                Watcher(junction, roads),
+                PriorityDesk(junction, roads),
+                mapem_of(roads, junction),
+            )
+            for junction in city_map.junctions
         }
+        for name, record in (kept or {}).items():
+            if name in self._junctions:
+                self._junctions[name].go_on(record)
+        self._by_station = {roadside_station(name): s for name, s in self._junctions.items()}
+
+    @property
+    def hears(self) -> tuple[Hears, ...]:
+        """The monitor and those who ask for priority; and cars, where detectors are needed."""
+        listening = [
+            Hears(CamRx, {"receiver": station})
+            for station, signals in self._by_station.items()
+            if signals.controller.needs_detectors
+        ]
+        tracks = (Hears(EyeTrack),) if listening else ()
+        return (Hears(MonitorStatus), Hears(SremRx), *listening, *tracks)
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Hear wishes and the monitor, step every junction, tell what it shows."""
+        """Hear wishes, cars and the monitor, step every junction, tell what it shows."""
         outbox: list[Outgoing] = []
         for item in inbox:
-            if isinstance(item.message, MonitorStatus):
-                self._hear_monitor(item.message, item.t_ns)
-            elif isinstance(item.message, PlanRequest):
-                outbox.append(Answer(item, self._serve(item.message)))
+            message = item.message
+            if isinstance(message, MonitorStatus):
+                self._hear_monitor(message, item.t_ns)
+            elif isinstance(message, SremRx):
+                self._hear_srem(message, now_ns)
+            elif isinstance(message, CamRx):
+                self._show([message.receiver], self._sightings.of_cam(message), item.t_ns)
+            elif isinstance(message, EyeTrack):
+                self._show(self._by_station, self._sightings.of_track(message), item.t_ns)
+            elif isinstance(message, PlanRequest | SignalRequest):
+                outbox += self._serve(item, message, now_ns)
         for signals in self._junctions.values():
             outbox += signals.step(now_ns)
         return outbox
@@ -71,99 +136,54 @@ class TrafficPart:
         event(_log, "traffic_finished", t_ns=now_ns, junctions=len(self._junctions))
         return []
 
+    def _hear_srem(self, heard: SremRx, now_ns: int) -> None:
+        signals = self._by_station.get(heard.receiver)
+        if signals is not None:
+            signals.desk.hear(heard, now_ns)
+
+    def _show(self, stations: Iterable[str], seen: Seen | None, arrived_ns: int) -> None:
+        for station in stations if seen is not None else ():
+            signals = self._by_station.get(station)
+            if signals is not None and seen is not None and signals.controller.needs_detectors:
+                signals.watcher.show(seen, arrived_ns)
+
     def _hear_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
         signals = self._junctions.get(status.junction)
         if signals:
             signals.hear_monitor(status, arrived_ns)
 
-    def _serve(self, request: PlanRequest) -> Message:
+    def _serve(
+        self, item: Incoming, request: PlanRequest | SignalRequest, now_ns: int
+    ) -> list[Outgoing]:
         signals = self._junctions.get(request.junction)
         if signals is None:
             known = list(self._junctions)
             hint = nearest(request.junction, known)
             detail = f"no junction {request.junction!r}{hint}, only {known}"
-            return Refused(code="not_found", detail=detail)
+            return [Answer(item, Refused(code="not_found", detail=detail))]
         try:
-            return signals.serve(request)
-        except PlanError as unknown:
-            return Refused(code="not_found", detail=str(unknown))
+            if isinstance(request, SignalRequest):
+                return [Answer(item, signals.serve_wish(request, now_ns))]
+            reply = signals.serve_plan(request)
+            return [Keep("plans", request.junction, signals.record), Answer(item, reply)]
+        except PlanError as refusal:
+            code = "invalid" if isinstance(request, SignalRequest) else "not_found"
+            return [Answer(item, Refused(code=code, detail=str(refusal)))]
 
 
-class _Signals:
-    """One junction: its controller, what the monitor said of it, and what is still to be told."""
+def tables_of(
+    city_map: CityMap, roads: Roads, programs: dict[str, Program], car: CarFacts
+) -> dict[str, Tables]:
+    """Return the timetables of all plans by junction; of several junctions they make green waves.
 
-    def __init__(self, junction: Junction, roads: Roads, plan: str | None) -> None:
-        self._junction = junction
-        self._controller = Controller(
-            junction.name,
-            program_of(junction, roads),
-            plan or junction.plan,
-            roads.city_map.revision,
-        )
-        self._told = (self._controller.mode, self._controller.plan)
-        self._asked = ""
-        self._why_flash = ""
-        self._monitor_ns: int | None = None
-        self._sent_ns: int | None = None
-
-    def hear_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
-        self._monitor_ns = arrived_ns
-        self._flash(
-            "monitor",
-            f"the monitor reports {status.fault}: {status.detail}",
-            on=status.fault is not None,
-        )
-
-    def serve(self, request: PlanRequest) -> PlanReply:
-        controller = self._controller
-        who = f"{request.by} asked" + (f": {request.reason}" if request.reason else "")
-        if request.plan == FLASH:
-            self._flash("person", who, on=True)
-            return PlanReply(junction=request.junction, plan=FLASH)
-        controller.ask(request.plan)
-        self._asked = who
-        self._flash("person", who, on=False)
-        plan = FLASH if controller.is_flashing else controller.plan
-        return PlanReply(junction=request.junction, plan=plan, pending=controller.pending)
-
-    def step(self, now_ns: int) -> list[Outgoing]:
-        controller = self._controller
-        if self._monitor_ns is not None:
-            silent = now_ns - self._monitor_ns > MONITOR_SILENT_NS
-            self._flash("silence", "the monitor fell silent", on=silent)
-        controller.step(now_ns)
-        spat = controller.spat(now_ns)
-        return [spat, *self._on_air(spat), *self._news(now_ns)]
-
-    def _flash(self, reason: str, why: str, *, on: bool) -> None:
-        if on and not self._controller.is_flashing:
-            self._why_flash = why
-        self._controller.flash(reason, on=on)
-
-    def _on_air(self, spat: Spat) -> list[Outgoing]:
-        due = self._sent_ns is None or spat.t_ns - self._sent_ns >= SPATEM_EVERY_NS - _EARLY_NS
-        if not due and not self._controller.changed:
-            return []
-        self._sent_ns = spat.t_ns
-        body = spatem_of(spat, self._junction)
-        return [SpatemTx(station=roadside_station(spat.junction), t_ns=spat.t_ns, body=body)]
-
-    def _news(self, now_ns: int) -> list[Outgoing]:
-        """Return events for what changed since they were last asked for."""
-        (mode, plan), now = self._told, (self._controller.mode, self._controller.plan)
-        self._told = now
-        where = f"junction {self._junction.name}"
-        news: list[Outgoing] = []
-        if plan != now[1]:
-            text = f"{where} runs plan {now[1]}, before {plan} ({self._asked})"
-            news.append(_event("info", "plan_changed", text, now_ns))
-        if mode != FLASH and now[0] == FLASH:
-            text = f"{where} flashes red: {self._why_flash}"
-            news.append(_event("warning", "signals_flash", text, now_ns))
-        if mode == FLASH and now[0] != FLASH:
-            news.append(_event("info", "signals_restart", f"{where} restarts all red", now_ns))
-        return news
-
-
-def _event(severity: Literal["info", "warning"], name: str, text: str, now_ns: int) -> CityEvent:
-    return CityEvent(severity=severity, source="traffic", t_ns=now_ns, name=name, text=text)
+    Raises:
+        PlanError: when a plan is not safe for a junction.
+    """
+    links = links_of(city_map, roads, car) if len(programs) > 1 else []
+    tables: dict[str, Tables] = {name: {} for name in programs}
+    for plan in plan_names():
+        alone = {name: load_timetable(plan, program) for name, program in programs.items()}
+        waves = waves_of(links, alone) if links else {n: (t, None) for n, t in alone.items()}
+        for name, pair in waves.items():
+            tables[name] = {**tables[name], plan: pair}
+    return tables

@@ -37,11 +37,12 @@ def _times(junction: Junction, group: Group, roads: Roads, car: CarFacts) -> Gro
         msg = f"junction {junction.name}: group {group.name!r} has no stop line on map"
         raise PlanError(f"{msg} {roads.city_map.name}")
     lanes = [line.lane for line in lines] + [move.lane for move in group.movements]
-    limit_mps = min(roads.definition(lane).speed_limit_mps for lane in lanes)
+    limits_mps = [roads.definition(lane).speed_limit_mps for lane in lanes]
+    limit_mps, fastest_mps = min(limits_mps), max(limits_mps)
     way_m = max(_way_m(line, move, group, roads) for line in lines for move in group.movements)
     return GroupTimes(
         min_green=whole_steps_ns(min_green_s(car, limit_mps)),
-        yellow=whole_steps_ns(yellow_s(car)),
+        yellow=whole_steps_ns(yellow_s(car, fastest_mps)),
         clearance=whole_steps_ns(clearance_s(car, way_m, limit_mps)),
     )
 

@@ -1,18 +1,25 @@
 """When a colour will end: promises for SPaT that are kept whatever anybody asks for.
 
-A plan only ever changes at the end of a cycle. So inside a cycle every end is known; and of the
-first red end beyond it, only that some plan's cycle begins there: the earliest start of all plans
-is promised as the minimum, the latest as the maximum. When the next cycle begins, the promise
-narrows to one of them; it never widens. The maximum allows for two late steps of the controller.
+Under a timetable a plan only ever changes at the end of a cycle. So inside a cycle every end is
+known; and of the first red end beyond it, only that some plan's cycle begins there: the earliest
+start of all plans is promised as the minimum, the latest as the maximum. When the next cycle
+begins, the promise narrows to one of them; it never widens. The maximum allows for two late steps.
+
+Under any other policy nobody knows how long a green will be wished for. A green that is still
+wished is promised for `AHEAD_NS` more, from step to step, so that a car which hears two SPATEM a
+second and loses one never doubts it; once it is no longer wished its end is known. A red lasts at
+least as long as the kernel must keep it; its maximum is unknown.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from scm.traffic.kernel import GroupTimes, Phase, Program, State
 from scm.traffic.plan import Timetable
 from scm.traffic.program import STEP_NS
 
 SLACK_NS = 2 * STEP_NS
+AHEAD_NS = 10 * STEP_NS
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +28,11 @@ class Promise:
 
     min_end_ns: int
     max_end_ns: int | None
+
+    def narrowed(self, by: "Promise") -> "Promise":
+        """Return what is left when both hold."""
+        known = [end for end in (self.max_end_ns, by.max_end_ns) if end is not None]
+        return Promise(max(self.min_end_ns, by.min_end_ns), min(known, default=None))
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +62,66 @@ def green_end(group: str, cycle: Cycle, now_ns: int, min_green_ns: int) -> Promi
 
 
 def red_end(group: str, cycle: Cycle, now_ns: int, plans: Iterable[Timetable]) -> Promise:
-    """Return when a red will end; `plans` are all that may run in the next cycle."""
+    """Return when a red will end.
+
+    Args:
+        group: Which one.
+        cycle: That runs now.
+        now_ns: The present time.
+        plans: All that may run in the next cycle; none: another policy follows it.
+    """
     slot = cycle.timetable and cycle.timetable.slot_of(group, now_ns - cycle.began_ns)
     if slot:
         return end_after(cycle.began_ns + slot.start_ns)
     starts = [plan.first_start_ns(group) for plan in plans]
+    if not starts:
+        return Promise(cycle.ends_ns, None)
     return Promise(cycle.ends_ns + min(starts), cycle.ends_ns + max(starts) + SLACK_NS)
+
+
+def wished_green(before: Promise | None, now_ns: int, least_ns: int, *, wished: bool) -> Promise:
+    """Return the promise of a green whose end no timetable knows; None: it begins now."""
+    if before is None:
+        return Promise(now_ns + max(least_ns, AHEAD_NS), None)
+    if before.max_end_ns is not None:
+        return before
+    if wished:
+        return Promise(max(before.min_end_ns, now_ns + AHEAD_NS), None)
+    return end_after(max(before.min_end_ns, now_ns))
+
+
+def earliest_green(
+    program: Program, state: State, number: int, ends: Sequence[Promise | None], now_ns: int
+) -> Promise:
+    """Return the promise of a red that nothing but the kernel keeps red for certain.
+
+    Args:
+        program: Of the junction.
+        state: Of its kernel.
+        number: Of the red group.
+        ends: What every group's colour was promised; None: not yet.
+        now_ns: The present time.
+    """
+    left = [still_ns(state, number, program.times[number], ends[number], now_ns)]
+    for other, name in enumerate(program.groups):
+        if frozenset((program.groups[number], name)) in program.conflicts:
+            left.append(still_ns(state, other, program.times[other], ends[other], now_ns))
+    return Promise(now_ns + max(left), None)
+
+
+def still_ns(
+    state: State, number: int, times: GroupTimes, promised: Promise | None, now_ns: int
+) -> int:
+    """Return for how long a group still is in others' way, or in its own, at the least [ns]."""
+    phase, elapsed_ns = state[number]
+    match phase:
+        case Phase.GREEN:
+            least_ns = times.min_green - elapsed_ns
+            told_ns = 0 if promised is None else promised.min_end_ns - now_ns
+            return max(least_ns, told_ns, 0) + times.yellow + times.clearance
+        case Phase.YELLOW:
+            return times.yellow - elapsed_ns + times.clearance
+        case Phase.CLEARANCE:
+            return times.clearance - elapsed_ns
+        case _:
+            return 0

@@ -13,7 +13,12 @@ The values that regulations print (yellow of 3 to 6 s) are for full-size cars an
 car at 0.25 m/s drives as if full size at 13 km/h, needs less yellow and much more clearance.
 """
 
+import math
 from dataclasses import dataclass
+
+from scm.errors import PlanError
+
+OVER_LIMIT = 1.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,8 +26,10 @@ class CarFacts:
     """The cars a junction must be safe for; the defaults are the nominal Nigel's.
 
     Attributes:
-        speed_mps: Fastest approach; Nigel's throttle-speed table ends at 0.267.
-        slow_mps: The slowest car that drives on through; Nigel at 0.8 of its throttle.
+        speed_mps: Fastest approach; Nigel's throttle-speed table ends at 0.267. Infinite: it
+            is only known to keep to the lane's limit, within a tenth.
+        slow_mps: The slowest car that drives on through; Nigel at 0.8 of its throttle. Infinite:
+            as fast as the lane allows.
         decel_mps2: Comfortable braking; ours, the drivers' own limit.
         accel_mps2: Getting away from a stop; ours, the drivers' own limit.
         reaction_s: From seeing a change to acting on it: one SPATEM at 2 Hz is sent at once on
@@ -43,9 +50,16 @@ class CarFacts:
 NIGEL = CarFacts()
 
 
-def yellow_s(car: CarFacts) -> float:
-    """Return the least yellow [s], level road."""
-    return car.reaction_s + car.speed_mps / (2.0 * car.decel_mps2)
+def yellow_s(car: CarFacts, limit_mps: float = math.inf) -> float:
+    """Return the least yellow [s], level road.
+
+    Raises:
+        PlanError: when neither the car nor the lane says how fast it may come.
+    """
+    speed_mps = car.speed_mps if math.isfinite(car.speed_mps) else OVER_LIMIT * limit_mps
+    if not math.isfinite(speed_mps):
+        raise PlanError("yellow: got neither a car's top speed nor a limit, expected one of them")
+    return car.reaction_s + speed_mps / (2.0 * car.decel_mps2)
 
 
 def clearance_s(car: CarFacts, way_m: float, limit_mps: float) -> float:

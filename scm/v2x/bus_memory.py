@@ -5,6 +5,7 @@ holds, and what would not survive the wire does not survive here. With a stepped
 that happens is a function of the order of calls, so a run can be repeated bit for bit.
 """
 
+import heapq
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -18,6 +19,7 @@ from scm.clock import Clock, nanoseconds
 from scm.errors import LinkError
 from scm.v2x.bus import check_reply, more_telling, no_answer, no_server
 from scm.v2x.exchange import Answer, Call, Incoming, RawSample
+from scm.v2x.faults import Faults
 from scm.v2x.key import check_name, everything, intersects, key_of, matches, selector
 from scm.v2x.mailbox import Mailbox, RawMailbox
 from scm.v2x.message import Delivery, Message, Refused, Request, decode, encode
@@ -74,10 +76,16 @@ class _Asked:
 
 
 class MemoryNetwork:
-    """What connects the memory buses of one process."""
+    """What connects the memory buses of one process.
 
-    def __init__(self, clock: Clock) -> None:
+    Args:
+        clock: The time.
+        faults: What goes wrong on the way; None: nothing.
+    """
+
+    def __init__(self, clock: Clock, faults: Faults | None = None) -> None:
         self.clock = clock
+        self.faults = faults
         self.lock = threading.RLock()
         self.buses: list[MemoryBus] = []
         self.wishes: list[_Wish] = []
@@ -85,6 +93,8 @@ class MemoryNetwork:
         self.asked: list[_Asked] = []
         self._routes: dict[str, list[_Wish]] = {}
         self._opened = 0
+        self._late: list[tuple[int, int, Callable[[], None]]] = []
+        self._sent = 0
 
     def bus(self, city: str, station: str) -> "MemoryBus":
         """Return a new connection for a station."""
@@ -95,7 +105,10 @@ class MemoryNetwork:
         return bus
 
     def expire(self) -> None:
-        """Refuse every call that has waited for longer than it wanted to, by the clock now."""
+        """Bring what was late until now, and refuse every call that has waited for too long."""
+        while self._late and self._late[0][0] <= self.clock.now_ns():
+            with self.lock:
+                heapq.heappop(self._late)[2]()
         if not self.asked:
             return
         with self.lock:
@@ -105,15 +118,45 @@ class MemoryNetwork:
             for asked in late:
                 asked.settle(no_answer(asked.call, asked.key), now_ns)
 
-    def route(self, sample: RawSample) -> None:
-        """Deliver a sample to everybody who wishes it, in the order they wished."""
+    def carry(self, sender: "MemoryBus", receiver: "MemoryBus", bring: Callable[[], None]) -> None:
+        """Bring something from one station to another, as the faults will have it."""
+        if self.faults is None or sender is receiver:
+            bring()
+            return
+        now_ns = self.clock.now_ns()
+        for delay_ns in self.faults.delays(sender.station, receiver.station):
+            if delay_ns:
+                self._sent += 1
+                heapq.heappush(self._late, (now_ns + delay_ns, self._sent, bring))
+            else:
+                bring()
+
+    def route(self, sample: RawSample, sender: "MemoryBus | None" = None) -> None:
+        """Deliver a sample to everybody who wishes it, in the order they wished.
+
+        Args:
+            sample: What is sent.
+            sender: Whose; None: it reaches everybody, whatever the faults.
+        """
         with self.lock:
             wishes = self._routes.get(sample.key)
             if wishes is None:
                 wishes = [w for w in self.wishes if matches(w.expression, sample.key)]
                 self._routes[sample.key] = wishes
             for wish in wishes:
-                wish.deliver(sample)
+                if self.faults is None or sender is None:
+                    wish.deliver(sample)
+                else:
+                    self.carry(sender, wish.owner, partial(self._bring, wish, sample))
+
+    def _bring(self, wish: _Wish, sample: RawSample) -> None:
+        if wish.owner.connected:
+            wish.deliver(replace(sample, t_ns=self.clock.now_ns()))
+
+    def bring_request(self, offer: _Offer, asked: _Asked, sample: RawSample) -> None:
+        """Bring a request to who offered to answer it, if it is still there."""
+        if offer.owner.connected:
+            offer.deliver(asked, replace(sample, t_ns=self.clock.now_ns()))
 
     def add_wish(self, wish: _Wish) -> None:
         """Remember a wish, and deliver what others kept for late joiners."""
@@ -189,7 +232,8 @@ class MemoryBus:
             if keep:
                 kept = self._kept.setdefault(key, deque(maxlen=keep))
                 kept.append((self._order(), sample))
-            self._network.route(sample)
+            is_presence = isinstance(message, Presence)
+            self._network.route(sample, None if is_presence else self)
 
     def _order(self) -> int:
         self._kept_count += 1
@@ -261,9 +305,12 @@ class MemoryBus:
         check_reply(answer)
         asked = self._to_answer.pop(answer.to, None)
         if asked is not None:
+            network = self._network
             reply = decode(type(answer.reply), *encode(answer.reply))
-            with self._network.lock:
-                asked.heard(self, reply, self._network.clock.now_ns())
+            with network.lock:
+                network.carry(
+                    self, asked.by, lambda: asked.heard(self, reply, network.clock.now_ns())
+                )
 
     def call(self, call: Call, on_reply: OnReply) -> None:
         """Ask, and hand the reply (or a `Refused`) to `on_reply` later; never blocks."""
@@ -279,7 +326,8 @@ class MemoryBus:
             asked.open.update(o.owner for o in offers)
             self._network.asked.append(asked)
             for offer in offers:
-                offer.deliver(asked, sample)
+                bring = partial(self._network.bring_request, offer, asked, sample)
+                self._network.carry(self, offer.owner, bring)
         if not offers:
             asked.settle(no_server(call.request, key), now_ns)
 

@@ -23,6 +23,7 @@ from scm.errors import LinkError, MessageError
 from scm.log import event
 from scm.v2x import zenoh_config
 from scm.v2x.bus import check_reply, more_telling, no_answer, no_server
+from scm.v2x.credentials import Credentials
 from scm.v2x.exchange import Answer, Call, Incoming, RawSample
 from scm.v2x.key import check_name, everything, key_of, parse, selector
 from scm.v2x.mailbox import Mailbox, RawMailbox
@@ -48,10 +49,11 @@ class _Publisher(Protocol):
 class ZenohBus:
     """One station's connection to the router of its city; see `scm.v2x.bus.Bus`.
 
-    Opening waits up to `connect_timeout_s` for the router.
+    Opening waits up to `connect_timeout_s` for the router. `credentials` say who the station is,
+    where the router asks.
 
     Raises:
-        LinkError: when there is no router at the endpoint.
+        LinkError: when there is no router at the endpoint, or it lets the station not in.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class ZenohBus:
         *,
         clock: Clock | None = None,
         connect_timeout_s: float = 5.0,
+        credentials: Credentials | None = None,
     ) -> None:
         self.city = check_name(city, "city")
         self.station = check_name(station, "station")
@@ -74,7 +77,7 @@ class ZenohBus:
         self._subscribers: list[tuple[Mailbox, Any]] = []
         self._wishes: dict[str, zenoh.Publisher] = {}
         self._to_answer: OrderedDict[Incoming, zenoh.Query] = OrderedDict()
-        self._session = _open(endpoint, connect_timeout_s)
+        self._session = _open(endpoint, connect_timeout_s, credentials)
         self.session = str(self._session.zid())
         self._connected = bool(self._session.info.routers_zid())
         self._declared.append(
@@ -389,14 +392,21 @@ def _undeclare(things: Iterable[Any]) -> None:
             event(_log, "undeclare_failed", level=logging.DEBUG, reason=cause)
 
 
-def _open(endpoint: str, connect_timeout_s: float) -> zenoh.Session:
+def _open(
+    endpoint: str, connect_timeout_s: float, credentials: Credentials | None
+) -> zenoh.Session:
+    who = credentials.client_settings() if credentials is not None else None
     try:
-        config = zenoh.Config.from_json5(zenoh_config.client(endpoint, connect_timeout_s))
+        config = zenoh.Config.from_json5(zenoh_config.client(endpoint, connect_timeout_s, who))
         with yielding():
             return zenoh.open(config)
     except zenoh.ZError as cause:
         why = zenoh_config.reason(cause)
-        msg = f"no city at {endpoint!r} within {connect_timeout_s} s: is `scm up` running? ({why})"
+        asked = "" if who is None else ", and does it know these credentials"
+        msg = (
+            f"no city at {endpoint!r} within {connect_timeout_s} s: "
+            f"is `scm up` running{asked}? ({why})"
+        )
         raise LinkError(msg) from cause
 
 

@@ -5,8 +5,8 @@ A 1:14 car is far below the resolution and the trigger thresholds of the standar
 enlarged city: lengths, speeds and accelerations times `SCALE`, time unchanged, positions as
 degrees from a reference point. Every field then means what the standard says.
 
-In JSON the names are those of the records, in snake case as in the open JSON schemas of Orange's
-its-client; the names of phase states and status bits are the standard's own.
+A body is, name by name, the `message` of the open JSON schemas of Orange's its-client (cam 2.4.0,
+spatem 2.0.0); `scm.v2x.etsi_json` puts their envelope around it.
 
 Field sets and units: EN 302 637-2 v1.4.1 (CAM), TS 103 301 with SAE J2735 phase states (SPATEM).
 """
@@ -16,80 +16,268 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from scm.v2x.etsi_parts import (
+    Byte,
+    Heading,
+    IntersectionId,
+    MinuteOfYear,
+    Name,
+    PathPoint,
+    ReferencePosition,
+    Revision,
+    Speed,
+    StationId,
+    Word,
+)
+
 SCALE = 14.0
 REFERENCE_LATITUDE_DEG = 0.0
 REFERENCE_LONGITUDE_DEG = 0.0
 
 CAM_ID = 2
 SPATEM_ID = 4
+PASSENGER_CAR, ROADSIDE_UNIT = 5, 15
 TIME_MARK_UNKNOWN = 36001
+MOST_PATH_POINTS = 40
+
+PHASE_STATES = (
+    "unavailable",
+    "dark",
+    "stop-Then-Proceed",
+    "stop-And-Remain",
+    "pre-Movement",
+    "permissive-Movement-Allowed",
+    "protected-Movement-Allowed",
+    "permissive-clearance",
+    "protected-clearance",
+    "caution-Conflicting-Traffic",
+)
+"""SAE J2735 MovementPhaseState; the place in the list is the number on the air."""
+STATUS_BITS = (
+    "manualControlIsEnabled",
+    "stopTimeIsActivated",
+    "failureFlash",
+    "preemptIsActive",
+    "signalPriorityIsActive",
+    "fixedTimeOperation",
+    "trafficDependentOperation",
+    "standbyOperation",
+    "failureMode",
+    "off",
+    "recentMAPmessageUpdate",
+    "recentChangeInMAPassignedLanesIDsUsed",
+    "noValidMAPisAvailableAtThisTime",
+    "noValidSPATisAvailableAtThisTime",
+)
+"""IntersectionStatusObject, first bit first; two more are reserved."""
 
 # A value beyond the standard's range is refused when read: it comes from the air.
-_Byte = Annotated[int, Meta(ge=0, le=255)]
-_Word = Annotated[int, Meta(ge=0, le=65_535)]
-_Station = Annotated[int, Meta(ge=0, le=2**32 - 1)]
-_TimeMark = Annotated[int, Meta(ge=0, le=36_111)]
+_TimeMark = Annotated[int, Meta(ge=0, le=TIME_MARK_UNKNOWN)]
 
 
-class CamBody(msgspec.Struct, kw_only=True, frozen=True):
-    """Basic and high-frequency containers of a CAM.
+class VehicleLength(msgspec.Struct, kw_only=True, frozen=True):
+    """0.1 m, 1023 unknown; confidence: 0 no trailer, 4 unknown."""
+
+    value: Annotated[int, Meta(ge=1, le=1023)]
+    confidence: Annotated[int, Meta(ge=0, le=4)] = 0
+
+
+class Acceleration(msgspec.Struct, kw_only=True, frozen=True):
+    """0.1 m/s^2, 161 unknown; confidence 0.1 m/s^2, 102 unknown."""
+
+    value: Annotated[int, Meta(ge=-160, le=161)] = 161
+    confidence: Annotated[int, Meta(ge=0, le=102)] = 102
+
+
+class Curvature(msgspec.Struct, kw_only=True, frozen=True):
+    """1e-4 1/m, + = left, 1023 unknown; confidence: a class, 7 unknown."""
+
+    value: Annotated[int, Meta(ge=-1023, le=1023)] = 1023
+    confidence: Annotated[int, Meta(ge=0, le=7)] = 7
+
+
+class YawRate(msgspec.Struct, kw_only=True, frozen=True):
+    """0.01 degree/s, + = left, 32767 unknown; confidence: a class, 8 unknown."""
+
+    value: Annotated[int, Meta(ge=-32_766, le=32_767)] = 32767
+    confidence: Annotated[int, Meta(ge=0, le=8)] = 8
+
+
+class BasicContainer(msgspec.Struct, kw_only=True, frozen=True):
+    """Who and where: the middle of the front bumper."""
+
+    station_type: Byte = PASSENGER_CAR
+    reference_position: ReferencePosition
+
+
+class VehicleHighFrequency(msgspec.Struct, kw_only=True, frozen=True):
+    """How a car moves.
 
     Attributes:
-        generation_delta_time: Milliseconds modulo 65536.
-        latitude, longitude: 1e-7 degree of the enlarged city, at the middle of the front
-            bumper.
-        heading: 0.1 degree clockwise from north (map +y), 3601 unknown.
-        speed: 0.01 m/s, 16383 unknown.      yaw_rate: 0.01 degree/s, + = left.
-        vehicle_length, vehicle_width: 0.1 m.      longitudinal_acceleration: 0.1 m/s^2.
-        curvature: 1e-4 1/m, + = left, 1023 unknown.      drive_direction: 0 forward, 1 backward.
+        drive_direction: 0 forward, 1 backward, 2 unknown.
+        vehicle_width: 0.1 m, 62 unknown.
+        curvature_calculation_mode: 0 from the yaw rate, 1 not, 2 unknown.
     """
 
-    protocol_version: _Byte = 2
-    message_id: _Byte = CAM_ID
-    station_id: _Station
-    station_type: _Byte = 5
-    generation_delta_time: _Word
-    latitude: Annotated[int, Meta(ge=-900_000_000, le=900_000_001)]
-    longitude: Annotated[int, Meta(ge=-1_800_000_000, le=1_800_000_001)]
-    heading: Annotated[int, Meta(ge=0, le=3601)]
-    speed: Annotated[int, Meta(ge=0, le=16_383)]
+    heading: Heading
+    speed: Speed
     drive_direction: Annotated[int, Meta(ge=0, le=2)] = 0
-    vehicle_length: Annotated[int, Meta(ge=1, le=1023)]
+    vehicle_length: VehicleLength
     vehicle_width: Annotated[int, Meta(ge=1, le=62)]
-    longitudinal_acceleration: Annotated[int, Meta(ge=-160, le=161)] = 161
-    curvature: Annotated[int, Meta(ge=-1023, le=1023)] = 1023
-    yaw_rate: Annotated[int, Meta(ge=-32_766, le=32_767)] = 32767
+    longitudinal_acceleration: Acceleration = Acceleration()
+    curvature: Curvature = Curvature()
+    curvature_calculation_mode: Annotated[int, Meta(ge=0, le=2)] = 0
+    yaw_rate: YawRate = YawRate()
 
 
-class MovementState(msgspec.Struct, kw_only=True, frozen=True):
-    """One signal group of a SPATEM.
+class HighFrequencyContainer(msgspec.Struct, kw_only=True, frozen=True):
+    """The standard's choice between a vehicle's and a roadside unit's; the vehicle's."""
 
-    Attributes:
-        event_state: SAE J2735 MovementPhaseState by name, e.g. `protected-Movement-Allowed`.
-        min_end_time, max_end_time: 0.1 s within the hour; 36001 is unknown.
-    """
+    basic_vehicle_container_high_frequency: VehicleHighFrequency
 
-    signal_group: _Byte
-    event_state: str
+
+class ExteriorLights(msgspec.Struct, kw_only=True, frozen=True):
+    """Which lights are switched on, in the order of the standard's bits."""
+
+    low_beam_headlights_on: bool = False
+    high_beam_headlights_on: bool = False
+    left_turn_signal_on: bool = False
+    right_turn_signal_on: bool = False
+    daytime_running_lights_on: bool = False
+    reverse_light_on: bool = False
+    fog_light_on: bool = False
+    parking_lights_on: bool = False
+
+
+class VehicleLowFrequency(msgspec.Struct, kw_only=True, frozen=True):
+    """What changes slowly; path_history: newest point first, each from the one before it."""
+
+    vehicle_role: Annotated[int, Meta(ge=0, le=15)] = 0
+    exterior_lights: ExteriorLights = ExteriorLights()
+    path_history: Annotated[tuple[PathPoint, ...], Meta(max_length=MOST_PATH_POINTS)] = ()
+
+
+class LowFrequencyContainer(msgspec.Struct, kw_only=True, frozen=True):
+    """The standard's choice, of which there is one so far."""
+
+    basic_vehicle_container_low_frequency: VehicleLowFrequency
+
+
+class CamBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
+    """A CAM; generation_delta_time: milliseconds modulo 65536."""
+
+    protocol_version: Byte
+    station_id: StationId
+    generation_delta_time: Word
+    basic_container: BasicContainer
+    high_frequency_container: HighFrequencyContainer
+    low_frequency_container: LowFrequencyContainer | None = None
+
+    @property
+    def position(self) -> ReferencePosition:
+        """Where the middle of the front bumper is."""
+        return self.basic_container.reference_position
+
+    @property
+    def motion(self) -> VehicleHighFrequency:
+        """How the car moves."""
+        return self.high_frequency_container.basic_vehicle_container_high_frequency
+
+    @property
+    def slow(self) -> VehicleLowFrequency | None:
+        """Role, lights and path, where they are told."""
+        container = self.low_frequency_container
+        return None if container is None else container.basic_vehicle_container_low_frequency
+
+
+class Timing(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
+    """When a phase ends: 0.1 s within the hour, 36000 far, 36001 unknown."""
+
     min_end_time: _TimeMark
-    max_end_time: _TimeMark = TIME_MARK_UNKNOWN
+    max_end_time: _TimeMark | None = None
+    likely_time: _TimeMark | None = None
+    next_time: _TimeMark | None = None
 
 
-class SpatemBody(msgspec.Struct, kw_only=True, frozen=True):
-    """One intersection of a SPATEM.
+class MovementEvent(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
+    """What a group shows now, by its place in `PHASE_STATES`."""
+
+    event_state: Annotated[int, Meta(ge=0, le=9)]
+    timing: Timing | None = None
+
+
+class MovementState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
+    """One signal group of a SPATEM; the first of `state_time_speed` is now."""
+
+    signal_group: Byte
+    state_time_speed: Annotated[tuple[MovementEvent, ...], Meta(min_length=1, max_length=16)]
+
+    @property
+    def event_state(self) -> str:
+        """SAE J2735 MovementPhaseState by name, e.g. `protected-Movement-Allowed`."""
+        return PHASE_STATES[self.state_time_speed[0].event_state]
+
+    @property
+    def min_end_time(self) -> int:
+        """0.1 s within the hour; 36001 is unknown."""
+        timing = self.state_time_speed[0].timing
+        return TIME_MARK_UNKNOWN if timing is None else timing.min_end_time
+
+    @property
+    def max_end_time(self) -> int:
+        """0.1 s within the hour; 36001 is unknown."""
+        timing = self.state_time_speed[0].timing
+        told = None if timing is None else timing.max_end_time
+        return TIME_MARK_UNKNOWN if told is None else told
+
+
+class IntersectionState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
+    """One junction of a SPATEM.
 
     Attributes:
         revision: Must equal that of the map the receiver holds.
-        status: Names of the set bits: `fixedTimeOperation`, `failureFlash` ...
-        moy: Minute of the year.      time_stamp: Milliseconds within the minute.
+        status: 16 characters 0 or 1, one for each of `STATUS_BITS`.
+        moy: Minute of the year.      timestamp: Milliseconds within the minute.
     """
 
-    protocol_version: _Byte = 2
-    message_id: _Byte = SPATEM_ID
-    station_id: _Station
-    intersection: _Word
-    revision: Annotated[int, Meta(ge=0, le=127)]
-    status: tuple[str, ...] = ()
-    moy: Annotated[int, Meta(ge=0, le=527_040)]
-    time_stamp: _Word
-    states: tuple[MovementState, ...]
+    name: Name | None = None
+    id: IntersectionId
+    revision: Revision
+    status: Annotated[str, Meta(pattern="^[01]{16}$")]
+    moy: MinuteOfYear | None = None
+    timestamp: Word | None = None
+    states: Annotated[tuple[MovementState, ...], Meta(min_length=1, max_length=255)]
+
+
+class SpatemBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
+    """A SPATEM; a roadside unit of ours tells of one junction, and of others' we read the first."""
+
+    protocol_version: Byte
+    station_id: StationId
+    timestamp: MinuteOfYear | None = None
+    intersections: Annotated[tuple[IntersectionState, ...], Meta(min_length=1, max_length=32)]
+
+    @property
+    def intersection(self) -> int:
+        """The junction's number."""
+        return self.intersections[0].id.id
+
+    @property
+    def revision(self) -> int:
+        """Of the junction's map."""
+        return self.intersections[0].revision
+
+    @property
+    def status(self) -> tuple[str, ...]:
+        """Names of the set bits: `fixedTimeOperation`, `failureFlash` ..."""
+        bits = self.intersections[0].status
+        return tuple(
+            name
+            for name, bit in zip(STATUS_BITS, bits[: len(STATUS_BITS)], strict=True)
+            if bit == "1"
+        )
+
+    @property
+    def states(self) -> tuple[MovementState, ...]:
+        """The signal groups."""
+        return self.intersections[0].states

@@ -18,13 +18,33 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import wrap_angle
 from scm.maps.model import Junction
 from scm.v2x.etsi import (
+    PHASE_STATES,
     REFERENCE_LATITUDE_DEG,
     REFERENCE_LONGITUDE_DEG,
     SCALE,
+    STATUS_BITS,
     TIME_MARK_UNKNOWN,
+    Acceleration,
+    BasicContainer,
     CamBody,
+    Curvature,
+    HighFrequencyContainer,
+    IntersectionState,
+    LowFrequencyContainer,
+    MovementEvent,
     MovementState,
     SpatemBody,
+    Timing,
+    VehicleHighFrequency,
+    VehicleLength,
+    YawRate,
+)
+from scm.v2x.etsi_parts import (
+    PROTOCOL_VERSION,
+    Heading,
+    IntersectionId,
+    ReferencePosition,
+    Speed,
 )
 from scm.v2x.messages.spat import Colour, SignalGroup, Spat
 from scm.v2x.messages.vehicle_state import VehicleState
@@ -41,6 +61,7 @@ REVISIONS = 128
 _ITS_EPOCH_MS = 1_072_915_200_000
 _LEAP_MS = 5_000  # leap seconds from 2004 to now: the ITS time scale does not skip them
 _DELTA_TIMES = 65_536
+_ITS_TIMES = 2**42
 _MARK_NS = NS_PER_S // 10
 _MARKS_PER_HOUR = 36_000
 _HOUR_NS = 3_600 * NS_PER_S
@@ -51,7 +72,7 @@ _STANDSTILL_MPS = 0.02
 _A_M, _E2 = 6_378_137.0, 6.694_379_990_141e-3
 _PHI = math.radians(REFERENCE_LATITUDE_DEG)
 _W2 = 1.0 - _E2 * math.sin(_PHI) ** 2
-_NORTH_M = math.radians(1.0) * _A_M * (1.0 - _E2) / _W2**1.5
+_NORTH_M: float = math.radians(1.0) * _A_M * (1.0 - _E2) / _W2**1.5
 _EAST_M = math.radians(1.0) * _A_M * math.cos(_PHI) / math.sqrt(_W2)
 
 _STATE_OF: dict[Colour, str] = {
@@ -64,9 +85,13 @@ _STATE_OF: dict[Colour, str] = {
 _COLOUR_OF: dict[str, Colour] = {state: colour for colour, state in _STATE_OF.items()}
 _STATUS_OF = {
     "plan": ("fixedTimeOperation",),
+    "adaptive": ("trafficDependentOperation",),
+    "priority": ("signalPriorityIsActive",),
+    "preempt": ("preemptIsActive",),
     "start": ("standbyOperation",),
     "flash": ("failureFlash",),
 }
+_STATUS_LENGTH = 16
 
 
 class CamView(NamedTuple):
@@ -112,6 +137,11 @@ def its_ms(t_ns: int) -> int:
     return t_ns // NS_PER_MS - _ITS_EPOCH_MS + _LEAP_MS
 
 
+def its_time(t_ns: int) -> int:
+    """Return `its_ms` as it is written on the air; a clock before 2004 counts up to the wrap."""
+    return its_ms(t_ns) % _ITS_TIMES
+
+
 def delta_time(t_ns: int) -> int:
     """Return generationDeltaTime: `its_ms` mod 65536."""
     return its_ms(t_ns) % _DELTA_TIMES
@@ -124,7 +154,8 @@ def generated_ns(body: CamBody, near_ns: int) -> int:
     return (near_ns // NS_PER_MS + ahead) * NS_PER_MS
 
 
-def _heading(yaw: float) -> int:
+def heading_of(yaw: float) -> int:
+    """Return 0.1 degree clockwise from north of a yaw [rad], never 3600."""
     return round((90.0 - math.degrees(yaw)) * 10.0) % 3600
 
 
@@ -135,23 +166,66 @@ def _curvature(state: VehicleState) -> int:
     return _clamp(curvature * 1e4, -CURVATURE_MAX, CURVATURE_MAX)
 
 
-def cam_of(state: VehicleState, *, length_m: float, width_m: float, front_m: float) -> CamBody:
+def position_of(x_m: float, y_m: float) -> ReferencePosition:
+    """Return a place of the map as a place on the earth."""
+    return ReferencePosition(latitude=latitude_of(y_m), longitude=longitude_of(x_m))
+
+
+def latitude_of(y_m: float) -> int:
+    """Return the latitude of map y, 1e-7 degree of the enlarged city."""
+    return round((REFERENCE_LATITUDE_DEG + y_m * SCALE / _NORTH_M) * 1e7)
+
+
+def longitude_of(x_m: float) -> int:
+    """Return the longitude of map x, 1e-7 degree of the enlarged city."""
+    return round((REFERENCE_LONGITUDE_DEG + x_m * SCALE / _EAST_M) * 1e7)
+
+
+def place_of(latitude: int, longitude: int) -> tuple[float, float]:
+    """Return map x and y [m] of a place on the earth."""
+    return (
+        (longitude * 1e-7 - REFERENCE_LONGITUDE_DEG) * _EAST_M / SCALE,
+        (latitude * 1e-7 - REFERENCE_LATITUDE_DEG) * _NORTH_M / SCALE,
+    )
+
+
+def speed_of(speed_mps: float) -> Speed:
+    """Return the magnitude of a speed of the table."""
+    return Speed(value=_clamp(abs(speed_mps) * SCALE * 100.0, 0, SPEED_MAX))
+
+
+def cam_of(
+    state: VehicleState,
+    *,
+    length_m: float,
+    width_m: float,
+    front_m: float,
+    low_frequency: LowFrequencyContainer | None = None,
+) -> CamBody:
     """Return the CAM of a car; `front_m` reaches from its rear axle to its front bumper."""
     x_m = state.x_m + front_m * math.cos(state.yaw_rad)
     y_m = state.y_m + front_m * math.sin(state.yaw_rad)
+    accel = _clamp(state.accel_mps2 * SCALE * 10.0, -ACCEL_MAX, ACCEL_MAX)
+    yaw_rate = _clamp(math.degrees(state.yaw_rate_radps) * 100.0, -YAW_RATE_MAX, YAW_RATE_MAX)
+    motion = VehicleHighFrequency(
+        heading=Heading(value=heading_of(state.yaw_rad)),
+        speed=speed_of(state.speed_mps),
+        drive_direction=int(state.speed_mps < -_STANDSTILL_MPS),
+        vehicle_length=VehicleLength(value=_clamp(length_m * SCALE * 10.0, 1, LENGTH_MAX)),
+        vehicle_width=_clamp(width_m * SCALE * 10.0, 1, WIDTH_MAX),
+        longitudinal_acceleration=Acceleration(value=accel),
+        curvature=Curvature(value=_curvature(state)),
+        yaw_rate=YawRate(value=yaw_rate),
+    )
     return CamBody(
+        protocol_version=PROTOCOL_VERSION,
         station_id=station_id(state.vehicle),
         generation_delta_time=delta_time(state.t_ns),
-        latitude=round((REFERENCE_LATITUDE_DEG + y_m * SCALE / _NORTH_M) * 1e7),
-        longitude=round((REFERENCE_LONGITUDE_DEG + x_m * SCALE / _EAST_M) * 1e7),
-        heading=_heading(state.yaw_rad),
-        speed=_clamp(abs(state.speed_mps) * SCALE * 100.0, 0, SPEED_MAX),
-        drive_direction=int(state.speed_mps < -_STANDSTILL_MPS),
-        vehicle_length=_clamp(length_m * SCALE * 10.0, 1, LENGTH_MAX),
-        vehicle_width=_clamp(width_m * SCALE * 10.0, 1, WIDTH_MAX),
-        longitudinal_acceleration=_clamp(state.accel_mps2 * SCALE * 10.0, -ACCEL_MAX, ACCEL_MAX),
-        curvature=_curvature(state),
-        yaw_rate=_clamp(math.degrees(state.yaw_rate_radps) * 100.0, -YAW_RATE_MAX, YAW_RATE_MAX),
+        basic_container=BasicContainer(reference_position=position_of(x_m, y_m)),
+        high_frequency_container=HighFrequencyContainer(
+            basic_vehicle_container_high_frequency=motion
+        ),
+        low_frequency_container=low_frequency,
     )
 
 
@@ -161,17 +235,19 @@ def _if_known(value: int, unknown: int, unit: float) -> float | None:
 
 def read_cam(body: CamBody) -> CamView:
     """Return a CAM in metres of the table; resolution 0.8 mm, 0.1 degree, 0.7 mm/s."""
-    backward = -1.0 if body.drive_direction == 1 else 1.0
-    heading = _if_known(body.heading, HEADING_UNKNOWN, 0.1)
+    motion, position = body.motion, body.position
+    backward = -1.0 if motion.drive_direction == 1 else 1.0
+    heading = _if_known(motion.heading.value, HEADING_UNKNOWN, 0.1)
+    x_m, y_m = place_of(position.latitude, position.longitude)
     return CamView(
         station_id=body.station_id,
-        x_m=(body.longitude * 1e-7 - REFERENCE_LONGITUDE_DEG) * _EAST_M / SCALE,
-        y_m=(body.latitude * 1e-7 - REFERENCE_LATITUDE_DEG) * _NORTH_M / SCALE,
+        x_m=x_m,
+        y_m=y_m,
         yaw_rad=None if heading is None else wrap_angle(math.radians(90.0 - heading)),
-        speed_mps=_if_known(body.speed, SPEED_UNKNOWN, backward * 0.01 / SCALE),
-        yaw_rate_radps=_if_known(body.yaw_rate, YAW_RATE_UNKNOWN, math.radians(0.01)),
-        length_m=body.vehicle_length * 0.1 / SCALE,
-        width_m=body.vehicle_width * 0.1 / SCALE,
+        speed_mps=_if_known(motion.speed.value, SPEED_UNKNOWN, backward * 0.01 / SCALE),
+        yaw_rate_radps=_if_known(motion.yaw_rate.value, YAW_RATE_UNKNOWN, math.radians(0.01)),
+        length_m=motion.vehicle_length.value * 0.1 / SCALE,
+        width_m=motion.vehicle_width * 0.1 / SCALE,
     )
 
 
@@ -186,12 +262,19 @@ def _mark(end_ns: int | None, now_ns: int, *, up: bool) -> int:
 
 def _movement(group: SignalGroup, number: int, spat: Spat) -> MovementState:
     promised = spat.mode != "flash" and group.colour in ("red", "green", "yellow")
-    return MovementState(
-        signal_group=number,
-        event_state=_STATE_OF[group.colour],
+    timing = Timing(
         min_end_time=_mark(group.min_end_ns if promised else None, spat.t_ns, up=False),
         max_end_time=_mark(group.max_end_ns if promised else None, spat.t_ns, up=True),
     )
+    event = MovementEvent(event_state=PHASE_STATES.index(_STATE_OF[group.colour]), timing=timing)
+    return MovementState(signal_group=number, state_time_speed=(event,))
+
+
+def moment_of(t_ns: int) -> tuple[int, int]:
+    """Return SAE J2735's minute of the year and millisecond of the minute, of UTC."""
+    now = datetime.fromtimestamp(t_ns // NS_PER_S, UTC)
+    minute = (now.timetuple().tm_yday - 1) * 1440 + now.hour * 60 + now.minute
+    return minute, now.second * 1000 + t_ns % NS_PER_S // NS_PER_MS
 
 
 def spatem_of(spat: Spat, junction: Junction) -> SpatemBody:
@@ -201,22 +284,32 @@ def spatem_of(spat: Spat, junction: Junction) -> SpatemBody:
         KeyError: when the Spat names a group that the junction does not have.
     """
     numbers = {group.name: group.number for group in junction.groups}
-    now = datetime.fromtimestamp(spat.t_ns // NS_PER_S, UTC)
-    return SpatemBody(
-        station_id=station_id(roadside_station(spat.junction)),
-        intersection=junction.number,
+    minute, millisecond = moment_of(spat.t_ns)
+    state = IntersectionState(
+        name=spat.junction,
+        id=IntersectionId(id=junction.number),
         revision=spat.revision % REVISIONS,
-        status=_STATUS_OF.get(spat.mode, ()),
-        moy=(now.timetuple().tm_yday - 1) * 1440 + now.hour * 60 + now.minute,
-        time_stamp=now.second * 1000 + spat.t_ns % NS_PER_S // NS_PER_MS,
+        status=_bits(_STATUS_OF.get(spat.mode, ())),
+        moy=minute,
+        timestamp=millisecond,
         states=tuple(_movement(group, numbers[group.group], spat) for group in spat.groups),
+    )
+    return SpatemBody(
+        protocol_version=PROTOCOL_VERSION,
+        station_id=station_id(roadside_station(spat.junction)),
+        timestamp=minute,
+        intersections=(state,),
     )
 
 
-def _until_s(mark: int, body: SpatemBody) -> float | None:
-    if mark >= _MARKS_PER_HOUR:
+def _bits(names: tuple[str, ...]) -> str:
+    return "".join("1" if name in names else "0" for name in STATUS_BITS).ljust(_STATUS_LENGTH, "0")
+
+
+def _until_s(mark: int, state: IntersectionState) -> float | None:
+    if mark >= _MARKS_PER_HOUR or state.moy is None or state.timestamp is None:
         return None
-    now_ms = body.moy % 60 * 60_000 + body.time_stamp
+    now_ms = state.moy % 60 * 60_000 + state.timestamp
     ahead_ms = (mark * 100 - now_ms + _MARK_PAST_MS) % 3_600_000 - _MARK_PAST_MS
     return max(0.0, ahead_ms / 1000.0)
 
@@ -229,8 +322,8 @@ def colours_of(body: SpatemBody) -> dict[int, Told]:
     return {
         state.signal_group: Told(
             _COLOUR_OF.get(state.event_state, "dark"),
-            _until_s(state.min_end_time, body),
-            _until_s(state.max_end_time, body),
+            _until_s(state.min_end_time, body.intersections[0]),
+            _until_s(state.max_end_time, body.intersections[0]),
         )
         for state in body.states
     }

@@ -11,14 +11,12 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from scm.v2x.etsi_parts import Byte, ItsTime, ReferencePosition, StationId, Word
+
 MONOVIDEO = 3
 PASSENGER_CAR = 5
 MOST_OBJECTS = 255
-NO_ALTITUDE, NO_ALTITUDE_CONFIDENCE = 800_001, 15
-NO_ELLIPSE, NO_ANGLE = 4095, 3601
 
-_Byte = Annotated[int, Meta(ge=0, le=255)]
-_Word = Annotated[int, Meta(ge=0, le=65_535)]
 _Span = Annotated[int, Meta(ge=-2048, le=2047)]
 
 
@@ -86,7 +84,7 @@ class Angles(msgspec.Struct, kw_only=True, frozen=True):
 class ObjectClass(msgspec.Struct, kw_only=True, frozen=True):
     """Kind of road vehicle: 5 a passenger car."""
 
-    vehicle: _Byte = PASSENGER_CAR
+    vehicle: Byte = PASSENGER_CAR
 
 
 class Classification(msgspec.Struct, kw_only=True, frozen=True):
@@ -107,60 +105,36 @@ class PerceivedObject(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=T
 
     measurement_delta_time: _Span
     position: Position
-    object_id: _Word
+    object_id: Word
     velocity: Velocity
     angles: Angles
     z_angular_velocity: AngularVelocity
     object_dimension_x: Dimension | None = None
     object_dimension_y: Dimension | None = None
-    sensor_id_list: tuple[_Byte, ...] | None = None
+    sensor_id_list: tuple[Byte, ...] | None = None
     classification: tuple[Classification, ...] = ()
-
-
-class Ellipse(msgspec.Struct, kw_only=True, frozen=True):
-    """Of the reference position: 0.01 m, 4095 unknown; 0.1 degree, 3601 unknown."""
-
-    semi_major: Annotated[int, Meta(ge=0, le=4095)] = NO_ELLIPSE
-    semi_minor: Annotated[int, Meta(ge=0, le=4095)] = NO_ELLIPSE
-    semi_major_orientation: Annotated[int, Meta(ge=0, le=3601)] = NO_ANGLE
-
-
-class Altitude(msgspec.Struct, kw_only=True, frozen=True):
-    """0.01 m, 800001 unknown."""
-
-    value: Annotated[int, Meta(ge=-100_000, le=800_001)] = NO_ALTITUDE
-    confidence: Annotated[int, Meta(ge=0, le=15)] = NO_ALTITUDE_CONFIDENCE
-
-
-class ReferencePosition(msgspec.Struct, kw_only=True, frozen=True):
-    """The map's origin: 1e-7 degree of the enlarged city."""
-
-    latitude: Annotated[int, Meta(ge=-900_000_000, le=900_000_001)]
-    longitude: Annotated[int, Meta(ge=-1_800_000_000, le=1_800_000_001)]
-    position_confidence_ellipse: Ellipse
-    altitude: Altitude
 
 
 class ManagementContainer(msgspec.Struct, kw_only=True, frozen=True):
     """When and where: reference_time counts ITS milliseconds since 2004."""
 
-    reference_time: Annotated[int, Meta(ge=0, le=4_398_046_511_103)]
+    reference_time: ItsTime
     reference_position: ReferencePosition
 
 
 class SensorInformation(msgspec.Struct, kw_only=True, frozen=True):
     """One camera; sensor_type 3 is a single video camera."""
 
-    sensor_id: _Byte
+    sensor_id: Byte
     sensor_type: Annotated[int, Meta(ge=0, le=31)] = MONOVIDEO
     shadowing_applies: bool = True
 
 
-class CpmBody(msgspec.Struct, kw_only=True, frozen=True):
+class CpmBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """What a roadside unit perceives; containers without anything in them are left out."""
 
-    protocol_version: _Byte = 2
-    station_id: Annotated[int, Meta(ge=0, le=2**32 - 1)]
+    protocol_version: Byte
+    station_id: StationId
     management_container: ManagementContainer
     sensor_information_container: tuple[SensorInformation, ...] | None = None
     perceived_object_container: tuple[PerceivedObject, ...] = ()

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import msgspec
+
+from scm.store.repository import Table
 from scm.v2x.message import Message, Request
 
 
@@ -53,4 +56,21 @@ class Answer:
     reply: Message
 
 
-Outgoing = Message | Call | Answer
+@dataclass(frozen=True, slots=True)
+class Keep:
+    """State that must outlive the process: stored before any answer of the same step leaves.
+
+    A runner without a store passes over it.
+
+    Attributes:
+        table: Where.
+        key: Under what name, beside what is there of other parts.
+        value: The record; None: forget it.
+    """
+
+    table: Table
+    key: str
+    value: msgspec.Struct | None
+
+
+Outgoing = Message | Call | Answer | Keep

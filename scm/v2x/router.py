@@ -5,13 +5,15 @@ it delays everybody.
 """
 
 import socket
+from collections.abc import Mapping
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import zenoh
 
-from scm.errors import RunError
+from scm.errors import AccessError, RunError
 from scm.v2x import zenoh_config
+from scm.v2x.access import is_local
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -19,12 +21,29 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 class Router:
     """A router that listens from `with` on until its end.
 
+    Args:
+        listen: The endpoint.
+        access: Who may enter and do what, from `access.router_settings`; None: everybody on this
+            machine.
+
     Attributes:
         listen: The endpoint, also the one that stations connect to.
+
+    Raises:
+        AccessError: when other computers could reach it, and everybody might enter.
     """
 
-    def __init__(self, listen: str = DEFAULT_ENDPOINT) -> None:
+    def __init__(
+        self, listen: str = DEFAULT_ENDPOINT, access: Mapping[str, Any] | None = None
+    ) -> None:
+        if access is None and not is_local(listen):
+            msg = (
+                f"router: got {listen!r} without a fleet file, which would let everybody on the "
+                "network drive the city; expected tcp/127.0.0.1:PORT, or a fleet file"
+            )
+            raise AccessError(msg)
         self.listen = listen
+        self._access = access
         self._session: zenoh.Session | None = None
 
     def __enter__(self) -> Self:
@@ -34,7 +53,7 @@ class Router:
             RunError: when the endpoint cannot be listened at.
         """
         try:
-            config = zenoh.Config.from_json5(zenoh_config.router(self.listen))
+            config = zenoh.Config.from_json5(zenoh_config.router(self.listen, self._access))
             self._session = zenoh.open(config)
         except zenoh.ZError as cause:
             why = zenoh_config.reason(cause)

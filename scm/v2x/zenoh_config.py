@@ -5,6 +5,8 @@ is off (its start races under load), and a silent neighbour is given up after on
 """
 
 import json
+from collections.abc import Mapping
+from typing import Any
 
 LEASE_MS = 1000
 RETRY_FIRST_MS = 100
@@ -15,32 +17,56 @@ RETRY_MOST_MS = 500
 BURST = {"real_time": 16, "data_high": 16, "data": 16}
 
 
-def client(endpoint: str, connect_timeout_s: float) -> str:
-    """Return the configuration of a station that reaches its city through one endpoint."""
+def client(
+    endpoint: str, connect_timeout_s: float, transport: Mapping[str, Any] | None = None
+) -> str:
+    """Return the configuration of a station that reaches its city through one endpoint.
+
+    `transport` says who it is, as `Credentials.client_settings` does.
+    """
     return json.dumps(
-        _both()
-        | {
-            "mode": "client",
-            "connect": {
-                "endpoints": [endpoint],
-                "timeout_ms": round(connect_timeout_s * 1000),
-                "exit_on_failure": True,
-                "retry": {
-                    "period_init_ms": RETRY_FIRST_MS,
-                    "period_max_ms": RETRY_MOST_MS,
-                    "period_increase_factor": 2,
+        _with(
+            _both(),
+            {
+                "mode": "client",
+                "connect": {
+                    "endpoints": [endpoint],
+                    "timeout_ms": round(connect_timeout_s * 1000),
+                    "exit_on_failure": True,
+                    "retry": {
+                        "period_init_ms": RETRY_FIRST_MS,
+                        "period_max_ms": RETRY_MOST_MS,
+                        "period_increase_factor": 2,
+                    },
                 },
+                "transport": dict(transport or {}),
             },
-        }
+        )
     )
 
 
-def router(listen: str) -> str:
-    """Return the configuration of the router of a city that listens at one endpoint."""
-    return json.dumps(_both() | {"mode": "router", "listen": {"endpoints": [listen]}})
+def router(listen: str, access: Mapping[str, Any] | None = None) -> str:
+    """Return the configuration of the router of a city that listens at one endpoint.
+
+    `access` says who may enter and do what, as `access.router_settings` does; None: everybody.
+    """
+    own = {"mode": "router", "listen": {"endpoints": [listen]}}
+    return json.dumps(_with(_with(_both(), own), access or {}))
 
 
-def _both() -> dict[str, object]:
+def _with(settings: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings with others laid over them, level by level."""
+    laid = dict(settings)
+    for name, value in more.items():
+        below = laid.get(name)
+        if isinstance(below, Mapping) and isinstance(value, Mapping):
+            laid[name] = _with(below, value)
+        else:
+            laid[name] = value
+    return laid
+
+
+def _both() -> dict[str, Any]:
     off = {"enabled": False}
     return {
         "scouting": {"delay": 0, "multicast": off, "gossip": off},

@@ -1,58 +1,142 @@
 """What is sent over the radio comes out where it is heard.
 
 With the drivers of hosted cars, who keep it themselves; on the bus for everybody else who listens.
+A body is a sealed letter here, but for the CAMs and SPATEMs that drivers read.
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
+from dataclasses import fields
 
 import numpy as np
 
-from scm.arrays import Floats, Ints
+from scm.arrays import Bools, Floats, Ints
+from scm.clock import NS_PER_MS
 from scm.v2x.etsi import CamBody
 from scm.v2x.etsi_convert import cam_of, read_cam
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cpm_rx import CpmRx
+from scm.v2x.messages.cpm_tx import CpmTx
+from scm.v2x.messages.denm_rx import DenmRx
+from scm.v2x.messages.denm_tx import DenmTx
+from scm.v2x.messages.mapem_rx import MapemRx
+from scm.v2x.messages.mapem_tx import MapemTx
+from scm.v2x.messages.radio_status import RadioStatus
 from scm.v2x.messages.spatem_rx import SpatemRx
 from scm.v2x.messages.spatem_tx import SpatemTx
+from scm.v2x.messages.srem_rx import SremRx
+from scm.v2x.messages.srem_tx import SremTx
+from scm.v2x.messages.ssem_rx import SsemRx
+from scm.v2x.messages.ssem_tx import SsemTx
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.publish import states_of
+from scm.world.radio import Receivers
 from scm.world.world import World
 
-Frame = CamTx | SpatemTx
+Frame = CamTx | CpmTx | DenmTx | MapemTx | SpatemTx | SremTx | SsemTx
+Heard = CamRx | CpmRx | DenmRx | MapemRx | SpatemRx | SremRx | SsemRx
+
+RECEIVED: dict[type[Frame], type[Heard]] = {
+    CamTx: CamRx,
+    CpmTx: CpmRx,
+    DenmTx: DenmRx,
+    MapemTx: MapemRx,
+    SpatemTx: SpatemRx,
+    SremTx: SremRx,
+    SsemTx: SsemRx,
+}
+"""All that the air carries: as sent, and as heard."""
+OF_ROADSIDE = (MapemTx, SpatemTx, SsemTx)
+"""What nobody else may say."""
 
 
 def call_out(world: World, now_ns: int) -> None:
-    """Send the CAMs that hosted cars owe the air, and let the radio carry them."""
-    slots = world.slots
-    due = world.cams.due(slots, now_ns)
-    if not len(due):
+    """Send what hosted cars owe the air, and let the radio carry it; what is late arrives."""
+    world.outbox += world.late.arrived(now_ns)
+    if world.busy.is_due(now_ns):
+        _measure(world, now_ns)
+    if world.every["radio"].is_due(now_ns):
+        world.outbox.append(status(world, now_ns))
+    due = world.cams.due(world.slots, now_ns, world.busy.control)
+    if len(due):
+        _call_cams(world, due, now_ns)
+
+
+def transmit(world: World, frame: Frame, now_ns: int) -> None:
+    """Bring a frame to every station that hears it; one of nobody's is counted and dropped."""
+    if isinstance(frame, OF_ROADSIDE) and frame.station not in world.roadside:
+        world.ignored += 1
         return
+    receivers = world.receivers()
+    place = world.antenna(frame.station)
+    if place is None:
+        world.radio.counts.sent += 1
+        world.radio.counts.unknown += 1
+        return
+    x, y = np.array([place[0]]), np.array([place[1]])
+    world.busy.note(kind_of(frame), x, y)
+    _tell_drivers(world, frame, now_ns)
+    heard = world.radio.reach([frame.station], x, y, receivers, _load(world, receivers))
+    listen = np.array(world.wishes.of(RECEIVED[type(frame)], "receiver", receivers.names), np.bool_)
+    _deliver(world, [frame], heard & listen, receivers, now_ns)
+
+
+def kind_of(frame: Frame) -> str:
+    """Return a frame's message type, as in `scm.v2x.congestion.BYTES`."""
+    return frame.KEY.rpartition("/")[2]
+
+
+def status(world: World, now_ns: int) -> RadioStatus:
+    """Return what became of the frames since the last time, and how busy the channel is."""
+    counts, before = world.radio.counts, world.radio_before
+    new = {f.name: getattr(counts, f.name) - getattr(before, f.name) for f in fields(counts)}
+    for name, value in new.items():
+        setattr(before, name, getattr(before, name) + value)
+    late_ns, _ = new.pop("late_ns"), new.pop("lost")
+    busy = world.busy
+    others = {name: busy.ratio_of(name) for name in world.receivers().names}
+    all_of_them = np.array([*busy.ratio[world.slots.hosted], *others.values(), 0.0])
+    stations = max(1, len(all_of_them) - 1)
+    return RadioStatus(
+        t_ns=now_ns,
+        waiting=len(world.late),
+        late_ms=late_ns / NS_PER_MS / max(1, new["late"]),
+        busy_mean=float(all_of_them.sum()) / stations,
+        busy_most=float(all_of_them.max()),
+        stations=tuple(others),
+        busy=tuple(others.values()),
+        **new,
+    )
+
+
+def _measure(world: World, now_ns: int) -> None:
+    slots = world.slots
+    world.busy.measure(now_ns, slots.x, slots.y, slots.hosted, world.receivers().places)
+
+
+def _load(world: World, receivers: Receivers) -> Floats | None:
+    return world.busy.loss_of(receivers.names) if world.busy.is_measured else None
+
+
+def _call_cams(world: World, due: Ints, now_ns: int) -> None:
+    slots = world.slots
     front = world.front[due]
     x, y, yaw = slots.x[due], slots.y[due], slots.yaw[due]
     bumper_x, bumper_y = x + front * np.cos(yaw), y + front * np.sin(yaw)
+    world.busy.note("cam", x, y)
     world.crowd.hear(due, now_ns, bumper_x, bumper_y, yaw, slots.speed[due], slots.yaw_rate[due])
     _tell_others(world, due, x, y, now_ns)
 
 
-def transmit(world: World, frame: Frame, now_ns: int) -> None:
-    """Bring the frame of somebody who is not hosted to every station that hears it."""
-    receivers = world.receivers()
-    number = receivers.number(frame.station)
-    if number is None:
-        world.radio.counts.sent += 1
-        world.radio.counts.unknown += 1
-        return
-    x, y = receivers.x[number : number + 1], receivers.y[number : number + 1]
+def _tell_drivers(world: World, frame: Frame, now_ns: int) -> None:
+    """Let the drivers of hosted cars keep what they read."""
     if isinstance(frame, SpatemTx):
         world.crowd.hear_spatem(frame.body, now_ns)
-    elif (car := world.remote.get(frame.station)) is not None:
-        _tell_drivers(world, car.slot, frame.body, now_ns)
-    heard = world.radio.reach([frame.station], x, y, receivers)[0]
-    names = [receivers.names[i] for i in np.flatnonzero(heard).tolist()]
-    world.outbox += _received(world, frame, names)
+    elif isinstance(frame, CamTx) and (car := world.remote.get(frame.station)) is not None:
+        _tell_of_car(world, car.slot, frame.body, now_ns)
 
 
-def _tell_drivers(world: World, slot: int, body: CamBody, now_ns: int) -> None:
+def _tell_of_car(world: World, slot: int, body: CamBody, now_ns: int) -> None:
     told = read_cam(body)
     world.crowd.show(slot, told.length_m, told.width_m)
     numbers = (told.x_m, told.y_m, told.yaw_rad, told.speed_mps, told.yaw_rate_radps)
@@ -68,32 +152,49 @@ def _tell_others(world: World, due: Ints, x: Floats, y: Floats, now_ns: int) -> 
         world.radio.counts.sent += len(due)
         return
     names = [world.slots.names[slot] for slot in due.tolist()]
-    reached = world.radio.reach(names, x, y, receivers) & listen
+    reached = world.radio.reach(names, x, y, receivers, _load(world, receivers)) & listen
     is_heard = reached.any(axis=1) | on_bus
-    rows = np.flatnonzero(is_heard).tolist()
-    for row, state in zip(rows, states_of(world, due[is_heard], now_ns), strict=True):
-        frame = _cam(world, state, now_ns)
-        world.outbox.append(frame)
+    frames: list[Frame] = [_cam(world, s, now_ns) for s in states_of(world, due[is_heard], now_ns)]
+    _deliver(world, frames, reached[is_heard], receivers, now_ns, also_sent=True)
+
+
+def _deliver(
+    world: World,
+    frames: Sequence[Frame],
+    reached: Bools,
+    receivers: Receivers,
+    now_ns: int,
+    *,
+    also_sent: bool = False,
+) -> None:
+    """Put frames (k,) that reach receivers (k, n) into the outbox, at once or when they arrive."""
+    delays = iter(world.radio.delays(int(reached.sum())).tolist())
+    for row, frame in enumerate(frames):
+        if also_sent:
+            world.outbox.append(frame)
         for i in np.flatnonzero(reached[row]).tolist():
-            world.outbox.append(_received_cam(receivers.names[i], frame))
+            heard = _received(receivers.names[i], frame)
+            delay_ns = next(delays)
+            if delay_ns:
+                world.late.put(now_ns + delay_ns, heard)
+            else:
+                world.outbox.append(heard)
 
 
 def _cam(world: World, state: VehicleState, now_ns: int) -> CamTx:
-    car = world.hosted[state.vehicle].car
-    rear, front = car.vector("body.footprint_x_m")
-    right, left = car.vector("body.footprint_y_m")
-    body = cam_of(state, length_m=front - rear, width_m=left - right, front_m=front)
+    hosted = world.hosted[state.vehicle]
+    rear, front = hosted.car.vector("body.footprint_x_m")
+    right, left = hosted.car.vector("body.footprint_y_m")
+    body = cam_of(
+        state,
+        length_m=front - rear,
+        width_m=left - right,
+        front_m=front,
+        low_frequency=hosted.slow_news.due(state, front),
+    )
     return CamTx(station=state.vehicle, t_ns=now_ns, body=body)
 
 
-def _received(world: World, frame: Frame, names: list[str]) -> Iterable[CamRx | SpatemRx]:
-    kind = CamRx if isinstance(frame, CamTx) else SpatemRx
-    for name, listens in zip(names, world.wishes.of(kind, "receiver", names), strict=True):
-        if listens and isinstance(frame, CamTx):
-            yield _received_cam(name, frame)
-        elif listens and isinstance(frame, SpatemTx):
-            yield SpatemRx(receiver=name, station=frame.station, t_ns=frame.t_ns, body=frame.body)
-
-
-def _received_cam(receiver: str, frame: CamTx) -> CamRx:
-    return CamRx(receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body)
+def _received(receiver: str, frame: Frame) -> Heard:
+    kind = RECEIVED[type(frame)]
+    return kind(receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body)  # type: ignore[arg-type]

@@ -4,6 +4,7 @@ import numpy as np
 
 from scm.arrays import Bools, Ints
 from scm.v2x.cam_trigger import HEADING_RAD, N_GEN_CAM, POSITION_M, SPEED_MPS, T_MAX_NS, T_MIN_NS
+from scm.v2x.congestion import ReactiveControl
 from scm.world.slots import Slots
 
 FEW, TICKS_BETWEEN = 100, 5
@@ -27,9 +28,13 @@ class CamTriggers:
         """Let the next car in a slot begin anew."""
         self._sent_ns[slot], self._interval_ns[slot], self._quiet[slot] = _NEVER_NS, T_MAX_NS, 0
 
-    def due(self, slots: Slots, now_ns: int) -> Ints:
-        """Return the slots, ascending, whose CAM must go now; they count as sent."""
-        asked = np.flatnonzero(slots.hosted & (now_ns - self._sent_ns >= T_MIN_NS))
+    def due(self, slots: Slots, now_ns: int, control: ReactiveControl | None = None) -> Ints:
+        """Return the slots, ascending, whose CAM must go now; they count as sent.
+
+        `control` may allow each car less than a CAM every 100 ms.
+        """
+        gap_ns = T_MIN_NS if control is None else np.maximum(T_MIN_NS, control.gap_ns)
+        asked = np.flatnonzero(slots.hosted & (now_ns - self._sent_ns >= gap_ns))
         moved = self._moved(slots, asked)
         owed = moved | (now_ns - self._sent_ns[asked] >= self._interval_ns[asked])
         due, moved = asked[owed], moved[owed]

@@ -44,6 +44,7 @@ def take_over(world: World, car: HostedCar, lease: rules.Lease, now_ns: int) -> 
         car.guard = car.guard or Guard(car.lease.epoch)
         car.guard.set_epoch(lease.epoch, now_ns)
     car.lease = lease
+    world.keep(car)
     world.errands.end(car.slot)
     world.slots.driven[car.slot] = False
     world.slots.hazard[car.slot] = False

@@ -13,9 +13,8 @@ from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.presence import Presence
-from scm.v2x.messages.spatem_tx import SpatemTx
 from scm.v2x.messages.vehicle_state import VehicleState
-from scm.world.air import transmit
+from scm.world.air import RECEIVED, Frame, transmit
 from scm.world.remote import is_plausible
 from scm.world.requests import reply_to
 from scm.world.watch import lose
@@ -55,7 +54,7 @@ def _command(world: World, command: DriveCommand, now_ns: int) -> None:
         car.switches = car.switches.told(command.headlights, command.indicators)
 
 
-def _frame(world: World, frame: CamTx | SpatemTx, now_ns: int) -> None:
+def _frame(world: World, frame: Frame, now_ns: int) -> None:
     if frame.station not in world.hosted:  # the bus brings our own cars' frames back
         transmit(world, frame, now_ns)
 
@@ -78,8 +77,7 @@ def _presence(world: World, presence: Presence, now_ns: int) -> None:
 _HANDLERS: dict[type[Message], Callable[[World, Any, int], None]] = {
     VehicleState: _state,
     DriveCommand: _command,
-    CamTx: _frame,
-    SpatemTx: _frame,
+    **dict.fromkeys(RECEIVED, _frame),
     MonitorStatus: _verdict,
     Presence: _presence,
 }

@@ -3,9 +3,10 @@
 Its dynamics live in the `Garage`, what it does now in the `Slots`, its driver in the crowd.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from scm.geometry import Pose2
+from scm.v2x.etsi_path import SlowNews
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.guard import Guard
@@ -23,6 +24,7 @@ class HostedCar:
         row: Its place in its fleet.
         guard: Of its commands, while somebody else holds its lease.
         switches: How its headlights and indicators are switched.
+        slow_news: What its CAMs tell now and then.
     """
 
     name: str
@@ -36,6 +38,7 @@ class HostedCar:
     lease: Lease
     guard: Guard | None = None
     switches: Switches = OFF
+    slow_news: SlowNews = field(default_factory=SlowNews)
 
     kind = "hosted"
 

@@ -13,6 +13,8 @@ from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.world.driving import send
 from scm.world.hearing import hears_of
+from scm.world.hosted import HostedCar
+from scm.world.kept import Kept, bring_back
 from scm.world.requests import SERVES, reply_to
 from scm.world.step import tick
 from scm.world.world import DEFAULT_CAR, NAME, PERIOD_NS, World
@@ -27,8 +29,9 @@ class WorldPart:
         city_map: The city.
         seed: Of all noise and of lost radio frames.
         hosted: (name, car file) of cars to spawn at the start; they circulate.
-        stopped_by: Who engaged the city stop in a run before this one; None: nobody.
         room: How many more cars may come.
+        kept: What a run before this one left behind: its cars are there instead of `hosted`, of
+            which those circulate again that are still there.
     """
 
     name = NAME
@@ -41,14 +44,16 @@ class WorldPart:
         city_map: CityMap,
         seed: int = 0,
         hosted: tuple[tuple[str, str], ...] = (),
-        stopped_by: str | None = None,
         room: int = ROOM,
+        kept: Kept | None = None,
     ) -> None:
-        cars = {DEFAULT_CAR, *(car for _, car in hosted)}
-        self.world = World(city_map, seed, capacity=len(hosted) + room, prepare=sorted(cars))
+        self._kept = kept or Kept()
+        kept_cars = {car.car_file for car in self._kept.cars.values()}
+        cars = {DEFAULT_CAR, *(car for _, car in hosted), *kept_cars}
+        capacity = max(len(hosted), len(self._kept.cars)) + room
+        self.world = World(city_map, seed, capacity=capacity, prepare=sorted(cars))
         self.hears: Sequence[Hears] = hears_of(())
         self._to_spawn = hosted
-        self._stopped_by = stopped_by
         self._is_open = False
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -73,22 +78,33 @@ class WorldPart:
 
     def _open(self, now_ns: int) -> list[Outgoing]:
         world = self.world
-        if self._stopped_by is not None:
+        stop = self._kept.stop
+        if stop is not None and stop.engaged:
             reason = "still engaged when the world was started again"
-            stop = StopRequest(engaged=True, by=self._stopped_by, reason=reason)
-            reply_to(world, stop, now_ns)
-        places = iter(world.city_map.spawns)
+            reply_to(world, StopRequest(engaged=True, by=stop.by, reason=reason), now_ns)
+        bring_back(world, self._kept, now_ns)
+        if self._kept.is_first:
+            self._spawn_all(now_ns)
+        for name, _ in self._to_spawn:
+            car = world.hosted.get(name)
+            if car is not None and car.lease.is_at_home:
+                self._circulate(car, now_ns)
+        definition = WorldDefinition(t_ns=now_ns, seed=world.seed, map=world.city_map)
+        return [definition, *world.outbox]
+
+    def _spawn_all(self, now_ns: int) -> None:
+        places = iter(self.world.city_map.spawns)
         for name, car_file in self._to_spawn:
             answer = self._spawn(name, car_file, places, now_ns)
             if isinstance(answer, Refused):
                 msg = f"{name}: {answer.detail}"
                 raise RunError(msg)
-            try:
-                send(world, world.hosted[name], RouteRequest(vehicle=name), now_ns)
-            except ScmError as cause:
-                world.say("info", "no_circulation", f"{cause}; it stands", now_ns, name)
-        definition = WorldDefinition(t_ns=now_ns, seed=world.seed, map=world.city_map)
-        return [definition, *world.outbox]
+
+    def _circulate(self, car: HostedCar, now_ns: int) -> None:
+        try:
+            send(self.world, car, RouteRequest(vehicle=car.name), now_ns)
+        except ScmError as cause:
+            self.world.say("info", "no_circulation", f"{cause}; it stands", now_ns, car.name)
 
     def _spawn(self, name: str, car_file: str, places: Iterator[Spawn], now_ns: int) -> Message:
         """Put a car of the start onto the next place; trying the first ones again would be slow."""

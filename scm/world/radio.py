@@ -1,8 +1,8 @@
 """The radio: who hears what is sent, by distance and luck.
 
-A frame sent by one station reaches every other station within the map's range, unless the seeded
-loss takes it. Stations are cars, and the roadside units at their junctions. What hosted cars hear
-their drivers keep, all for themselves (`vehicles/drivers/crowd.py`); here are all other receivers.
+A frame sent by one station reaches other stations as `vehicles/drivers/channel.py` says. Stations
+are cars, and the roadside units at their junctions. What hosted cars hear their drivers keep, all
+for themselves (`vehicles/drivers/crowd.py`); here are all other receivers.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,9 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scm.arrays import Bools, Floats
+from scm.arrays import Bools, Floats, Ints
 from scm.maps.model import CityMap, Point
+from scm.maps.roadside import roadside_place
 from scm.v2x.etsi_convert import roadside_station
+from scm.vehicles.drivers.channel import (
+    DELAY_NS,
+    FADING,
+    JITTER_NS,
+    LOSS,
+    RANGE,
+    Channel,
+    link_losses,
+)
 
 
 @dataclass(slots=True)
@@ -20,6 +30,10 @@ class RadioCounts:
     """What became of frames: one frame to three stations counts three times but for `sent`.
 
     Attributes:
+        out_of_range: Beyond a sharp edge.
+        lost: All that got lost within it: `by_chance`, `by_distance` (fading and walls) and
+            `by_load` (collisions, and what a full channel never sends).
+        late: How many of the delivered came later than at once; `late_ns` all they were late.
         unknown: Frames of senders whose place nobody knows.
     """
 
@@ -27,6 +41,11 @@ class RadioCounts:
     delivered: int = 0
     out_of_range: int = 0
     lost: int = 0
+    by_chance: int = 0
+    by_distance: int = 0
+    by_load: int = 0
+    late: int = 0
+    late_ns: int = 0
     unknown: int = 0
 
 
@@ -39,9 +58,10 @@ class Receivers:
     """
 
     def __init__(self, places: Mapping[str, Point]) -> None:
+        self.places = dict(places)
         self.names: Sequence[str] = sorted(places)
         at = np.array([places[name] for name in self.names]).reshape(-1, 2)
-        self.x, self.y = at.T
+        self.x, self.y = np.ascontiguousarray(at.T)
         self._number = {name: number for number, name in enumerate(self.names)}
 
     def number(self, name: str) -> int | None:
@@ -50,33 +70,77 @@ class Receivers:
 
 
 class Radio:
-    """A channel of one range and one loss probability."""
+    """The channel to all stations but hosted cars."""
 
-    def __init__(self, range_m: float, rng: np.random.Generator, loss: float = 0.0) -> None:
-        self._range_m = range_m
+    def __init__(self, channel: Channel, rng: np.random.Generator) -> None:
+        self._channel = channel
         self._rng = rng
-        self._loss = loss
         self.counts = RadioCounts()
 
-    def reach(self, senders: Sequence[str], x: Floats, y: Floats, receivers: Receivers) -> Bools:
+    def reach(
+        self,
+        senders: Sequence[str],
+        x: Floats,
+        y: Floats,
+        receivers: Receivers,
+        load: Floats | None = None,
+    ) -> Bools:
         """Return who hears the frames of senders at x (k,), y (k,): (k, number of receivers).
 
-        Nobody hears itself.
+        Nobody hears itself. `load` (n,) is what share of frames a full channel costs each.
         """
-        near: Bools = np.hypot(receivers.x - x[:, None], receivers.y - y[:, None]) <= self._range_m
+        numbers = self._channel.numbers
+        sharp = numbers[FADING] <= 0.0
+        near: Bools = np.hypot(receivers.x - x[:, None], receivers.y - y[:, None]) <= numbers[RANGE]
+        if not sharp:
+            near = np.ones_like(near)
         own = np.zeros_like(near)
         for row, sender in enumerate(senders):
             column = receivers.number(sender)
             if column is not None:
                 own[row, column] = True
         near &= ~own
-        heard = near & (self._rng.random(near.shape) >= self._loss) if self._loss else near
+        heard = near & ~self._lost(near, x, y, receivers, load)
         counts = self.counts
         counts.sent += len(senders)
         counts.delivered += int(heard.sum())
         counts.lost += int((near & ~heard).sum())
         counts.out_of_range += int((~near & ~own).sum())
         return heard
+
+    def delays(self, count: int) -> Ints:
+        """Return how late frames that are heard arrive [ns], (count,)."""
+        numbers = self._channel.numbers
+        late = np.full(count, numbers[DELAY_NS])
+        if numbers[JITTER_NS]:
+            late += numbers[JITTER_NS] * self._rng.random(count)
+        if late.any():
+            self.counts.late += count
+            self.counts.late_ns += int(late.sum())
+        return late.astype(np.int64)
+
+    def _lost(
+        self, near: Bools, x: Floats, y: Floats, receivers: Receivers, load: Floats | None
+    ) -> Bools:
+        """Return what gets lost of the frames to who is near, and count why."""
+        numbers, walls = self._channel.numbers, self._channel.walls
+        link = np.zeros(near.shape)
+        if numbers[FADING] or len(walls):
+            places = (np.ascontiguousarray(x), np.ascontiguousarray(y))
+            link_losses(numbers, walls, *places, receivers.x, receivers.y, link)
+        busy = np.zeros(near.shape[1]) if load is None else load
+        if not (numbers[LOSS] or link.any() or busy.any()):
+            return np.zeros_like(near)
+        luck = self._rng.random(near.shape)
+        by_chance = np.full(near.shape, numbers[LOSS])
+        by_distance = by_chance + (1.0 - by_chance) * link
+        by_load = by_distance + (1.0 - by_distance) * busy
+        counts = self.counts
+        counts.by_chance += int((near & (luck < by_chance)).sum())
+        counts.by_distance += int((near & (luck >= by_chance) & (luck < by_distance)).sum())
+        counts.by_load += int((near & (luck >= by_distance) & (luck < by_load)).sum())
+        lost: Bools = luck < by_load
+        return lost
 
 
 def roadside_places(city_map: CityMap) -> dict[str, Point]:
@@ -85,15 +149,6 @@ def roadside_places(city_map: CityMap) -> dict[str, Point]:
     A junction without lights gets the middle of the floor.
     """
     return {
-        roadside_station(junction.name): _middle(city_map, junction.name)
+        roadside_station(junction.name): roadside_place(city_map, junction.name)
         for junction in city_map.junctions
     }
-
-
-def _middle(city_map: CityMap, junction: str) -> Point:
-    lights = [light for light in city_map.lights if light.junction == junction]
-    if not lights:
-        floor = city_map.floor
-        return 0.5 * sum(floor.x_m), 0.5 * sum(floor.y_m)
-    n = len(lights)
-    return sum(light.x_m for light in lights) / n, sum(light.y_m for light in lights) / n

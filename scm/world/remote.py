@@ -2,8 +2,9 @@
 
 Between reports the body goes on as reported. A contact changes the body at once and is told to the
 agent under a number; until a report says that the agent has felt this number, the change is kept on
-top of its reports, so that one hit is not told twice. What the agent drove on before it felt a hit
-is told as a shift of place. Agents that never say what they felt are given `ECHO_NS`.
+top of its reports, so that one hit is not told twice: also while no report comes, for who pushes a
+car that is silent would else add up speed. What the agent drove on before it felt a hit is told as
+a shift of place. Agents that never say what they felt are given `ECHO_NS` of reports.
 """
 
 from collections import deque
@@ -128,11 +129,12 @@ class RemoteCar:
         age = seconds(min(self.age_ns(now_ns), STALE_NS))
         row[:3] += row[3:] * age
         patience_ns = ANSWER_NS if state is not None and state.contacts else ECHO_NS
-        while self._echo and now_ns - self._echo[0].hit_ns > patience_ns:
+        while self._echo and self.heard_ns - self._echo[0].hit_ns > patience_ns:
             self._echo.popleft()
         for echo in self._echo:
+            since = seconds(min(max(0, now_ns - echo.hit_ns), STALE_NS))
             row[3:] += echo.dv
-            row[:3] += echo.dv * seconds(max(0, now_ns - echo.hit_ns)) + echo.shift
+            row[:3] += echo.dv * since + echo.shift
         return row
 
     def hit(self, dv: Floats, shift: Floats, against: set[str], now_ns: int) -> None:

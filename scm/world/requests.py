@@ -9,6 +9,8 @@ from typing import Any
 from scm.errors import LeaseError, RunError, ScmError, nearest
 from scm.geometry import Pose2
 from scm.part import Serves
+from scm.store.records import StopRecord
+from scm.v2x.exchange import Keep
 from scm.v2x.key import check_name
 from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
@@ -29,6 +31,7 @@ from scm.world.world import NAME, AnyCar, World
 
 KINDS = ("remote", "real")
 CLEARANCE_M = 0.45  # between rear axles: half a Nigel stays free between two of them
+AHEAD_S = 1.5  # until a car that comes has heard of the new one and stands
 
 
 class _RefusedError(ScmError):
@@ -123,9 +126,12 @@ def _lease(world: World, request: LeaseRequest, now_ns: int) -> LeaseReply:
         lease = rules.steal(before, owner, ttl_ms, request.reason, now_ns)
         text = f"{owner} took {car.name} from {before.owner}: {request.reason}"
         world.say("warning", "lease_stolen", text, now_ns, car.name)
-    if isinstance(car, HostedCar) and lease.epoch != before.epoch:
+    is_new = lease.epoch != before.epoch
+    if isinstance(car, HostedCar) and is_new:
         take_over(world, car, lease, now_ns)
     car.lease = lease
+    if isinstance(car, RemoteCar) and is_new:
+        world.keep(car)
     return LeaseReply(vehicle=car.name, owner=lease.owner, epoch=lease.epoch, ttl_ms=lease.ttl_ms)
 
 
@@ -144,7 +150,8 @@ def _stop(world: World, request: StopRequest, now_ns: int) -> CityStop:
     verb = "stopped the city" if request.engaged else "let the city drive again"
     reason = f": {request.reason}" if request.reason else ""
     world.say("warning", "city_stop", f"{request.by} {verb}{reason}", now_ns)
-    world.outbox.append(world.stop)
+    record = StopRecord(engaged=request.engaged, by=request.by, reason=request.reason)
+    world.outbox += [world.stop, Keep("latches", "stop", record)]
     return world.stop
 
 
@@ -182,18 +189,19 @@ def _place(world: World, spawn: str) -> Pose2:
     roads = world.roads
     if spawn:
         pose = roads.spawn_pose(spawn)
-        if not _is_free(world, pose):
+        if not is_free(world, pose):
             raise _RefusedError("occupied", f"spawn: a car stands at {spawn!r}")
         return pose
     for place in world.city_map.spawns:
         pose = roads.spawn_pose(place.name)
-        if _is_free(world, pose):
+        if is_free(world, pose):
             return pose
     raise _RefusedError("full", f"no spawn place of map {world.city_map.name} is free")
 
 
-def _is_free(world: World, pose: Pose2) -> bool:
-    return world.slots.nearest_m(pose) >= CLEARANCE_M
+def is_free(world: World, pose: Pose2) -> bool:
+    """Return whether a car can be put there."""
+    return world.slots.nearest_m(pose, ahead_s=AHEAD_S) >= CLEARANCE_M
 
 
 def _boxes(world: World, request: BoxesRequest, now_ns: int) -> BoxesReply:

@@ -100,11 +100,17 @@ class Slots:
         self.mode[slot], self.seq[slot] = IDLE, 0
         self._numbers.give_back(slot)
 
-    def nearest_m(self, pose: Pose2) -> float:
+    def nearest_m(self, pose: Pose2, *, ahead_s: float = 0.0) -> float:
         """Return how far the nearest car's rear axle is [m]; infinity in an empty city.
 
-        What lies to the side counts double: cars are longer than wide.
+        What lies to the side counts double: cars are longer than wide. A car that comes nearer
+        counts from where it will be within the next `ahead_s`, where that is nearest.
         """
         x, y, c, s = self.x - pose.x, self.y - pose.y, math.cos(pose.yaw), math.sin(pose.yaw)
-        away: Floats = np.hypot(c * x + s * y, 2.0 * (c * y - s * x))[self.used]
+        along, across = c * x + s * y, 2.0 * (c * y - s * x)
+        u = self.speed * np.cos(self.yaw - pose.yaw)
+        v = 2.0 * self.speed * np.sin(self.yaw - pose.yaw)
+        squared = np.maximum(u * u + v * v, 1e-12)
+        when = np.clip(-(along * u + across * v) / squared, 0.0, ahead_s)
+        away: Floats = np.hypot(along + u * when, across + v * when)[self.used]
         return float(away.min()) if len(away) else float("inf")

@@ -48,4 +48,5 @@ def _watch_lease(world: World, car: RemoteCar, now_ns: int) -> None:
     if rules.is_expired(car.lease, now_ns):
         text = f"{car.lease.owner} did not renew the lease of {car.name}: it is its agent's again"
         car.lease = rules.sent_home(car.lease)
+        world.keep(car)
         world.say("warning", "lease_lost", text, now_ns, car.name)

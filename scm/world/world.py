@@ -9,17 +9,20 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
+from msgspec.structs import replace
 
 from scm import registry
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
-from scm.maps.model import CityMap
+from scm.maps.model import CityMap, Point
 from scm.maps.route import Roads
 from scm.maps.segments import wall_segments
-from scm.v2x.exchange import Outgoing
+from scm.store.records import CarRecord, EpochRecord
+from scm.v2x.exchange import Keep, Outgoing
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
+from scm.vehicles.drivers.channel import RANGE
 from scm.vehicles.drivers.crowd import Crowd
 from scm.vehicles.drivers.early import compile_together
 from scm.vehicles.drivers.errands import Errands
@@ -31,13 +34,15 @@ from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sensor
 from scm.world import lease as rules
+from scm.world.busy import Busy
 from scm.world.cams import CamTriggers
 from scm.world.contacts import Contacts
 from scm.world.garage import Garage
 from scm.world.hosted import HostedCar
 from scm.world.impacts import Impacts
+from scm.world.late import Late
 from scm.world.pace import Every, Pace
-from scm.world.radio import Radio, Receivers, roadside_places
+from scm.world.radio import Radio, RadioCounts, Receivers, roadside_places
 from scm.world.remote import RemoteCar
 from scm.world.seeds import generator, number
 from scm.world.slots import Numbers, Slots
@@ -48,6 +53,7 @@ PERIOD_NS = 20 * NS_PER_MS
 SENSORS = "scm.vehicles.sensors"
 SCANNER = "lidar"
 DEFAULT_CAR = "nigel"
+EYE = "eye"
 
 AnyCar = HostedCar | RemoteCar
 
@@ -59,7 +65,7 @@ class World:
         city_map: The city.
         seed: Of all noise and of lost radio frames.
         capacity: Most cars at a time.
-        loss: Share of radio frames that get lost.
+        loss: Share of radio frames that get lost; 0: as the map says.
         prepare: Car files whose kernels are compiled now and not when their first car comes.
 
     Attributes:
@@ -74,11 +80,16 @@ class World:
         placed: Where the remote cars are, for their LIDARs: only the world can see for them.
         banks: The devices of all cars, by kind of sensor.
         readings: By kind and slot the newest reading, NaN before the first; not of LIDARs.
+        radio: How frames come to everybody but the drivers of hosted cars.
+        radio_before: What had become of frames when that was last told.
+        busy: How full the channel is.
+        late: Frames on their way.
         wishes: What anybody would hear.
         stop: The red button as it stands.
         outbox: What the tick under way sends.
         ignored: Messages that fitted nothing: unknown cars, commands without the lease.
         last_hit_ns: When a car's contact was last told.
+        highest_epoch: Of any car that left: a newcomer's is higher, whatever its name.
     """
 
     def __init__(
@@ -98,9 +109,14 @@ class World:
         self.garage = Garage(capacity, self.ground.fit)
         self.contacts = Contacts(city_map)
         self.impacts = Impacts()
-        self.crowd = Crowd(streets_of(self.roads), capacity, seed=seed, loss=loss)
+        radio = replace(city_map.radio, loss=loss) if loss else city_map.radio
+        self.crowd = Crowd(streets_of(self.roads), capacity, seed=seed, radio=radio)
         self.errands = Errands(self.crowd, spread=True)
-        self.radio = Radio(city_map.radio_range_m, generator(seed, NAME, "radio"), loss)
+        channel = self.crowd.channel
+        self.radio = Radio(channel, generator(seed, NAME, "radio"))
+        self.radio_before = RadioCounts()
+        self.busy = Busy(radio, float(channel.numbers[RANGE]), channel.load)
+        self.late = Late()
         self.roadside = roadside_places(city_map)
         self.cams = CamTriggers(capacity)
         self.front = np.zeros(capacity)
@@ -120,12 +136,13 @@ class World:
         self.remote: dict[str, RemoteCar] = {}
         self.leased: dict[str, HostedCar] = {}
         self.pace = Pace(PERIOD_NS)
-        self.every = {"snapshot": Every(20.0), "second": Every(1.0)}
+        self.every = {"snapshot": Every(20.0), "second": Every(1.0), "radio": Every(1.0)}
         self.stop = CityStop(t_ns=0, engaged=False)
         self.outbox: list[Outgoing] = []
         self.tick = 0
         self.ignored = 0
         self.last_hit_ns: dict[str, int] = {}
+        self.highest_epoch = 0
         self._tags = Numbers(city_map.first_vehicle_tag_id, never=city_map.tag.tag_id)
         self._unnamed = 0
         self._came = 0
@@ -155,6 +172,15 @@ class World:
             return self._receivers
         cars = {car.name: (car.pose.x, car.pose.y) for car in self.remote.values()}
         return Receivers({**self.roadside, **cars})
+
+    def antenna(self, station: str) -> Point | None:
+        """Return where a station that is no hosted car sends from; None: nobody knows."""
+        if (car := self.remote.get(station)) is not None:
+            return car.pose.x, car.pose.y
+        if station == EYE or station.startswith(f"{EYE}-"):
+            (left, right), (low, high) = self.city_map.floor.x_m, self.city_map.floor.y_m
+            return 0.5 * (left + right), 0.5 * (low + high)
+        return self.roadside.get(station)
 
     def locate(self) -> None:
         """Note where all cars are and how they move."""
@@ -206,8 +232,9 @@ class World:
             slots=self.slots,
             fleet=fleet,
             row=row,
-            lease=rules.grant(NAME, first_epoch(now_ns)),
+            lease=rules.grant(NAME, self._first_epoch(now_ns)),
         )
+        self.keep(self.hosted[name])
         return self.hosted[name]
 
     def admit(
@@ -231,10 +258,11 @@ class World:
             car_file=car_name,
             tag_id=self._tags.take(),
             slot=slot,
-            lease=rules.grant(name, first_epoch(now_ns)),
+            lease=rules.grant(name, self._first_epoch(now_ns)),
             pose=pose,
             heard_ns=now_ns,
         )
+        self.keep(self.remote[name])
         return self.remote[name]
 
     def remove(self, name: str) -> None:
@@ -246,6 +274,23 @@ class World:
             self._forget(car)
         elif name in self.remote:
             self._forget(self.remote.pop(name))
+
+    def keep(self, car: AnyCar) -> None:
+        """Have a car and its lease stored."""
+        x, y, yaw = car.pose
+        lease = car.lease
+        record = CarRecord(
+            car_file=car.car_file,
+            hosted=isinstance(car, HostedCar),
+            x_m=x,
+            y_m=y,
+            yaw_rad=yaw,
+            home=lease.home,
+            owner=lease.owner,
+            epoch=lease.epoch,
+            ttl_ms=lease.ttl_ms,
+        )
+        self.outbox.append(Keep("leases", car.name, record))
 
     def free_name(self) -> str:
         """Return a name for a car that has none."""
@@ -287,8 +332,17 @@ class World:
         _, self.front[slot] = self.garage.car(car_name).vector("body.footprint_x_m")
         return slot
 
+    def _first_epoch(self, now_ns: int) -> int:
+        """Return an epoch above all that any car of this city has had so far."""
+        return max(now_ns // NS_PER_MS, self.highest_epoch + 1)
+
     def _forget(self, car: AnyCar) -> None:
         slot = car.slot
+        self.highest_epoch = max(self.highest_epoch, car.lease.epoch)
+        self.outbox += [
+            Keep("leases", car.name, None),
+            Keep("latches", "epochs", EpochRecord(highest=self.highest_epoch)),
+        ]
         self.contacts.remove(slot)
         self.errands.forget(slot)
         self.crowd.leave(slot)
@@ -306,8 +360,3 @@ class World:
         # The golden ratio spreads the cars' first scans evenly over a period, however many come.
         self._came += kind == SCANNER
         return self._came * 0.618034 % 1.0 if kind == SCANNER else 0.0
-
-
-def first_epoch(now_ns: int) -> int:
-    """Return an epoch above all that an earlier run of this city can have given out."""
-    return max(1, now_ns // NS_PER_MS)

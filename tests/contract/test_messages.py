@@ -26,6 +26,18 @@ PLAIN_NUMBERS = {
     "beams": "a count",
     "laps": "a count",
     "boxes": "a count",
+    "wanted": "a count",
+    "entered": "a count",
+    "arrived": "a count",
+    "refused": "a count",
+    "queued": "a count",
+    "longest_queue": "a count",
+    "passed": "a count",
+    "stops": "a count",
+    "queue": "a count",
+    "queue_most": "a count",
+    "saturation": "a share of what could pass",
+    "certainty": "a probability",
     "contacts": "a count",
     "revision": "a count",
     "number": "an identity",
@@ -39,6 +51,21 @@ PLAIN_NUMBERS = {
     "shared_covariance": "mixed, see the docstring",
     "lean_covariance": "mixed, see the docstring",
     "real_time_factor": "a ratio",
+    "score": "a sum of doubts, see its docstring",
+    "plausibility": "a probability",
+    "claims": "a count",
+    "sent": "a count of frames",
+    "delivered": "a count of frames",
+    "out_of_range": "a count of frames",
+    "by_chance": "a count of frames",
+    "by_distance": "a count of frames",
+    "by_load": "a count of frames",
+    "unknown": "a count of frames",
+    "late": "a count of frames",
+    "waiting": "a count of frames",
+    "busy": "a share of time",
+    "busy_mean": "a share of time",
+    "busy_most": "a share of time",
     "start": "a pose of the map, see its docstring",
 }
 UNITS = tuple(
@@ -49,7 +76,7 @@ UNITS = tuple(
         *("id", "number"),
     )
 )
-ETSI = ("scm.v2x.etsi", "scm.v2x.etsi_cpm")
+ETSI = "scm.v2x.etsi"  # modules whose numbers are in the units of the standards
 
 
 def message_classes():
@@ -91,12 +118,26 @@ def values(of):
     if origin is Literal:
         return st.sampled_from(inner)
     if origin is Annotated:
-        return st.integers(inner[1].ge, inner[1].le)
+        return annotated(*inner)
     if origin is tuple and inner[-1] is Ellipsis:
         return st.lists(values(inner[0]), max_size=3).map(tuple)
     if origin is tuple:
         return st.tuples(*(values(t) for t in inner))
     return OF_TYPE[of]
+
+
+def annotated(of, meta):
+    """Return a strategy for a type with limits."""
+    if of is int:
+        return st.integers(meta.ge, meta.le)
+    if of is not str:
+        least = meta.min_length or 0
+        items = st.lists(values(get_args(of)[0]), min_size=least, max_size=max(2, least))
+        return items.map(tuple)
+    if meta.pattern:
+        return st.from_regex(meta.pattern.replace("$", r"\Z"))
+    characters = st.characters(codec="ascii")
+    return st.text(characters, min_size=meta.min_length or 0, max_size=meta.max_length)
 
 
 def structs(kind):
@@ -168,7 +209,7 @@ def numeric_fields(kind):
 
 def _numeric(path, name, of):
     if isinstance(of, type) and issubclass(of, msgspec.Struct):
-        if of.__module__ not in ETSI and of.__module__ != "scm.maps.model":
+        if not of.__module__.startswith(ETSI) and of.__module__ != "scm.maps.model":
             yield from numeric_fields(of)
     elif of in (int, float):
         yield path, name

@@ -360,14 +360,14 @@ def _phase(phase_s):
 class ServedCity:
     """The demo city behind a real server on a free port."""
 
-    def __init__(self, api_key=None, port=0):
+    def __init__(self, keys=None, port=0):
         self.view = CityView()
         self.city = DemoCity(self.view)
         app = create_app(
             self.view,
             self.city.ask,
             self.city.city_map,
-            api_key=api_key,
+            keys=keys,
             plans={"crossing": ("calm", "busy")},
         )
         self.url = ""

@@ -9,6 +9,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from scm.api.keys import KeyRing
+from scm.store.memory import MemoryStore
+
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 ARGS = [
     "--no-sandbox",
@@ -217,6 +220,26 @@ def test_the_red_button_stops_the_city_and_releases_it(open_page, served):
     page.keyboard.press("Enter")
     page.wait_for_selector(".banner.stopped", state="detached")
     assert served.city.stopped is None
+
+
+def test_a_city_with_keys_asks_for_one_and_shows_itself_to_who_has_it(browser):
+    ring = KeyRing(MemoryStore())
+    key = ring.add("anna", "operator", 1)
+    with demo_city.ServedCity(keys=ring) as city, browser.new_context() as context:
+        page = context.new_page()
+        page.goto(city.url)
+        for given in ("scm_00000000_wrong", key):
+            page.fill("dialog input[name=key]", given)
+            with page.expect_response("**/api/v1/session"):
+                page.click("dialog button.primary")
+        page.wait_for_selector('.link-state[data-link="live"]')
+        page.wait_for_selector(".cars tbody tr")
+        wait_for(page, "() => document.querySelector('.picture').width === 720")
+        page.click("#city-stop")
+        page.wait_for_selector("dialog[open]")
+        page.keyboard.press("Enter")
+        page.wait_for_selector(".banner.stopped")
+        assert city.city.stopped.by == "dashboard"
 
 
 def test_the_red_button_asks_first(open_page, served):

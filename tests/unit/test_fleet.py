@@ -44,7 +44,7 @@ def test_the_same_script_gives_the_same_times_bit_for_bit() -> None:
 @pytest.mark.parametrize(
     ("ask", "said"),
     [
-        (lambda c: c.use_plan("nope"), "no plan 'nope', only ['brisk', 'calm', 'flash']"),
+        (lambda c: c.use_plan("nope"), "no plan 'nope', only ['brisk', 'calm', 'actuated'"),
         (lambda c: c.use_plan("calm", junction="x"), "no junction 'x', only ['crossing']"),
         (lambda c: c.spawn("nigl"), "did you mean 'nigel'?"),
         (lambda c: c.spawn(at="nowhere"), "no spawn 'nowhere'"),

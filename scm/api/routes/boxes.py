@@ -4,6 +4,7 @@ from fastapi import APIRouter, Response
 
 from scm.api.city import City, IdempotencyKey, json_response
 from scm.api.picture import Picture
+from scm.api.roles import OPERATOR, VIEWER
 from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
 from scm.v2x.messages.world_snapshot import SnapshotBox
 
@@ -15,13 +16,15 @@ def boxes_of(picture: Picture) -> tuple[SnapshotBox, ...]:
 
 def router(city: City) -> APIRouter:
     """Return the routes."""
-    routes = APIRouter(prefix="/boxes", tags=["boxes"])
+    routes = APIRouter(prefix="/boxes", tags=["boxes"], dependencies=[VIEWER])
 
     @routes.get("", summary="Where the boxes are that cars can push")
     def boxes() -> Response:
         return json_response({"boxes": boxes_of(city.view.picture())})
 
-    @routes.post("/reset", summary="Put all boxes back where the map has them")
+    @routes.post(
+        "/reset", summary="Put all boxes back where the map has them", dependencies=[OPERATOR]
+    )
     def reset(key: IdempotencyKey = "") -> Response:
         return json_response(city.ask(BoxesRequest(request_id=key, by="api"), BoxesReply))
 

@@ -8,6 +8,7 @@ from fastapi.responses import StreamingResponse
 
 from scm.api.city import City, Name, json_response, not_found
 from scm.api.problem import RefusedError
+from scm.api.roles import VIEWER
 from scm.api.stream import Stream
 from scm.camera.optics import fitted
 from scm.v2x.message import Refused
@@ -20,7 +21,7 @@ BOUNDARY = "frame"
 
 def router(city: City, stream: Stream) -> APIRouter:
     """Return the routes."""
-    routes = APIRouter(prefix="/cars", tags=["cameras"])
+    routes = APIRouter(prefix="/cars", tags=["cameras"], dependencies=[VIEWER])
 
     @routes.get("/{name}/camera/{camera}.jpg", summary="One picture", response_class=Response)
     async def still(name: Name, camera: Name) -> Response:

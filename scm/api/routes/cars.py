@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.car_rows import CarRow, cars_topic
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
+from scm.api.roles import OPERATOR, VIEWER
 from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
@@ -46,13 +47,13 @@ class LightsBody(BaseModel):
 
 def router(city: City) -> APIRouter:
     """Return the routes."""
-    routes = APIRouter(prefix="/cars", tags=["cars"])
+    routes = APIRouter(prefix="/cars", tags=["cars"], dependencies=[VIEWER])
 
     @routes.get("", summary="All cars on the map")
     def all_cars() -> Response:
         return json_response(cars_topic(city.view.picture()))
 
-    @routes.post("", summary="Spawn a hosted car", status_code=201)
+    @routes.post("", summary="Spawn a hosted car", status_code=201, dependencies=[OPERATOR])
     def spawn(body: SpawnBody, key: IdempotencyKey = "") -> Response:
         request = SpawnRequest(request_id=key, vehicle=body.vehicle, car=body.car, spawn=body.spawn)
         reply = city.ask(request, SpawnReply)
@@ -62,12 +63,12 @@ def router(city: City) -> APIRouter:
     def one_car(name: Name) -> Response:
         return json_response(_find(city, name))
 
-    @routes.delete("/{name}", summary="Take a car off the map")
+    @routes.delete("/{name}", summary="Take a car off the map", dependencies=[OPERATOR])
     def remove(name: Name, reason: str = "", key: IdempotencyKey = "") -> Response:
         request = RemoveRequest(request_id=key, vehicle=name, reason=reason)
         return json_response(city.ask(request, RemoveReply))
 
-    @routes.post("/{name}/route", summary="Send a car on a route")
+    @routes.post("/{name}/route", summary="Send a car on a route", dependencies=[OPERATOR])
     def route(name: Name, body: RouteBody, key: IdempotencyKey = "") -> Response:
         request = RouteRequest(
             request_id=key,
@@ -78,7 +79,11 @@ def router(city: City) -> APIRouter:
         )
         return json_response(city.ask(request, RouteReply))
 
-    @routes.put("/{name}/lights", summary="Switch a car's headlights and indicators")
+    @routes.put(
+        "/{name}/lights",
+        summary="Switch a car's headlights and indicators",
+        dependencies=[OPERATOR],
+    )
     def lights(name: Name, body: LightsBody, key: IdempotencyKey = "") -> Response:
         request = LightRequest(
             request_id=key, vehicle=name, headlights=body.headlights, indicators=body.indicators

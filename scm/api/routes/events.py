@@ -5,11 +5,12 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from scm.api.city import City, json_response
+from scm.api.roles import VIEWER
 
 
 def router(city: City) -> APIRouter:
     """Return the routes."""
-    routes = APIRouter(prefix="/events", tags=["events"])
+    routes = APIRouter(prefix="/events", tags=["events"], dependencies=[VIEWER])
 
     @routes.get("", summary="Events in order of arrival")
     def events(

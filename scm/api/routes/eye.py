@@ -4,11 +4,12 @@ from fastapi import APIRouter, Response
 
 from scm.api.city import City, Name, json_response, not_found
 from scm.api.eye_rows import camera_rows, frame_of, tags_of
+from scm.api.roles import VIEWER
 
 
 def router(city: City) -> APIRouter:
     """Return the routes."""
-    routes = APIRouter(prefix="/eye", tags=["eye"])
+    routes = APIRouter(prefix="/eye", tags=["eye"], dependencies=[VIEWER])
 
     @routes.get("", summary="All cameras, with tags and poses seen")
     def cameras() -> Response:

@@ -5,12 +5,13 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 
+from scm.api.roles import VIEWER
 from scm.api.stream import Stream
 
 
 def router(stream: Stream) -> APIRouter:
     """Return the route."""
-    routes = APIRouter(tags=["stream"])
+    routes = APIRouter(tags=["stream"], dependencies=[VIEWER])
 
     @routes.get("/stream", summary="Everything live: a snapshot, then what changed, at 20 Hz")
     async def live(

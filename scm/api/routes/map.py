@@ -6,6 +6,7 @@ import msgspec
 from fastapi import APIRouter, Request, Response
 
 from scm.api.city import City
+from scm.api.roles import VIEWER
 from scm.maps.draw import draw_svg
 
 
@@ -17,7 +18,7 @@ class SvgResponse(Response):
 
 def router(city: City) -> APIRouter:
     """Return the routes; both forms are made once, a map does not change while the city runs."""
-    routes = APIRouter(tags=["map"])
+    routes = APIRouter(tags=["map"], dependencies=[VIEWER])
     as_json = msgspec.json.encode(city.city_map)
     as_svg = draw_svg(city.city_map, movable=False).encode()  # the page draws those live
 

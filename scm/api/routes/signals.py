@@ -4,6 +4,7 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
+from scm.api.roles import ENGINEER, OPERATOR, VIEWER
 from scm.api.signal_rows import junction_rows
 from scm.v2x.messages.monitor_reset import MonitorReset
 from scm.v2x.messages.monitor_status import MonitorStatus
@@ -31,7 +32,7 @@ class ResetBody(BaseModel):
 
 def router(city: City) -> APIRouter:
     """Return the routes."""
-    routes = APIRouter(prefix="/signals", tags=["signals"])
+    routes = APIRouter(prefix="/signals", tags=["signals"], dependencies=[VIEWER])
 
     @routes.get("", summary="All junctions")
     def all_signals() -> Response:
@@ -46,7 +47,7 @@ def router(city: City) -> APIRouter:
             raise not_found("junction", name)
         return json_response(found)
 
-    @routes.put("/{name}/plan", summary="Wish for another plan")
+    @routes.put("/{name}/plan", summary="Wish for another plan", dependencies=[OPERATOR])
     def plan(name: Name, body: PlanBody, key: IdempotencyKey = "") -> Response:
         _check(city, name)
         request = PlanRequest(
@@ -54,7 +55,11 @@ def router(city: City) -> APIRouter:
         )
         return json_response(city.ask(request, PlanReply))
 
-    @routes.post("/{name}/monitor/reset", summary="Clear a latched fault of the monitor")
+    @routes.post(
+        "/{name}/monitor/reset",
+        summary="Clear a latched fault of the monitor",
+        dependencies=[ENGINEER],
+    )
     def reset(name: Name, body: ResetBody, key: IdempotencyKey = "") -> Response:
         _check(city, name)
         request = MonitorReset(request_id=key, junction=name, by=body.by, reason=body.reason)

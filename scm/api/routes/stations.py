@@ -3,11 +3,12 @@
 from fastapi import APIRouter, Response
 
 from scm.api.city import City, json_response
+from scm.api.roles import VIEWER
 
 
 def router(city: City) -> APIRouter:
     """Return the routes."""
-    routes = APIRouter(prefix="/stations", tags=["stations"])
+    routes = APIRouter(prefix="/stations", tags=["stations"], dependencies=[VIEWER])
 
     @routes.get("", summary="All stations")
     def all_stations() -> Response:

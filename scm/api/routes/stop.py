@@ -5,6 +5,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, json_response
 from scm.api.picture import Picture
+from scm.api.roles import OPERATOR, VIEWER
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.stop_request import StopRequest
 
@@ -26,13 +27,13 @@ def stop_of(picture: Picture) -> CityStop:
 
 def router(city: City) -> APIRouter:
     """Return the routes."""
-    routes = APIRouter(prefix="/stop", tags=["stop"])
+    routes = APIRouter(prefix="/stop", tags=["stop"], dependencies=[VIEWER])
 
     @routes.get("", summary="Whether the city-wide stop is engaged")
     def stop() -> Response:
         return json_response(stop_of(city.view.picture()))
 
-    @routes.put("", summary="Engage or release the city-wide stop")
+    @routes.put("", summary="Engage or release the city-wide stop", dependencies=[OPERATOR])
     def set_stop(body: StopBody, key: IdempotencyKey = "") -> Response:
         request = StopRequest(request_id=key, engaged=body.engaged, by=body.by, reason=body.reason)
         return json_response(city.ask(request, CityStop))

@@ -22,7 +22,7 @@ from scm.scenery.solids import (
     rectangle,
     shape_of,
 )
-from scm.scenery.tags import PRINT_SCALE, tag_corners
+from scm.scenery.tags import PRINT_SCALE, TAG_COUNT, tag_corners
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 SHADOW = 0.42
@@ -105,7 +105,7 @@ def paint_car(frame: Image, placed: LaidOut, gain: float) -> Canvas | None:
     if canvas.is_empty:
         return None
     draw_shape(canvas, placed.shape, placed.solid, gain)
-    if car_body(placed.car.car).has_tag:
+    if car_body(placed.car.car).has_tag and 0 <= placed.car.tag_id < TAG_COUNT:
         canvas.picture(_roof_print(placed.car.tag_id, gain), placed.tag)
     canvas.put_back()
     return canvas

@@ -10,7 +10,6 @@ from scm.v2x.etsi import REFERENCE_LATITUDE_DEG, REFERENCE_LONGITUDE_DEG, SCALE
 from scm.v2x.etsi_convert import its_ms, station_id
 from scm.v2x.etsi_cpm import (
     MOST_OBJECTS,
-    Altitude,
     Angle,
     Angles,
     AngularVelocity,
@@ -19,16 +18,15 @@ from scm.v2x.etsi_cpm import (
     Coordinate,
     CpmBody,
     Dimension,
-    Ellipse,
     ManagementContainer,
     ObjectClass,
     PerceivedObject,
     Position,
-    ReferencePosition,
     SensorInformation,
     Velocity,
     VelocityComponent,
 )
+from scm.v2x.etsi_parts import PROTOCOL_VERSION, ReferencePosition
 from scm.v2x.messages.cpm_tx import CpmTx
 
 SURELY = 1.96
@@ -59,11 +57,10 @@ def collective_perception(
         reference_position=ReferencePosition(
             latitude=round(REFERENCE_LATITUDE_DEG * 1e7),
             longitude=round(REFERENCE_LONGITUDE_DEG * 1e7),
-            position_confidence_ellipse=Ellipse(),
-            altitude=Altitude(),
         ),
     )
     filled = CpmBody(
+        protocol_version=PROTOCOL_VERSION,
         station_id=station_id(station),
         management_container=container,
         sensor_information_container=sensors or None,

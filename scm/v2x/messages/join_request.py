@@ -13,7 +13,7 @@ class JoinReply(Message, kw_only=True, frozen=True):
         epoch: Of the agent's lease; renewed by every `VehicleState` it sends.
     """
 
-    KEY: ClassVar[str] = "world/join/reply"
+    KEY: ClassVar[str] = "v/{vehicle}/join/reply"
 
     vehicle: str
     x_m: float
@@ -34,7 +34,7 @@ class JoinRequest(Request, kw_only=True, frozen=True):
         spawn: Wished spawn place; empty: the first free one.
     """
 
-    KEY: ClassVar[str] = "world/join"
+    KEY: ClassVar[str] = "v/{vehicle}/join"
     REPLY: ClassVar[type[Message]] = JoinReply
 
     vehicle: str

@@ -8,7 +8,7 @@ from scm.v2x.message import Message, Request
 class RemoveReply(Message, kw_only=True, frozen=True):
     """It is gone."""
 
-    KEY: ClassVar[str] = "world/remove/reply"
+    KEY: ClassVar[str] = "v/{vehicle}/remove/reply"
 
     vehicle: str
 
@@ -16,7 +16,7 @@ class RemoveReply(Message, kw_only=True, frozen=True):
 class RemoveRequest(Request, kw_only=True, frozen=True):
     """Remove a car, with a reason for the event log."""
 
-    KEY: ClassVar[str] = "world/remove"
+    KEY: ClassVar[str] = "v/{vehicle}/remove"
     REPLY: ClassVar[type[Message]] = RemoveReply
 
     vehicle: str

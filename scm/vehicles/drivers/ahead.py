@@ -86,7 +86,6 @@ def cars_ahead(
     count: int,
     reach: float,
     now_ns: int,
-    loss: float,
     seed: int,
 ) -> int:
     """Find the cars on the surveyed way, nearest first; return how many.
@@ -112,7 +111,7 @@ def cars_ahead(
             other = heard.in_cell[at]
             if other == car or is_outside(window, heard.at[other]):
                 continue
-            known, x, y, cos, sin, speed = known_to(heard, other, car, now_ns, loss, seed)
+            known, x, y, cos, sin, speed = known_to(heard, other, car, now_ns, seed)
             if not known:
                 continue
             half_length, half_width = 0.5 * heard.size[other, 0], 0.5 * heard.size[other, 1]

@@ -9,11 +9,3 @@ def mixed(a: int, b: int) -> int:
     state = ((a & 0xFFFFFFFF) * 747796405 + (b & 0xFFFFFFFF) * 277803737 + 2891336453) & 0xFFFFFFFF
     word = (((state >> ((state >> 28) + 4)) ^ state) * 277803737) & 0xFFFFFFFF
     return (word >> 22) ^ word
-
-
-@law
-def reached(loss: float, seed: int, sender: int, receiver: int, frame: int) -> bool:
-    """Return whether a frame reached a receiver: the same answer whoever asks, and when."""
-    if loss <= 0.0:
-        return True
-    return mixed(mixed(seed, sender), mixed(receiver, frame)) >= loss * 4294967296.0

@@ -11,15 +11,17 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import MapError
+from scm.maps.model import RadioChannel
+from scm.maps.segments import wall_segments
 from scm.v2x.etsi import SpatemBody
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers import memory as m
 from scm.vehicles.drivers.ahead import Scratch, scratch
+from scm.vehicles.drivers.channel import channel_of, frames_kept
 from scm.vehicles.drivers.law import decide
-from scm.vehicles.drivers.signal_table import KEPT_WHEN_LOSSY as FRAMES_KEPT
+from scm.vehicles.drivers.order import note_standing
 from scm.vehicles.drivers.signal_table import SignalTable
-from scm.vehicles.drivers.stations import KEPT_WHEN_LOSSY as CAMS_KEPT
 from scm.vehicles.drivers.stations import find_cells, hear_cams, nobody
 from scm.vehicles.drivers.streets import Streets
 from scm.vehicles.drivers.way import look_from
@@ -35,28 +37,34 @@ class Crowd:
         streets: The lanes of the map.
         capacity: How many slots there are.
         seed: Of the luck of radio frames.
-        loss: Share of radio frames that each receiver misses.
+        radio: What the air does to frames; None: nothing.
 
     Attributes:
         throttle: (capacity,) last decided, -1 to 1; likewise `steering`, + = left.
+        channel: What the air does to frames on their way to the drivers.
         signals: What is told of the signals.
         threads: How many work on large crowds; what is decided does not depend on it.
     """
 
     def __init__(
-        self, streets: Streets, capacity: int, *, seed: int = 0, loss: float = 0.0
+        self, streets: Streets, capacity: int, *, seed: int = 0, radio: RadioChannel | None = None
     ) -> None:
         city_map = streets.roads.city_map
         self.streets = streets
         self.capacity = capacity
-        self._seed, self._loss = seed, float(loss)
+        self._seed = seed
         self._memory = m.empty_memory(capacity)
-        self._heard = nobody(city_map, capacity, CAMS_KEPT if loss else 1)
-        self.signals = SignalTable(city_map, FRAMES_KEPT if loss else 1)
+        radio = radio or RadioChannel()
+        self.channel = channel_of(
+            radio, radio.range_m or city_map.radio_range_m, capacity, wall_segments(city_map)
+        )
+        kept = frames_kept(radio)
+        self._heard = nobody(city_map, capacity, kept, self.channel)
+        self.signals = SignalTable(city_map, kept, self.channel)
         self.threads = 1
         self._rooms = [scratch()]
         self._pool: ThreadPoolExecutor | None = None
-        self._poses = np.zeros((capacity, 4))
+        self._poses = self.channel.poses
         self._commands = np.zeros((2, capacity))
         self._kinds: dict[CarLimits, int] = {}
         self._entered = np.zeros(capacity, np.bool_)
@@ -152,6 +160,7 @@ class Crowd:
         self._entered[slot] = self._sent[slot] = False
         self._heard.size[slot] = 0.0
         self._heard.number[:, slot] = -1
+        self._memory.stood[slot] = m.NEVER_NS
         self._memory.sight[slot] = -1
         self._memory.ints[slot, m.COUNT] = 0
         self._commands[:, slot] = 0.0
@@ -185,7 +194,7 @@ class Crowd:
         ints[m.ROUTE], ints[m.COUNT], ints[m.INDEX] = at, len(numbers), first
         ints[m.AFTER] = m.AFTERS.index(after)
         ints[m.GOAL] = m.NO_GOAL if after == "loop" else len(numbers) - 1
-        ints[m.GOING_LINE], ints[m.ARRIVED] = -1, 0
+        ints[m.GOING_LINE], ints[m.RULE_LINE], ints[m.ARRIVED] = -1, -1, 0
         floats[m.S], floats[m.DONE] = s, 0.0
         floats[m.TOLD] = np.inf if speed is None else speed
         look_from(self.streets.ways, self._memory, slot, numbers[first])
@@ -239,7 +248,9 @@ class Crowd:
     ) -> None:
         """Take what cars tell on the air now, shape (k,): of the middle of their front bumpers."""
         cams = np.column_stack((x, y, yaw, speed, yaw_rate))
-        hear_cams(self._heard, np.asarray(slots, np.int64), now_ns, cams)
+        stations = np.asarray(slots, np.int64)
+        note_standing(self._memory.stood, self._memory.stood_at, stations, now_ns, cams)
+        hear_cams(self._heard, stations, now_ns, cams)
 
     def hear_spatem(self, body: SpatemBody, now_ns: int) -> None:
         """Take a SPATEM that is on the air now."""
@@ -313,7 +324,6 @@ class Crowd:
                 self._commands,
                 now_ns,
                 bool(stop),
-                self._loss,
                 self._seed,
             )
 

@@ -44,7 +44,6 @@ def has_room(
     s: float,
     speed: float,
     now_ns: int,
-    loss: float,
     seed: int,
 ) -> bool:
     """Return whether a car, once past a line, will find a place behind the junction.
@@ -63,7 +62,6 @@ def has_room(
         s: Where the car is on its lane [m].
         speed: Along the body [m/s].
         now_ns: The present time [ns].
-        loss: Share of radio frames that get lost.
         seed: Of the luck.
     """
     leave = leaving(ways, sight, s, at, line)
@@ -81,7 +79,7 @@ def has_room(
     ids, begins = room.ids, room.begins
     count, _, _ = survey(ways.segment_first, ways.segments, sight, s, 0.0, farthest, ids, begins)
     reach = max(REACH, farthest - kind[FRONT])
-    queued = cars_ahead(ways.segments, heard, room, kind, car, count, reach, now_ns, loss, seed)
+    queued = cars_ahead(ways.segments, heard, room, kind, car, count, reach, now_ns, seed)
     place = farthest
     for other in range(queued):
         place -= room.ahead[other, LENGTH_OF] + STANDSTILL_GAP

@@ -11,6 +11,7 @@ from scm.vehicles.drivers.ahead import REACH
 
 REMEMBER_NS = 3 * NS_PER_S
 LONGEST_GUESS_S = 1.0
+AROUND_M = 2.0
 
 
 class HeardCars:
@@ -43,7 +44,7 @@ class HeardCars:
 
 
 def _may_be_within_reach(view: CamView, near: Pose2) -> bool:
-    farthest = REACH + view.length_m + LONGEST_GUESS_S * abs(view.speed_mps or 0.0)
+    farthest = REACH + AROUND_M + view.length_m + LONGEST_GUESS_S * abs(view.speed_mps or 0.0)
     dx, dy = view.x_m - near.x, view.y_m - near.y
     return dx * dx + dy * dy <= farthest * farthest
 

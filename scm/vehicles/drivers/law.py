@@ -14,6 +14,7 @@ from scm.vehicles.drivers.ahead import (
     cars_ahead,
 )
 from scm.vehicles.drivers.exits import has_room
+from scm.vehicles.drivers.giving_way import gives_way
 from scm.vehicles.drivers.memory import (
     ARRIVED,
     DECEL,
@@ -26,15 +27,18 @@ from scm.vehicles.drivers.memory import (
     LAST_NS,
     LATERAL_ACCEL,
     ORDER,
+    SIGN,
     SWING,
     TOLD,
     TURN,
     VEHICLE,
     WAITING,
+    WAS_FREE,
     Memory,
     S,
 )
 from scm.vehicles.drivers.pace import STANDSTILL, braking, free_speed, stopping_speed, throttle
+from scm.vehicles.drivers.rules import LIT
 from scm.vehicles.drivers.signal_table import Told
 from scm.vehicles.drivers.stations import Heard
 from scm.vehicles.drivers.steering import LEAST_HALF, steer
@@ -69,14 +73,13 @@ def decide(
     commands: Floats,
     now_ns: int,
     stop: bool,
-    loss: float,
     seed: int,
 ) -> None:
     """Let the drivers of some cars, given by number, decide.
 
     `heard` must have its cells up to date. `poses` (capacity, 4) are x, y, yaw of the rear axle and
     the speed along the body; `commands` (2, capacity) takes throttle and steering, -1 to 1. `stop`
-    brings all to rest in their lanes; `loss` and `seed` decide which radio frames get lost.
+    brings all to rest in their lanes; `seed` decides which radio frames get lost.
     """
     ids, begins = room.ids, room.begins
     for number in range(len(cars)):
@@ -91,7 +94,7 @@ def decide(
         count, here, ends = survey(
             ways.segment_first, ways.segments, sight, floats[S], back, front + REACH, ids, begins
         )
-        found = cars_ahead(ways.segments, heard, room, kind, car, count, REACH, now_ns, loss, seed)
+        found = cars_ahead(ways.segments, heard, room, kind, car, count, REACH, now_ns, seed)
         wished, reason = wish(
             ways.segments, ids, begins, room.ahead, kind, floats, count, here, found, ends, stop
         )
@@ -109,7 +112,7 @@ def decide(
         if distance >= 0.0:
             held = hold(
                 ways, memory, heard, told, room, kind, car, found, line, at, distance, speed,
-                passed, now_ns, loss, seed,
+                passed, now_ns, seed,
             )  # fmt: skip
             before_line = stopping_speed(distance - SHORT_OF_LINE - front, kind[DECEL])
             if held != FREE and before_line < wished:
@@ -136,7 +139,6 @@ def hold(
     speed: float,
     passed: float,
     now_ns: int,
-    loss: float,
     seed: int,
 ) -> int:
     """Return what holds a car at a line, FREE if nothing does; a car without room looks elsewhere.
@@ -147,13 +149,22 @@ def hold(
     brake = braking(max(0.0, speed), kind[DECEL], REACTION)
     can_stop = distance - kind[FRONT] >= brake + NEAREST
     index = ints[INDEX] + at - HERE
-    held = signal_says(told, ways.line_links, ints, line, index, can_stop, car, now_ns, loss, seed)
+    held = SIGN
+    is_lit = ways.rules.kind[line] == LIT
+    if is_lit:
+        held = signal_says(told, ways.line_links, ints, line, index, can_stop, car, now_ns, seed)
+    if held == SIGN:
+        held = gives_way(
+            ways, memory, heard, kind, car, line, at, distance, speed, can_stop, is_lit, now_ns,
+            seed,
+        )  # fmt: skip
     if held != VEHICLE:
         return held
     if has_room(
-        ways, heard, room, kind, sight, found, car, line, at, distance, s, speed, now_ns, loss, seed
+        ways, heard, room, kind, sight, found, car, line, at, distance, s, speed, now_ns, seed
     ):
         return FREE
+    ints[WAS_FREE] = 0
     if at == HERE and speed < STANDSTILL and is_turn(now_ns, passed):
         choose_again(ways, memory, car)
     return VEHICLE

@@ -25,11 +25,15 @@ S, BESIDE, DONE, TOLD, ANGLE, STEER, PACE, SUM = range(8)
 
 # Of a car, whole numbers: its kind; which lane of its way it is on; where its route begins among
 # all routes, how many lanes it has, and what comes after them; its own seed; the line it decided
-# to cross and on which lane of its way; when it last decided; what holds it; which way it turns.
+# to cross and on which lane of its way; when it last decided; what holds it; which way it turns;
+# whether it has arrived. Of the line without lights before it: which it is and on which lane of
+# its way, since when it rests there, when cars in motion last kept it, when one was last in the
+# junction, whether it was free the last time.
 (
     KIND, INDEX, ROUTE, COUNT, AFTER, GOAL, SEED, GOING_LINE, GOING_INDEX, LAST_NS, WAITING, TURN,
-    ARRIVED,
-) = range(13)  # fmt: skip
+    ARRIVED, RULE_LINE, RULE_INDEX, REST_NS, KEPT_NS, BUSY_NS, WAS_FREE,
+) = range(19)  # fmt: skip
+INTS = 19
 NEVER_NS = -(2**62)
 NO_GOAL = 2**62
 
@@ -40,8 +44,8 @@ AFTERS = ("stop", "loop", "circulate")
 # Lanes of a way in sight: one behind, the one it is on, those ahead; -1 where there is none.
 BEHIND, HERE, IN_SIGHT = 0, 1, 8
 
-WAITING_FOR = (None, "signal", "vehicle", "stop")
-FREE, SIGNAL, VEHICLE, ORDER = range(4)
+WAITING_FOR = (None, "signal", "vehicle", "stop", "sign")
+FREE, SIGNAL, VEHICLE, ORDER, SIGN = range(5)
 
 
 class Memory(NamedTuple):
@@ -49,9 +53,11 @@ class Memory(NamedTuple):
 
     Attributes:
         kinds: (k, 32) of the kinds of cars.
-        floats: (capacity, 8); `ints` (capacity, 13).
+        floats: (capacity, 8); `ints` (capacity, 19).
         sight: (capacity, 8) lanes of each car's way, by number.
         routes: All routes, one behind the other.
+        stood: (capacity,) since when each station has told that it stands; NEVER_NS: it does not.
+        stood_at: (capacity, 2) where [m].
     """
 
     kinds: Floats
@@ -59,6 +65,8 @@ class Memory(NamedTuple):
     ints: Ints
     sight: Ints
     routes: Ints
+    stood: Ints
+    stood_at: Floats
 
 
 def kind_row(limits: CarLimits, sharpest: float) -> Floats:
@@ -80,7 +88,7 @@ def kind_row(limits: CarLimits, sharpest: float) -> Floats:
 
 def empty_memory(capacity: int) -> Memory:
     """Return the memory of a crowd that nobody has entered yet."""
-    ints = np.zeros((capacity, 13), np.int64)
+    ints = np.zeros((capacity, INTS), np.int64)
     ints[:, LAST_NS] = NEVER_NS
     return Memory(
         kinds=np.zeros((0, SPEEDS + MOST_SPEEDS)),
@@ -88,4 +96,6 @@ def empty_memory(capacity: int) -> Memory:
         ints=ints,
         sight=np.full((capacity, IN_SIGHT), -1, np.int64),
         routes=np.zeros(0, np.int64),
+        stood=np.full(capacity, NEVER_NS, np.int64),
+        stood_at=np.zeros((capacity, 2)),
     )

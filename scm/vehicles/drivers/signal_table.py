@@ -11,16 +11,16 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_S
 from scm.maps.model import CityMap
+from scm.maps.roadside import roadside_place
 from scm.v2x.etsi import SpatemBody
 from scm.v2x.etsi_convert import REVISIONS, colours_of
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Colour
-from scm.vehicles.drivers.chance import reached
+from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived, ideal
 from scm.vehicles.jit import law
 
 FRESH_NS = NS_PER_S
 RESOLUTION_S = 0.1
-KEPT_WHEN_LOSSY = 8
 
 COLOURS: tuple[Colour | None, ...] = (None, "green", "yellow", "red", "flashing_red", "dark")
 UNKNOWN, GREEN, YELLOW, _RED, FLASHING, _DARK = range(6)
@@ -39,6 +39,8 @@ class Told(NamedTuple):
         colour: (m, g) by their place in `COLOURS`.
         min_end: (m, g) for how long the colour lasts at least [s] after arrival, NaN: unknown.
         fault: (j,) whether the monitor has found a fault.
+        place: (j, 2) where the roadside units stand [m].
+        channel: What the air does to SPATEMs on their way.
     """
 
     newest: Ints
@@ -48,6 +50,8 @@ class Told(NamedTuple):
     colour: Ints
     min_end: Floats
     fault: Bools
+    place: Floats
+    channel: Channel
 
 
 class SignalTable:
@@ -58,7 +62,7 @@ class SignalTable:
         ignored: Frames of another map, or another revision of it.
     """
 
-    def __init__(self, city_map: CityMap, kept: int = 1) -> None:
+    def __init__(self, city_map: CityMap, kept: int = 1, channel: Channel | None = None) -> None:
         self._revision = city_map.revision % REVISIONS
         self._kept = kept
         self._junctions = {junction.number: n for n, junction in enumerate(city_map.junctions)}
@@ -78,6 +82,10 @@ class SignalTable:
             colour=np.zeros((kept, count), np.int64),
             min_end=np.full((kept, count), np.nan),
             fault=np.zeros(junctions, np.bool_),
+            place=np.array([roadside_place(city_map, j.name) for j in city_map.junctions]).reshape(
+                -1, 2
+            ),
+            channel=channel or ideal(),
         )
         self._frames = 0
         self.ignored = 0
@@ -113,7 +121,7 @@ class SignalTable:
 
 
 @law
-def frame_for(told: Told, junction: int, receiver: int, loss: float, seed: int) -> int:
+def frame_for(told: Told, junction: int, receiver: int, now_ns: int, seed: int) -> int:
     """Return the place of the newest frame of a junction that reached a receiver, or -1."""
     kept = len(told.number)
     for older in range(kept):
@@ -121,7 +129,12 @@ def frame_for(told: Told, junction: int, receiver: int, loss: float, seed: int) 
         number = told.number[place, junction]
         if number < 0:
             return -1
-        if reached(loss, seed, -_SALT - junction, receiver, number):
+        if told.channel.numbers[IDEAL] > 0.0:
+            return int(place)
+        age_ns = now_ns - told.arrived_ns[place, junction]
+        x, y = told.place[junction, 0], told.place[junction, 1]
+        sender = -_SALT - junction
+        if has_arrived(told.channel, seed, sender, receiver, number, x, y, age_ns):
             return int(place)
     return -1
 

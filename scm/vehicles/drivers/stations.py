@@ -12,14 +12,13 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.clock import NS_PER_S
 from scm.maps.model import CityMap
-from scm.vehicles.drivers.chance import reached
+from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived
 from scm.vehicles.jit import array_kernel, law
 
 REMEMBER_NS = 3 * NS_PER_S
 LONGEST_GUESS_S = 1.0
 CELL_M = 1.0
 MARGIN_M = 1.0
-KEPT_WHEN_LOSSY = 8
 
 # Columns of a CAM: the middle of the front bumper, speed along the heading, and turn of it.
 CAM_X, CAM_Y, CAM_YAW, CAM_SPEED, CAM_YAW_RATE = range(5)
@@ -43,6 +42,7 @@ class Heard(NamedTuple):
         in_cell: Stations, cell by cell.
         cell_of: (capacity,) of each station, -1: silent.
         floor: See the columns above.
+        channel: What the air does to CAMs on their way.
     """
 
     newest: Ints
@@ -55,9 +55,10 @@ class Heard(NamedTuple):
     in_cell: Ints
     cell_of: Ints
     floor: Floats
+    channel: Channel
 
 
-def nobody(city_map: CityMap, capacity: int, kept: int) -> Heard:
+def nobody(city_map: CityMap, capacity: int, kept: int, channel: Channel) -> Heard:
     """Return the arrays for a map on which nobody has spoken."""
     (x0, x1), (y0, y1) = city_map.floor.x_m, city_map.floor.y_m
     across = max(1, math.ceil((x1 - x0 + 2.0 * MARGIN_M) / CELL_M))
@@ -73,6 +74,7 @@ def nobody(city_map: CityMap, capacity: int, kept: int) -> Heard:
         in_cell=np.zeros(capacity, np.int64),
         cell_of=np.full(capacity, -1, np.int64),
         floor=np.array([x0 - MARGIN_M, y0 - MARGIN_M, across, up, 0.0]),
+        channel=channel,
     )
 
 
@@ -134,10 +136,10 @@ def find_cells(heard: Heard, now_ns: int) -> None:
 
 @law
 def known_to(
-    heard: Heard, station: int, receiver: int, now_ns: int, loss: float, seed: int
+    heard: Heard, station: int, receiver: int, now_ns: int, seed: int
 ) -> tuple[bool, float, float, float, float, float]:
     """Return whether a receiver knows of a station, and (x, y, cos, sin, speed) of it."""
-    if loss <= 0.0:
+    if heard.channel.numbers[IDEAL] > 0.0:
         at = heard.at[station]
         return True, at[AT_X], at[AT_Y], at[AT_COS], at[AT_SIN], at[AT_SPEED]
     kept = len(heard.number)
@@ -147,8 +149,10 @@ def known_to(
         age_ns = now_ns - heard.t_ns[place, station]
         if number < 0 or age_ns > REMEMBER_NS:
             break
-        if reached(loss, seed, station, receiver, number):
-            cam, length = heard.cams[place, station], heard.size[station, 0]
+        cam = heard.cams[place, station]
+        x, y = cam[CAM_X], cam[CAM_Y]
+        if has_arrived(heard.channel, seed, station, receiver, number, x, y, age_ns):
+            length = heard.size[station, 0]
             x, y, cos, sin, speed = moved_on(cam, 1e-9 * age_ns, length)
             return True, x, y, cos, sin, speed
     return False, 0.0, 0.0, 1.0, 0.0, 0.0

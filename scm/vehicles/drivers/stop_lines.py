@@ -2,7 +2,8 @@
 
 A yellow light, or a green one whose promised end has passed, stops a car that can stop with
 comfortable deceleration before the line, and lets the others clear the junction. Whoever went on
-for that reason goes on. Red, flashing red and silence stop everybody.
+for that reason goes on. Red and silence stop everybody. Flashing red is a stop sign for all; where
+the monitor tells of a fault and the lights do not flash, everybody stands.
 """
 
 from scm.arrays import Floats, Ints
@@ -12,10 +13,11 @@ from scm.vehicles.drivers.memory import (
     GOING_LINE,
     HERE,
     IN_SIGHT,
+    SIGN,
     SIGNAL,
     VEHICLE,
 )
-from scm.vehicles.drivers.signal_table import GREEN, YELLOW, Told, believed, frame_for
+from scm.vehicles.drivers.signal_table import FLASHING, GREEN, YELLOW, Told, believed, frame_for
 from scm.vehicles.drivers.streets import GROUP, JUNCTION
 from scm.vehicles.jit import law
 
@@ -64,10 +66,11 @@ def signal_says(
     can_stop: bool,
     car: int,
     now_ns: int,
-    loss: float,
     seed: int,
 ) -> int:
-    """Return what holds a car at a line: SIGNAL; FREE; or VEHICLE, unless there is room behind it.
+    """Return what holds a car at a line: SIGNAL, or nothing: FREE.
+
+    VEHICLE: the others, unless there is room behind it. SIGN: the junction has no signals now.
 
     Args:
         told: The signals.
@@ -78,15 +81,16 @@ def signal_says(
         can_stop: Whether the car would come to rest before it without haste.
         car: The car's number.
         now_ns: The present time [ns].
-        loss: Share of radio frames that get lost.
         seed: Of the luck.
     """
     is_going = ints[GOING_LINE] == line and ints[GOING_INDEX] == index
-    place = frame_for(told, links[line, JUNCTION], car, loss, seed)
+    place = frame_for(told, links[line, JUNCTION], car, now_ns, seed)
     colour = believed(told, links[line, GROUP], links[line, JUNCTION], place, now_ns)
     if colour == GREEN and can_stop and not is_going:
         return VEHICLE
     if colour == GREEN or (colour == YELLOW and (is_going or not can_stop)):
         ints[GOING_LINE], ints[GOING_INDEX] = line, index
         return FREE
-    return SIGNAL
+    is_flashing = told.flashing[place, links[line, JUNCTION]]
+    shows_flash = is_flashing or told.colour[place, links[line, GROUP]] == FLASHING
+    return SIGN if colour == FLASHING and shows_flash else SIGNAL

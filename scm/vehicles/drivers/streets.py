@@ -14,14 +14,16 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.geometry import Pose2
 from scm.maps.model import Lane
-from scm.maps.polyline import advance, extent
+from scm.maps.polyline import advance
 from scm.maps.route import Roads
+from scm.vehicles.drivers.rules import RuleBook, Rules, cut_segments, lines_of
 
 # Columns of a segment: where on its lane, its length, its start pose, 1/radius (+ = left), the
 # lane's speed limit; and the rectangle that holds it.
 AT, LENGTH, X, Y, COS, SIN, YAW, CURVATURE, LIMIT, WEST, SOUTH, EAST, NORTH = range(13)
 # Columns of a stop line: where on its lane. Columns of its links: group and junction by number.
 GROUP, JUNCTION = range(2)
+MICRO = 1e-6
 
 
 class Ways(NamedTuple):
@@ -33,6 +35,7 @@ class Ways(NamedTuple):
         following: Lanes that begin where one ends, by number.
         line_at: Where on its lane each stop line is [m]; `line_links` its group and junction.
         stretches: (n, 2) from and to of where nobody may stop [m]; `stretch_junction` whose.
+        rules: Who goes first at each line.
     """
 
     length: Floats
@@ -46,6 +49,7 @@ class Ways(NamedTuple):
     stretch_first: Ints
     stretches: Floats
     stretch_junction: Ints
+    rules: Rules
 
 
 class Streets:
@@ -63,35 +67,33 @@ class Streets:
         self.roads = roads
         self.names = tuple(lane.name for lane in city_map.lanes)
         self.numbers = {name: number for number, name in enumerate(self.names)}
-        junctions = {junction.name: n for n, junction in enumerate(city_map.junctions)}
-        groups = group_numbers(roads)
-        segments = [_segments(lane) for lane in city_map.lanes]
-        following = [[self.numbers[n] for n in lane.next] for lane in city_map.lanes]
+        names = [junction.name for junction in city_map.junctions]
+        names += [crossing.name for crossing in city_map.crossings]
+        junctions = {name: n for n, name in enumerate(names)}
+        segments = [_segments(roads, lane) for lane in city_map.lanes]
+        segment_first = _firsts(segments)
+        following = [[self.numbers[n] for n in roads.successors(name)] for name in self.names]
         self.goes_round = _endless(following)
         following = [[n for n in row if self.goes_round[n]] or row for row in following]
-        lines = [roads.stop_lines_on(name) for name in self.names]
+        lines = lines_of(roads)
         stretches = [roads.movements_on(name) for name in self.names]
         self.ways = Ways(
             length=np.array([sum(row[LENGTH] for row in rows) for rows in segments], np.float64),
-            segment_first=_firsts(segments),
+            segment_first=segment_first,
             segments=_table([row for rows in segments for row in rows], 13),
             next_first=_firsts(following),
             following=np.array([n for row in following for n in row], np.int64),
             line_first=_firsts(lines),
             line_at=np.array([line.at_m for row in lines for line in row], np.float64),
             line_links=np.array(
-                [
-                    (groups[line.junction, line.group], junctions[line.junction])
-                    for row in lines
-                    for line in row
-                ],
-                np.int64,
+                [(line.group, line.junction) for row in lines for line in row], np.int64
             ).reshape(-1, 2),
             stretch_first=_firsts(stretches),
             stretches=_table([(m.from_m, m.to_m) for row in stretches for _, m in row], 2),
             stretch_junction=np.array(
                 [junctions[name] for row in stretches for name, _ in row], np.int64
             ),
+            rules=RuleBook(roads, lines, segment_first).rules(),
         )
 
     def round_from(self, lane: str) -> tuple[str, ...] | None:
@@ -120,16 +122,6 @@ class Streets:
         return max(largest, float(between.max(initial=0.0)))
 
 
-def group_numbers(roads: Roads) -> dict[tuple[str, str], int]:
-    """Return the number of each signal group, counted through all junctions of the map."""
-    names = (
-        (junction.name, group.name)
-        for junction in roads.city_map.junctions
-        for group in junction.groups
-    )
-    return {name: number for number, name in enumerate(names)}
-
-
 def streets_of(roads: Roads) -> Streets:
     """Return the streets of these roads, made once."""
     found: Streets | None = getattr(roads, "streets", None)
@@ -155,14 +147,15 @@ def _endless(following: list[list[int]]) -> list[bool]:
     return [count > 0 for count in choices]
 
 
-def _segments(lane: Lane) -> list[tuple[float, ...]]:
+def _segments(roads: Roads, lane: Lane) -> list[tuple[float, ...]]:
     pose, at = Pose2(*lane.start), 0.0
     rows: list[tuple[float, ...]] = []
-    for segment in lane.segments:
-        length, curvature = extent(segment)
+    limits = roads.limits_on(lane.name)
+    for length, curvature in cut_segments(roads, lane.name):
         x, y, yaw = pose
         held = _rectangle(pose, length, curvature)
-        cos, sin, limit = math.cos(yaw), math.sin(yaw), lane.speed_limit_mps
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        limit = next(limit for begin, limit in reversed(limits) if begin <= at + MICRO)
         rows.append((at, length, x, y, cos, sin, yaw, curvature, limit, *held))
         pose, at = advance(pose, length, curvature), at + length
     return rows

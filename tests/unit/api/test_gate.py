@@ -1,32 +1,58 @@
+import asyncio
+
+import httpx
 import pytest
+from fastapi.routing import APIRoute
 
 from scm.api.app import create_app
-from scm.api.gate import check_bind, content_policy, is_loopback
+from scm.api.brake import Brake
+from scm.api.gate import Gate, check_bind, content_policy, is_loopback
+from scm.api.keys import KeyRing
+from scm.api.roles import ROLES, AtLeast
+from scm.clock import NS_PER_S, StepClock
 from scm.errors import RunError
+from scm.store.memory import MemoryStore
 from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.monitor_reset import MonitorReset
+from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.stop_request import StopRequest
 
-KEY = "a-long-enough-key"
 STOP = "/api/v1/stop"
 
 
 @pytest.fixture
-def keyed_app(view, fake_city, city_map):
+def ring():
+    return KeyRing(MemoryStore())
+
+
+@pytest.fixture
+def key_of(ring):
+    """Make a key of a role."""
+    return lambda role: ring.add("anna", role, 1)
+
+
+@pytest.fixture
+def keyed_app(view, fake_city, city_map, ring):
     fake_city.answers[StopRequest] = CityStop(t_ns=1, engaged=True)
-    return create_app(view, fake_city.ask, city_map, api_key=KEY)
+    return create_app(view, fake_city.ask, city_map, keys=ring)
 
 
 def put_stop(client, **headers):
     return client("PUT", STOP, json={"engaged": True}, headers=headers)
 
 
+def bearer(key):
+    return {"Authorization": f"Bearer {key}"}
+
+
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.4", "::", "city.example"])
-def test_a_public_address_without_a_key_is_refused(host):
+def test_a_public_address_without_a_key_is_refused(host, ring, key_of):
     with pytest.raises(RunError, match="API key"):
         check_bind(host, None)
     with pytest.raises(RunError, match="API key"):
-        check_bind(host, "")
-    check_bind(host, KEY)
+        check_bind(host, ring)
+    key_of("viewer")
+    check_bind(host, ring)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.8.8.8", "localhost", "::1"])
@@ -72,24 +98,125 @@ class TestWithoutKey:
         assert fake_city.asked == []
 
 
-class TestWithKey:
-    def test_everybody_may_read(self, keyed_app, client_of):
-        client = client_of(keyed_app, "http://city.example")
-        assert client("GET", "/api/v1/cars").status_code == 200
+class TestWithKeys:
+    @pytest.mark.parametrize("path", ["/", "/docs", "/healthz", "/api/v1/openapi.json"])
+    def test_what_tells_nothing_of_the_city_is_open(self, keyed_app, client_of, path):
+        assert client_of(keyed_app, "http://city.example")("GET", path).status_code == 200
 
-    @pytest.mark.parametrize(
-        "headers",
-        [{}, {"Authorization": "Bearer wrong"}, {"Authorization": f"Basic {KEY}"}],
-    )
-    def test_a_change_without_the_key_is_refused(self, keyed_app, client_of, fake_city, headers):
+    @pytest.mark.parametrize("path", ["/api/v1/cars", "/api/v1/stream", "/api/v1/keys"])
+    def test_nobody_reads_without_a_key(self, keyed_app, client_of, path):
+        response = client_of(keyed_app)("GET", path)
+        assert (response.status_code, response.json()["code"]) == (401, "unauthorised")
+
+    @pytest.mark.parametrize("headers", [{}, {"Authorization": "Bearer wrong"}])
+    def test_a_change_without_a_key_is_refused(self, keyed_app, client_of, fake_city, headers):
         response = put_stop(client_of(keyed_app), **headers)
         assert (response.status_code, response.json()["code"]) == (401, "unauthorised")
         assert response.headers["www-authenticate"] == "Bearer"
         assert fake_city.asked == []
 
-    def test_a_change_with_the_key_passes(self, keyed_app, client_of):
+    def test_a_key_is_a_bearer_and_nothing_else(self, keyed_app, client_of, key_of):
+        headers = {"Authorization": f"Basic {key_of('admin')}"}
+        assert put_stop(client_of(keyed_app), **headers).status_code == 401
+
+    @pytest.mark.parametrize(
+        ("method", "path", "body", "least"),
+        [
+            ("GET", "/api/v1/cars", None, "viewer"),
+            ("PUT", STOP, {"engaged": True}, "operator"),
+            ("POST", "/api/v1/signals/crossing/monitor/reset", {"reason": "seen"}, "engineer"),
+            ("GET", "/api/v1/keys", None, "admin"),
+        ],
+    )
+    def test_each_role_may_do_what_those_below_may_and_more(
+        self, keyed_app, client_of, fake_city, key_of, method, path, body, least
+    ):
+        fake_city.answers[MonitorReset] = MonitorStatus(
+            junction="crossing", t_ns=1, since_ns=1, fault=None, detail=""
+        )
         client = client_of(keyed_app, "http://city.example")
-        assert put_stop(client, Authorization=f"Bearer {KEY}").status_code == 200
+        for role in ROLES:
+            response = client(method, path, json=body, headers=bearer(key_of(role)))
+            may = ROLES.index(role) >= ROLES.index(least)
+            assert response.status_code == (200 if may else 403), (role, response.text)
+            assert may or least in response.json()["detail"]
+
+    def test_a_revoked_key_ends_at_once(self, keyed_app, client_of, key_of, ring):
+        client, key = client_of(keyed_app), key_of("operator")
+        assert put_stop(client, **bearer(key)).status_code == 200
+        ring.revoke(key.split("_")[1])
+        assert put_stop(client, **bearer(key)).status_code == 401
+
+    def test_an_admin_ends_a_key(self, keyed_app, client_of, key_of):
+        client, admin, other = client_of(keyed_app), key_of("admin"), key_of("viewer")
+        listed = client("GET", "/api/v1/keys", headers=bearer(admin))
+        assert {row["role"] for row in listed.json()["keys"]} == {"admin", "viewer"}
+        assert other.split("_", 2)[2] not in listed.text
+        path = f"/api/v1/keys/{other.split('_')[1]}"
+        assert client("DELETE", path, headers=bearer(admin)).status_code == 200
+        assert client("DELETE", path, headers=bearer(admin)).status_code == 404
+        assert client("GET", "/api/v1/cars", headers=bearer(other)).status_code == 401
+
+    def test_a_page_reads_with_a_cookie_and_changes_with_its_key_alone(
+        self, keyed_app, client_of, key_of, fake_city
+    ):
+        client = client_of(keyed_app)
+        begun = client("PUT", "/api/v1/session", headers=bearer(key_of("operator")))
+        cookie = begun.headers["set-cookie"]
+        assert {"HttpOnly", "SameSite=strict", "Path=/api"} <= set(cookie.split("; "))
+        with_cookie = {"Cookie": cookie.split(";")[0]}
+        assert client("GET", "/api/v1/cars", headers=with_cookie).status_code == 200
+        who = client("GET", "/api/v1/session", headers=with_cookie).json()
+        assert who == {"owner": "anna", "role": "operator"}
+        assert put_stop(client, **with_cookie).status_code == 401
+        assert fake_city.asked == []
+
+    def test_guessing_is_slowed_down_for_the_address_it_comes_from(
+        self, view, fake_city, city_map, ring, key_of
+    ):
+        clock = StepClock()
+        fake_city.answers[StopRequest] = CityStop(t_ns=1, engaged=True)
+        inner = create_app(view, fake_city.ask, city_map, keys=ring)
+        gate = Gate(inner, keys=ring, policy="", brake=Brake(clock))
+        key, guess = key_of("operator"), bearer("wrong")
+        codes = [call_from(gate, "10.0.0.9", guess).status_code for _ in range(12)]
+        assert codes == [401] * 10 + [429] * 2
+        slowed = call_from(gate, "10.0.0.9", bearer(key))  # nor is a right one tried
+        assert (slowed.status_code, slowed.headers["retry-after"]) == (429, "5")
+        assert call_from(gate, "10.0.0.8", bearer(key)).status_code == 200
+        clock.set_ns(6 * NS_PER_S)
+        assert call_from(gate, "10.0.0.9", bearer(key)).status_code == 200
+
+
+def call_from(app, address, headers):
+    async def call():
+        transport = httpx.ASGITransport(app, client=(address, 1))
+        async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1") as client:
+            return await client.get("/api/v1/cars", headers=headers)
+
+    return asyncio.run(call())
+
+
+def test_addresses_of_one_ipv6_network_are_one_guesser():
+    brake = Brake(StepClock())
+    for i in range(10):
+        brake.note_wrong(f"2001:db8::{i + 1}")
+    assert brake.wait_s("2001:db8::ffff") == pytest.approx(5.0)
+    assert brake.wait_s("2001:db8:0:1::1") == 0.0
+
+
+def test_every_route_names_its_least_role_and_no_change_is_for_viewers(app):
+    for route in app.routes:
+        if not isinstance(route, APIRoute) or not route.path.startswith("/api/"):
+            continue
+        roles = [
+            ROLES.index(found.call.role)
+            for found in route.dependant.dependencies
+            if isinstance(found.call, AtLeast)
+        ]
+        least = 0 if route.methods <= {"GET"} or route.path == "/api/v1/session" else 1
+        assert roles, route.path
+        assert max(roles) >= least, route.path
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", "/api/v1/cars", "/nothing", "/static/js/app.js"])

@@ -54,6 +54,12 @@ def test_a_car_changes_only_the_pixels_around_it(still):
     assert len(rows) > 5000
 
 
+@pytest.mark.parametrize("tag_id", [-1, 587, 10**9])
+def test_a_car_with_a_number_that_no_tag_has_drives_without_one(still, tag_id):
+    seen = ids(still.render(light(msgspec.structs.replace(CAR, tag_id=tag_id))))
+    assert seen == [0]
+
+
 def test_the_sensors_noise_has_the_cameras_sigma():
     noisy = source_of(noise_sigma=3.0)
     difference = noisy.render(light()).astype(float) - noisy.render(light()).copy()

@@ -115,6 +115,7 @@ def test_the_recorder_says_how_it_is_doing_once_a_second(tmp_path: Path) -> None
         (b"[" * 20_000, None, None),
         (b"\x01\x02", b"no json", {"unreadable": "bm8ganNvbg==", "payload": "AQI="}),
         (b"\x01\x02", b"[1]", {"unreadable": "WzFd", "payload": "AQI="}),
+        (b"\x01\x02", b'{"\xe1\xe1":1}', {"unreadable": "eyLh4SI6MX0=", "payload": "AQI="}),
         (b"\x01\x02", b"", {"unreadable": "", "payload": "AQI="}),
     ],
 )

@@ -1,8 +1,6 @@
 """Every reachable state of the kernel under every wish is safe; every mutant of it is caught."""
 
-import types
 from itertools import combinations
-from pathlib import Path
 
 import pytest
 
@@ -10,6 +8,7 @@ from scm.errors import PlanError
 from scm.traffic import kernel
 from scm.traffic.kernel import GroupTimes, Phase, Program
 from scm.traffic.proof import in_steps, prove
+from tests.unit.traffic.mutants import KERNEL, mutant_of
 
 
 def pairs(*names):
@@ -44,59 +43,9 @@ def test_no_state_of_a_dual_ring_of_eight_phases_is_unsafe():
     assert walked.transitions > 80_000
 
 
-MUTANTS = {
-    "all-red left out": (
-        "return GroupState(Phase.CLEARANCE)\n        case Phase.CLEARANCE",
-        "return GroupState(Phase.RED)\n        case Phase.CLEARANCE",
-    ),
-    "all-red too short": ("elapsed >= times.clearance", "True"),
-    "all-red does not guard": (
-        "_ACTIVE = (Phase.GREEN, Phase.YELLOW, Phase.CLEARANCE)",
-        "_ACTIVE = (Phase.GREEN, Phase.YELLOW)",
-    ),
-    "yellow does not guard": (
-        "_ACTIVE = (Phase.GREEN, Phase.YELLOW, Phase.CLEARANCE)",
-        "_ACTIVE = (Phase.GREEN, Phase.CLEARANCE)",
-    ),
-    "green does not guard": (
-        "_ACTIVE = (Phase.GREEN, Phase.YELLOW, Phase.CLEARANCE)",
-        "_ACTIVE = (Phase.YELLOW, Phase.CLEARANCE)",
-    ),
-    "min green ignored": ("elapsed >= times.min_green:", "True:"),
-    "yellow too short": ("elapsed >= times.yellow", "True"),
-    "yellow as short as all-red": ("elapsed >= times.yellow", "elapsed >= times.clearance"),
-    "yellow skipped": ("else GroupState(Phase.YELLOW)", "else GroupState(Phase.CLEARANCE)"),
-    "conflicts ignored": ("in program.conflicts", "in ()"),
-    "two start at once": ("_is_free(program, after, name)", "_is_free(program, list(state), name)"),
-    "flash ends without clearing": (
-        "case Phase.FLASH:\n            return GroupState(Phase.CLEARANCE)",
-        "case Phase.FLASH:\n            return GroupState(Phase.RED)",
-    ),
-    "power-on without clearing": (
-        "return tuple(GroupState(Phase.CLEARANCE) for _",
-        "return tuple(GroupState(Phase.RED) for _",
-    ),
-    "green that nobody wished": ("is Phase.RED and name in wishes and", "is Phase.RED and"),
-    "never green": (
-        "is Phase.RED and name in wishes",
-        "is Phase.RED and name not in program.groups",
-    ),
-    "flash ignored": ("if flash:", "if flash and not state:"),
-    "time not counted": (
-        "else GroupState(group.phase, elapsed)",
-        "else GroupState(group.phase, group.elapsed)",
-    ),
-    "a green never ends": ("times.min_green) if wished", "times.min_green) if True"),
-}
-
-
-@pytest.mark.parametrize("name", sorted(MUTANTS))
+@pytest.mark.parametrize("name", sorted(KERNEL))
 def test_a_mutant_of_the_kernel_is_caught(name):
-    old, new = MUTANTS[name]
-    source = Path(kernel.__file__).read_text(encoding="utf-8")
-    assert source.count(old) == 1
-    mutant = types.ModuleType("mutant")
-    exec(compile(source.replace(old, new), "mutant", "exec"), mutant.__dict__)
+    mutant = mutant_of(kernel, *KERNEL[name])
     with pytest.raises(PlanError, match="unsafe"):
         prove_all(mutant)
 

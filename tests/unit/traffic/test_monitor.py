@@ -157,6 +157,12 @@ def test_silence_of_more_than_500_ms_is_stale():
     assert watch(stream("rr    rr", "rrrrrrrr")).fault is None
 
 
+def test_an_output_that_hangs_and_says_the_same_again_and_again_is_stale():
+    before = [spat(100 * k, ("a", "r"), ("b", "r")) for k in range(3)]
+    assert watch([*before, *[before[-1]] * 5]).fault is None
+    assert watch([*before, *[before[-1]] * 6]).fault == "stale"
+
+
 def test_a_controller_never_seen_has_five_seconds_and_its_silence_ends_with_its_first_word():
     monitor = watch([None] * 51)
     assert monitor.fault is None

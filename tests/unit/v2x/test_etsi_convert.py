@@ -7,11 +7,21 @@ import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.model import Conflict, Group, Junction
 from scm.v2x import etsi_convert as ec
-from scm.v2x.etsi import SCALE, CamBody, MovementState, SpatemBody
+from scm.v2x.etsi import (
+    PHASE_STATES,
+    SCALE,
+    HighFrequencyContainer,
+    MovementEvent,
+    SpatemBody,
+    VehicleHighFrequency,
+    VehicleLength,
+)
+from scm.v2x.etsi_parts import Heading, Speed
 from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.v2x.messages.vehicle_state import VehicleState
 
@@ -89,51 +99,54 @@ def test_a_cam_read_back_is_the_car_within_the_fields_resolution(x, y, yaw, spee
 
 def test_the_air_knows_the_enlarged_city():
     cam = a_cam(x_m=1.0, y_m=2.0, accel_mps2=0.5)
-    assert cam.speed == 364
-    assert (cam.vehicle_length, cam.vehicle_width) == (36, 28)
-    assert cam.longitudinal_acceleration == 70
-    assert cam.longitude == pytest.approx(1.2 * 14 / 111_319.49 * 1e7, abs=1)
-    assert cam.latitude == pytest.approx(2.0 * 14 / 110_574.28 * 1e7, abs=1)
+    assert cam.motion.speed.value == 364
+    assert (cam.motion.vehicle_length.value, cam.motion.vehicle_width) == (36, 28)
+    assert cam.motion.longitudinal_acceleration.value == 70
+    assert cam.position.longitude == pytest.approx(1.2 * 14 / 111_319.49 * 1e7, abs=1)
+    assert cam.position.latitude == pytest.approx(2.0 * 14 / 110_574.28 * 1e7, abs=1)
 
 
 @pytest.mark.parametrize(
     ("yaw", "heading"), [(0.0, 900), (math.pi / 2, 0), (math.pi, 2700), (-math.pi / 2, 1800)]
 )
 def test_heading_runs_clockwise_from_north(yaw, heading):
-    assert a_cam(yaw_rad=yaw).heading == heading
+    assert a_cam(yaw_rad=yaw).motion.heading.value == heading
 
 
 def test_a_heading_just_west_of_north_wraps_to_zero_and_never_reaches_3600():
-    assert a_cam(yaw_rad=math.pi / 2 + 1e-6).heading == 0
+    assert a_cam(yaw_rad=math.pi / 2 + 1e-6).motion.heading.value == 0
 
 
 def test_a_left_turn_has_positive_curvature_and_a_standing_car_unknown():
-    assert a_cam(yaw_rate_radps=0.026).curvature == round(0.1 / SCALE * 1e4)
-    assert a_cam(yaw_rate_radps=-5.0).curvature == -1022
-    assert a_cam(speed_mps=0.0).curvature == 1023
+    assert a_cam(yaw_rate_radps=0.026).motion.curvature.value == round(0.1 / SCALE * 1e4)
+    assert a_cam(yaw_rate_radps=-5.0).motion.curvature.value == -1022
+    assert a_cam(speed_mps=0.0).motion.curvature.value == 1023
 
 
 def test_what_does_not_fit_is_the_largest_value_not_the_unknown_one():
-    cam = a_cam(speed_mps=100.0, yaw_rate_radps=1e3, accel_mps2=-99.0)
-    assert (cam.speed, cam.yaw_rate, cam.longitudinal_acceleration) == (16382, 32766, -160)
+    motion = a_cam(speed_mps=100.0, yaw_rate_radps=1e3, accel_mps2=-99.0).motion
+    assert (motion.speed.value, motion.yaw_rate.value) == (16382, 32766)
+    assert motion.longitudinal_acceleration.value == -160
 
 
 def test_driving_backward_is_a_direction_and_not_a_negative_speed():
     cam = a_cam(speed_mps=-0.1)
-    assert (cam.speed, cam.drive_direction) == (140, 1)
+    assert (cam.motion.speed.value, cam.motion.drive_direction) == (140, 1)
     assert ec.read_cam(cam).speed_mps == pytest.approx(-0.1)
 
 
 def test_unknown_values_are_none():
-    cam = CamBody(
-        station_id=1,
-        generation_delta_time=0,
-        latitude=0,
-        longitude=0,
-        heading=3601,
-        speed=16383,
-        vehicle_length=1,
+    motion = VehicleHighFrequency(
+        heading=Heading(value=3601),
+        speed=Speed(value=16383),
+        vehicle_length=VehicleLength(value=1),
         vehicle_width=1,
+    )
+    cam = replace(
+        a_cam(),
+        high_frequency_container=HighFrequencyContainer(
+            basic_vehicle_container_high_frequency=motion
+        ),
     )
     view = ec.read_cam(cam)
     assert (view.yaw_rad, view.speed_mps, view.yaw_rate_radps) == (None, None, None)
@@ -156,7 +169,9 @@ def test_a_spatem_names_junction_groups_phase_and_time():
     body = ec.spatem_of(a_spat(max_end_ns=NOW + 2 * NS_PER_S, revision=130), JUNCTION)
     assert (body.intersection, body.revision, body.status) == (7, 2, ("fixedTimeOperation",))
     assert body.station_id == ec.station_id("rsu-centre")
-    assert (body.moy, body.time_stamp) == ((325 - 1) * 1440 + 843, 5000)
+    junction = body.intersections[0]
+    assert body.timestamp == junction.moy == (325 - 1) * 1440 + 843
+    assert (junction.timestamp, junction.status) == (5000, "0000010000000000")
     assert [s.signal_group for s in body.states] == [1, 2]
     assert body.states[0].event_state == "protected-Movement-Allowed"
     assert (body.states[0].min_end_time, body.states[0].max_end_time) == (1860, 1870)
@@ -208,17 +223,14 @@ def test_flash_promises_nothing_and_says_failure(colour):
 
 @pytest.mark.parametrize(
     "state",
-    ["permissive-Movement-Allowed", "unavailable", "caution-Conflicting-Traffic", "nonsense"],
+    ["permissive-Movement-Allowed", "unavailable", "caution-Conflicting-Traffic"],
 )
 def test_only_a_protected_movement_is_green(state):
-    body = SpatemBody(
-        station_id=1,
-        intersection=1,
-        revision=1,
-        moy=0,
-        time_stamp=0,
-        states=(MovementState(signal_group=1, event_state=state, min_end_time=36001),),
-    )
+    spatem = ec.spatem_of(a_spat(), JUNCTION)
+    event = MovementEvent(event_state=PHASE_STATES.index(state))
+    group = replace(spatem.states[0], state_time_speed=(event,))
+    junction = replace(spatem.intersections[0], states=(group,))
+    body = replace(spatem, intersections=(junction,))
     assert ec.colours_of(body)[1] == ("dark", None, None)
 
 
@@ -226,4 +238,9 @@ def test_the_records_travel_as_json_with_the_names_of_the_open_json_schemas():
     body = ec.spatem_of(a_spat(), JUNCTION)
     raw = msgspec.json.encode(body)
     assert msgspec.json.decode(raw, type=SpatemBody) == body
-    assert {"protocol_version", "station_id", "time_stamp"} <= set(msgspec.json.decode(raw))
+    assert set(msgspec.json.decode(raw)) == {
+        "protocol_version",
+        "station_id",
+        "timestamp",
+        "intersections",
+    }

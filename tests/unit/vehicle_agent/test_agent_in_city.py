@@ -205,12 +205,12 @@ def test_the_city_stop_stops_the_car_and_its_release_lets_it_drive(city, watch):
     assert watch.state("n1").mode == "drive"
 
 
-def test_flashing_red_holds_the_car_at_its_line(city, city_map, watch):
+def test_flashing_red_is_a_stop_sign(city, city_map, watch):
     city.add(AgentPart("n1"))
     city.call(PlanRequest(junction="crossing", plan="flash", by="test"))
     city.run_for(40.0)
-    assert list(crossings(city_map, watch.all(WorldSnapshot))) == []
-    assert watch.all(Trip)[-1].waiting_for == "signal"
+    assert list(crossings(city_map, watch.all(WorldSnapshot)))
+    assert "sign" in {trip.waiting_for for trip in watch.all(Trip)}
 
 
 def test_without_signals_the_car_waits_at_its_line(city_map):

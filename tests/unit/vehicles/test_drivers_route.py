@@ -161,7 +161,20 @@ def test_the_bumper_stops_two_to_six_centimetres_before_a_red_line(scene):
     assert run.driver.waiting_for == "signal"
 
 
-@pytest.mark.parametrize("colour", ["flashing_red", "dark", "red"])
+def test_flashing_red_is_a_stop_sign(scene):
+    run = scene()
+    run.colour = "flashing_red"
+    rested = False
+    for _ in range(150):
+        run.run(0.2)
+        rested = rested or (run.car.speed < 0.005 and 0.02 <= run.bumper_before_line <= 0.06)
+        if run.bumper_before_line < 0.0:
+            break
+    assert rested
+    assert run.bumper_before_line < 0.0
+
+
+@pytest.mark.parametrize("colour", ["dark", "red"])
 def test_a_car_that_waits_does_not_go_on(scene, colour):
     run = scene()
     run.colour = colour

@@ -1,18 +1,26 @@
 """A frame reaches who is in range, loses its share, and every fate is counted."""
 
+import math
+
 import numpy as np
 import pytest
 
-from scm.maps.model import CityMap, Floor, Group, Junction, Light, MapTag
+from scm.maps.model import CityMap, Floor, Group, Junction, Light, MapTag, RadioChannel
 from scm.maps.model import Conflict as Stretch
+from scm.v2x.messages.part_status import PartStatus
+from scm.vehicles.drivers.channel import channel_of
+from scm.world.late import Late
 from scm.world.radio import Radio, Receivers, roadside_places
 
 PLACES = {"n1": (0.0, 0.0), "n2": (3.0, 4.0), "n3": (0.0, 5.1), "rsu-x": (1.0, 0.0)}
 STATIONS = Receivers(PLACES)
+WALLS = [[2.0, -1.0, 2.0, 9.0]]
 
 
-def radio(range_m=5.0, loss=0.0, seed=0):
-    return Radio(range_m, np.random.default_rng(seed), loss)
+def radio(range_m=5.0, loss=0.0, seed=0, **more):
+    settings = RadioChannel(loss=loss, **more)
+    channel = channel_of(settings, range_m, 0, np.array(WALLS))
+    return Radio(channel, np.random.default_rng(seed))
 
 
 def heard(air, *senders):
@@ -71,3 +79,52 @@ def test_a_roadside_unit_stands_amid_the_lights_of_its_junction():
         lights=lights,
     )
     assert roadside_places(city_map) == {"rsu-main": (2.0, 2.0)}
+
+
+def shares(air, distance_m, load=0.0, frames=4000):
+    """Return what share of frames is heard at a distance."""
+    places = Receivers({"there": (distance_m, 0.0)})
+    x = np.zeros(frames)
+    return air.reach(["here"] * frames, x, x, places, np.array([load])).mean()
+
+
+@pytest.mark.parametrize("distance_m", [2.0, 5.0, 8.0])
+def test_loss_by_distance_follows_the_formula(distance_m):
+    margin_db = 10.0 * 2.5 * np.log10(5.0 / distance_m)
+    wanted = 1.0 - 0.5 * math.erfc(margin_db / (6.0 * math.sqrt(2.0)))
+    air = radio(fading_db=6.0, path_loss_exponent=2.5)
+    assert shares(air, distance_m) == pytest.approx(wanted, abs=0.03)
+
+
+def test_causes_of_loss_add_up_as_independent_ones():
+    air = radio(loss=0.2, fading_db=6.0)
+    assert shares(air, 5.0, load=0.25) == pytest.approx(0.8 * 0.5 * 0.75, abs=0.03)
+    counts = air.counts
+    assert counts.by_chance + counts.by_distance + counts.by_load == counts.lost
+    assert counts.by_chance / 4000 == pytest.approx(0.2, abs=0.03)
+    assert counts.by_distance / 4000 == pytest.approx(0.8 * 0.5, abs=0.03)
+
+
+def test_a_wall_between_shadows_and_one_beside_does_not():
+    air = radio(wall_db=10.0, range_m=5.0)
+    assert shares(air, 1.9) == 1.0
+    assert shares(air, 2.1) == 0.0
+
+
+def test_delays_lie_between_the_least_and_the_most():
+    air = radio(delay_ms=30.0, jitter_ms=50.0)
+    delays_ms = air.delays(2000) / 1e6
+    assert delays_ms.min() >= 30.0
+    assert delays_ms.max() <= 80.0
+    assert delays_ms.mean() == pytest.approx(55.0, abs=2.0)
+    assert air.counts.late == 2000
+
+
+def test_late_frames_come_in_the_order_of_their_time_and_never_before():
+    late = Late()
+    for due_ns, name in ((50, "b"), (20, "a"), (50, "c")):
+        late.put(due_ns, PartStatus(station=name, t_ns=0))
+    assert late.arrived(19) == []
+    assert [frame.station for frame in late.arrived(49)] == ["a"]
+    assert [frame.station for frame in late.arrived(50)] == ["b", "c"]
+    assert len(late) == 0

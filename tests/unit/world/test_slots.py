@@ -48,3 +48,16 @@ def test_the_nearest_car_is_looked_for_among_those_that_are_there():
     slots.take("n2", Pose2(3.0, 2.0, 0.0), hosted=False)
     slots.free(gone)
     assert slots.nearest_m(here) == 5.0
+
+
+def test_a_car_that_comes_counts_from_where_it_soon_will_be_and_one_that_goes_does_not():
+    slots = Slots(2)
+    place = Pose2(1.0, 0.0, 0.0)
+    comes = slots.take("n1", Pose2(0.4, 0.0, 0.0), hosted=True)
+    slots.speed[comes] = 0.25
+    assert slots.nearest_m(place) == pytest.approx(0.6)
+    assert slots.nearest_m(place, ahead_s=1.5) == pytest.approx(0.6 - 1.5 * 0.25)
+    slots.speed[comes] = -0.25
+    assert slots.nearest_m(place, ahead_s=1.5) == pytest.approx(0.6)
+    slots.speed[comes] = 0.8  # it will have passed by then: it counts from where it is nearest
+    assert slots.nearest_m(place, ahead_s=1.5) == pytest.approx(0.0, abs=1e-9)

@@ -1,5 +1,7 @@
 """What the world is asked: spawn, join, remove, route, lease, stop; refusals say why."""
 
+import math
+
 import pytest
 
 from scm.geometry import Pose2
@@ -19,6 +21,7 @@ from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.world_definition import WorldDefinition
+from scm.world.requests import is_free
 
 MAP = load_map("driving_school")
 
@@ -193,14 +196,6 @@ def test_the_red_button_stops_cars_and_releasing_it_lets_them_drive(city):
     assert city.shown("n1").speed_mps > 0.1
 
 
-def test_a_world_that_is_started_again_under_the_stop_keeps_it(make_city):
-    city = make_city(hosted=(("n1", "nigel"),), stopped_by="ann")
-    city.run_for(2.0)
-    first = city.heard(CityStop)[0]
-    assert (first.engaged, first.by) == (True, "ann")
-    assert city.shown("n1").speed_mps == pytest.approx(0.0, abs=1e-3)
-
-
 def test_the_red_button_is_repeated_every_second_while_engaged(city):
     city.ask(StopRequest(engaged=True, by="ann"))
     city.run_for(3.0)
@@ -304,6 +299,29 @@ def test_a_remote_car_that_drives_into_a_standing_one_is_told_of_the_contact(cit
     assert "n1" in told.against
     assert (told.dvx_mps, told.dvy_mps) != (0.0, 0.0)
     assert "contact" in city.events()
+
+
+def test_a_remote_car_that_says_nothing_is_not_pushed_faster_than_who_pushes_it(make_city):
+    city = make_city(hosted=(("n1", "nigel"),))
+    city.run_for(2.0)  # n1 drives
+    city.join()
+    ahead = city.world.hosted["n1"].pose @ Pose2(0.32, 0.0, 0.0)
+    city.run(2, city.report(x=ahead.x, y=ahead.y, yaw_rad=ahead.yaw))
+    city.run_for(0.9)
+    told = [contact for contact in city.heard(Contact) if "n1" in contact.against]
+    gained = math.hypot(sum(c.dvx_mps for c in told), sum(c.dvy_mps for c in told))
+    assert 0.02 < gained < 0.3
+
+
+def test_nobody_is_put_before_a_car_that_comes(make_city):
+    city = make_city(hosted=(("n1", "nigel"),))
+    city.run_for(1.5)
+    car = city.world.hosted["n1"]
+    x, y, yaw = car.pose
+    near = Pose2(x + 0.6 * math.cos(yaw), y + 0.6 * math.sin(yaw), yaw)
+    assert car.speed > 0.2
+    assert not is_free(city.world, near)
+    assert is_free(city.world, Pose2(x - 0.6 * math.cos(yaw), y - 0.6 * math.sin(yaw), yaw))
 
 
 def test_the_same_seed_gives_the_same_run_bit_for_bit(make_city):

@@ -53,6 +53,22 @@ async function send(method, path, body, requestId) {
   throw new Error(reply.detail || reply.title || `${method} ${path}: ${response.status}`);
 }
 
+/**
+ * Make sure that this page may read: ask for a key as long as the city wants one.
+ * @returns whether it may; false when the person gives none.
+ */
+export async function enter() {
+  while ((await fetch("/api/v1/session")).status === 401) {
+    const key = sessionStorage.getItem(KEY);
+    if (!key && !(await askForKey())) return false;
+    const headers = { Authorization: `Bearer ${sessionStorage.getItem(KEY)}` };
+    const reply = await fetch("/api/v1/session", { method: "PUT", headers });
+    if (!reply.ok) sessionStorage.removeItem(KEY);
+    if (reply.status === 429) await new Promise((resolve) => setTimeout(resolve, 5000));
+  }
+  return true;
+}
+
 async function askForKey() {
   const key = await new Promise((resolve) => (keyWanted.value = resolve));
   keyWanted.value = null;

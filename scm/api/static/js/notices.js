@@ -27,7 +27,7 @@ export function KeyDialog() {
   };
   return html`
     <${Dialog} title="API key" onClose=${() => answer("")}>
-      <p>Changes to this city need its API key. It is kept for this tab only.</p>
+      <p>This city asks for an API key. It is kept for this tab.</p>
       <form onSubmit=${submit}>
         <input name="key" type="password" autocomplete="off" required aria-label="API key" />
         <div class="actions">

@@ -1,5 +1,6 @@
 /** The one store: what the live stream told last, and how fresh it is. */
 import { batch, computed, signal } from "@preact/signals";
+import { enter } from "./api.js";
 
 const EVENTS_KEPT = 200;
 const STALE_MS = 500;
@@ -98,7 +99,11 @@ let run = null;
 function listen() {
   const source = new EventSource("/api/v1/stream");
   source.onopen = () => (connected.value = true);
-  source.onerror = () => (connected.value = false);
+  source.onerror = () => {
+    connected.value = false;
+    // Refused for good, as with a key that has ended: a stream that only broke tries again itself.
+    if (source.readyState === EventSource.CLOSED) again();
+  };
   source.addEventListener("snapshot", (message) => {
     const topics = JSON.parse(message.data);
     // After a restart of the server its events are numbered from one again.
@@ -121,9 +126,16 @@ function keepTime() {
   }, 100);
 }
 
+async function again() {
+  const may = await enter().catch(() => null);
+  if (may) listen();
+  else if (may === null) setTimeout(again, 2000);
+}
+
 /** Begin: fetch the map once, then listen for ever. */
 export async function start() {
   keepTime();
+  if (!(await enter().catch(() => true))) return;
   listen();
   const response = await fetch("/api/v1/map");
   city.value = await response.json();

@@ -10,12 +10,13 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import Pose2
 from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
+from scm.maps.model import RadioChannel
 from scm.maps.route import Roads
 from scm.traffic.part import TrafficPart
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers.chance import reached
+from scm.vehicles.drivers.channel import channel_of, has_arrived
 from scm.vehicles.drivers.crowd import Crowd
 from scm.vehicles.drivers.memory import WAITING_FOR
 from scm.vehicles.drivers.streets import Streets
@@ -243,7 +244,7 @@ def test_nobody_enters_a_junction_whose_exit_is_full_even_if_all_roll_there(grid
 
 
 def test_with_all_frames_lost_nobody_is_seen(eight):
-    city = City(eight, [("east_loop", 0.3), ("east_loop", 1.2)], loss=1.0)
+    city = City(eight, [("east_loop", 0.3), ("east_loop", 1.2)], radio=RadioChannel(loss=1.0))
     city.driven[1] = False
     for _ in range(300):
         city.tick()
@@ -251,11 +252,16 @@ def test_with_all_frames_lost_nobody_is_seen(eight):
 
 
 def test_with_some_frames_lost_cars_still_keep_apart(eight):
-    city = City(eight, [("east_loop", 0.3), ("east_loop", 1.2)], loss=0.3)
+    city = City(eight, [("east_loop", 0.3), ("east_loop", 1.2)], radio=RadioChannel(loss=0.3))
     city.driven[1] = False
     for _ in range(400):
         city.tick()
     assert touching(city) == []
+
+
+def reached(loss, seed, sender, receiver, frame):
+    air = channel_of(RadioChannel(loss=loss), 20.0, 1 + receiver, np.zeros((0, 4)))
+    return has_arrived(air, seed, sender, receiver, frame, 0.0, 0.0, 0)
 
 
 def test_luck_takes_its_share_of_frames_evenly():

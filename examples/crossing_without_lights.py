@@ -1,0 +1,93 @@
+"""Four cars meet where there are no lights, and only the radio tells them of each other.
+
+Each approaches from another side at the same time; who goes first they work out from their CAMs:
+all must stop, and who stood there first goes first. The radio gets worse from row to row.
+    python examples/crossing_without_lights.py
+"""
+
+import itertools
+import math
+
+import numpy as np
+from msgspec.structs import replace
+
+from scm.lockstep import Lockstep
+from scm.maps.grid_city import grid_city
+from scm.maps.model import RadioChannel, Sign
+from scm.v2x.messages.route_request import RouteRequest
+from scm.world.driving import send
+from scm.world.part import WorldPart
+
+ARMS = {"e": "j0_1_e", "n": "j1_0_n", "w": "j2_1_w", "s": "j1_2_s"}
+LINE_M, BEFORE_M, LONGEST_S = 4.78, 0.9, 90.0
+RADIOS = {
+    "perfect": RadioChannel(),
+    "30 % lost": RadioChannel(loss=0.3),
+    "70 % lost": RadioChannel(loss=0.7),
+    "90 % lost": RadioChannel(loss=0.9),
+    "300 ms late": RadioChannel(delay_ms=250.0, jitter_ms=100.0),
+    "both": RadioChannel(loss=0.5, delay_ms=150.0, jitter_ms=100.0),
+}
+
+
+def crossing(radio: RadioChannel) -> WorldPart:
+    """Return a world whose middle junction has four stop signs, and a car before each."""
+    signs = [
+        Sign(sign_id=n, kind="stop", x_m=0.0, y_m=0.0, yaw_rad=0.0, lane=lane, at_m=LINE_M)
+        for n, lane in enumerate(ARMS.values(), start=1)
+    ]
+    city_map = grid_city(3, 3, block_m=6.0, signs=True)
+    part = WorldPart(replace(city_map, signs=tuple(signs), radio=radio), room=4)
+    part.learn_wishes(lambda _kind, _where: False)
+    for arm, lane in ARMS.items():
+        at = part.world.roads.lane(lane).at(LINE_M - BEFORE_M)
+        car = part.world.host(arm, "nigel", at, 0)
+        lanes = (f"j1_1_{arm}{arm}", f"j1_1_{arm}")
+        send(part.world, car, RouteRequest(vehicle=arm, via=lanes), 0)
+    return part
+
+
+def apart(x: float, y: float, yaw: float, corners: np.ndarray) -> float:
+    """Return how far corners (4, 2) are from the outline of a car [m]; 0: inside."""
+    dx, dy = corners[:, 0] - x, corners[:, 1] - y
+    ahead, beside = dx * math.cos(yaw) + dy * math.sin(yaw), dy * math.cos(yaw) - dx * math.sin(yaw)
+    away = np.maximum([np.abs(ahead - 0.08) - 0.15, np.abs(beside) - 0.0875], 0.0)
+    return float(np.hypot(*away).min())
+
+
+def corners_of(x: float, y: float, yaw: float) -> np.ndarray:
+    """Return the corners (4, 2) of a car whose rear axle is there."""
+    at = np.array([(a, b) for a in (-0.07, 0.23) for b in (-0.0875, 0.0875)])
+    turn = np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]])
+    return at @ turn + (x, y)
+
+
+def run(radio: RadioChannel) -> tuple[list[float], float]:
+    """Return when each car was over the junction [s], and the least distance between two [m]."""
+    part = crossing(radio)
+    slots = part.world.slots
+    through, least = [math.inf] * 4, math.inf
+    with Lockstep([part]) as city:
+        for step in range(round(LONGEST_S / 0.1)):
+            city.run_for(0.1)
+            poses = [(slots.x[n], slots.y[n], slots.yaw[n]) for n in range(4)]
+            for one, other in itertools.permutations(poses, 2):
+                least = min(least, apart(*one, corners_of(*other)))
+            for n in range(4):
+                if part.world.crowd.passed[n] >= 2:
+                    through[n] = min(through[n], 0.1 * step)
+            if max(through) < math.inf:
+                break
+    return through, least
+
+
+print(
+    "| radio | "
+    + " | ".join(f"{arm}, s" for arm in ARMS)
+    + " | all through, s | least distance, m |"
+)
+print("|---|" + "---:|" * 6)
+for name, radio in RADIOS.items():
+    times, least_m = run(radio)
+    cells = [f"{t:.1f}" for t in (*times, max(times))]
+    print(f"| {name} | {' | '.join(cells)} | {least_m:.3f} |", flush=True)

@@ -1,0 +1,109 @@
+"""API keys: shown once, kept as salted hashes, compared in constant time.
+
+A key reads `scm_<id>_<secret>`. The id finds its record; the secret is 256 random bits, so that one
+fast hash is enough: there is nothing to guess that a slow one would protect.
+"""
+
+import hashlib
+import hmac
+import re
+import secrets
+from collections.abc import Iterator
+
+import msgspec
+
+from scm.api.roles import Role, check_role
+from scm.errors import AccessError, StoreError
+from scm.store.repository import Repository
+
+SECRET_BYTES = 32
+_PREFIX = "api/"
+_KEY = re.compile(r"scm_([0-9a-f]{8})_([A-Za-z0-9_-]{43})")
+_PERSON = b"scm api key"
+
+
+class KeyRecord(msgspec.Struct, frozen=True, kw_only=True):
+    """What is kept of a key.
+
+    Attributes:
+        key_id: Public part of the key.
+        owner: Whose it is, for people.
+        role: What it may do.
+        made_s: When it was made, seconds since 1970.
+        salt, digest: Hexadecimal, of the secret.
+    """
+
+    key_id: str
+    owner: str
+    role: Role
+    made_s: int
+    salt: str
+    digest: str
+
+
+class KeyRing:
+    """The keys of one city in a store; changes count at once, in every process that reads it."""
+
+    def __init__(self, store: Repository) -> None:
+        self._store = store
+
+    def add(self, owner: str, role: str, now_s: int) -> str:
+        """Make a key; return it, for it is never shown again.
+
+        Raises:
+            AccessError: when there is no such role, or nobody is named.
+        """
+        if not owner.strip() or len(owner) > 64:
+            msg = f"owner: got {owner!r}, expected 1 to 64 characters"
+            raise AccessError(msg)
+        key_id, secret = secrets.token_hex(4), secrets.token_urlsafe(SECRET_BYTES)
+        salt = secrets.token_bytes(hashlib.blake2b.SALT_SIZE)
+        record = KeyRecord(
+            key_id=key_id, owner=owner, role=check_role(role), made_s=now_s, salt=salt.hex(),
+            digest=_digest(secret, salt),
+        )  # fmt: skip
+        self._store.put("credentials", _PREFIX + key_id, msgspec.json.encode(record))
+        return f"scm_{key_id}_{secret}"
+
+    def records(self) -> Iterator[KeyRecord]:
+        """Return what is kept of all keys, by id."""
+        for name, body in self._store.items("credentials"):
+            if name.startswith(_PREFIX):
+                yield _read(name, body)
+
+    def revoke(self, key_id: str) -> KeyRecord:
+        """End a key, and return what was kept of it.
+
+        Raises:
+            AccessError: when there is none of that id.
+        """
+        body = self._store.get("credentials", _PREFIX + key_id)
+        if body is None:
+            msg = f"key: got {key_id!r}, expected the id of one: `scm key list` names them"
+            raise AccessError(msg)
+        self._store.delete("credentials", _PREFIX + key_id)
+        return _read(key_id, body)
+
+    def find(self, key: str) -> KeyRecord | None:
+        """Return whose key this is; None: nobody's."""
+        match = _KEY.fullmatch(key)
+        if match is None:
+            return None
+        body = self._store.get("credentials", _PREFIX + match[1])
+        if body is None:
+            return None
+        record = _read(match[1], body)
+        given = _digest(match[2], bytes.fromhex(record.salt))
+        return record if hmac.compare_digest(given, record.digest) else None
+
+
+def _digest(secret: str, salt: bytes) -> str:
+    return hashlib.blake2b(secret.encode(), salt=salt, person=_PERSON).hexdigest()
+
+
+def _read(name: str, body: bytes) -> KeyRecord:
+    try:
+        return msgspec.json.decode(body, type=KeyRecord)
+    except msgspec.MsgspecError as cause:
+        msg = f"credentials, {name}: {cause}; expected the record of an API key"
+        raise StoreError(msg) from cause

@@ -1,0 +1,54 @@
+"""Roles of those who call the interface: each may do what the one before may, and more.
+
+A viewer looks. An operator runs the city: cars, routes, plans, the stop. An engineer also clears
+faults that the monitor latched. An admin also sees and ends keys. Every route names its least role.
+"""
+
+from typing import Literal, get_args
+
+from fastapi import Depends, Request
+from fastapi.params import Depends as Dependency
+from starlette.exceptions import HTTPException
+
+from scm.errors import AccessError, nearest
+
+Role = Literal["viewer", "operator", "engineer", "admin"]
+ROLES: tuple[Role, ...] = get_args(Role)
+
+
+def check_role(name: str) -> Role:
+    """Return the role of that name.
+
+    Raises:
+        AccessError: when there is none.
+    """
+    for role in ROLES:
+        if role == name:
+            return role
+    msg = f"role: got {name!r}, expected one of {ROLES}{nearest(name, ROLES)}"
+    raise AccessError(msg)
+
+
+class AtLeast:
+    """A dependency of a route: the caller's role, from the gate, is this one or above."""
+
+    def __init__(self, role: Role) -> None:
+        self.role = role
+
+    def __call__(self, request: Request) -> None:
+        """Pass, or refuse."""
+        own: Role | None = request.scope.get("scm_role")
+        if own is None or ROLES.index(own) < ROLES.index(self.role):
+            detail = f"your key is one of a {own}; this needs {self.role} or above"
+            raise HTTPException(403, detail)
+
+
+def _at_least(role: Role) -> Dependency:
+    dependency: Dependency = Depends(AtLeast(role))
+    return dependency
+
+
+VIEWER = _at_least("viewer")
+OPERATOR = _at_least("operator")
+ENGINEER = _at_least("engineer")
+ADMIN = _at_least("admin")

@@ -1,0 +1,53 @@
+"""`scm attack`: a car of its own that lies on the air, to try the misbehaviour part on."""
+
+import argparse
+import gc
+
+from scm.command import Command, credentials_argument
+from scm.v2x.misbehaviour.attack import attack_names
+from scm.v2x.router import DEFAULT_ENDPOINT
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("attack", metavar="NAME", help=", ".join(attack_names()))
+    parser.add_argument("--car", required=True, metavar="STATION", help="its name in the city")
+    parser.add_argument("--map", default="driving_school", help="what it knows of the city")
+    parser.add_argument("--spawn", default="", help="where it comes in; without: anywhere free")
+    parser.add_argument(
+        "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router (%(default)s)"
+    )
+    credentials_argument(parser)
+    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of the attack (%(default)s)")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    import threading
+
+    from scm.clock import WallClock
+    from scm.command import credentials_of
+    from scm.live import run, stop_on_signal
+    from scm.maps.load import load_map
+    from scm.traffic.attacker import Attacker
+    from scm.v2x.bus_zenoh import ZenohBus
+    from scm.v2x.key import check_name
+    from vehicle_agent.agent import AgentPart
+    from vehicle_agent.leaving import Leaving
+
+    name, attacks = check_name(arguments.car, "--car"), {arguments.car: arguments.attack}
+    credentials = credentials_of(arguments, name)
+    wish, done, clock = stop_on_signal(), threading.Event(), WallClock()
+    with ZenohBus(arguments.city, name, arguments.connect, credentials=credentials) as bus:
+        agent = AgentPart(name, "nigel", arguments.spawn, bus.session, arguments.seed)
+        part = Attacker(agent, attacks, load_map(arguments.map), arguments.seed)
+        run(Leaving(part, wish, done), bus, clock, done)
+    gc.freeze()  # as in `scm.command.run_part`
+    return 0
+
+
+COMMAND = Command(
+    help="Join as a car of its own that drives well and lies on the air.",
+    example="scm attack zero_speed --car n7 --connect tcp/127.0.0.1:7447",
+    arguments=_arguments,
+    run=_run,
+)

@@ -1,0 +1,47 @@
+"""`scm demand`: cars come and go as a table says."""
+
+import argparse
+from pathlib import Path
+
+from scm.command import Command, credentials_argument, run_part
+from scm.v2x.router import DEFAULT_ENDPOINT
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("table", type=Path, metavar="TABLE", help=".toml, .csv or SUMO's .rou.xml")
+    parser.add_argument(
+        "map", nargs="?", default="driving_school", metavar="MAP", help="map name or file"
+    )
+    parser.add_argument(
+        "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router (%(default)s)"
+    )
+    credentials_argument(parser)
+    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument(
+        "--time", metavar="HH:MM", help="time of day to begin at (that of the first row)"
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.maps.load import load_map
+    from scm.traffic.demand import DemandPart
+    from scm.traffic.demand_table import load_demand, seconds_of_day
+
+    begin_s = None if arguments.time is None else seconds_of_day(arguments.time, "--time")
+    flows = load_demand(arguments.table)
+    part = DemandPart(load_map(arguments.map), flows, begin_s)
+    code = run_part(part, arguments)
+    told = part.status
+    print(
+        f"{told.wanted} wanted, {told.entered} entered, {told.arrived} arrived, "
+        f"{told.queued} waited at the end (at most {told.longest_queue}), {told.refused} refused"
+    )
+    return code
+
+
+COMMAND = Command(
+    help="Cars that come, drive and leave as a demand table says.",
+    example="scm demand rush.csv driving_school --connect tcp/127.0.0.1:7447",
+    arguments=_arguments,
+    run=_run,
+)

@@ -1,0 +1,27 @@
+"""`scm fleet remove`: let a station into the city no more."""
+
+import argparse
+
+from scm.command import Command
+from scm.commands.fleet_add import fleet_argument
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", metavar="NAME", help="of the station")
+    fleet_argument(parser)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.v2x.fleet_file import load_fleet, remove
+
+    remove(load_fleet(arguments.fleet), arguments.name)
+    print(f"{arguments.name} is removed. A router that runs lets it in until its next start.")
+    return 0
+
+
+COMMAND = Command(
+    help="Let a station into the city no more.",
+    example="scm fleet remove n7",
+    arguments=_arguments,
+    run=_run,
+)

@@ -1,0 +1,61 @@
+"""`scm import sumo`: a SUMO network as a map file."""
+
+import argparse
+from pathlib import Path
+
+from scm.command import Command
+from scm.errors import MapError
+
+
+def floor_of(text: str) -> tuple[float, float]:
+    """Return width and depth [m] of `6x4`."""
+    width, _, depth = text.partition("x")
+    try:
+        return float(width), float(depth)
+    except ValueError as error:
+        msg = f"got {text!r}, expected WIDTHxDEPTH in metre, as in 6x4"
+        raise argparse.ArgumentTypeError(msg) from error
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("net", type=Path, metavar="NET", help="a SUMO network, .net.xml")
+    parser.add_argument("--out", type=Path, required=True, metavar="MAP", help="map file to write")
+    parser.add_argument(
+        "--scale", type=float, help="full size over ours (14, or what makes it fit the floor)"
+    )
+    parser.add_argument(
+        "--floor", type=floor_of, metavar="WxD", help="floor that it must fit [m], as in 6x4"
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.maps.load import load_map
+    from scm.maps.sumo import import_sumo
+    from scm.maps.sumo_toml import map_toml
+
+    if arguments.scale is not None and not arguments.scale > 0.0:
+        raise MapError(f"--scale: got {arguments.scale}, expected above 0")
+    made = import_sumo(arguments.net, scale=arguments.scale, floor_m=arguments.floor)
+    arguments.out.write_text(map_toml(made.city_map), encoding="utf-8")
+    city = load_map(arguments.out)
+    width, depth = (high - low for low, high in (city.floor.x_m, city.floor.y_m))
+    print(f"{arguments.out}: 1:{made.scale:g} on {width:.1f} x {depth:.1f} m")
+    print(
+        f"  {len(city.lanes)} lanes, {len(city.junctions)} junctions with signals, "
+        f"{len(city.crossings)} without"
+    )
+    print(
+        f"  lanes within {1e3 * made.error_m:.0f} mm of the network's, least radius "
+        f"{made.tightest_m:.2f} m, {made.shortened} lanes shortened for their turns"
+    )
+    if made.left_out:
+        print(f"  {len(made.left_out)} turns back left out: a Nigel cannot drive them")
+    return 0
+
+
+COMMAND = Command(
+    help="A SUMO network as a map file; OpenStreetMap and OpenDRIVE by netconvert first.",
+    example="scm import sumo town.net.xml --out town.toml --scale 14",
+    arguments=_arguments,
+    run=_run,
+)

@@ -1,0 +1,51 @@
+"""`scm key add`: an API key for a person or a program."""
+
+import argparse
+
+from scm.command import Command
+
+DEFAULT = "sqlite:keys.db"
+
+
+def keys_argument(parser: argparse.ArgumentParser) -> None:
+    """Add where the keys are."""
+    parser.add_argument(
+        "--keys",
+        default=DEFAULT,
+        metavar="STORE",
+        help="sqlite:PATH or postgresql://... (%(default)s)",
+    )
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("owner", metavar="OWNER", help="whose it is, for people")
+    parser.add_argument(
+        "--role",
+        required=True,
+        choices=("viewer", "operator", "engineer", "admin"),
+        help="each may do what those before it may, and more",
+    )
+    keys_argument(parser)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from contextlib import closing
+
+    from scm.api.keys import KeyRing
+    from scm.clock import NS_PER_S, WallClock
+    from scm.store.open import open_store
+
+    with closing(open_store(arguments.keys)) as store:
+        now_s = WallClock().now_ns() // NS_PER_S
+        key = KeyRing(store).add(arguments.owner, arguments.role, now_s)
+    print(f"{arguments.role} key of {arguments.owner}, shown this once:")
+    print(key)
+    return 0
+
+
+COMMAND = Command(
+    help="Make an API key; it is shown once and counts at once.",
+    example="scm key add anna --role operator",
+    arguments=_arguments,
+    run=_run,
+)

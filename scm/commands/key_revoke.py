@@ -1,0 +1,31 @@
+"""`scm key revoke`: end an API key."""
+
+import argparse
+
+from scm.command import Command
+from scm.commands.key_add import keys_argument
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("key_id", metavar="ID", help="as `scm key list` shows it")
+    keys_argument(parser)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from contextlib import closing
+
+    from scm.api.keys import KeyRing
+    from scm.store.open import open_store
+
+    with closing(open_store(arguments.keys)) as store:
+        ended = KeyRing(store).revoke(arguments.key_id)
+    print(f"the {ended.role} key of {ended.owner} has ended")
+    return 0
+
+
+COMMAND = Command(
+    help="End an API key; it counts at once.",
+    example="scm key revoke 1a2b3c4d",
+    arguments=_arguments,
+    run=_run,
+)

@@ -1,0 +1,125 @@
+"""`scm selftest`: hurt a city in every way there is, and measure how it takes it."""
+
+import argparse
+import signal
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scm.command import Command, credentials_argument, credentials_of
+
+if TYPE_CHECKING:
+    from scm.maps.model import CityMap
+    from scm.selftest.signals import SignalTrials
+    from scm.v2x.credentials import Credentials
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "fault", nargs="*", metavar="FAULT", help="only these; default: one after the other, all"
+    )
+    parser.add_argument(
+        "--faults",
+        action="store_true",
+        help="hurt processes, router, disk and bus of a whole city of one's own instead",
+    )
+    parser.add_argument("--map", default="driving_school", help="map name or file (%(default)s)")
+    parser.add_argument(
+        "--connect",
+        metavar="ENDPOINT",
+        help="test the signals of a city that runs on this machine, not of one's own",
+    )
+    parser.add_argument("--city", default="city", help="its name (%(default)s)")
+    credentials_argument(parser)
+    parser.add_argument("--yes", action="store_true", help="disturb it without asking first")
+    parser.add_argument("--list", action="store_true", help="tell the faults, and end")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the table as Markdown")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.registry import names
+    from scm.selftest.harms import HARMS, harm_city
+    from scm.selftest.signals import FAULTS, faults_of
+
+    if arguments.list:
+        print(*(HARMS if arguments.faults else names(FAULTS)), sep="\n")
+        return 0
+    if arguments.faults:
+        return harm_city(arguments.map, arguments.fault, print, arguments.out)
+    faults_of(arguments.fault)
+    if arguments.connect and not (arguments.yes or _agreed(arguments.connect)):
+        print("nothing was disturbed")
+        return 0
+    return _test_signals(arguments)
+
+
+def _agreed(endpoint: str) -> bool:
+    print(f"The signals of the city at {endpoint} will fail one way after the other, and flash.")
+    print("Go on? [y/N] ", end="", flush=True)
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
+
+
+def _test_signals(arguments: argparse.Namespace) -> int:
+    from scm.selftest.signals import HEAD
+    from scm.selftest.table import markdown_table, text_table
+
+    with _trials(arguments) as trials:
+        outcomes = []
+        for outcome in trials.run(arguments.fault):
+            outcomes.append(outcome)
+            print(f"  {outcome.what}: {outcome.said or 'nothing'}", flush=True)
+    rows = [outcome.row() for outcome in outcomes]
+    print(text_table(HEAD, rows))
+    if arguments.out:
+        arguments.out.write_text(markdown_table(HEAD, rows) + "\n")
+    return 0 if all(outcome.ok for outcome in outcomes) else 1
+
+
+@contextmanager
+def _trials(arguments: argparse.Namespace) -> "Iterator[SignalTrials]":
+    from scm.maps.load import load_map
+    from scm.selftest.city import CITY, SIGNALS_ONLY, City
+
+    city_map = load_map(arguments.map)
+    with ExitStack() as stack:
+        if arguments.connect:
+            from scm.selftest.running import send_to_part
+
+            send = partial(send_to_part, "traffic", arguments.connect)
+            facts = arguments.connect, arguments.city
+        else:
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            own = stack.enter_context(City(arguments.map, folder, SIGNALS_ONLY))
+            send, facts = partial(own.send, "traffic"), (own.endpoint, CITY)
+        credentials = credentials_of(arguments)
+        yield stack.enter_context(_open(city_map, *facts, credentials, send))
+
+
+@contextmanager
+def _open(
+    city_map: "CityMap",
+    endpoint: str,
+    city: str,
+    credentials: "Credentials | None",
+    send: Callable[[signal.Signals], None],
+) -> "Iterator[SignalTrials]":
+    from scm.selftest.observer import Observer
+    from scm.selftest.signals import SignalTrials
+    from scm.selftest.stand_in import StandIn
+
+    junction = city_map.junctions[0].name if city_map.junctions else ""
+    with Observer(city_map, endpoint, city, credentials) as observer:
+        make = partial(StandIn, city_map, junction, endpoint, city, credentials)
+        yield SignalTrials(city_map, observer, make, send)
+
+
+COMMAND = Command(
+    help="Hurt a city in every way there is, and measure how it takes it.",
+    example="scm selftest frozen_controller short_yellow",
+    arguments=_arguments,
+    run=_run,
+)

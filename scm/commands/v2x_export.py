@@ -1,0 +1,55 @@
+"""`scm v2x export`: what a run's stations said over the radio, for other people's tools."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scm.command import Command
+from scm.errors import ScmError
+
+if TYPE_CHECKING:
+    from scm.recorder.on_air import OnAir
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("recording", type=Path, metavar="RECORDING", help="the .mcap of a run")
+    parser.add_argument(
+        "--pcap",
+        type=Path,
+        metavar="FILE",
+        help="ITS-G5 frames with their times, for Wireshark; needs the extra scm[v2x]",
+    )
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="envelopes of Orange's its-client, one a line"
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    if arguments.pcap is None and arguments.json is None:
+        msg = "expected --pcap FILE, --json FILE or both, got neither"
+        raise ScmError(msg)
+    from scm.recorder.on_air import OnAir, write_json, write_pcap
+
+    said = OnAir(arguments.recording)
+    for path, write in ((arguments.pcap, write_pcap), (arguments.json, write_json)):
+        if path is not None:
+            with path.open("wb") as stream:
+                count = write(said, stream)
+            print(f"{path}: {count} messages ({_counted(said)})")
+    if arguments.pcap is not None and said.counts["cpm"]:
+        print(f"{arguments.pcap}: {said.counts['cpm']} CPMs are not in it: they have no UPER here")
+    if said.unreadable:
+        print(f"{arguments.recording}: {said.unreadable} messages are of an older form: left out")
+    return 0
+
+
+def _counted(said: "OnAir") -> str:
+    return ", ".join(f"{count} {kind.upper()}" for kind, count in sorted(said.counts.items()))
+
+
+COMMAND = Command(
+    help="Radio messages of a run as a capture for Wireshark, or as JSON.",
+    example="scm v2x export runs/today.mcap --pcap today.pcap",
+    arguments=_arguments,
+    run=_run,
+)

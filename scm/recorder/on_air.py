@@ -1,0 +1,105 @@
+"""What the stations of a recorded run said over the radio, as other people's tools read it."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from scm.errors import MessageError, RecordingError
+from scm.recorder.mcap_file import MESSAGES, read_keys, read_run
+from scm.registry import load
+from scm.v2x.etsi_json import KINDS, Body, wrap
+from scm.v2x.message import Message, decode
+from scm.v2x.pcap import Positions, frame_of, write_capture
+from scm.v2x.uper.codec import CODINGS, encode
+
+_KEY = re.compile(r"scm/@v\d+/[^/]+/v2x/tx/([^/]+)/([^/]+)")
+
+
+class Said(NamedTuple):
+    """One message on the air.
+
+    Attributes:
+        kind: Its message_type.
+        station: Who sent it.
+        t_ns: When, on the sender's clock.
+        heard_ns: When the recorder heard it.
+    """
+
+    kind: str
+    station: str
+    t_ns: int
+    heard_ns: int
+    body: Body
+
+
+class OnAir:
+    """The radio messages of one run.
+
+    Attributes:
+        counts: Of each kind that was gone through, once that is done.
+        unreadable: Messages that are not of today's form, as recordings before it have them.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Find what there is.
+
+        Raises:
+            RecordingError: when the file is no complete run, or nothing was said over the radio.
+        """
+        self._path = path
+        self._keys = [
+            key for key in read_keys(path) if (m := _KEY.fullmatch(key)) and m[2] in KINDS
+        ]
+        if not self._keys:
+            msg = f"{path}: expected messages under v2x/tx/, got none: nobody spoke over the radio"
+            raise RecordingError(msg)
+        self.counts: Counter[str] = Counter()
+        self.unreadable = 0
+
+    def __iter__(self) -> Iterator[Said]:
+        """Yield them in the order in which they were heard; counts begin anew."""
+        self.counts, self.unreadable = Counter(), 0
+        classes: dict[str, type[Message]] = {
+            kind: load(MESSAGES, f"{kind}_tx", "MESSAGE", type) for kind in KINDS
+        }
+        for one in read_run(self._path, self._keys):
+            match = _KEY.fullmatch(one.key)
+            assert match is not None  # noqa: S101  only such keys were asked for
+            station, kind = match[1], match[2]
+            try:
+                message = decode(classes[kind], one.body)
+            except MessageError:
+                self.unreadable += 1
+                continue
+            self.counts[kind] += 1
+            yield Said(kind, station, message.t_ns, one.t_ns, message.body)  # type: ignore[attr-defined]
+
+
+def write_pcap(said: OnAir, stream: BinaryIO) -> int:
+    """Write a run's messages as a capture of ITS-G5 frames; return how many there are in it.
+
+    A CPM is left out: it has no UPER here.
+
+    Raises:
+        MessageError: when the extra for UPER is not installed.
+    """
+    positions = Positions()
+    return write_capture(
+        stream,
+        (
+            (one.heard_ns, frame_of(one.kind, encode(one.body), positions.of(one.body), one.t_ns))
+            for one in said
+            if one.kind in CODINGS
+        ),
+    )
+
+
+def write_json(said: OnAir, stream: BinaryIO) -> int:
+    """Write a run's messages in its-client's envelopes, one a line; return how many there are."""
+    lines = 0
+    for one in said:
+        stream.write(wrap(one.body, one.station, one.t_ns) + b"\n")
+        lines += 1
+    return lines

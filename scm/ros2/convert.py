@@ -1,0 +1,115 @@
+"""The city's messages as ROS knows them; times are the city's, units and axes are the same."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from scm.clock import seconds
+from scm.geometry import TAU, Pose2
+from scm.ros2.frames import header, pose, quaternion, time, vector
+from scm.ros2.types import ros
+from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.vehicle_sensors import VehicleSensors
+from scm.v2x.messages.vehicle_state import VehicleState
+
+SCAN_BYTES = 4
+_NOT_MEASURED = -1.0
+
+
+def clock(t_ns: int) -> Any:
+    """Return `rosgraph_msgs/Clock`."""
+    return ros("rosgraph_msgs/Clock", clock=time(t_ns))
+
+
+def odometry(name: str, state: VehicleState, at: Pose2) -> Any:
+    """Return `nav_msgs/Odometry`: the pose in `odom`, the motion in `base_link`.
+
+    All covariances are 0, which means unknown.
+    """
+    twist = ros(
+        "geometry_msgs/Twist",
+        linear=vector(state.speed_mps, state.lateral_speed_mps),
+        angular=vector(0.0, 0.0, state.yaw_rate_radps),
+    )
+    unknown = np.zeros(36)
+    return ros(
+        "nav_msgs/Odometry",
+        header=header(state.t_ns, f"{name}/odom"),
+        child_frame_id=f"{name}/base_link",
+        pose=ros("geometry_msgs/PoseWithCovariance", pose=pose(at), covariance=unknown),
+        twist=ros("geometry_msgs/TwistWithCovariance", twist=twist, covariance=unknown),
+    )
+
+
+def scan(name: str, turn: LidarScan, before_ns: int | None) -> Any:
+    """Return `sensor_msgs/LaserScan`: infinity is a miss, as there (REP-117).
+
+    The stamp is the last beam's time: the scan comes as if all had looked then.
+
+    Args:
+        name: The car's in ROS.
+        turn: The scan.
+        before_ns: Time of the scan before it; None: not known.
+    """
+    step = turn.bearing_step_rad if turn.bearing_step_rad is not None else TAU / turn.beams
+    ranges = np.frombuffer(turn.payload, "<f4", count=len(turn.payload) // SCAN_BYTES)
+    return ros(
+        "sensor_msgs/LaserScan",
+        header=header(turn.t_ns, f"{name}/laser"),
+        angle_min=turn.bearing_first_rad,
+        angle_max=turn.bearing_first_rad + step * (turn.beams - 1),
+        angle_increment=step,
+        time_increment=0.0,
+        scan_time=0.0 if before_ns is None else seconds(turn.t_ns - before_ns),
+        range_min=turn.range_min_m,
+        range_max=turn.range_max_m,
+        ranges=ranges.astype(np.float32),
+        intensities=np.zeros(0, np.float32),
+    )
+
+
+def imu(name: str, sensors: VehicleSensors) -> Any:
+    """Return `sensor_msgs/Imu`; where nothing is measured the covariance begins with -1."""
+    unknown = np.zeros(9)
+    turn = sensors.orientation_rad
+    nothing = unknown.copy()
+    nothing[0] = _NOT_MEASURED
+    return ros(
+        "sensor_msgs/Imu",
+        header=header(sensors.t_ns, f"{name}/imu"),
+        orientation=quaternion(turn if turn is not None else (0.0, 0.0, 0.0)),
+        orientation_covariance=unknown if turn is not None else nothing,
+        angular_velocity=vector(*sensors.gyro_radps),
+        angular_velocity_covariance=unknown,
+        linear_acceleration=vector(*sensors.accel_mps2),
+        linear_acceleration_covariance=unknown,
+    )
+
+
+def picture(name: str, frame: CameraFrame) -> Any:
+    """Return `sensor_msgs/CompressedImage`, the JPEG file as it came."""
+    return ros(
+        "sensor_msgs/CompressedImage",
+        header=header(frame.t_ns, f"{name}/camera_optical"),
+        format="jpeg",
+        data=np.frombuffer(frame.payload, np.uint8),
+    )
+
+
+def wished(kind: str, message: Any, wheelbase_m: float) -> tuple[float, float]:
+    """Return speed [m/s] and road-wheel angle [rad, + = left] that a command asks for.
+
+    A car cannot turn on the spot: at standstill a turn is not followed. What is not a number
+    stands still.
+    """
+    if kind == "geometry_msgs/Twist":
+        speed, rate = message.linear.x, message.angular.z
+        # The angle for v and omega: the same both ways, reversing mirrors it.
+        angle = math.atan(wheelbase_m * rate / speed) if speed else 0.0
+    else:
+        speed, angle = message.speed, message.steering_angle
+    if not (math.isfinite(speed) and math.isfinite(angle)):
+        return 0.0, 0.0
+    return float(speed), float(angle)

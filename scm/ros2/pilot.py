@@ -1,0 +1,177 @@
+"""Drives one car for a ROS node, as anybody drives here: by a lease, and only while it is told to.
+
+    a command arrives       the lease is asked for, then renewed three times in its life
+    every 50 ms             throttle and steering towards the newest command
+    none for 300 ms         zero throttle, steering held
+    none for 1 s            the lease is given back: the car stands
+
+Who loses the lease to somebody else does not ask again before the node has been silent for a
+second: a person who took the car over is not fought for it.
+Speed is found by the car's own table of steady throttles and feedback; without one by feedback.
+"""
+
+import bisect
+import logging
+
+from scm.clock import NS_PER_MS, NS_PER_S, seconds
+from scm.log import event
+from scm.v2x.exchange import Call, Outgoing
+from scm.v2x.message import Message, Refused
+from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
+from scm.vehicles.driver import CarLimits
+
+FRESH_NS = 300 * NS_PER_MS
+SILENT_NS = NS_PER_S
+DRIVE_NS = 50 * NS_PER_MS
+LEASE_MS = 1000
+RENEW_NS = LEASE_MS * NS_PER_MS // 3
+ASK_AGAIN_NS = NS_PER_S
+ASK_S = 0.5
+LONGEST_STEP_S = 0.1
+MOST_SUM = 0.3
+
+_log = logging.getLogger(__name__)
+
+
+class Pilot:
+    """One car's lease and pedals on behalf of ROS.
+
+    Args:
+        vehicle: The car.
+        owner: Whose lease it will be: the part's station.
+        limits: What the car can do.
+    """
+
+    def __init__(self, vehicle: str, owner: str, limits: CarLimits) -> None:
+        self.vehicle = vehicle
+        self.limits = limits
+        self._owner = owner
+        self._speed_mps = 0.0
+        self._angle_rad = 0.0
+        self._heard_ns: int | None = None
+        self._epoch: int | None = None
+        self._seq = 0
+        self._asked_ns: int | None = None
+        self._drive_ns = 0
+        self._lost = False
+        self._cruise = _Cruise(limits)
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether a node has spoken within the last second, or the lease is still held."""
+        return self._heard_ns is not None or self._epoch is not None
+
+    def hear(self, speed_mps: float, angle_rad: float, now_ns: int) -> None:
+        """Take a command: speed, + = forward, and road-wheel angle, + = left."""
+        self._speed_mps, self._angle_rad, self._heard_ns = speed_mps, angle_rad, now_ns
+
+    def step(self, now_ns: int, speed_mps: float) -> list[Outgoing]:
+        """Return what is due: asking for the lease, renewing it, driving, giving it back.
+
+        Args:
+            now_ns: Now.
+            speed_mps: Of the car, as it last told.
+        """
+        if self._heard_ns is not None and now_ns - self._heard_ns >= SILENT_NS:
+            self._heard_ns = None
+            self._lost = False
+        if self._heard_ns is None:
+            return self.release()
+        due = self._asked_ns is None or now_ns - self._asked_ns >= self._pause_ns
+        if due and not self._lost:
+            self._asked_ns = now_ns
+            return [self._ask("acquire" if self._epoch is None else "renew")]
+        if self._epoch is None or now_ns < self._drive_ns:
+            return []
+        return [self._drive(now_ns, speed_mps, self._heard_ns)]
+
+    @property
+    def _pause_ns(self) -> int:
+        return ASK_AGAIN_NS if self._epoch is None else RENEW_NS
+
+    def _drive(self, now_ns: int, speed_mps: float, heard_ns: int) -> DriveCommand:
+        is_fresh = now_ns - heard_ns < FRESH_NS
+        self._drive_ns = now_ns + DRIVE_NS
+        self._seq += 1
+        return DriveCommand(
+            vehicle=self.vehicle,
+            t_ns=now_ns,
+            epoch=self._epoch or 0,
+            seq=self._seq,
+            throttle=self._cruise.throttle(self._speed_mps if is_fresh else 0.0, speed_mps, now_ns),
+            steering=max(-1.0, min(1.0, self._angle_rad / self.limits.steer_limit)),
+        )
+
+    def release(self) -> list[Outgoing]:
+        """Return what gives the lease back, if it is held."""
+        out: list[Outgoing] = [] if self._epoch is None else [self._ask("release")]
+        self._forget_lease()
+        return out
+
+    def _forget_lease(self) -> None:
+        self._epoch = self._asked_ns = None
+        self._cruise = _Cruise(self.limits)
+
+    def replied(self, request: LeaseRequest, reply: Message) -> None:
+        """Hear what became of a request for the lease."""
+        if isinstance(reply, LeaseReply) and request.verb == "acquire":
+            if reply.owner == self._owner:
+                self._epoch, self._seq = reply.epoch, 0
+        elif isinstance(reply, Refused) and request.verb != "release":
+            event(_log, "ros_lease", level=logging.WARNING, verb=request.verb, why=reply.detail)
+            if request.verb == "renew" and reply.code == "owned":
+                self._lost = True
+                self._forget_lease()
+
+    def _ask(self, verb: str) -> Call:
+        request = LeaseRequest(
+            vehicle=self.vehicle,
+            owner=self._owner,
+            verb=verb,  # type: ignore[arg-type]
+            epoch=self._epoch or 0,
+            ttl_ms=LEASE_MS,
+        )
+        return Call(request, ASK_S)
+
+
+class _Cruise:
+    """Throttle for a speed: what the car's table says, and feedback for the rest."""
+
+    def __init__(self, limits: CarLimits) -> None:
+        self._limits = limits
+        self._gain, self._rate = (4.0, 2.0) if limits.speeds else (1.0, 1.0)
+        self._aim_mps: float | None = None
+        self._sum = 0.0
+        self._then_ns: int | None = None
+
+    def throttle(self, wished_mps: float, speed_mps: float, now_ns: int) -> float:
+        """Return the throttle, -1 to 1, with which the car comes to a speed at its own pace."""
+        passed_s = 0.0 if self._then_ns is None else seconds(now_ns - self._then_ns)
+        passed_s = min(LONGEST_STEP_S, passed_s)
+        self._then_ns = now_ns
+        if wished_mps == 0.0:
+            self._aim_mps, self._sum = None, 0.0
+            return 0.0
+        most = self._limits.accel * passed_s
+        aim = speed_mps if self._aim_mps is None else self._aim_mps
+        aim += max(-most, min(most, wished_mps - aim))
+        self._aim_mps = aim
+        error = aim - speed_mps
+        value = self._steady(aim) + self._gain * error + self._sum
+        slowest = self._limits.brake_throttle
+        low, high = (slowest, 1.0) if wished_mps > 0.0 else (-1.0, -slowest)
+        bounded = max(low, min(high, value))
+        if bounded == value:
+            more = self._sum + self._rate * error * passed_s
+            self._sum = max(-MOST_SUM, min(MOST_SUM, more))
+        return bounded
+
+    def _steady(self, speed_mps: float) -> float:
+        speeds = (0.0, *self._limits.speeds)
+        if len(speeds) == 1:
+            return 0.0
+        above = min(bisect.bisect(speeds, abs(speed_mps)), len(speeds) - 1)
+        low, high = speeds[above - 1], speeds[above]
+        share = min(1.0, (abs(speed_mps) - low) / (high - low))
+        return (above - 1 + share) / (len(speeds) - 1) * (1.0 if speed_mps >= 0.0 else -1.0)

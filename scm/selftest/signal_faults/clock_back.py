@@ -1,0 +1,22 @@
+"""The controller's clock jumps two seconds back."""
+
+import msgspec
+
+from scm.clock import NS_PER_S
+from scm.selftest.signal_fault import Bend, SignalFault
+from scm.traffic.card import Card
+from scm.v2x.messages.spat import Spat
+
+JUMP_NS = -2 * NS_PER_S
+
+
+def _bends(card: Card) -> Bend:
+    del card
+
+    def bend(spat: Spat) -> Spat:
+        return msgspec.structs.replace(spat, t_ns=spat.t_ns + JUMP_NS)
+
+    return bend
+
+
+FAULT = SignalFault(what="clock jumps back", expects=("clock_jump",), bends=_bends)

@@ -1,0 +1,19 @@
+"""A group shows red and green at once."""
+
+import msgspec
+
+from scm.selftest.signal_fault import Bend, SignalFault
+from scm.traffic.card import Card
+from scm.v2x.messages.spat import Spat
+
+
+def _bends(card: Card) -> Bend:
+    def bend(spat: Spat) -> Spat:
+        red = [g for g in spat.groups if g.colour == "red" and g.group == card.groups[0].name]
+        twice = tuple(msgspec.structs.replace(group, colour="yellow") for group in red)
+        return msgspec.structs.replace(spat, groups=spat.groups + twice)
+
+    return bend
+
+
+FAULT = SignalFault(what="dual indication", expects=("dual",), bends=_bends)

@@ -1,0 +1,9 @@
+"""The controller's process is gone at once."""
+
+from signal import SIGKILL
+
+from scm.selftest.signal_fault import SignalFault
+
+FAULT = SignalFault(
+    what="killed controller", expects=("stale", "skipped_yellow", "sequence"), process=SIGKILL
+)

@@ -1,0 +1,214 @@
+"""One junction of the traffic part: its controller, its detectors, and what is still to be told."""
+
+from typing import Literal
+
+from msgspec.structs import replace
+
+from scm.clock import NS_PER_MS
+from scm.maps.model import Junction
+from scm.store.records import PlanRecord
+from scm.traffic.controller import Controller, Heard
+from scm.traffic.detectors import Watcher
+from scm.traffic.plan import FLASH
+from scm.traffic.priority_air import PriorityDesk
+from scm.traffic.program import STEP_NS
+from scm.v2x.etsi_convert import roadside_station, spatem_of
+from scm.v2x.etsi_mapem import MapemBody
+from scm.v2x.etsi_topology import mapem_at
+from scm.v2x.exchange import Outgoing
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.mapem_tx import MapemTx
+from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.plan_request import PlanReply, PlanRequest
+from scm.v2x.messages.signal_request import SignalReply, SignalRequest, SignalWish
+from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.spatem_tx import SpatemTx
+
+MONITOR_SILENT_NS = 3_000 * NS_PER_MS
+SPATEM_EVERY_NS = 500 * NS_PER_MS
+MAPEM_EVERY_NS = 1_000 * NS_PER_MS
+EARLY_NS = STEP_NS // 2
+
+Severity = Literal["info", "warning"]
+
+
+class JunctionSignals:
+    """Steps one controller; hears the monitor, people and vehicles for it."""
+
+    def __init__(
+        self,
+        junction: Junction,
+        controller: Controller,
+        watcher: Watcher,
+        desk: PriorityDesk,
+        mapem: MapemBody,
+    ) -> None:
+        self.junction = junction
+        self._mapem = mapem
+        self._mapem_ns: int | None = None
+        self.record = PlanRecord(plan="")
+        self.desk = desk
+        self.controller = controller
+        self.watcher = watcher
+        self._told = (controller.mode, controller.running, "")
+        self._asked = "as the map says"
+        self._why_flash = ""
+        self._monitor_ns: int | None = None
+        self._sent_ns: int | None = None
+        self._wishes = controller.asked
+        self._news: list[Outgoing] = []
+
+    def hear_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
+        """Flash while the monitor reports a fault."""
+        self._monitor_ns = arrived_ns
+        self._flash(
+            "monitor",
+            f"the monitor reports {status.fault}: {status.detail}",
+            on=status.fault is not None,
+        )
+
+    def go_on(self, record: PlanRecord) -> None:
+        """Take what was asked for in an earlier run, as if it were asked now.
+
+        Raises:
+            PlanError: when there is no such plan any more.
+        """
+        for plan in (record.plan, FLASH if record.flash else ""):
+            if plan:
+                self.serve_plan(PlanRequest(junction=self.junction.name, plan=plan, by=record.by))
+
+    def serve_plan(self, request: PlanRequest) -> PlanReply:
+        """Take a wish for a plan, or for flash; `record` is what should outlive the process.
+
+        Raises:
+            PlanError: when there is no such plan.
+        """
+        controller = self.controller
+        who = f"{request.by} asked" + (f": {request.reason}" if request.reason else "")
+        if request.plan == FLASH:
+            self._flash("person", who, on=True)
+            self.record = replace(self.record, flash=True, by=request.by)
+            return PlanReply(junction=request.junction, plan=FLASH)
+        controller.ask(request.plan)
+        self.record = PlanRecord(plan=request.plan, by=request.by)
+        self._asked = who
+        self._flash("person", who, on=False)
+        plan = FLASH if controller.is_flashing else controller.running
+        return PlanReply(junction=request.junction, plan=plan, pending=controller.pending)
+
+    def serve_wish(self, request: SignalRequest, now_ns: int) -> SignalReply:
+        """Take a wish for groups, or for a policy.
+
+        Raises:
+            PlanError: saying why it cannot be taken.
+        """
+        controller = self.controller
+        controller.take(request, now_ns)
+        self._wishes = controller.asked
+        what = " ".join((request.verb, request.policy, *request.groups)).replace("  ", " ")
+        why = f": {request.reason}" if request.reason else ""
+        text = f"{request.by} asked{why}"
+        if request.verb in ("policy", "clear"):
+            self._asked = text
+        if controller.is_flashing and not self._why_flash:
+            self._why_flash = text
+        self._tell("info", "signal_wish", f"{what} ({text}), {request.expires_s:g} s", now_ns)
+        return SignalReply(
+            junction=request.junction,
+            policy=controller.policy,
+            pending=controller.pending,
+            wishes=tuple(
+                SignalWish(
+                    verb=one.verb,
+                    groups=one.groups,
+                    by=one.by,
+                    reason=one.reason,
+                    ends_ns=one.until_ns,
+                    policy=one.policy,
+                )
+                for one in controller.asked
+            ),
+        )
+
+    def step(self, now_ns: int) -> list[Outgoing]:
+        """Go on to `now_ns`; return what the city and the air are told."""
+        controller = self.controller
+        if self._monitor_ns is not None:
+            silent = now_ns - self._monitor_ns > MONITOR_SILENT_NS
+            self._flash("silence", "the monitor fell silent", on=silent)
+        controller.step(now_ns, self._heard(now_ns))
+        spat = controller.spat(now_ns)
+        self._lapses(now_ns)
+        self._changes(now_ns)
+        news, self._news = self._news, []
+        return [spat, *self._on_air(spat), *self.desk.tell(controller.priority, now_ns), *news]
+
+    def _heard(self, now_ns: int) -> Heard:
+        calls = self.desk.calls(now_ns)
+        if not self.controller.needs_detectors:
+            return Heard({}, priority=calls)
+        watcher = self.watcher
+        detectors = watcher.by_group(watcher.read(now_ns))
+        return Heard(detectors, watcher.sees(now_ns), calls)
+
+    def _flash(self, reason: str, why: str, *, on: bool) -> None:
+        if on and not self.controller.is_flashing:
+            self._why_flash = why
+        self.controller.flash(reason, on=on)
+
+    def _on_air(self, spat: Spat) -> list[Outgoing]:
+        station, now_ns = roadside_station(spat.junction), spat.t_ns
+        sent: list[Outgoing] = []
+        if self.controller.changed or _is_due(self._sent_ns, now_ns, SPATEM_EVERY_NS):
+            self._sent_ns = now_ns
+            body = spatem_of(spat, self.junction)
+            sent.append(SpatemTx(station=station, t_ns=now_ns, body=body))
+        if _is_due(self._mapem_ns, now_ns, MAPEM_EVERY_NS):
+            self._mapem_ns = now_ns
+            lanes = mapem_at(self._mapem, now_ns)
+            sent.append(MapemTx(station=station, t_ns=now_ns, body=lanes))
+        return sent
+
+    def _lapses(self, now_ns: int) -> None:
+        """Tell wishes that ended by themselves."""
+        held = self.controller.asked
+        if held == self._wishes:
+            return
+        for one in self._wishes:
+            if one.until_ns <= now_ns and one not in held:
+                what = " ".join((one.verb, one.policy, *one.groups)).replace("  ", " ")
+                self._tell("info", "signal_wish_lapsed", f"{what} of {one.by} lapsed", now_ns)
+        self._wishes = held
+
+    def _changes(self, now_ns: int) -> None:
+        """Tell what changed since this was last asked."""
+        controller = self.controller
+        (mode, running, failure), now = self._told, (
+            controller.mode,
+            controller.running,
+            controller.failure,
+        )  # fmt: skip
+        self._told = now
+        if running != now[1]:
+            text = f"runs plan {now[1]}, before {running} ({self._asked})"
+            self._tell("info", "plan_changed", text, now_ns)
+        if now[2] and failure != now[2]:
+            text = f"falls back to fixed time: {now[2]}"
+            self._tell("warning", "policy_failed", text, now_ns)
+        if mode != FLASH and now[0] == FLASH:
+            self._tell("warning", "signals_flash", f"flashes red: {self._why_flash}", now_ns)
+        if mode == FLASH and now[0] != FLASH:
+            self._why_flash = ""
+            self._tell("info", "signals_restart", "restarts all red", now_ns)
+        if mode != "preempt" and now[0] == "preempt":
+            self._tell("info", "signals_preempted", "is pre-empted", now_ns)
+
+    def _tell(self, severity: Severity, name: str, what: str, now_ns: int) -> None:
+        text = f"junction {self.junction.name} {what}"
+        self._news.append(
+            CityEvent(severity=severity, source="traffic", t_ns=now_ns, name=name, text=text)
+        )
+
+
+def _is_due(sent_ns: int | None, now_ns: int, every_ns: int) -> bool:
+    return sent_ns is None or now_ns - sent_ns >= every_ns - EARLY_NS

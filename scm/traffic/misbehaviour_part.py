@@ -1,0 +1,144 @@
+"""The misbehaviour part: hears all CAMs at the roadside units and the Eye, and says who lies.
+
+It judges by `scm/v2x/misbehaviour`, knows no truth of the world, and touches nothing: a report is
+for people, and for those who wish to ignore a station.
+"""
+
+from collections.abc import Sequence
+
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.maps.model import CityMap
+from scm.part import Hears, Serves
+from scm.traffic.cars import facts_of
+from scm.v2x.etsi_convert import roadside_station
+from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.message import Message
+from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.eye_track import EyeTrack
+from scm.v2x.messages.misbehaviour_report import (
+    EvidenceCam,
+    EvidencePose,
+    MisbehaviourReport,
+    Observation,
+)
+from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores, StationScore
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.misbehaviour.detector import EYE_WORKS_NS, Detector, Judged
+from scm.v2x.misbehaviour.ground import Ground, Sees
+from scm.v2x.misbehaviour.limits import Limits
+
+NAME = "misbehaviour"
+PERIOD_NS = 50 * NS_PER_MS
+CAR = "nigel"
+MOST_TOLD = 200
+"""Stations in a list of scores: those that most is held against."""
+
+
+class MisbehaviourPart:
+    """Judges what is said on the air of one city; see `scm.part.Part`."""
+
+    role = "part"
+    period_ns = PERIOD_NS
+    serves: Sequence[Serves] = ()
+
+    def __init__(self, city_map: CityMap, sees: Sees | None = None) -> None:
+        """Take the map; `sees` says what the Eye overlooks, the map's cameras if it is None."""
+        self.name = NAME
+        units = [roadside_station(junction.name) for junction in city_map.junctions]
+        at_units = (Hears(CamRx, {"receiver": unit}) for unit in units)
+        self.hears: Sequence[Hears] = (*at_units, Hears(EyeTrack))
+        limits = Limits(speed_mps=facts_of(CAR).speed_mps)
+        self.detector = Detector(Ground(city_map, sees), limits)
+        self._due_ns = 0
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Judge what arrived; report at once, tell scores once a second."""
+        outbox: list[Outgoing] = []
+        detector = self.detector
+        for item in inbox:
+            message = item.message
+            if isinstance(message, EyeTrack):
+                detector.see(message)
+            elif isinstance(message, CamRx):
+                found = detector.hear(message.station, message.receiver, message.t_ns, message.body)
+                if found is not None and found.is_reported:
+                    outbox += self._tell(found, now_ns)
+        if now_ns >= self._due_ns:
+            self._due_ns = now_ns + NS_PER_S
+            detector.forget(now_ns)
+            outbox += self._each_second(now_ns)
+        return outbox
+
+    def finish(self, now_ns: int) -> list[Outgoing]:
+        """Fall silent."""
+        del now_ns
+        return []
+
+    def _tell(self, found: Judged, now_ns: int) -> list[Message]:
+        report = report_of(found, self.detector, now_ns)
+        checks = ", ".join(one.check for one in report.observations[:3])
+        text = f"{report.suspect} is suspected of lying on the air: {checks}"
+        event = CityEvent(
+            severity="warning",
+            source=NAME,
+            t_ns=now_ns,
+            name="misbehaviour",
+            text=text,
+            vehicle=report.suspect,
+        )
+        return [report, event] if found.memory.is_news else [report]
+
+    def _each_second(self, now_ns: int) -> list[Message]:
+        memories = sorted(self.detector.memories.items(), key=lambda one: -one[1].score)
+        suspected = sum(memory.since_ns is not None for _, memory in memories)
+        rows = tuple(
+            StationScore(
+                station=memory.station,
+                station_id=who,
+                score=round(memory.score, 3),
+                worst=memory.worst,
+                suspected=memory.since_ns is not None,
+            )
+            for who, memory in memories[:MOST_TOLD]
+        )
+        eye_ns = self.detector.eye_ns
+        witness = eye_ns is not None and now_ns - eye_ns <= EYE_WORKS_NS
+        detail = f"{len(memories)} stations, {suspected} suspected"
+        return [
+            MisbehaviourScores(t_ns=now_ns, witness=witness, stations=rows),
+            PartStatus(station=NAME, t_ns=now_ns, detail=detail),
+        ]
+
+
+def report_of(found: Judged, detector: Detector, now_ns: int) -> MisbehaviourReport:
+    """Return the report on a station that has just been judged."""
+    memory, claim = found.memory, found.claim
+    worst_first = sorted(memory.noted.values(), key=lambda noted: noted.least)
+    track = detector.track_of(claim.who)
+    return MisbehaviourReport(
+        suspect=memory.station,
+        suspect_id=claim.who,
+        t_ns=now_ns,
+        since_ns=memory.since_ns or now_ns,
+        score=round(memory.score, 3),
+        observations=tuple(
+            Observation(
+                kind=noted.check.kind,
+                check=noted.check.name,
+                plausibility=noted.least,
+                claims=noted.claims,
+            )
+            for noted in worst_first
+        ),
+        evidence=tuple(EvidenceCam(t_ns=one.sent_ns, body=one.body) for one in memory.evidence),
+        seen=None
+        if track is None or track.stale
+        else EvidencePose(
+            t_ns=track.t_ns,
+            x_m=track.x_m,
+            y_m=track.y_m,
+            yaw_rad=track.yaw_rad,
+            speed_mps=track.speed_mps,
+        ),
+    )

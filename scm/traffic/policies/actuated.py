@@ -1,0 +1,100 @@
+"""Actuated: rings and barriers, green as long as vehicles come, none where nobody is.
+
+A phase is called by a vehicle before its stop line or by an operator; one that has been red for
+`UNSEEN_NS` is called anyway, for whoever the detectors do not see. Max 2 is in force where a queue
+is longer than max 1 can clear. When detectors see nothing at all, every phase has max recall: then
+it runs like fixed time.
+
+Vocabulary and rules: NEMA TS 2 and NTCIP 1202, as far as `scm.traffic.rings` says.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from scm.clock import NS_PER_S
+from scm.traffic import rings
+from scm.traffic.asked import groups_of
+from scm.traffic.kernel import Phase
+from scm.traffic.policy import Answer, JunctionView, Mode, Policy, Site
+from scm.traffic.rings import Inputs, Recall, Rings
+
+UNSEEN_NS = 120 * NS_PER_S
+LONG_QUEUE = 4
+
+
+class Memory(NamedTuple):
+    """The rings, and since when each phase has not been green [ns]."""
+
+    rings: Rings
+    not_green_ns: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What the rings are to be told, and whether the detectors can be relied on."""
+
+    inputs: Inputs
+    sees: bool
+
+
+def start(site: Site) -> Memory:
+    """Begin with nothing served."""
+    return Memory(rings.start(site.layout), (0,) * len(site.program.groups))
+
+
+def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer]:
+    """Let the rings go on."""
+    memory = ride(site, memory, view, told_of(site, memory, view))
+    mode: Mode = "preempt" if groups_of(view.asked, "preempt") else "adaptive"
+    return memory, Answer(named(site, rings.wishes(memory.rings)), mode=mode)
+
+
+def ride(site: Site, memory: Memory, view: JunctionView, told: Told) -> Memory:
+    """Return the memory a step later."""
+    green = rings.green_in(view.state)
+    layout = site.layout
+    if not told.sees:
+        blind = tuple(phase._replace(recall=Recall.MAX) for phase in layout.phases)
+        layout = layout._replace(phases=blind)
+    after = rings.step(layout, memory.rings, told.inputs, green, view.dt_ns)
+    waits = tuple(
+        0 if i in green else wait + view.dt_ns for i, wait in enumerate(memory.not_green_ns)
+    )
+    return Memory(after, waits)
+
+
+def told_of(site: Site, memory: Memory, view: JunctionView) -> Told:
+    """Return what detectors and operators tell the rings."""
+    groups = site.program.groups
+    calls = {i for i, wait in enumerate(memory.not_green_ns) if wait >= UNSEEN_NS}
+    long = set()
+    for i, name in enumerate(groups):
+        detector = view.detectors.get(name)
+        is_green = view.state[i].phase is Phase.GREEN
+        if detector is not None and (detector.extend if is_green else detector.call):
+            calls.add(i)
+        if detector is not None and detector.queue > LONG_QUEUE:
+            long.add(i)
+    preempt = sorted(numbers(site, groups_of(view.asked, "preempt")))
+    inputs = Inputs(
+        calls=frozenset(calls) | numbers(site, groups_of(view.asked, "call")),
+        hold=numbers(site, groups_of(view.asked, "hold")),
+        force_off=numbers(site, groups_of(view.asked, "force_off")),
+        omit=numbers(site, groups_of(view.asked, "omit")),
+        preempt=preempt[0] if preempt else None,
+        max2=frozenset(long),
+    )
+    return Told(inputs, view.sees)
+
+
+def numbers(site: Site, groups: frozenset[str]) -> frozenset[int]:
+    """Return groups as numbers of phases."""
+    return frozenset(site.program.groups.index(group) for group in groups)
+
+
+def named(site: Site, phases: frozenset[int]) -> frozenset[str]:
+    """Return phases as names of groups."""
+    return frozenset(site.program.groups[phase] for phase in phases)
+
+
+POLICY = Policy("actuated: green for whoever is there, as long as they come", start, step)

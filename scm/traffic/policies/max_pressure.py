@@ -1,0 +1,131 @@
+"""Max pressure: green for the stage with the longest queues, less the queues that it would feed.
+
+    pressure(stage) = sum over its groups of (queue before the line - cars standing behind it)
+
+A stage stays at least its least green. Then the stage of the highest pressure follows; the present
+one stays on a tie, and where its own cars still come. Nobody waits for ever: a group that is
+called and has waited `STARVED_NS` is served next, whatever the others' pressure.
+
+Rule: Varaiya 2013, Max pressure control of a network of signalized intersections; the least
+wait is ours. It needs no knowledge of demand, and nothing of other junctions but the queues.
+"""
+
+from itertools import combinations
+from typing import NamedTuple
+
+from scm.clock import NS_PER_S
+from scm.traffic.asked import groups_of
+from scm.traffic.kernel import Phase, Program
+from scm.traffic.plan import stages, times_of
+from scm.traffic.policy import Answer, JunctionView, Policy, Site
+
+STARVED_NS = 60 * NS_PER_S
+UNSEEN_NS = 120 * NS_PER_S
+SWITCH_AT = 1.0
+MANY_GROUPS = 10
+
+
+class Memory(NamedTuple):
+    """Which groups are green, for how long all of them were, and how long the others wait [ns]."""
+
+    stage: frozenset[str]
+    green_ns: int
+    waits_ns: tuple[int, ...]
+
+
+def start(site: Site) -> Memory:
+    """Begin with nobody green."""
+    return Memory(frozenset(), 0, (0,) * len(site.program.groups))
+
+
+def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer]:
+    """Stay, or choose the next stage."""
+    program = site.program
+    is_green = [group.phase is Phase.GREEN for group in view.state]
+    called = _called(site, memory, view)
+    waits = tuple(
+        0 if green or name not in called else wait + view.dt_ns
+        for name, green, wait in zip(program.groups, is_green, memory.waits_ns, strict=True)
+    )
+    all_green = all(
+        green for name, green in zip(program.groups, is_green, strict=True) if name in memory.stage
+    )
+    green_ns = memory.green_ns + view.dt_ns if all_green else 0
+    stage = memory.stage
+    least_ns = max((times_of(program, name).min_green for name in stage), default=0)
+    if green_ns >= least_ns and (all_green or not stage):
+        stage = _choose(site, stage, view, called, waits)
+    if stage != memory.stage:
+        green_ns = 0
+    return Memory(stage, green_ns, waits), Answer(stage)
+
+
+def stages_of(program: Program) -> list[frozenset[str]]:
+    """Return every largest set of groups without conflict; of many groups, just a cover."""
+    if len(program.groups) > MANY_GROUPS:
+        return [frozenset(stage) for stage in stages(program)]
+    free = [
+        frozenset(some)
+        for count in range(1, len(program.groups) + 1)
+        for some in combinations(program.groups, count)
+        if not any(frozenset(pair) in program.conflicts for pair in combinations(some, 2))
+    ]
+    return [some for some in free if not any(some < other for other in free)]
+
+
+def _called(site: Site, memory: Memory, view: JunctionView) -> frozenset[str]:
+    omitted = groups_of(view.asked, "omit")
+    called = set(groups_of(view.asked, "call") | groups_of(view.asked, "preempt"))
+    for name in site.program.groups:
+        detector = view.detectors.get(name)
+        if not view.sees or (detector is not None and detector.call):
+            called.add(name)
+    return frozenset(called - omitted)
+
+
+def _choose(
+    site: Site,
+    now: frozenset[str],
+    view: JunctionView,
+    called: frozenset[str],
+    waits: tuple[int, ...],
+) -> frozenset[str]:
+    """Return the stage to be green now."""
+    held = groups_of(view.asked, "hold") & now
+    if held:
+        return now
+    candidates = [s for s in stages_of(site.program) if s & called]
+    preempt = groups_of(view.asked, "preempt")
+    must = preempt or _starved(site, waits)
+    candidates = [s for s in candidates if s & must] or candidates
+    if not candidates:
+        return now
+    forced = groups_of(view.asked, "force_off") & now
+    best = max(candidates, key=lambda stage: _pressure(stage, view, called))
+    better = _pressure(best, view, called) - _pressure(now, view, called)
+    is_idle = not now & called
+    if not (must or forced or is_idle) and better < SWITCH_AT:
+        return now
+    return best - groups_of(view.asked, "omit")
+
+
+def _starved(site: Site, waits: tuple[int, ...]) -> frozenset[str]:
+    longest = max(waits)
+    if longest < STARVED_NS:
+        return frozenset()
+    return frozenset((site.program.groups[waits.index(longest)],))
+
+
+def _pressure(stage: frozenset[str], view: JunctionView, called: frozenset[str]) -> float:
+    """Return the pressure of a stage; a car that still drives up counts half."""
+    total = 0.0
+    for name in stage & called:
+        detector = view.detectors.get(name)
+        if detector is None:
+            total += 1.0
+        else:
+            total += detector.queue + 0.5 * (detector.near - detector.queue) - detector.ahead
+    return total
+
+
+POLICY = Policy("max pressure: the longest queues first, where there is room for them", start, step)

@@ -1,0 +1,130 @@
+"""Certificates of a fleet: its own small authority, one certificate a station, one of the router.
+
+ECDSA on P-256. A certificate is good for one purpose: a station's cannot pose as a router.
+"""
+
+import ipaddress
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from scm.errors import AccessError
+
+AUTHORITY_DAYS = 3650
+STATION_DAYS = 365
+EARLY = timedelta(hours=1)  # computers' clocks differ
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """A certificate and its private key, both as PEM."""
+
+    certificate: str
+    private_key: str
+
+
+def make_authority(name: str, now: datetime) -> Pair:
+    """Return a new authority that signs itself."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    builder = (
+        _builder(name, name, key, now, AUTHORITY_DAYS)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .add_extension(_usage(signs_certificates=True), critical=True)
+    )
+    return _pair(builder.sign(key, hashes.SHA256()), key)
+
+
+def issue_station(authority: Pair, name: str, now: datetime, days: int = STATION_DAYS) -> Pair:
+    """Return a station's certificate: `name` is its common name, by which the router knows it."""
+    return _issue(authority, name, now, days, ExtendedKeyUsageOID.CLIENT_AUTH, ())
+
+
+def issue_router(
+    authority: Pair, hosts: Sequence[str], now: datetime, days: int = STATION_DAYS
+) -> Pair:
+    """Return the router's certificate, good at the addresses that stations reach it by."""
+    return _issue(authority, "router", now, days, ExtendedKeyUsageOID.SERVER_AUTH, hosts)
+
+
+def expiry_of(pem: str) -> datetime:
+    """Return when a certificate ends, UTC."""
+    return x509.load_pem_x509_certificate(pem.encode()).not_valid_after_utc
+
+
+def _issue(
+    authority: Pair,
+    name: str,
+    now: datetime,
+    days: int,
+    purpose: x509.ObjectIdentifier,
+    hosts: Sequence[str],
+) -> Pair:
+    issuer = x509.load_pem_x509_certificate(authority.certificate.encode())
+    signer = serialization.load_pem_private_key(authority.private_key.encode(), None)
+    if not isinstance(signer, ec.EllipticCurvePrivateKey):
+        msg = "the fleet's authority: expected an ECDSA key, as `scm fleet add` makes it"
+        raise AccessError(msg)
+    key = ec.generate_private_key(ec.SECP256R1())
+    parent = str(issuer.subject.get_attributes_for_oid(NameOID.COMMON_NAME)[0].value)
+    builder = (
+        _builder(name, parent, key, now, days)
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(_usage(signs_certificates=False), critical=True)
+        .add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)
+    )
+    if hosts:
+        names = [_general_name(host) for host in hosts]
+        builder = builder.add_extension(x509.SubjectAlternativeName(names), critical=False)
+    return _pair(builder.sign(signer, hashes.SHA256()), key)
+
+
+def _builder(
+    name: str, issuer: str, key: ec.EllipticCurvePrivateKey, now: datetime, days: int
+) -> x509.CertificateBuilder:
+    now = now.astimezone(UTC)
+    return (
+        x509.CertificateBuilder()
+        .subject_name(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)]))
+        .issuer_name(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, issuer)]))
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - EARLY)
+        .not_valid_after(now + timedelta(days=days))
+    )
+
+
+def _usage(*, signs_certificates: bool) -> x509.KeyUsage:
+    return x509.KeyUsage(
+        digital_signature=not signs_certificates,
+        content_commitment=False,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        key_cert_sign=signs_certificates,
+        crl_sign=signs_certificates,
+        encipher_only=False,
+        decipher_only=False,
+    )
+
+
+def _general_name(host: str) -> x509.GeneralName:
+    try:
+        return x509.IPAddress(ipaddress.ip_address(host))
+    except ValueError:
+        return x509.DNSName(host)
+
+
+def _pair(certificate: x509.Certificate, key: ec.EllipticCurvePrivateKey) -> Pair:
+    return Pair(
+        certificate.public_bytes(serialization.Encoding.PEM).decode(),
+        key.private_bytes(
+            serialization.Encoding.PEM,
+            serialization.PrivateFormat.PKCS8,
+            serialization.NoEncryption(),
+        ).decode(),
+    )

@@ -1,0 +1,58 @@
+"""Faults of a network, planned by a seed: for the bus in memory, to be repeated bit for bit.
+
+What is sent may be lost, doubled, or come late; what comes late is overtaken by what was sent
+after it. Two sides of a partition hear nothing of each other. Who is there (`Presence`), and what
+is kept for late joiners, is told all the same.
+"""
+
+import random
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from scm.clock import nanoseconds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weather:
+    """How likely each fault is, between 0 and 1.
+
+    Attributes:
+        late_s: The longest delay of what comes late [s].
+    """
+
+    drop: float = 0.0
+    double: float = 0.0
+    late: float = 0.0
+    late_s: float = 0.5
+
+
+class Faults:
+    """Decides over each thing that goes from one station to another.
+
+    Attributes:
+        weather: In force now.
+    """
+
+    def __init__(self, seed: int, weather: Weather | None = None) -> None:
+        self._rng = random.Random(seed)
+        self.weather = weather or Weather()
+        self._away: frozenset[str] = frozenset()
+
+    def cut_off(self, stations: Iterable[str]) -> None:
+        """Part these stations from all others; nobody: the network is whole again."""
+        self._away = frozenset(stations)
+
+    def delays(self, sender: str, receiver: str) -> tuple[int, ...]:
+        """Return when copies of one thing arrive after it was sent [ns]; nothing: it is lost."""
+        if (sender in self._away) != (receiver in self._away):
+            return ()
+        rng, weather = self._rng, self.weather
+        if rng.random() < weather.drop:
+            return ()
+        copies = 2 if rng.random() < weather.double else 1
+        return tuple(self._delay() for _ in range(copies))
+
+    def _delay(self) -> int:
+        if self._rng.random() >= self.weather.late:
+            return 0
+        return nanoseconds(self._rng.uniform(0.0, self.weather.late_s))

@@ -1,0 +1,246 @@
+"""The fleet file: which stations a city knows and what each is, in TOML, without any secret.
+
+Secrets lie in the folder beside it (`fleet.toml` -> `fleet.secrets/`): one credentials file a
+station, and what the router needs, which is a list of passwords or an authority with its key. Each
+time a station is given new credentials its number goes up, and the router knows only the newest: a
+stolen file ends with the next `scm fleet add` of its owner and a restart of the router.
+"""
+
+import secrets
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from scm.errors import AccessError, nearest
+from scm.v2x.credentials import Credentials, read_credentials, write_credentials, write_secret
+from scm.v2x.key import check_name
+from scm.v2x.rights import rights_of
+
+if TYPE_CHECKING:
+    from scm.v2x.certificates import Pair
+
+Auth = Literal["password", "mtls"]
+HERE = ("127.0.0.1", "::1", "localhost")
+PASSWORD_BYTES = 32
+RENEW_BEFORE = timedelta(days=30)
+
+_HEAD = (
+    "# Who may enter the city. Written by `scm fleet add`; secrets lie in the folder beside it.\n"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One station: its name, its role, and how often it was given credentials."""
+
+    name: str
+    role: str
+    issued: int = 1
+
+    @property
+    def identity(self) -> str:
+        """The user name or common name that the router knows it by."""
+        return f"{self.name}.{self.issued}"
+
+
+@dataclass(slots=True)
+class Fleet:
+    """Who may enter.
+
+    Attributes:
+        path: Of the file.
+        auth: How all of its stations prove who they are.
+        hosts: Addresses that stations reach the router by; its certificate names them.
+        members: By name.
+        issued: How many credentials each name was ever given, also of those who were removed.
+    """
+
+    path: Path
+    auth: Auth
+    hosts: tuple[str, ...] = HERE
+    members: dict[str, Member] = field(default_factory=dict)
+    issued: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def folder(self) -> Path:
+        """Where its secrets lie."""
+        return self.path.with_suffix(".secrets")
+
+    @property
+    def users(self) -> Path:
+        """The router's list of passwords."""
+        return self.folder / "router.users"
+
+    def credentials(self, name: str) -> Path:
+        """Return the credentials file of a station."""
+        return self.folder / f"{name}.toml"
+
+    def pem(self, name: str) -> Path:
+        """Return the place of `authority.crt`, `authority.key`, `router.crt` or `router.key`."""
+        return self.folder / name
+
+
+def load_fleet(path: Path) -> Fleet:
+    """Read a fleet file.
+
+    Raises:
+        AccessError: when it cannot be read or says what makes no sense.
+    """
+    try:
+        values = tomllib.loads(path.read_text("utf-8"))
+    except OSError as cause:
+        msg = f"fleet {path}: {cause.strerror}; `scm fleet add` makes one"
+        raise AccessError(msg) from cause
+    except ValueError as cause:
+        msg = f"fleet {path}: {cause}; expected TOML as `scm fleet add` writes it"
+        raise AccessError(msg) from cause
+    auth = values.get("auth")
+    if auth not in ("password", "mtls"):
+        msg = f"fleet {path}: auth: got {auth!r}, expected password or mtls"
+        raise AccessError(msg)
+    try:
+        fleet = Fleet(path, auth, tuple(map(str, values.get("hosts", HERE))))
+        for name, of_station in values.get("stations", {}).items():
+            member = Member(check_name(name, "station"), of_station["role"], of_station["issued"])
+            rights_of(member.role, name)
+            fleet.members[name] = member
+        fleet.issued = {name: int(count) for name, count in values.get("removed", {}).items()}
+    except (AccessError, ValueError, KeyError, TypeError, AttributeError) as cause:
+        msg = f"fleet {path}: {cause!r}; expected what `scm fleet add` writes"
+        raise AccessError(msg) from cause
+    fleet.issued |= {member.name: member.issued for member in fleet.members.values()}
+    return fleet
+
+
+def save_fleet(fleet: Fleet) -> None:
+    """Write a fleet file over whatever was there."""
+    hosts = ", ".join(f'"{host}"' for host in fleet.hosts)
+    lines = [_HEAD, f'auth = "{fleet.auth}"', f"hosts = [{hosts}]", ""]
+    for member in sorted(fleet.members.values(), key=lambda member: member.name):
+        lines += [f"[stations.{member.name}]", f'role = "{member.role}"']
+        lines += [f"issued = {member.issued}", ""]
+    gone = {name: count for name, count in fleet.issued.items() if name not in fleet.members}
+    if gone:
+        lines += ["[removed]", *(f"{name} = {count}" for name, count in sorted(gone.items())), ""]
+    write_secret(fleet.path, "\n".join(lines))
+
+
+def add(fleet: Fleet, name: str, role: str, now: datetime) -> Credentials:
+    """Let a station in, or give one new credentials; write all files and return what it got.
+
+    Raises:
+        AccessError: when the role is unknown, or files cannot be written.
+        MessageError: when the name may not stand in a key.
+    """
+    rights_of(role, check_name(name, "station"))
+    member = Member(name, role, fleet.issued.get(name, 0) + 1)
+    made = _with_password(member) if fleet.auth == "password" else _certified(fleet, member, now)
+    write_credentials(fleet.credentials(name), made)
+    fleet.members[name] = member
+    fleet.issued[name] = member.issued
+    if fleet.auth == "password":
+        _write_users(fleet, {member.identity: made.password})
+    save_fleet(fleet)
+    return made
+
+
+def remove(fleet: Fleet, name: str) -> None:
+    """Let a station in no more, once the router was started again.
+
+    Raises:
+        AccessError: when the file does not know it.
+    """
+    if name not in fleet.members:
+        close = nearest(name, list(fleet.members))
+        msg = f"fleet {fleet.path}: there is no station named {name!r}{close}"
+        raise AccessError(msg)
+    del fleet.members[name]
+    if fleet.auth == "password":
+        _write_users(fleet, {})
+    save_fleet(fleet)
+    fleet.credentials(name).unlink(missing_ok=True)
+
+
+def complete(fleet: Fleet, stations: Mapping[str, str], now: datetime) -> None:
+    """Give a city's own stations (name -> role) what they lack, and renew what ends soon."""
+    for name, role in stations.items():
+        if _lacks_credentials(fleet, name, now):
+            add(fleet, name, role, now)
+    name_hosts(fleet, (), now)
+
+
+def name_hosts(fleet: Fleet, hosts: Iterable[str], now: datetime) -> None:
+    """Make the router's certificate good at more addresses, and renew it when it ends soon."""
+    wished = (*fleet.hosts, *(host for host in hosts if host not in fleet.hosts))
+    is_new = wished != fleet.hosts
+    fleet.hosts = wished
+    if fleet.auth == "mtls":
+        from scm.v2x.certificates import issue_router  # noqa: PLC0415  slow to load, rarely needed
+
+        authority, old = _authority(fleet, now), fleet.pem("router.crt")
+        if is_new or not old.is_file() or _ends_soon(old.read_text(), now):
+            pair = issue_router(authority, fleet.hosts, now)
+            write_secret(fleet.pem("router.key"), pair.private_key)
+            write_secret(fleet.pem("router.crt"), pair.certificate)
+    save_fleet(fleet)
+
+
+def _lacks_credentials(fleet: Fleet, name: str, now: datetime) -> bool:
+    path = fleet.credentials(name)
+    if name not in fleet.members or not path.is_file():
+        return True
+    return fleet.auth == "mtls" and _ends_soon(read_credentials(path).certificate, now)
+
+
+def _ends_soon(certificate: str, now: datetime) -> bool:
+    from scm.v2x.certificates import expiry_of  # noqa: PLC0415  slow to load, rarely needed
+
+    return expiry_of(certificate) - now < RENEW_BEFORE
+
+
+def _with_password(member: Member) -> Credentials:
+    return Credentials(
+        station=member.name,
+        role=member.role,
+        user=member.identity,
+        password=secrets.token_urlsafe(PASSWORD_BYTES),
+    )
+
+
+def _certified(fleet: Fleet, member: Member, now: datetime) -> Credentials:
+    from scm.v2x.certificates import issue_station  # noqa: PLC0415  slow to load, rarely needed
+
+    name_hosts(fleet, (), now)
+    authority = _authority(fleet, now)
+    pair = issue_station(authority, member.identity, now)
+    return Credentials(
+        station=member.name,
+        role=member.role,
+        certificate=pair.certificate,
+        private_key=pair.private_key,
+        authority=authority.certificate,
+    )
+
+
+def _authority(fleet: Fleet, now: datetime) -> "Pair":
+    from scm.v2x.certificates import Pair, make_authority  # noqa: PLC0415  slow, rarely needed
+
+    key, certificate = fleet.pem("authority.key"), fleet.pem("authority.crt")
+    if key.is_file() and certificate.is_file():
+        return Pair(certificate.read_text(), key.read_text())
+    made = make_authority(f"scm {fleet.path.stem}", now)
+    write_secret(key, made.private_key)
+    write_secret(certificate, made.certificate)
+    return made
+
+
+def _write_users(fleet: Fleet, new: Mapping[str, str]) -> None:
+    """Write the router's passwords: Zenoh reads them in plain."""
+    lines = fleet.users.read_text().splitlines() if fleet.users.is_file() else []
+    known = dict(line.split(":", 1) for line in lines) | dict(new)
+    current = [member.identity for member in fleet.members.values()]
+    users = [f"{user}:{known[user]}\n" for user in sorted(current) if user in known]
+    write_secret(fleet.users, "".join(users))

@@ -1,0 +1,228 @@
+"""What a step must leave behind before its answers may go: one transaction of a store.
+
+`Keeper` writes at once; `KeeperBehind` writes on a thread, so that a slow disk or a server that is
+away never keeps a part from its next step: only the answers wait. What could not be written is
+written again, the same, until it is; meanwhile `stuck` says why.
+"""
+
+import logging
+import queue
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import msgspec
+
+from scm.errors import StoreError
+from scm.log import event
+from scm.store.audit import AuditLog, Deed
+from scm.store.repository import Repository, Table
+from scm.v2x.answers import StoredAnswer
+from scm.v2x.exchange import Answer
+
+RETRY_S = 0.5
+CLOSE_S = 2.0
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Batch:
+    """What one step leaves behind.
+
+    Attributes:
+        values: Table, key and value; None forgets it.
+        deeds: For the audit log.
+        answers: What may leave when all that is stored.
+    """
+
+    values: Sequence[tuple[Table, str, bytes | None]]
+    deeds: Sequence[Deed]
+    answers: Sequence[Answer]
+
+
+class Keeps(Protocol):
+    """Stores batches in order, each whole or not at all."""
+
+    def stored_answers(self) -> dict[str, StoredAnswer]:
+        """Return the answers of earlier runs, by key."""
+        ...
+
+    def write(self, batch: Batch) -> None:
+        """Store a batch, now or soon."""
+        ...
+
+    def written(self) -> list[Batch]:
+        """Return the batches that are safe, and were not returned before, in order."""
+        ...
+
+    @property
+    def stuck(self) -> str:
+        """Why nothing can be stored now; empty: it can."""
+        ...
+
+    def close(self) -> None:
+        """Try for a moment to store what waits; the store itself stays open."""
+        ...
+
+
+class _Writer:
+    """Writes batches of one run of one station, and knows whether it has done so already.
+
+    A server may lose the line just when it commits. The mark written with the batches tells at the
+    next attempt whether they are there: an audit log would show a second copy.
+    """
+
+    def __init__(self, store: Repository, station: str, session: str) -> None:
+        self._store = store
+        self._station = station
+        self._session = session
+        self._number = 0
+        self._in_doubt = False
+        self.stuck = ""
+
+    def stored_answers(self) -> dict[str, StoredAnswer]:
+        prefix = f"{self._station}/"
+        return {
+            key.removeprefix(prefix): msgspec.json.decode(value, type=StoredAnswer)
+            for key, value in self._store.items("answers")
+            if key.startswith(prefix)
+        }
+
+    def commit(self, batches: Sequence[Batch]) -> bool:
+        try:
+            self._write(batches)
+        except StoreError as cause:
+            self._in_doubt = True
+            if not self.stuck:
+                facts = {"station": self._station, "reason": cause}
+                event(_log, "state_not_stored", level=logging.ERROR, **facts)
+            self.stuck = f"{self._station} cannot store its state now: {cause}"
+            return False
+        if self.stuck:
+            event(_log, "state_stored_again", station=self._station)
+        self._number += 1
+        self._in_doubt, self.stuck = False, ""
+        return True
+
+    def _write(self, batches: Sequence[Batch]) -> None:
+        store, log = self._store, AuditLog(self._store)
+        mark = f"{self._session} {self._number}".encode()
+        with store.transaction():
+            if self._in_doubt and store.get("marks", self._station) == mark:
+                return
+            for batch in batches:
+                for table, key, value in batch.values:
+                    name = f"{self._station}/{key}"
+                    if value is None:
+                        store.delete(table, name)
+                    else:
+                        store.put(table, name, value)
+                for deed in batch.deeds:
+                    log.note(deed)
+            store.put("marks", self._station, mark)
+
+
+class Keeper:
+    """Stores at once, in the caller's step; see `Keeps`."""
+
+    def __init__(self, store: Repository, station: str, session: str) -> None:
+        self._writer = _Writer(store, station, session)
+        self._waiting: list[Batch] = []
+        self._under_way: list[Batch] = []
+        self._safe: list[Batch] = []
+
+    def stored_answers(self) -> dict[str, StoredAnswer]:
+        """Return the answers of earlier runs, by key."""
+        return self._writer.stored_answers()
+
+    def write(self, batch: Batch) -> None:
+        """Store a batch."""
+        self._waiting.append(batch)
+
+    def written(self) -> list[Batch]:
+        """Return the batches that are safe, and were not returned before, in order."""
+        while self._under_way or self._waiting:
+            if not self._under_way:
+                self._under_way, self._waiting = self._waiting, []
+            if not self._writer.commit(self._under_way):
+                return []
+            self._safe += self._under_way
+            self._under_way = []
+        safe, self._safe = self._safe, []
+        return safe
+
+    @property
+    def stuck(self) -> str:
+        """Why nothing can be stored now; empty: it can."""
+        return self._writer.stuck
+
+    def close(self) -> None:
+        """Nothing waits here longer than a step."""
+
+
+class KeeperBehind:
+    """Stores on a thread of its own, everything that waits in one transaction; see `Keeps`."""
+
+    def __init__(self, store: Repository, station: str, session: str) -> None:
+        self._writer = _Writer(store, station, session)
+        self._waiting: queue.SimpleQueue[Batch | None] = queue.SimpleQueue()
+        self._safe: queue.SimpleQueue[Batch] = queue.SimpleQueue()
+        self._ending = threading.Event()
+        self._failure: Exception | None = None
+        self._thread = threading.Thread(target=self._run, name=f"keep {station}", daemon=True)
+        self._thread.start()
+
+    def stored_answers(self) -> dict[str, StoredAnswer]:
+        """Return the answers of earlier runs, by key."""
+        return self._writer.stored_answers()
+
+    def write(self, batch: Batch) -> None:
+        """Have a batch stored soon."""
+        self._waiting.put(batch)
+
+    def written(self) -> list[Batch]:
+        """Return the batches that are safe, and were not returned before, in order."""
+        if self._failure is not None:
+            raise self._failure
+        safe: list[Batch] = []
+        while not self._safe.empty():
+            safe.append(self._safe.get())
+        return safe
+
+    @property
+    def stuck(self) -> str:
+        """Why nothing can be stored now; empty: it can."""
+        return self._writer.stuck
+
+    def close(self) -> None:
+        """Try for a moment to store what waits."""
+        self._waiting.put(None)
+        self._thread.join(CLOSE_S)
+        self._ending.set()
+
+    def _run(self) -> None:
+        try:
+            while (batches := self._take()) is not None:
+                while not self._writer.commit(batches):
+                    if self._ending.wait(RETRY_S):
+                        return
+                for batch in batches:
+                    self._safe.put(batch)
+        except Exception as failure:  # noqa: BLE001  the edge of a thread: the part must hear of it
+            self._failure = failure
+
+    def _take(self) -> list[Batch] | None:
+        """Wait for a batch; return all that wait then, or None at the end."""
+        first = self._waiting.get()
+        if first is None:
+            return None
+        batches = [first]
+        while not self._waiting.empty():
+            more = self._waiting.get()
+            if more is None:
+                self._waiting.put(None)
+                break
+            batches.append(more)
+        return batches

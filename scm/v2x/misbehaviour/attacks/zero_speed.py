@@ -1,0 +1,43 @@
+"""Zero speed: says it stands, wherever it is.
+
+v' = 0        a lie while it drives: above 1 m/s of the full city, and moved
+"""
+
+import math
+import random
+
+from scm.v2x.etsi_convert import CamView, read_cam
+from scm.v2x.misbehaviour.attack import (
+    SLOW_MPS,
+    STEP_M,
+    Attack,
+    Frame,
+    Scene,
+    Sent,
+    Transform,
+)
+from scm.v2x.misbehaviour.forge import driven
+
+
+def drives(told: CamView, before: CamView | None) -> bool:
+    """Return whether a car truly moves, by its speed and its way since the CAM before."""
+    if before is None or abs(told.speed_mps or 0.0) <= SLOW_MPS:
+        return False
+    return math.hypot(told.x_m - before.x_m, told.y_m - before.y_m) > STEP_M / 5.0
+
+
+def _start(rng: random.Random, scene: Scene) -> Transform:
+    del rng, scene
+    before: CamView | None = None
+
+    def send(frame: Frame) -> list[Sent]:
+        nonlocal before
+        told, last = read_cam(frame.body), before
+        before = told
+        body = driven(frame.body, speed_mps=0.0)
+        return [Sent(frame._replace(body=body), lies=drives(told, last))]
+
+    return send
+
+
+ATTACK = Attack("a speed of zero while driving", _start)

@@ -1,0 +1,120 @@
+"""The contract of a check: what it is given, and what it answers.
+
+A check answers how plausible a claim is, 0..1, or None where it cannot tell. 1 is ordinary. Near 0
+is what an honest car would claim with that probability at most.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+from scm import registry
+from scm.geometry import wrap_angle
+from scm.v2x.messages.eye_track import EyeTrack
+from scm.v2x.misbehaviour.claim import Claim
+from scm.v2x.misbehaviour.ground import Ground
+from scm.v2x.misbehaviour.kalman import Kalman
+from scm.v2x.misbehaviour.limits import Limits
+
+CHECKS = "scm.v2x.misbehaviour.checks"
+Class = Literal["beacon", "static", "security", "position", "speed", "longAcc"]
+"""The classes of observations of ETSI TS 103 759."""
+
+
+class Strayed:
+    """How far a station's way strays from its speeds, the last seconds counting most.
+
+    Attributes:
+        last_m: Of the last claim alone, + = went farther than it said.
+        sum_m: Of the last `WINDOW_S`, faded; `over_s` is their faded time.
+    """
+
+    WINDOW_S = 5.0
+    __slots__ = ("last_m", "over_s", "sum_m")
+
+    def __init__(self) -> None:
+        self.last_m = self.sum_m = self.over_s = 0.0
+
+    def add(self, now: Claim, before: Claim, dt_s: float, front_share: float) -> None:
+        """Take the way from one claim to the next."""
+        (x1, y1), (x0, y0) = now.rear(front_share), before.rear(front_share)
+        yaw0, yaw1 = before.yaw_rad or 0.0, now.yaw_rad or 0.0
+        yaw = yaw0 + wrap_angle(yaw1 - yaw0) / 2.0
+        way = (x1 - x0) * math.cos(yaw) + (y1 - y0) * math.sin(yaw)
+        self.last_m = way - ((now.speed_mps or 0.0) + (before.speed_mps or 0.0)) / 2.0 * dt_s
+        fade = math.exp(-dt_s / self.WINDOW_S)
+        self.sum_m, self.over_s = self.sum_m * fade + self.last_m, self.over_s * fade + dt_s
+
+
+class Standing(NamedTuple):
+    """What is held against a station, see `fusion`, and since when it is known [ns]."""
+
+    score: float
+    since_ns: int
+
+
+@dataclass(slots=True)
+class Case:
+    """One claim and all that it may be held against; one object serves all claims in turn.
+
+    Attributes:
+        now: The claim to be judged.
+        before: The station's claim before it; None: its first.
+        dt_s: Between these two, by what they say; 0 for the first.
+        gap_s: Between their arrivals.
+        kalman: The station's filter, which has taken `now`.
+        neighbours: Newest claims of stations around it that are not older than a second or so.
+        strayed: The station's way beside its speeds, which has taken `now`.
+        standings: By station number.
+        track: The Eye's track of this very car, fresh; None: it has none.
+        nearest_track_m: From the claimed rear axle to any fresh track; inf: there is none near.
+        eye_sees: Whether the Eye works and overlooks the place.
+        since_start_s: How long we have listened.
+        idle: Claims in a row that came fast although nothing had changed.
+        is_own_number: Whether the number in the CAM is that of the station that sent it.
+    """
+
+    now: Claim
+    limits: Limits
+    ground: Ground
+    before: Claim | None = None
+    dt_s: float = 0.0
+    gap_s: float = 0.0
+    kalman: Kalman = field(default_factory=Kalman)
+    neighbours: tuple[Claim, ...] = ()
+    strayed: Strayed = field(default_factory=Strayed)
+    standings: dict[int, Standing] = field(default_factory=dict)
+    track: EyeTrack | None = None
+    nearest_track_m: float = float("inf")
+    eye_sees: bool = False
+    since_start_s: float = 0.0
+    idle: int = 0
+    is_own_number: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One check.
+
+    Attributes:
+        judge: The answer to a case.
+        kind: Its class of observations.
+        floor: The least it may answer, however sure: what alone shall not condemn anybody.
+        witnessed: Whether an Eye that confirms the place settles the question in the car's favour.
+        name: Filled in by `load_checks`.
+    """
+
+    judge: Callable[[Case], float | None]
+    kind: Class
+    floor: float = 1e-9
+    witnessed: bool = False
+    name: str = ""
+
+
+def load_checks() -> tuple[Check, ...]:
+    """Return all checks, by name."""
+    loaded = [
+        (name, registry.load(CHECKS, name, "CHECK", Check)) for name in registry.names(CHECKS)
+    ]
+    return tuple(Check(one.judge, one.kind, one.floor, one.witnessed, name) for name, one in loaded)

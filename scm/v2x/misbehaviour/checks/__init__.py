@@ -1,0 +1,1 @@
+"""One check a file, each with `CHECK`; the contract is `scm.v2x.misbehaviour.check`."""

@@ -1,0 +1,24 @@
+"""Acceleration plausibility: no car brakes or speeds up harder than a car can.
+
+    p = erfc((a - a_max) / sigma) for speeding up, likewise for braking
+
+Only between two claims that are both beyond it: a bump is over at once, and cars do bump.
+"""
+
+from scm.v2x.misbehaviour.check import Case, Check
+from scm.v2x.misbehaviour.likely import at_most
+
+
+def _judge(case: Case) -> float | None:
+    now, before = case.now, case.before
+    if now.accel_mps2 is None or before is None or before.accel_mps2 is None:
+        return None
+    sigma = case.limits.own_mps2
+    gain = min(now.accel_mps2, before.accel_mps2)
+    loss = -max(now.accel_mps2, before.accel_mps2)
+    return min(
+        at_most(gain, case.limits.accel_mps2, sigma), at_most(loss, case.limits.decel_mps2, sigma)
+    )
+
+
+CHECK = Check(_judge, "longAcc")

@@ -1,0 +1,34 @@
+"""Acceleration against speed (F2MD's SCC): speed changes as the claimed acceleration says.
+
+    r = v1 - v0 - (a0 + a1) / 2 dt        p = erfc of |r| beyond a share of |a1 - a0| dt
+
+Holds for claims that follow within NEAR_S of each other: later, anything may have come between.
+Acceleration is told of an instant, so it tells little: alone it needs many claims.
+"""
+
+import math
+
+from scm.v2x.misbehaviour.check import Case, Check
+from scm.v2x.misbehaviour.likely import of_number
+
+NEAR_S = 0.25
+TOLERANCE_MPS = 0.01
+SHARE = 0.5
+
+
+def _judge(case: Case) -> float | None:
+    now, before, dt = case.now, case.before, case.dt_s
+    if before is None or not 0.0 < dt <= NEAR_S:
+        return None
+    if now.speed_mps is None or before.speed_mps is None:
+        return None
+    if now.accel_mps2 is None or before.accel_mps2 is None:
+        return None
+    gain = now.speed_mps - before.speed_mps
+    mean = (now.accel_mps2 + before.accel_mps2) / 2.0
+    spread = abs(now.accel_mps2 - before.accel_mps2)
+    sigma = math.hypot(math.hypot(now.own_mps, before.own_mps), case.limits.own_mps2 * dt)
+    return of_number(gain - mean * dt, TOLERANCE_MPS + SHARE * spread * dt, sigma)
+
+
+CHECK = Check(_judge, "longAcc", floor=1e-2)

@@ -1,0 +1,19 @@
+"""Speed plausibility: nobody is faster than his car.
+
+p = erfc((|v| - v_max) / sigma)        v_max of the car itself, not VeReMi's 62 m/s
+"""
+
+from scm.v2x.misbehaviour.check import Case, Check
+from scm.v2x.misbehaviour.likely import at_most
+
+TOLERANCE = 1.1
+
+
+def _judge(case: Case) -> float | None:
+    speed = case.now.speed_mps
+    if speed is None:
+        return None
+    return at_most(abs(speed), TOLERANCE * case.limits.speed_mps, case.now.own_mps)
+
+
+CHECK = Check(_judge, "speed")

@@ -1,0 +1,236 @@
+"""The detector: CAMs and tracks go in, reports on stations come out.
+
+A CAM that several roadside units hear counts once. What comes from outside never stops it.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from scm.clock import NS_PER_S
+from scm.v2x.etsi import CamBody
+from scm.v2x.etsi_convert import station_id
+from scm.v2x.messages.eye_track import EyeTrack
+from scm.v2x.misbehaviour.check import Case, Check, Standing, Strayed, load_checks
+from scm.v2x.misbehaviour.claim import Claim, claim_of
+from scm.v2x.misbehaviour.fusion import FREE, Memory
+from scm.v2x.misbehaviour.ground import Ground
+from scm.v2x.misbehaviour.limits import REAPPEARS_S, Limits
+
+FRESH_NS = NS_PER_S // 3
+EYE_WORKS_NS = NS_PER_S // 2
+FORGET_NS = 60 * NS_PER_S
+NEIGHBOUR_M = 0.5
+CONFIRMED = 0.05
+BAD_FLAGS = frozenset({"tentative", "duplicate", "disagree", "wrong_id", "jumped"})
+MOST_STATIONS = 10_000
+"""More station numbers than any city has: a flood of new ones must not fill the memory."""
+ORDINARY = 10.0**-FREE
+IDLE_S, UNMOVED = 0.9, 0.5
+MOVED_M, MOVED_MPS, MOVED_RAD = 4.0 / 14.0, 0.5 / 14.0, math.radians(4.0)
+
+
+class Judged(NamedTuple):
+    """One claim, what each check found doubtful in it, and whether a report is due."""
+
+    claim: Claim
+    memory: Memory
+    doubts: list[tuple[Check, float]]
+    is_reported: bool
+
+
+class Detector:
+    """Judges all stations of a city.
+
+    Attributes:
+        memories: By station number.
+        heard: Claims judged so far.
+        eye_ns: Of the newest track; None: no Eye was ever heard.
+    """
+
+    def __init__(
+        self, ground: Ground, limits: Limits | None = None, checks: Sequence[Check] | None = None
+    ) -> None:
+        """Take the map's knowledge, what cars can do, and the checks; None: all there are."""
+        self._limits = limits or Limits()
+        chosen = load_checks() if checks is None else checks
+        # Those that a witness settles come after those by which it speaks.
+        self._checks = sorted(chosen, key=lambda check: check.witnessed)
+        self._ground = ground
+        self.memories: dict[int, Memory] = {}
+        self.heard = 0
+        self._numbers: dict[str, int] = {}
+        self._cells: dict[tuple[int, int], dict[int, Claim]] = {}
+        self._tracks: dict[int, EyeTrack] = {}
+        self.eye_ns: int | None = None
+        self._standings: dict[int, Standing] = {}
+        self._began_ns: int | None = None
+
+    def see(self, track: EyeTrack) -> None:
+        """Take a track of the Eye."""
+        self._tracks[self._number(track.vehicle)] = track
+        self.eye_ns = track.t_ns
+
+    def hear(self, station: str, receiver: str, sent_ns: int, body: CamBody) -> Judged | None:
+        """Judge a CAM; None: it was heard before, through another receiver."""
+        memory = self._memory(body.station_id, station, sent_ns)
+        newest = memory.newest
+        if newest is not None and sent_ns <= newest.sent_ns:
+            return None
+        if self._began_ns is None:
+            self._began_ns = sent_ns
+        claim = claim_of(station, receiver, sent_ns, body, self._limits)
+        case = self._case(claim, memory)
+        doubts = self._ask(case)
+        due = memory.add(claim, case.gap_s, doubts)
+        self._place(claim, newest)
+        memory.newest = claim
+        self._standings[claim.who] = Standing(memory.score, memory.first_ns)
+        self.heard += 1
+        return Judged(claim, memory, doubts, due)
+
+    def track_of(self, who: int) -> EyeTrack | None:
+        """Return the newest track of a station's own tag, however old."""
+        return self._tracks.get(who)
+
+    def forget(self, now_ns: int) -> None:
+        """Drop stations and tracks that were not heard or seen for a minute."""
+        for who, memory in list(self.memories.items()):
+            newest = memory.newest
+            if newest is not None and now_ns - newest.sent_ns > FORGET_NS:
+                self._cells.get(_cell(*newest.middle), {}).pop(who, None)
+                del self.memories[who]
+                self._standings.pop(who, None)
+        self._tracks = {w: t for w, t in self._tracks.items() if now_ns - t.t_ns < FORGET_NS}
+
+    def _memory(self, who: int, station: str, sent_ns: int) -> Memory:
+        memory = self.memories.get(who)
+        if memory is None:
+            if len(self.memories) >= MOST_STATIONS:
+                self.memories.pop(next(iter(self.memories)))
+            memory = self.memories[who] = Memory(station, sent_ns)
+        return memory
+
+    def _number(self, name: str) -> int:
+        number = self._numbers.get(name)
+        if number is None:
+            if len(self._numbers) >= MOST_STATIONS:
+                self._numbers.clear()
+            number = self._numbers[name] = station_id(name)
+        return number
+
+    def _ask(self, case: Case) -> list[tuple[Check, float]]:
+        doubts: list[tuple[Check, float]] = []
+        confirmed = False
+        for check in self._checks:
+            if confirmed and check.witnessed:
+                continue
+            plausibility = check.judge(case)
+            if plausibility is None:
+                continue
+            if plausibility < ORDINARY:
+                doubts.append((check, max(plausibility, check.floor)))
+            if check.name == "eye_position":
+                confirmed = plausibility >= CONFIRMED
+        return doubts
+
+    def _case(self, claim: Claim, memory: Memory) -> Case:
+        before = memory.newest
+        gap_s = 0.0 if before is None else (claim.sent_ns - before.sent_ns) * 1e-9
+        if gap_s > REAPPEARS_S:
+            before = None
+        dt_s = 0.0 if before is None else (claim.t_ns - before.t_ns) * 1e-9
+        memory.idle = _idle(claim, before, gap_s, memory.idle)
+        self._filter(claim, memory, before, dt_s)
+        track = self._fresh(claim)
+        eye_sees = self._eye_sees(claim)
+        return Case(
+            now=claim,
+            limits=self._limits,
+            ground=self._ground,
+            before=before,
+            dt_s=dt_s,
+            gap_s=gap_s,
+            kalman=memory.kalman,
+            neighbours=self._around(claim),
+            strayed=memory.strayed,
+            standings=self._standings,
+            track=track,
+            nearest_track_m=self._nearest_m(claim) if eye_sees and track is None else math.inf,
+            eye_sees=eye_sees,
+            since_start_s=(claim.sent_ns - (self._began_ns or claim.sent_ns)) * 1e-9,
+            idle=memory.idle,
+            is_own_number=self._number(claim.station) == claim.who,
+        )
+
+    def _filter(self, claim: Claim, memory: Memory, before: Claim | None, dt_s: float) -> None:
+        x, y = claim.rear(self._limits.front_share)
+        yaw, speed = claim.yaw_rad or 0.0, claim.speed_mps or 0.0
+        vx, vy = speed * math.cos(yaw), speed * math.sin(yaw)
+        kalman = memory.kalman
+        if before is None or dt_s <= 0.0:
+            kalman.begin(claim.t_ns, x, y, vx, vy)
+            memory.strayed = Strayed()
+        else:
+            kalman.take(claim.t_ns, x, y, vx, vy, claim.own_m, claim.own_mps)
+            memory.strayed.add(claim, before, dt_s, self._limits.front_share)
+
+    def _fresh(self, claim: Claim) -> EyeTrack | None:
+        track = self._tracks.get(claim.who)
+        return track if track is not None and _is_fresh(track, claim.t_ns) else None
+
+    def _eye_sees(self, claim: Claim) -> bool:
+        if self.eye_ns is None or abs(claim.sent_ns - self.eye_ns) > EYE_WORKS_NS:
+            return False
+        return self._ground.sees(*claim.middle)
+
+    def _nearest_m(self, claim: Claim) -> float:
+        x, y = claim.rear(self._limits.front_share)
+        return min(
+            (
+                math.hypot(x - track.x_m, y - track.y_m)
+                for track in self._tracks.values()
+                if not track.stale and abs(claim.t_ns - track.t_ns) <= FRESH_NS
+            ),
+            default=math.inf,
+        )
+
+    def _around(self, claim: Claim) -> tuple[Claim, ...]:
+        i, j = _cell(*claim.middle)
+        found: list[Claim] = []
+        for a in (i - 1, i, i + 1):
+            for b in (j - 1, j, j + 1):
+                held = self._cells.get((a, b))
+                if held:
+                    found += held.values()
+        return tuple(one for one in found if one.who != claim.who)
+
+    def _place(self, claim: Claim, before: Claim | None) -> None:
+        cell = _cell(*claim.middle)
+        if before is not None:
+            was = _cell(*before.middle)
+            if was != cell:
+                self._cells.get(was, {}).pop(claim.who, None)
+        self._cells.setdefault(cell, {})[claim.who] = claim
+
+
+def _cell(x: float, y: float) -> tuple[int, int]:
+    return math.floor(x / NEIGHBOUR_M), math.floor(y / NEIGHBOUR_M)
+
+
+def _is_fresh(track: EyeTrack, t_ns: int) -> bool:
+    if track.stale or abs(t_ns - track.t_ns) > FRESH_NS:
+        return False
+    return not track.flags or BAD_FLAGS.isdisjoint(track.flags)
+
+
+def _idle(claim: Claim, before: Claim | None, gap_s: float, idle: int) -> int:
+    """Return how many claims in a row came fast although the car had not moved."""
+    if before is None or gap_s > IDLE_S:
+        return 0
+    moved = max(
+        math.hypot(claim.x_m - before.x_m, claim.y_m - before.y_m) / MOVED_M,
+        abs((claim.speed_mps or 0.0) - (before.speed_mps or 0.0)) / MOVED_MPS,
+        abs(math.remainder((claim.yaw_rad or 0.0) - (before.yaw_rad or 0.0), math.tau)) / MOVED_RAD,
+    )
+    return 0 if moved > UNMOVED else idle + 1

@@ -1,0 +1,40 @@
+"""What a car can do and how well it knows itself, in metres of the table.
+
+Those of VeReMi NextGen hold after division by the city's scale of 14, speed by the car's own
+limit instead: acceleration 5.4 m/s^2 and deceleration 5.0 m/s^2 would be 0.39 and 0.36 m/s^2
+here, and Nigels drive harder than that, so these too are the car's own; heading 76 degrees and
+a reappearance after 4.7 s are used as they are.
+"""
+
+import math
+from dataclasses import dataclass
+
+HEADING_RAD = math.radians(76.0)
+REAPPEARS_S = 4.7
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Of the fastest, strongest car that may be met.
+
+    Attributes:
+        speed_mps: Greatest speed.
+        accel_mps2: Greatest gain of speed over a tenth of a second; `decel_mps2` likewise of loss.
+        interval_s: Least time between two CAMs.
+        own_m: Standard deviation of a position whose CAM does not tell it; likewise the others.
+        most_own_m: What a CAM may claim at most: who knows himself worse is judged by this.
+        front_share: Of a car's length, what lies before its rear axle.
+    """
+
+    speed_mps: float = 0.267
+    accel_mps2: float = 0.9
+    decel_mps2: float = 1.5
+    interval_s: float = 0.1
+    own_m: float = 0.008
+    own_mps: float = 0.008
+    own_rad: float = 0.02
+    own_mps2: float = 0.05
+    most_own_m: float = 0.03
+    most_own_mps: float = 0.03
+    most_own_rad: float = 0.1
+    front_share: float = 0.767

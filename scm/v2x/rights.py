@@ -1,0 +1,189 @@
+"""What each role of station may say, hear, ask and serve: the one table of who may do what.
+
+A line is a key below `scm/@v1/<city>/` with Zenoh's `*` and `**`; `{me}` stands for the station's
+own name. Whatever is not here is denied. The same tests hold the table against what every part of
+a running city really does, so a new message that is left out here fails before it is missed.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from scm.errors import AccessError, nearest
+
+Role = Literal["vehicle", "part", "viewer", "operator", "driver", "camera"]
+ROLES: tuple[str, ...] = get_args(Role)
+
+
+@dataclass(frozen=True, slots=True)
+class Rights:
+    """Keys below the city's prefix.
+
+    Attributes:
+        says: What it publishes.
+        hears: What it subscribes to; presence too.
+        asks: Whom it sends requests.
+        serves: Which requests it answers.
+    """
+
+    says: tuple[str, ...] = ()
+    hears: tuple[str, ...] = ()
+    asks: tuple[str, ...] = ()
+    serves: tuple[str, ...] = ()
+
+    def of(self, name: str) -> "Rights":
+        """Return these rights with a station's name filled in."""
+
+        def own(keys: tuple[str, ...]) -> tuple[str, ...]:
+            return tuple(key.replace("{me}", name) for key in keys)
+
+        return Rights(own(self.says), own(self.hears), own(self.asks), own(self.serves))
+
+    def __add__(self, other: "Rights") -> "Rights":
+        """Return the rights of both."""
+        return Rights(
+            self.says + other.says,
+            self.hears + other.hears,
+            self.asks + other.asks,
+            self.serves + other.serves,
+        )
+
+
+# `**` stands for no chunk that begins with @: pictures have to be named.
+EVERYTHING = ("**", "v/*/@camera/*", "eye/*/@preview", "eye/*/@picture")
+EVERY_REQUEST = (
+    "v/*/lease",
+    "v/*/cmd/*",
+    "v/*/remove",
+    "world/spawn",
+    "world/boxes",
+    "world/stop_request",
+    "tl/*/req",
+    "tl/*/wish",
+    "tl/*/mon/reset",
+)
+
+_EVERYBODY = Rights(says=("part/{me}/status", "event/*/{me}"))
+_WATCHES = Rights(hears=EVERYTHING)
+
+_OF_ROLE: dict[str, Rights] = {
+    # Not `v/{me}/**`: what others tell a car (commands, contacts) it cannot tell itself; nor may
+    # it send what only roadside units send (SPATEM, MAPEM, SSEM).
+    "vehicle": Rights(
+        says=(
+            "v/{me}/state",
+            "v/{me}/sensors",
+            "v/{me}/scan",
+            "v/{me}/trip",
+            "v/{me}/@camera/*",
+            "v2x/tx/{me}/cam",
+            "v2x/tx/{me}/cpm",
+            "v2x/tx/{me}/denm",
+            "v2x/tx/{me}/srem",
+        ),
+        hears=(
+            "world/def",
+            "world/stop",
+            "tl/*/mon",
+            "tl/*/spat",
+            "v/{me}/alive/*",
+            "v/{me}/contact",
+            "v/{me}/cmd/drive",
+            "v2x/rx/{me}/*/*",
+            "eye/pose/{me}",
+            "eye/*/pose/{me}",
+        ),
+        asks=("v/{me}/join", "v/{me}/lease", "v/{me}/remove"),
+        serves=("v/{me}/cmd/*",),
+    ),
+    "viewer": _WATCHES,
+    "operator": _WATCHES + Rights(asks=EVERY_REQUEST),
+    "driver": _WATCHES + Rights(says=("v/*/cmd/drive",), asks=EVERY_REQUEST),
+    "camera": Rights(says=("eye/{me}/@picture",)),
+}
+
+_OF_PART: dict[str, Rights] = {
+    "world": Rights(
+        says=(
+            "world/*",
+            "v/*/state",
+            "v/*/sensors",
+            "v/*/scan",
+            "v/*/trip",
+            "v/*/contact",
+            "v/*/cmd/drive",
+            "v2x/tx/*/*",
+            "v2x/rx/*/*/*",
+        ),
+        hears=(
+            "v/*/alive/*",
+            "v/*/state",
+            "v/*/cmd/drive",
+            "v2x/tx/*/*",
+            "tl/*/mon",
+            "tl/*/spat",
+        ),
+        asks=("v/*/cmd/*",),
+        serves=("world/*", "v/*/lease", "v/*/join", "v/*/remove", "v/*/cmd/*"),
+    ),
+    "traffic": Rights(
+        says=("tl/*/spat", "v2x/tx/*/*"),
+        hears=("tl/*/mon", "v2x/rx/*/*/*", "eye/pose/*", "world/def"),
+        serves=("tl/*/req", "tl/*/wish"),
+    ),
+    "monitor": Rights(says=("tl/*/mon",), hears=("tl/*/spat",), serves=("tl/*/mon/reset",)),
+    "eye": Rights(
+        says=("eye/*/*", "eye/*/pose/*", "eye/pose/*", "eye/*/@preview", "v2x/tx/*/cpm"),
+        hears=("world/snapshot", "eye/*/pose/*", "eye/*/@picture"),
+    ),
+    "camera": Rights(says=("v/*/@camera/*",), hears=("world/snapshot", "world/def", "tl/*/spat")),
+    "record": _WATCHES,
+    "api": _WATCHES + Rights(asks=EVERY_REQUEST),
+    "up": _WATCHES,
+    "selftest": _WATCHES + Rights(says=("**",), asks=("**",)),
+    "observer": Rights(
+        says=("traffic/counts", "violation/*"),
+        hears=("eye/pose/*", "v/*/state", "v/*/contact", "tl/*/spat"),
+    ),
+    "misbehaviour": Rights(
+        says=("misbehaviour/scores", "misbehaviour/*/report"),
+        hears=("v2x/rx/*/*/*", "eye/pose/*"),
+    ),
+    "demand": Rights(
+        says=("demand/status",),
+        hears=("v/*/trip",),
+        asks=("world/spawn", "v/*/cmd/route", "v/*/remove"),
+    ),
+    "ros2": _WATCHES + Rights(says=("v/*/cmd/drive",), asks=("v/*/lease",)),
+}
+"""By the part's name; `eye-<camera>` has the rights of `eye`."""
+
+_RESERVED = ("eye-", "rsu-")
+_PRESENCE = {"vehicle": "v/{me}/alive/*", "part": "part/{me}/alive/*"}
+_CLIENT = "client/{me}/alive/*"
+
+
+def rights_of(role: str, name: str) -> Rights:
+    """Return what a station may do.
+
+    Raises:
+        AccessError: when there is no such role, or no such part of the city.
+    """
+    if role == "part":
+        kind = "eye" if name.startswith("eye-") else name
+        if kind not in _OF_PART:
+            close = nearest(name, list(_OF_PART))
+            msg = f"part: got {name!r}, expected one of {sorted(_OF_PART)} or eye-<camera>{close}"
+            raise AccessError(msg)
+        return (_EVERYBODY + _OF_PART[kind]).of(name)
+    if name in _OF_PART or name.startswith(_RESERVED):
+        msg = f"{role}: got {name!r}, a name of the city's own; expected another"
+        raise AccessError(msg)
+    if role not in _OF_ROLE:
+        msg = f"role: got {role!r}, expected one of {sorted(ROLES)}{nearest(role, ROLES)}"
+        raise AccessError(msg)
+    return (_EVERYBODY + _OF_ROLE[role]).of(name)
+
+
+def presence_of(role: str, name: str) -> str:
+    """Return the key on which a station may say that it is there."""
+    return _PRESENCE.get(role, _CLIENT).replace("{me}", name)

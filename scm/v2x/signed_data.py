@@ -1,0 +1,313 @@
+"""The bytes of signed messages: IEEE 1609.2 data and certificates, in canonical OER.
+
+Only the profile that we send is written and read: ECDSA on P-256, SHA-256, explicit certificates,
+a payload inside. Its shape is fixed, so each field has its place, and nothing else gets past
+the reader. Tests hold every byte against pycrate, which has the whole standard.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from scm.errors import MessageError
+
+VERSION = 3
+DIGEST_BYTES = 8
+NUMBER_BYTES = 32
+
+# Preambles of optional fields, and tags of the choices that we make.
+_SIGNED_DATA = bytes([VERSION, 0x81, 0x00])  # version, signedData, hash sha256
+_TBS_START = bytes([0x40, VERSION, 0x80])  # its payload: data, version, unsecuredData
+_WITH_TIME, _WITH_TIME_AND_PLACE = 0x40, 0x50
+_BY_DIGEST, _BY_CERTIFICATE = 0x80, 0x81
+_SIGNATURE = b"\x80\x80"  # ecdsaNistP256, r as x only
+_ISSUED_BY, _SELF = b"\x80", b"\x81\x00"
+_EVEN, _ODD = 0x82, 0x83
+_MAY_SEND, _MAY_ISSUE = 0x10, 0x08
+
+
+class Point(NamedTuple):
+    """A public key on P-256, compressed."""
+
+    x: bytes
+    is_odd: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certificate:
+    """What a certificate says.
+
+    Attributes:
+        issuer: Digest of the issuer's certificate; None: it signs itself.
+        name: Of the station, or of the authority.
+        start_s: From when on it is good, TAI seconds since 2004.
+        hours: For how long.
+        psids: Which kinds of message it may sign; none: it issues certificates.
+        key: Public key.
+    """
+
+    issuer: bytes | None
+    name: str
+    start_s: int
+    hours: int
+    psids: tuple[int, ...]
+    key: Point
+
+    def to_be_signed(self) -> bytes:
+        """Return the part that its signature covers."""
+        name = self.name.encode()
+        perms = bytes([1, len(self.psids)]) + b"".join(b"\x00" + _integer(p) for p in self.psids)
+        if not self.psids:
+            # One group: all kinds, with the defaults of the standard for the rest.
+            perms = bytes([1, 1, 0x00, 0x81])
+        return b"".join(
+            (
+                bytes([_MAY_SEND if self.psids else _MAY_ISSUE, 0x81, len(name)]),
+                name,
+                bytes(5),  # no revocation list
+                self.start_s.to_bytes(4, "big"),
+                b"\x84" + self.hours.to_bytes(2, "big"),
+                perms,
+                bytes([0x80, 0x80, _ODD if self.key.is_odd else _EVEN]),
+                self.key.x,
+            )
+        )
+
+    def signed(self, signature: bytes) -> bytes:
+        """Return the whole certificate; `signature` is r and s, 64 bytes."""
+        issuer = _SELF if self.issuer is None else _ISSUED_BY + self.issuer
+        head = bytes([0x80, VERSION, 0x00])  # with a signature, version, explicit
+        return head + issuer + self.to_be_signed() + _SIGNATURE + signature
+
+
+class Reader:
+    """Takes bytes from the front."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self.at = 0
+
+    def take(self, count: int) -> bytes:
+        """Return the next bytes.
+
+        Raises:
+            MessageError: when there are fewer.
+        """
+        found = self._data[self.at : self.at + count]
+        if len(found) < count:
+            msg = f"signed data: got {len(self._data)} bytes, expected {count} from {self.at} on"
+            raise MessageError(msg)
+        self.at += count
+        return found
+
+    def expect(self, wanted: bytes) -> None:
+        """Take bytes that have to be these.
+
+        Raises:
+            MessageError: when they are others.
+        """
+        begun = self.at
+        found = self.take(len(wanted))
+        if found != wanted:
+            msg = f"signed data, byte {begun}: got {found.hex()}, expected {wanted.hex()}"
+            raise MessageError(msg)
+
+    def byte(self) -> int:
+        """Return the next byte."""
+        return self.take(1)[0]
+
+    def number(self, count: int) -> int:
+        """Return the next bytes as a number."""
+        return int.from_bytes(self.take(count), "big")
+
+    def length(self) -> int:
+        """Return a length: one byte, or how many bytes it takes and then they."""
+        first = self.byte()
+        return first if first < 0x80 else self.number(first & 0x7F)
+
+    def since(self, start: int) -> bytes:
+        """Return what was taken since a place."""
+        return self._data[start : self.at]
+
+    def end(self) -> None:
+        """Refuse anything that is left.
+
+        Raises:
+            MessageError: when something is.
+        """
+        left = len(self._data) - self.at
+        if left:
+            msg = f"signed data: {left} bytes more than expected"
+            raise MessageError(msg)
+
+
+class ReadCertificate(NamedTuple):
+    """A certificate as it came, with what its signature covers."""
+
+    says: Certificate
+    raw: bytes
+    to_be_signed: bytes
+    signature: bytes
+
+
+class SignedMessage(NamedTuple):
+    """A signed message as it came.
+
+    Attributes:
+        payload: What was signed, mostly UPER.
+        psid: Kind of message: 36 CAM, 37 DENM.
+        time_us: When it was made, TAI microseconds since 2004.
+        to_be_signed: What the signature covers, with the signer.
+        digest: Of the signer's certificate, where only that came.
+        certificate: The signer's, where it came whole.
+        signature: r and s.
+    """
+
+    payload: bytes
+    psid: int
+    time_us: int
+    to_be_signed: bytes
+    digest: bytes | None
+    certificate: ReadCertificate | None
+    signature: bytes
+
+
+def to_be_signed(
+    payload: bytes, psid: int, time_us: int, place: tuple[int, int, int] | None = None
+) -> bytes:
+    """Return what is signed of a message.
+
+    `place` is latitude and longitude [1e-7 degree] and elevation [0.1 m above -409.6 m].
+    """
+    head = _WITH_TIME if place is None else _WITH_TIME_AND_PLACE
+    parts = [
+        _TBS_START, _length(len(payload)), payload,
+        bytes([head]), _integer(psid), time_us.to_bytes(8, "big"),
+    ]  # fmt: skip
+    if place is not None:
+        latitude, longitude, elevation = place
+        parts += [
+            latitude.to_bytes(4, "big", signed=True),
+            longitude.to_bytes(4, "big", signed=True),
+            elevation.to_bytes(2, "big"),
+        ]
+    return b"".join(parts)
+
+
+def write_message(tbs: bytes, signer: bytes, signature: bytes) -> bytes:
+    """Return a signed message; `signer` is a digest of 8 bytes, or a whole certificate."""
+    if len(signer) == DIGEST_BYTES:
+        who = bytes([_BY_DIGEST]) + signer
+    else:
+        who = bytes([_BY_CERTIFICATE, 1, 1]) + signer
+    return _SIGNED_DATA + tbs + who + _SIGNATURE + signature
+
+
+def read_message(data: bytes) -> SignedMessage:
+    """Read a signed message.
+
+    Raises:
+        MessageError: when it is none, or none of our profile.
+    """
+    reader = Reader(data)
+    reader.expect(_SIGNED_DATA)
+    begun = reader.at
+    reader.expect(_TBS_START)
+    payload = reader.take(reader.length())
+    head = reader.byte()
+    psid = reader.number(reader.length())
+    time_us = reader.number(8)
+    if head == _WITH_TIME_AND_PLACE:
+        reader.take(10)
+    elif head != _WITH_TIME:
+        msg = f"signed data: header {head:#x}, expected a time, and a place or none"
+        raise MessageError(msg)
+    tbs = reader.since(begun)
+    digest, certificate = _read_signer(reader)
+    reader.expect(_SIGNATURE)
+    signature = reader.take(2 * NUMBER_BYTES)
+    reader.end()
+    return SignedMessage(payload, psid, time_us, tbs, digest, certificate, signature)
+
+
+def _read_signer(reader: Reader) -> tuple[bytes | None, ReadCertificate | None]:
+    kind = reader.byte()
+    if kind == _BY_DIGEST:
+        return reader.take(DIGEST_BYTES), None
+    if kind != _BY_CERTIFICATE:
+        msg = f"signed data: signer {kind:#x}, expected a digest or a certificate"
+        raise MessageError(msg)
+    reader.expect(b"\x01\x01")
+    return None, _take_certificate(reader)
+
+
+def read_certificate(data: bytes) -> ReadCertificate:
+    """Read a certificate.
+
+    Raises:
+        MessageError: when it is none, or none of our profile.
+    """
+    reader = Reader(data)
+    found = _take_certificate(reader)
+    reader.end()
+    return found
+
+
+def _take_certificate(reader: Reader) -> ReadCertificate:
+    begun = reader.at
+    reader.expect(bytes([0x80, VERSION, 0x00]))
+    issuer = reader.take(DIGEST_BYTES) if reader.byte() == _ISSUED_BY[0] else None
+    if issuer is None:
+        reader.expect(_SELF[1:])
+    covered = reader.at
+    kind = reader.byte()
+    reader.expect(b"\x81")
+    name = reader.take(reader.byte())
+    reader.expect(bytes(5))
+    start_s = reader.number(4)
+    reader.expect(b"\x84")
+    hours = reader.number(2)
+    psids = _take_psids(reader, kind)
+    reader.expect(b"\x80\x80")
+    parity = reader.byte()
+    key = Point(reader.take(NUMBER_BYTES), parity == _ODD)
+    tbs = reader.since(covered)
+    reader.expect(_SIGNATURE)
+    signature = reader.take(2 * NUMBER_BYTES)
+    try:
+        says = Certificate(
+            issuer=issuer, name=name.decode(), start_s=start_s, hours=hours, psids=psids, key=key
+        )
+    except UnicodeDecodeError as cause:
+        msg = f"certificate: name {name!r} is no text"
+        raise MessageError(msg) from cause
+    if says.to_be_signed() != tbs:
+        msg = "certificate: it is not written as the standard's canonical form has it"
+        raise MessageError(msg)
+    return ReadCertificate(says, reader.since(begun), tbs, signature)
+
+
+def _take_psids(reader: Reader, kind: int) -> tuple[int, ...]:
+    if kind == _MAY_ISSUE:
+        reader.expect(bytes([1, 1, 0x00, 0x81]))
+        return ()
+    if kind != _MAY_SEND:
+        msg = f"certificate: fields {kind:#x}, expected what it may send, or that it may issue"
+        raise MessageError(msg)
+    reader.expect(b"\x01")
+    psids = []
+    for _ in range(reader.byte()):
+        reader.expect(b"\x00")
+        psids.append(reader.number(reader.length()))
+    return tuple(psids)
+
+
+def _length(count: int) -> bytes:
+    if count < 0x80:
+        return bytes([count])
+    size = (count.bit_length() + 7) // 8
+    return bytes([0x80 | size]) + count.to_bytes(size, "big")
+
+
+def _integer(value: int) -> bytes:
+    size = max(1, (value.bit_length() + 7) // 8)
+    return bytes([size]) + value.to_bytes(size, "big")

@@ -1,0 +1,238 @@
+"""Sign what goes on the air and verify what comes from there, as IEEE 1609.2 has it.
+
+A station signs with a ticket of the city's own authority: the whole certificate once a second and
+whenever nobody can have heard it yet, its digest otherwise. Unlike on the road a ticket names its
+station: there are no pseudonyms here, and so no privacy.
+"""
+
+import hashlib
+from collections import OrderedDict
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.asymmetric.utils import (
+    decode_dss_signature,
+    encode_dss_signature,
+)
+
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import AccessError, MessageError
+from scm.v2x.signed_data import (
+    DIGEST_BYTES,
+    NUMBER_BYTES,
+    Certificate,
+    Point,
+    ReadCertificate,
+    read_certificate,
+    read_message,
+    to_be_signed,
+    write_message,
+)
+
+CAM, DENM = 36, 37
+CERTIFICATE_EVERY_NS = NS_PER_S
+FRESH_NS = 2 * NS_PER_S
+AHEAD_NS = 500 * NS_PER_MS
+SIGNERS_KEPT = 4096
+HOURS = 24 * 365
+
+_EPOCH_S = 1_072_915_200  # 2004-01-01 UTC, seconds since 1970
+_LEAP_S = 5  # TAI has gone ahead of UTC by so much since then
+_ALGORITHM = ec.ECDSA(hashes.SHA256())
+
+
+class Ticket(NamedTuple):
+    """A certificate as bytes, and its private key."""
+
+    certificate: bytes
+    key: ec.EllipticCurvePrivateKey
+
+    @property
+    def digest(self) -> bytes:
+        """What others call the certificate by."""
+        return digest_of(self.certificate)
+
+
+def digest_of(certificate: bytes) -> bytes:
+    """Return the last 8 bytes of a certificate's hash."""
+    return hashlib.sha256(certificate).digest()[-DIGEST_BYTES:]
+
+
+def make_authority(name: str, now_ns: int, hours: int = HOURS) -> Ticket:
+    """Return a new authority, whose certificate signs itself."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    says = Certificate(
+        issuer=None, name=name, start_s=_tai_us(now_ns) // 1_000_000, hours=hours, psids=(),
+        key=_point(key),
+    )  # fmt: skip
+    return Ticket(says.signed(_sign(key, says.to_be_signed(), b"")), key)
+
+
+def issue(
+    authority: Ticket, station: str, now_ns: int, *, psids: tuple[int, ...] = (CAM, DENM),
+    hours: int = 24,
+) -> Ticket:  # fmt: skip
+    """Return a ticket under which a station may sign these kinds of message."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    says = Certificate(
+        issuer=authority.digest, name=station, start_s=_tai_us(now_ns) // 1_000_000, hours=hours,
+        psids=psids, key=_point(key),
+    )  # fmt: skip
+    signature = _sign(authority.key, says.to_be_signed(), authority.certificate)
+    return Ticket(says.signed(signature), key)
+
+
+class Signer:
+    """Signs for one station."""
+
+    def __init__(self, ticket: Ticket) -> None:
+        self._ticket = ticket
+        self._digest = ticket.digest
+        self._shown_ns: int | None = None
+
+    def sign(
+        self, payload: bytes, psid: int, t_ns: int, place: tuple[int, int, int] | None = None
+    ) -> bytes:
+        """Return a signed message of bytes that were made at `t_ns`.
+
+        `place` (latitude and longitude in 1e-7 degree, elevation) belongs to a DENM.
+        """
+        tbs = to_be_signed(payload, psid, _tai_us(t_ns), place)
+        signature = _sign(self._ticket.key, tbs, self._ticket.certificate)
+        if self._shown_ns is None or t_ns - self._shown_ns >= CERTIFICATE_EVERY_NS:
+            self._shown_ns = t_ns
+            return write_message(tbs, self._ticket.certificate, signature)
+        return write_message(tbs, self._digest, signature)
+
+
+class Verified(NamedTuple):
+    """What a message that was verified says, and who says it."""
+
+    payload: bytes
+    psid: int
+    station: str
+    t_ns: int
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A certificate that was verified."""
+
+    says: Certificate
+    raw: bytes
+
+    @cached_property
+    def key(self) -> ec.EllipticCurvePublicKey:
+        return _public(self.says.key)
+
+    @cached_property
+    def hash(self) -> bytes:
+        return hashlib.sha256(self.raw).digest()
+
+
+class Verifier:
+    """Verifies messages under one authority; remembers the certificates that it has seen."""
+
+    def __init__(self, authority: bytes) -> None:
+        found = read_certificate(authority)
+        root = _Known(found.says, found.raw)
+        _check(root.key, found.to_be_signed, hashlib.sha256(b"").digest(), found.signature)
+        self._root = root
+        self._root_digest = digest_of(authority)
+        self._known: OrderedDict[bytes, _Known] = OrderedDict()
+
+    def verify(self, data: bytes, now_ns: int) -> Verified:
+        """Return what a message says and who says it.
+
+        Raises:
+            MessageError: when it cannot be read.
+            AccessError: when its signer is not known (yet), may not say it, or did not.
+        """
+        message = read_message(data)
+        if message.certificate is not None:
+            signer = self._learn(message.certificate)
+        else:
+            signer = self._recall(message.digest or b"")
+        t_ns = _unix_ns(message.time_us)
+        _check_says(signer.says, message.psid, message.time_us)
+        if not -AHEAD_NS <= now_ns - t_ns <= FRESH_NS:
+            msg = f"{signer.says.name}: it is {(now_ns - t_ns) / NS_PER_S:.1f} s old"
+            raise AccessError(msg)
+        _check(signer.key, message.to_be_signed, signer.hash, message.signature)
+        return Verified(message.payload, message.psid, signer.says.name, t_ns)
+
+    def _recall(self, digest: bytes) -> _Known:
+        found = self._known.get(digest)
+        if found is None:
+            msg = f"signer {digest.hex()}: its certificate has not come yet"
+            raise AccessError(msg)
+        return found
+
+    def _learn(self, came: ReadCertificate) -> _Known:
+        digest = digest_of(came.raw)
+        known = self._known.get(digest)
+        if known is not None and known.raw == came.raw:
+            return known
+        root = self._root
+        if came.says.issuer != self._root_digest or not came.says.psids:
+            msg = f"{came.says.name}: its certificate is not of our authority"
+            raise AccessError(msg)
+        _check(root.key, came.to_be_signed, root.hash, came.signature)
+        found = self._known[digest] = _Known(came.says, came.raw)
+        if len(self._known) > SIGNERS_KEPT:
+            self._known.popitem(last=False)
+        return found
+
+
+def _check_says(says: Certificate, psid: int, time_us: int) -> None:
+    if psid not in says.psids:
+        msg = f"{says.name}: it may sign {says.psids}, not {psid}"
+        raise AccessError(msg)
+    age_s = time_us // 1_000_000 - says.start_s
+    if not 0 <= age_s <= says.hours * 3600:
+        msg = f"{says.name}: its certificate was not good when this was signed"
+        raise AccessError(msg)
+
+
+def _sign(key: ec.EllipticCurvePrivateKey, tbs: bytes, signer: bytes) -> bytes:
+    hashed = hashlib.sha256(tbs).digest() + hashlib.sha256(signer).digest()
+    r, s = decode_dss_signature(key.sign(hashed, _ALGORITHM))
+    return r.to_bytes(NUMBER_BYTES, "big") + s.to_bytes(NUMBER_BYTES, "big")
+
+
+def _check(key: ec.EllipticCurvePublicKey, tbs: bytes, signer_hash: bytes, rs: bytes) -> None:
+    """Refuse a signature (r and s) that is not the key's."""
+    r = int.from_bytes(rs[:NUMBER_BYTES], "big")
+    s = int.from_bytes(rs[NUMBER_BYTES:], "big")
+    try:
+        hashed = hashlib.sha256(tbs).digest() + signer_hash
+        key.verify(encode_dss_signature(r, s), hashed, _ALGORITHM)
+    except InvalidSignature as cause:
+        msg = "signature: it is not the signer's, or what was signed was changed"
+        raise AccessError(msg) from cause
+
+
+def _point(key: ec.EllipticCurvePrivateKey) -> Point:
+    numbers = key.public_key().public_numbers()
+    return Point(numbers.x.to_bytes(NUMBER_BYTES, "big"), bool(numbers.y & 1))
+
+
+def _public(point: Point) -> ec.EllipticCurvePublicKey:
+    encoded = (b"\x03" if point.is_odd else b"\x02") + point.x
+    try:
+        return ec.EllipticCurvePublicKey.from_encoded_point(ec.SECP256R1(), encoded)
+    except ValueError as cause:
+        msg = f"certificate: {point.x.hex()} is no point of P-256"
+        raise MessageError(msg) from cause
+
+
+def _tai_us(t_ns: int) -> int:
+    return t_ns // 1000 + (_LEAP_S - _EPOCH_S) * 1_000_000
+
+
+def _unix_ns(time_us: int) -> int:
+    return (time_us - (_LEAP_S - _EPOCH_S) * 1_000_000) * 1000

@@ -1,0 +1,71 @@
+import pytest
+
+from scm.api.keys import KeyRing
+from scm.errors import AccessError, StoreError
+from scm.store.memory import MemoryStore
+from scm.store.sqlite import SqliteStore
+
+
+@pytest.fixture
+def store():
+    return MemoryStore()
+
+
+@pytest.fixture
+def ring(store):
+    return KeyRing(store)
+
+
+def test_a_key_finds_its_owner_and_role(ring):
+    found = ring.find(ring.add("anna", "engineer", 7))
+    assert (found.owner, found.role, found.made_s) == ("anna", "engineer", 7)
+
+
+def test_the_store_holds_no_secret(ring, store):
+    secret = ring.add("anna", "viewer", 1).split("_", 2)[2]
+    (kept,) = (body for _, body in store.items("credentials"))
+    assert secret.encode() not in kept
+
+
+def test_the_same_secret_under_another_id_is_nobody_s(ring):
+    one, other = ring.add("anna", "viewer", 1), ring.add("ben", "admin", 1)
+    mixed = f"scm_{other.split('_')[1]}_{one.split('_', 2)[2]}"
+    assert ring.find(mixed) is None
+
+
+@pytest.mark.parametrize(
+    "key", ["", "scm", "scm_12345678_", "scm_12345678_" + "a" * 43, "scm_../../x_" + "a" * 43]
+)
+def test_what_is_no_key_finds_nobody(ring, key):
+    ring.add("anna", "admin", 1)
+    assert ring.find(key) is None
+
+
+def test_a_key_with_anything_after_it_is_none(ring):
+    key = ring.add("anna", "admin", 1)
+    assert ring.find(key) is not None
+    assert ring.find(key + "\n") is None
+
+
+def test_a_revoked_key_is_nobody_s_in_any_process(tmp_path):
+    here, there = (KeyRing(SqliteStore(tmp_path / "keys.db")) for _ in range(2))
+    key = here.add("anna", "admin", 1)
+    assert there.find(key) is not None
+    there.revoke(key.split("_")[1])
+    assert here.find(key) is None
+    assert list(here.records()) == []
+
+
+def test_a_role_that_does_not_exist_and_an_id_nobody_has_are_refused(ring):
+    with pytest.raises(AccessError, match=r"role: got 'operater'.*did you mean 'operator'"):
+        ring.add("anna", "operater", 1)
+    with pytest.raises(AccessError, match="owner"):
+        ring.add(" ", "viewer", 1)
+    with pytest.raises(AccessError, match="key: got 'nobody'"):
+        ring.revoke("nobody")
+
+
+def test_a_broken_record_says_where_it_is(ring, store):
+    store.put("credentials", "api/12345678", b"{}")
+    with pytest.raises(StoreError, match="12345678"):
+        list(ring.records())

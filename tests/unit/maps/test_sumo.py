@@ -1,0 +1,220 @@
+"""Networks that SUMO's own tools make become cities that cars can drive."""
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from scm.__main__ import main
+from scm.errors import MapError
+from scm.lockstep import Lockstep
+from scm.maps.check import problems_of
+from scm.maps.load import load_map
+from scm.maps.polyline import extent
+from scm.maps.sumo import ERROR_M, LEAST_RADIUS_M, import_sumo
+from scm.maps.sumo_toml import map_toml
+from scm.traffic.part import TrafficPart
+from scm.v2x.messages.route_request import RouteRequest
+from scm.world.driving import send
+from scm.world.part import WorldPart
+from tests.unit.maps.sumo_nets import OSM, grid, made, stadium
+
+CARS = 8
+SPAN_S = 40.0
+BESIDE_CAR_M = 0.0219  # a lane of 0.2186 m leaves that on each side of a Nigel of 0.175 m
+
+NETS = {
+    "grid": ("netgenerate", "--grid", "--grid.number", "3", "--grid.length", "56"),
+    "lights": ("netgenerate", "--grid", "--grid.number", "3", "--grid.length", "56",
+               "--default-junction-type", "traffic_light"),
+    "spider": ("netgenerate", "--spider", "--spider.arm-number", "5", "--spider.circle-number",
+               "2", "--spider.space-radius", "60", "--spider.omit-center"),
+    "random": ("netgenerate", "--rand", "--rand.iterations", "15", "--seed", "3"),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=[*NETS, "osm", "opendrive"])
+def net(request, tmp_path_factory):
+    """A network file, of each kind."""
+    folder = tmp_path_factory.mktemp(request.param)
+    out = folder / "town.net.xml"
+    if request.param in NETS:
+        return made(*NETS[request.param], out=out)
+    if request.param == "osm":
+        source = folder / "town.osm"
+        source.write_text(OSM)
+        return made("netconvert", "--osm-files", str(source), out=out)
+    source = folder / "town.xodr"
+    source.write_text(stadium())
+    return made("netconvert", "--opendrive-files", str(source), out=out)
+
+
+@pytest.fixture(scope="module")
+def imported(net):
+    return import_sumo(net)
+
+
+def test_the_map_checks_find_nothing(imported):
+    assert problems_of(imported.city_map) == []
+
+
+def test_no_arc_is_tighter_than_a_nigel_steers(imported):
+    radii = [
+        segment.radius_m
+        for lane in imported.city_map.lanes
+        for segment in lane.segments
+        if segment.radius_m is not None
+    ]
+    assert min(radii, default=math.inf) >= LEAST_RADIUS_M
+    assert min(radii, default=math.inf) == pytest.approx(imported.tightest_m)
+
+
+def test_its_map_file_reads_back_equal(imported, tmp_path):
+    path = tmp_path / "town.toml"
+    path.write_text(map_toml(imported.city_map), encoding="utf-8")
+    assert load_map(path) == imported.city_map
+
+
+def test_cars_go_round_in_their_lanes(imported):
+    part = WorldPart(imported.city_map, room=CARS)
+    part.learn_wishes(lambda _kind, _where: False)
+    world = part.world
+    streets, spawns = world.crowd.streets, imported.city_map.spawns
+    places = [s for s in spawns if streets.goes_round[streets.numbers[s.lane]]]
+    count = min(CARS, len(places))
+    for i in range(count):
+        pose = world.roads.spawn_pose(places[i * len(places) // count].name)
+        car = world.host(f"n{i}", "nigel", pose, 0)
+        send(world, car, RouteRequest(vehicle=car.name), 0)
+    worst, way = np.zeros(count), np.zeros(count)
+    parts = [part, TrafficPart(imported.city_map)] if imported.city_map.junctions else [part]
+    with Lockstep(parts) as city:
+        for _ in range(round(SPAN_S / 0.2)):
+            city.run_for(0.2)
+            worst = np.maximum(worst, np.abs(world.crowd.cross_track[:count]))
+            way += 0.2 * np.abs(world.slots.speed[:count])
+    assert worst.max() < BESIDE_CAR_M
+    assert way.min() > 0.3
+    assert way.max() > 6.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "signs"),
+    [
+        ("traffic_light", {}),
+        ("right_before_left", {}),
+        ("priority", {"give_way": 5}),
+        ("priority_stop", {"stop": 5}),
+        ("allway_stop", {"stop": 16}),
+    ],
+)
+def test_kinds_of_junctions_become_signals_or_signs(tmp_path, kind, signs):
+    city = import_sumo(grid(tmp_path / "g.net.xml", kind)).city_map
+    lit = kind == "traffic_light"
+    assert len(city.junctions) == (5 if lit else 0)
+    assert len(city.crossings) == (0 if lit else 5)
+    found = Counter(sign.kind for sign in city.signs)
+    assert set(found) == set(signs)
+    for name, least in signs.items():
+        assert found[name] >= least
+    for group in (g for junction in city.junctions for g in junction.groups):
+        assert len([line for line in city.stop_lines if line.group == group.name]) == 1
+
+
+def test_signals_of_osm_are_kept(tmp_path):
+    source = tmp_path / "town.osm"
+    source.write_text(OSM)
+    net = made("netconvert", "--osm-files", str(source), out=tmp_path / "o.net.xml")
+    city = import_sumo(net).city_map
+    assert [len(junction.groups) for junction in city.junctions] == [4]
+
+
+def test_lengths_follow_the_scale_and_speeds_the_car(tmp_path):
+    net = grid(tmp_path / "g.net.xml", "priority", "--default.speed", "10")
+    for scale in (10.0, 14.0):
+        city = import_sumo(net, scale=scale).city_map
+        lane = next(lane for lane in city.lanes if lane.name == "A1B1_0")
+        way = next(lane for lane in city.lanes if lane.name == "A1B1_0..B1C1_0")
+        after = next(lane for lane in city.lanes if lane.name == "B1C1_0")
+        start_m, end_m = lane.start[0], after.start[0] + extent(after.segments[0])[0]
+        assert end_m - start_m == pytest.approx((2 * 56 - 2 * 7.2) / scale, abs=0.5)
+        assert lane.width_m == pytest.approx(3.2 / scale - 0.01, abs=1e-4)
+        assert lane.speed_limit_mps == way.speed_limit_mps == 0.25
+
+
+def test_a_slower_street_keeps_its_share_of_the_limit(tmp_path):
+    source = tmp_path / "town.osm"
+    source.write_text(OSM)
+    net = made("netconvert", "--osm-files", str(source), out=tmp_path / "o.net.xml")
+    limits = {round(lane.speed_limit_mps, 3) for lane in import_sumo(net).city_map.lanes}
+    assert sorted(limits) == pytest.approx([0.15, 0.25], abs=2e-4)
+
+
+def test_a_bent_street_stays_close_to_the_network(tmp_path):
+    source = tmp_path / "ring.xodr"
+    source.write_text(stadium())
+    net = made("netconvert", "--opendrive-files", str(source), out=tmp_path / "r.net.xml")
+    imported = import_sumo(net)
+    assert imported.error_m < ERROR_M
+    bend = max(imported.city_map.lanes, key=lambda lane: len(lane.segments))
+    turned = sum(length * curvature for length, curvature in map(extent, bend.segments))
+    assert abs(turned) > 2.5
+
+
+def test_the_floor_decides_the_scale_or_refuses_it(tmp_path):
+    net = grid(tmp_path / "g.net.xml", "priority")
+    fitted = import_sumo(net, floor_m=(9.5, 10.5))
+    low, high = fitted.city_map.floor.x_m
+    assert high - low == pytest.approx(9.5)
+    xs = [lane.start[0] for lane in fitted.city_map.lanes]
+    assert low + 0.4 < min(xs)
+    assert max(xs) < high - 0.4
+    with pytest.raises(MapError, match=r"does not fit 6 x 4 m; expected a scale of 1:3"):
+        import_sumo(net, scale=14.0, floor_m=(6.0, 4.0))
+
+
+@pytest.mark.parametrize(
+    ("scale", "words"),
+    [(20.0, r"0\.160 m wide at 1:20; expected at least 0\.2 m .* 1:16\.0")],
+)
+def test_a_network_too_narrow_for_the_car_is_refused(tmp_path, scale, words):
+    net = grid(tmp_path / "g.net.xml", "priority")
+    with pytest.raises(MapError, match=words):
+        import_sumo(net, scale=scale)
+
+
+def test_a_network_too_tight_for_the_car_is_refused(tmp_path):
+    net = made("netgenerate", "--grid", "--grid.number", "3", "--grid.length", "12",
+               "--default.junctions.radius", "0.5", out=tmp_path / "t.net.xml")  # fmt: skip
+    with pytest.raises(MapError, match=r"too tight at 1:14: at junction '.*' .* at least 0\.38 m"):
+        import_sumo(net)
+
+
+def test_other_files_are_refused_with_what_to_do(tmp_path):
+    for name, words in (("a.osm", "netconvert --osm-files"), ("b.net.xml", "lanes for cars")):
+        path = tmp_path / name
+        path.write_text("<osm/>")
+        with pytest.raises(MapError, match=words):
+            import_sumo(path)
+    with pytest.raises(MapError, match="no such file"):
+        import_sumo(tmp_path / "c.net.xml")
+
+
+def test_a_missing_library_is_said(tmp_path, monkeypatch):
+    path = tmp_path / "b.net.xml"
+    path.write_text("<net/>")
+    monkeypatch.setitem(__import__("sys").modules, "sumolib", None)
+    with pytest.raises(MapError, match=r"scm\[sumo\]"):
+        import_sumo(path)
+
+
+def test_the_command_writes_a_map_that_can_be_shown(tmp_path, capsys):
+    net = grid(tmp_path / "g.net.xml", "traffic_light")
+    out, picture = tmp_path / "city.toml", tmp_path / "city.svg"
+    assert main(["import", "sumo", str(net), "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "5 junctions with signals" in said
+    assert "turns back left out" in said
+    assert main(["show", "map", str(out), "--out", str(picture)]) == 0
+    assert "<svg" in picture.read_text()

@@ -1,0 +1,41 @@
+"""Who is started again, and who is not."""
+
+import sys
+
+import pytest
+
+from scm.clock import WallClock
+from scm.crew import Crew, Job
+from scm.v2x.messages.presence import Presence
+
+CLOCK = WallClock()
+
+
+def crew_of(role, code, said):
+    def command():
+        return [sys.executable, "-c", f"import time; time.sleep(0.2); raise SystemExit({code})"]
+
+    return Crew([Job("x", role, "does it", command)], CLOCK, said.append)
+
+
+def until_it_died(crew, said, *, up):
+    crew.look()
+    if up:
+        crew.heard(Presence(role="part", station="x", session="1", alive=True))
+    crew.members["x"].process.wait(timeout=10.0)
+    crew.look()
+    return said[-1]
+
+
+@pytest.mark.parametrize("up", [True, False])
+def test_a_part_that_finds_its_input_bad_at_the_start_alone_is_left_alone(up):
+    said = []
+    last = until_it_died(crew_of("part", 2, said), said, up=up)
+    assert ("starts again" in last) == up
+    assert ("its input is bad" in last) != up
+
+
+def test_what_crashed_is_started_again_and_what_left_is_not():
+    for code, words in ((1, "starts again"), (0, "left")):
+        said = []
+        assert words in until_it_died(crew_of("part", code, said), said, up=False)

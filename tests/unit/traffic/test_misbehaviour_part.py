@@ -1,0 +1,113 @@
+"""The misbehaviour part in a city on a stepped clock, with cars that lie and cars that do not."""
+
+import itertools
+
+import pytest
+
+from scm.lockstep import Lockstep
+from scm.maps.load import load_map
+from scm.part import Hears
+from scm.traffic.attacker import Attacker
+from scm.traffic.misbehaviour_part import MisbehaviourPart
+from scm.traffic.part import TrafficPart
+from scm.v2x.etsi_convert import read_cam, station_id
+from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
+from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
+from scm.world.part import WorldPart
+from vehicle_agent.agent import AgentPart
+
+MAP = load_map("driving_school")
+START_NS = 1_795_000_000_000_000_000
+CARS = (("n1", "nigel"), ("n2", "nigel"), ("n3", "nigel"))
+KINDS = (MisbehaviourReport, MisbehaviourScores, CityEvent, CamTx)
+
+
+def run(attacks, span_s=25.0, *more, **options):
+    """Return reports, the last scores, events and CAMs of a city in which some lie."""
+    world = Attacker(WorldPart(MAP, 1, hosted=CARS), attacks, MAP, **options)
+    with Lockstep([world, TrafficPart(MAP), MisbehaviourPart(MAP), *more], start_ns=START_NS) as c:
+        boxes = [c.hear(Hears(kind)) for kind in KINDS]
+        c.run_for(span_s)
+        reports, scores, events, cams = (
+            [item.message for item in box.drain()] for box in boxes
+        )  # fmt: skip
+    return reports, scores[-1], [e for e in events if e.name == "misbehaviour"], cams
+
+
+@pytest.fixture(scope="module")
+def lying():
+    return run({"n2": "zero_speed"})
+
+
+def test_a_liar_is_reported_and_nobody_else(lying):
+    reports, scores, _, _ = lying
+    assert {report.suspect for report in reports} == {"n2"}
+    rows = {row.station: row for row in scores.stations}
+    assert rows["n2"].suspected
+    assert not rows["n1"].suspected
+    assert rows["n1"].score < 2.0
+    assert not scores.witness
+
+
+def test_a_report_names_class_check_and_plausibility(lying):
+    first = lying[0][0]
+    assert first.suspect_id == station_id("n2")
+    assert "speed" in {one.kind for one in first.observations}
+    assert first.observations[0].plausibility < 0.01
+    worst = [one.plausibility for one in first.observations]
+    assert worst == sorted(worst)
+
+
+def test_its_evidence_is_the_cams_that_were_sent(lying):
+    reports, _, _, cams = lying
+    sent = {(cam.t_ns, cam.body) for cam in cams if cam.station == "n2"}
+    evidence = reports[0].evidence
+    assert len(evidence) >= 2
+    assert {(one.t_ns, one.body) for one in evidence} <= sent
+    assert [one.t_ns for one in evidence] == sorted(one.t_ns for one in evidence)
+    assert all(read_cam(one.body).speed_mps == 0.0 for one in evidence)
+
+
+def test_people_are_told_once_though_reports_go_on(lying):
+    reports, _, events, _ = lying
+    assert len(reports) >= 2
+    assert [one.vehicle for one in events] == ["n2"]
+    gaps = [b.t_ns - a.t_ns for a, b in itertools.pairwise(reports)]
+    assert min(gaps) >= 10_000_000_000
+
+
+def test_an_honest_city_is_left_in_peace():
+    reports, scores, events, _ = run({})
+    assert reports == events == []
+    assert len(scores.stations) == 3
+
+
+def test_ghosts_under_the_attackers_key_are_known_by_their_numbers():
+    reports, _, _, _ = run({"n2": "congestion_sybil"}, 15.0)
+    assert reports
+    assert {one.suspect for one in reports} == {"n2"}
+    assert station_id("n2") not in {one.suspect_id for one in reports}
+    assert all("identity" in {o.check for o in one.observations} for one in reports)
+
+
+def test_ghosts_with_names_of_their_own_are_found_by_what_they_say():
+    reports, _, _, _ = run({"n2": "congestion_sybil"}, 20.0, own_names=True)
+    found = {one.suspect for one in reports}
+    assert found
+    assert all(name.startswith("n2-ghost") for name in found)
+
+
+def test_late_frames_are_sent_when_they_are_due():
+    _, _, _, cams = run({"n2": "time_delay"}, 8.0)
+    first = {name: min(c.t_ns for c in cams if c.station == name) for name in ("n1", "n2")}
+    assert 1.9e9 < first["n2"] - first["n1"] < 4.5e9
+
+
+def test_a_car_that_joins_and_lies_is_a_station_of_its_own():
+    agent = Attacker(AgentPart("n9"), {"n9": "constant_position_offset"}, MAP)
+    reports, scores, _, cams = run({}, 15.0, agent)
+    assert "n9" in {row.station for row in scores.stations}
+    assert {one.suspect for one in reports} == {"n9"}
+    assert {one.station for one in cams} >= {"n1", "n9"}

@@ -1,0 +1,75 @@
+"""Air times of frames, what a full channel costs, and cars that speak less when it is busy."""
+
+import numpy as np
+import pytest
+
+from scm.clock import NS_PER_MS
+from scm.v2x.congestion import (
+    AROUND_BYTES,
+    BYTES,
+    TARGET,
+    WINDOW_NS,
+    ReactiveControl,
+    air_time,
+    load_loss,
+)
+
+
+def test_a_frame_takes_the_preamble_and_whole_symbols():
+    symbols = -(-(22 + 8 * (BYTES["cam"] + AROUND_BYTES)) // 48)
+    assert air_time("cam", 6.0) == pytest.approx(40e-6 + 8e-6 * symbols)
+    assert air_time("cam", 0.0) == 0.0
+
+
+def test_a_channel_that_all_hear_loses_only_what_does_not_fit():
+    lost = load_loss(np.array([0.0, 0.9, 2.0]), 0.0)
+    assert lost == pytest.approx([0.0, 0.0, 0.5])
+
+
+def test_hidden_senders_collide_as_in_aloha():
+    assert load_loss(np.array([0.5]), 0.4) == pytest.approx(1.0 - np.exp(-0.4))
+
+
+def test_a_busy_channel_makes_stations_speak_less_step_by_step():
+    control = ReactiveControl(1)
+    gaps = []
+    for window in range(5):
+        control.measure(np.array([0.7]), window * WINDOW_NS)
+        gaps.append(control.gap_ns[0] // NS_PER_MS)
+    assert gaps == [100, 200, 250, 1000, 1000]
+
+
+def test_a_quiet_channel_lets_them_speak_more_after_five_seconds():
+    control = ReactiveControl(1)
+    control.measure(np.array([0.35]), 0)
+    for window in range(1, 40):
+        control.measure(np.array([0.1]), window * WINDOW_NS)
+    assert control.gap_ns[0] == 100 * NS_PER_MS
+    for window in range(40, 62):
+        control.measure(np.array([0.1]), window * WINDOW_NS)
+    assert control.gap_ns[0] == 50 * NS_PER_MS
+
+
+def closed_loop(cars, windows, *, controlled):
+    """Return the ratios of two windows each where all cars hear each other and want 10 Hz."""
+    control, cam_s = ReactiveControl(cars), air_time("cam", 6.0)
+    sent_ns = -np.arange(cars) * NS_PER_MS
+    ratios, before = [], 0.0
+    for tick in range(5 * windows):
+        now_ns = tick * WINDOW_NS // 5
+        gap_ns = np.maximum(WINDOW_NS, control.gap_ns) if controlled else WINDOW_NS
+        due = now_ns - sent_ns >= gap_ns
+        sent_ns[due] = now_ns
+        before += due.sum() * cam_s
+        if tick % 5 == 4:
+            ratios.append(before / (WINDOW_NS * 1e-9))
+            control.measure(np.full(cars, min(1.0, np.mean(ratios[-2:]))), now_ns)
+            before = 0.0
+    return 0.5 * (np.array(ratios[20:]) + np.array(ratios[19:-1]))
+
+
+def test_control_keeps_two_hundred_cars_in_range_under_the_target():
+    assert closed_loop(200, 300, controlled=False).min() > TARGET
+    ratios = closed_loop(200, 300, controlled=True)
+    assert ratios.mean() < TARGET
+    assert np.mean(ratios > TARGET) < 0.05

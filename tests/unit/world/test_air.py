@@ -1,0 +1,148 @@
+"""All kinds of frames go through the air of a world: to whom, when, and who may send them."""
+
+import itertools
+import math
+from types import SimpleNamespace
+
+import msgspec
+import numpy as np
+import pytest
+
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import MapError
+from scm.maps.load import load_map
+from scm.maps.model import RadioChannel
+from scm.maps.radio import with_radio
+from scm.maps.radio_check import radio_problems
+from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cpm_tx import CpmTx
+from scm.v2x.messages.denm_tx import DenmTx
+from scm.v2x.messages.mapem_tx import MapemTx
+from scm.v2x.messages.radio_status import RadioStatus
+from scm.v2x.messages.srem_tx import SremTx
+from scm.v2x.messages.ssem_tx import SsemTx
+from scm.vehicles.drivers.channel import channel_of, has_arrived
+from scm.world.air import OF_ROADSIDE, RECEIVED, transmit
+from scm.world.busy import Busy
+from scm.world.world import World
+
+MAP = load_map("driving_school")
+RSU = "rsu-" + MAP.junctions[0].name
+
+
+class Air:
+    """A world in which frames are put on the air by hand, at times of one's own."""
+
+    def __init__(self, **radio):
+        city_map = msgspec.structs.replace(MAP, radio=RadioChannel(**radio))
+        self.world = World(city_map, capacity=4)
+        self.remote("n7", 1.0, 0.6)
+
+    def remote(self, name, x, y):
+        pose = SimpleNamespace(x=x, y=y)
+        self.world.remote[name] = SimpleNamespace(name=name, pose=pose, slot=0)
+
+    def send(self, kind, station, now_ns=0):
+        self.world.outbox = []
+        sent = kind(station=station, t_ns=now_ns, body=None)
+        transmit(self.world, sent, now_ns)
+        return [(type(out), out.receiver) for out in self.world.outbox]
+
+
+@pytest.fixture(scope="module")
+def air():
+    return Air()
+
+
+@pytest.mark.parametrize("kind", [CpmTx, DenmTx, SremTx])
+def test_every_kind_that_cars_say_reaches_the_roadside_unit(air, kind):
+    assert air.send(kind, "n7") == [(RECEIVED[kind], RSU)]
+
+
+@pytest.mark.parametrize("kind", [MapemTx, SsemTx])
+def test_every_kind_that_roadside_units_say_reaches_the_car(air, kind):
+    assert air.send(kind, RSU) == [(RECEIVED[kind], "n7")]
+
+
+@pytest.mark.parametrize("kind", OF_ROADSIDE)
+def test_a_car_cannot_say_what_roadside_units_say(air, kind):
+    before = air.world.ignored
+    assert air.send(kind, "n7") == []
+    assert air.world.ignored == before + 1
+
+
+def test_a_frame_of_nobody_is_counted_and_dropped(air):
+    before = air.world.radio.counts.unknown
+    assert air.send(DenmTx, "ghost") == []
+    assert air.world.radio.counts.unknown == before + 1
+
+
+def test_a_late_frame_waits_for_its_time():
+    air = Air(delay_ms=70.0)
+    assert air.send(DenmTx, "n7") == []
+    assert air.world.late.arrived(70 * NS_PER_MS - 1) == []
+    assert [out.receiver for out in air.world.late.arrived(70 * NS_PER_MS)] == [RSU]
+
+
+def test_the_radio_tells_once_a_second_what_became_of_frames(make_city):
+    city = make_city(hosted=(("n1", "nigel"),))
+    city.run_for(3.0)
+    told = city.heard(RadioStatus)
+    assert [one.t_ns // NS_PER_S for one in told] == [0, 1, 2, 3]
+    heard = [out for out in city.heard(CamRx) if out.t_ns < told[-1].t_ns]
+    assert sum(one.delivered for one in told) == len(heard) >= 2
+
+
+def test_the_channel_is_as_busy_as_the_frames_in_range_make_it():
+    lost = np.zeros(2)
+    busy = Busy(RadioChannel(data_rate_mbps=6.0, hidden_share=0.5), 5.0, lost)
+    x, hosted = np.array([0.0, 20.0]), np.ones(2, np.bool_)
+    for window in range(1, 4):
+        busy.note("cam", np.zeros(100), np.zeros(100))
+        busy.measure(window * 100 * NS_PER_MS, x, np.zeros(2), hosted, {"rsu-a": (4.0, 0.0)})
+    wanted = 100 * 352e-6 / 0.1
+    assert busy.ratio == pytest.approx([wanted, 0.0])
+    assert busy.ratio_of("rsu-a") == pytest.approx(wanted)
+    assert lost[0] == pytest.approx(1.0 - math.exp(-wanted))
+
+
+def test_a_map_is_told_what_is_wrong_with_its_radio():
+    wrong = msgspec.structs.replace(MAP, radio=RadioChannel(loss=1.5, hidden_share=0.1))
+    assert [problem.split(":")[0] for problem in radio_problems(wrong)] == [
+        "radio.loss", "radio.data_rate_mbps",
+    ]  # fmt: skip
+
+
+def test_settings_of_a_command_replace_those_of_the_map():
+    radio = with_radio(MAP, ["loss=0.3", "congestion_control=true", "data_rate_mbps=6"]).radio
+    assert radio == RadioChannel(loss=0.3, data_rate_mbps=6.0, congestion_control=True)
+    with pytest.raises(MapError, match="expected one of"):
+        with_radio(MAP, ["los=0.3"])
+
+
+def known_at(ms, frames=500, distance_m=3.0, **radio):
+    """Return which frames of a sender a driver has heard, so long after they were sent."""
+    air = channel_of(RadioChannel(**radio), 5.0, 1, np.zeros((0, 4)))
+    age_ns = ms * NS_PER_MS
+    return [has_arrived(air, 1, 2, 0, n, distance_m, 0.0, age_ns) for n in range(frames)]
+
+
+def test_a_driver_never_reads_a_frame_before_its_time():
+    radio = {"delay_ms": 100.0, "jitter_ms": 50.0}
+    assert not any(known_at(99, **radio))
+    assert 0.4 < np.mean(known_at(125, **radio)) < 0.6
+    assert all(known_at(150, **radio))
+
+
+def test_what_a_driver_has_read_it_never_unreads():
+    radio = {"delay_ms": 20.0, "jitter_ms": 200.0, "loss": 0.3, "fading_db": 6.0}
+    seen = [known_at(ms, **radio) for ms in range(20, 240, 20)]
+    assert all(not a or b for one, next_one in itertools.pairwise(seen)
+               for a, b in zip(one, next_one, strict=True))  # fmt: skip
+
+
+def test_drivers_lose_frames_by_distance_as_the_formula_says():
+    margin_db = 20.0 * math.log10(5.0 / 8.0)
+    wanted = 1.0 - 0.5 * math.erfc(margin_db / (6.0 * math.sqrt(2.0)))
+    got = np.mean(known_at(0, 8000, 8.0, fading_db=6.0))
+    assert got == pytest.approx(wanted, abs=0.02)
