@@ -90,11 +90,21 @@ def _again(ratios: Sequence[Ratio]) -> list[str]:
     if of_true:
         near = _share(sum(ratio <= NEAR for ratio in of_true), len(of_true))
         found.append(f"  the true car's: median {np.median(of_true):.2f}, within {NEAR} in {near}")
+        beyond = [_beyond(r.found_m, r.true_m) / _beyond(r.nominal_m, r.true_m)
+                  for r in ratios if r.true_m and r.nominal_m > r.true_m]  # fmt: skip
+        found.append(
+            f"  the nominal car's, both beyond the true car's: median {np.median(beyond):.2f}"
+        )
     of_laws = [r.found_m / r.nominal_m for r in ratios if r.true_m is None]
     if of_laws:
         half = _share(sum(ratio <= 0.5 for ratio in of_laws), len(of_laws))
         found.append(f"  the nominal car's, laws outside the library: at most half in {half}")
     return found
+
+
+def _beyond(error_m: float, true_m: float) -> float:
+    """Return what an error has beside the noise that the true car's has too."""
+    return math.sqrt(max(error_m**2 - true_m**2, 0.0))
 
 
 def _times(outcomes: Iterable[Outcome]) -> list[str]:

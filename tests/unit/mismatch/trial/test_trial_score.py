@@ -185,6 +185,7 @@ def test_the_table_compares_patched_cars_with_nominal_tuned_and_true_ones():
     assert "the nominal car's: median 0.30" in text
     assert "the re-tuned car's: median 0.25" in text
     assert "the true car's: median 1.05, within 1.15 in 100 %" in text
+    assert "the nominal car's, both beyond the true car's: median 0.06" in text
     assert "at most half in 100 %" in text
 
 
