@@ -342,7 +342,8 @@ class Controller:
     def _as_asked(self, wishes: frozenset[str]) -> frozenset[str]:
         """Return a policy's wishes with those of people in them, which it may have overlooked."""
         green = {name for name, shown in self._shown.items() if shown.colour == "green"}
-        held = asked.groups_of(self.asked, "hold") & green
+        may_hold = self.mode != "preempt"  # pre-emption goes before a hold
+        held = asked.groups_of(self.asked, "hold") & green if may_hold else set[str]()
         return (wishes - (asked.groups_of(self.asked, "omit") - green)) | held
 
     def _check(self, answer: Answer) -> None:

@@ -26,6 +26,7 @@ from scm.traffic.plan import load_timetable, plan_names
 from scm.traffic.policy import FIXED
 from scm.traffic.priority_air import PriorityDesk
 from scm.traffic.program import STEP_NS, program_of
+from scm.traffic.proof_load import check_junction
 from scm.traffic.sightings import Sightings
 from scm.traffic.timetables import Tables
 from scm.traffic.timing import NIGEL, CarFacts
@@ -77,6 +78,8 @@ class TrafficPart:
         roads = Roads(city_map)
         programs = {j.name: program_of(j, roads, car) for j in city_map.junctions}
         tables = tables_of(city_map, roads, programs, car)
+        for name, program in programs.items():
+            check_junction(name, program, (table for table, _ in tables[name].values()))
         self._sightings = Sightings()
         self._junctions = {
             junction.name: JunctionSignals(

@@ -7,6 +7,7 @@ through them is the worst wait, and it is told. That every green is safe is the 
 which holds for any wishes; here it is only checked that the rings' wishes do not conflict.
 """
 
+from collections.abc import Callable
 from itertools import chain, combinations
 from typing import NamedTuple, Protocol
 
@@ -14,6 +15,8 @@ from scm.errors import PlanError
 from scm.traffic import kernel
 from scm.traffic.kernel import GroupTimes, Phase, Program, State
 from scm.traffic.rings import Inputs, Layout, PhaseTimes, Rings, green_in
+
+MOST_STATES = 20_000
 
 
 class RingLogic(Protocol):
@@ -46,13 +49,13 @@ class Served(NamedTuple):
     worst_wait: tuple[int, ...]
 
 
-_Node = tuple[State, Rings]
+Node = tuple[State, Rings]
 
 
-class _Explored(NamedTuple):
-    """All that can be reached: its nodes, and what follows each for each set of calls."""
+class Explored(NamedTuple):
+    """All that can be reached: its nodes, and what follows each for each of the inputs."""
 
-    nodes: list[_Node]
+    nodes: list[Node]
     ways: list[tuple[int, ...]]
 
 
@@ -82,11 +85,15 @@ def prove_service(
     layout = logic.layout_of(program, phases)
     everyone = frozenset(range(len(program.groups)))
     sets = [frozenset(c) for c in chain(*(combinations(everyone, n) for n in range(9)))]
-    explored = _explore(logic, program, layout, sets)
+
+    def follow(node: Node, told: Inputs) -> Node:
+        return after(logic, program, layout, node, told)
+
+    explored = explore((logic, program, layout), [Inputs(calls=calls) for calls in sets], follow)
     worst = []
     for phase in sorted(everyone):
         waiting = [number for number, told in enumerate(sets) if phase in told]
-        worst.append(_longest_wait(explored, phase, waiting, program))
+        worst.append(longest_wait(explored, phase, waiting, program))
     if bound is not None and max(worst) > bound:
         late = program.groups[worst.index(max(worst))]
         msg = f"unsafe: group {late!r} may wait {max(worst)} steps, expected at most {bound}"
@@ -95,8 +102,8 @@ def prove_service(
 
 
 def after(
-    logic: RingLogic, program: Program, layout: Layout, node: _Node, told: Inputs, dt: int = 1
-) -> _Node:
+    logic: RingLogic, program: Program, layout: Layout, node: Node, told: Inputs, dt: int = 1
+) -> Node:
     """Return kernel and rings a step later.
 
     Raises:
@@ -112,26 +119,35 @@ def after(
     return kernel.step(program, state, wished, dt), rings
 
 
-def _explore(
-    logic: RingLogic, program: Program, layout: Layout, sets: list[frozenset[int]]
-) -> _Explored:
-    """Return what follows each state that can be reached, for each set of calls."""
+def explore(
+    of: tuple[RingLogic, Program, Layout],
+    letters: list[Inputs],
+    follow: Callable[[Node, Inputs], Node],
+) -> Explored:
+    """Return what follows each state that can be reached, for each of the inputs.
+
+    Raises:
+        PlanError: when there are more than `MOST_STATES`.
+    """
+    logic, program, layout = of
     nodes = [(kernel.start(program), logic.start(layout))]
     number = {nodes[0]: 0}
     ways: list[tuple[int, ...]] = []
     for node in nodes:  # grows while it is walked through
         following = []
-        for calls in sets:
-            then = after(logic, program, layout, node, Inputs(calls=calls))
+        for told in letters:
+            then = follow(node, told)
             if then not in number:
                 number[then] = len(nodes)
                 nodes.append(then)
             following.append(number[then])
         ways.append(tuple(following))
-    return _Explored(nodes, ways)
+        if len(nodes) > MOST_STATES:
+            raise PlanError(f"unsafe: more than {MOST_STATES} states, so nothing is proven")
+    return Explored(nodes, ways)
 
 
-def _longest_wait(explored: _Explored, phase: int, waiting: list[int], program: Program) -> int:
+def longest_wait(explored: Explored, phase: int, waiting: list[int], program: Program) -> int:
     """Return the longest way through states in which a phase is called and not green.
 
     Raises:

@@ -77,12 +77,15 @@ class Ring(NamedTuple):
         green: How long it has been green.
         gap: Since the last vehicle.
         waited: For how long somebody in conflict has been called; max 1 and max 2 end it.
+        passed: With no phase: the one that was left out when its turn came; the ring goes on
+            behind it.
     """
 
     phase: int | None = None
     green: int = 0
     gap: int = 0
     waited: int = 0
+    passed: int | None = None
 
 
 class Rings(NamedTuple):
@@ -196,8 +199,11 @@ def _count(
     dt: int,
 ) -> Ring:
     """Return a ring with its timers run on; they run while its phase is green."""
-    if ring.phase is None or ring.phase not in green:
-        return Ring(None if ring.phase in told.omit else ring.phase)
+    if ring.phase is None:
+        return ring
+    if ring.phase not in green:
+        is_left_out = ring.phase in told.omit
+        return Ring(None, passed=ring.phase) if is_left_out else Ring(ring.phase)
     times = layout.phases[ring.phase]
     is_there = ring.phase in told.calls or times.recall is Recall.MAX
     return Ring(
@@ -249,14 +255,15 @@ def _go_on(layout: Layout, state: Rings, told: Inputs, called: frozenset[int]) -
             for sequence, ring in zip(layout.sections[state.section], state.rings, strict=True)
         ]
         is_last = [
-            ring.phase is None or following is None
+            _place(ring) is None or following is None
             for ring, following in zip(state.rings, after, strict=True)
         ]
-        is_begun = any(ring.phase is not None for ring in state.rings)
+        is_begun = any(_place(ring) is not None for ring in state.rings)
         if all(ready) and all(is_last) and (is_begun or not any(i in called for i in here)):
             return _cross(layout, state, called)
+    is_shut = any(ring.phase in told.hold for ring in state.rings)
     rings = tuple(
-        _advance(sequence, ring, called, wraps=not others) if may else ring
+        _advance(sequence, ring, called, wraps=is_shut or not others) if may else ring
         for sequence, ring, may in zip(
             layout.sections[state.section], state.rings, ready, strict=True
         )
@@ -264,16 +271,25 @@ def _go_on(layout: Layout, state: Rings, told: Inputs, called: frozenset[int]) -
     return state._replace(rings=rings)
 
 
+def _place(ring: Ring) -> int | None:
+    """Return the phase where a ring is, though it was left out; None: before the first."""
+    return ring.passed if ring.phase is None else ring.phase
+
+
 def _next_in(sequence: tuple[int, ...], ring: Ring, called: frozenset[int]) -> int | None:
     """Return the next called phase of a ring before the barrier; None: there is none."""
-    at = -1 if ring.phase is None else sequence.index(ring.phase)
+    place = _place(ring)
+    at = -1 if place is None else sequence.index(place)
     return next((i for i in sequence[at + 1 :] if i in called), None)
 
 
 def _advance(
     sequence: tuple[int, ...], ring: Ring, called: frozenset[int], *, wraps: bool
 ) -> Ring:  # fmt: skip
-    """Return a ring at its next called phase; where nobody waits elsewhere it may begin again."""
+    """Return a ring at its next called phase.
+
+    It may begin again where nobody waits elsewhere, or a hold keeps the barrier shut anyway.
+    """
     following = _next_in(sequence, ring, called)
     if following is None and wraps:
         following = next((i for i in sequence if i in called and i != ring.phase), None)

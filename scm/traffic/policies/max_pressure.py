@@ -17,7 +17,7 @@ from scm.clock import NS_PER_S
 from scm.traffic.asked import groups_of
 from scm.traffic.kernel import Phase, Program
 from scm.traffic.plan import stages, times_of
-from scm.traffic.policy import Answer, JunctionView, Policy, Site
+from scm.traffic.policy import Answer, JunctionView, Mode, Policy, Site
 
 STARVED_NS = 60 * NS_PER_S
 UNSEEN_NS = 120 * NS_PER_S
@@ -57,7 +57,8 @@ def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer
         stage = _choose(site, stage, view, called, waits)
     if stage != memory.stage:
         green_ns = 0
-    return Memory(stage, green_ns, waits), Answer(stage)
+    mode: Mode = "preempt" if groups_of(view.asked, "preempt") else "adaptive"
+    return Memory(stage, green_ns, waits), Answer(stage, mode=mode)
 
 
 def stages_of(program: Program) -> list[frozenset[str]]:
@@ -91,11 +92,10 @@ def _choose(
     waits: tuple[int, ...],
 ) -> frozenset[str]:
     """Return the stage to be green now."""
-    held = groups_of(view.asked, "hold") & now
-    if held:
+    preempt = groups_of(view.asked, "preempt")
+    if groups_of(view.asked, "hold") & now and not preempt:
         return now
     candidates = [s for s in stages_of(site.program) if s & called]
-    preempt = groups_of(view.asked, "preempt")
     must = preempt or _starved(site, waits)
     candidates = [s for s in candidates if s & must] or candidates
     if not candidates:

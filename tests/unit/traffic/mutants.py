@@ -111,3 +111,34 @@ RINGS = {
         "return frozenset(range(2))",
     ),
 }
+
+RINGS_TOLD = {
+    "crosses to where nobody waits": (
+        "if any(i in called for ring in layout.sections[section] for i in ring)",
+        "if layout.sections[section]",
+    ),
+    "hold ignored": ("is_over and ring.phase not in told.hold", "is_over"),
+    "hold shuts the ring beside it": ("wraps=is_shut or not others", "wraps=not others"),
+    "omit ignored": ("| always) - told.omit\n", "| always)\n"),
+    "omit too late": ("is_left_out = ring.phase in told.omit", "is_left_out = False"),
+    "omit loses the place": ("Ring(None, passed=ring.phase)", "Ring(None)"),
+    "omit opens the barrier": (
+        "_place(ring) is None or following",
+        "ring.phase is None or following",
+    ),
+    "pre-emption ignored": ("if told.preempt is not None:", "if told.preempt == 99:"),
+    "pre-emption waits for its turn": (
+        "if told.preempt is not None:",
+        "if told.preempt is not None and not state.rings[0].green:",
+    ),
+    "pre-emption drags others along": (
+        "else tuple(Ring() for _ in sequences)",
+        "else tuple(Ring(sequence[0]) for sequence in sequences)",
+    ),
+    "pre-emption never ends": ("return _go_on(layout, state, told, called)", "return state"),
+    "force-off holds": ("or ring.phase in told.force_off", "and ring.phase not in told.force_off"),
+    "no max while max 2 is told": (
+        "or ring.waited >= _most(times, ring.phase, told)",
+        "or (ring.waited >= times.max1 and not told.max2)",
+    ),
+}
