@@ -6,6 +6,7 @@
     count      cars that have passed the line
     queue      cars that stand, from the line on; queue_m to the tail of the last of them
     gap_s      since a car last kept the green
+    arrivals_s when cars that drive will be at the line
 
 A car is believed to be where its last CAM, heard at the roadside, or the overhead cameras put it,
 brought forward at its speed for `FORWARD_NS` at most, and forgotten after `FORGET_NS`: a standing
@@ -21,7 +22,7 @@ from scm.geometry import Pose2
 from scm.maps.model import Group, Junction, StopLine
 from scm.maps.route import Roads
 
-REACH_M = 1.6
+REACH_M = 2.4
 AHEAD_M = 0.9
 PRESENCE_M = 0.25
 EXTEND_S = 3.0
@@ -54,6 +55,7 @@ class Detector:
         near: Cars within reach, standing or not.
         ahead: Cars that stand just behind the junction, where this group's cars go.
         gap_s: None: never yet.
+        arrivals_s: Of the cars that drive, from now; the first first.
     """
 
     call: bool = False
@@ -65,6 +67,7 @@ class Detector:
     queue_m: float = 0.0
     ahead: int = 0
     gap_s: float | None = None
+    arrivals_s: tuple[float, ...] = ()
 
 
 class Stretch(NamedTuple):
@@ -213,6 +216,9 @@ class Watcher:
             queue_m=queue_m,
             ahead=_standing(approach.ahead, by_lane),
             gap_s=None if kept_ns is None else (now_ns - kept_ns) / NS_PER_S,
+            arrivals_s=tuple(
+                left / seen.speed_mps for left, _, seen in near if seen.speed_mps > STANDS_MPS
+            ),
         )
 
     def _count(
@@ -276,4 +282,5 @@ def _together(detectors: list[Detector]) -> Detector:
         queue_m=max(d.queue_m for d in detectors),
         ahead=sum(d.ahead for d in detectors),
         gap_s=min(gaps) if gaps else None,
+        arrivals_s=tuple(sorted(arrival for d in detectors for arrival in d.arrivals_s)),
     )

@@ -59,8 +59,13 @@ def test_a_car_on_the_lane_before_counts_and_one_out_of_reach_does_not(watcher):
     show(watcher, at(1.2, speed=0.2))
     assert read(watcher).call
     assert not read(watcher).presence
-    show(watcher, at(1.9, who=2))
+    show(watcher, at(2.45, who=2))
     assert read(watcher).near == 1
+
+
+def test_cars_that_drive_tell_when_they_arrive_and_those_that_stand_do_not(watcher):
+    show(watcher, at(1.0, speed=0.25, who=1), at(0.5, speed=0.2, who=2), at(0.05, who=3))
+    assert read(watcher).arrivals_s == pytest.approx((2.5, 4.0), abs=0.1)
 
 
 def test_a_car_beside_the_lane_or_against_it_is_nobody(watcher):

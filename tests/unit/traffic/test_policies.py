@@ -8,8 +8,9 @@ from scm.clock import NS_PER_S
 from scm.errors import PlanError
 from scm.traffic.controller import Controller, Heard
 from scm.traffic.detectors import Detector
-from scm.traffic.kernel import GroupTimes, Program
-from scm.traffic.policy import PriorityCall, load_policy, policy_names
+from scm.traffic.kernel import GroupState, GroupTimes, Phase, Program
+from scm.traffic.policies import actuated
+from scm.traffic.policy import JunctionView, PriorityCall, load_policy, policy_names, site_of
 from scm.traffic.program import STEP_NS
 from scm.v2x.messages.signal_request import SignalRequest
 
@@ -144,6 +145,28 @@ def test_a_hold_that_would_break_a_promise_waits_until_it_does_not():
     after = drive.run(2000)
     assert after[-1].mode == "plan"
     assert drive.controller.asked == ()
+
+
+@pytest.mark.parametrize("policy", ["actuated", "max_pressure", "priority"])
+def test_pre_emption_goes_before_a_hold(policy):
+    drive = Drive(policy)
+    drive.waits = {"a"}
+    drive.run(300)
+    drive.wish("hold", "a", expires_s=300.0)
+    assert not greens(drive.run(300), "c")
+    drive.wish("preempt", "c", expires_s=60.0)
+    assert greens(drive.run(300), "c")
+
+
+@pytest.mark.parametrize(("waiting", "ends"), [(1, False), (9, True)])
+def test_a_green_waits_for_a_car_while_that_costs_those_who_stand_less_than_it_a_red(waiting, ends):
+    site = site_of("x", CROSSING)
+    state = (GroupState(Phase.GREEN, 29 * S), GroupState(Phase.RED), GroupState(Phase.RED))
+    coming = Detector(call=True, near=1, arrivals_s=(5.0,))
+    queue = Detector(call=True, extend=True, near=waiting, queue=waiting)
+    view = JunctionView(0, S, state, {"a": coming, "b": queue}, sees=True)
+    told = actuated.told_of(site, actuated.start(site), view)
+    assert (0 not in told.inputs.calls) is ends
 
 
 def test_an_omitted_group_is_left_out_and_comes_back():
