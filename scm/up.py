@@ -28,31 +28,16 @@ LOOK_EVERY_NS = 50 * NS_PER_MS
 _say_now: Say = partial(print, flush=True)
 
 
-def run_city(
-    map_name: str,
-    *,
-    city: str = "city",
-    hosted: int = 4,
-    agents: int = 2,
-    port: int = 8000,
-    listen: str = DEFAULT_ENDPOINT,
-    record_dir: Path = Path("runs"),
-    seed: int = 0,
-    fleet: Path | None = None,
-    state: str | None = None,
-    host: str = HOST,
-    keys: str | None = None,
-    ros2: bool = False,
-    demand: Path | None = None,
-    say: Say = _say_now,
-) -> int:
-    """Run a city until SIGINT or SIGTERM; return the exit code.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """What city is to run.
 
-    Args:
+    Attributes:
         map_name: Of a shipped map, or the path of a map file.
         city: Chunk of all its keys on the bus.
         hosted: How many cars the world simulates itself: n1, n2 ...
         agents: How many cars come as processes of their own, named on from there.
+        host: Address that the dashboard is bound to.
         port: Of the dashboard; 0 takes a free one.
         listen: Endpoint of the router; one that ends in `:0` takes a free one.
         record_dir: Where the recording goes; made when missing.
@@ -60,75 +45,89 @@ def run_city(
         fleet: Fleet file of those who may enter; None: everybody on this machine.
         state: Store of what must outlive a part's process, and this city when it is named; None: a
             new file beside the recording.
-        host: Address that the dashboard is bound to.
         keys: Store of API keys; None: everybody on this machine.
         ros2: Whether ROS 2 nodes shall see the city.
         demand: Table of who wants to drive from where to where; None: nobody else comes.
-        say: Tells a person one line.
+    """
+
+    map_name: str
+    city: str = "city"
+    hosted: int = 4
+    agents: int = 2
+    host: str = HOST
+    port: int = 8000
+    listen: str = DEFAULT_ENDPOINT
+    record_dir: Path = Path("runs")
+    seed: int = 0
+    fleet: Path | None = None
+    state: str | None = None
+    keys: str | None = None
+    ros2: bool = False
+    demand: Path | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Plan:
+    """What is wanted, and what was settled before anything starts.
+
+    Attributes:
+        port: One that is free.
+        agents: The names of their cars.
+        eyes: Cameras by the station that looks through each.
+    """
+
+    wanted: Wanted
+    guard: Guard
+    agents: tuple[str, ...]
+    port: int
+    recording: Path
+    state: str
+    eyes: Mapping[str, str]
+
+
+def run_city(wanted: Wanted, say: Say = _say_now) -> int:
+    """Run a city until SIGINT or SIGTERM, `say` telling a person lines; return the exit code.
 
     Raises:
         ScmError: when the map, the port or the endpoint is not to be had.
     """
-    if keys is None and not is_loopback(host):
-        msg = (
-            f"host: got {host!r} without API keys, expected 127.0.0.1, or a store of `scm key add`"
-        )
-        raise RunError(msg)
-    city_map = load_map(map_name)
-    port = _free_port(port)
-    record_dir.mkdir(parents=True, exist_ok=True)
-    recording = record_dir / f"{city}-{_stamp()}.mcap"
-    eyes = {
-        eye_station(camera.name, first=i == 0): camera.name
-        for i, camera in enumerate(city_map.cameras)
-    }
-    agent_names = tuple(f"n{hosted + i + 1}" for i in range(agents))
-    guard = guard_of(fleet, city, _free(listen), own_stations(eyes, agent_names), _now())
+    plan = _settled(wanted)
+    guard = plan.guard
     with (
         Router(guard.listen, guard.settings) as router,
-        ZenohBus(city, "up", guard.connect, credentials=guard.credentials("up")) as bus,
+        ZenohBus(wanted.city, "up", guard.connect, credentials=guard.credentials("up")) as bus,
     ):
-        plan = _Plan(
-            map_name=map_name,
-            city=city,
-            guard=guard,
-            hosted=hosted,
-            agents=agent_names,
-            host=host,
-            port=port,
-            keys=keys,
-            ros2=ros2,
-            demand=demand,
-            recording=recording,
-            state=state or f"sqlite:{recording.with_suffix('.db')}",
-            seed=seed,
-            eyes=eyes,
-        )
-        say(f"scm: city {city!r} on map {map_name!r}, bus {router.listen}")
+        say(f"scm: city {wanted.city!r} on map {wanted.map_name!r}, bus {router.listen}")
         _watch(plan, bus, say)
     if plan.recording.exists():
         say(f"recorded in {plan.recording}")
     return 0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Plan:
-    """What city is to run."""
-
-    map_name: str
-    city: str
-    guard: Guard
-    hosted: int
-    agents: tuple[str, ...]
-    host: str
-    port: int
-    keys: str | None
-    ros2: bool
-    demand: Path | None
-    recording: Path
-    state: str
-    seed: int
-    eyes: Mapping[str, str]
+def _settled(wanted: Wanted) -> _Plan:
+    if wanted.keys is None and not is_loopback(wanted.host):
+        got = f"host: got {wanted.host!r} without API keys"
+        msg = f"{got}, expected 127.0.0.1, or a store of `scm key add`"
+        raise RunError(msg)
+    city_map = load_map(wanted.map_name)
+    port = _free_port(wanted.port)
+    wanted.record_dir.mkdir(parents=True, exist_ok=True)
+    recording = wanted.record_dir / f"{wanted.city}-{_stamp()}.mcap"
+    eyes = {
+        eye_station(camera.name, first=i == 0): camera.name
+        for i, camera in enumerate(city_map.cameras)
+    }
+    agents = tuple(f"n{wanted.hosted + i + 1}" for i in range(wanted.agents))
+    stations = own_stations(eyes, agents)
+    return _Plan(
+        wanted=wanted,
+        guard=guard_of(wanted.fleet, wanted.city, _free(wanted.listen), stations, _now()),
+        agents=agents,
+        port=port,
+        recording=recording,
+        state=wanted.state or f"sqlite:{recording.with_suffix('.db')}",
+        eyes=eyes,
+    )
 
 
 def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
@@ -154,14 +153,14 @@ def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
 
 def _parts(plan: _Plan) -> list[Job]:
     def scm(name: str, *more: str, station: str = "") -> Sequence[str]:
-        shared = (*_at_bus(plan, station or name), "--seed", str(plan.seed))
-        return [*SCM, name, plan.map_name, *shared, *more]
+        shared = (*_at_bus(plan, station or name), "--seed", str(plan.wanted.seed))
+        return [*SCM, name, plan.wanted.map_name, *shared, *more]
 
     def record() -> Sequence[str]:
         """Name another file when a recorder died: a recording is never written over."""
         first = plan.recording
-        out = first.with_stem(f"{plan.city}-{_stamp()}") if first.exists() else first
-        sparse = ["--sparse"] if plan.hosted > MOST_RECORDED else []
+        out = first.with_stem(f"{plan.wanted.city}-{_stamp()}") if first.exists() else first
+        sparse = ["--sparse"] if plan.wanted.hosted > MOST_RECORDED else []
         return scm("record", "--out", str(out), *sparse)
 
     def part(name: str, what: str, *more: str) -> Job:
@@ -171,13 +170,13 @@ def _parts(plan: _Plan) -> list[Job]:
         command = partial(scm, "eye", "--camera", camera, station=station)
         return Job(station, "part", f"overhead camera {camera}: tags, poses, tracks", command)
 
-    cars = f"cars, walls, sensors, radio; {plan.hosted} hosted"
+    cars = f"cars, walls, sensors, radio; {plan.wanted.hosted} hosted"
     kept = ("--state", plan.state)
-    keys = () if plan.keys is None else ("--keys", plan.keys)
-    web = ("--host", plan.host, "--port", str(plan.port), *keys)
+    keys = () if plan.wanted.keys is None else ("--keys", plan.wanted.keys)
+    web = ("--host", plan.wanted.host, "--port", str(plan.port), *keys)
 
     def demand(table: Path) -> Job:
-        command = [*SCM, "demand", str(table), plan.map_name, *_at_bus(plan, "demand")]
+        command = [*SCM, "demand", str(table), plan.wanted.map_name, *_at_bus(plan, "demand")]
         return Job("demand", "part", f"cars that come and go as in {table}", lambda: command)
 
     jobs = [
@@ -190,23 +189,23 @@ def _parts(plan: _Plan) -> list[Job]:
         ),
         part("traffic", "signals: safe kernel, policies, plans", *kept),
         part("monitor", "second channel: doubts the signals, latches flash", *kept),
-        part("world", cars, "--hosted", str(plan.hosted), *kept),
+        part("world", cars, "--hosted", str(plan.wanted.hosted), *kept),
         *(eye(station, camera) for station, camera in plan.eyes.items()),
         part("camera", "cars' own cameras, rendered while somebody looks"),
         part("observer", "counts, delays, and who breaks the rules"),
         part("misbehaviour", "doubts what cars claim on the air"),
         part("api", "REST, event stream, dashboard", *web),
     ]
-    if plan.demand is not None:
-        jobs.append(demand(plan.demand))
-    if plan.ros2:
+    if plan.wanted.demand is not None:
+        jobs.append(demand(plan.wanted.demand))
+    if plan.wanted.ros2:
         jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))
     return jobs
 
 
 def _at_bus(plan: _Plan, station: str) -> Sequence[str]:
     """Return how a station's program finds the bus, and what it is let in by."""
-    shared = ("--connect", plan.guard.connect, "--city", plan.city)
+    shared = ("--connect", plan.guard.connect, "--city", plan.wanted.city)
     return (*shared, *plan.guard.arguments(station))
 
 
@@ -224,12 +223,12 @@ def _agents(plan: _Plan) -> list[Job]:
 
 def _tell_next(plan: _Plan, say: Say) -> None:
     script = f"--connect {plan.guard.connect}"
-    at = script + ("" if plan.city == "city" else f" --city {plan.city}")
+    at = script + ("" if plan.wanted.city == "city" else f" --city {plan.wanted.city}")
     programs = Path(sys.executable).parent
     if programs.is_relative_to(Path.cwd()):
         programs = programs.relative_to(Path.cwd())
-    car = f"n{plan.hosted + len(plan.agents) + 1}"
-    say(f"dashboard: http://{plan.host}:{plan.port}")
+    car = f"n{plan.wanted.hosted + len(plan.agents) + 1}"
+    say(f"dashboard: http://{plan.wanted.host}:{plan.port}")
     say("try next, in another shell:")
     say(f"  {programs}/vehicle-agent join --name {car} {at}      another car")
     say(f"  {programs}/python examples/travel_times.py --live {script}      a fleet script")

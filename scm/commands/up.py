@@ -1,6 +1,7 @@
 """`scm up`: the whole city, one process a part."""
 
 import argparse
+from dataclasses import fields
 from pathlib import Path
 
 from scm.command import Command
@@ -48,24 +49,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from scm.up import run_city
+    from scm.up import Wanted, run_city
 
-    return run_city(
-        arguments.map,
-        city=arguments.city,
-        hosted=arguments.hosted,
-        agents=arguments.agents,
-        port=arguments.port,
-        listen=arguments.listen,
-        record_dir=arguments.record_dir,
-        seed=arguments.seed,
-        fleet=arguments.fleet,
-        state=arguments.state,
-        host=arguments.host,
-        keys=arguments.keys,
-        ros2=arguments.ros2,
-        demand=arguments.demand,
-    )
+    settings = {**vars(arguments), "map_name": arguments.map}
+    return run_city(Wanted(**{field.name: settings[field.name] for field in fields(Wanted)}))
 
 
 COMMAND = Command(

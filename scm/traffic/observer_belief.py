@@ -18,6 +18,7 @@ from scm.v2x.messages.vehicle_state import VehicleState
 FRESH_NS = NS_PER_S
 SELF_STD_M, SELF_STD_MPS = 0.01, 0.02
 NOBODY = "tag-"
+FARTHEST_M, FASTEST_MPS, MOST_RAD = 10_000.0, 100.0, 1_000.0
 SAME_M = 0.2
 
 
@@ -43,12 +44,15 @@ class Beliefs:
         self._self: dict[str, tuple[Belief, int]] = {}
 
     def take(self, message: EyeTrack | VehicleState, arrived_ns: int) -> None:
-        """Take a message in."""
+        """Take a message in, unless no car can be where it says, or move so."""
         if isinstance(message, EyeTrack):
-            if not message.stale:
-                self._eye[message.vehicle] = (_of_track(message), arrived_ns)
+            belief, table = _of_track(message), self._eye
+            if message.stale:
+                return
         else:
-            self._self[message.vehicle] = (_of_state(message), arrived_ns)
+            belief, table = _of_state(message), self._self
+        if _can_be(belief):
+            table[message.vehicle] = (belief, arrived_ns)
 
     def now(self, now_ns: int) -> list[Belief]:
         """Return what is believed of each car that was told of within the last second."""
@@ -64,6 +68,15 @@ class Beliefs:
             if belief.vehicle.startswith(NOBODY)
             and all(math.dist((belief.x, belief.y), (one.x, one.y)) > SAME_M for one in named)
         ]
+
+
+def _can_be(belief: Belief) -> bool:
+    lengths = (belief.x, belief.y, belief.std_m)
+    return (
+        all(abs(length) <= FARTHEST_M for length in lengths)
+        and max(abs(belief.speed), belief.std_mps) <= FASTEST_MPS
+        and abs(belief.yaw) <= MOST_RAD
+    )
 
 
 def _of_track(track: EyeTrack) -> Belief:

@@ -16,7 +16,11 @@ from scm.errors import MessageError
 from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.registry import load, names
+from scm.traffic.demand import DemandPart
+from scm.traffic.demand_table import Flow
+from scm.traffic.misbehaviour_part import MisbehaviourPart
 from scm.traffic.monitor_part import MonitorPart
+from scm.traffic.observer_part import ObserverPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.exchange import Call
 from scm.v2x.key import key_of
@@ -33,6 +37,7 @@ PLACES = {
     "vehicle": ("n1", "n2"),
     "receiver": ("n2",),
     "station": ("n1", "n2", "world"),
+    "suspect": ("n1", "n2"),
     "source": ("world",),
     "junction": ("crossing",),
     "camera": ("overhead",),
@@ -40,6 +45,7 @@ PLACES = {
     "car": ("nigel",),
     "kind": ("remote",),
 }
+BITS = ("0" * 16, "1" * 16, "01" * 8)  # of the one field that has a pattern: status bits
 MADE_BY_THE_BUS_OR_ONCE = {"presence", "world_definition"}
 
 
@@ -51,7 +57,7 @@ SENT = [
 
 def extreme(of, name, turn):
     """Return the `turn`-th value for a field, through all its ends and in another order each."""
-    if name in PLACES:
+    if name in PLACES and isinstance(of, inspect.StrType):
         return PLACES[name][turn % len(PLACES[name])]
     return MAKERS[type(of)](of, turn)
 
@@ -62,18 +68,25 @@ def integer(of, turn):
     return value if of.le is None else min(of.le, value)
 
 
+def words(of, turn):
+    if of.pattern is not None:
+        return BITS[turn % len(BITS)]
+    text = ("", "x" * 3000, "\u0000")[turn % 3].ljust(of.min_length or 0, "x")
+    return text if of.max_length is None else text[: of.max_length]
+
+
 MAKERS = {
     inspect.IntType: integer,
     inspect.FloatType: lambda _, turn: FLOATS[turn % len(FLOATS)],
     inspect.BoolType: lambda _, turn: turn % 2 == 0,
-    inspect.StrType: lambda _, turn: ("", "x" * 3000, "\u0000")[turn % 3],
+    inspect.StrType: words,
     inspect.BytesType: lambda *_: b"\xff",
     inspect.NoneType: lambda *_: None,
     inspect.LiteralType: lambda of, turn: of.values[turn % len(of.values)],
     inspect.UnionType: lambda of, turn: extreme(of.types[turn % len(of.types)], "", turn),
     inspect.StructType: lambda of, turn: fields(of.cls, turn),
     inspect.VarTupleType: lambda of, turn: [
-        extreme(of.item_type, "", turn + i) for i in range(turn % 3)
+        extreme(of.item_type, "", turn + i) for i in range(max(turn % 3, of.min_length or 0))
     ],
     inspect.TupleType: lambda of, turn: [
         extreme(item, "", turn + i) for i, item in enumerate(of.item_types)
@@ -89,7 +102,15 @@ def fields(kind, turn):
 @pytest.fixture(scope="module")
 def city():
     view = CityView()
-    parts = [WorldPart(MAP, 0, (("n1", "nigel"),)), TrafficPart(MAP), MonitorPart(MAP), view]
+    parts = [
+        WorldPart(MAP, 0, (("n1", "nigel"),)),
+        TrafficPart(MAP, policy="actuated"),
+        MonitorPart(MAP),
+        ObserverPart(MAP),
+        MisbehaviourPart(MAP),
+        DemandPart(MAP, (Flow("east_loop", "west_loop", 600.0),), 0.0),
+        view,
+    ]
     with Lockstep([*parts, AgentPart("n2")], start_ns=10**18) as running:
         running.run_for(1.5)
         yield running, view

@@ -5,7 +5,7 @@ import socket
 import pytest
 
 from scm.errors import MapError, RunError
-from scm.up import run_city
+from scm.up import Wanted, run_city
 from scm.v2x.router import Router, free_endpoint
 
 
@@ -16,7 +16,8 @@ def start(tmp_path):
     def start(map_name="driving_school", **facts):
         facts = {"port": 0, "listen": "tcp/127.0.0.1:0", **facts}
         try:
-            run_city(map_name, record_dir=tmp_path / "runs", say=said.append, **facts)
+            wanted = Wanted(map_name=map_name, record_dir=tmp_path / "runs", **facts)
+            run_city(wanted, said.append)
         finally:
             assert said == []
 
@@ -38,3 +39,8 @@ def test_a_taken_dashboard_port_is_refused_with_its_number(start):
 def test_a_taken_endpoint_is_refused(start):
     with Router(free_endpoint()) as other, pytest.raises(RunError, match="another city"):
         start(listen=other.listen)
+
+
+def test_a_dashboard_for_others_needs_keys(start):
+    with pytest.raises(RunError, match="without API keys"):
+        start(host="0.0.0.0")
