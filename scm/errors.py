@@ -9,6 +9,8 @@
     ├── PlanError     (ValueError)       a signal plan or program card
     ├── EyeError      (ValueError)       a camera or its calibration
     ├── LinkError     (ConnectionError)  the bus, a serial line, a peer that is not there
+    ├── StoreError    (OSError)          state that must survive, and cannot be read or written
+    ├── AccessError   (PermissionError)  credentials, and what somebody may not do
     ├── LeaseError    (PermissionError)  driving a car that somebody else owns
     └── RunError      (RuntimeError)     a city that cannot start or go on
 

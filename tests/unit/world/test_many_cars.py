@@ -10,6 +10,7 @@ from scm.v2x.message import Message
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.radio_status import RadioStatus
 from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
@@ -81,7 +82,7 @@ def test_what_nobody_hears_is_not_made():
 
     _, said = run(60, cars(5), is_wanted=nobody)
     made = {type(item) for tick in said for item in tick}
-    assert made - {Keep} <= {CityEvent, PartStatus, Trip, WorldDefinition}
+    assert made - {Keep} <= {CityEvent, PartStatus, RadioStatus, Trip, WorldDefinition}
     assert {VehicleState, WorldSnapshot, LidarScan} <= set(asked)
 
 

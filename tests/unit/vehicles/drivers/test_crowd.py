@@ -137,7 +137,7 @@ def test_dense_traffic_flows_without_touching_running_red_or_blocking_a_junction
         if tick > 250:
             assert np.abs(crowd.cross_track).max() < 0.007
     assert passed > 60
-    assert driven.min() > 1.0
+    assert driven.min() > 0.8  # all junctions share the longest cycle of them, for a green wave
 
 
 def test_every_car_of_a_crowd_decides_as_it_would_alone(eight):
