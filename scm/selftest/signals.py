@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from scm.clock import NS_PER_MS, NS_PER_S
+from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.errors import RunError
 from scm.maps.model import CityMap
 from scm.registry import load, names
@@ -30,6 +30,7 @@ FAULTS = "scm.selftest.signal_faults"
 BAR_NS = NS_PER_S
 SHOWN_S = 30.0  # a whole cycle may pass before there is a yellow to cut short
 BACK_S = 30.0
+TAKES_OVER_S = 0.5
 CALM_NS = 600 * NS_PER_MS
 HEAD = ("fault", "monitor said", "flash after", "cars stop after", "goes on after", "")
 
@@ -124,11 +125,16 @@ class SignalTrials:
         self._controller(signal.SIGSTOP)
         try:
             with self._stand_in() as stand_in:
-                self._settle()
+                self._take_over()
                 yield stand_in
         finally:
             self._controller(signal.SIGCONT)
-            self._settle()
+            self._take_over()
+
+    def _take_over(self) -> None:
+        """Let one controller follow another until nothing of the first is heard of any more."""
+        self._observer.listen(seconds(CALM_NS) + TAKES_OVER_S)
+        self._settle()
 
     def _hurt(self, fault: SignalFault, number: signal.Signals) -> Outcome:
         began_ns = self._observer.clock.now_ns()
