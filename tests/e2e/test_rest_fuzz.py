@@ -15,7 +15,7 @@ pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 PARTS = ("traffic", "monitor", "world", "api")
 ENDLESS = ("/stream", "/live", ".mjpeg", "/events/stream")
-SPAN_S = 45.0
+SPAN_S = 20.0
 EXAMPLES = 12
 CHECKS = [not_a_server_error, response_schema_conformance]
 

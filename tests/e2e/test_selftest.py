@@ -13,19 +13,12 @@ def selftest(*arguments, **more):
     return subprocess.run(command, check=False, capture_output=True, text=True, timeout=120, **more)
 
 
-def test_faults_of_the_output_and_a_killed_and_a_frozen_controller_are_found_in_time(tmp_path):
+def test_a_fault_of_the_output_and_a_frozen_controller_are_found_in_time(tmp_path):
     out = tmp_path / "table.md"
-    done = selftest(
-        "conflicting_greens",
-        "missing_indication",
-        "frozen_controller",
-        "killed_controller",
-        "--out",
-        str(out),
-    )
+    done = selftest("conflicting_greens", "frozen_controller", "--out", str(out))
     assert done.returncode == 0, done.stdout + done.stderr
     rows = [line for line in out.read_text().splitlines() if line.endswith("| ok |")]
-    assert len(rows) == 4, out.read_text()
+    assert len(rows) == 2, out.read_text()
 
 
 def test_a_running_city_is_left_alone_without_a_yes():
