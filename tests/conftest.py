@@ -9,10 +9,17 @@ SHARED = ROOT.parent / "shared"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark every test of `tests/e2e` as such."""
+    """Mark every test of `tests/e2e` as such, and let one process run them, from the start on.
+
+    They mostly wait for cities, two of which would starve each other; the tests of any other file
+    stay together too, for what they share.
+    """
+    items.sort(key=lambda item: "e2e" not in item.path.parts)
     for item in items:
-        if "e2e" in item.path.parts:
+        of_city = "e2e" in item.path.parts
+        if of_city:
             item.add_marker(pytest.mark.e2e)
+        item.add_marker(pytest.mark.xdist_group("cities" if of_city else str(item.path)))
 
 
 @pytest.fixture(scope="session")
