@@ -16,7 +16,7 @@ from scm.mismatch.laws.sensed import Sensed
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate, Knob
 from scm.mismatch.report.wording import quantity
-from scm.mismatch.search import Search, price
+from scm.mismatch.search import Search
 from scm.vehicles.car import Car
 
 NINETY = 1.645
@@ -62,7 +62,7 @@ def tried_of(search: Search) -> tuple[Tried, ...]:
         # a rival's own q is none of then: the one that was taken has been settled since
         for fitted, criterion in zip(step.rivals, step.criteria, strict=True):
             name = fitted.names[-1]
-            needed = price(fitted.effects, search.events, len(search.listed))
+            needed = search.price(fitted.effects)
             one = Tried(name=name, gain=step.base.q + needed - criterion, needed=needed)
             if name not in best or best[name].gain < one.gain:
                 best[name] = one

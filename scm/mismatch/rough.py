@@ -5,6 +5,7 @@ one effect in it. What is left is then judged by strides, and each round takes e
 pays beside those before it, until what the others make needless is taken back.
 """
 
+import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
@@ -18,7 +19,7 @@ from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate, Knob
 from scm.mismatch.noise import usual_noise
 from scm.mismatch.parts import Parts, split
-from scm.mismatch.search import Search, Step, price
+from scm.mismatch.search import FALSE_ALARMS, Search, Step
 from scm.mismatch.strides import Striding, learn_sizes, told_anew
 from scm.vehicles.car import Car
 
@@ -89,6 +90,13 @@ class RoughSearch(Search):
         self, model: Likelihood, part: Floats, library: Sequence[Candidate], tell: Tell
     ) -> None:
         super().__init__(model, part, library, tell, learn_sizes)
+
+    def price(self, effects: Sequence[Candidate]) -> float:
+        """Return what effects must gain: `ln n` a number, for strides hold more than noise."""
+        knobs = sum(len(effect.knobs) for effect in effects)
+        rare = sum(effect.rare for effect in effects)
+        size = 2.0 * math.log(len(self.listed) / FALSE_ALARMS)
+        return rare + knobs * math.log(self.events) + len(effects) * size
 
     def run(self, is_over: Callable[[], bool] = lambda: False) -> Fitted:
         """Return the model that explains the recordings best, see `Search.run`."""
@@ -188,7 +196,7 @@ class RoughSearch(Search):
         return rounds
 
     def _cost(self, fitted: Fitted) -> float:
-        return price(fitted.effects[-1:], self.events, len(self.listed))
+        return self.price(fitted.effects[-1:])
 
     def _gain(self, e: Floats, columns: Floats) -> float:
         """Return how much less the loss would be, were everything linear."""

@@ -1,13 +1,14 @@
 """Which effects explain a recording: screen all, refit the best, add one at a time, take back.
 
-An effect must earn more than chance gives the best of so many tried: its numbers cost `ln n` each,
-the library's size twice its logarithm (the criterion of PASTIS).
+An effect must gain more than chance gives the best of so many tried one time in fifty: what
+chi-squared with as many degrees of freedom as it has numbers exceeds so seldom.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from statistics import NormalDist
 
 import numpy as np
 
@@ -32,7 +33,7 @@ OFF = 0.125  # two simulators' equations of the same effect differ by as much
 REMAINDER, COVERED = OFF * OFF, 0.2
 FALSE_ALARMS = 0.02
 NEAR = 40.0
-DRIFTED, BACK = 8.0, 1.0  # what a number at its limit counts; within its scatter again
+DRIFTED, BACK = 4.0, 1.0  # what a number at its limit counts; within its scatter again
 TWINS: Mapping[str, str] = {
     "payload": "motor_gain", "motor_gain": "payload", "grade": "wind", "wind": "grade",
 }  # fmt: skip
@@ -54,11 +55,24 @@ class Step:
     criteria: tuple[float, ...]
 
 
-def price(effects: Sequence[Candidate], events: int, library: int) -> float:
-    """Return what effects must gain to be believed."""
-    knobs = sum(len(effect.knobs) for effect in effects)
-    rare = sum(effect.rare for effect in effects)
-    return rare + knobs * math.log(events) + 2.0 * len(effects) * math.log(library / FALSE_ALARMS)
+def price(effects: Sequence[Candidate], library: int) -> float:
+    """Return what effects must gain to be believed, the best of so many in a library.
+
+    Of one that has a place, each that it was begun at counts as one more that was tried.
+    """
+    total = 0.0
+    for effect in effects:
+        tried = library * (len(effect.starts) if effect.is_placed else 1)
+        total += effect.rare + exceeded(len(effect.knobs), FALSE_ALARMS / tried)
+    return total
+
+
+@cache
+def exceeded(degrees: int, chance: float) -> float:
+    """Return what chi-squared exceeds with a small chance (Wilson and Hilferty, 1931)."""
+    spread = 2.0 / (9.0 * degrees)
+    at = NormalDist().inv_cdf(1.0 - chance)
+    return degrees * (1.0 - spread + at * math.sqrt(spread)) ** 3
 
 
 class Search:
@@ -92,9 +106,13 @@ class Search:
         self.steps: list[Step] = []
         self.explained: Callable[[Fitted], bool] = lambda _: False
 
+    def price(self, effects: Sequence[Candidate]) -> float:
+        """Return what effects must gain to be believed."""
+        return price(effects, len(self.listed))
+
     def criterion(self, fitted: Fitted) -> float:
         """Return Q and the price of its effects."""
-        return fitted.q + price(fitted.effects, self.events, len(self.listed))
+        return fitted.q + self.price(fitted.effects)
 
     def run(self, is_over: Callable[[], bool] = lambda: False) -> Fitted:
         """Return the model that explains the recordings best without inventing anything.
@@ -323,7 +341,7 @@ class Search:
 
     def _pays(self, best: Fitted, gains: Floats) -> Bools:
         """Return which effects gain their price where they were fitted."""
-        prices = [price((effect,), self.events, len(self.listed)) for effect in best.effects]
+        prices = [self.price((effect,)) for effect in best.effects]
         return np.asarray(gains > prices)
 
     def _remainders(self, best: Fitted, others: Sequence[Fitted], gains: Floats) -> Bools:

@@ -102,12 +102,9 @@ def _hoped_for(cars: Mapping[str, Searched], asked: set[str]) -> list[tuple[Cand
             gains[name] = gains.get(name, 0.0) + gain
             if gain > starts.get(name, (-math.inf,))[0]:
                 starts[name] = gain, effect, values
-    events = sum(s.search.events for s in cars.values())
     listed = max(len(s.search.listed) for s in cars.values())
-    hopes = [
-        name for name, gain in gains.items()
-        if name not in asked and gain > HOPEFUL * price((starts[name][1],), events, listed)
-    ]  # fmt: skip
+    asks = {name: price((effect,), listed) for name, (_, effect, _) in starts.items()}
+    hopes = [n for n, gain in gains.items() if n not in asked and gain > HOPEFUL * asks[n]]
     hopes.sort(key=lambda name: -gains[name])
     return [starts[name][1:] for name in hopes[:MOST_HOPES]]
 
@@ -122,7 +119,7 @@ def _tried(searched: Searched) -> dict[str, tuple[float, Candidate, Floats]]:
             effect = rival.effects[-1]
             if CAUSES.get(effect.name) is None:
                 continue
-            paid = price((effect,), searched.search.events, len(searched.search.listed))
+            paid = searched.search.price((effect,))
             gain = bare + paid - criterion
             if gain > best.get(effect.name, (0.0,))[0]:
                 best[effect.name] = gain, effect, rival.values[-len(effect.knobs) :].copy()
@@ -156,9 +153,8 @@ def _asked(
     values, precision = _together(group)
     gains = {name: w.gain(w.at(values)) for name, w in witnesses.items()}
     if searched_for:
-        events = sum(s.search.events for s in cars.values())
         listed = max(len(s.search.listed) for s in cars.values())
-        if sum(gains[name] for name in agreeing) < price((effect,), events, listed):
+        if sum(gains[name] for name in agreeing) < price((effect,), listed):
             _leave(witnesses)
             return None
     sights = {

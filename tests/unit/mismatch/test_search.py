@@ -5,12 +5,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from scm.mismatch.fit import FARTHEST, Fitted, Fitter
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.noise import CALM, calmed, usual_noise
 from scm.mismatch.rough import SETTLES_FAR
-from scm.mismatch.search import DRIFTED, PLENTY, REMAINDER, Search, _next_starts
+from scm.mismatch.search import (
+    DRIFTED,
+    FALSE_ALARMS,
+    PLENTY,
+    REMAINDER,
+    Search,
+    _next_starts,
+    exceeded,
+    price,
+)
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
 
@@ -23,6 +33,26 @@ def model():
 def a_search(model, *names):
     library = [candidate(name) for name in names]
     return Search(model, np.ones(len(model.t)), library, lambda _: None)
+
+
+@pytest.mark.parametrize("degrees", [1, 2, 4])
+@pytest.mark.parametrize("chance", [0.05, 4e-4, 1e-4])
+def test_chi_squared_exceeds_it_as_seldom_as_asked(degrees, chance):
+    assert exceeded(degrees, chance) == pytest.approx(chi2.isf(chance, degrees), rel=0.08)
+
+
+def test_chance_gives_the_best_of_a_library_its_price_one_time_in_fifty():
+    one, library = candidate("steer_trim"), 40
+    draws = np.random.default_rng(1).chisquare(1, (20_000, library)).max(axis=1)
+    assert np.mean(draws > price((one,), library)) == pytest.approx(FALSE_ALARMS, rel=0.35)
+
+
+def test_an_effect_of_some_place_pays_for_every_place_it_was_tried_at():
+    near, far = (0.0, 0.0, 0.3, 0.6), (1.0, 0.0, 0.3, 0.6)
+    one = replace(candidate("surface_patch"), starts=(near,))
+    two = replace(one, starts=(near, far))
+    assert price((two,), 10) == price((one,), 20) > price((one,), 10)
+    assert price((one, one), 10) == 2.0 * price((one,), 10)
 
 
 def test_calm_noise_is_no_larger_than_a_cars_usual_times_a_few(model):
@@ -147,7 +177,7 @@ def losing(seen, unseen, where, shows):
         ((100.0,), (20.0,), (0,), (0.0,), True),
         ((100.0,), (1.0,), (0,), (100.0,), False),
         ((100.0,), (1.0,), (0,), (0.0,), True),
-        ((9.0,), (0.5,), (0,), (0.0,), False),
+        ((4.0,), (0.2,), (0,), (0.0,), False),
         ((1500.0,), (PLENTY + 1.0,), (0,), (900.0,), True),
         ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 0), (0.0, 0.0), False),
         ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 1), (0.0, 0.0), True),

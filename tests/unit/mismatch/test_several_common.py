@@ -5,14 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from scm.mismatch.search import price
 from scm.mismatch.several_common import compared
 from scm.mismatch.several_findings import Cause, Sight
 from scm.mismatch.several_witness import Witness
 from tests.unit.mismatch.made_cars import drive_of, searched, tagged, tilted
 
 CARS = ("a", "b", "c")
-TILT, WEAK, TAG_M = 0.03, 0.013, 0.03
+TILT, WEAK, TAG_M = 0.03, 0.009, 0.03
 
 
 @cache
@@ -71,7 +70,7 @@ def test_a_tilt_too_weak_for_one_car_is_found_by_all_together():
     (tilt,), taken = compared(cars, lambda _: None)
     for name, one in zip(CARS, tilt.cars, strict=True):
         search = cars[name].search
-        assert one.gain < price((search.listed[0],), search.events, len(search.listed))
+        assert one.gain < search.price((search.listed[0],))
     assert tilt.shared
     assert tilt.parameters["tilt_x"].low < WEAK < tilt.parameters["tilt_x"].high
     assert all(one.best.names == ("camera_tilt",) for one in taken.values())
