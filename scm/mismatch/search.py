@@ -13,6 +13,7 @@ from statistics import NormalDist
 import numpy as np
 
 from scm.arrays import Bools, Floats
+from scm.mismatch.findings import Equation
 from scm.mismatch.fit import FARTHEST, OF_OWN, SPOTS, Fitted, Fitter
 from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.likelihood import Likelihood
@@ -33,7 +34,9 @@ OFF = 0.125  # two simulators' equations of the same effect differ by as much
 REMAINDER, COVERED = OFF * OFF, 0.2
 FALSE_ALARMS = 0.02
 NEAR = 40.0
-DRIFTED, BACK = 4.0, 1.0  # what a number at its limit counts; within its scatter again
+DRIFTED, BACK = 8.0, 1.0  # what a number at its limit counts; within its scatter again
+HALF_BELIEVED = 4.0  # of that, where an effect is not told from another but from nothing
+WRITTEN = 12.0  # two simulators' tyres, both right, differ by as much on a drive of 90 s
 TWINS: Mapping[str, str] = {
     "payload": "motor_gain", "motor_gain": "payload", "grade": "wind", "wind": "grade",
 }  # fmt: skip
@@ -58,12 +61,14 @@ class Step:
 def price(effects: Sequence[Candidate], library: int) -> float:
     """Return what effects must gain to be believed, the best of so many in a library.
 
-    Of one that has a place, each that it was begun at counts as one more that was tried.
+    Of one that has a place, each that it was begun at counts as one more that was tried. Effects of
+    tyres pay more: they first make good how the simulator writes its tyres.
     """
     total = 0.0
     for effect in effects:
         tried = library * (len(effect.starts) if effect.is_placed else 1)
-        total += effect.rare + exceeded(len(effect.knobs), FALSE_ALARMS / tried)
+        written = WRITTEN * (effect.equation is Equation.TYRE)
+        total += effect.rare + written + exceeded(len(effect.knobs), FALSE_ALARMS / tried)
     return total
 
 
@@ -127,7 +132,7 @@ class Search:
             before = best = step.base
             if not before.effects:
                 self.retuned = before
-            margin = self.criterion(before) - step.criteria[0] if step.rivals else -math.inf
+            margin = self._margin(step)
             if margin >= 0.0:
                 best = self.prune(self.settle(step.rivals[0]))
             if margin < DOUBTFUL and (margin >= 0.0 or not before.effects) and self.explained(best):
@@ -137,6 +142,13 @@ class Search:
             if len(best.effects) == len(before.effects):
                 break
         return best
+
+    def _margin(self, step: Step) -> float:
+        """Return by how much the best effect of a round gains more than its price."""
+        if not step.rivals:
+            return -math.inf
+        drifted = self.criterion(step.rivals[0]) - step.criteria[0]
+        return self.criterion(step.base) - step.criteria[0] - min(drifted, HALF_BELIEVED)
 
     def _calmly(self, best: Fitted, learned: Noise) -> Fitted:
         """Return the best effect that a calm belief about noise shows, or what was found without.

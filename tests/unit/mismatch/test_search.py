@@ -16,7 +16,9 @@ from scm.mismatch.search import (
     FALSE_ALARMS,
     PLENTY,
     REMAINDER,
+    WRITTEN,
     Search,
+    Step,
     _next_starts,
     exceeded,
     price,
@@ -53,6 +55,21 @@ def test_an_effect_of_some_place_pays_for_every_place_it_was_tried_at():
     two = replace(one, starts=(near, far))
     assert price((two,), 10) == price((one,), 20) > price((one,), 10)
     assert price((one, one), 10) == 2.0 * price((one,), 10)
+
+
+def test_an_effect_of_tyres_pays_for_how_simulators_write_them():
+    assert price((candidate("tyre_relaxation"),), 10) == WRITTEN + price(
+        (candidate("payload"),), 10
+    )
+
+
+@pytest.mark.parametrize(("short_by", "told"), [(3.0, True), (5.0, False)])
+def test_of_a_number_at_its_limit_half_counts_where_the_rival_is_nothing(model, short_by, told):
+    search = a_search(model, "steer_rate")
+    base, effect = search.fitter.null(), candidate("steer_rate")
+    found = replace(base, effects=(effect,), q=base.q - search.price((effect,)) + short_by)
+    step = Step(base, (found,), (search.criterion(found) - DRIFTED,))
+    assert (search._margin(step) > 0.0) == told
 
 
 def test_calm_noise_is_no_larger_than_a_cars_usual_times_a_few(model):
