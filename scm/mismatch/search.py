@@ -344,7 +344,8 @@ class Search:
             )
             shown = np.array([float(fitter.weights(best.e) @ (f.e - best.e) ** 2) for f in others])
             least = np.where(self._pays(best, seen_gains), shown - CHANCE * np.sqrt(shown), np.inf)
-            gains -= np.minimum(self.holds * np.minimum(share * seen_gains, least), PLENTY)
+            asked = self.holds * np.minimum(share * seen_gains, least)
+            gains -= np.minimum(np.minimum(asked, least), PLENTY)
             gains[self._remainders(best, others, seen_gains)] = -np.inf
             if gains.min() > 0.0:
                 return best

@@ -180,9 +180,10 @@ def losing(seen, unseen, where, shows):
                   0.0, np.zeros((3 + n, 1)))  # fmt: skip
     others = []
     for lost, hidden, at, more in zip(seen, unseen, where, shows, strict=True):
-        value = np.sqrt(8.0 * np.expm1(hidden / 8.0))  # what the loss makes `hidden` of
+        value = np.sqrt(8.0 * np.expm1(abs(hidden) / 8.0))  # what the loss makes `hidden` of
         other = e.copy()
-        other[1], other[3 + at] = value, np.sqrt(lost)
+        other[1], other[3 + at] = value * (hidden > 0.0), np.sqrt(lost)
+        e[1] = value * (hidden < 0.0)
         other[2] = -e[2] if more else e[2]
         others.append(replace(best, effects=best.effects[1:], e=other, q=lost))
     return best, others
@@ -194,13 +195,15 @@ def losing(seen, unseen, where, shows):
         ((100.0,), (20.0,), (0,), (0.0,), True),
         ((100.0,), (1.0,), (0,), (100.0,), False),
         ((100.0,), (1.0,), (0,), (0.0,), True),
+        ((100.0,), (-1.9,), (0,), (0.7,), True),
+        ((100.0,), (-4.0,), (0,), (0.7,), False),
         ((4.0,), (0.2,), (0,), (0.0,), False),
         ((1500.0,), (PLENTY + 1.0,), (0,), (900.0,), True),
         ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 0), (0.0, 0.0), False),
         ((1500.0, 0.5 * REMAINDER * 1500.0), (900.0, 500.0), (0, 1), (0.0, 0.0), True),
     ],
     ids=["its share", "less than its share", "hardly acts there",
-         "hardly acts anywhere", "plenty",
+         "worse there by chance", "worse there by more", "hardly acts anywhere", "plenty",
          "a remainder of another", "small elsewhere"],
 )  # fmt: skip
 def test_an_effect_stays_where_its_gain_holds_on_an_unseen_part(
