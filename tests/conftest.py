@@ -1,5 +1,6 @@
 """What all tests share: where other people's data lies, and marks that come from the folder."""
 
+import gc
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if of_city:
             item.add_marker(pytest.mark.e2e)
         item.add_marker(pytest.mark.xdist_group("cities" if of_city else str(item.path)))
+
+
+def pytest_collection_finish() -> None:
+    """Keep thousands of collected tests out of every later collection of garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")
