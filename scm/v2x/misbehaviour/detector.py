@@ -216,10 +216,13 @@ class Detector:
         return any(overlap_m(box, other) > 0.0 for other in (*claimed, *seen))
 
     def _seen_beside(self, claim: Claim, size: tuple[float, float]) -> Iterator[Box]:
-        """Yield the outlines of all other cars that the Eye sees, as large as this one."""
+        """Yield the outlines of all other cars that the Eye told of, as large as this one.
+
+        A doubtful track too: two cars that press against each other hide each other's tags.
+        """
         ahead = (self._limits.front_share - 0.5) * claim.length_m
         for who, track in self._tracks.items():
-            if who != claim.who and _is_fresh(track, claim.t_ns):
+            if who != claim.who and abs(claim.t_ns - track.t_ns) <= FRESH_NS:
                 x = track.x_m + ahead * math.cos(track.yaw_rad)
                 y = track.y_m + ahead * math.sin(track.yaw_rad)
                 yield (x, y, track.yaw_rad, *size)

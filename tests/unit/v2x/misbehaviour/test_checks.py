@@ -84,13 +84,16 @@ def test_who_brakes_while_nobody_hears_it_has_not_lied_about_the_way():
 
 
 @pytest.mark.parametrize("name", ["acceleration_plausibility", "acceleration_speed"])
-@pytest.mark.parametrize("witness", ["its claim", "the Eye"])
+@pytest.mark.parametrize("witness", ["its claim", "the Eye", "a stale track"])
 def test_who_is_pushed_has_not_lied_about_his_acceleration(name, witness):
     judge, doubts = detector(CHECKS[name]), []
     for k in range(8):
         beside = state(0.2 * k, 0.1 + 0.29, v=0.0, name="n2")
         if k >= 4:  # until then it stands alone, and presses against nothing
-            hear(judge, beside) if witness == "its claim" else judge.see(track(beside))
+            if witness == "its claim":
+                hear(judge, beside)
+            else:
+                judge.see(track(beside, stale=witness == "a stale track"))
         doubts.append(hear(judge, state(0.2 * k, 0.1, v=0.0, a=1.14)).doubts)
     assert any(doubts[:4])
     assert not any(doubts[4:])
