@@ -122,7 +122,8 @@ class Attacker:
         """Let the part leave."""
         for name, record in self._records.items():
             found = "never reported" if record.since_ns is None else "reported"
-            self._say(f"{name} leaves: {record.cams} CAMs, {record.lies} of them lies, {found}")
+            sums = f"{record.cams} CAMs, {record.lies} of them lies, {found}"
+            self._say(f"{name} leaves: {sums if record.cams else 'it was never in the city'}")
         return self._part.finish(now_ns)
 
     def _overhear(self, cam: Cam) -> None:

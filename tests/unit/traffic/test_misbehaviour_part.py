@@ -133,6 +133,12 @@ def test_an_attack_that_nobody_finds_ends_without_a_report():
     assert lines[-1].endswith("never reported")
 
 
+def test_a_liar_that_was_never_let_in_said_nothing():
+    lines = []
+    Attacker(AgentPart("n9"), {"n9": "zero_speed"}, MAP, say=lines.append).finish(START_NS)
+    assert lines == ["n9 leaves: it was never in the city"]
+
+
 def test_the_log_names_a_suspect_once(caplog):
     run({"n2": "zero_speed"}, 20.0)
     (line,) = [one for one in caplog.messages if one.startswith("station_suspected")]
