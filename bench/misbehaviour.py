@@ -374,10 +374,11 @@ def healthy(stories: dict[int, Story], ground: Ground) -> None:
               f"{dict(tally.blamed_why)}", flush=True)  # fmt: skip
 
 
-def cost(cars: int = 200, rate_hz: float = 10.0, span_s: float = 10.0) -> None:
+def cost(folder: Path | None, cars: int = 200, rate_hz: float = 10.0, span_s: float = 10.0) -> None:
     """Print the share of a core that so many cars cost; their CAMs are those of a smaller city."""
     town = TOWNS["grid"]
-    story, ground = tell(town, 1), Ground(load_map(town.map), lambda _x, _y: True)
+    story = kept(town, 1, folder, own_eye=False)
+    ground = Ground(load_map(town.map), lambda _x, _y: True)
     frames = story.frames[len(story.frames) // 4 :]
     bodies: list[CamBody] = [frame.body for frame in frames]
     for title, eye in (("with Eye", True), ("CAMs alone", False)):
@@ -410,7 +411,7 @@ def main() -> None:
     given = parser.parse_args()
     for what in given.what or ("school", "grid", "cost"):
         if what == "cost":
-            cost()
+            cost(given.keep)
             continue
         attacks = [] if given.healthy else given.attacks
         town = TOWNS[what]
