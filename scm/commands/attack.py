@@ -23,6 +23,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     import threading
+    from functools import partial
 
     from scm.clock import WallClock
     from scm.command import credentials_of
@@ -36,10 +37,13 @@ def _run(arguments: argparse.Namespace) -> int:
 
     name, attacks = check_name(arguments.car, "--car"), {arguments.car: arguments.attack}
     credentials = credentials_of(arguments, name)
+    say = partial(print, flush=True)
+    say(f"{name} joins the city {arguments.city!r} at {arguments.connect}; Ctrl-C: it leaves")
     wish, done, clock = stop_on_signal(), threading.Event(), WallClock()
     with ZenohBus(arguments.city, name, arguments.connect, credentials=credentials) as bus:
         agent = AgentPart(name, "nigel", arguments.spawn, bus.session, arguments.seed)
-        part = Attacker(agent, attacks, load_map(arguments.map), arguments.seed)
+        city_map = load_map(arguments.map)
+        part = Attacker(agent, attacks, city_map, arguments.seed, say=say)
         run(Leaving(part, wish, done), bus, clock, done)
     gc.freeze()  # as in `scm.command.run_part`
     return 0

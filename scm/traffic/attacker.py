@@ -10,17 +10,32 @@ cars hear the truth, for they hear it inside the world.
 import heapq
 import itertools
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
+from scm.clock import seconds
 from scm.maps.model import CityMap
 from scm.part import Hears, IsWanted, Part, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.misbehaviour.attack import Frame, Scene, Transform, load_attack
 from scm.v2x.misbehaviour.ground import Ground
 
 Cam = CamTx | CamRx
+MOST_CHECKS = 3
+
+
+@dataclass(slots=True)
+class _Record:
+    """What one liar has said so far, and since when it is suspected for it."""
+
+    about: str
+    cams: int = 0
+    lies: int = 0
+    first_ns: int = 0
+    since_ns: int | None = None
 
 
 class Attacker:
@@ -33,6 +48,8 @@ class Attacker:
         seed: Of all attacks.
         own_names: Ghosts go under names of their own, as if they had certificates; else under the
             attacker's, as a city that guards its keys allows nothing else.
+        say: Takes lines for a person: the first lie, each suspicion, the sum at the end. None:
+            nobody is told. A city that guards its keys tells no car who is suspected.
 
     Raises:
         RunError: when there is no such attack.
@@ -46,6 +63,7 @@ class Attacker:
         seed: int = 0,
         *,
         own_names: bool = False,
+        say: Callable[[str], None] | None = None,
     ) -> None:
         self._part = part
         self.name, self.role, self.period_ns = part.name, part.role, part.period_ns
@@ -55,13 +73,17 @@ class Attacker:
             for station, name in attacks.items()
         }
         self._own_names = own_names
+        self._say = say or _nobody
+        self._is_told = say is not None
+        self._records = {name: _Record(load_attack(a).about) for name, a in attacks.items()}
         self._later: list[tuple[int, int, list[Cam]]] = []
         self._count = itertools.count()
 
     @property
     def hears(self) -> Sequence[Hears]:
-        """What the part hears."""
-        return self._part.hears
+        """What the part hears, and reports on its liars where somebody is told."""
+        reports = (Hears(MisbehaviourReport, {"suspect": name}) for name in self._send)
+        return (*self._part.hears, *reports) if self._is_told else self._part.hears
 
     @property
     def serves(self) -> Sequence[Serves]:
@@ -79,6 +101,8 @@ class Attacker:
         for item in inbox:
             if isinstance(item.message, CamRx):
                 self._overhear(item.message)
+            elif isinstance(item.message, MisbehaviourReport):
+                self._is_reported(item.message)
         outbox: list[Outgoing] = []
         heard: dict[tuple[str, int], list[Cam]] = {}
         for said in self._part.step(now_ns, inbox):
@@ -96,6 +120,10 @@ class Attacker:
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """Let the part leave."""
+        for name, record in self._records.items():
+            found = "never reported" if record.since_ns is None else "reported"
+            sums = f"{record.cams} CAMs, {record.lies} of them lies, {found}"
+            self._say(f"{name} leaves: {sums if record.cams else 'it was never in the city'}")
         return self._part.finish(now_ns)
 
     def _overhear(self, cam: Cam) -> None:
@@ -104,14 +132,39 @@ class Attacker:
     def _lie(self, copies: list[Cam]) -> None:
         """Replace one frame, as sent and as each receiver heard it."""
         first = copies[0]
+        record = self._records[first.station]
         for sent in self._send[first.station](Frame(first.station, first.t_ns, first.body)):
             frame = sent.frame
+            record.cams += 1
+            record.lies += sent.lies
+            if sent.lies and record.lies == 1:
+                record.first_ns = frame.t_ns
+                self._say(f"{first.station} lies from now on: {record.about}")
             name = frame.station if self._own_names else first.station
             told = [_as(copy, name, frame) for copy in copies]
             heapq.heappush(self._later, (frame.t_ns, next(self._count), told))
+
+    def _is_reported(self, report: MisbehaviourReport) -> None:
+        """Say it once for each suspicion, not at every repetition."""
+        record = self._records[report.suspect]
+        if record.since_ns == report.since_ns:
+            return
+        record.since_ns = report.since_ns
+        after_s = seconds(report.t_ns - record.first_ns)
+        checks = ", ".join(
+            f"{one.check} ({one.claims} CAMs doubted)" for one in report.observations[:MOST_CHECKS]
+        )
+        self._say(
+            f"{report.suspect} is reported {after_s:.1f} s after its first lie, "
+            f"score {report.score:.1f}: {checks}"
+        )
 
 
 def _as(copy: Cam, name: str, frame: Frame) -> Cam:
     if isinstance(copy, CamTx):
         return CamTx(station=name, t_ns=frame.t_ns, body=frame.body)
     return CamRx(receiver=copy.receiver, station=name, t_ns=frame.t_ns, body=frame.body)
+
+
+def _nobody(line: str) -> None:
+    del line

@@ -4,9 +4,11 @@ It judges by `scm/v2x/misbehaviour`, knows no truth of the world, and touches no
 for people, and for those who wish to ignore a station.
 """
 
+import logging
 from collections.abc import Sequence
 
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.log import event
 from scm.maps.model import CityMap
 from scm.part import Hears, Serves
 from scm.traffic.cars import facts_of
@@ -27,6 +29,8 @@ from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.misbehaviour.detector import EYE_WORKS_NS, Detector, Judged
 from scm.v2x.misbehaviour.ground import Ground, Sees
 from scm.v2x.misbehaviour.limits import Limits
+
+_log = logging.getLogger(__name__)
 
 NAME = "misbehaviour"
 PERIOD_NS = 50 * NS_PER_MS
@@ -77,17 +81,20 @@ class MisbehaviourPart:
 
     def _tell(self, found: Judged, now_ns: int) -> list[Message]:
         report = report_of(found, self.detector, now_ns)
-        checks = ", ".join(one.check for one in report.observations[:3])
-        text = f"{report.suspect} is suspected of lying on the air: {checks}"
-        event = CityEvent(
+        if not found.memory.is_news:
+            return [report]
+        checks = [one.check for one in report.observations[:3]]
+        facts = {"station": report.suspect, "score": report.score, "checks": ",".join(checks)}
+        event(_log, "station_suspected", level=logging.WARNING, **facts)
+        news = CityEvent(
             severity="warning",
             source=NAME,
             t_ns=now_ns,
             name="misbehaviour",
-            text=text,
+            text=f"{report.suspect} is suspected of lying on the air: {', '.join(checks)}",
             vehicle=report.suspect,
         )
-        return [report, event] if found.memory.is_news else [report]
+        return [report, news]
 
     def _each_second(self, now_ns: int) -> list[Message]:
         memories = sorted(self.detector.memories.items(), key=lambda one: -one[1].score)

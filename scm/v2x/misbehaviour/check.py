@@ -28,13 +28,15 @@ class Strayed:
     Attributes:
         last_m: Of the last claim alone, + = went farther than it said.
         sum_m: Of the last `WINDOW_S`, faded; `over_s` is their faded time.
+        variance_m2: Of `sum_m` for not knowing when between two claims the speed changed: anything
+            from at once to at last, a rectangle of width |v1 - v0| dt. Much where claims were lost.
     """
 
     WINDOW_S = 5.0
-    __slots__ = ("last_m", "over_s", "sum_m")
+    __slots__ = ("last_m", "over_s", "sum_m", "variance_m2")
 
     def __init__(self) -> None:
-        self.last_m = self.sum_m = self.over_s = 0.0
+        self.last_m = self.sum_m = self.over_s = self.variance_m2 = 0.0
 
     def add(self, now: Claim, before: Claim, dt_s: float, front_share: float) -> None:
         """Take the way from one claim to the next."""
@@ -42,8 +44,11 @@ class Strayed:
         yaw0, yaw1 = before.yaw_rad or 0.0, now.yaw_rad or 0.0
         yaw = yaw0 + wrap_angle(yaw1 - yaw0) / 2.0
         way = (x1 - x0) * math.cos(yaw) + (y1 - y0) * math.sin(yaw)
-        self.last_m = way - ((now.speed_mps or 0.0) + (before.speed_mps or 0.0)) / 2.0 * dt_s
+        v0, v1 = before.speed_mps or 0.0, now.speed_mps or 0.0
+        self.last_m = way - (v1 + v0) / 2.0 * dt_s
         fade = math.exp(-dt_s / self.WINDOW_S)
+        width = (v1 - v0) * dt_s
+        self.variance_m2 = self.variance_m2 * fade * fade + width * width / 12.0
         self.sum_m, self.over_s = self.sum_m * fade + self.last_m, self.over_s * fade + dt_s
 
 
@@ -73,6 +78,8 @@ class Case:
         since_start_s: How long we have listened.
         idle: Claims in a row that came fast although nothing had changed.
         is_own_number: Whether the number in the CAM is that of the station that sent it.
+        touches: Whether another car, by its claim or by the Eye, is so near that they may push each
+            other; costly, so ask only in doubt.
     """
 
     now: Claim
@@ -91,6 +98,7 @@ class Case:
     since_start_s: float = 0.0
     idle: int = 0
     is_own_number: bool = True
+    touches: Callable[[], bool] = lambda: False
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,8 @@ A CAM that several roadside units hear counts once. What comes from outside neve
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from scm.clock import NS_PER_S
@@ -15,6 +16,7 @@ from scm.v2x.misbehaviour.check import Case, Check, Standing, Strayed, load_chec
 from scm.v2x.misbehaviour.claim import Claim, claim_of
 from scm.v2x.misbehaviour.fusion import FREE, Memory
 from scm.v2x.misbehaviour.ground import Ground
+from scm.v2x.misbehaviour.likely import Box, overlap_m
 from scm.v2x.misbehaviour.limits import REAPPEARS_S, Limits
 
 FRESH_NS = NS_PER_S // 3
@@ -22,6 +24,7 @@ EYE_WORKS_NS = NS_PER_S // 2
 FORGET_NS = 60 * NS_PER_S
 NEIGHBOUR_M = 0.5
 CONFIRMED = 0.05
+TOUCH_M = 0.03
 BAD_FLAGS = frozenset({"tentative", "duplicate", "disagree", "wrong_id", "jumped"})
 MOST_STATIONS = 10_000
 """More station numbers than any city has: a flood of new ones must not fill the memory."""
@@ -144,6 +147,7 @@ class Detector:
         self._filter(claim, memory, before, dt_s)
         track = self._fresh(claim)
         eye_sees = self._eye_sees(claim)
+        neighbours = self._around(claim)
         return Case(
             now=claim,
             limits=self._limits,
@@ -152,7 +156,7 @@ class Detector:
             dt_s=dt_s,
             gap_s=gap_s,
             kalman=memory.kalman,
-            neighbours=self._around(claim),
+            neighbours=neighbours,
             strayed=memory.strayed,
             standings=self._standings,
             track=track,
@@ -161,6 +165,7 @@ class Detector:
             since_start_s=(claim.sent_ns - (self._began_ns or claim.sent_ns)) * 1e-9,
             idle=memory.idle,
             is_own_number=self._number(claim.station) == claim.who,
+            touches=partial(self._touches, claim, neighbours),
         )
 
     def _filter(self, claim: Claim, memory: Memory, before: Claim | None, dt_s: float) -> None:
@@ -194,6 +199,33 @@ class Detector:
             ),
             default=math.inf,
         )
+
+    def _touches(self, claim: Claim, neighbours: tuple[Claim, ...]) -> bool:
+        """Return whether the claimed car, a little larger, overlaps another one."""
+        if claim.yaw_rad is None:
+            return False
+        size = claim.length_m + TOUCH_M, claim.width_m + TOUCH_M
+        box: Box = (*claim.middle, claim.yaw_rad, *size)
+        near_ns = 2 * FRESH_NS
+        claimed = (
+            (*other.middle, other.yaw_rad, other.length_m + TOUCH_M, other.width_m + TOUCH_M)
+            for other in neighbours
+            if other.yaw_rad is not None and abs(claim.t_ns - other.t_ns) <= near_ns
+        )
+        seen = self._seen_beside(claim, size)
+        return any(overlap_m(box, other) > 0.0 for other in (*claimed, *seen))
+
+    def _seen_beside(self, claim: Claim, size: tuple[float, float]) -> Iterator[Box]:
+        """Yield the outlines of all other cars that the Eye told of, as large as this one.
+
+        A doubtful track too: two cars that press against each other hide each other's tags.
+        """
+        ahead = (self._limits.front_share - 0.5) * claim.length_m
+        for who, track in self._tracks.items():
+            if who != claim.who and abs(claim.t_ns - track.t_ns) <= FRESH_NS:
+                x = track.x_m + ahead * math.cos(track.yaw_rad)
+                y = track.y_m + ahead * math.sin(track.yaw_rad)
+                yield (x, y, track.yaw_rad, *size)
 
     def _around(self, claim: Claim) -> tuple[Claim, ...]:
         i, j = _cell(*claim.middle)

@@ -111,3 +111,35 @@ def test_a_car_that_joins_and_lies_is_a_station_of_its_own():
     assert "n9" in {row.station for row in scores.stations}
     assert {one.suspect for one in reports} == {"n9"}
     assert {one.station for one in cams} >= {"n1", "n9"}
+
+
+def test_whoever_watches_an_attack_is_told_of_the_first_lie_the_report_and_the_end():
+    lines = []
+    reports, _, _, cams = run({"n2": "zero_speed"}, 20.0, say=lines.append)
+    first, found, last = lines
+    assert first == "n2 lies from now on: a speed of zero while driving"
+    assert f"score {reports[0].score:.1f}: {reports[0].observations[0].check}" in found
+    assert 0.0 < float(found.split(" s after")[0].rpartition(" ")[2]) < 20.0
+    count = sum(cam.station == "n2" for cam in cams)
+    assert last.startswith(f"n2 leaves: {count} CAMs, ")
+    assert last.endswith("of them lies, reported")
+
+
+def test_an_attack_that_nobody_finds_ends_without_a_report():
+    lines = []
+    world = Attacker(WorldPart(MAP, 1, hosted=CARS), {"n2": "zero_speed"}, MAP, say=lines.append)
+    with Lockstep([world, TrafficPart(MAP)], start_ns=START_NS) as city:
+        city.run_for(10.0)
+    assert lines[-1].endswith("never reported")
+
+
+def test_a_liar_that_was_never_let_in_said_nothing():
+    lines = []
+    Attacker(AgentPart("n9"), {"n9": "zero_speed"}, MAP, say=lines.append).finish(START_NS)
+    assert lines == ["n9 leaves: it was never in the city"]
+
+
+def test_the_log_names_a_suspect_once(caplog):
+    run({"n2": "zero_speed"}, 20.0)
+    (line,) = [one for one in caplog.messages if one.startswith("station_suspected")]
+    assert "station=n2" in line

@@ -2,7 +2,8 @@
 
     p = erfc((a - a_max) / sigma) for speeding up, likewise for braking
 
-Only between two claims that are both beyond it: a bump is over at once, and cars do bump.
+Only between two claims that are both beyond it: a bump is over at once, and cars do bump. Never
+while another car touches: who is pushed knows no limit.
 """
 
 from scm.v2x.misbehaviour.check import Case, Check
@@ -16,9 +17,10 @@ def _judge(case: Case) -> float | None:
     sigma = case.limits.own_mps2
     gain = min(now.accel_mps2, before.accel_mps2)
     loss = -max(now.accel_mps2, before.accel_mps2)
-    return min(
+    p = min(
         at_most(gain, case.limits.accel_mps2, sigma), at_most(loss, case.limits.decel_mps2, sigma)
     )
+    return 1.0 if p < 1.0 and case.touches() else p
 
 
 CHECK = Check(_judge, "longAcc")

@@ -3,7 +3,8 @@
     r = v1 - v0 - (a0 + a1) / 2 dt        p = erfc of |r| beyond a share of |a1 - a0| dt
 
 Holds for claims that follow within NEAR_S of each other: later, anything may have come between.
-Acceleration is told of an instant, so it tells little: alone it needs many claims.
+Acceleration is told of an instant, so it tells little: alone it needs many claims. While another
+car touches, an instant tells nothing at all.
 """
 
 import math
@@ -28,7 +29,8 @@ def _judge(case: Case) -> float | None:
     mean = (now.accel_mps2 + before.accel_mps2) / 2.0
     spread = abs(now.accel_mps2 - before.accel_mps2)
     sigma = math.hypot(math.hypot(now.own_mps, before.own_mps), case.limits.own_mps2 * dt)
-    return of_number(gain - mean * dt, TOLERANCE_MPS + SHARE * spread * dt, sigma)
+    p = of_number(gain - mean * dt, TOLERANCE_MPS + SHARE * spread * dt, sigma)
+    return 1.0 if p < 1.0 and case.touches() else p
 
 
 CHECK = Check(_judge, "longAcc", floor=1e-2)

@@ -7,7 +7,8 @@ Along the heading, because a length would grow with noise; over seconds, because
 cancels there and a small constant lie remains.
 
 Between two CAMs the speed strays from both by DRIFT_MPS: beyond it another CAM would have been due
-(EN 302 637-2, 6.1.3), and lost ones make the tolerance grow with the square of the time.
+(EN 302 637-2, 6.1.3), and lost ones make the tolerance grow with the square of the time, and the
+mean as unsure as it is when the speed changed.
 """
 
 import math
@@ -33,7 +34,8 @@ def _judge(case: Case) -> float | None:
     if strayed.over_s < LEAST_S:
         return p
     mean = strayed.sum_m / strayed.over_s
-    doubt = math.hypot(SIGMA_MPS, 2.0 * now.own_m / strayed.over_s)
+    unsure_m = math.hypot(2.0 * now.own_m, math.sqrt(strayed.variance_m2))
+    doubt = math.hypot(SIGMA_MPS, unsure_m / strayed.over_s)
     return min(p, of_number(mean, MEAN_MPS, doubt))
 
 

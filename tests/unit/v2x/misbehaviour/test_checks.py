@@ -77,6 +77,28 @@ def test_a_small_constant_lie_about_speed_is_found_by_the_seconds():
     assert least("position_speed_consistency", told) < 0.01
 
 
+def test_who_brakes_while_nobody_hears_it_has_not_lied_about_the_way():
+    cruise = [state(0.25 * k, 0.05 + 0.0625 * k, v=0.25) for k in range(9)]
+    braked = [state(4.5, 0.05 + 1.05, v=0.05), state(4.7, 0.05 + 1.056, v=0.01)]
+    assert least("position_speed_consistency", cruise + braked) == 1.0
+
+
+@pytest.mark.parametrize("name", ["acceleration_plausibility", "acceleration_speed"])
+@pytest.mark.parametrize("witness", ["its claim", "the Eye", "a stale track"])
+def test_who_is_pushed_has_not_lied_about_his_acceleration(name, witness):
+    judge, doubts = detector(CHECKS[name]), []
+    for k in range(8):
+        beside = state(0.2 * k, 0.1 + 0.29, v=0.0, name="n2")
+        if k >= 4:  # until then it stands alone, and presses against nothing
+            if witness == "its claim":
+                hear(judge, beside)
+            else:
+                judge.see(track(beside, stale=witness == "a stale track"))
+        doubts.append(hear(judge, state(0.2 * k, 0.1, v=0.0, a=1.14)).doubts)
+    assert any(doubts[:4])
+    assert not any(doubts[4:])
+
+
 def test_cams_come_at_most_every_tenth_of_a_second():
     assert least("beacon_frequency", [state(0.04 * k, 0.1) for k in range(4)]) < 1e-3
     assert least("beacon_frequency", [state(0.1 * k, 0.1 + 0.02 * k) for k in range(4)]) == 1.0
