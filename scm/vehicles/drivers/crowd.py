@@ -19,6 +19,7 @@ from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers import memory as m
 from scm.vehicles.drivers.ahead import Scratch, scratch
 from scm.vehicles.drivers.channel import channel_of, frames_kept
+from scm.vehicles.drivers.green_light import HORIZON
 from scm.vehicles.drivers.law import decide
 from scm.vehicles.drivers.order import note_standing
 from scm.vehicles.drivers.signal_table import SignalTable
@@ -44,6 +45,7 @@ class Crowd:
         channel: What the air does to frames on their way to the drivers.
         signals: What is told of the signals.
         threads: How many work on large crowds; what is decided does not depend on it.
+        horizon: From how far before a line speed is chosen for its next green [m]; 0: never.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class Crowd:
         self._heard = nobody(city_map, capacity, kept, self.channel)
         self.signals = SignalTable(city_map, kept, self.channel)
         self.threads = 1
+        self.horizon = HORIZON if city_map.speed_advice else 0.0
         self._rooms = [scratch()]
         self._pool: ThreadPoolExecutor | None = None
         self._poses = self.channel.poses
@@ -325,6 +328,7 @@ class Crowd:
                 now_ns,
                 bool(stop),
                 self._seed,
+                self.horizon,
             )
 
         if self.threads == 1 or len(cars) < WORTH_THREADS:
