@@ -20,6 +20,7 @@ from scm.v2x.message import Message, Refused
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.denm_rx import DenmRx
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.monitor_status import MonitorStatus
@@ -89,6 +90,7 @@ class AgentPart:
             Presence: self._on_presence,
             SpatemRx: self._on_spatem,
             CamRx: self._on_cam,
+            DenmRx: self._on_denm,
             MonitorStatus: self._on_monitor,
             CityStop: self._on_stop,
             Contact: self._on_contact,
@@ -101,6 +103,7 @@ class AgentPart:
             Hears(Presence, {"role": self.role, "station": name}),
             Hears(SpatemRx, here),
             Hears(CamRx, here),
+            Hears(DenmRx, here),
             Hears(MonitorStatus),
             Hears(CityStop),
             Hears(Contact, own),
@@ -184,6 +187,12 @@ class AgentPart:
         message = item.message
         if isinstance(message, CamRx) and self._stay is not None and message.station != self.name:
             self._stay.cars.hear(message.body, item.t_ns)
+        return []
+
+    def _on_denm(self, item: Incoming) -> list[Outgoing]:
+        message = item.message
+        if isinstance(message, DenmRx) and self._stay is not None and message.station != self.name:
+            self._stay.trips.driver.crowd.hear_denm(message.body, item.t_ns)
         return []
 
     def _on_monitor(self, item: Incoming) -> list[Outgoing]:

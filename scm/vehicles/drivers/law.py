@@ -52,7 +52,8 @@ from scm.vehicles.drivers.stop_lines import (
     next_line,
     signal_says,
 )
-from scm.vehicles.drivers.streets import Ways
+from scm.vehicles.drivers.streets import LIMIT, Ways
+from scm.vehicles.drivers.warned import Warned, cautious
 from scm.vehicles.drivers.way import choose_again, locate, survey, turned
 from scm.vehicles.jit import array_kernel, law
 
@@ -77,13 +78,14 @@ def decide(
     stop: bool,
     seed: int,
     horizon: float,
+    warned: Warned,
 ) -> None:
     """Let the drivers of some cars, given by number, decide.
 
     `heard` must have its cells up to date. `poses` (capacity, 4) are x, y, yaw of the rear axle and
     the speed along the body; `commands` (2, capacity) takes throttle and steering, -1 to 1. `stop`
     brings all to rest in their lanes; `seed` decides which radio frames get lost. From `horizon`
-    before a line on [m] speed is chosen for its next green; 0: it is not.
+    before a line on [m] speed is chosen for its next green; 0: it is not. `warned` are dangers.
     """
     ids, begins = room.ids, room.begins
     for number in range(len(cars)):
@@ -102,6 +104,8 @@ def decide(
         wished, reason = wish(
             ways.segments, ids, begins, room.ahead, kind, floats, count, here, found, ends, stop
         )
+        limit = ways.segments[ids[here], LIMIT]
+        wished = min(wished, limit * cautious(warned, car, x, y, yaw, now_ns, seed))
         passed = 1e-9 * (now_ns - ints[LAST_NS]) if ints[LAST_NS] >= 0 else -1.0
         ints[LAST_NS] = now_ns
         commands[1, car] = steer(
