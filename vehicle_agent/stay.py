@@ -6,6 +6,7 @@ hear -> move the body up to now -> decide -> guard -> command the body -> report
 from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.v2x.cam_trigger import CamTrigger
+from scm.v2x.congestion import OwnControl
 from scm.v2x.etsi_convert import cam_of
 from scm.v2x.etsi_events import CarWarnings
 from scm.v2x.etsi_path import SlowNews
@@ -35,6 +36,7 @@ class Stay:
         guard: Between every commander and the body.
         trips: Where it is sent.
         switches: How its headlights and indicators are switched.
+        air: How busy it is, and how seldom the car may speak.
     """
 
     def __init__(
@@ -51,6 +53,8 @@ class Stay:
         self.guard = Guard(epoch)
         self.trips = Trips(vehicle, Roads(city_map), body.limits, body.motion().pose, now_ns)
         self.switches = OFF
+        radio = city_map.radio
+        self.air = OwnControl(radio.data_rate_mbps, is_on=radio.congestion_control)
         self._cam = CamTrigger()
         self._slow_news = SlowNews()
         self._warnings = CarWarnings(vehicle)
@@ -115,7 +119,8 @@ class Stay:
     ) -> list[Outgoing]:
         state = self._state(guarded, led_here, now_ns)
         outbox: list[Outgoing] = [state, *self._body.sensors(self._vehicle, now_ns)]
-        if self._cam.due(state, now_ns):
+        if self._cam.due(state, now_ns, self.air.gap_ns(now_ns)):
+            self.air.hear("cam", now_ns)
             limits = self._body.limits
             body = cam_of(
                 state,

@@ -23,7 +23,7 @@ from scm.vehicles.jit import array_kernel, law
 
 WORDS = 4294967296.0
 NEAREST_M = 0.01
-KEPT_WHEN_LOSSY, FASTEST_MS = 8, 100.0
+KEPT_WHEN_LOSSY, FASTEST_MS = 16, 100.0
 
 # Columns of the numbers; IDEAL is 1 where every frame reaches every driver at once.
 IDEAL, LOSS, RANGE, FADING, EXPONENT, WALL, DELAY_NS, JITTER_NS = range(8)
