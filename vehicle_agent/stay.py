@@ -19,6 +19,7 @@ from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.driver import RouteView
 from scm.vehicles.drivers.alone import OWN
+from scm.vehicles.drivers.channel import is_ideal
 from scm.vehicles.drivers.heard import HeardCars
 from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.guard import Guard, Guarded
@@ -55,6 +56,7 @@ class Stay:
         self.switches = OFF
         radio = city_map.radio
         self.air = OwnControl(radio.data_rate_mbps, is_on=radio.congestion_control)
+        self._loses_nothing = is_ideal(radio)
         self._cam = CamTrigger()
         self._slow_news = SlowNews()
         self._warnings = CarWarnings(vehicle)
@@ -102,6 +104,7 @@ class Stay:
             speed=motion.speed,
             signals=self.signals,
             others=self.cars.others(now_ns, motion.pose),
+            hears_well=self._loses_nothing or self.cars.hears_well(now_ns),
         )
         throttle, steering = self.trips.decide(view)
         self._turn = TURNS[int(self.trips.driver.crowd.turn[OWN])]

@@ -11,7 +11,7 @@ and stays. An ideal air loses nothing: there silence is absence.
 
 from scm.arrays import Floats
 from scm.clock import NS_PER_S
-from scm.vehicles.drivers.channel import IDEAL, has_arrived
+from scm.vehicles.drivers.channel import DEAF, IDEAL, has_arrived
 from scm.vehicles.drivers.stations import (
     CAM_X,
     CAM_Y,
@@ -53,7 +53,7 @@ def arrived_of(
 def hears_well(heard: Heard, window: Floats, car: int, now_ns: int, seed: int) -> bool:
     """Return whether a car may trust what it does not hear within a window over the floor."""
     if heard.channel.numbers[IDEAL] > 0.0:
-        return True
+        return bool(heard.channel.numbers[DEAF] == 0.0)
     floor, known, arrived = heard.floor, 0, 0
     across = int(floor[CELLS_X])
     left = cell_number(floor, window[LEFT], LOW_X, CELLS_X)
