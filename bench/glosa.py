@@ -1,6 +1,6 @@
 """Speed advice for green lights beside the same city without it: stops, time, energy, evenness.
 
-Run with `python -m bench.glosa [MAP ...] --seconds S`. Hosted cars circulate on a grid of lights in
+Run with `python -m bench glosa [MAP ...] --seconds S`. Hosted cars circulate on a grid of lights in
 lockstep, each city twice with the same seed: drivers that read SPATEM for speed, and drivers that
 do not. Ratios are with over without. A stop is a car that had driven and stands, whatever for;
 energy is what speeding up takes, a kilogram and metre; evenness is the variance of speed.
@@ -116,7 +116,7 @@ def compare(given: argparse.Namespace, name: str, loss: float) -> None:
 
 def main() -> None:
     """Print a table."""
-    parser = argparse.ArgumentParser(prog="python -m bench.glosa", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m bench glosa", description=__doc__)
     parser.add_argument("cities", nargs="*", default=list(MAPS), help="maps with lights")
     parser.add_argument("--seconds", type=float, default=120.0)
     parser.add_argument("--cars", type=int, default=40)
