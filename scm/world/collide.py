@@ -96,6 +96,6 @@ def _report(world: World, against: _Against, row: int, dv: Floats, t_ns: int) ->
     world.last_hit_ns[name] = t_ns
     touched = sorted(against.of(row))
     others = ", ".join(touched)
-    world.hits[name] = tuple(touched)
+    world.dangers.hits[name] = tuple(touched)
     text = f"{name} hit {others}: its speed changed by {float(np.hypot(dv[0], dv[1])):.2f} m/s"
     world.say("warning", "contact", text, t_ns, name)

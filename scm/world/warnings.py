@@ -28,7 +28,7 @@ _CALLED = {ACCIDENT: "an accident", STATIONARY_VEHICLE: "a vehicle that stands"}
 
 def call_denms(world: World, now_ns: int) -> list[DenmTx]:
     """Return the DENMs that hosted cars send now."""
-    slots, hosted, warners = world.slots, world.hosted, world.warners
+    slots, hosted, warners = world.slots, world.hosted, world.dangers.warners
     stranded = _stranded(world)
     braking = world.garage.signal("accel_x") <= -HARD_BRAKING_MPS2
     braking &= slots.hosted & (slots.mode == DRIVE)
@@ -36,24 +36,24 @@ def call_denms(world: World, now_ns: int) -> list[DenmTx]:
         del warners[gone]
     busy = {name for name, one in warners.items() if one.is_busy}
     struck = {slots.names[n] for n in np.flatnonzero(stranded | braking).tolist()}
-    names = sorted((busy | struck | set(world.hits)) & set(hosted))
+    names = sorted((busy | struck | set(world.dangers.hits)) & set(hosted))
     of = np.array([hosted[name].slot for name in names], np.int64)
     frames: list[DenmTx] = []
     for state in states_of(world, of, now_ns):
         name = state.vehicle
         bodies = warners.setdefault(name, CarWarnings(name)).step(
             state,
-            _contacts(name, world.hits.get(name), now_ns),
+            _contacts(name, world.dangers.hits.get(name), now_ns),
             is_stranded=bool(stranded[hosted[name].slot]),
         )
         frames += [DenmTx(station=name, t_ns=now_ns, body=body) for body in bodies]
-    world.hits.clear()
+    world.dangers.hits.clear()
     return frames
 
 
 def tell(world: World, frame: DenmTx, now_ns: int) -> None:
     """Put what is new on the air into the log of the city, whoever warns."""
-    found, situation = world.denms.hear(frame.body, now_ns), frame.body.situation_container
+    found, situation = world.dangers.told.hear(frame.body, now_ns), frame.body.situation_container
     if found == "new" and situation is not None:
         what = _CALLED.get(situation.event_type.cause, "a danger")
         text = f"{frame.station} warns of {what}"

@@ -18,7 +18,6 @@ from scm.maps.model import CityMap, Point
 from scm.maps.route import Roads
 from scm.maps.segments import wall_segments
 from scm.store.records import CarRecord, EpochRecord
-from scm.v2x.etsi_events import CarWarnings, DenmWatch
 from scm.v2x.exchange import Keep, Outgoing
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
@@ -38,6 +37,7 @@ from scm.world import lease as rules
 from scm.world.busy import Busy
 from scm.world.cams import CamTriggers
 from scm.world.contacts import Contacts
+from scm.world.dangers import Dangers
 from scm.world.garage import Garage
 from scm.world.hosted import HostedCar
 from scm.world.impacts import Impacts
@@ -90,8 +90,7 @@ class World:
         outbox: What the tick under way sends.
         ignored: Messages that fitted nothing: unknown cars, commands without the lease.
         last_hit_ns: When a car's contact was last told.
-        hits: What cars have hit since they last might warn of it, by name.
-        warners: What hosted cars warn of on the air, by name; `denms` what all stations do.
+        dangers: What is known of warnings on the air.
         highest_epoch: Of any car that left: a newcomer's is higher, whatever its name.
     """
 
@@ -148,12 +147,9 @@ class World:
         self.stop = CityStop(t_ns=0, engaged=False)
         self.outbox: list[Outgoing] = []
         self.tick = 0
-        self.ignored = 0
+        self.ignored = self.highest_epoch = 0
         self.last_hit_ns: dict[str, int] = {}
-        self.hits: dict[str, tuple[str, ...]] = {}
-        self.warners: dict[str, CarWarnings] = {}
-        self.denms = DenmWatch()
-        self.highest_epoch = 0
+        self.dangers = Dangers()
         self._tags = Numbers(city_map.first_vehicle_tag_id, never=city_map.tag.tag_id)
         self._unnamed = 0
         self._came = 0
