@@ -24,6 +24,7 @@ BENCHMARKS = (
 
 LONG = (
     "flow",
+    "glosa",
     "misbehaviour",
     "mismatch",
 )  # takes minutes: only where it is asked for, alone, with its own arguments

@@ -14,6 +14,7 @@ from scm.errors import RunError
 from scm.eye.station import eye_station
 from scm.live import stop_on_signal
 from scm.maps.load import load_map
+from scm.maps.radio import with_radio
 from scm.v2x.access import Guard, guard_of, is_loopback, own_stations
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
@@ -48,6 +49,7 @@ class Wanted:
         keys: Store of API keys; None: everybody on this machine.
         ros2: Whether ROS 2 nodes shall see the city.
         demand: Table of who wants to drive from where to where; None: nobody else comes.
+        radio: What the air does in the place of what the map says, `key=value` each.
     """
 
     map_name: str
@@ -64,6 +66,7 @@ class Wanted:
     keys: str | None = None
     ros2: bool = False
     demand: Path | None = None
+    radio: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +112,7 @@ def _settled(wanted: Wanted) -> _Plan:
         got = f"host: got {wanted.host!r} without API keys"
         msg = f"{got}, expected 127.0.0.1, or a store of `scm key add`"
         raise RunError(msg)
-    city_map = load_map(wanted.map_name)
+    city_map = with_radio(load_map(wanted.map_name), wanted.radio)
     port = _free_port(wanted.port)
     wanted.record_dir.mkdir(parents=True, exist_ok=True)
     recording = wanted.record_dir / f"{wanted.city}-{_stamp()}.mcap"
@@ -175,6 +178,8 @@ def _parts(plan: _Plan) -> list[Job]:
     keys = () if plan.wanted.keys is None else ("--keys", plan.wanted.keys)
     web = ("--host", plan.wanted.host, "--port", str(plan.port), *keys)
 
+    air = [word for setting in plan.wanted.radio for word in ("--radio", setting)]
+
     def demand(table: Path) -> Job:
         command = [*SCM, "demand", str(table), plan.wanted.map_name, *_at_bus(plan, "demand")]
         return Job("demand", "part", f"cars that come and go as in {table}", lambda: command)
@@ -189,7 +194,7 @@ def _parts(plan: _Plan) -> list[Job]:
         ),
         part("traffic", "signals: safe kernel, policies, plans", *kept),
         part("monitor", "second channel: doubts the signals, latches flash", *kept),
-        part("world", cars, "--hosted", str(plan.wanted.hosted), *kept),
+        part("world", cars, "--hosted", str(plan.wanted.hosted), *air, *kept),
         *(eye(station, camera) for station, camera in plan.eyes.items()),
         part("camera", "cars' own cameras, rendered while somebody looks"),
         part("observer", "counts, delays, and who breaks the rules"),

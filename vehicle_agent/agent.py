@@ -20,11 +20,13 @@ from scm.v2x.message import Message, Refused
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.denm_rx import DenmRx
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
+from scm.v2x.messages.radio_status import RadioStatus
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spatem_rx import SpatemRx
 from scm.v2x.messages.world_definition import WorldDefinition
@@ -89,7 +91,9 @@ class AgentPart:
             Presence: self._on_presence,
             SpatemRx: self._on_spatem,
             CamRx: self._on_cam,
+            DenmRx: self._on_denm,
             MonitorStatus: self._on_monitor,
+            RadioStatus: self._on_radio,
             CityStop: self._on_stop,
             Contact: self._on_contact,
             DriveCommand: self._on_command,
@@ -101,7 +105,9 @@ class AgentPart:
             Hears(Presence, {"role": self.role, "station": name}),
             Hears(SpatemRx, here),
             Hears(CamRx, here),
+            Hears(DenmRx, here),
             Hears(MonitorStatus),
+            Hears(RadioStatus),
             Hears(CityStop),
             Hears(Contact, own),
             Hears(DriveCommand, own),
@@ -178,12 +184,29 @@ class AgentPart:
     def _on_spatem(self, item: Incoming) -> list[Outgoing]:
         if isinstance(item.message, SpatemRx) and self._stay is not None:
             self._stay.signals.hear_spatem(item.message.body, item.t_ns)
+            self._stay.air.hear("spatem", item.t_ns)
         return []
 
     def _on_cam(self, item: Incoming) -> list[Outgoing]:
         message = item.message
         if isinstance(message, CamRx) and self._stay is not None and message.station != self.name:
             self._stay.cars.hear(message.body, item.t_ns)
+            self._stay.air.hear("cam", item.t_ns)
+        return []
+
+    def _on_denm(self, item: Incoming) -> list[Outgoing]:
+        message = item.message
+        if isinstance(message, DenmRx) and self._stay is not None and message.station != self.name:
+            self._stay.trips.driver.crowd.hear_denm(message.body, item.t_ns)
+            self._stay.air.hear("denm", item.t_ns)
+        return []
+
+    def _on_radio(self, item: Incoming) -> list[Outgoing]:
+        message = item.message
+        if isinstance(message, RadioStatus) and self._stay is not None:
+            told = dict(zip(message.stations, message.busy, strict=False))
+            if self.name in told:
+                self._stay.air.told(told[self.name], item.t_ns)
         return []
 
     def _on_monitor(self, item: Incoming) -> list[Outgoing]:

@@ -6,6 +6,7 @@ hear -> move the body up to now -> decide -> guard -> command the body -> report
 from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.v2x.cam_trigger import CamTrigger
+from scm.v2x.congestion import OwnControl
 from scm.v2x.etsi_convert import cam_of
 from scm.v2x.etsi_events import CarWarnings
 from scm.v2x.etsi_path import SlowNews
@@ -18,6 +19,7 @@ from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.driver import RouteView
 from scm.vehicles.drivers.alone import OWN
+from scm.vehicles.drivers.channel import is_ideal
 from scm.vehicles.drivers.heard import HeardCars
 from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.guard import Guard, Guarded
@@ -35,6 +37,7 @@ class Stay:
         guard: Between every commander and the body.
         trips: Where it is sent.
         switches: How its headlights and indicators are switched.
+        air: How busy it is, and how seldom the car may speak.
     """
 
     def __init__(
@@ -51,6 +54,9 @@ class Stay:
         self.guard = Guard(epoch)
         self.trips = Trips(vehicle, Roads(city_map), body.limits, body.motion().pose, now_ns)
         self.switches = OFF
+        radio = city_map.radio
+        self.air = OwnControl(radio.data_rate_mbps, is_on=radio.congestion_control)
+        self._loses_nothing = is_ideal(radio)
         self._cam = CamTrigger()
         self._slow_news = SlowNews()
         self._warnings = CarWarnings(vehicle)
@@ -98,6 +104,7 @@ class Stay:
             speed=motion.speed,
             signals=self.signals,
             others=self.cars.others(now_ns, motion.pose),
+            hears_well=self._loses_nothing or self.cars.hears_well(now_ns),
         )
         throttle, steering = self.trips.decide(view)
         self._turn = TURNS[int(self.trips.driver.crowd.turn[OWN])]
@@ -115,7 +122,8 @@ class Stay:
     ) -> list[Outgoing]:
         state = self._state(guarded, led_here, now_ns)
         outbox: list[Outgoing] = [state, *self._body.sensors(self._vehicle, now_ns)]
-        if self._cam.due(state, now_ns):
+        if self._cam.due(state, now_ns, self.air.gap_ns(now_ns)):
+            self.air.hear("cam", now_ns)
             limits = self._body.limits
             body = cam_of(
                 state,

@@ -45,13 +45,20 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--demand", type=Path, metavar="TABLE", help="who wants to drive from where to where"
     )
+    parser.add_argument(
+        "--radio",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="what the air does, instead of what the map says: loss=0.3; see docs/radio.md",
+    )
     parser.add_argument("--ros2", action="store_true", help="let ROS 2 nodes see the city")
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.up import Wanted, run_city
 
-    settings = {**vars(arguments), "map_name": arguments.map}
+    settings = {**vars(arguments), "map_name": arguments.map, "radio": tuple(arguments.radio)}
     return run_city(Wanted(**{field.name: settings[field.name] for field in fields(Wanted)}))
 
 

@@ -413,7 +413,12 @@ class RadioChannel(Record, kw_only=True, frozen=True):
 
 
 class CityMap(Record, kw_only=True, frozen=True):
-    """One city. `revision` counts changes of the lanes that cars must know of."""
+    """One city.
+
+    Attributes:
+        revision: Counts changes of the lanes that cars must know of.
+        speed_advice: Whether drivers come to red lights no sooner than SPATEM lets them pass.
+    """
 
     map: Literal[1]
     name: str
@@ -438,3 +443,4 @@ class CityMap(Record, kw_only=True, frozen=True):
     cameras: tuple[Camera, ...] = ()
     radio_range_m: float = 20.0
     radio: RadioChannel = RadioChannel()
+    speed_advice: bool = False

@@ -4,8 +4,8 @@
     or   if T >= T_gen                                        100 ms = T_min <= T_gen <= T_max = 1 s
 
 A send for motion sets T_gen to the interval it came after; three sends in a row without motion
-set it back to T_max. 4 m and 0.5 m/s are 0.286 m and 0.036 m/s on the table. No congestion control:
-T_GenCam_DCC is T_min.
+set it back to T_max. 4 m and 0.5 m/s are 0.286 m and 0.036 m/s on the table. Where a busy channel
+wants a longer gap between two frames, that gap (T_GenCam_DCC) stands in the place of T_min.
 Source: EN 302 637-2 v1.4.1, 6.1.3 (same rule in TS 103 900 v2.2.1, 6.1.3).
 """
 
@@ -33,12 +33,15 @@ class CamTrigger:
         self._interval_ns = T_MAX_NS
         self._quiet = 0
 
-    def due(self, state: VehicleState, now_ns: int) -> bool:
-        """Return whether a CAM must go now; if so, it counts as sent."""
+    def due(self, state: VehicleState, now_ns: int, gap_ns: int = 0) -> bool:
+        """Return whether a CAM must go now; if so, it counts as sent.
+
+        `gap_ns` is the least time between two that congestion control allows.
+        """
         if self._sent is None:
             return self._send(state, now_ns)
         elapsed_ns = now_ns - self._sent_ns
-        if elapsed_ns < T_MIN_NS:
+        if elapsed_ns < max(T_MIN_NS, gap_ns):
             return False
         if _moved(self._sent, state):
             self._interval_ns, self._quiet = min(elapsed_ns, T_MAX_NS), 0

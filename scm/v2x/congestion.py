@@ -22,6 +22,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 
 WINDOW_NS = 100 * NS_PER_MS
 DOWN_NS = 5 * NS_PER_S
+TOLD_FOR_NS = 2 * NS_PER_S
 TARGET = 0.65
 LIMITS: Floats = np.array([0.30, 0.40, 0.50, TARGET, np.inf])
 GAPS_NS: Ints = np.array([50, 100, 200, 250, 1000]) * NS_PER_MS
@@ -83,3 +84,51 @@ class ReactiveControl:
         self._above_ns[up | down] = now_ns
         self._state = state + up - down
         self.gap_ns = GAPS_NS[self._state]
+
+
+class OwnControl:
+    """The gap of one station on its own: by the busy ratio that it is told, else by what it hears.
+
+    What it hears is less than what is on the air: frames that got lost, and kinds that it does not
+    listen to, are not in it.
+
+    Args:
+        data_rate_mbps: Of the channel; 0: endless, it is never busy.
+        is_on: Whether it is to be obeyed; else the gap is 0.
+    """
+
+    def __init__(self, data_rate_mbps: float, *, is_on: bool) -> None:
+        self._rate_mbps = data_rate_mbps
+        self._control = ReactiveControl(1) if is_on else None
+        self._window_ns: int | None = None
+        self._air_s = self._heard = 0.0
+        self._told: tuple[float, int] | None = None
+
+    def told(self, ratio: float, now_ns: int) -> None:
+        """Take the busy ratio where the station is, as somebody measured it."""
+        self._told = ratio, now_ns
+
+    def hear(self, kind: str, now_ns: int) -> None:
+        """Take a frame of a kind that is on the air now, also one of its own."""
+        self._measure(now_ns)
+        self._air_s += air_time(kind, self._rate_mbps)
+
+    def gap_ns(self, now_ns: int) -> int:
+        """Return the least time between two frames [ns]."""
+        if self._control is None:
+            return 0
+        self._measure(now_ns)
+        return int(self._control.gap_ns[0])
+
+    def _measure(self, now_ns: int) -> None:
+        if self._window_ns is None:
+            self._window_ns = now_ns
+        span_ns = now_ns - self._window_ns
+        if self._control is None or span_ns < WINDOW_NS:
+            return
+        now = self._air_s * NS_PER_S / span_ns
+        ratio, self._heard = 0.5 * (self._heard + now), now
+        self._window_ns, self._air_s = now_ns, 0.0
+        if self._told is not None and now_ns - self._told[1] <= TOLD_FOR_NS:
+            ratio = self._told[0]
+        self._control.measure(np.array([ratio]), now_ns)

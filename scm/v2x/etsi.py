@@ -230,6 +230,13 @@ class MovementState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=Tru
         told = None if timing is None else timing.max_end_time
         return TIME_MARK_UNKNOWN if told is None else told
 
+    @property
+    def likely_time(self) -> int:
+        """0.1 s within the hour; 36001 is unknown."""
+        timing = self.state_time_speed[0].timing
+        told = None if timing is None else timing.likely_time
+        return TIME_MARK_UNKNOWN if told is None else told
+
 
 class IntersectionState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """One junction of a SPATEM.

@@ -116,6 +116,7 @@ class Told(NamedTuple):
     colour: Colour
     min_end_s: float | None
     max_end_s: float | None
+    likely_end_s: float | None = None
 
 
 def station_id(name: str) -> int:
@@ -324,6 +325,7 @@ def colours_of(body: SpatemBody) -> dict[int, Told]:
             _COLOUR_OF.get(state.event_state, "dark"),
             _until_s(state.min_end_time, body.intersections[0]),
             _until_s(state.max_end_time, body.intersections[0]),
+            _until_s(state.likely_time, body.intersections[0]),
         )
         for state in body.states
     }

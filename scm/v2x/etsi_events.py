@@ -38,7 +38,10 @@ from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.vehicle_state import VehicleState
 
 ACCIDENT, STATIONARY_VEHICLE, DANGEROUS_SITUATION = 2, 94, 99
-MULTI_VEHICLE_ACCIDENT = 1
+MULTI_VEHICLE_ACCIDENT, EMERGENCY_BRAKE = 1, 1
+HARD_BRAKING_MPS2 = 1.0  # twice what drivers find comfortable; 14 m/s2 on the air
+LEAST_BRAKING_MPS = 0.05
+BRAKES_NS = 5 * NS_PER_S
 COUNTS = 65_536
 MOST_KNOWN = 4096
 STANDSTILL_MPS = 0.02
@@ -125,6 +128,11 @@ class DenmSender:
         management = heard.management_container
         interval_ns = (management.transmission_interval or 1000) * NS_PER_MS
         self._end(heard, NEGATION, interval_ns, now_ns + _left_ns(heard, now_ns), now_ns)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether there is something to send now or later."""
+        return bool(self._told)
 
     def due(self, now_ns: int) -> list[DenmBody]:
         """Return what has to be sent now; it counts as sent."""
@@ -282,35 +290,83 @@ def stationary(state: VehicleState) -> Event:
     )
 
 
+def hard_braking(state: VehicleState) -> Event:
+    """Return what a car warns of that brakes as hard as nobody does without need."""
+    return Event(
+        cause=DANGEROUS_SITUATION,
+        subcause=EMERGENCY_BRAKE,
+        x_m=state.x_m,
+        y_m=state.y_m,
+        yaw_rad=state.yaw_rad,
+        speed_mps=state.speed_mps,
+        valid_s=2,
+        interval_ms=100,
+        awareness=1,
+    )
+
+
 def city_stop(x_m: float, y_m: float) -> Event:
     """Return what a roadside station at a place warns of while the whole city is stopped."""
     return Event(cause=DANGEROUS_SITUATION, x_m=x_m, y_m=y_m, awareness=4, quality=7)
 
 
 class CarWarnings:
-    """When a car warns: of a hit at once, and of itself while it stands without wanting to.
+    """When a car warns: of a hit or of hard braking at once, and while it stands and should not.
 
-    Standing is meant when its guard holds or stops it (`mode`), not when it waits at a red light.
+    It should not stand when its guard holds or stops it (`mode`), unless whoever asks knows better;
+    waiting at a red light is no event.
     """
 
     def __init__(self, vehicle: str) -> None:
         self._sender = DenmSender(vehicle)
         self._hit_ns: int | None = None
+        self._braked_ns: int | None = None
         self._since_ns: int | None = None
         self._stands: tuple[ActionId, int] | None = None
 
-    def step(self, state: VehicleState, contacts: tuple[Contact, ...] = ()) -> list[DenmBody]:
-        """Return the DENMs that go out now; ask at every report of the car."""
+    @property
+    def is_busy(self) -> bool:
+        """Whether it warns of something, or is about to: it must be asked again."""
+        return self._sender.is_busy or self._since_ns is not None
+
+    def step(
+        self,
+        state: VehicleState,
+        contacts: tuple[Contact, ...] = (),
+        *,
+        is_stranded: bool | None = None,
+    ) -> list[DenmBody]:
+        """Return the DENMs that go out now; ask at every report of the car.
+
+        Args:
+            state: Of the car now.
+            contacts: What hit it since the last time.
+            is_stranded: Whether it stands where it should not; None: as its guard's mode says.
+        """
         now_ns = state.t_ns
         for contact in contacts:
             if contact.against and (self._hit_ns is None or now_ns - self._hit_ns >= HITS_NS):
                 self._sender.trigger(accident(contact, state), now_ns)
                 self._hit_ns = now_ns
-        self._stand(state, now_ns)
+        if not contacts:
+            self._brake(state)
+        if is_stranded is None:
+            is_stranded = state.mode in ("hold", "stop") and abs(state.speed_mps) < STANDSTILL_MPS
+        self._stand(state, is_stranded=is_stranded)
         return self._sender.due(now_ns)
 
-    def _stand(self, state: VehicleState, now_ns: int) -> None:
-        if state.mode not in ("hold", "stop") or abs(state.speed_mps) >= STANDSTILL_MPS:
+    def _brake(self, state: VehicleState) -> None:
+        is_hard = state.accel_mps2 <= -HARD_BRAKING_MPS2 and state.speed_mps > LEAST_BRAKING_MPS
+        hit_ns, braked_ns = self._hit_ns, self._braked_ns
+        was_hit = hit_ns is not None and state.t_ns - hit_ns < BRAKES_NS
+        has_told = braked_ns is not None and state.t_ns - braked_ns < BRAKES_NS
+        if is_hard and not was_hit and not has_told:
+            self._sender.trigger(hard_braking(state), state.t_ns)
+            self._braked_ns = state.t_ns
+
+    def _stand(self, state: VehicleState, *, is_stranded: bool) -> None:
+        now_ns = state.t_ns
+        if not is_stranded:
             self._since_ns = None
             if self._stands is not None:
                 self._sender.cancel(self._stands[0], now_ns)

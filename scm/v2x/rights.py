@@ -83,6 +83,7 @@ _OF_ROLE: dict[str, Rights] = {
         hears=(
             "world/def",
             "world/stop",
+            "world/radio",
             "tl/*/mon",
             "tl/*/spat",
             "v/{me}/alive/*",

@@ -39,6 +39,7 @@ class RouteView:
         speed: Its own, along the body's x [m/s].
         others: Every other car it knows of, itself left out.
         stop: Whether it must come to rest in its lane, wherever it is.
+        hears_well: Whether it may take silence for absence where there are no lights.
     """
 
     now_ns: int
@@ -47,6 +48,7 @@ class RouteView:
     signals: "SignalView"
     others: tuple[Other, ...] = ()
     stop: bool = False
+    hears_well: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """What is sent over the radio comes out where it is heard.
 
 With the drivers of hosted cars, who keep it themselves; on the bus for everybody else who listens.
-A body is a sealed letter here, but for the CAMs and SPATEMs that drivers read.
+A body is a sealed letter here, but for the CAMs, SPATEMs and DENMs that drivers read.
 """
 
 from collections.abc import Sequence
@@ -31,6 +31,7 @@ from scm.v2x.messages.ssem_tx import SsemTx
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.publish import states_of
 from scm.world.radio import Receivers
+from scm.world.warnings import call_denms, tell
 from scm.world.world import World
 
 Frame = CamTx | CpmTx | DenmTx | MapemTx | SpatemTx | SremTx | SsemTx
@@ -60,6 +61,9 @@ def call_out(world: World, now_ns: int) -> None:
     due = world.cams.due(world.slots, now_ns, world.busy.control)
     if len(due):
         _call_cams(world, due, now_ns)
+    if world.every["denm"].is_due(now_ns):
+        for frame in call_denms(world, now_ns):
+            _call_denm(world, frame, now_ns)
 
 
 def transmit(world: World, frame: Frame, now_ns: int) -> None:
@@ -128,10 +132,25 @@ def _call_cams(world: World, due: Ints, now_ns: int) -> None:
     _tell_others(world, due, x, y, now_ns)
 
 
+def _call_denm(world: World, frame: DenmTx, now_ns: int) -> None:
+    """Send a hosted car's warning."""
+    slot = world.hosted[frame.station].slot
+    x, y = world.slots.x[slot : slot + 1].copy(), world.slots.y[slot : slot + 1].copy()
+    world.busy.note("denm", x, y)
+    _tell_drivers(world, frame, now_ns)
+    receivers = world.receivers()
+    reached = world.radio.reach([frame.station], x, y, receivers, _load(world, receivers))
+    listen = np.array(world.wishes.of(DenmRx, "receiver", receivers.names), np.bool_)
+    _deliver(world, [frame], reached & listen, receivers, now_ns, also_sent=True)
+
+
 def _tell_drivers(world: World, frame: Frame, now_ns: int) -> None:
     """Let the drivers of hosted cars keep what they read."""
     if isinstance(frame, SpatemTx):
         world.crowd.hear_spatem(frame.body, now_ns)
+    elif isinstance(frame, DenmTx):
+        world.crowd.hear_denm(frame.body, now_ns)
+        tell(world, frame, now_ns)
     elif isinstance(frame, CamTx) and (car := world.remote.get(frame.station)) is not None:
         _tell_of_car(world, car.slot, frame.body, now_ns)
 

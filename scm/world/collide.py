@@ -94,6 +94,8 @@ def _report(world: World, against: _Against, row: int, dv: Floats, t_ns: int) ->
     if t_ns - world.last_hit_ns.get(name, -QUIET_NS) < QUIET_NS:
         return
     world.last_hit_ns[name] = t_ns
-    others = ", ".join(sorted(against.of(row)))
+    touched = sorted(against.of(row))
+    others = ", ".join(touched)
+    world.dangers.hits[name] = tuple(touched)
     text = f"{name} hit {others}: its speed changed by {float(np.hypot(dv[0], dv[1])):.2f} m/s"
     world.say("warning", "contact", text, t_ns, name)

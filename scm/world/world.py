@@ -37,6 +37,7 @@ from scm.world import lease as rules
 from scm.world.busy import Busy
 from scm.world.cams import CamTriggers
 from scm.world.contacts import Contacts
+from scm.world.dangers import Dangers
 from scm.world.garage import Garage
 from scm.world.hosted import HostedCar
 from scm.world.impacts import Impacts
@@ -89,6 +90,7 @@ class World:
         outbox: What the tick under way sends.
         ignored: Messages that fitted nothing: unknown cars, commands without the lease.
         last_hit_ns: When a car's contact was last told.
+        dangers: What is known of warnings on the air.
         highest_epoch: Of any car that left: a newcomer's is higher, whatever its name.
     """
 
@@ -136,13 +138,18 @@ class World:
         self.remote: dict[str, RemoteCar] = {}
         self.leased: dict[str, HostedCar] = {}
         self.pace = Pace(PERIOD_NS)
-        self.every = {"snapshot": Every(20.0), "second": Every(1.0), "radio": Every(1.0)}
+        self.every = {
+            "snapshot": Every(20.0),
+            "second": Every(1.0),
+            "radio": Every(1.0),
+            "denm": Every(10.0),
+        }
         self.stop = CityStop(t_ns=0, engaged=False)
         self.outbox: list[Outgoing] = []
         self.tick = 0
-        self.ignored = 0
+        self.ignored = self.highest_epoch = 0
         self.last_hit_ns: dict[str, int] = {}
-        self.highest_epoch = 0
+        self.dangers = Dangers()
         self._tags = Numbers(city_map.first_vehicle_tag_id, never=city_map.tag.tag_id)
         self._unnamed = 0
         self._came = 0

@@ -5,7 +5,7 @@ import socket
 import pytest
 
 from scm.errors import MapError, RunError
-from scm.up import Wanted, run_city
+from scm.up import Wanted, _parts, _settled, run_city
 from scm.v2x.router import Router, free_endpoint
 
 
@@ -44,3 +44,18 @@ def test_a_taken_endpoint_is_refused(start):
 def test_a_dashboard_for_others_needs_keys(start):
     with pytest.raises(RunError, match="without API keys"):
         start(host="0.0.0.0")
+
+
+def test_a_wrong_radio_is_refused_by_its_key(start):
+    with pytest.raises(MapError, match=r"lost.*loss"):
+        start(radio=("lost=0.3",))
+
+
+def test_the_radio_goes_to_the_world_and_to_no_other_part(tmp_path):
+    wanted = Wanted(
+        map_name="driving_school", port=0, listen="tcp/127.0.0.1:0", record_dir=tmp_path,
+        radio=("loss=0.3", "delay_ms=50"),
+    )  # fmt: skip
+    told = {job.name: job.command() for job in _parts(_settled(wanted))}
+    assert told["world"][-6:-2] == ["--radio", "loss=0.3", "--radio", "delay_ms=50"]
+    assert [name for name, command in told.items() if "--radio" in command] == ["world"]

@@ -9,6 +9,7 @@ import numpy as np
 
 from scm.maps.route import Roads
 from scm.vehicles.driver import CarLimits, Other, RouteView
+from scm.vehicles.drivers.channel import DEAF
 from scm.vehicles.drivers.crowd import Crowd
 from scm.vehicles.drivers.memory import WAITING_FOR
 from scm.vehicles.drivers.streets import streets_of
@@ -52,6 +53,7 @@ class Alone:
     def decide(self, view: RouteView) -> tuple[float, float]:
         """Return (throttle, steering), both -1 to 1: + forward, + left."""
         self._show(_nearest(view), view.now_ns)
+        self.crowd.channel.numbers[DEAF] = 0.0 if view.hears_well else 1.0
         pose = (*view.pose, view.speed)
         return self.crowd.decide_alone(OWN, view.now_ns, pose, view.signals.table, stop=view.stop)
 

@@ -23,17 +23,18 @@ from scm.vehicles.jit import array_kernel, law
 
 WORDS = 4294967296.0
 NEAREST_M = 0.01
-KEPT_WHEN_LOSSY, FASTEST_MS = 8, 100.0
+KEPT_WHEN_LOSSY, FASTEST_MS = 16, 100.0
 
-# Columns of the numbers; IDEAL is 1 where every frame reaches every driver at once.
-IDEAL, LOSS, RANGE, FADING, EXPONENT, WALL, DELAY_NS, JITTER_NS = range(8)
+# Columns of the numbers; IDEAL is 1 where every frame reaches every driver at once, DEAF where the
+# only driver has found that it hears too little.
+IDEAL, LOSS, RANGE, FADING, EXPONENT, WALL, DELAY_NS, JITTER_NS, DEAF = range(9)
 
 
 class Channel(NamedTuple):
     """What the air is like.
 
     Attributes:
-        numbers: (8,) see the columns above.
+        numbers: (9,) see the columns above.
         walls: (w, 4) both ends of each [m]; none when they shadow nothing.
         poses: (capacity, 4) of each receiver, x and y first [m].
         load: (capacity,) what share of frames each receiver loses because the channel is full.
@@ -56,6 +57,7 @@ def channel_of(
     numbers = [
         float(is_ideal(given)), given.loss, range_m, given.fading_db, given.path_loss_exponent,
         given.wall_db, 1e6 * given.delay_ms, 1e6 * given.jitter_ms,
+        0.0,
     ]  # fmt: skip
     return Channel(np.array(numbers), segments, np.zeros((capacity, 4)), np.zeros(capacity))
 

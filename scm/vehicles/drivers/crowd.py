@@ -14,16 +14,19 @@ from scm.errors import MapError
 from scm.maps.model import RadioChannel
 from scm.maps.segments import wall_segments
 from scm.v2x.etsi import SpatemBody
+from scm.v2x.etsi_denm import DenmBody
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers import memory as m
 from scm.vehicles.drivers.ahead import Scratch, scratch
 from scm.vehicles.drivers.channel import channel_of, frames_kept
+from scm.vehicles.drivers.green_light import HORIZON
 from scm.vehicles.drivers.law import decide
 from scm.vehicles.drivers.order import note_standing
 from scm.vehicles.drivers.signal_table import SignalTable
 from scm.vehicles.drivers.stations import find_cells, hear_cams, nobody
 from scm.vehicles.drivers.streets import Streets
+from scm.vehicles.drivers.warned import Warnings
 from scm.vehicles.drivers.way import look_from
 
 PACKED_FROM = 4096
@@ -44,6 +47,7 @@ class Crowd:
         channel: What the air does to frames on their way to the drivers.
         signals: What is told of the signals.
         threads: How many work on large crowds; what is decided does not depend on it.
+        horizon: From how far before a line speed is chosen for its next green [m]; 0: never.
     """
 
     def __init__(
@@ -61,7 +65,9 @@ class Crowd:
         kept = frames_kept(radio)
         self._heard = nobody(city_map, capacity, kept, self.channel)
         self.signals = SignalTable(city_map, kept, self.channel)
+        self._warnings = Warnings(self.channel)
         self.threads = 1
+        self.horizon = HORIZON if city_map.speed_advice else 0.0
         self._rooms = [scratch()]
         self._pool: ThreadPoolExecutor | None = None
         self._poses = self.channel.poses
@@ -236,6 +242,16 @@ class Crowd:
         """Return the lanes of a car's way from the one it is on, as far as it has decided."""
         return tuple(self.streets.names[n] for n in self._memory.sight[slot, m.HERE :] if n >= 0)
 
+    def is_in_junction(self, slots: Ints) -> Bools:
+        """Return which of some cars (k,) have their middle where nobody may stop."""
+        s, lanes = self.s[slots], self.lane[slots]
+        kinds = self._memory.kinds[self._memory.ints[slots, m.KIND]]
+        middle = s + 0.5 * (kinds[:, m.FRONT] - kinds[:, m.REAR])
+        within = self.streets.forbidden[lanes]
+        at = middle[:, None]
+        inside: Bools = ((within[:, :, 0] <= at) & (at <= within[:, :, 1])).any(axis=1)
+        return inside & (lanes >= 0)
+
     def hear(
         self,
         slots: Ints,
@@ -255,6 +271,10 @@ class Crowd:
     def hear_spatem(self, body: SpatemBody, now_ns: int) -> None:
         """Take a SPATEM that is on the air now."""
         self.signals.hear_spatem(body, now_ns)
+
+    def hear_denm(self, body: DenmBody, now_ns: int) -> None:
+        """Take a warning that is on the air now."""
+        self._warnings.hear(body, now_ns)
 
     def hear_monitor(self, status: MonitorStatus) -> None:
         """Take the monitor's verdict on a junction."""
@@ -325,6 +345,8 @@ class Crowd:
                 now_ns,
                 bool(stop),
                 self._seed,
+                self.horizon,
+                self._warnings.warned,
             )
 
         if self.threads == 1 or len(cars) < WORTH_THREADS:

@@ -42,6 +42,7 @@ from scm.vehicles.drivers.memory import (
 from scm.vehicles.drivers.order import STANDS, has_turn, is_earlier, since_told
 from scm.vehicles.drivers.pace import STANDSTILL, braking, stopping_speed
 from scm.vehicles.drivers.rules import STOP_SIGN, Rules
+from scm.vehicles.drivers.silence import hears_well
 from scm.vehicles.drivers.stations import (
     CELLS_X,
     CELLS_Y,
@@ -122,8 +123,21 @@ def gives_way(
     )  # fmt: skip
     must_rest = all_stop or rules.kind[line] == STOP_SIGN
     held = waits(ints, rules.order[line], around, is_turn, all_stop, must_rest, now_ns)
+    if not held and gives_way_to_any(rules, way, all_stop):
+        held = not hears_well(heard, rules.window[line], car, now_ns, seed)
     ints[WAS_FREE] = 0 if held else 1
     return SIGN if held else VEHICLE
+
+
+@law
+def gives_way_to_any(rules: Rules, way: int, all_stop: bool) -> bool:
+    """Return whether there is anybody to whom a car on a way could have to give way."""
+    if all_stop:
+        return True
+    for pair in range(rules.pair_first[way], rules.pair_first[way + 1] if way >= 0 else 0):
+        if rules.pair_yields[pair]:
+            return True
+    return False
 
 
 @law

@@ -1,6 +1,7 @@
 """The cars around, as their CAMs tell: remembered for a while and moved on at their last speed."""
 
 import math
+from collections import deque
 
 from scm.clock import NS_PER_S, seconds
 from scm.geometry import Pose2
@@ -8,8 +9,11 @@ from scm.v2x.etsi import CamBody
 from scm.v2x.etsi_convert import CamView, read_cam
 from scm.vehicles.driver import Other
 from scm.vehicles.drivers.ahead import REACH
+from scm.vehicles.drivers.silence import ENOUGH, FRESH_NS
 
 REMEMBER_NS = 3 * NS_PER_S
+COUNTED = 16
+COUNTED_NS = COUNTED * NS_PER_S
 LONGEST_GUESS_S = 1.0
 AROUND_M = 2.0
 
@@ -19,10 +23,27 @@ class HeardCars:
 
     def __init__(self) -> None:
         self._heard: dict[int, tuple[CamView, int]] = {}
+        self._arrivals: dict[int, deque[int]] = {}
 
     def hear(self, body: CamBody, arrived_ns: int) -> None:
         """Take a CAM that arrived at `arrived_ns`, on the receiver's own clock."""
         self._heard[body.station_id] = (read_cam(body), arrived_ns)
+        arrivals = self._arrivals.setdefault(body.station_id, deque(maxlen=COUNTED))
+        arrivals.append(arrived_ns)
+
+    def hears_well(self, now_ns: int) -> bool:
+        """Return whether a car on an air that loses frames may take silence for absence.
+
+        It has heard of somebody in the last 16 s, of each lately, and of all often enough; see
+        `silence.py`. Who has left counts as silent for so long.
+        """
+        kept = (
+            (s, [t for t in row if now_ns - t <= COUNTED_NS]) for s, row in self._arrivals.items()
+        )
+        self._arrivals = {s: deque(row, COUNTED) for s, row in kept if row}
+        rows = self._arrivals.values()
+        are_fresh = all(now_ns - row[-1] <= FRESH_NS for row in rows)
+        return bool(rows) and are_fresh and sum(map(len, rows)) >= ENOUGH * len(rows)
 
     def others(self, now_ns: int, near: Pose2 | None = None) -> tuple[Other, ...]:
         """Return where the others are believed to be now, in the order of their station ids.

@@ -1,7 +1,8 @@
 """The driver's law, compiled, for any number of cars: where it is, what is ahead, how fast to go.
 
 Of all that limits the speed, the slowest wins: the lane and its curves, the end of the route, the
-next stop line, the car ahead (time gap in flow, a fixed gap at rest), the order to stop.
+next stop line, the car ahead (time gap in flow, a fixed gap at rest), the order to stop; and where
+the map asks for it, the speed that comes to a red line when it turns green.
 """
 
 from scm.arrays import Floats, Ints
@@ -15,6 +16,7 @@ from scm.vehicles.drivers.ahead import (
 )
 from scm.vehicles.drivers.exits import has_room
 from scm.vehicles.drivers.giving_way import gives_way
+from scm.vehicles.drivers.green_light import advice
 from scm.vehicles.drivers.memory import (
     ARRIVED,
     DECEL,
@@ -50,7 +52,8 @@ from scm.vehicles.drivers.stop_lines import (
     next_line,
     signal_says,
 )
-from scm.vehicles.drivers.streets import Ways
+from scm.vehicles.drivers.streets import LIMIT, Ways
+from scm.vehicles.drivers.warned import Warned, cautious
 from scm.vehicles.drivers.way import choose_again, locate, survey, turned
 from scm.vehicles.jit import array_kernel, law
 
@@ -74,12 +77,15 @@ def decide(
     now_ns: int,
     stop: bool,
     seed: int,
+    horizon: float,
+    warned: Warned,
 ) -> None:
     """Let the drivers of some cars, given by number, decide.
 
     `heard` must have its cells up to date. `poses` (capacity, 4) are x, y, yaw of the rear axle and
     the speed along the body; `commands` (2, capacity) takes throttle and steering, -1 to 1. `stop`
-    brings all to rest in their lanes; `seed` decides which radio frames get lost.
+    brings all to rest in their lanes; `seed` decides which radio frames get lost. From `horizon`
+    before a line on [m] speed is chosen for its next green; 0: it is not. `warned` are dangers.
     """
     ids, begins = room.ids, room.begins
     for number in range(len(cars)):
@@ -98,6 +104,8 @@ def decide(
         wished, reason = wish(
             ways.segments, ids, begins, room.ahead, kind, floats, count, here, found, ends, stop
         )
+        limit = ways.segments[ids[here], LIMIT]
+        wished = min(wished, limit * cautious(warned, car, x, y, yaw, now_ns, seed))
         passed = 1e-9 * (now_ns - ints[LAST_NS]) if ints[LAST_NS] >= 0 else -1.0
         ints[LAST_NS] = now_ns
         commands[1, car] = steer(
@@ -105,22 +113,58 @@ def decide(
         )
         beyond = turned(ways.segments, ids, begins, count, here, front + INDICATE_AHEAD)
         ints[TURN] = 0 if abs(beyond) < INDICATE_FROM else (1 if beyond > 0.0 else -1)
-        far = LOOK_AHEAD + 2.0 * braking(rolling, kind[DECEL], REACTION)
-        line, at, distance = next_line(
-            ways.length, ways.line_first, ways.line_at, sight, floats[S], front, front + far
-        )
-        if distance >= 0.0:
-            held = hold(
-                ways, memory, heard, told, room, kind, car, found, line, at, distance, speed,
-                passed, now_ns, seed,
-            )  # fmt: skip
-            before_line = stopping_speed(distance - SHORT_OF_LINE - front, kind[DECEL])
-            if held != FREE and before_line < wished:
-                wished, reason = before_line, held
+        wished, reason = until_line(
+            ways, memory, heard, told, room, kind, car, found, speed, wished, reason, passed,
+            horizon, now_ns, seed,
+        )  # fmt: skip
         commands[0, car] = throttle(kind, floats, wished, speed, passed)
         standing = speed < STANDSTILL and commands[0, car] == 0.0
         ints[WAITING] = reason if standing else FREE
         ints[ARRIVED] = has_arrived(ways.length, ints, sight, floats[S])
+
+
+@law
+def until_line(
+    ways: Ways,
+    memory: Memory,
+    heard: Heard,
+    told: Told,
+    room: Scratch,
+    kind: Floats,
+    car: int,
+    found: int,
+    speed: float,
+    wished: float,
+    reason: int,
+    passed: float,
+    horizon: float,
+    now_ns: int,
+    seed: int,
+) -> tuple[float, int]:
+    """Return what the next line leaves of a wished speed [m/s], and what would hold the car."""
+    floats, sight, front = memory.floats[car], memory.sight[car], kind[FRONT]
+    near = front + LOOK_AHEAD + 2.0 * braking(max(0.0, speed), kind[DECEL], REACTION)
+    line, at, distance = next_line(
+        ways.length, ways.line_first, ways.line_at, sight, floats[S], front,
+        max(near, front + horizon),
+    )  # fmt: skip
+    if distance < 0.0:
+        return wished, reason
+    if horizon > 0.0 and ways.rules.kind[line] == LIT:
+        wished = advice(
+            ways, told, kind, floats, sight, room.ahead, found, car, line, at, distance, wished,
+            passed, now_ns, seed,
+        )  # fmt: skip
+    if distance > near:
+        return wished, reason
+    held = hold(
+        ways, memory, heard, told, room, kind, car, found, line, at, distance, speed, passed,
+        now_ns, seed,
+    )  # fmt: skip
+    before_line = stopping_speed(distance - SHORT_OF_LINE - front, kind[DECEL])
+    if held != FREE and before_line < wished:
+        return before_line, held
+    return wished, reason
 
 
 @law

@@ -23,7 +23,7 @@ FRESH_NS = NS_PER_S
 RESOLUTION_S = 0.1
 
 COLOURS: tuple[Colour | None, ...] = (None, "green", "yellow", "red", "flashing_red", "dark")
-UNKNOWN, GREEN, YELLOW, _RED, FLASHING, _DARK = range(6)
+UNKNOWN, GREEN, YELLOW, RED, FLASHING, _DARK = range(6)
 _CODES = {colour: code for code, colour in enumerate(COLOURS)}
 _SALT = 77
 

@@ -1,7 +1,8 @@
 """The cars around, as their CAMs told: the last ones of every station, and cells to find them by.
 
-A car is moved on from its CAM at its last speed and turn, for a second at most; a silent one is
-forgotten after three.
+A car is moved on from its CAM at its last speed and turn, for a second at most; one that fell
+silent is forgotten after three. Where frames get lost a driver believes the last one that it got
+for longer: there silence is not absence.
 """
 
 import math
@@ -16,6 +17,7 @@ from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived
 from scm.vehicles.jit import array_kernel, law
 
 REMEMBER_NS = 3 * NS_PER_S
+BELIEVE_NS = 16 * NS_PER_S
 LONGEST_GUESS_S = 1.0
 CELL_M = 1.0
 MARGIN_M = 1.0
@@ -147,7 +149,7 @@ def known_to(
         place = (heard.newest[station] - older) % kept
         number = heard.number[place, station]
         age_ns = now_ns - heard.t_ns[place, station]
-        if number < 0 or age_ns > REMEMBER_NS:
+        if number < 0 or age_ns > BELIEVE_NS:
             break
         cam = heard.cams[place, station]
         x, y = cam[CAM_X], cam[CAM_Y]

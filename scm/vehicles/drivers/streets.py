@@ -59,6 +59,7 @@ class Streets:
         roads: Where they come from.
         names: Of the lanes, by number; `numbers` the other way round.
         goes_round: Of each lane, whether a car can drive on from it for ever.
+        forbidden: (lanes, k, 2) from and to of where nobody may stop on each lane [m], NaN: none.
         ways: The arrays; of the lanes that follow one, those without end if there are any.
     """
 
@@ -77,6 +78,10 @@ class Streets:
         following = [[n for n in row if self.goes_round[n]] or row for row in following]
         lines = lines_of(roads)
         stretches = [roads.movements_on(name) for name in self.names]
+        self.forbidden = np.full((len(stretches), max(map(len, stretches), default=0), 2), np.nan)
+        for number, row in enumerate(stretches):
+            for at, (_, move) in enumerate(row):
+                self.forbidden[number, at] = move.from_m, move.to_m
         self.ways = Ways(
             length=np.array([sum(row[LENGTH] for row in rows) for rows in segments], np.float64),
             segment_first=segment_first,

@@ -9,6 +9,7 @@ from scm.v2x.congestion import (
     BYTES,
     TARGET,
     WINDOW_NS,
+    OwnControl,
     ReactiveControl,
     air_time,
     load_loss,
@@ -73,3 +74,29 @@ def test_control_keeps_two_hundred_cars_in_range_under_the_target():
     ratios = closed_loop(200, 300, controlled=True)
     assert ratios.mean() < TARGET
     assert np.mean(ratios > TARGET) < 0.05
+
+
+def alone(frames_a_window, *, is_on=True, told=None, seconds=3.0, told_until_s=np.inf):
+    """Return the gap [ms] of a station that hears so many CAMs in 100 ms, told every second."""
+    control = OwnControl(6.0, is_on=is_on)
+    for step in range(round(seconds * 100)):
+        now_ns = step * 10 * NS_PER_MS
+        for _ in range(frames_a_window // 10):
+            control.hear("cam", now_ns)
+        if told is not None and step % 100 == 0 and step < 100 * told_until_s:
+            control.told(told, now_ns)
+        gap = control.gap_ns(now_ns) / NS_PER_MS
+    return gap
+
+
+def test_a_station_alone_speaks_less_by_what_it_hears():
+    assert alone(0) == 50
+    assert alone(100) == 100, "100 CAMs of 0.35 ms in 100 ms are 0.35"
+    assert alone(130) == 200
+    assert alone(130, is_on=False) == 0
+
+
+def test_what_it_is_told_goes_before_what_it_hears_while_it_is_fresh():
+    assert alone(0, told=0.45) == 200
+    assert alone(130, told=0.1) == 50
+    assert alone(130, told=0.1, seconds=6.0, told_until_s=2.0) == 200

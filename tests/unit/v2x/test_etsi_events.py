@@ -10,6 +10,7 @@ from scm.v2x.etsi_convert import place_of
 from scm.v2x.etsi_denm import CANCELLATION, NEGATION
 from scm.v2x.etsi_events import (
     ACCIDENT,
+    DANGEROUS_SITUATION,
     STATIONARY_VEHICLE,
     CarWarnings,
     DenmSender,
@@ -23,10 +24,11 @@ NOW = 1_800_000_000 * NS_PER_S
 EVENT = Event(cause=ACCIDENT, x_m=1.0, y_m=0.5, valid_s=10, interval_ms=500)
 
 
-def state(t_ns, mode="drive", speed_mps=0.0):
+def state(t_ns, mode="drive", speed_mps=0.0, accel_mps2=0.0):
     return VehicleState(
         vehicle="n1", t_ns=t_ns, seq=0, x_m=1.0, y_m=0.5, yaw_rad=0.0, speed_mps=speed_mps,
         yaw_rate_radps=0.0, steering_rad=0.0, throttle=0.0, source="simulated", mode=mode,
+        accel_mps2=accel_mps2,
     )  # fmt: skip
 
 
@@ -164,3 +166,38 @@ def test_a_car_warns_of_itself_while_its_guard_keeps_it_standing(mode, warns):
     assert causes == ([STATIONARY_VEHICLE] if warns else [])
     (*ended,) = car.step(state(now + NS_PER_S, "drive", 0.2))
     assert [watch.hear(body, now + NS_PER_S) for body in ended] == (["ended"] if warns else [])
+
+
+def braking(accels, speed_mps=0.2, contacts=()):
+    warnings, sent = CarWarnings("n1"), []
+    for step, accel in enumerate(accels):
+        t_ns = NOW + step * 100 * NS_PER_MS
+        sent += warnings.step(state(t_ns, "drive", speed_mps, accel), contacts)
+        contacts = ()
+    return sent
+
+
+def test_hard_braking_is_one_event_and_comfortable_braking_none():
+    assert braking([-0.5] * 20) == []
+    assert braking([-1.5] * 20, speed_mps=0.01) == []
+    sent = braking([-1.5] * 30)
+    causes = {(e.cause, e.subcause) for e in (b.situation_container.event_type for b in sent)}
+    assert causes == {(DANGEROUS_SITUATION, 1)}
+    assert len({b.management_container.action_id for b in sent}) == 1
+    assert len(sent) == 20, "ten times a second while it is valid"
+
+
+def test_who_was_hit_does_not_also_say_that_it_brakes():
+    sent = braking([-9.0] * 20, contacts=(hit(NOW, "n2"),))
+    assert {b.situation_container.event_type.cause for b in sent} == {ACCIDENT}
+
+
+def test_whoever_asks_may_know_better_whether_a_car_should_not_stand():
+    for is_stranded, mode in ((True, "drive"), (False, "stop")):
+        car = CarWarnings("n1")
+        sent = [
+            body
+            for ms in range(0, 4000, 100)
+            for body in car.step(state(NOW + ms * NS_PER_MS, mode), is_stranded=is_stranded)
+        ]
+        assert bool(sent) == car.is_busy == is_stranded

@@ -3,12 +3,15 @@
 import subprocess
 import sys
 
+import msgspec
+import numpy as np
 import pytest
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import CarError, MessageError, RunError
 from scm.geometry import Pose2
 from scm.maps.load import load_map
+from scm.maps.model import RadioChannel
 from scm.maps.route import Roads
 from scm.v2x.exchange import Answer, Call, Incoming
 from scm.v2x.message import Refused
@@ -21,6 +24,7 @@ from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
+from scm.v2x.messages.radio_status import RadioStatus
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
@@ -297,3 +301,18 @@ def test_its_name_must_fit_into_a_key():
 def test_the_agent_itself_loads_without_the_physics_compiler():
     code = "import sys, vehicle_agent.agent; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], timeout=30.0, check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("is_on", "station"), [(True, "n7"), (True, "n8"), (False, "n7")])
+def test_a_car_speaks_less_when_the_world_tells_it_that_the_channel_is_busy(
+    city_map, spawn, is_on, station
+):
+    radio = RadioChannel(data_rate_mbps=6.0, congestion_control=is_on)
+    desk = Desk(msgspec.structs.replace(city_map, radio=radio), spawn).join()
+    spoke = []
+    for second in range(8):
+        desk.step(RadioStatus(t_ns=second, stations=(station,), busy=(0.9,)))
+        spoke += [desk.now_ns for _ in range(49) if one(desk.step(), CamTx)]
+    gaps = np.diff([t_ns for t_ns in spoke if t_ns > NS_PER_S])
+    obeys = is_on and station == "n7"
+    assert (gaps.min() >= NS_PER_S) == obeys

@@ -90,3 +90,36 @@ def test_cars_at_the_other_end_of_a_large_city_are_left_out():
     cars = HeardCars()
     cars.hear(cam(x_m=10.0), 0)
     assert cars.others(0, Pose2(0.0, 0.0, 0.0)) == ()
+
+
+def hearing(gaps_s, name="n1", cars=None, start_s=0.0):
+    cars, at_s = cars or HeardCars(), start_s
+    for gap_s in gaps_s:
+        at_s += gap_s
+        cars.hear(cam(name), round(at_s * NS_PER_S))
+    return cars, round(at_s * NS_PER_S)
+
+
+def test_who_hears_nobody_does_not_hear_well():
+    assert not HeardCars().hears_well(0)
+
+
+def test_who_hears_a_car_every_second_hears_well_and_silence_ends_that():
+    cars, now_ns = hearing([1.0] * 8)
+    assert cars.hears_well(now_ns)
+    assert cars.hears_well(now_ns + 2 * NS_PER_S)
+    assert not cars.hears_well(now_ns + 3 * NS_PER_S)
+
+
+def test_one_frame_in_ten_is_too_little():
+    cars, now_ns = hearing([10.0, 1.0, 9.0])
+    assert not cars.hears_well(now_ns)
+
+
+def test_one_silent_car_among_many_is_enough_to_doubt_until_it_is_long_gone():
+    cars, now_ns = hearing([1.0] * 8)
+    hearing([0.5] * 30, "n2", cars, 1e-9 * now_ns)
+    later_ns = now_ns + 15 * NS_PER_S
+    assert not cars.hears_well(later_ns)
+    hearing([0.5] * 30, "n2", cars, 1e-9 * later_ns)
+    assert cars.hears_well(later_ns + 15 * NS_PER_S)

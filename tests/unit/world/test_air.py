@@ -14,7 +14,9 @@ from scm.maps.load import load_map
 from scm.maps.model import RadioChannel
 from scm.maps.radio import with_radio
 from scm.maps.radio_check import radio_problems
+from scm.v2x.etsi_events import ACCIDENT, DenmSender, Event
 from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.cpm_tx import CpmTx
 from scm.v2x.messages.denm_tx import DenmTx
 from scm.v2x.messages.mapem_tx import MapemTx
@@ -44,9 +46,17 @@ class Air:
 
     def send(self, kind, station, now_ns=0):
         self.world.outbox = []
-        sent = kind(station=station, t_ns=now_ns, body=None)
+        body = warning(station, now_ns) if kind is DenmTx else None
+        sent = kind(station=station, t_ns=now_ns, body=body)
         transmit(self.world, sent, now_ns)
-        return [(type(out), out.receiver) for out in self.world.outbox]
+        heard = [out for out in self.world.outbox if not isinstance(out, CityEvent)]
+        return [(type(out), out.receiver) for out in heard]
+
+
+def warning(station, now_ns):
+    sender = DenmSender(station)
+    sender.trigger(Event(cause=ACCIDENT, x_m=0.0, y_m=0.0), now_ns)
+    return sender.due(now_ns)[0]
 
 
 @pytest.fixture(scope="module")

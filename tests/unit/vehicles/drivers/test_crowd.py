@@ -19,7 +19,9 @@ from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers.channel import channel_of, has_arrived
 from scm.vehicles.drivers.crowd import Crowd
 from scm.vehicles.drivers.memory import WAITING_FOR
+from scm.vehicles.drivers.stations import known_to
 from scm.vehicles.drivers.streets import Streets
+from scm.vehicles.jit import plain
 
 NIGEL = CarLimits(
     wheelbase=0.14154, steer_limit=0.5235988, steer_rate=0.42, front=0.23, rear=0.07, width=0.175,
@@ -299,3 +301,21 @@ def test_a_silent_car_is_forgotten(eight):
     city.now_ns += 4 * NS_PER_S
     city.decide()
     assert city.crowd.throttle[0] > 0.0
+
+
+def test_where_frames_get_lost_a_silent_car_is_believed_to_stand_where_it_stood(grid):
+    now_ns = 10 * NS_PER_S
+    for air, after_s, is_known in (
+        (RadioChannel(loss=0.3), 3.5, True),
+        (RadioChannel(loss=0.3), 17.0, False),
+    ):
+        crowd = Crowd(Streets(grid), 2, radio=air)
+        crowd.enter(0, NIGEL, 0)
+        crowd.show(1, 0.3, 0.175)
+        for frame in range(16):
+            told = np.array([[1.0], [1.0], [0.0], [0.0], [0.0]])
+            crowd.hear(np.array([1]), now_ns + frame * NS_PER_MS, *told)
+        told_ns = now_ns + round(after_s * NS_PER_S)
+        known, x, *_ = plain(known_to)(crowd._heard, 1, 0, told_ns, 0)
+        assert known == is_known
+        assert x == (pytest.approx(0.85) if is_known else 0.0)

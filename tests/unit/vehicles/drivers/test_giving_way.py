@@ -11,6 +11,7 @@ from scm.maps.grid_city import grid_city
 from scm.maps.model import RadioChannel, Sign
 from scm.maps.route import Roads
 from scm.vehicles.driver import CarLimits
+from scm.vehicles.drivers.channel import DEAF
 from scm.vehicles.drivers.crowd import Crowd
 from scm.vehicles.drivers.memory import WAITING_FOR
 from scm.vehicles.drivers.streets import Streets
@@ -207,6 +208,29 @@ def test_nobody_touches_where_a_third_of_all_frames_is_lost(seed):
     air = RadioChannel(loss=0.3)
     drive = Drive(crossing(*kinds), cars, radio=air, seed=seed).run(45.0)
     assert None not in drive.crossed_s
+
+
+def test_who_knows_that_it_hears_too_little_stays_before_its_line():
+    for arm, to, goes in (("n", "n", False), ("e", "e", True)):
+        drive = Drive(crossing("n give_way", "s give_way"), [(arm, to, 0.6)])
+        drive.crowd.channel.numbers[DEAF] = 1.0
+        drive.run(10.0)
+        assert (drive.crossed_s[0] is not None) == goes
+        drive.crowd.channel.numbers[DEAF] = 0.0
+        drive.run(5.0)
+        assert drive.crossed_s[0] is not None
+
+
+def test_a_driver_alone_on_an_air_that_loses_frames_stays_until_it_hears_somebody():
+    air, far = RadioChannel(loss=0.2), ("w", "w", 4.0)
+    roads = crossing("n give_way", "s give_way")
+    drive = Drive(roads, [("n", "n", 0.6), far], radio=air)
+    drive.driven[1], drive.heard[1] = False, False
+    drive.run(12.0)
+    assert drive.crossed_s[0] is None
+    drive.heard[1] = True
+    drive.run(8.0)
+    assert drive.crossed_s[0] is not None
 
 
 def test_who_stood_for_long_has_its_turn_before_those_with_the_right_of_way():

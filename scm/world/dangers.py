@@ -1,0 +1,20 @@
+"""What the world remembers of warnings on the air."""
+
+from dataclasses import dataclass, field
+
+from scm.v2x.etsi_events import CarWarnings, DenmWatch
+
+
+@dataclass(slots=True)
+class Dangers:
+    """Who warns of what.
+
+    Attributes:
+        hits: What cars have hit since they last might warn of it, by name.
+        warners: What hosted cars warn of, by name.
+        told: What all stations warn of.
+    """
+
+    hits: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    warners: dict[str, CarWarnings] = field(default_factory=dict)
+    told: DenmWatch = field(default_factory=DenmWatch)
