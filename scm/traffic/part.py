@@ -19,7 +19,7 @@ from scm.maps.route import Roads
 from scm.part import Hears, Serves
 from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller
-from scm.traffic.detectors import Seen, Watcher
+from scm.traffic.detectors import Seen, Watcher, reach_of
 from scm.traffic.junction_signals import JunctionSignals
 from scm.traffic.kernel import Program
 from scm.traffic.own_plan import OWN, own_table
@@ -93,8 +93,9 @@ class TrafficPart:
                     policy=policy,
                     tables=tables[junction.name],
                     learned=learned,
+                    car=car,
                 ),
-                Watcher(junction, roads),
+                Watcher(junction, roads, reach_of(programs[junction.name], roads)),
                 PriorityDesk(junction, roads),
                 mapem_of(roads, junction),
             )
