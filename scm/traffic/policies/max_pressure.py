@@ -2,9 +2,10 @@
 
     pressure(stage) = sum over its groups of (queue before the line - cars standing behind it)
 
-A stage stays at least its least green. Then the stage of the highest pressure follows; the present
-one stays on a tie, and where its own cars still come. Nobody waits for ever: a group that is
-called and has waited `STARVED_NS` is served next, whatever the others' pressure.
+A stage stays at least its least green, and while its cars are worth waiting for, up to max 1: else
+every car more elsewhere would cost a change, in which nobody drives. Then the stage of the highest
+pressure follows; the present one stays on a tie. Nobody waits for ever: a group that is called and
+has waited `STARVED_NS` is served next, whatever the others' pressure.
 
 Rule: Varaiya 2013, Max pressure control of a network of signalized intersections; the least
 wait is ours. It needs no knowledge of demand, and nothing of other junctions but the queues.
