@@ -1,13 +1,20 @@
 """Whether a city flows: 200 cars on a grid, with lights and with signs, faster than real time.
 
 Run with `python -m bench.flow [lights | signs | MAP ...] --seconds S`. Printed per city: junctions
-passed an hour, the longest time that a car stood without a red light before it or its queue, cars
-that touched, simulated over elapsed time. `--loss 0.2` lets each driver miss so many radio frames.
+passed an hour, the same in each quarter of the time, the longest time that a car stood without a
+red light before it or its queue, cars that touched, simulated over elapsed time.
+`--loss 0.2` lets each driver miss so many radio frames. `--observe S` lets the observer judge the
+first S seconds by the true poses with a camera's noise, so what it tells is false unless cars
+touch. `--flash` lets all signals flash red. `--progress` tells each minute on the error output.
 """
 
 import argparse
 import math
+import sys
 import time
+from collections import Counter
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,8 +22,15 @@ from bench.city import fill
 from scm.arrays import Bools, Floats, Ints
 from scm.lockstep import Lockstep
 from scm.maps.load import load_map
+from scm.part import Hears, Serves
 from scm.traffic.monitor_part import MonitorPart
+from scm.traffic.observer_part import ObserverPart
 from scm.traffic.part import TrafficPart
+from scm.traffic.policy import FIXED
+from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.messages.eye_track import EyeTrack, Row6
+from scm.v2x.messages.traffic_counts import TrafficCounts
+from scm.v2x.messages.violation import Violation
 from scm.vehicles.drivers.crowd import Crowd
 from scm.vehicles.drivers.memory import SIGNAL
 from scm.world.contacts import Contacts, Touches
@@ -26,6 +40,89 @@ from scm.world.world import World
 MAPS = {"lights": "grid:8x8:4", "signs": "grid:8x8:4:signs"}
 LOOK_S = 0.5
 STANDS_MPS = 0.01
+
+
+POSE_STD_M, YAW_STD_RAD, SPEED_STD_MPS = 0.005, 0.01, 0.03
+EYE_PERIOD_NS = 100_000_000
+
+
+class Cameras:
+    """Stand for the overhead cameras: the world's true poses with the noise that they tell."""
+
+    name, role, period_ns = "eye", "part", EYE_PERIOD_NS
+    hears: tuple[Hears, ...] = ()
+    serves: tuple[Serves, ...] = ()
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._dice = np.random.default_rng(1)
+        variances = (POSE_STD_M, POSE_STD_M, YAW_STD_RAD, SPEED_STD_MPS, 0.01, 0.01)
+        rows = np.diag(np.square(variances)).tolist()
+        self._doubt: tuple[Row6, ...] = tuple(map(tuple, rows))  # type: ignore[arg-type]
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Tell a track of every hosted car."""
+        del inbox
+        slots = self._world.slots
+        of = np.flatnonzero(slots.hosted)
+        noise = self._dice.normal(size=(4, len(of)))
+        rows = zip(
+            of.tolist(),
+            (slots.x[of] + POSE_STD_M * noise[0]).tolist(),
+            (slots.y[of] + POSE_STD_M * noise[1]).tolist(),
+            (slots.yaw[of] + YAW_STD_RAD * noise[2]).tolist(),
+            (slots.speed[of] + SPEED_STD_MPS * noise[3]).tolist(),
+            strict=True,
+        )
+        return [self._track(now_ns, *row) for row in rows]
+
+    def finish(self, now_ns: int) -> list[Outgoing]:
+        """Say nothing more."""
+        del now_ns
+        return []
+
+    def _track(
+        self, now_ns: int, slot: int, x: float, y: float, yaw: float, speed: float
+    ) -> EyeTrack:
+        return EyeTrack(
+            vehicle=self._world.slots.names[slot], tag_id=1, t_ns=now_ns, x_m=x, y_m=y,
+            yaw_rad=yaw, speed_mps=speed, lateral_speed_mps=0.0, yaw_rate_radps=0.0, age_s=0.0,
+            stale=False, covariance=self._doubt,  # type: ignore[arg-type]
+        )  # fmt: skip
+
+
+class Observed:
+    """Cameras and an observer that run in a city for its first time; what the observer told.
+
+    Attributes:
+        told: How many violations of each kind, and the first few in words.
+    """
+
+    def __init__(self, city: Lockstep, world: World, span_s: float) -> None:
+        self._city, self._left_s = city, span_s
+        self._parts = [Cameras(world), ObserverPart(world.city_map)]
+        self.told: Counter[str] = Counter()
+        self.words: list[str] = []
+        self.counts: TrafficCounts | None = None
+        for part in self._parts:
+            city.add(part)
+        self._mailbox = city.hear(Hears(Violation))
+
+    def look(self, passed_s: float) -> None:
+        """Note what was told since; take the parts away when their time is over."""
+        if not self._parts:
+            return
+        for item in self._mailbox.drain():
+            violation = item.message
+            self.told[violation.kind] += 1
+            self.words.append(violation.text)
+        self._left_s -= passed_s
+        observer = self._parts[-1]
+        assert isinstance(observer, ObserverPart)  # noqa: S101
+        self.counts = observer.counters.counts(self._city.now_ns)
+        if self._left_s <= 0.0:
+            while self._parts:
+                self._city.remove(self._parts.pop())
 
 
 class TouchCount(Contacts):
@@ -75,61 +172,121 @@ def behind_red(crowd: Crowd) -> Bools:
     return found
 
 
+class Count:
+    """What is counted while a city runs; the driven time is cut into four quarters."""
+
+    def __init__(self, world: World, span_s: float) -> None:
+        self._world, self._span_s = world, span_s
+        self._touched = counted(world)
+        self.standing = Standing(world.crowd.capacity)
+        self._passed = [world.crowd.passed.copy()]
+        self._began = time.perf_counter()
+        self.took_s = 0.0
+
+    def look(self, at_s: float, *, tells: bool) -> None:
+        """Take note of an instant; `at_s` after the count began."""
+        self.standing.look(self._world.crowd, self._world.slots.speed, LOOK_S)
+        self.took_s = time.perf_counter() - self._began
+        while at_s >= len(self._passed) * self._span_s / 4.0 and len(self._passed) <= 4:
+            self._passed.append(self._world.crowd.passed.copy())
+        if tells and at_s % 60.0 < LOOK_S:
+            print(
+                f"{at_s:.0f} s of the city's time in {self.took_s:.0f} s; now longest stand "
+                f"{self.standing.now_s.max():.0f} s, ever {self.standing.longest_s.max():.0f} s; "
+                f"{len(self._touched.began)} contacts {self._touched.began[:3]}",
+                file=sys.stderr,
+                flush=True,
+            )
+
+    def row(self, span_s: float) -> dict[str, float]:
+        """Return what there is to tell of a run that lasted so long."""
+        crowd, hosted = self._world.crowd, self._world.slots.hosted
+        passed = crowd.passed - self._passed[0]
+        marks = [float(mark.sum()) / 2.0 for mark in self._passed]
+        share = 4.0 * 3600.0 / self._span_s
+        quarters = {f"quarter{i}": (b - a) * share for i, (a, b) in enumerate(pairwise(marks))}
+        return {
+            "cars": float(hosted.sum()),
+            "hours": span_s / 3600.0,
+            "passages_per_h": float(passed.sum()) / 2.0 / span_s * 3600.0,
+            "least": float(passed[hosted].min()) / 2.0,
+            "longest_s": float(self.standing.longest_s.max()),
+            "contacts": len(self._touched.began),
+            "ratio": span_s / self.took_s,
+            **quarters,
+        }
+
+
 def flow(
-    name: str, cars: int, span_s: float, loss: float = 0.0, wall_s: float = math.inf
-) -> dict[str, float]:
+    name: str,
+    cars: int,
+    span_s: float,
+    loss: float = 0.0,
+    wall_s: float = math.inf,
+    *,
+    policy: str = FIXED,
+    observed_s: float = 0.0,
+    tells: bool = False,
+) -> tuple[dict[str, float], Observed | None]:
     """Run a city for a time, or until so much real time is over; return what there is to tell."""
     city_map = load_map(name)
     part = WorldPart(city_map, room=cars)
     if loss:
         part.world = World(city_map, capacity=cars, loss=loss, prepare=["nigel"])
     part.learn_wishes(lambda _kind, _where: False)
-    world = part.world
-    touched, crowd = counted(world), world.crowd
-    fill(world, cars)
-    standing = Standing(crowd.capacity)
-    with Lockstep([part, TrafficPart(city_map), MonitorPart(city_map)]) as city:
+    fill(part.world, cars)
+    parts = [part, TrafficPart(city_map, policy=policy), MonitorPart(city_map)]
+    with Lockstep(parts) as city:
+        observed = Observed(city, part.world, observed_s) if observed_s else None
         city.run_for(1.0)
-        before, began = crowd.passed.copy(), time.perf_counter()
-        for look in range(1, 1 + round(span_s / LOOK_S)):
+        count, at_s = Count(part.world, span_s), 0.0
+        while at_s < span_s and count.took_s <= wall_s:
             city.run_for(LOOK_S)
-            standing.look(crowd, world.slots.speed, LOOK_S)
-            took = time.perf_counter() - began
-            if took > wall_s:
-                span_s = look * LOOK_S
-                break
-    passed = float((crowd.passed - before).sum()) / 2.0
-    return {
-        "cars": cars,
-        "hours": span_s / 3600.0,
-        "passages_per_h": passed / span_s * 3600.0,
-        "least": float((crowd.passed - before)[world.slots.hosted].min()) / 2.0,
-        "longest_s": float(standing.longest_s.max()),
-        "contacts": len(touched.began),
-        "ratio": span_s / took,
-    }
+            at_s += LOOK_S
+            count.look(at_s, tells=tells)
+            if observed is not None:
+                observed.look(LOOK_S)
+    return count.row(at_s), observed
 
 
-def main() -> None:
-    """Print a table, a row a city."""
+def arguments() -> argparse.Namespace:
+    """Return what was asked for."""
     parser = argparse.ArgumentParser(prog="python -m bench.flow", description=__doc__)
     parser.add_argument("cities", nargs="*", default=list(MAPS), help="lights, signs, or a map")
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--wall", type=float, default=math.inf, help="s of real time at most")
     parser.add_argument("--cars", type=int, default=200)
     parser.add_argument("--loss", type=float, default=0.0)
-    given = parser.parse_args()
-    print("| city | cars | hours | junctions passed an hour | fewest by a car | longest stand, s "
-          "| contacts | x real time |")  # fmt: skip
-    print("|---|---:|---:|---:|---:|---:|---:|---:|")
+    parser.add_argument("--observe", type=float, default=0.0, help="s that the observer judges")
+    parser.add_argument("--policy", default=FIXED, help="of all signals")
+    parser.add_argument("--flash", action="store_true", help="all signals flash red")
+    parser.add_argument("--progress", action="store_true")
+    return parser.parse_args()
+
+
+def main() -> None:
+    """Print a table, a row a city."""
+    given = arguments()
+    print("| city | cars | hours | junctions passed an hour | in each quarter | fewest by a car "
+          "| longest stand, s | contacts | x real time |")  # fmt: skip
+    print("|---|---:|---:|---:|---:|---:|---:|---:|---:|")
     for city in given.cities:
-        row = flow(MAPS.get(city, city), given.cars, given.seconds, given.loss, given.wall)
+        row, observed = flow(
+            MAPS.get(city, city), given.cars, given.seconds, given.loss, given.wall,
+            policy="flashing" if given.flash else given.policy,
+            observed_s=given.observe, tells=given.progress,
+        )  # fmt: skip
+        quarters = " ".join(f"{row[f'quarter{i}']:.0f}" for i in range(4) if f"quarter{i}" in row)
         print(
             f"| {city} | {row['cars']:.0f} | {row['hours']:.3f} | {row['passages_per_h']:.0f} "
-            f"| {row['least']:.0f} | {row['longest_s']:.1f} | {row['contacts']:.0f} "
+            f"| {quarters} | {row['least']:.0f} | {row['longest_s']:.1f} | {row['contacts']:.0f} "
             f"| {row['ratio']:.1f} |",
             flush=True,
         )
+        if observed is not None:
+            told = ", ".join(f"{n} {kind}" for kind, n in observed.told.items()) or "nothing"
+            print(f"\nThe observer told, in {given.observe:.0f} s: {told}")
+            print("\n".join(f"- {words}" for words in observed.words[:20]), flush=True)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from scm.maps.load import load_map
 from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.traffic.controller import Controller, Heard
-from scm.traffic.detectors import Seen, Watcher
+from scm.traffic.detectors import Seen, Watcher, reach_of
 from scm.traffic.part import tables_of
 from scm.traffic.program import STEP_NS, program_of
 from scm.traffic.timing import NIGEL
@@ -68,7 +68,10 @@ class Flow:
             )
             for name, program in programs.items()
         }
-        self.watchers = {j.name: Watcher(j, self.roads) for j in city_map.junctions}
+        self.watchers = {
+            j.name: Watcher(j, self.roads, reach_of(programs[j.name], self.roads))
+            for j in city_map.junctions
+        }
         self.favoured = {
             line.name
             for line in city_map.stop_lines

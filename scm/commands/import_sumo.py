@@ -31,12 +31,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
     from scm.maps.sumo import import_sumo
+    from scm.maps.sumo_build import PLAN
     from scm.maps.sumo_toml import map_toml
+    from scm.traffic.own_plan import OWN, adopted
 
     if arguments.scale is not None and not arguments.scale > 0.0:
         raise MapError(f"--scale: got {arguments.scale}, expected above 0")
     made = import_sumo(arguments.net, scale=arguments.scale, floor_m=arguments.floor)
-    arguments.out.write_text(map_toml(made.city_map), encoding="utf-8")
+    built, unsafe = adopted(made.city_map)
+    arguments.out.write_text(map_toml(built), encoding="utf-8")
     city = load_map(arguments.out)
     width, depth = (high - low for low, high in (city.floor.x_m, city.floor.y_m))
     print(f"{arguments.out}: 1:{made.scale:g} on {width:.1f} x {depth:.1f} m")
@@ -50,6 +53,11 @@ def _run(arguments: argparse.Namespace) -> int:
     )
     if made.left_out:
         print(f"  {len(made.left_out)} turns back left out: a Nigel cannot drive them")
+    if city.junctions:
+        kept = sum(junction.plan == OWN for junction in city.junctions)
+        print(f"  the network's signal programs kept at {kept} of {len(city.junctions)} junctions")
+    for name, why in (made.unread | unsafe).items():
+        print(f"  {name} runs plan {PLAN!r} instead: {why}")
     return 0
 
 

@@ -9,7 +9,7 @@ import msgspec
 from scm.errors import nearest
 from scm.geometry import wrap_angle
 from scm.maps.floor_check import floor_problems
-from scm.maps.model import CityMap, Conflict, Group, Segment
+from scm.maps.model import CityMap, Conflict, Group, Junction, Segment
 from scm.maps.radio_check import radio_problems
 from scm.maps.route import LanePath
 from scm.maps.rules_check import rule_problems
@@ -20,7 +20,7 @@ JOIN_RAD = math.radians(0.1)
 _POSITIVE = {
     "width_m", "length_m", "radius_m", "height_m", "size_m", "speed_limit_mps", "radio_range_m",
     "z_m", "width_px", "height_px", "fx_px", "fy_px", "rate_hz", "mass_kg", "gust_s", "m_per_grey",
-    "value_mps", "range_m", "path_loss_exponent",
+    "value_mps", "range_m", "path_loss_exponent", "green_s",
 }  # fmt: skip
 _NOT_NEGATIVE = {
     "thickness_m", "noise_sigma", "tag_id", "first_vehicle_tag_id", "friction", "loss", "fading_db",
@@ -163,6 +163,7 @@ def _references(city_map: CityMap) -> Iterator[str]:
             where = f"junctions[{index}].groups[{number}] ({group.name})"
             for key, move in _movements(group):
                 yield from _known(f"{where}.{key}.lane", "lane", move.lane, lanes)
+        yield from _staged(f"junctions[{index}]", junction)
     for index, line in enumerate(city_map.stop_lines):
         where = f"stop_lines[{index}] ({line.name})"
         yield from _known(f"{where}.lane", "lane", line.lane, lanes)
@@ -170,6 +171,15 @@ def _references(city_map: CityMap) -> Iterator[str]:
     for index, light in enumerate(city_map.lights):
         where = f"lights[{index}] ({light.light_id})"
         yield from _known_group(where, light.junction, light.group, groups)
+
+
+def _staged(where: str, junction: Junction) -> Iterator[str]:
+    """Doubt the groups of a junction's own stages."""
+    groups = [group.name for group in junction.groups]
+    for number, stage in enumerate(junction.stages):
+        for name in stage.groups:
+            what = f"group of {junction.name}"
+            yield from _known(f"{where}.stages[{number}].groups", what, name, groups)
 
 
 def _known_group(

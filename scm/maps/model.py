@@ -227,13 +227,25 @@ class Group(Record, kw_only=True, frozen=True):
         return (self.movement, *self.more)
 
 
+class PlanStage(Record, kw_only=True, frozen=True):
+    """Groups that are green together in a junction's own plan, and for how long."""
+
+    groups: tuple[str, ...]
+    green_s: float
+
+
 class Junction(Record, kw_only=True, frozen=True):
-    """Where lanes cross; which groups conflict is derived from the stretches' geometry."""
+    """Where lanes cross; which groups conflict is derived from the stretches' geometry.
+
+    Attributes:
+        stages: A cycle of its own, as the plan `own`; empty: it has the plans of all junctions.
+    """
 
     name: str
     number: int
     groups: tuple[Group, ...]
     plan: str
+    stages: tuple[PlanStage, ...] = ()
 
 
 class Approach(Record, kw_only=True, frozen=True):

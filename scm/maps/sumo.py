@@ -5,7 +5,7 @@
     turns    laid anew from lane to lane; where a turn is tighter than a Nigel can steer, the lanes
              before and behind it are cut back until it fits; turns back are left out instead
     signals  one group for each lane that a traffic light holds; which may be green together follows
-             from where their ways meet, and the plan is ours: SUMO's greens let oncoming cars cross
+             from where their ways meet; SUMO's programs come along, to be kept where they are safe
     signs    stop, give way from the states of SUMO's links; right before left has none
 
 Speeds follow the car, not Froude's law: by that 50 km/h would be 3.7 m/s at 1:14, fourteen times
@@ -21,6 +21,7 @@ from scm.errors import MapError
 from scm.maps.model import CityMap, Point
 from scm.maps.sumo_build import CityBuilder
 from scm.maps.sumo_curves import Curve, cut, distance_m, fit, length_of, turn
+from scm.maps.sumo_program import with_programs
 from scm.maps.sumo_read import Net, NetLane, NetLink, read_net
 
 LEAST_RADIUS_M = 0.38  # a Nigel turns on 0.245 m; at 0.35 m drivers swing 40 mm wide, here 8 mm
@@ -43,6 +44,7 @@ class Imported:
         tightest_m: Least radius that cars must drive.
         left_out: Turns that the city does not have, as (from, to).
         shortened: How many lanes were cut back for a turn.
+        unread: Junctions whose program cannot be told as stages, and why.
     """
 
     city_map: CityMap
@@ -51,6 +53,7 @@ class Imported:
     tightest_m: float
     left_out: tuple[tuple[str, str], ...]
     shortened: int
+    unread: dict[str, str]
 
 
 def import_sumo(
@@ -87,13 +90,16 @@ def import_sumo(
         )
     builder = CityBuilder(net, lanes, {n: laid.curve(n) for n in lanes}, laid.turns, scale)
     curves = [*(laid.curve(n) for n in lanes), *(t.curve for t in laid.turns)]
+    links = [laid_turn.link for laid_turn in laid.turns]
+    city_map, unread = with_programs(builder.city(floor_m), net, links, builder.name_of)
     return Imported(
-        city_map=builder.city(floor_m),
+        city_map=city_map,
         scale=scale,
         error_m=error_m,
         tightest_m=min(curve.least_radius_m for curve in curves),
         left_out=tuple((link.start, link.end) for link in laid.left_out),
         shortened=laid.shortened,
+        unread=unread,
     )
 
 

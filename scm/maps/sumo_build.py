@@ -135,9 +135,9 @@ class CityBuilder:
         for node, shape in self._net.shapes.items():
             points = tuple(self._at(x / self._scale, y / self._scale) for x, y in shape)
             if len(set(points)) > 2:
-                yield Area(name=self._name(node), points=points)
+                yield Area(name=self.name_of(node), points=points)
 
-    def _name(self, node: str) -> str:
+    def name_of(self, node: str) -> str:
         """Return a junction's name on the bus, always the same for the same SUMO id."""
         if node not in self._names:
             wished = re.sub(r"[^a-z0-9_-]", "_", node.lower())[:22] or "_"
@@ -196,7 +196,7 @@ class CityBuilder:
         for turn in self._turns:
             link = turn.link
             table, key = (lit, link.signal) if link.signal else (unlit, link.node)
-            table[self._name(key)][link.start].append(link)
+            table[self.name_of(key)][link.start].append(link)
         return tuple(  # type: ignore[return-value]
             {name: lanes for name, lanes in table.items() if _any_meet(lanes, roads)}
             for table in (lit, unlit)

@@ -38,6 +38,7 @@ class NetLink:
         state: SUMO's: `M` has priority, `m` gives way, `=` right before left, `s` stop, `w` all
             stop, `o` and `O` under a signal.
         signal: The traffic light that holds it; empty: none.
+        number: Its place in the states of that light's phases; -1: none.
     """
 
     start: str
@@ -46,16 +47,26 @@ class NetLink:
     direction: str
     state: str
     signal: str
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class NetPhase:
+    """How long a traffic light shows what: a letter for each link, `G` and `g` are green."""
+
+    duration_s: float
+    state: str
 
 
 @dataclass(frozen=True, slots=True)
 class Net:
-    """What is imported of a network, and the shapes of its junctions by name."""
+    """What is imported of a network; shapes by junction, programs by traffic light."""
 
     name: str
     lanes: tuple[NetLane, ...]
     links: tuple[NetLink, ...]
     shapes: dict[str, tuple[Point, ...]]
+    programs: dict[str, tuple[NetPhase, ...]]
 
 
 def read_net(path: Path) -> Net:
@@ -76,7 +87,7 @@ def read_net(path: Path) -> Net:
             f"{path}: SUMO networks are read by sumolib, which is missing: pip install 'scm[sumo]'"
         ) from error
     try:
-        net = sumolib.net.readNet(str(path))
+        net = sumolib.net.readNet(str(path), withPrograms=True)
     except Exception as error:
         raise MapError(f"{path}: cannot be read as a SUMO network: {error}") from error
     lanes = tuple(_lanes(net))
@@ -85,7 +96,8 @@ def read_net(path: Path) -> Net:
     names = {lane.name for lane in lanes}
     links = tuple(link for link in _links(net) if link.start in names and link.end in names)
     shapes = {node.getID(): _flat(node.getShape()) for node in net.getNodes()}
-    return Net(path.name.removesuffix(".net.xml"), lanes, links, shapes)
+    programs = {light.getID(): _phases(light) for light in net.getTrafficLights()}
+    return Net(path.name.removesuffix(".net.xml"), lanes, links, shapes, programs)
 
 
 def plain(name: str) -> str:
@@ -117,11 +129,21 @@ def _links(net: Any) -> list[NetLink]:
             link.getDirection(),
             link.getState(),
             link.getTLSID() or "",
+            int(link.getTLLinkIndex()),
         )
         for edge in net.getEdges(withInternal=False)
         for links in edge.getOutgoing().values()
         for link in links
     ]
+
+
+def _phases(light: Any) -> tuple[NetPhase, ...]:
+    """Return the phases of a light's program `0`, or of its first."""
+    programs = light.getPrograms()
+    if not programs:
+        return ()
+    program = programs.get("0") or next(iter(programs.values()))
+    return tuple(NetPhase(float(p.duration), str(p.state)) for p in program.getPhases())
 
 
 def _flat(shape: Any) -> tuple[Point, ...]:

@@ -38,6 +38,7 @@ from scm.traffic.promise import (
     wished_green,
 )
 from scm.traffic.timetables import Tables, Timetables
+from scm.traffic.timing import NIGEL, CarFacts
 from scm.v2x.messages.signal_request import SignalRequest
 from scm.v2x.messages.spat import Colour, SignalGroup, Spat
 
@@ -103,6 +104,7 @@ class Controller:
         policy: str = FIXED,
         tables: Tables | None = None,
         learned: Callable[[Any], Any] | None = None,
+        car: CarFacts = NIGEL,
     ) -> None:
         """Take a junction.
 
@@ -114,6 +116,7 @@ class Controller:
             policy: To run while nobody wishes another one.
             tables: Timetables by plan, in step with the neighbours; None: all plans, alone.
             learned: For the policy `learned`.
+            car: As the worst of the fleet; policies reckon with how fast its queue leaves.
 
         Raises:
             PlanError: when there is no such plan or policy, or a plan is not safe.
@@ -124,7 +127,7 @@ class Controller:
         tables = tables or {name: (load_timetable(name, program), None) for name in plan_names()}
         self._plans = list(tables)
         self._timetables = Timetables(tables, self._known(plan))
-        self._site = site_of(junction, program, learned)
+        self._site = site_of(junction, program, learned, car)
         self._policies = {name: load_policy(name) for name in policy_names()}
         self._usual = self._known_policy(policy)
         self.policy = FIXED

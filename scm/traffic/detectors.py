@@ -21,8 +21,10 @@ from scm.clock import NS_PER_S
 from scm.geometry import Pose2
 from scm.maps.model import Group, Junction, StopLine
 from scm.maps.route import Roads
+from scm.traffic.kernel import Program
 
 REACH_M = 2.4
+LATE_S = 2.5
 AHEAD_M = 0.9
 PRESENCE_M = 0.25
 EXTEND_S = 3.0
@@ -88,7 +90,20 @@ class Approach(NamedTuple):
     ahead: tuple[Stretch, ...]
 
 
-def approaches_of(junction: Junction, roads: Roads) -> tuple[Approach, ...]:
+def reach_of(program: Program, roads: Roads) -> float:
+    """Return from how far before a line cars are to be known [m].
+
+    From there a car that drives at the fastest limit comes to the line when the green of others is
+    over: its last message may be a second old, and their green is promised for a second.
+    """
+    change_s = max(times.yellow + times.clearance for times in program.times) / NS_PER_S
+    fastest_mps = max(lane.speed_limit_mps for lane in roads.city_map.lanes)
+    return max(REACH_M, fastest_mps * (change_s + LATE_S))
+
+
+def approaches_of(
+    junction: Junction, roads: Roads, reach_m: float = REACH_M
+) -> tuple[Approach, ...]:
     """Return the approaches of a junction, one for each stop line."""
     lanes = roads.city_map.lanes
     feeders: dict[str, list[str]] = {}
@@ -97,22 +112,22 @@ def approaches_of(junction: Junction, roads: Roads) -> tuple[Approach, ...]:
             feeders.setdefault(following, []).append(lane.name)
     groups = {group.name: group for group in junction.groups}
     return tuple(
-        _approach(line, group, feeders, roads)
+        _approach(line, group, feeders, roads, reach_m)
         for group in groups.values()
         for line in roads.stop_lines_of(junction.name, group.name)
     )
 
 
 def _approach(
-    line: StopLine, group: Group, feeders: dict[str, list[str]], roads: Roads
-) -> Approach:  # fmt: skip
-    before = [Stretch(line.lane, max(0.0, line.at_m - REACH_M), line.at_m, line.at_m)]
+    line: StopLine, group: Group, feeders: dict[str, list[str]], roads: Roads, reach_m: float
+) -> Approach:
+    before = [Stretch(line.lane, max(0.0, line.at_m - reach_m), line.at_m, line.at_m)]
     todo = [(line.lane, line.at_m)]
     while todo:
         lane, gone_m = todo.pop()
-        for feeder in feeders.get(lane, []) if gone_m < REACH_M else []:
+        for feeder in feeders.get(lane, []) if gone_m < reach_m else []:
             length_m = roads.length_of(feeder)
-            start_m = max(0.0, length_m - (REACH_M - gone_m))
+            start_m = max(0.0, length_m - (reach_m - gone_m))
             before.append(Stretch(feeder, start_m, length_m, length_m + gone_m))
             todo.append((feeder, gone_m + length_m))
     beyond, ahead = [], []
@@ -147,8 +162,8 @@ class Watcher:
         heard_ns: When anything was last heard or seen here; None: never.
     """
 
-    def __init__(self, junction: Junction, roads: Roads) -> None:
-        self.approaches = approaches_of(junction, roads)
+    def __init__(self, junction: Junction, roads: Roads, reach_m: float = REACH_M) -> None:
+        self.approaches = approaches_of(junction, roads, reach_m)
         self.heard_ns: int | None = None
         self._roads = roads
         self._cars: dict[int, _Car] = {}

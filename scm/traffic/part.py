@@ -19,9 +19,10 @@ from scm.maps.route import Roads
 from scm.part import Hears, Serves
 from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller
-from scm.traffic.detectors import Seen, Watcher
+from scm.traffic.detectors import Seen, Watcher, reach_of
 from scm.traffic.junction_signals import JunctionSignals
 from scm.traffic.kernel import Program
+from scm.traffic.own_plan import OWN, own_table
 from scm.traffic.plan import load_timetable, plan_names
 from scm.traffic.policy import FIXED
 from scm.traffic.priority_air import PriorityDesk
@@ -92,8 +93,9 @@ class TrafficPart:
                     policy=policy,
                     tables=tables[junction.name],
                     learned=learned,
+                    car=car,
                 ),
-                Watcher(junction, roads),
+                Watcher(junction, roads, reach_of(programs[junction.name], roads)),
                 PriorityDesk(junction, roads),
                 mapem_of(roads, junction),
             )
@@ -179,6 +181,8 @@ def tables_of(
 ) -> dict[str, Tables]:
     """Return the timetables of all plans by junction; of several junctions they make green waves.
 
+    A junction with stages of its own has the plan `own` besides, in step with nobody.
+
     Raises:
         PlanError: when a plan is not safe for a junction.
     """
@@ -189,4 +193,8 @@ def tables_of(
         waves = waves_of(links, alone) if links else {n: (t, None) for n, t in alone.items()}
         for name, pair in waves.items():
             tables[name] = {**tables[name], plan: pair}
+    for junction in city_map.junctions:
+        if junction.stages:
+            table = own_table(junction.stages, programs[junction.name])
+            tables[junction.name] = {**tables[junction.name], OWN: (table, None)}
     return tables

@@ -13,13 +13,15 @@ from scm import registry
 from scm.errors import PlanError
 from scm.traffic.asked import Asked
 from scm.traffic.detectors import Detector
-from scm.traffic.kernel import Program, State
+from scm.traffic.kernel import GroupTimes, Program, State
+from scm.traffic.promise import AHEAD_NS
 from scm.traffic.rings import Layout, PhaseTimes, layout_of
+from scm.traffic.timing import NIGEL, CarFacts, headway_s
 
 PACKAGE = "scm.traffic.policies"
 FIXED = "fixed"
 
-PASSAGE_NS = 500_000_000
+PASSAGE_NS = 200_000_000
 MAX1_GREENS, MAX2_GREENS = 3, 5
 
 Mode = Literal["adaptive", "priority", "preempt"]
@@ -46,11 +48,17 @@ class PriorityCall(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """What a policy knows of its junction for good; `layout` has its rings and barriers."""
+    """What a policy knows of its junction for good.
+
+    Attributes:
+        layout: Its rings and barriers.
+        headway_s: Between cars that leave a queue.
+    """
 
     junction: str
     program: Program
     layout: Layout
+    headway_s: float
     learned: Callable[[Any], Any] | None = None
 
 
@@ -128,14 +136,22 @@ def load_policy(name: str) -> Policy:
 
 
 def site_of(
-    junction: str, program: Program, learned: Callable[[Any], Any] | None = None
-) -> Site:  # fmt: skip
-    """Return the site of a junction; max 1 is three least greens, max 2 is five."""
+    junction: str,
+    program: Program,
+    learned: Callable[[Any], Any] | None = None,
+    car: CarFacts = NIGEL,
+) -> Site:
+    """Return the site of a junction; max 1 is three least greens, max 2 is five, as shown."""
     phases = tuple(
-        PhaseTimes(t.min_green, PASSAGE_NS, MAX1_GREENS * t.min_green, MAX2_GREENS * t.min_green)
+        PhaseTimes(t.min_green, PASSAGE_NS, _most_ns(t, MAX1_GREENS), _most_ns(t, MAX2_GREENS))
         for t in program.times
     )
-    return Site(junction, program, layout_of(program, phases), learned)
+    return Site(junction, program, layout_of(program, phases), headway_s(car), learned)
+
+
+def _most_ns(times: GroupTimes, greens: int) -> int:
+    """Return when it is decided at the latest that a green ends: what is promised then is in it."""
+    return max(times.min_green, greens * times.min_green - AHEAD_NS)
 
 
 def nothing(site: Site) -> None:

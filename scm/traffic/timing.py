@@ -3,6 +3,7 @@
     yellow     Y = t_pr + v / (2 a)                who cannot stop before the line reaches it
     clearance  R = (W + L) / v_slow                who passed it last is out before others start
     green      G = n t_pr + v / (2 a_start) + (n - 1) (L + gap) / v_slow     n cars leave a queue
+    headway    h = t_pr + (L + gap) / v_slow          each of them is so much behind the one before
 
 v is the fastest approach, v_slow the slowest car, W the way from the stop line to the end of the
 conflict, L a car's length. The two formulas for yellow and clearance are those of traffic
@@ -19,6 +20,7 @@ from dataclasses import dataclass
 from scm.errors import PlanError
 
 OVER_LIMIT = 1.1
+LANE_MPS = 0.25  # what our maps' lanes allow, for cars whose own speed is not known
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +67,11 @@ def yellow_s(car: CarFacts, limit_mps: float = math.inf) -> float:
 def clearance_s(car: CarFacts, way_m: float, limit_mps: float) -> float:
     """Return the least all-red [s] for a way from stop line to end of conflict [m]."""
     return (way_m + car.length_m) / min(car.slow_mps, limit_mps)
+
+
+def headway_s(car: CarFacts, limit_mps: float = LANE_MPS) -> float:
+    """Return by how much later each next car of a queue passes the line [s]."""
+    return car.reaction_s + (car.length_m + car.gap_m) / min(car.slow_mps, limit_mps)
 
 
 def min_green_s(car: CarFacts, limit_mps: float, queue: int = 2) -> float:

@@ -1,6 +1,7 @@
 """The contact stage: hand every car's motion to the contact solver, and its answer back to the car.
 
-Hosted cars get their change at once; what was done to a remote car waits for `RemoteCar.contact`.
+Hosted cars get their change at once, and who watches is told at the end of the tick; what was done
+to a remote car waits for `RemoteCar.contact`.
 A car that touches nothing is not written to at all.
 """
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_S
+from scm.v2x.messages.contact import Contact
 from scm.vehicles.fleet import Fleet
 from scm.world.contacts import FIRST_BOX, Touches
 from scm.world.contacts import WALL as A_WALL
@@ -52,6 +54,8 @@ def _tell(world: World, slots: Ints, touches: Touches, t_ns: int) -> None:
             _push(world, fleet, rows[struck], touches, begin + struck)
         begin += len(rows)
     against = _Against(world, slots, touches.pairs)
+    for row in np.flatnonzero(changed[:begin]).tolist() if world.wishes.any(Contact) else ():
+        world.blows.add(against.name(row), touches.dv[row], against.of(row))
     for row, car in enumerate(world.remote.values(), start=begin):
         if changed[row]:
             car.hit(touches.dv[row], touches.shift[row], against.of(row), t_ns)

@@ -47,6 +47,7 @@ def publish(world: World, now_ns: int) -> None:
         slots = _whose_turn(world)
         world.slots.seq[slots] += 1
         world.outbox += states_of(world, slots, now_ns)
+    world.outbox += world.blows.take(now_ns)
     for remote in world.remote.values():
         contact = remote.contact(now_ns)
         if contact is not None:

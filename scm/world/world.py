@@ -34,6 +34,7 @@ from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sensor
 from scm.world import lease as rules
+from scm.world.blows import Blows
 from scm.world.busy import Busy
 from scm.world.cams import CamTriggers
 from scm.world.contacts import Contacts
@@ -73,6 +74,7 @@ class World:
         slots: What every car has, as arrays.
         ground: The floor under the wheels, and the wind.
         impacts: What contacts add to the cars' accelerations in this tick.
+        blows: What contacts did to hosted cars in this tick, for who watches.
         hosted: Cars simulated here, by name, in the order they came; likewise `remote`.
         leased: Those of the hosted that somebody else drives.
         crowd: The drivers of the hosted cars, and what they hear over the radio.
@@ -111,6 +113,7 @@ class World:
         self.garage = Garage(capacity, self.ground.fit)
         self.contacts = Contacts(city_map)
         self.impacts = Impacts()
+        self.blows = Blows()
         radio = replace(city_map.radio, loss=loss) if loss else city_map.radio
         self.crowd = Crowd(streets_of(self.roads), capacity, seed=seed, radio=radio)
         self.errands = Errands(self.crowd, spread=True)

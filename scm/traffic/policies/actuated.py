@@ -17,6 +17,7 @@ from scm.traffic.asked import groups_of
 from scm.traffic.kernel import Phase
 from scm.traffic.policy import Answer, JunctionView, Mode, Policy, Site
 from scm.traffic.rings import Inputs, Recall, Rings
+from scm.traffic.waiting import is_worth_waiting
 
 UNSEEN_NS = 120 * NS_PER_S
 LONG_QUEUE = 4
@@ -73,7 +74,7 @@ def told_of(site: Site, memory: Memory, view: JunctionView) -> Told:
         is_green = view.state[i].phase is Phase.GREEN
         if detector is None:
             continue
-        if _is_worth_waiting(site, i, view) if is_green else detector.call:
+        if is_worth_waiting(site, i, view) if is_green else detector.call:
             calls.add(i)
         if detector.queue > LONG_QUEUE:
             long.add(i)
@@ -87,34 +88,6 @@ def told_of(site: Site, memory: Memory, view: JunctionView) -> Told:
         max2=frozenset(long),
     )
     return Told(inputs, view.sees)
-
-
-def _is_worth_waiting(site: Site, number: int, view: JunctionView) -> bool:
-    """Return whether a green should go on for cars that come.
-
-    Waiting for k cars until the last of them passes costs each of those who stand elsewhere that
-    time; ending the green costs each of the k a red at least. What costs less is done.
-    """
-    detector = view.detectors[site.program.groups[number]]
-    rivals = [
-        other
-        for other, name in enumerate(site.program.groups)
-        if frozenset((name, site.program.groups[number])) in site.program.conflicts
-        and name in view.detectors
-    ]
-    waiting = sum(view.detectors[site.program.groups[other]].near for other in rivals)
-    red_s = _red_ns(site, number, rivals, view) / NS_PER_S
-    comes = any(at_s * waiting < (k + 1) * red_s for k, at_s in enumerate(detector.arrivals_s))
-    stands = detector.extend and not (detector.arrivals_s and detector.queue == 0)
-    return comes or stands
-
-
-def _red_ns(site: Site, number: int, rivals: list[int], view: JunctionView) -> int:
-    """Return the shortest red that follows if a green ends now: those who are called go once."""
-    times = site.program.times
-    called = [i for i in rivals if view.detectors[site.program.groups[i]].call]
-    own_ns = times[number].yellow + times[number].clearance
-    return own_ns + sum(sum(times[i]) for i in called)
 
 
 def numbers(site: Site, groups: frozenset[str]) -> frozenset[int]:

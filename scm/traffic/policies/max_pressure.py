@@ -2,9 +2,10 @@
 
     pressure(stage) = sum over its groups of (queue before the line - cars standing behind it)
 
-A stage stays at least its least green. Then the stage of the highest pressure follows; the present
-one stays on a tie, and where its own cars still come. Nobody waits for ever: a group that is
-called and has waited `STARVED_NS` is served next, whatever the others' pressure.
+A stage stays at least its least green, and while its cars are worth waiting for, up to max 1: else
+every car more elsewhere would cost a change, in which nobody drives. Then the stage of the highest
+pressure follows; the present one stays on a tie. Nobody waits for ever: a group that is called and
+has waited `STARVED_NS` is served next, whatever the others' pressure.
 
 Rule: Varaiya 2013, Max pressure control of a network of signalized intersections; the least
 wait is ours. It needs no knowledge of demand, and nothing of other junctions but the queues.
@@ -18,6 +19,7 @@ from scm.traffic.asked import groups_of
 from scm.traffic.kernel import Phase, Program
 from scm.traffic.plan import stages, times_of
 from scm.traffic.policy import Answer, JunctionView, Mode, Policy, Site
+from scm.traffic.waiting import is_worth_waiting
 
 STARVED_NS = 60 * NS_PER_S
 UNSEEN_NS = 120 * NS_PER_S
@@ -53,12 +55,25 @@ def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer
     green_ns = memory.green_ns + view.dt_ns if all_green else 0
     stage = memory.stage
     least_ns = max((times_of(program, name).min_green for name in stage), default=0)
-    if green_ns >= least_ns and (all_green or not stage):
+    if (
+        green_ns >= least_ns
+        and (all_green or not stage)
+        and not _goes_on(site, memory, view, green_ns)
+    ):
         stage = _choose(site, stage, view, called, waits)
     if stage != memory.stage:
         green_ns = 0
     mode: Mode = "preempt" if groups_of(view.asked, "preempt") else "adaptive"
     return Memory(stage, green_ns, waits), Answer(stage, mode=mode)
+
+
+def _goes_on(site: Site, memory: Memory, view: JunctionView, green_ns: int) -> bool:
+    """Return whether ending the stage costs its cars more than the others gain, up to max 1."""
+    if not view.sees or groups_of(view.asked, "preempt") or groups_of(view.asked, "force_off"):
+        return False
+    numbers = [site.program.groups.index(name) for name in memory.stage if name in view.detectors]
+    most_ns = max((site.layout.phases[i].max1 for i in numbers), default=0)
+    return green_ns < most_ns and any(is_worth_waiting(site, i, view) for i in numbers)
 
 
 def stages_of(program: Program) -> list[frozenset[str]]:

@@ -1,4 +1,7 @@
-"""The world tells a remote car that it was hit: what the contact did to its motion."""
+"""The world tells that a car was hit: what the contact did to its motion.
+
+A remote car is to apply it; a hosted one has done so already, and others only watch.
+"""
 
 from typing import ClassVar
 
@@ -10,6 +13,7 @@ class Contact(Message, kw_only=True, frozen=True):
 
     Attributes:
         number: Counts the contacts told to this car, from 1; its reports say what it has felt.
+            0: a hosted car, whose report needs not say.
         dx_m: Position correction out of the overlap, and for what it drove on before it felt the
             hit; likewise `dy_m`, `dyaw_rad`.
         against: What it touched: names of cars, or `wall`.

@@ -1,8 +1,10 @@
 """Networks that SUMO's own tools make become cities that cars can drive."""
 
+import itertools
 import math
 from collections import Counter
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -13,9 +15,14 @@ from scm.maps.check import problems_of
 from scm.maps.load import load_map
 from scm.maps.polyline import extent
 from scm.maps.sumo import ERROR_M, LEAST_RADIUS_M, import_sumo
+from scm.maps.sumo_program import stages_of
+from scm.maps.sumo_read import NetPhase
 from scm.maps.sumo_toml import map_toml
+from scm.part import Hears
+from scm.traffic.own_plan import adopted
 from scm.traffic.part import TrafficPart
 from scm.v2x.messages.route_request import RouteRequest
+from scm.v2x.messages.spat import Spat
 from scm.world.driving import send
 from scm.world.part import WorldPart
 from tests.unit.maps.sumo_nets import OSM, grid, made, stadium
@@ -97,6 +104,75 @@ def test_cars_go_round_in_their_lanes(imported):
     assert worst.max() < BESIDE_CAR_M
     assert way.min() > 0.3
     assert way.max() > 6.0
+
+
+def lit(tmp_path, layout):
+    """Import a grid of SUMO whose lights serve opposite, or single, approaches together."""
+    out = tmp_path / "g.net.xml"
+    return import_sumo(grid(out, "traffic_light", "--tls.layout", layout))
+
+
+def test_a_signal_program_of_the_network_runs_at_its_junction(tmp_path):
+    imported = lit(tmp_path, "incoming")
+    city, why_not = adopted(imported.city_map)
+    assert (imported.unread, why_not) == ({}, {})
+    assert {junction.plan for junction in city.junctions} == {"own"}
+    path = tmp_path / "town.toml"
+    path.write_text(map_toml(city), encoding="utf-8")
+    with Lockstep([TrafficPart(load_map(path))]) as lockstep:
+        spats = lockstep.hear(Hears(Spat, {"junction": "b1"}))
+        lockstep.run_for(200.0)
+        told = [item.message for item in spats.drain()]
+    greens = [tuple(g.group for g in spat.groups if g.colour == "green") for spat in told]
+    runs = [(groups, len(list(run))) for groups, run in itertools.groupby(greens) if groups]
+    assert {spat.plan for spat in told} == {"own"}
+    stages = next(j for j in city.junctions if j.name == "b1").stages
+    assert [groups for groups, _ in runs[: len(stages)]] == [stage.groups for stage in stages]
+    for (_, steps), stage in zip(runs, stages, strict=False):
+        assert steps / 10.0 == pytest.approx(stage.green_s, abs=0.11)
+
+
+def test_a_signal_program_that_lets_ways_cross_is_left_out_and_says_why(tmp_path):
+    imported = lit(tmp_path, "opposites")
+    city, why_not = adopted(imported.city_map)
+    assert imported.unread.keys() | why_not.keys() == {j.name for j in city.junctions}
+    assert "conflict but share a stage" in why_not["b1"]
+    assert "for some ways of lane 'A0A1_0' alone" in imported.unread["a1"]
+    assert {junction.plan for junction in city.junctions} == {"calm"}
+    TrafficPart(city)
+
+
+@pytest.mark.parametrize(
+    ("phases", "expected"),
+    [
+        ([(9, "Gr"), (3, "yr"), (5, "rG"), (4, "rg"), (3, "ry")], [("a", 9), ("b", 9)]),
+        ([(2, "Gr"), (3, "yr"), (5, "rG"), (3, "ry"), (4, "Gr")], [("a", 6), ("b", 5)]),
+        ([(9, "GG"), (2, "rr")], [("ab", 9)]),
+    ],
+)
+def test_phases_become_stages(phases, expected):
+    stages = stages_of([NetPhase(s, lights) for s, lights in phases], {"a": [0], "b": [1]})
+    assert [("".join(stage.groups), stage.green_s) for stage in stages] == expected
+
+
+@pytest.mark.parametrize(
+    ("lights", "words"), [("oo", "blinks for lane 'a'"), ("rr", "no phase"), ("", "no phase")]
+)
+def test_phases_that_cannot_be_shown_are_refused(lights, words):
+    phases = [NetPhase(9.0, lights)] if lights else []
+    with pytest.raises(MapError, match=words):
+        stages_of(phases, {"a": [0], "b": [1]})
+
+
+def test_a_green_of_the_network_too_short_for_our_cars_is_refused(tmp_path):
+    imported = lit(tmp_path, "incoming")
+    first = imported.city_map.junctions[0]
+    short = tuple(msgspec.structs.replace(stage, green_s=1.0) for stage in first.stages)
+    junctions = (msgspec.structs.replace(first, stages=short), *imported.city_map.junctions[1:])
+    city, why_not = adopted(msgspec.structs.replace(imported.city_map, junctions=junctions))
+    assert list(why_not) == [first.name]
+    assert "green 1.0 s, expected at least" in why_not[first.name]
+    assert [j.plan for j in city.junctions] == ["calm", *["own"] * (len(city.junctions) - 1)]
 
 
 @pytest.mark.parametrize(
@@ -215,6 +291,8 @@ def test_the_command_writes_a_map_that_can_be_shown(tmp_path, capsys):
     assert main(["import", "sumo", str(net), "--out", str(out)]) == 0
     said = capsys.readouterr().out
     assert "5 junctions with signals" in said
+    assert "signal programs kept at 0 of 5 junctions" in said
+    assert "b1 runs plan 'calm' instead: plan 'own': " in said
     assert "turns back left out" in said
     assert main(["show", "map", str(out), "--out", str(picture)]) == 0
     assert "<svg" in picture.read_text()

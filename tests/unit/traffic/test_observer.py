@@ -347,3 +347,22 @@ def test_a_collision_in_the_world_is_told_once_for_the_pair():
     assert {violations[0].vehicle, *violations[0].against} == {"r1", "r2"}
     assert "contact" in violations[0].sources
     assert violations[0].track
+
+
+def test_a_collision_of_cars_that_the_world_drives_is_told_once_for_the_pair():
+    part = WorldPart(GRID, 1, room=2)
+    behind, ahead = (ROADS.spawn_pose(f"{LANE}_{i}") for i in (0, 2))
+    x, y = ahead.apply(-0.31, 0.0)
+    for name, pose, speed in (("n1", behind._replace(x=x, y=y), 0.3), ("n2", ahead, 0.0)):
+        car = part.world.host(name, "nigel", pose, 0)
+        car.fleet.place(car.row, pose, speed)
+    with Lockstep([part, ObserverPart(GRID)]) as city:
+        told, contacts = city.hear(Hears(Violation)), city.hear(Hears(Contact))
+        city.run_for(1.5)
+        violations = [item.message for item in told.drain()]
+        blows = [item.message for item in contacts.drain()]
+    assert [v.kind for v in violations] == ["collision"]
+    assert {violations[0].vehicle, *violations[0].against} == {"n1", "n2"}
+    assert {blow.vehicle for blow in blows} == {"n1", "n2"}
+    lost = sum(blow.dvx_mps for blow in blows), sum(blow.dvy_mps for blow in blows)
+    assert lost == pytest.approx((0.0, 0.0), abs=1e-9)
