@@ -14,6 +14,9 @@ from scm.errors import RunError
 from scm.eye.station import eye_station
 from scm.live import stop_on_signal
 from scm.maps.load import load_map
+from scm.store.open import open_store
+from scm.traffic.demand import DemandPart
+from scm.traffic.demand_table import load_demand
 from scm.v2x.access import Guard, guard_of, is_loopback, own_stations
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
@@ -110,8 +113,14 @@ def _settled(wanted: Wanted) -> _Plan:
         msg = f"{got}, expected 127.0.0.1, or a store of `scm key add`"
         raise RunError(msg)
     city_map = load_map(wanted.map_name)
+    _check_counts(wanted)
+    if wanted.demand is not None:
+        DemandPart(city_map, load_demand(wanted.demand))
+    for url in (wanted.state, wanted.keys):
+        if url is not None:
+            open_store(url).close()
     port = _free_port(wanted.port)
-    wanted.record_dir.mkdir(parents=True, exist_ok=True)
+    _make_folder(wanted.record_dir)
     recording = wanted.record_dir / f"{wanted.city}-{_stamp()}.mcap"
     eyes = {
         eye_station(camera.name, first=i == 0): camera.name
@@ -128,6 +137,21 @@ def _settled(wanted: Wanted) -> _Plan:
         state=wanted.state or f"sqlite:{recording.with_suffix('.db')}",
         eyes=eyes,
     )
+
+
+def _check_counts(wanted: Wanted) -> None:
+    for what, got in (("hosted", wanted.hosted), ("agents", wanted.agents)):
+        if got < 0:
+            msg = f"{what}: got {got} cars, expected 0 or more"
+            raise RunError(msg)
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as cause:
+        msg = f"{folder}: {cause.strerror}; expected a folder for recordings"
+        raise RunError(msg) from cause
 
 
 def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
@@ -262,8 +286,9 @@ def _free_port(port: int) -> int:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((HOST, port))
-        except OSError as cause:
-            msg = f"dashboard port {port}: {cause.strerror}; expected a free one, or 0 for any"
+        except (OSError, OverflowError) as cause:
+            why = getattr(cause, "strerror", "there is no such port")
+            msg = f"dashboard port {port}: {why}; expected a free one, or 0 for any"
             raise RunError(msg) from cause
         bound: int = probe.getsockname()[1]
         return bound

@@ -6,6 +6,7 @@ time a station is given new credentials its number goes up, and the router knows
 stolen file ends with the next `scm fleet add` of its owner and a restart of the router.
 """
 
+import re
 import secrets
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -26,6 +27,7 @@ Auth = Literal["password", "mtls"]
 HERE = ("127.0.0.1", "::1", "localhost")
 PASSWORD_BYTES = 32
 RENEW_BEFORE = timedelta(days=30)
+_HOST = re.compile(r"[A-Za-z0-9_.:-]{1,253}")
 
 _HEAD = (
     "# Who may enter the city. Written by `scm fleet add`; secrets lie in the folder beside it.\n"
@@ -103,6 +105,7 @@ def load_fleet(path: Path) -> Fleet:
         raise AccessError(msg)
     try:
         fleet = Fleet(path, auth, tuple(map(str, values.get("hosts", HERE))))
+        check_hosts(fleet.hosts)
         for name, of_station in values.get("stations", {}).items():
             member = Member(check_name(name, "station"), of_station["role"], of_station["issued"])
             rights_of(member.role, name)
@@ -170,6 +173,18 @@ def complete(fleet: Fleet, stations: Mapping[str, str], now: datetime) -> None:
         if _lacks_credentials(fleet, name, now):
             add(fleet, name, role, now)
     name_hosts(fleet, (), now)
+
+
+def check_hosts(hosts: Iterable[str]) -> None:
+    """Refuse what is no address and no host's name: it goes into a file and a certificate.
+
+    Raises:
+        AccessError: naming the first one.
+    """
+    for host in hosts:
+        if not _HOST.fullmatch(host):
+            msg = f"host: got {host!r}, expected an address or a name, as in 192.168.1.5"
+            raise AccessError(msg)
 
 
 def name_hosts(fleet: Fleet, hosts: Iterable[str], now: datetime) -> None:
