@@ -253,9 +253,13 @@ def _tell_next(plan: _Plan, say: Say) -> None:
         programs = programs.relative_to(Path.cwd())
     car = f"n{plan.wanted.hosted + len(plan.agents) + 1}"
     say(f"dashboard: http://{plan.wanted.host}:{plan.port}")
-    say("try next, in another shell:")
-    say(f"  {programs}/vehicle-agent join --name {car} {at}      another car")
-    say(f"  {programs}/python examples/travel_times.py --live {script}      a fleet script")
+    if plan.wanted.fleet is None:
+        say("try next, in another shell:")
+        say(f"  {programs}/vehicle-agent join --name {car} {at}      another car")
+        say(f"  {programs}/python examples/travel_times.py --live {script}      a fleet script")
+    else:
+        say(f"who is in {plan.wanted.fleet} may enter: --connect and --credentials say how")
+        say(f"  {programs}/vehicle-agent join --name NAME {at} --credentials FILE      a car of it")
     say("Ctrl-C stops the city and names its recording")
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from datetime import timedelta
 from functools import partial
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import zenoh
 from zenoh import ext
@@ -31,6 +31,9 @@ from scm.v2x.message import Delivery, Message, Refused, Request, decode, encode,
 from scm.v2x.messages.presence import Presence
 from scm.v2x.reader import Reader
 from scm.v2x.yielding import yielding
+
+if TYPE_CHECKING:
+    from scm.v2x.signed_cams import SignedCams
 
 REQUESTS_KEPT = 1024
 ASK_AGAIN = timedelta(seconds=1)
@@ -69,7 +72,8 @@ class ZenohBus:
         self.city = check_name(city, "city")
         self.station = check_name(station, "station")
         self._clock = clock or WallClock()
-        self._reader = Reader(self._clock)
+        self._air = _signed_cams(credentials)
+        self._reader = Reader(self._clock, None if self._air is None else self._air.check)
         self._lock = threading.Lock()
         self._closed = False
         self._publishers: dict[str, _Publisher] = {}
@@ -102,6 +106,8 @@ class ZenohBus:
         While disconnected only an EVENT is kept, for when the connection is back.
         """
         self._check_open()
+        if self._air is not None:
+            message = self._air.signed(message, self._clock.now_ns())
         kind = type(message)
         if self._connected or kind.DELIVERY is Delivery.EVENT:
             key = key_of(self.city, message)
@@ -382,6 +388,14 @@ class _Asked:
 
     def done(self) -> None:
         self.settle(self._refused or no_server(self._call.request, self._key))
+
+
+def _signed_cams(credentials: Credentials | None) -> "SignedCams | None":
+    if credentials is None or not credentials.air_authority:
+        return None
+    from scm.v2x.signed_cams import SignedCams  # noqa: PLC0415  cryptography is slow to load
+
+    return SignedCams(credentials)
 
 
 def _undeclare(things: Iterable[Any]) -> None:

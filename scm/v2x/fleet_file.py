@@ -10,7 +10,7 @@ import re
 import secrets
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -141,6 +141,7 @@ def add(fleet: Fleet, name: str, role: str, now: datetime) -> Credentials:
     rights_of(role, check_name(name, "station"))
     member = Member(name, role, fleet.issued.get(name, 0) + 1)
     made = _with_password(member) if fleet.auth == "password" else _certified(fleet, member, now)
+    made = _with_ticket(fleet, made, now)
     write_credentials(fleet.credentials(name), made)
     fleet.members[name] = member
     fleet.issued[name] = member.issued
@@ -207,13 +208,41 @@ def _lacks_credentials(fleet: Fleet, name: str, now: datetime) -> bool:
     path = fleet.credentials(name)
     if name not in fleet.members or not path.is_file():
         return True
-    return fleet.auth == "mtls" and _ends_soon(read_credentials(path).certificate, now)
+    held = read_credentials(path)
+    if not _has_ticket(fleet.members[name], held, now):
+        return True
+    return fleet.auth == "mtls" and _ends_soon(held.certificate, now)
+
+
+def _has_ticket(member: Member, held: Credentials, now: datetime) -> bool:
+    from scm.v2x.tickets import ticket_ends  # noqa: PLC0415  slow to load, rarely needed
+
+    if not held.air_authority:
+        return False
+    return not speaks(member.role, member.name) or (
+        bool(held.ticket) and ticket_ends(held.ticket) - now >= RENEW_BEFORE
+    )
 
 
 def _ends_soon(certificate: str, now: datetime) -> bool:
     from scm.v2x.certificates import expiry_of  # noqa: PLC0415  slow to load, rarely needed
 
     return expiry_of(certificate) - now < RENEW_BEFORE
+
+
+def speaks(role: str, name: str) -> bool:
+    """Return whether a station sends CAMs: a car, or the world for those it hosts."""
+    return role == "vehicle" or (role, name) == ("part", "world")
+
+
+def _with_ticket(fleet: Fleet, made: Credentials, now: datetime) -> Credentials:
+    """Return credentials with what a station needs on the air."""
+    from scm.v2x.tickets import air_authority, issue_ticket  # noqa: PLC0415  slow to load
+
+    if not speaks(made.role, made.station):
+        return replace(made, air_authority=air_authority(fleet.folder, now))
+    text = issue_ticket(fleet.folder, made.station, now)
+    return replace(made, ticket=text.ticket, ticket_key=text.key, air_authority=text.authority)
 
 
 def _with_password(member: Member) -> Credentials:
