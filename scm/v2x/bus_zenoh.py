@@ -449,7 +449,8 @@ def ask_again(kind: type[Message] | None, every: timedelta) -> timedelta | None:
 
 def _declare_publisher(session: zenoh.Session, kind: type[Message], key: str) -> _Publisher:
     if kind.DELIVERY is Delivery.EVENT:
-        return declare_event_publisher(session, key, kind.KEEP)
+        events: _Publisher = declare_event_publisher(session, key, kind.KEEP)
+        return events
     if kind.DELIVERY is Delivery.COMMAND:
         priority = zenoh.Priority.REAL_TIME
     else:
