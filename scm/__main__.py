@@ -49,7 +49,11 @@ def build_parser() -> argparse.ArgumentParser:
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """Return what the words after `scm` ask for."""
-    return build_parser().parse_args(_joined(argv))
+    parser = build_parser()
+    seconds = _seconds(argv)
+    if seconds:
+        parser.error(f"expected a second word, as in `scm {argv[0]} {seconds[0]}`: {seconds}")
+    return parser.parse_args(_joined(argv))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -82,6 +86,17 @@ def _joined(argv: Sequence[str]) -> list[str]:
         if first in known:
             break
     return list(argv)
+
+
+def _seconds(argv: Sequence[str]) -> list[str]:
+    """Return what may follow a first word that is no command without it; nothing: all is well."""
+    from scm.registry import names
+
+    known = names("scm.commands")
+    first = argv[0] if argv else ""
+    seconds = [name.removeprefix(f"{first}_") for name in known if name.startswith(f"{first}_")]
+    is_whole = first in known or (len(argv) > 1 and argv[1] in seconds)
+    return [] if is_whole else seconds
 
 
 def _said(command: str, error: Exception) -> int:

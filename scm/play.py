@@ -124,7 +124,7 @@ def read_drive(path: Path) -> tuple[Drive, list[Row]]:
         msg = f"{path}: cannot be read: {cause.strerror or cause}"
         raise ScmError(msg) from cause
     except (yaml.YAMLError, msgspec.ValidationError) as cause:
-        msg = f"{path}: {cause}"
+        msg = f"{path}: {cause}; expected a drive as `scm mismatch` writes it"
         raise ScmError(msg) from cause
     table = read_table(path.parent / drive.commands)
     columns = [table[name] for name in ("t_s", "throttle", "steering")]

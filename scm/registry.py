@@ -25,7 +25,8 @@ def load(
     """
     known = names(package)
     if name not in known:
-        msg = f"{package}: no {constant.lower()} named {name!r}{nearest(name, known)}"
+        hint = nearest(name, known) or f"; there are {', '.join(known)}"
+        msg = f"{package}: no {constant.lower()} named {name!r}{hint}"
         raise error(msg)
     plugin = getattr(importlib.import_module(f"{package}.{name}"), constant, None)
     if not isinstance(plugin, kind):

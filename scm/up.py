@@ -15,6 +15,9 @@ from scm.eye.station import eye_station
 from scm.live import stop_on_signal
 from scm.maps.load import load_map
 from scm.maps.radio import with_radio
+from scm.store.open import open_store
+from scm.traffic.demand import DemandPart
+from scm.traffic.demand_table import load_demand
 from scm.v2x.access import Guard, guard_of, is_loopback, own_stations
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
@@ -113,8 +116,14 @@ def _settled(wanted: Wanted) -> _Plan:
         msg = f"{got}, expected 127.0.0.1, or a store of `scm key add`"
         raise RunError(msg)
     city_map = with_radio(load_map(wanted.map_name), wanted.radio)
+    _check_counts(wanted)
+    if wanted.demand is not None:
+        DemandPart(city_map, load_demand(wanted.demand))
+    for url in (wanted.state, wanted.keys):
+        if url is not None:
+            open_store(url).close()
     port = _free_port(wanted.port)
-    wanted.record_dir.mkdir(parents=True, exist_ok=True)
+    _make_folder(wanted.record_dir)
     recording = wanted.record_dir / f"{wanted.city}-{_stamp()}.mcap"
     eyes = {
         eye_station(camera.name, first=i == 0): camera.name
@@ -131,6 +140,21 @@ def _settled(wanted: Wanted) -> _Plan:
         state=wanted.state or f"sqlite:{recording.with_suffix('.db')}",
         eyes=eyes,
     )
+
+
+def _check_counts(wanted: Wanted) -> None:
+    for what, got in (("hosted", wanted.hosted), ("agents", wanted.agents)):
+        if got < 0:
+            msg = f"{what}: got {got} cars, expected 0 or more"
+            raise RunError(msg)
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as cause:
+        msg = f"{folder}: {cause.strerror}; expected a folder for recordings"
+        raise RunError(msg) from cause
 
 
 def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
@@ -234,9 +258,13 @@ def _tell_next(plan: _Plan, say: Say) -> None:
         programs = programs.relative_to(Path.cwd())
     car = f"n{plan.wanted.hosted + len(plan.agents) + 1}"
     say(f"dashboard: http://{plan.wanted.host}:{plan.port}")
-    say("try next, in another shell:")
-    say(f"  {programs}/vehicle-agent join --name {car} {at}      another car")
-    say(f"  {programs}/python examples/travel_times.py --live {script}      a fleet script")
+    if plan.wanted.fleet is None:
+        say("try next, in another shell:")
+        say(f"  {programs}/vehicle-agent join --name {car} {at}      another car")
+        say(f"  {programs}/python examples/travel_times.py --live {script}      a fleet script")
+    else:
+        say(f"who is in {plan.wanted.fleet} may enter: --connect and --credentials say how")
+        say(f"  {programs}/vehicle-agent join --name NAME {at} --credentials FILE      a car of it")
     say("Ctrl-C stops the city and names its recording")
 
 
@@ -267,8 +295,9 @@ def _free_port(port: int) -> int:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((HOST, port))
-        except OSError as cause:
-            msg = f"dashboard port {port}: {cause.strerror}; expected a free one, or 0 for any"
+        except (OSError, OverflowError) as cause:
+            why = getattr(cause, "strerror", "there is no such port")
+            msg = f"dashboard port {port}: {why}; expected a free one, or 0 for any"
             raise RunError(msg) from cause
         bound: int = probe.getsockname()[1]
         return bound

@@ -46,7 +46,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
     from scm.clock import WallClock, seconds
     from scm.errors import AccessError
-    from scm.v2x.fleet_file import Fleet, add, load_fleet, name_hosts
+    from scm.v2x.fleet_file import Fleet, add, check_hosts, load_fleet, name_hosts
 
     now = datetime.fromtimestamp(seconds(WallClock().now_ns()), UTC)
     is_new = not arguments.fleet.exists()
@@ -55,12 +55,11 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.auth not in (None, fleet.auth):
         msg = f"fleet {fleet.path}: its stations use {fleet.auth}, not {arguments.auth}"
         raise AccessError(msg)
+    check_hosts(arguments.host)
     made = add(fleet, arguments.name, arguments.role, now)
     name_hosts(fleet, arguments.host, now)
     file = fleet.credentials(made.station)
     print(f"{made.station}: {made.role}; credentials in {file}: copy it to where it runs, mode 600")
-    if made.password:
-        print(f"password, shown this once: {made.password}")
     print("A router that runs already learns of it at its next start.")
     return 0
 

@@ -1,8 +1,16 @@
 """`scm key add`: an API key for a person or a program."""
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scm.command import Command
+from scm.errors import AccessError
+
+if TYPE_CHECKING:
+    from scm.api.keys import KeyRing
 
 DEFAULT = "sqlite:keys.db"
 
@@ -15,6 +23,26 @@ def keys_argument(parser: argparse.ArgumentParser) -> None:
         metavar="STORE",
         help="sqlite:PATH or postgresql://... (%(default)s)",
     )
+
+
+@contextmanager
+def key_ring(url: str) -> "Iterator[KeyRing]":
+    """Open the keys that are there already; nothing is made where none are.
+
+    Raises:
+        AccessError: when there is no such file.
+    """
+    from contextlib import closing
+
+    from scm.api.keys import KeyRing
+    from scm.store.open import open_store
+
+    path = url.removeprefix("sqlite:").removeprefix("//")
+    if url.startswith("sqlite:") and not Path(path).exists():
+        msg = f"keys {path}: there is no such file; `scm key add` makes one"
+        raise AccessError(msg)
+    with closing(open_store(url)) as store:
+        yield KeyRing(store)
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,7 +3,7 @@
 import argparse
 
 from scm.command import Command
-from scm.commands.key_add import keys_argument
+from scm.commands.key_add import key_ring, keys_argument
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -12,13 +12,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from contextlib import closing
-
-    from scm.api.keys import KeyRing
-    from scm.store.open import open_store
-
-    with closing(open_store(arguments.keys)) as store:
-        ended = KeyRing(store).revoke(arguments.key_id)
+    with key_ring(arguments.keys) as keys:
+        ended = keys.revoke(arguments.key_id)
     print(f"the {ended.role} key of {ended.owner} has ended")
     return 0
 

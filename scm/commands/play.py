@@ -10,7 +10,9 @@ NAME = "played"
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("drive", type=Path, help="the drive's .yaml, as scm mismatch writes it")
+    parser.add_argument(
+        "drive", type=Path, metavar="DRIVE", help="the drive's .yaml, as scm mismatch writes it"
+    )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", default=Path("played"), help="recording (%(default)s)"
     )
@@ -19,6 +21,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--connect", metavar="ROUTER", help="of a running city; default: one of its own"
     )
     credentials_argument(parser)
+    parser.add_argument("--city", default="city", help="name of the running city (%(default)s)")
     parser.add_argument(
         "--vehicle", metavar="NAME", help="a car of the running city that stands at the start"
     )
@@ -38,7 +41,7 @@ def _run(arguments: argparse.Namespace) -> int:
     print(drive.say)
     if arguments.connect:
         with ZenohBus(
-            "city", "script", arguments.connect, credentials=credentials_of(arguments)
+            arguments.city, "script", arguments.connect, credentials=credentials_of(arguments)
         ) as bus:
             played = play(LiveLink(bus), arguments.vehicle or "n1", rows)
     else:

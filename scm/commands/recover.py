@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from scm.command import Command
+from scm.errors import RecordingError
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,6 +15,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.recorder.recover import recover
 
+    if arguments.recording.is_dir():
+        msg = f"{arguments.recording}: got a folder, expected the .mcap that was cut off"
+        raise RecordingError(msg)
     result = recover(arguments.recording, arguments.out)
     state = "was whole" if result.whole else "was cut off"
     print(f"{arguments.recording} {state}: {result.messages} messages over {result.span_s:.1f} s")

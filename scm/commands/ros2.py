@@ -5,10 +5,21 @@ import argparse
 from scm.command import Command, part_arguments, run_part
 from scm.ros2.wire import DEFAULT_LISTEN
 
+MOST_DOMAIN = 232  # what leaves DDS a port: ROS 2 knows no more
+
+
+def _domain(text: str) -> int:
+    if not text.isdecimal() or int(text) > MOST_DOMAIN:
+        msg = f"got {text!r}, expected 0 to {MOST_DOMAIN}"
+        raise argparse.ArgumentTypeError(msg)
+    return int(text)
+
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
-    parser.add_argument("--domain", type=int, default=0, help="ROS_DOMAIN_ID (%(default)s)")
+    parser.add_argument(
+        "--domain", type=_domain, default=0, metavar="N", help="ROS_DOMAIN_ID (%(default)s)"
+    )
     side = parser.add_mutually_exclusive_group()
     side.add_argument(
         "--ros-listen",

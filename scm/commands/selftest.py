@@ -41,12 +41,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from scm.registry import names
-    from scm.selftest.harms import HARMS, harm_city
-    from scm.selftest.signals import FAULTS, faults_of
+    from scm.selftest.harms import harm_city
+    from scm.selftest.signals import faults_of
 
     if arguments.list:
-        print(*(HARMS if arguments.faults else names(FAULTS)), sep="\n")
+        print("\n".join(_known()))
         return 0
     if arguments.faults:
         return harm_city(arguments.map, arguments.fault, print, arguments.out)
@@ -55,6 +54,20 @@ def _run(arguments: argparse.Namespace) -> int:
         print("nothing was disturbed")
         return 0
     return _test_signals(arguments)
+
+
+def _known() -> Iterator[str]:
+    """Yield every fault's name and what it is, by the call that injects it."""
+    from scm.registry import names
+    from scm.selftest.harms import HARMS
+    from scm.selftest.signals import FAULTS, faults_of
+
+    yield "of signals, `scm selftest NAME ...`:"
+    for name, fault in zip(names(FAULTS), faults_of(()), strict=True):
+        yield f"  {name:<20} {fault.what}"
+    yield "of a whole city of its own, `scm selftest --faults NAME ...`:"
+    for name, harms in HARMS.items():
+        yield f"  {name:<20} {(harms.__doc__ or '').partition(chr(10))[0]}"
 
 
 def _agreed(endpoint: str) -> bool:

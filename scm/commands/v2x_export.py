@@ -1,6 +1,7 @@
 """`scm v2x export`: what a run's stations said over the radio, for other people's tools."""
 
 import argparse
+from collections.abc import Container
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,16 +36,18 @@ def _run(arguments: argparse.Namespace) -> int:
         if path is not None:
             with path.open("wb") as stream:
                 count = write(said, stream)
-            print(f"{path}: {count} messages ({_counted(said)})")
+            without = ("cpm",) if write is write_pcap else ()
+            print(f"{path}: {count} messages ({_counted(said, without)})")
     if arguments.pcap is not None and said.counts["cpm"]:
         print(f"{arguments.pcap}: {said.counts['cpm']} CPMs are not in it: they have no UPER here")
     if said.unreadable:
-        print(f"{arguments.recording}: {said.unreadable} messages are of an older form: left out")
+        print(f"{arguments.recording}: {said.unreadable} messages cannot be read: left out")
     return 0
 
 
-def _counted(said: "OnAir") -> str:
-    return ", ".join(f"{count} {kind.upper()}" for kind, count in sorted(said.counts.items()))
+def _counted(said: "OnAir", without: Container[str]) -> str:
+    counts = sorted(said.counts.items())
+    return ", ".join(f"{count} {kind.upper()}" for kind, count in counts if kind not in without)
 
 
 COMMAND = Command(

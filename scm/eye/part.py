@@ -35,6 +35,7 @@ from scm.maps.model import Camera, CityMap, MapTag
 from scm.part import Hears, IsWanted
 from scm.scenery.bodies import NIGEL, CarBody, car_body
 from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.key import is_name
 from scm.v2x.message import Message
 from scm.v2x.messages.cpm_tx import CpmTx
 from scm.v2x.messages.eye_frame import EyeFrame
@@ -178,7 +179,8 @@ class EyePart:
     def _known(self) -> dict[int, tuple[str, CarBody]]:
         """Return whose tag is whose: the only facts taken from the snapshot."""
         vehicles = self._light.vehicles if self._light else ()
-        return {car.tag_id: (car.vehicle, car_body(car.car)) for car in vehicles}
+        named = [car for car in vehicles if is_name(car.vehicle)]
+        return {car.tag_id: (car.vehicle, car_body(car.car)) for car in named}
 
     def _sightings(
         self, frame: Frame, tags: Sequence[TagSeen], known: dict[int, tuple[str, CarBody]],

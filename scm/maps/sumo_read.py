@@ -89,7 +89,8 @@ def read_net(path: Path) -> Net:
     try:
         net = sumolib.net.readNet(str(path), withPrograms=True)
     except Exception as error:
-        raise MapError(f"{path}: cannot be read as a SUMO network: {error}") from error
+        why = f"{error} is missing" if isinstance(error, KeyError) else error
+        raise MapError(f"{path}: cannot be read as a SUMO network: {why}") from error
     lanes = tuple(_lanes(net))
     if not lanes:
         raise MapError(f"{path}: expected lanes for cars (class {CAR}), got none")

@@ -202,5 +202,6 @@ def _reading(path: Path) -> Iterator[None]:
         msg = f"{path}: cannot be read: {cause.strerror or cause}"
         raise RecordingError(msg) from cause
     except UNREADABLE as cause:
-        msg = f"{path}: not a complete recording ({cause}): try `scm recover {path}`"
+        why = str(cause) or "it ends too soon"
+        msg = f"{path}: not a complete recording ({why}): try `scm recover {path}`"
         raise RecordingError(msg) from cause

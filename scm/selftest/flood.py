@@ -1,6 +1,7 @@
 """One station that says too much: `python -m scm.selftest.flood ENDPOINT CITY RATE SECONDS`.
 
-It talks on a key that those who drive and those who steer signals do not hear; the recorder does.
+It talks on a key that those who drive and those who steer signals do not hear; the recorder and
+the dashboard do.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""Messages that nobody should send: `python -m scm.selftest.fuzz ENDPOINT CITY COUNT RATE SEED`.
+"""Messages that nobody should send: python -m scm.selftest.fuzz ENDPOINT CITY COUNT HZ MOST_S SEED.
 
 Half of them are random bytes, half are real ones of the city with something broken; they go to
 every key on which the city talks, and to keys of every message class besides.
@@ -24,21 +24,26 @@ from scm.v2x.key import prefix, variables
 from scm.v2x.message import Message
 
 LISTENED_S = 3.0
+AT_ONCE = 50
 WRONG = (b"null", b"-1", b"1e999", b"9223372036854775808", b'"x"', b"[]", b"{}", b"NaN", b"true")
 _VALUE = re.compile(rb'(?<=:)(-?[0-9.e+-]+|"[^"]*"|null|true|false)')
 
 
-def main(endpoint: str, city: str, count: int, rate_hz: float, seed: int) -> None:
-    """Send so many broken messages, evenly in time."""
+def main(endpoint: str, city: str, count: int, rate_hz: float, most_s: float, seed: int) -> None:
+    """Send so many broken messages, evenly in time, for no longer than that; print how many."""
     samples = _listen(endpoint, city)
     session = zenoh.open(zenoh.Config.from_json5(zenoh_config.client(endpoint, 5.0)))
     clock, never = WallClock(), threading.Event()
-    began_ns = clock.now_ns()
-    for number, (key, body, attachment) in enumerate(broken(samples, city, count, seed)):
-        if number % 50 == 0:
-            clock.wait_until(began_ns + round(number / rate_hz * NS_PER_S), never)
+    began_ns, sent = clock.now_ns(), 0
+    for key, body, attachment in broken(samples, city, count, seed):
+        if sent % AT_ONCE == 0:
+            if clock.now_ns() - began_ns > most_s * NS_PER_S:
+                break
+            clock.wait_until(began_ns + round(sent / rate_hz * NS_PER_S), never)
         session.put(key, body, attachment=attachment)
+        sent += 1
     session.close()  # type: ignore[no-untyped-call]
+    sys.stdout.write(f"{sent}\n")
 
 
 def broken(
@@ -47,6 +52,7 @@ def broken(
     """Yield so many (key, body, attachment)."""
     rng = random.Random(seed)
     keys = sorted({sample.key for sample in samples} | set(_own_keys(city)))
+    places = {id(one): [place.span() for place in _VALUE.finditer(one.body)] for one in samples}
     for _ in range(count):
         if rng.random() < 0.5 or not samples:
             body = rng.randbytes(rng.choice((0, 1, 20, 300, 4000)))
@@ -54,10 +60,11 @@ def broken(
         else:
             sample = rng.choice(samples)
             key = sample.key if rng.random() < 0.8 else rng.choice(keys)
-            yield key, _break(sample.body, rng), sample.attachment
+            yield key, _break(sample.body, places[id(sample)], rng), sample.attachment
 
 
-def _break(body: bytes, rng: random.Random) -> bytes:
+def _break(body: bytes, places: list[tuple[int, int]], rng: random.Random) -> bytes:
+    """Return a body that is cut, hit, doubled, or has another value at one of its places."""
     match rng.randrange(4):
         case 0:
             return body[: rng.randrange(len(body) + 1)]
@@ -66,11 +73,10 @@ def _break(body: bytes, rng: random.Random) -> bytes:
             return body[:at] + rng.randbytes(1) + body[at + 1 :]
         case 2:
             return body + body
-    places = list(_VALUE.finditer(body[:20_000]))
     if not places:
         return b"[" * 10_000
-    place = rng.choice(places)
-    return body[: place.start()] + rng.choice(WRONG) + body[place.end() :]
+    begin, end = rng.choice(places)
+    return body[:begin] + rng.choice(WRONG) + body[end:]
 
 
 def _own_keys(city: str) -> Iterator[str]:
@@ -99,4 +105,5 @@ def _is_json(body: bytes) -> bool:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2], int(sys.argv[3]), float(sys.argv[4]), int(sys.argv[5]))
+    count, rate_hz, most_s = int(sys.argv[3]), float(sys.argv[4]), float(sys.argv[5])
+    main(sys.argv[1], sys.argv[2], count, rate_hz, most_s, int(sys.argv[6]))

@@ -161,7 +161,8 @@ class Watch:
     def events_lost(self, since_ns: int) -> str:
         """Return how many of the talker's events never came, in words."""
         heard = self.observer.heard(CityEvent, since_ns)
-        got = {int(m.text) for _, m in heard if m.source == "talker" and m.name == "talk"}
+        told = [m.text for _, m in heard if m.source == "talker" and m.name == "talk"]
+        got = {int(text) for text in told if text.isascii() and text.isdecimal()}
         now_ns = self.observer.clock.now_ns()
         sent = {
             number

@@ -209,7 +209,7 @@ class SignalTrials:
         return any(s.fault is not None for _, s in told[-8:] if s.junction == self._junction)
 
     def _is_calm(self) -> bool:
-        """Say whether the plan has run for a while, and the monitor believes it."""
+        """Say whether the plan has run for a while, the monitor believes it, and both is news."""
         since_ns = self._observer.clock.now_ns() - CALM_NS
         shown = [s for _, s in self._observer.heard(Spat, since_ns) if s.junction == self._junction]
         told = [
@@ -218,4 +218,5 @@ class SignalTrials:
             if s.junction == self._junction
         ]
         runs = len(shown) >= 3 and all(spat.mode == "plan" for spat in shown)
+        runs = runs and shown[-1].t_ns > since_ns  # a busy observer may hear what is long past
         return runs and bool(told) and all(status.fault is None for status in told)

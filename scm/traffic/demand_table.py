@@ -83,7 +83,8 @@ def load_demand(path: Path) -> tuple[Flow, ...]:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise DemandError(f"{path}: cannot be read: {error}") from error
+        why = getattr(error, "strerror", None) or error
+        raise DemandError(f"{path}: cannot be read: {why}") from error
     if path.suffix == ".xml":
         flows = _of_sumo(text, path)
     elif path.suffix == ".toml":

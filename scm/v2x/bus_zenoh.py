@@ -13,10 +13,9 @@ from collections.abc import Callable, Iterable, Mapping
 from datetime import timedelta
 from functools import partial
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import zenoh
-from zenoh import ext
 
 from scm.clock import Clock, WallClock
 from scm.errors import LinkError, MessageError
@@ -25,17 +24,23 @@ from scm.v2x import zenoh_config
 from scm.v2x.bus import check_reply, more_telling, no_answer, no_server
 from scm.v2x.credentials import Credentials
 from scm.v2x.exchange import Answer, Call, Incoming, RawSample
+from scm.v2x.flood_gate import FloodGate
 from scm.v2x.key import check_name, everything, key_of, parse, selector
 from scm.v2x.mailbox import Mailbox, RawMailbox
 from scm.v2x.message import Delivery, Message, Refused, Request, decode, encode, is_bulk
 from scm.v2x.messages.presence import Presence
 from scm.v2x.reader import Reader
 from scm.v2x.yielding import yielding
+from scm.v2x.zenoh_events import declare_event_publisher, declare_event_subscriber
+
+if TYPE_CHECKING:
+    from scm.v2x.signed_cams import SignedCams
 
 REQUESTS_KEPT = 1024
 ASK_AGAIN = timedelta(seconds=1)
 ASK_AGAIN_FOR_ALL = timedelta(seconds=5)
 _TIMEOUT = b"Timeout"
+_FLOOD = "more than is read of one key in a second"
 
 _log = logging.getLogger(__name__)
 
@@ -69,7 +74,8 @@ class ZenohBus:
         self.city = check_name(city, "city")
         self.station = check_name(station, "station")
         self._clock = clock or WallClock()
-        self._reader = Reader(self._clock)
+        self._air = _signed_cams(credentials)
+        self._reader = Reader(self._clock, None if self._air is None else self._air.check)
         self._lock = threading.Lock()
         self._closed = False
         self._publishers: dict[str, _Publisher] = {}
@@ -102,6 +108,8 @@ class ZenohBus:
         While disconnected only an EVENT is kept, for when the connection is back.
         """
         self._check_open()
+        if self._air is not None:
+            message = self._air.signed(message, self._clock.now_ns())
         kind = type(message)
         if self._connected or kind.DELIVERY is Delivery.EVENT:
             key = key_of(self.city, message)
@@ -130,7 +138,7 @@ class ZenohBus:
         callback = self._direct(self._noting(on_sample))
         if kind.DELIVERY is Delivery.EVENT:
             again = ask_again(kind, ASK_AGAIN)
-            subscriber = _declare_event_subscriber(
+            subscriber = declare_event_subscriber(
                 self._session, expression, callback, kind.KEEP, again
             )
         else:
@@ -195,13 +203,19 @@ class ZenohBus:
             self._declare(self._session.declare_subscriber(expression, callback))
             return
         again = ask_again(kind, ASK_AGAIN_FOR_ALL)
-        self._declare(_declare_event_subscriber(self._session, expression, callback, None, again))
+        self._declare(declare_event_subscriber(self._session, expression, callback, None, again))
 
     def serve(self, kind: type[Request], where: Mapping[str, str], mailbox: Mailbox) -> None:
         """Bring requests of a class into a mailbox; each waits there for its `answer`."""
         self._check_open()
 
+        gate = FloodGate()
+
         def on_query(query: zenoh.Query) -> None:
+            if not gate.admits(str(query.key_expr), 0, self._clock.now_ns()):
+                self._reader.reject(str(query.key_expr), _FLOOD)
+                query.drop()  # type: ignore[no-untyped-call]
+                return
             body = query.payload.to_bytes() if query.payload is not None else b""
             attachment = query.attachment.to_bytes() if query.attachment is not None else None
             facts = (body, attachment, self._clock.now_ns())
@@ -313,11 +327,17 @@ class ZenohBus:
         self._connected = change.kind == zenoh.SampleKind.PUT
 
     def _noting(self, on_sample: OnSample) -> Callable[[zenoh.Sample], None]:
+        gate = FloodGate()
+
         def note(sample: zenoh.Sample) -> None:
-            if sample.kind == zenoh.SampleKind.PUT:
-                attachment = sample.attachment.to_bytes() if sample.attachment is not None else None
-                key, body = str(sample.key_expr), sample.payload.to_bytes()
-                on_sample(key, body, attachment, self._clock.now_ns())
+            if sample.kind != zenoh.SampleKind.PUT:
+                return
+            key, now_ns = str(sample.key_expr), self._clock.now_ns()
+            if not gate.admits(key, len(sample.payload), now_ns):
+                self._reader.reject(key, _FLOOD)
+                return
+            attachment = sample.attachment.to_bytes() if sample.attachment is not None else None
+            on_sample(key, sample.payload.to_bytes(), attachment, now_ns)
 
         return note
 
@@ -384,6 +404,14 @@ class _Asked:
         self.settle(self._refused or no_server(self._call.request, self._key))
 
 
+def _signed_cams(credentials: Credentials | None) -> "SignedCams | None":
+    if credentials is None or not credentials.air_authority:
+        return None
+    from scm.v2x.signed_cams import SignedCams  # noqa: PLC0415  cryptography is slow to load
+
+    return SignedCams(credentials)
+
+
 def _undeclare(things: Iterable[Any]) -> None:
     for thing in things:
         try:
@@ -421,7 +449,8 @@ def ask_again(kind: type[Message] | None, every: timedelta) -> timedelta | None:
 
 def _declare_publisher(session: zenoh.Session, kind: type[Message], key: str) -> _Publisher:
     if kind.DELIVERY is Delivery.EVENT:
-        return _declare_event_publisher(session, key, kind.KEEP)
+        events: _Publisher = declare_event_publisher(session, key, kind.KEEP)
+        return events
     if kind.DELIVERY is Delivery.COMMAND:
         priority = zenoh.Priority.REAL_TIME
     else:
@@ -433,44 +462,4 @@ def _declare_publisher(session: zenoh.Session, kind: type[Message], key: str) ->
         priority=priority,
         congestion_control=zenoh.CongestionControl.DROP,
         express=kind.DELIVERY is Delivery.COMMAND,
-    )
-
-
-# The two functions below are all that touches the part of Zenoh which is marked unstable.
-
-
-def _declare_event_publisher(session: zenoh.Session, key: str, keep: int) -> _Publisher:
-    """Return a publisher that keeps its last samples for late joiners and those who lost some."""
-    return ext.declare_advanced_publisher(
-        session,
-        key,
-        cache=ext.CacheConfig(keep),
-        sample_miss_detection=ext.MissDetectionConfig(),  # type: ignore[call-arg]
-        publisher_detection=True,
-        congestion_control=zenoh.CongestionControl.DROP,
-    )
-
-
-def _declare_event_subscriber(
-    session: zenoh.Session,
-    expression: str,
-    callback: Any,
-    keep: int | None,
-    again: timedelta | None,
-) -> Any:
-    """Return a subscriber that gets what was kept first, and asks for what it lost.
-
-    A gap shows at the next sample. What comes at no fixed rate is asked for every `again`, because
-    heartbeats do not do it: after a router's restart those of 1.10.2 arrive and nobody asks. Each
-    sender is asked in turn, which 200 of them feel (a third of a core at 1 s).
-    """
-    # The stubs want both arguments, and seconds; the library wants one alone, and a timedelta.
-    facts: dict[str, Any] = {"periodic_queries": again} if again else {"heartbeat": True}
-    recovery = ext.RecoveryConfig(**facts)
-    return ext.declare_advanced_subscriber(
-        session,
-        expression,
-        callback,
-        history=ext.HistoryConfig(detect_late_publishers=True, max_samples=keep),
-        recovery=recovery,
     )

@@ -29,6 +29,8 @@ class Credentials:
         user: Name that goes with the password; empty with a certificate.
         password: Empty with a certificate.
         certificate, private_key, authority: PEM; empty with a password.
+        ticket, ticket_key: What it signs on the air with, base64 and PEM; empty: it sends nothing.
+        air_authority: What others' tickets have to come from, base64; empty: nobody signs.
     """
 
     station: str
@@ -38,6 +40,9 @@ class Credentials:
     certificate: str = ""
     private_key: str = ""
     authority: str = ""
+    ticket: str = ""
+    ticket_key: str = ""
+    air_authority: str = ""
 
     def client_settings(self) -> dict[str, object]:
         """Return the `transport` settings of Zenoh for a client with these credentials."""

@@ -6,10 +6,11 @@ time a station is given new credentials its number goes up, and the router knows
 stolen file ends with the next `scm fleet add` of its owner and a restart of the router.
 """
 
+import re
 import secrets
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -26,6 +27,7 @@ Auth = Literal["password", "mtls"]
 HERE = ("127.0.0.1", "::1", "localhost")
 PASSWORD_BYTES = 32
 RENEW_BEFORE = timedelta(days=30)
+_HOST = re.compile(r"[A-Za-z0-9_.:-]{1,253}")
 
 _HEAD = (
     "# Who may enter the city. Written by `scm fleet add`; secrets lie in the folder beside it.\n"
@@ -103,6 +105,7 @@ def load_fleet(path: Path) -> Fleet:
         raise AccessError(msg)
     try:
         fleet = Fleet(path, auth, tuple(map(str, values.get("hosts", HERE))))
+        check_hosts(fleet.hosts)
         for name, of_station in values.get("stations", {}).items():
             member = Member(check_name(name, "station"), of_station["role"], of_station["issued"])
             rights_of(member.role, name)
@@ -138,6 +141,7 @@ def add(fleet: Fleet, name: str, role: str, now: datetime) -> Credentials:
     rights_of(role, check_name(name, "station"))
     member = Member(name, role, fleet.issued.get(name, 0) + 1)
     made = _with_password(member) if fleet.auth == "password" else _certified(fleet, member, now)
+    made = _with_ticket(fleet, made, now)
     write_credentials(fleet.credentials(name), made)
     fleet.members[name] = member
     fleet.issued[name] = member.issued
@@ -172,6 +176,18 @@ def complete(fleet: Fleet, stations: Mapping[str, str], now: datetime) -> None:
     name_hosts(fleet, (), now)
 
 
+def check_hosts(hosts: Iterable[str]) -> None:
+    """Refuse what is no address and no host's name: it goes into a file and a certificate.
+
+    Raises:
+        AccessError: naming the first one.
+    """
+    for host in hosts:
+        if not _HOST.fullmatch(host):
+            msg = f"host: got {host!r}, expected an address or a name, as in 192.168.1.5"
+            raise AccessError(msg)
+
+
 def name_hosts(fleet: Fleet, hosts: Iterable[str], now: datetime) -> None:
     """Make the router's certificate good at more addresses, and renew it when it ends soon."""
     wished = (*fleet.hosts, *(host for host in hosts if host not in fleet.hosts))
@@ -192,13 +208,41 @@ def _lacks_credentials(fleet: Fleet, name: str, now: datetime) -> bool:
     path = fleet.credentials(name)
     if name not in fleet.members or not path.is_file():
         return True
-    return fleet.auth == "mtls" and _ends_soon(read_credentials(path).certificate, now)
+    held = read_credentials(path)
+    if not _has_ticket(fleet.members[name], held, now):
+        return True
+    return fleet.auth == "mtls" and _ends_soon(held.certificate, now)
+
+
+def _has_ticket(member: Member, held: Credentials, now: datetime) -> bool:
+    from scm.v2x.tickets import ticket_ends  # noqa: PLC0415  slow to load, rarely needed
+
+    if not held.air_authority:
+        return False
+    return not speaks(member.role, member.name) or (
+        bool(held.ticket) and ticket_ends(held.ticket) - now >= RENEW_BEFORE
+    )
 
 
 def _ends_soon(certificate: str, now: datetime) -> bool:
     from scm.v2x.certificates import expiry_of  # noqa: PLC0415  slow to load, rarely needed
 
     return expiry_of(certificate) - now < RENEW_BEFORE
+
+
+def speaks(role: str, name: str) -> bool:
+    """Return whether a station sends CAMs: a car, or the world for those it hosts."""
+    return role == "vehicle" or (role, name) == ("part", "world")
+
+
+def _with_ticket(fleet: Fleet, made: Credentials, now: datetime) -> Credentials:
+    """Return credentials with what a station needs on the air."""
+    from scm.v2x.tickets import air_authority, issue_ticket  # noqa: PLC0415  slow to load
+
+    if not speaks(made.role, made.station):
+        return replace(made, air_authority=air_authority(fleet.folder, now))
+    text = issue_ticket(fleet.folder, made.station, now)
+    return replace(made, ticket=text.ticket, ticket_key=text.key, air_authority=text.authority)
 
 
 def _with_password(member: Member) -> Credentials:

@@ -29,6 +29,12 @@ def check_name(name: str, what: str) -> str:
     return name
 
 
+@lru_cache(maxsize=65536)
+def is_name(name: str) -> bool:
+    """Return whether a vehicle, station, city ... of this name may stand in a key."""
+    return _CHUNK.fullmatch(name) is not None
+
+
 def variables(kind: type[Message]) -> list[str]:
     """Return the names of the variable chunks in a message's key, in order."""
     return [name for _, name, _, _ in Formatter().parse(kind.KEY) if name]
@@ -102,12 +108,15 @@ def parse(city: str, kind: type[Message], key: str) -> dict[str, str]:
 def agrees(key: str, message: Message) -> bool:
     """Return whether a message says the same names inside as the key it came on.
 
-    No message agrees with a key of wildcards: a query may come on one.
+    No message agrees with a key of wildcards, which a query may come on, nor of what is no name:
+    whoever answered under it, or told of it, could not.
     """
     chunks = key.split("/", 3)[-1].split("/")
     own = type(message).KEY.split("/")
     for i, name in _places(type(message)):
         own[i] = getattr(message, name)
+        if not is_name(str(own[i])):
+            return False
     return chunks == own
 
 

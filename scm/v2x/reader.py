@@ -4,9 +4,10 @@ The log says so at most once a second, however much rubbish arrives.
 """
 
 import logging
+from collections.abc import Callable
 
 from scm.clock import NS_PER_S, Clock
-from scm.errors import MessageError
+from scm.errors import MessageError, ScmError
 from scm.log import event
 from scm.v2x.exchange import Incoming
 from scm.v2x.key import agrees
@@ -15,15 +16,23 @@ from scm.v2x.message import Message, decode
 _log = logging.getLogger(__name__)
 
 
+Check = Callable[[Message, int], None]
+
+
 class Reader:
     """Reads what arrives at one bus.
+
+    Args:
+        clock: For how often the log says so.
+        check: Refuses, with a `ScmError`, what can be read and must not be believed.
 
     Attributes:
         rejected: How many arrivals could not be read, or came on a key that is not theirs.
     """
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, check: Check | None = None) -> None:
         self._clock = clock
+        self._check = check
         self._quiet_until_ns: int | None = None
         self.rejected = 0
 
@@ -39,6 +48,12 @@ class Reader:
         if not agrees(key, message):
             self.reject(key, "the names inside are not those of its key")
             return None
+        if self._check is not None:
+            try:
+                self._check(message, t_ns)
+            except ScmError as cause:
+                self.reject(key, str(cause))
+                return None
         return Incoming(message, t_ns)
 
     def reject(self, key: str, reason: str) -> None:

@@ -62,7 +62,9 @@ EVERY_REQUEST = (
     "tl/*/mon/reset",
 )
 
-_EVERYBODY = Rights(says=("part/{me}/status", "event/*/{me}"))
+_EVERYBODY = Rights(
+    says=("part/{me}/status", "event/info/{me}", "event/warning/{me}", "event/error/{me}")
+)
 _WATCHES = Rights(hears=EVERYTHING)
 
 _OF_ROLE: dict[str, Rights] = {

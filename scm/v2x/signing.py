@@ -72,6 +72,11 @@ def make_authority(name: str, now_ns: int, hours: int = HOURS) -> Ticket:
     return Ticket(says.signed(_sign(key, says.to_be_signed(), b"")), key)
 
 
+def starts_ns(says: Certificate) -> int:
+    """Return from when on a certificate is good, nanoseconds since 1970."""
+    return _unix_ns(says.start_s * 1_000_000)
+
+
 def issue(
     authority: Ticket, station: str, now_ns: int, *, psids: tuple[int, ...] = (CAM, DENM),
     hours: int = 24,

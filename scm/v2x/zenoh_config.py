@@ -12,6 +12,9 @@ LEASE_MS = 1000
 RETRY_FIRST_MS = 100
 RETRY_MOST_MS = 500
 
+LARGEST_BYTES = 32 << 20
+"""Of one message: a raw 4K picture. Zenoh's own is 1 GiB, and a thousand of them may wait."""
+
 # Batches that may wait to be sent, by priority, before messages are dropped. Zenoh's own 2 is soon
 # full of commands, which are each sent in a batch of their own.
 BURST = {"real_time": 16, "data_high": 16, "data": 16}
@@ -72,7 +75,10 @@ def _both() -> dict[str, Any]:
         "scouting": {"delay": 0, "multicast": off, "gossip": off},
         "transport": {
             "shared_memory": off,
-            "link": {"tx": {"lease": LEASE_MS, "queue": {"size": BURST}}},
+            "link": {
+                "tx": {"lease": LEASE_MS, "queue": {"size": BURST}},
+                "rx": {"max_message_size": LARGEST_BYTES},
+            },
         },
         "timestamping": {"enabled": True},
     }

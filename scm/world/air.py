@@ -215,5 +215,10 @@ def _cam(world: World, state: VehicleState, now_ns: int) -> CamTx:
 
 
 def _received(receiver: str, frame: Frame) -> Heard:
+    if isinstance(frame, CamTx):
+        return CamRx(
+            receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body,
+            signed=frame.signed,
+        )  # fmt: skip
     kind = RECEIVED[type(frame)]
     return kind(receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body)  # type: ignore[arg-type]

@@ -34,7 +34,7 @@ INTEGERS = (0, -1, 1, 2**63 - 1, -(2**63))
 FLOATS = (0.0, -0.0, 1e-320, 1e154, 1.7e308, -1.7e308, 0.3)
 # so that a message concerns somebody who is there
 PLACES = {
-    "vehicle": ("n1", "n2"),
+    "vehicle": ("n1", "n2", "n R"),
     "receiver": ("n2",),
     "station": ("n1", "n2", "world"),
     "suspect": ("n1", "n2"),

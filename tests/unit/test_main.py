@@ -62,6 +62,45 @@ def test_a_log_level_that_does_not_exist_is_refused(capsys: pytest.CaptureFixtur
     assert "'nonsense'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("words", "second"),
+    [(["fleet"], "scm fleet add"), (["v2x", "expor"], "scm v2x export"), (["key", "-h"], "'add'")],
+)
+def test_half_a_command_is_told_its_second_word(
+    words: list[str], second: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2
+    assert second in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [["list"], ["revoke", "1a2b3c4d"]])
+def test_keys_that_are_not_there_are_not_made_by_looking(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keys = tmp_path / "keys.db"
+    assert main(["key", *words, "--keys", f"sqlite:{keys}"]) == 2
+    assert "there is no such file" in capsys.readouterr().err
+    assert not keys.exists()
+
+
+def test_a_folder_is_no_recording_to_mend(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["recover", str(tmp_path)]) == 2
+    assert "got a folder" in capsys.readouterr().err
+
+
+def test_the_selftest_lists_faults_of_signals_and_of_cities(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["selftest", "--list"]) == 0
+    lines = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
+    assert {"frozen_controller", "flood"} <= {line[0] for line in lines}
+    assert all(len(line) == 2 for line in lines)
+
+
 @pytest.mark.parametrize("name", names("scm.commands"))
 def test_every_command_shows_an_example_that_it_understands(
     name: str, capsys: pytest.CaptureFixture[str]

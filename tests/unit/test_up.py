@@ -1,10 +1,11 @@
 """`scm up` refuses what cannot work before it starts anything."""
 
 import socket
+from pathlib import Path
 
 import pytest
 
-from scm.errors import MapError, RunError
+from scm.errors import MapError, RunError, ScmError
 from scm.up import Wanted, _parts, _settled, run_city
 from scm.v2x.router import Router, free_endpoint
 
@@ -59,3 +60,25 @@ def test_the_radio_goes_to_the_world_and_to_no_other_part(tmp_path):
     told = {job.name: job.command() for job in _parts(_settled(wanted))}
     assert told["world"][-6:-2] == ["--radio", "loss=0.3", "--radio", "delay_ms=50"]
     assert [name for name, command in told.items() if "--radio" in command] == ["world"]
+
+
+@pytest.mark.parametrize(
+    ("facts", "said"),
+    [
+        ({"hosted": -1}, "hosted: got -1"),
+        ({"agents": -1}, "agents: got -1"),
+        ({"port": 70000}, "no such port"),
+        ({"state": "nonsense"}, "expected sqlite:PATH"),
+        ({"keys": "sqlite:/no/such/keys.db"}, "cannot open"),
+        ({"demand": Path("no_such.csv")}, "no_such.csv: cannot be read"),
+    ],
+)
+def test_what_a_part_would_refuse_is_refused_at_once(start, facts, said):
+    with pytest.raises(ScmError, match=said):
+        start(**facts)
+
+
+def test_a_file_is_no_folder_for_recordings(start, tmp_path):
+    (tmp_path / "runs").write_text("")
+    with pytest.raises(RunError, match="expected a folder"):
+        start()

@@ -6,13 +6,14 @@ from scm.v2x.etsi import CamBody
 from scm.v2x.message import Message
 
 
-class CamRx(Message, kw_only=True, frozen=True):
+class CamRx(Message, kw_only=True, frozen=True, omit_defaults=True):
     """A CAM reaches a station.
 
     Attributes:
         receiver: Who hears it.
         station: Who sent it.
         t_ns: When it was sent.
+        signed: The sender's signature, see `CamTx`.
     """
 
     KEY: ClassVar[str] = "v2x/rx/{receiver}/{station}/cam"
@@ -22,6 +23,7 @@ class CamRx(Message, kw_only=True, frozen=True):
     station: str
     t_ns: int
     body: CamBody
+    signed: str = ""
 
 
 MESSAGE = CamRx

@@ -6,8 +6,12 @@ from scm.v2x.etsi import CamBody
 from scm.v2x.message import Message
 
 
-class CamTx(Message, kw_only=True, frozen=True):
-    """A CAM leaves a station's antenna."""
+class CamTx(Message, kw_only=True, frozen=True, omit_defaults=True):
+    """A CAM leaves a station's antenna.
+
+    Attributes:
+        signed: Signature in a guarded city, base64 of IEEE 1609.2; empty in others.
+    """
 
     KEY: ClassVar[str] = "v2x/tx/{station}/cam"
     RATE_HZ: ClassVar[float | None] = 10.0
@@ -15,6 +19,7 @@ class CamTx(Message, kw_only=True, frozen=True):
     station: str
     t_ns: int
     body: CamBody
+    signed: str = ""
 
 
 MESSAGE = CamTx

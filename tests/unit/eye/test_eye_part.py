@@ -11,6 +11,7 @@ from scm.eye.source import Frame
 from scm.eye.sources.file import FileSource
 from scm.maps.load import load_map
 from scm.v2x.exchange import Incoming
+from scm.v2x.key import key_of
 from scm.v2x.messages.cpm_tx import CpmTx
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
@@ -274,3 +275,12 @@ def test_only_the_first_camera_of_a_map_tells_tracks_and_hears_the_others():
         heard = [Incoming(pose, snapshot.t_ns) for pose in of(EyePose, out)]
         told = first.step(snapshot.t_ns, [Incoming(snapshot, snapshot.t_ns), *heard])
     assert set(of(EyeTrack, told)[0].cameras) == {"overhead", "side"}
+
+
+def test_a_name_that_no_key_can_hold_stops_nobody():
+    wrong = msgspec.structs.replace(CAR, vehicle="n R")
+    eye = EyePart(CITY, seed=3)
+    out = [message for tick in (1, 2, 3) for message in see(eye, light(tick, wrong))]
+    assert {pose.vehicle for pose in of(EyePose, out)} == {f"tag-{CAR.tag_id}"}
+    for message in out:
+        key_of("city", message)

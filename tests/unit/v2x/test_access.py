@@ -19,9 +19,11 @@ from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.certificates import Pair, issue_station, make_authority
 from scm.v2x.credentials import Credentials, read_credentials
+from scm.v2x.etsi_convert import cam_of
 from scm.v2x.exchange import Answer
 from scm.v2x.fleet_file import Fleet, add, name_hosts, remove
 from scm.v2x.message import Refused, encode
+from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.drive_command import DriveCommand
@@ -215,6 +217,21 @@ def test_a_raw_put_of_a_car_on_a_key_that_is_not_its_own_reaches_nobody(guarded,
     until(heard_fence, also=lambda: mouth.put(fence, b"fence"))
     assert {bytes(s.payload) for s in heard} == {b"fence"}
     subscriber.undeclare()
+
+
+def test_a_cam_that_its_own_car_did_not_sign_is_dropped_and_counted(guarded):
+    box, world = guarded.hears("world", CamTx), guarded.bus("world")
+    mouth, honest = raw(guarded, "n1"), guarded.bus("n1")
+    plain = CamTx(station="n1", t_ns=1, body=cam_of(state(), length_m=0.3, width_m=0.2, front_m=0))
+    before = world.rejected
+
+    def forge():
+        mouth.put("scm/@v1/city/v2x/tx/n1/cam", encode(plain)[0])
+        honest.publish(plain)
+
+    until(lambda: bool(messages(box)) and world.rejected > before, also=forge)
+    forge()
+    assert all(message.signed for message in messages(box))
 
 
 def test_a_car_hears_its_own_commands_and_not_those_of_others(guarded):

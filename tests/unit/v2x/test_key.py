@@ -92,6 +92,8 @@ def test_everything_matches_every_key_of_the_city_and_none_of_another():
 def test_a_message_agrees_with_its_own_key_only():
     assert agrees("scm/@v1/city/event/info/world", event("world"))
     assert not agrees("scm/@v1/city/event/info/n7", event("world"))
+    for wrong in ("nR", "", "n 7", "né", "a" * 33):
+        assert not agrees(f"scm/@v1/city/event/info/{wrong}", event(wrong))
 
 
 @pytest.mark.parametrize(

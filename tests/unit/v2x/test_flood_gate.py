@@ -1,0 +1,110 @@
+"""The flood gate: one loud key is cut, and nobody else is."""
+
+import threading
+
+import pytest
+
+from scm.clock import NS_PER_S, WallClock
+from scm.v2x.bus import Mailbox
+from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.exchange import Answer, Call
+from scm.v2x.flood_gate import BYTES_A_SECOND, MESSAGES_A_SECOND, FloodGate
+from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.stop_request import StopRequest
+from scm.v2x.router import Router, free_endpoint
+
+
+def test_a_loud_key_is_cut_at_its_limit_and_others_are_not():
+    gate = FloodGate()
+    admitted = sum(gate.admits("loud", 10, i) for i in range(3 * MESSAGES_A_SECOND))
+    assert (admitted, gate.dropped) == (MESSAGES_A_SECOND, 2 * MESSAGES_A_SECOND)
+    assert gate.admits("quiet", 10, 1)
+
+
+def test_a_second_later_a_cut_key_is_heard_again():
+    gate = FloodGate()
+    while gate.admits("loud", 10, 0):
+        pass
+    assert not gate.admits("loud", 10, NS_PER_S - 1)
+    assert gate.admits("loud", 10, NS_PER_S)
+
+
+@pytest.mark.parametrize("jump_s", [-3600, 3600])
+def test_a_clock_that_jumps_shuts_nobody_out(jump_s):
+    gate = FloodGate()
+    while gate.admits("loud", 10, 5000 * NS_PER_S):
+        pass
+    assert gate.admits("loud", 10, (5000 + jump_s) * NS_PER_S)
+
+
+def test_few_huge_messages_are_a_flood_too():
+    gate = FloodGate()
+    size = BYTES_A_SECOND // 4
+    assert [gate.admits("loud", size, 0) for _ in range(6)] == [True] * 4 + [False] * 2
+
+
+@pytest.fixture
+def buses():
+    endpoint = free_endpoint()
+    with (
+        Router(endpoint),
+        ZenohBus("city", "ears", endpoint) as ears,
+        ZenohBus("city", "mouth", endpoint) as mouth,
+    ):
+        yield ears, mouth
+
+
+def wait_for(condition):
+    clock, never = WallClock(), threading.Event()
+    end_ns = clock.now_ns() + 10 * NS_PER_S
+    while not condition():
+        assert clock.now_ns() < end_ns
+        never.wait(0.005)
+
+
+def status(station, number=0):
+    return PartStatus(station=station, t_ns=number)
+
+
+def test_a_reader_of_a_flooded_key_still_hears_the_others(buses):
+    ears, mouth = buses
+    box, heard = Mailbox(100_000), []
+
+    def look():
+        heard.extend(item.message.station for item in box.drain())
+        return heard
+
+    def say_both():
+        for i in range(500):
+            mouth.publish(status("loud", i))
+        mouth.publish(status("quiet"))
+
+    ears.subscribe(PartStatus, {}, box)
+    wait_for(lambda: mouth.publish(status("quiet")) or look())
+    wait_for(lambda: say_both() or ears.rejected > 0)
+    del heard[:]
+    wait_for(lambda: say_both() or "quiet" in look())
+    assert heard.count("loud") <= 2 * MESSAGES_A_SECOND
+
+
+def test_a_flood_of_requests_is_cut_and_a_second_later_one_is_answered(buses):
+    ears, mouth = buses
+    box, replies = Mailbox(100_000), []
+    ears.serve(StopRequest, {}, box)
+
+    def answer():
+        for item in box.drain():
+            ears.answer(Answer(item, CityStop(t_ns=1, engaged=False)))
+
+    def ask():
+        call = Call(StopRequest(engaged=False, by="me"), 1.0)
+        mouth.call(call, lambda item: replies.append(item.message))
+
+    def flood():
+        for _ in range(200):
+            ask()
+        answer()
+
+    wait_for(lambda: flood() or ears.rejected > 0)
+    wait_for(lambda: answer() or ask() or any(isinstance(one, CityStop) for one in replies[-5:]))
