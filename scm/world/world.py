@@ -56,6 +56,7 @@ SENSORS = "scm.vehicles.sensors"
 SCANNER = "lidar"
 DEFAULT_CAR = "nigel"
 EYE = "eye"
+RATES_HZ = {"snapshot": 20.0, "second": 1.0, "radio": 1.0, "denm": 10.0}
 
 AnyCar = HostedCar | RemoteCar
 
@@ -141,12 +142,7 @@ class World:
         self.remote: dict[str, RemoteCar] = {}
         self.leased: dict[str, HostedCar] = {}
         self.pace = Pace(PERIOD_NS)
-        self.every = {
-            "snapshot": Every(20.0),
-            "second": Every(1.0),
-            "radio": Every(1.0),
-            "denm": Every(10.0),
-        }
+        self.every = {name: Every(rate_hz) for name, rate_hz in RATES_HZ.items()}
         self.stop = CityStop(t_ns=0, engaged=False)
         self.outbox: list[Outgoing] = []
         self.tick = 0
