@@ -381,9 +381,7 @@ def cost(folder: Path | None, cars: int = 200, rate_hz: float = 10.0) -> None:
     ground = Ground(load_map(town.map), lambda _x, _y: True)
     air = [Sent(frame, lies=False) for frame in story.frames]
     for title, eye in (("with Eye and its tracks", True), ("CAMs alone", False)):
-        judge(
-            story, air, ground, eye=eye, loss=0.0, seed=1
-        )  # Ground remembers
+        judge(story, air, ground, eye=eye, loss=0.0, seed=1)
         began = time.process_time()
         judge(story, air, ground, eye=eye, loss=0.0, seed=1)
         each_s = (time.process_time() - began) / len(air)
