@@ -24,7 +24,7 @@ from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.part import Hears
 from scm.traffic.part import TrafficPart
-from scm.v2x.etsi import SCALE, CamBody
+from scm.v2x.etsi import SCALE
 from scm.v2x.etsi_convert import read_cam
 from scm.v2x.message import Refused
 from scm.v2x.messages.cam_tx import CamTx
@@ -374,27 +374,19 @@ def healthy(stories: dict[int, Story], ground: Ground) -> None:
               f"{dict(tally.blamed_why)}", flush=True)  # fmt: skip
 
 
-def cost(folder: Path | None, cars: int = 200, rate_hz: float = 10.0, span_s: float = 10.0) -> None:
-    """Print the share of a core that so many cars cost; their CAMs are those of a smaller city."""
+def cost(folder: Path | None, cars: int = 200, rate_hz: float = 10.0) -> None:
+    """Print the share of a core that so many cars cost, by what a smaller city costs a CAM."""
     town = TOWNS["grid"]
     story = kept(town, 1, folder, own_eye=False)
     ground = Ground(load_map(town.map), lambda _x, _y: True)
-    frames = story.frames[len(story.frames) // 4 :]
-    bodies: list[CamBody] = [frame.body for frame in frames]
-    for title, eye in (("with Eye", True), ("CAMs alone", False)):
-        detector = Detector(ground)
-        for track in story.tracks[-200:] if eye else ():
-            detector.see(track)
-        count = round(cars * rate_hz * span_s)
-        receiver = next(iter(ground.receivers))
+    air = [Sent(frame, lies=False) for frame in story.frames]
+    for title, eye in (("with Eye and its tracks", True), ("CAMs alone", False)):
+        judge(story, air, ground, eye=eye, loss=0.0, seed=1)
         began = time.process_time()
-        for k in range(count):
-            frame = frames[k % len(frames)]
-            detector.hear(frame.station, receiver, frame.t_ns + k, bodies[k % len(frames)])
-        took = time.process_time() - began
-        share = took / span_s
-        print(f"{cars} cars x {rate_hz:g} CAMs/s, {title}: {took / count * 1e6:.1f} us a CAM, "
-              f"{share:.1%} of a core")  # fmt: skip
+        judge(story, air, ground, eye=eye, loss=0.0, seed=1)
+        each_s = (time.process_time() - began) / len(air)
+        print(f"{cars} cars x {rate_hz:g} CAMs/s, {title}: {each_s * 1e6:.1f} us a CAM, "
+              f"{each_s * cars * rate_hz:.1%} of a core")  # fmt: skip
 
 
 def main() -> None:
