@@ -3,16 +3,25 @@
 import threading
 
 import pytest
+import zenoh
 
 from scm.clock import NS_PER_S, WallClock
+from scm.v2x import zenoh_config
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.exchange import Answer, Call
 from scm.v2x.flood_gate import BYTES_A_SECOND, MESSAGES_A_SECOND, FloodGate
+from scm.v2x.message import encode
+from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.router import Router, free_endpoint
+from scm.v2x.zenoh_config import LARGEST_BYTES
+
+ENDPOINT = free_endpoint()
+KEY = "scm/@v1/city/v/n1/@camera/front"
+NEVER = threading.Event()
 
 
 def test_a_loud_key_is_cut_at_its_limit_and_others_are_not():
@@ -22,19 +31,23 @@ def test_a_loud_key_is_cut_at_its_limit_and_others_are_not():
     assert gate.admits("quiet", 10, 1)
 
 
-def test_a_second_later_a_cut_key_is_heard_again():
+def filled(now_ns):
     gate = FloodGate()
-    while gate.admits("loud", 10, 0):
-        pass
+    for _ in range(MESSAGES_A_SECOND):
+        gate.admits("loud", 10, now_ns)
+    return gate
+
+
+def test_a_second_later_a_cut_key_is_heard_again():
+    gate = filled(0)
     assert not gate.admits("loud", 10, NS_PER_S - 1)
     assert gate.admits("loud", 10, NS_PER_S)
 
 
 @pytest.mark.parametrize("jump_s", [-3600, 3600])
 def test_a_clock_that_jumps_shuts_nobody_out(jump_s):
-    gate = FloodGate()
-    while gate.admits("loud", 10, 5000 * NS_PER_S):
-        pass
+    gate = filled(5000 * NS_PER_S)
+    assert not gate.admits("loud", 10, 5000 * NS_PER_S)
     assert gate.admits("loud", 10, (5000 + jump_s) * NS_PER_S)
 
 
@@ -46,11 +59,10 @@ def test_few_huge_messages_are_a_flood_too():
 
 @pytest.fixture
 def buses():
-    endpoint = free_endpoint()
     with (
-        Router(endpoint),
-        ZenohBus("city", "ears", endpoint) as ears,
-        ZenohBus("city", "mouth", endpoint) as mouth,
+        Router(ENDPOINT),
+        ZenohBus("city", "ears", ENDPOINT) as ears,
+        ZenohBus("city", "mouth", ENDPOINT) as mouth,
     ):
         yield ears, mouth
 
@@ -108,3 +120,36 @@ def test_a_flood_of_requests_is_cut_and_a_second_later_one_is_answered(buses):
 
     wait_for(lambda: flood() or ears.rejected > 0)
     wait_for(lambda: answer() or ask() or any(isinstance(one, CityStop) for one in replies[-5:]))
+
+
+def frame(size):
+    return CameraFrame(
+        vehicle="n1", camera="front", t_ns=size, width_px=1, height_px=1, payload=bytes(size)
+    )
+
+
+def test_a_message_beyond_all_measure_reaches_nobody_and_the_city_goes_on(buses):
+    ears, mouth = buses
+    statuses, frames = Mailbox(100), Mailbox(100)
+    ears.subscribe(PartStatus, {}, statuses)
+    ears.subscribe(CameraFrame, {}, frames)
+
+    def show(size):
+        mouth.publish(frame(size))
+
+    wait_for(lambda: show(1_000_000) or frames.drain())
+    with zenoh.open(zenoh.Config.from_json5(zenoh_config.client(ENDPOINT, 5.0))) as huge:
+        body, header = encode(frame(LARGEST_BYTES + 1_000_000))
+        blocks = zenoh.CongestionControl.BLOCK
+        huge.put(KEY, body, attachment=header, congestion_control=blocks)
+        NEVER.wait(0.5)
+    wait_for(lambda: mouth.publish(status("after")) or statuses.drain())
+    sizes = []
+
+    def look():
+        show(2_000_000)
+        sizes.extend(item.message.t_ns for item in frames.drain())
+        return 2_000_000 in sizes
+
+    wait_for(look)
+    assert max(sizes) <= LARGEST_BYTES
