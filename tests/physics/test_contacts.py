@@ -194,7 +194,7 @@ class Agent:
         """Move a tick, having heard the contacts of the tick before last; report."""
         arrived, self._under_way = (
             self._under_way,
-            [m for m in self.world.outbox if isinstance(m, Contact)],
+            [m for m in self.world.outbox if isinstance(m, Contact) and m.number],
         )
         for contact in arrived:
             self.felt = contact.number
