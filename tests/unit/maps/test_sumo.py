@@ -20,6 +20,7 @@ from scm.maps.sumo_read import NetPhase
 from scm.maps.sumo_toml import map_toml
 from scm.part import Hears
 from scm.traffic.own_plan import adopted
+from scm.traffic.own_plan import adopted
 from scm.traffic.part import TrafficPart
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spat import Spat
@@ -84,10 +85,11 @@ def test_its_map_file_reads_back_equal(imported, tmp_path):
 
 
 def test_cars_go_round_in_their_lanes(imported):
-    part = WorldPart(imported.city_map, room=CARS)
+    city_map, _ = adopted(imported.city_map)
+    part = WorldPart(city_map, room=CARS)
     part.learn_wishes(lambda _kind, _where: False)
     world = part.world
-    streets, spawns = world.crowd.streets, imported.city_map.spawns
+    streets, spawns = world.crowd.streets, city_map.spawns
     places = [s for s in spawns if streets.goes_round[streets.numbers[s.lane]]]
     count = min(CARS, len(places))
     for i in range(count):
@@ -95,7 +97,7 @@ def test_cars_go_round_in_their_lanes(imported):
         car = world.host(f"n{i}", "nigel", pose, 0)
         send(world, car, RouteRequest(vehicle=car.name), 0)
     worst, way = np.zeros(count), np.zeros(count)
-    parts = [part, TrafficPart(imported.city_map)] if imported.city_map.junctions else [part]
+    parts = [part, TrafficPart(city_map)] if city_map.junctions else [part]
     with Lockstep(parts) as city:
         for _ in range(round(SPAN_S / 0.2)):
             city.run_for(0.2)

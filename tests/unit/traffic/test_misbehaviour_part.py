@@ -129,6 +129,7 @@ def test_an_attack_that_nobody_finds_ends_without_a_report():
     lines = []
     world = Attacker(WorldPart(MAP, 1, hosted=CARS), {"n2": "zero_speed"}, MAP, say=lines.append)
     with Lockstep([world, TrafficPart(MAP)], start_ns=START_NS) as city:
+        city.hear(Hears(CamTx))  # somebody listens, and judges nothing
         city.run_for(10.0)
     assert lines[-1].endswith("never reported")
 
