@@ -20,7 +20,6 @@ from scm.maps.sumo_read import NetPhase
 from scm.maps.sumo_toml import map_toml
 from scm.part import Hears
 from scm.traffic.own_plan import adopted
-from scm.traffic.own_plan import adopted
 from scm.traffic.part import TrafficPart
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spat import Spat
