@@ -201,10 +201,12 @@ def test_a_station_hears_itself_when_it_asks_to(city):
 
 
 def test_a_late_joiner_gets_the_last_events_of_each_key_and_then_the_new_ones(city):
-    sender = city.bus("world")
+    sender, heard = city.bus("world"), Mailbox(1000)
+    city.bus("eye").subscribe(CityEvent, {}, heard)
     for n in range(CityEvent.KEEP + 5):
         sender.publish(news(f"e{n}"))
     sender.publish(news("other", source="gate"))
+    gather(city, heard, CityEvent.KEEP + 6)  # else the late one joins amid them, and hears more
     mailbox = Mailbox(1000)
     city.bus("api").subscribe(CityEvent, {}, mailbox)
     names = [i.message.name for i in gather(city, mailbox, CityEvent.KEEP + 1)]
