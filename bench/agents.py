@@ -2,8 +2,9 @@
 
 Who measures is not who is measured. The stations are sessions of their own in four processes that
 tell how late they themselves were; one process hears all of them, as a recorder does; and two more
-hold a stopwatch: one sends 100 states a second, the other hears only these. Their ages are what
-the bus adds between two quiet programs while the fleet talks. Run: `python -m bench.agents`.
+hold a stopwatch: one sends at every beat, the other hears only these. Their ages are what the bus
+adds between two quiet programs while the fleet talks. All keep to beats of the clock, as agents do.
+Run: `python -m bench.agents`.
 """
 
 import subprocess
@@ -14,6 +15,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from bench.bus import Monotonic, percentiles, state
+from scm.clock import NS_PER_S, nanoseconds, next_beat_ns, seconds
 from scm.selftest.city import CITY
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
@@ -22,7 +24,7 @@ from scm.v2x.router import free_endpoint
 
 FLEETS = (20, 50, 100, 200)
 RATE_HZ = 20.0
-PROBE_HZ = 100.0
+PROBE_HZ = 40.0
 PROBE = 9999
 SECONDS = 8.0
 WARM_S = 2.0
@@ -102,7 +104,7 @@ def _listen(bus: ZenohBus, router: int) -> tuple[float, list[float]]:
 
 
 def send(endpoint: str, first: int, count: int) -> None:
-    """Be some stations, evenly spread over each period; print how late they were, p50 and p99."""
+    """Be some stations, spread over the beats of each period; print how late they were."""
     buses = [_bus(f"n{first + i}", endpoint) for i in range(count)]
     _ready()
     lags_ms = _send(list(zip(range(first, first + count), buses, strict=True)), RATE_HZ * count)
@@ -134,9 +136,10 @@ def ears(endpoint: str, count: int) -> None:
 
 def _send(stations: list[tuple[int, ZenohBus]], rate_hz: float) -> list[float]:
     """Send in turn for as long as it takes; return how late each was [ms]."""
-    lags_ms, began = list[float](), time.monotonic()
+    lags_ms, began_ns = list[float](), time.time_ns()
+    shift = began_ns / NS_PER_S - time.monotonic()
     for n in range(round(SECONDS * rate_hz)):
-        due = began + n / rate_hz
+        due = seconds(next_beat_ns(began_ns + nanoseconds(n / rate_hz))) - shift
         _wait(due - time.monotonic())
         number, bus = stations[n % len(stations)]
         lags_ms.append((time.monotonic() - due) * 1e3)

@@ -12,6 +12,14 @@ from typing import Protocol
 NS_PER_S = 1_000_000_000
 NS_PER_MS = 1_000_000
 
+BEAT_NS = 25 * NS_PER_MS
+"""What many at one router keep to when any instant would do: it wakes once for all of a beat."""
+
+
+def next_beat_ns(t_ns: int) -> int:
+    """Return the first beat at or after an instant [ns]: a whole multiple of `BEAT_NS`."""
+    return -(-t_ns // BEAT_NS) * BEAT_NS
+
 
 def seconds(t_ns: int) -> float:
     """Return a span of nanoseconds as seconds."""

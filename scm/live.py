@@ -12,7 +12,7 @@ from types import FrameType
 
 import msgspec
 
-from scm.clock import NS_PER_MS, NS_PER_S, Clock
+from scm.clock import NS_PER_MS, NS_PER_S, Clock, next_beat_ns
 from scm.errors import LinkError, ScmError
 from scm.log import event
 from scm.part import Part
@@ -28,18 +28,27 @@ _log = logging.getLogger(__name__)
 
 
 def run(
-    part: Part, bus: Bus, clock: Clock, stop: threading.Event, state: Repository | None = None
+    part: Part,
+    bus: Bus,
+    clock: Clock,
+    stop: threading.Event,
+    state: Repository | None = None,
+    *,
+    on_beat: bool = False,
 ) -> None:
     """Step a part until `stop` is set, then let it say its last words and close the bus.
 
-    With a store, answers leave only when they and what they promise are in it.
+    With a store, answers leave only when they and what they promise are in it. `on_beat` begins at
+    a beat of the clock, for parts of which a city has many: their messages come together, at all
+    computers whose clocks agree, and wake its router and its listeners less often.
 
     Its vital signs (`PartStatus`) go out once a second, filled into its own ones when it sends
     such. An exception of the part is logged, told to the city and raised: the process should die.
     """
     with bus:
         keeper = None if state is None else KeeperBehind(state, part.name, bus.session)
-        loop = _Loop(part, Station(part, bus, keeper), clock)
+        begin_ns = next_beat_ns(clock.now_ns()) if on_beat else clock.now_ns()
+        loop = _Loop(part, Station(part, bus, keeper), clock, begin_ns)
         try:
             while not clock.wait_until(loop.due_ns, stop):
                 loop.step()
@@ -71,11 +80,11 @@ def stop_on_signal() -> threading.Event:
 class _Loop:
     """The steps of one part, when the next is due, and how it has been doing."""
 
-    def __init__(self, part: Part, station: Station, clock: Clock) -> None:
+    def __init__(self, part: Part, station: Station, clock: Clock, begin_ns: int) -> None:
         self._part = part
         self._station = station
         self._clock = clock
-        self.due_ns = clock.now_ns()
+        self.due_ns = begin_ns
         self._status_due_ns = self.due_ns + NS_PER_S
         self._late_steps = 0
         self._slowest_ns = 0

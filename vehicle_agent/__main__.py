@@ -84,7 +84,7 @@ def _join(arguments: argparse.Namespace) -> int:
         part = AgentPart(
             arguments.name, arguments.car, arguments.spawn, bus.session, arguments.seed
         )
-        run(Leaving(part, wish, done), bus, clock, done)
+        run(Leaving(part, wish, done), bus, clock, done, on_beat=True)
     gc.freeze()  # taking the compiler's objects apart one by one would take a quarter of a second
     return 0
 

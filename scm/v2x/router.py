@@ -4,8 +4,10 @@ It routes without Python's help, but shares its process only with what is idle: 
 it delays everybody.
 """
 
+import os
 import socket
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
@@ -16,6 +18,10 @@ from scm.v2x import zenoh_config
 from scm.v2x.access import is_local
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+# The thread that watches all links also writes to them: one wake-up less for each message. It is
+# not the one that reads, since that may wait for a slow listener. Zenoh takes it once a process.
+THREADS = "(acc: (handover: tx))"
 
 
 class Router:
@@ -54,7 +60,8 @@ class Router:
         """
         try:
             config = zenoh.Config.from_json5(zenoh_config.router(self.listen, self._access))
-            self._session = zenoh.open(config)
+            with _environment("ZENOH_RUNTIME", THREADS):
+                self._session = zenoh.open(config)
         except zenoh.ZError as cause:
             why = zenoh_config.reason(cause)
             msg = f"cannot listen at {self.listen!r}: does another city run there? ({why})"
@@ -70,6 +77,19 @@ class Router:
         if self._session is not None:
             self._session.close()  # type: ignore[no-untyped-call]
             self._session = None
+
+
+@contextmanager
+def _environment(name: str, value: str) -> Iterator[None]:
+    """Hold a variable of the environment at a value, unless the user has set it."""
+    if name in os.environ:
+        yield
+        return
+    os.environ[name] = value
+    try:
+        yield
+    finally:
+        del os.environ[name]
 
 
 def free_endpoint() -> str:

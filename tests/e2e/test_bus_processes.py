@@ -263,3 +263,16 @@ def test_children_die_with_a_supervisor_that_is_killed(watch):
         until(lambda: watch.alive("orphan"))
         supervisor.kill()
     until(lambda: not watch.alive("orphan"), 2.0)
+
+
+def test_a_router_watches_and_writes_to_its_links_with_one_thread():
+    endpoint = free_endpoint()
+    with subprocess.Popen([sys.executable, "-m", "scm.selftest.router", endpoint]) as router:
+        try:
+            ZenohBus("city", "guest", endpoint, connect_timeout_s=LONG_S).close()
+            threads = Path(f"/proc/{router.pid}/task").glob("*/comm")
+            names = {thread.read_text().strip() for thread in threads}
+        finally:
+            router.kill()
+    assert "tx-0" in names
+    assert "acc-0" not in names

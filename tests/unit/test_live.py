@@ -28,8 +28,8 @@ class City:
         self._listener.subscribe(kind, {}, mailbox)
         return mailbox
 
-    def run(self, part):
-        run(part, self.network.bus("city", part.name), self.clock, self.stop)
+    def run(self, part, **options):
+        run(part, self.network.bus("city", part.name), self.clock, self.stop, **options)
 
 
 class Stepping:
@@ -72,6 +72,13 @@ def test_steps_keep_to_absolute_deadlines_whatever_they_cost(city):
     part = Stepping(city, 5, costs_ms=[3, 17, 0, 19, 1])
     city.run(part)
     assert part.began == [0, 20, 40, 60, 80]
+
+
+def test_many_of_a_kind_step_together_at_beats_of_the_clock(city):
+    city.clock.set_ns(NS_PER_S + 3 * NS_PER_MS)
+    part = Stepping(city, 4, costs_ms=[1, 25])
+    city.run(part, on_beat=True)
+    assert part.began == [25, 45, 70, 85]
 
 
 def test_a_step_that_overruns_coalesces_the_ones_it_covered(city):
