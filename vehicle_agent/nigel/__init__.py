@@ -1,0 +1,1 @@
+"""The real Nigel: rosserial over a cable, the driver of it, and what the firmware tells."""
