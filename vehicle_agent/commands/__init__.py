@@ -1,0 +1,1 @@
+"""The commands of `vehicle-agent`, one file each."""

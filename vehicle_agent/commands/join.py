@@ -1,0 +1,48 @@
+"""`vehicle-agent join`: be one car of a city."""
+
+import argparse
+import gc
+import threading
+
+from scm.command import Command, credentials_argument, credentials_of
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--name", required=True, help="of the vehicle: a-z 0-9 _ -")
+    parser.add_argument("--connect", required=True, metavar="ENDPOINT", help="the city's router")
+    credentials_argument(parser)
+    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument("--car", default="nigel", help="car file (%(default)s)")
+    parser.add_argument("--spawn", default="", help="place to start at; default: any free one")
+    parser.add_argument("--seed", type=int, default=0, help="of the sensors' noise (%(default)s)")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.clock import WallClock
+    from scm.live import run, stop_on_signal
+    from scm.v2x.bus_zenoh import ZenohBus
+    from scm.v2x.key import check_name
+    from vehicle_agent.agent import AgentPart
+    from vehicle_agent.leaving import Leaving
+
+    check_name(arguments.name, "--name")
+    check_name(arguments.city, "--city")
+    credentials = credentials_of(arguments, arguments.name)
+    wish, done, clock = stop_on_signal(), threading.Event(), WallClock()
+    with ZenohBus(
+        arguments.city, arguments.name, arguments.connect, clock=clock, credentials=credentials
+    ) as bus:
+        part = AgentPart(
+            arguments.name, arguments.car, arguments.spawn, bus.session, arguments.seed
+        )
+        run(Leaving(part, wish, done), bus, clock, done, on_beat=True)
+    gc.freeze()  # taking the compiler's objects apart one by one would take a quarter of a second
+    return 0
+
+
+COMMAND = Command(
+    help="join a city with a car of one's own dynamics, and drive until Ctrl-C",
+    example="vehicle-agent join --name n7 --connect tcp/127.0.0.1:7447",
+    arguments=_arguments,
+    run=_run,
+)
