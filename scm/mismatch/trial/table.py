@@ -82,7 +82,11 @@ def _again(ratios: Sequence[Ratio]) -> list[str]:
         return []
     found = [f"another drive: {len(ratios)} cars whose effect shows in free runs; error over"]
     of_nominal = [ratio.found_m / ratio.nominal_m for ratio in ratios]
-    found.append(f"  the nominal car's: median {np.median(of_nominal):.2f} (bar 0.25)")
+    text = f"  the nominal car's: median {np.median(of_nominal):.2f} (bar 0.25)"
+    least = [r.true_m / r.nominal_m for r in ratios if r.true_m]
+    if least:
+        text += f"; the true car itself, beside the noise of poses: {np.median(least):.2f}"
+    found.append(text)
     of_tuned = [ratio.found_m / ratio.retuned_m for ratio in ratios if ratio.retuned_m]
     if of_tuned:
         found.append(f"  the re-tuned car's: median {np.median(of_tuned):.2f}")

@@ -182,7 +182,8 @@ def test_wilsons_interval_is_that_of_the_textbook():
 def test_the_table_compares_patched_cars_with_nominal_tuned_and_true_ones():
     ratios = [Ratio("case_000", 0.1, 0.02, 0.019, 0.08), Ratio("case_001", 0.1, 0.04, None)]
     text = "\n".join(lines([score(label(), diagnosis())], ratios))
-    assert "the nominal car's: median 0.30" in text
+    assert "the nominal car's: median 0.30 (bar 0.25); the true car itself" in text
+    assert "noise of poses: 0.19" in text
     assert "the re-tuned car's: median 0.25" in text
     assert "the true car's: median 1.05, within 1.15 in 100 %" in text
     assert "the nominal car's, both beyond the true car's: median 0.06" in text
