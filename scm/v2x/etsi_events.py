@@ -39,7 +39,7 @@ from scm.v2x.messages.vehicle_state import VehicleState
 
 ACCIDENT, STATIONARY_VEHICLE, DANGEROUS_SITUATION = 2, 94, 99
 MULTI_VEHICLE_ACCIDENT, EMERGENCY_BRAKE = 1, 1
-HARD_BRAKING_MPS2 = 1.0  # twice what drivers find comfortable; 14 m/s2 on the air
+HARD_BRAKING_MPS2 = 2.0  # four times what drivers find comfortable; where they stop for a light 1.2
 LEAST_BRAKING_MPS = 0.05
 BRAKES_NS = 5 * NS_PER_S
 COUNTS = 65_536
@@ -335,6 +335,7 @@ class CarWarnings:
         contacts: tuple[Contact, ...] = (),
         *,
         is_stranded: bool | None = None,
+        has_braked: bool | None = None,
     ) -> list[DenmBody]:
         """Return the DENMs that go out now; ask at every report of the car.
 
@@ -342,13 +343,18 @@ class CarWarnings:
             state: Of the car now.
             contacts: What hit it since the last time.
             is_stranded: Whether it stands where it should not; None: as its guard's mode says.
+            has_braked: Whether it has braked hard since the last time; None: as `state` says, which
+                a small car outruns: it stands within a tenth of a second.
         """
         now_ns = state.t_ns
         for contact in contacts:
             if contact.against and (self._hit_ns is None or now_ns - self._hit_ns >= HITS_NS):
                 self._sender.trigger(accident(contact, state), now_ns)
                 self._hit_ns = now_ns
-        if not contacts:
+        if has_braked is None:
+            is_moving = state.speed_mps > LEAST_BRAKING_MPS
+            has_braked = is_moving and state.accel_mps2 <= -HARD_BRAKING_MPS2
+        if has_braked and not contacts:
             self._brake(state)
         if is_stranded is None:
             is_stranded = state.mode in ("hold", "stop") and abs(state.speed_mps) < STANDSTILL_MPS
@@ -356,11 +362,10 @@ class CarWarnings:
         return self._sender.due(now_ns)
 
     def _brake(self, state: VehicleState) -> None:
-        is_hard = state.accel_mps2 <= -HARD_BRAKING_MPS2 and state.speed_mps > LEAST_BRAKING_MPS
         hit_ns, braked_ns = self._hit_ns, self._braked_ns
         was_hit = hit_ns is not None and state.t_ns - hit_ns < BRAKES_NS
         has_told = braked_ns is not None and state.t_ns - braked_ns < BRAKES_NS
-        if is_hard and not was_hit and not has_told:
+        if not was_hit and not has_told:
             self._sender.trigger(hard_braking(state), state.t_ns)
             self._braked_ns = state.t_ns
 

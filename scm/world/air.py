@@ -31,7 +31,7 @@ from scm.v2x.messages.ssem_tx import SsemTx
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.publish import states_of
 from scm.world.radio import Receivers
-from scm.world.warnings import call_denms, tell
+from scm.world.warnings import call_denms, tell, watch
 from scm.world.world import World
 
 Frame = CamTx | CpmTx | DenmTx | MapemTx | SpatemTx | SremTx | SsemTx
@@ -61,6 +61,7 @@ def call_out(world: World, now_ns: int) -> None:
     due = world.cams.due(world.slots, now_ns, world.busy.control)
     if len(due):
         _call_cams(world, due, now_ns)
+    watch(world)
     if world.every["denm"].is_due(now_ns):
         for frame in call_denms(world, now_ns):
             _call_denm(world, frame, now_ns)

@@ -11,10 +11,12 @@ class Dangers:
 
     Attributes:
         hits: What cars have hit since they last might warn of it, by name.
+        braked: Slots of hosted cars that have braked hard since they last might warn of it.
         warners: What hosted cars warn of, by name.
         told: What all stations warn of.
     """
 
     hits: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    braked: set[int] = field(default_factory=set)
     warners: dict[str, CarWarnings] = field(default_factory=dict)
     told: DenmWatch = field(default_factory=DenmWatch)

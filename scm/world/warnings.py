@@ -12,7 +12,10 @@ import numpy as np
 from scm.arrays import Bools
 from scm.v2x.etsi_events import (
     ACCIDENT,
+    DANGEROUS_SITUATION,
+    EMERGENCY_BRAKE,
     HARD_BRAKING_MPS2,
+    LEAST_BRAKING_MPS,
     STANDSTILL_MPS,
     STATIONARY_VEHICLE,
     CarWarnings,
@@ -23,19 +26,30 @@ from scm.world.publish import states_of
 from scm.world.slots import DRIVE
 from scm.world.world import World
 
-_CALLED = {ACCIDENT: "an accident", STATIONARY_VEHICLE: "a vehicle that stands"}
+_CALLED = {
+    (ACCIDENT, None): "an accident",
+    (STATIONARY_VEHICLE, None): "a vehicle that stands",
+    (DANGEROUS_SITUATION, EMERGENCY_BRAKE): "its hard braking",
+}
+
+
+def watch(world: World) -> None:
+    """Note who brakes hard: at every step, since a Nigel stops within a tenth of a second."""
+    slots = world.slots
+    hard = world.garage.signal("accel_x") <= -HARD_BRAKING_MPS2
+    hard &= slots.hosted & (slots.mode == DRIVE) & (slots.speed > LEAST_BRAKING_MPS)
+    world.dangers.braked.update(np.flatnonzero(hard).tolist())
 
 
 def call_denms(world: World, now_ns: int) -> list[DenmTx]:
     """Return the DENMs that hosted cars send now."""
     slots, hosted, warners = world.slots, world.hosted, world.dangers.warners
     stranded = _stranded(world)
-    braking = world.garage.signal("accel_x") <= -HARD_BRAKING_MPS2
-    braking &= slots.hosted & (slots.mode == DRIVE)
+    braked = world.dangers.braked
     for gone in set(warners) - set(hosted):
         del warners[gone]
     busy = {name for name, one in warners.items() if one.is_busy}
-    struck = {slots.names[n] for n in np.flatnonzero(stranded | braking).tolist()}
+    struck = {slots.names[n] for n in {*np.flatnonzero(stranded).tolist(), *braked}}
     names = sorted((busy | struck | set(world.dangers.hits)) & set(hosted))
     of = np.array([hosted[name].slot for name in names], np.int64)
     frames: list[DenmTx] = []
@@ -45,9 +59,11 @@ def call_denms(world: World, now_ns: int) -> list[DenmTx]:
             state,
             _contacts(name, world.dangers.hits.get(name), now_ns),
             is_stranded=bool(stranded[hosted[name].slot]),
+            has_braked=hosted[name].slot in braked,
         )
         frames += [DenmTx(station=name, t_ns=now_ns, body=body) for body in bodies]
     world.dangers.hits.clear()
+    braked.clear()
     return frames
 
 
@@ -55,7 +71,9 @@ def tell(world: World, frame: DenmTx, now_ns: int) -> None:
     """Put what is new on the air into the log of the city, whoever warns."""
     found, situation = world.dangers.told.hear(frame.body, now_ns), frame.body.situation_container
     if found == "new" and situation is not None:
-        what = _CALLED.get(situation.event_type.cause, "a danger")
+        event = situation.event_type
+        of_any_kind = _CALLED.get((event.cause, None), "a danger")
+        what = _CALLED.get((event.cause, event.subcause), of_any_kind)
         text = f"{frame.station} warns of {what}"
         world.say("warning", "denm", text, now_ns, frame.station)
     elif found == "ended":

@@ -178,9 +178,9 @@ def braking(accels, speed_mps=0.2, contacts=()):
 
 
 def test_hard_braking_is_one_event_and_comfortable_braking_none():
-    assert braking([-0.5] * 20) == []
-    assert braking([-1.5] * 20, speed_mps=0.01) == []
-    sent = braking([-1.5] * 30)
+    assert braking([-1.2] * 20) == [], "as hard as a Nigel stops for a light"
+    assert braking([-2.7] * 20, speed_mps=0.01) == []
+    sent = braking([-2.7] * 30)
     causes = {(e.cause, e.subcause) for e in (b.situation_container.event_type for b in sent)}
     assert causes == {(DANGEROUS_SITUATION, 1)}
     assert len({b.management_container.action_id for b in sent}) == 1

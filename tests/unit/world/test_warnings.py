@@ -2,7 +2,12 @@
 
 from scm.geometry import Pose2
 from scm.v2x.etsi_convert import station_id
-from scm.v2x.etsi_events import ACCIDENT, STATIONARY_VEHICLE
+from scm.v2x.etsi_events import (
+    ACCIDENT,
+    DANGEROUS_SITUATION,
+    EMERGENCY_BRAKE,
+    STATIONARY_VEHICLE,
+)
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.denm_rx import DenmRx
 from scm.v2x.messages.denm_tx import DenmTx
@@ -45,6 +50,19 @@ def test_a_car_that_was_given_up_warns_until_it_drives_again(make_city):
     city.run_for(1.5)
     assert city.heard(DenmTx)[0].body.management_container.termination == 0
     assert "denm" in city.events()
+
+
+def test_a_car_that_brakes_as_hard_as_it_can_warns_of_that(make_city):
+    city = make_city(hosted=CARS[:1])
+    lease = city.lease()
+    for seq in range(1, 50):
+        city.run(1, city.command(lease, seq, 1.0 if seq < 35 else -1.0))
+    assert (DANGEROUS_SITUATION, EMERGENCY_BRAKE) in {
+        (event.cause, event.subcause)
+        for event in (f.body.situation_container.event_type for f in city.heard(DenmTx))
+    }
+    told = [event.text for event in city.heard(CityEvent) if event.name == "denm"]
+    assert told[:1] == ["n1 warns of its hard braking"]
 
 
 def test_a_stop_of_the_whole_city_is_no_event_of_a_car(make_city):
