@@ -2,7 +2,14 @@
 
 import numpy as np
 
-from scm.mismatch.diagnose import Found, retuned_error, write
+from scm.mismatch.diagnose import (
+    Found,
+    as_given,
+    gained_nothing,
+    retuned_error,
+    verdict_of,
+    write,
+)
 from scm.mismatch.experiment.changed import drive_alone
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES
 from scm.mismatch.experiment.pace import Floor, pace_of
@@ -10,9 +17,12 @@ from scm.mismatch.experiment.plan import place
 from scm.mismatch.experiment.separation import Apart
 from scm.mismatch.experiment.suggest import Suggestion, Weighed
 from scm.mismatch.findings import Undecided, Verdict
+from scm.mismatch.fit import Fitter
 from scm.mismatch.judge import judge
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.parts import split
+from scm.mismatch.patch import patched
+from tests.unit.mismatch import made_fit
 from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.mismatch.made_drive import big_nigel, driven, healthy_model, nigel
 
@@ -35,6 +45,28 @@ def test_the_re_tuned_car_strays_by_what_refitting_alone_could_not_take_off():
     strays_m = retuned_error([drive], big_nigel(), tuned, {"steering.trim_rad": true}, parts)
     before, after = (side["position_m"] for side in (fit.confirm.before, fit.confirm.after))
     assert after < 0.9 * strays_m < 0.7 * before
+
+
+def test_numbers_that_gained_nothing_on_unseen_parts_stay_as_the_file_has_them(tmp_path):
+    assert gained_nothing(made_up.fit(before=0.018, after=0.0184))
+    assert not gained_nothing(made_up.fit(before=0.018, after=0.0176))
+    model, _, best = made_fit.healthy()
+    fitter = Fitter(model, np.ones(len(model.t)))
+    assert np.abs(best.z).max() > 0.0
+    keys = [own.key for own in model.ordinary if nigel().has(own.key)]
+
+    def moved(fitted):
+        car = patched(nigel(), model, fitted, tmp_path)
+        return [key for key in keys if car.value(key) != nigel().value(key)]
+
+    assert moved(best)
+    assert moved(as_given(fitter, best)) == []
+
+
+def test_free_runs_far_beyond_noise_are_a_mismatch_without_a_name():
+    floor = made_up.fit().confirm.noise_floor["position_m"]
+    assert verdict_of((), (), made_up.fit(after=3.1 * floor)) is Verdict.MISMATCH
+    assert verdict_of((), (), made_up.fit(after=2.3 * floor)) is Verdict.NONE
 
 
 def test_the_drives_of_two_open_questions_lie_side_by_side(tmp_path):
