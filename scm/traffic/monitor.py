@@ -66,10 +66,11 @@ class Monitor:
     def __init__(self, card: Card, now_ns: int) -> None:
         self.card = card
         self._card = {group.name: group for group in card.groups}
+        self._is_new = True
         self.reset(now_ns)
 
     def reset(self, now_ns: int) -> None:
-        """Forget the fault and everything seen."""
+        """Forget the fault and everything seen, but not whether there was a controller."""
         self.fault: str | None = None
         self.detail = ""
         self.since_ns = now_ns
@@ -79,7 +80,6 @@ class Monitor:
         self._ahead_ns: deque[int] = deque(maxlen=20)
         self._heard_ns = now_ns
         self._ticked_ns = now_ns
-        self._is_new = True
 
     def keep(self, fault: str, now_ns: int) -> None:
         """Keep a fault that was latched before the monitor itself was started again."""

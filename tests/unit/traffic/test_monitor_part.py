@@ -123,6 +123,16 @@ def test_a_fault_stays_when_the_signals_are_well_again_until_a_person_resets_it(
     assert "plan" in {spat.mode for spat in messages(spats)}
 
 
+def test_a_controller_that_is_still_silent_after_a_reset_is_stale_within_a_second(city, traffic):
+    city.run_for(12.0)
+    traffic.wires = lambda _spat: None
+    city.run_for(1.0)
+    assert reset(city).fault is None
+    box = city.hear(Hears(MonitorStatus))
+    city.run_for(0.7)
+    assert messages(box)[-1].fault == "stale"
+
+
 @pytest.mark.parametrize("missing", ["by", "reason"])
 def test_a_reset_without_a_person_or_a_reason_is_refused(city, missing):
     reply = reset(city, **{missing: " "})
