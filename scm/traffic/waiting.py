@@ -10,6 +10,7 @@ which the first k would lose more than all rivals do. Who passes within the time
 is promised anyway needs no more of it.
 """
 
+import math
 from collections.abc import Iterable
 
 from scm.clock import NS_PER_S
@@ -23,14 +24,33 @@ PROMISED_S = AHEAD_NS / NS_PER_S
 
 def is_worth_waiting(site: Site, number: int, view: JunctionView) -> bool:
     """Return whether the green of a group should go on, by its number."""
+    return worth_s(site, number, view, most_s=0.0) > 0.0
+
+
+def worth_s(site: Site, number: int, view: JunctionView, most_s: float = math.inf) -> float:
+    """Return for how long the green of a group will be worth going on [s]; 0: it is not now.
+
+    It is looked at again when each car that is known by now needs no more, up to the first time
+    after `most_s`.
+    """
     own = view.detectors[site.program.groups[number]]
-    comes = coming(own, site.headway_s)
-    if not comes:
-        return False
-    rivals = rivals_of(site, number, view)
     change_s = _change_s(site, number)
+    rivals = rivals_of(site, number, view)
     red_s = change_s + sum(_served_s(site, i, view) for i in rivals)
     waiting = [at_s for i in rivals for at_s in _arrivals(view.detectors[site.program.groups[i]])]
+    comes, after_s = coming(own, site.headway_s), 0.0
+    for number_gone, at_s in enumerate(comes):
+        left = [one - after_s for one in comes[number_gone:]]
+        if not _is_worth(left, red_s, change_s, [max(0.0, at - after_s) for at in waiting]):
+            break
+        after_s = at_s - PROMISED_S
+        if after_s > most_s:
+            break
+    return after_s
+
+
+def _is_worth(comes: list[float], red_s: float, change_s: float, waiting: list[float]) -> bool:
+    """Return whether there is a first of those who come that is worth waiting for."""
     saved = 0.0
     for at_s in comes:
         saved += max(0.0, red_s - at_s) + START_S
@@ -76,5 +96,10 @@ def _served_s(site: Site, number: int, view: JunctionView) -> float:
     detector = view.detectors[site.program.groups[number]]
     if not detector.call:
         return 0.0
+    return green_s(site, number, detector) + _change_s(site, number)
+
+
+def green_s(site: Site, number: int, detector: Detector) -> float:
+    """Return the green that a group's cars take to leave, no less than its least [s]."""
     least_s = site.program.times[number].min_green / NS_PER_S
-    return max(least_s, detector.near * site.headway_s) + _change_s(site, number)
+    return max(least_s, detector.near * site.headway_s)

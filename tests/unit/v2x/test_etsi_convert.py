@@ -217,7 +217,7 @@ def test_an_end_of_an_hour_or_so_ahead_is_far_and_read_as_unknown(ahead_s):
 def test_flash_promises_nothing_and_says_failure(colour):
     body = ec.spatem_of(a_spat(mode="flash", colour=colour, max_end_ns=NOW), JUNCTION)
     assert body.status == ("failureFlash",)
-    assert ec.colours_of(body)[1] == (colour, None, None, None)
+    assert ec.colours_of(body)[1] == (colour, None, None, None, None)
     assert (body.states[0].min_end_time, body.states[0].max_end_time) == (36001, 36001)
 
 
@@ -231,7 +231,7 @@ def test_only_a_protected_movement_is_green(state):
     group = replace(spatem.states[0], state_time_speed=(event,))
     junction = replace(spatem.intersections[0], states=(group,))
     body = replace(spatem, intersections=(junction,))
-    assert ec.colours_of(body)[1] == ("dark", None, None, None)
+    assert ec.colours_of(body)[1] == ("dark", None, None, None, None)
 
 
 def test_the_records_travel_as_json_with_the_names_of_the_open_json_schemas():
