@@ -16,7 +16,7 @@ from scm.traffic import asked, kernel
 from scm.traffic.asked import NEED_RINGS, Asked
 from scm.traffic.detectors import Detector
 from scm.traffic.kernel import Phase, Program
-from scm.traffic.likely import AS_PLANNED, Likely, forecasts, within
+from scm.traffic.likely import forecasts, within
 from scm.traffic.plan import FLASH, load_timetable, plan_names
 from scm.traffic.policy import (
     FIXED,
@@ -150,7 +150,7 @@ class Controller:
         self._is_late = False
         self._seq = 0
         self._foreseen_ns = 0
-        self._forecasts: dict[str, Likely] = {}
+        self._forecasts: dict[str, int] = {}
         self._restart_ns = max(times.clearance for times in program.times) + STEP_NS
 
     @property
@@ -362,17 +362,16 @@ class Controller:
             return
         if self.policy == FIXED:
             if self._wanted() == FIXED:
-                starts = {name: self._timetables.next_start_ns(name) for name in self._shown}
-                self._forecasts = {n: Likely(at, AS_PLANNED) for n, at in starts.items()}
+                start_ns = self._timetables.next_start_ns
+                reds = [name for name, shown in self._shown.items() if shown.colour == "red"]
+                self._forecasts = {name: start_ns(name) for name in reds}
             return
-        view = self._view(now_ns, 0, heard)
+        view, promises = self._view(now_ns, 0, heard), self._promises()
         try:
             turns = self._policies[self.policy].foresee(self._site, self._memory, view)
+            self._forecasts = forecasts(self._program, self._state, promises, turns, now_ns)
         except Exception as cause:  # noqa: BLE001 as above; the next step gives it up
             self._fail(cause)
-            return
-        promises = self._promises()
-        self._forecasts = forecasts(self._program, self._state, promises, turns, now_ns)
 
     def _as_asked(self, wishes: frozenset[str]) -> frozenset[str]:
         """Return a policy's wishes with those of people in them, which it may have overlooked."""
@@ -448,7 +447,9 @@ class Controller:
     def _tell(self, name: str, shown: _Shown, now_ns: int) -> SignalGroup:
         likely = None
         if self.mode != FLASH:
-            likely = within(shown.promise, self._forecasts.get(name), now_ns)
+            forecast_ns, is_red = self._forecasts.get(name), shown.colour == "red"
+            planned = self.policy == FIXED
+            likely = within(shown.promise, forecast_ns, now_ns, red=is_red, planned=planned)
         return SignalGroup(
             group=name,
             colour=shown.colour,

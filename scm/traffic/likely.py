@@ -7,7 +7,7 @@ it does not see yet. Here the kernel's times are put between them:
     end of a red      end of the turn before, its yellow and clearance, in turns that follow
 
 What is promised bounds it. How sure it is was measured: the share of forecasts like it that came
-true within a second (`docs/signals.md`).
+true within a second (`docs/signals.md`). A policy that foresees nothing leaves it unknown.
 """
 
 from collections.abc import Sequence
@@ -18,9 +18,16 @@ from scm.traffic.kernel import Phase, Program, State
 from scm.traffic.policy import Turn
 from scm.traffic.promise import SLACK_NS, Promise, still_ns
 
-CERTAIN = 1.0
-AS_PLANNED = 0.98
-"""What a timetable says beyond this cycle: somebody may yet ask for another plan."""
+CERTAIN, AS_PLANNED = 1.0, 0.98
+FREED = 0.98
+SURE = ((0.05, 0.78), (0.5, 0.9), (2.0, 0.75), (16.0, 0.45))
+FAR = 0.21
+"""Shares, measured on a grid full of cars, where guessing is hardest; the lower of two policies.
+
+A timetable's next cycle is `AS_PLANNED`: somebody may yet ask for another plan. A red is `FREED`
+when nothing but the kernel's own times is left of it. Else it hangs on how many seconds a forecast
+goes beyond the promise: `SURE` up to so many, then `FAR`.
+"""
 
 
 class Likely(NamedTuple):
@@ -30,17 +37,36 @@ class Likely(NamedTuple):
     confidence: float
 
 
-def within(promise: Promise, forecast: Likely | None, now_ns: int) -> Likely | None:
-    """Return a forecast as far as the promise lets it be; what is promised exactly needs none."""
+def within(
+    promise: Promise, forecast_ns: int | None, now_ns: int, *, red: bool, planned: bool
+) -> Likely | None:
+    """Return a forecast as far as the promise lets it be; what is promised exactly needs none.
+
+    Args:
+        promise: Of the colour that is shown.
+        forecast_ns: Its likely end; None: nobody knows.
+        now_ns: The present time.
+        red: Whether it is red.
+        planned: Whether a timetable says so.
+    """
     latest_ns = promise.max_end_ns
     if latest_ns is not None and latest_ns - promise.min_end_ns <= SLACK_NS:
         return Likely(promise.min_end_ns, CERTAIN)
-    if forecast is None:
+    if forecast_ns is None:
         return None
-    end_ns = max(forecast.end_ns, promise.min_end_ns, now_ns)
+    earliest_ns = max(promise.min_end_ns, now_ns)
+    end_ns = max(forecast_ns, earliest_ns)
     if latest_ns is not None:
         end_ns = min(end_ns, latest_ns)
-    return forecast._replace(end_ns=end_ns)
+    return Likely(end_ns, AS_PLANNED if planned else _share(end_ns - earliest_ns, red=red))
+
+
+def _share(beyond_ns: int, *, red: bool) -> float:
+    """Return how often a forecast comes true that goes so far beyond the promise."""
+    beyond_s = beyond_ns / NS_PER_S
+    if red and beyond_s <= SURE[0][0]:
+        return FREED
+    return next((share for most_s, share in SURE if beyond_s <= most_s), FAR)
 
 
 def forecasts(
@@ -49,8 +75,8 @@ def forecasts(
     promises: Sequence[Promise | None],
     turns: Sequence[Turn],
     now_ns: int,
-) -> dict[str, Likely]:
-    """Return the likely ends of the present colours, of the groups whose end the turns tell.
+) -> dict[str, int]:
+    """Return the likely ends of the present colours [ns], of the groups whose end the turns tell.
 
     Args:
         program: Of the junction.
@@ -59,9 +85,10 @@ def forecasts(
         turns: That the policy foresees, what is green now first.
         now_ns: The present time.
     """
-    ends: dict[str, Likely] = {}
+    ends: dict[str, int] = {}
     green = {
-        name for name, group in zip(program.groups, state, strict=True)
+        name
+        for name, group in zip(program.groups, state, strict=True)
         if group.phase is Phase.GREEN
     }
     at_ns, before = now_ns, frozenset[str]()
@@ -71,13 +98,13 @@ def forecasts(
         if number == 0:
             at_ns += _cleared_ns(program, state, promises, entering, now_ns)
         for name in entering:
-            ends.setdefault(name, _forecast(at_ns, now_ns))
+            ends.setdefault(name, at_ns)
         if turn.green_s is None:
             break
         at_ns += round(turn.green_s * NS_PER_S)
         following = turns[number + 1].groups if number + 1 < len(turns) else frozenset[str]()
         for name in (turn.groups & green) - following:
-            ends.setdefault(name, _forecast(at_ns, now_ns))
+            ends.setdefault(name, at_ns)
         before = turn.groups
     return ends
 
@@ -110,7 +137,3 @@ def _cleared_ns(
         ),
         default=0,
     )
-
-
-def _forecast(end_ns: int, now_ns: int) -> Likely:
-    return Likely(end_ns, 0.5)

@@ -10,7 +10,6 @@ which the first k would lose more than all rivals do. Who passes within the time
 is promised anyway needs no more of it.
 """
 
-import math
 from collections.abc import Iterable
 
 from scm.clock import NS_PER_S
@@ -24,29 +23,38 @@ PROMISED_S = AHEAD_NS / NS_PER_S
 
 def is_worth_waiting(site: Site, number: int, view: JunctionView) -> bool:
     """Return whether the green of a group should go on, by its number."""
-    return worth_s(site, number, view, most_s=0.0) > 0.0
+    comes = coming(view.detectors[site.program.groups[number]], site.headway_s)
+    return bool(comes) and _is_worth(comes, *_rivalry(site, number, view))
 
 
-def worth_s(site: Site, number: int, view: JunctionView, most_s: float = math.inf) -> float:
-    """Return for how long the green of a group will be worth going on [s]; 0: it is not now.
+def worth_until_s(site: Site, number: int, view: JunctionView, from_s: float) -> float:
+    """Return until when the green of a group will be worth going on from a time on [s from now].
 
-    It is looked at again when each car that is known by now needs no more, up to the first time
-    after `most_s`.
+    It is decided again whenever one of the cars that are known by now needs no more of it.
     """
-    own = view.detectors[site.program.groups[number]]
+    comes = coming(view.detectors[site.program.groups[number]], site.headway_s)
+    red_s, change_s, waiting = _rivalry(site, number, view)
+    until_s = from_s
+    for place, at_s in enumerate(comes):
+        if at_s - until_s <= PROMISED_S:
+            continue
+        left = [one - until_s for one in comes[place:]]
+        there = [max(0.0, one - until_s) for one in waiting]
+        if not _is_worth(left, red_s, change_s, there):
+            break
+        until_s = at_s - PROMISED_S
+    return until_s
+
+
+def _rivalry(
+    site: Site, number: int, view: JunctionView
+) -> tuple[float, float, list[float]]:  # fmt: skip
+    """Return the red that follows a green, the change before it, and when the others' cars come."""
     change_s = _change_s(site, number)
     rivals = rivals_of(site, number, view)
     red_s = change_s + sum(_served_s(site, i, view) for i in rivals)
     waiting = [at_s for i in rivals for at_s in _arrivals(view.detectors[site.program.groups[i]])]
-    comes, after_s = coming(own, site.headway_s), 0.0
-    for number_gone, at_s in enumerate(comes):
-        left = [one - after_s for one in comes[number_gone:]]
-        if not _is_worth(left, red_s, change_s, [max(0.0, at - after_s) for at in waiting]):
-            break
-        after_s = at_s - PROMISED_S
-        if after_s > most_s:
-            break
-    return after_s
+    return red_s, change_s, waiting
 
 
 def _is_worth(comes: list[float], red_s: float, change_s: float, waiting: list[float]) -> bool:

@@ -18,7 +18,7 @@ from scm.traffic.kernel import Phase
 from scm.traffic.policy import Answer, JunctionView, Mode, Policy, Site, Turn
 from scm.traffic.promise import AHEAD_NS
 from scm.traffic.rings import Inputs, Recall, Ring, Rings
-from scm.traffic.waiting import PROMISED_S, green_s, is_worth_waiting, worth_s
+from scm.traffic.waiting import PROMISED_S, green_s, is_worth_waiting, worth_until_s
 
 UNSEEN_NS = 120 * NS_PER_S
 LONG_QUEUE = 4
@@ -131,9 +131,11 @@ def _left_s(site: Site, ring: Ring, inputs: Inputs, view: JunctionView) -> float
     least_s = (times.min_green - ring.green) / NS_PER_S
     if not view.sees:
         return max(least_s, over_s) + PROMISED_S
-    waits_s = worth_s(site, ring.phase, view)
-    gap_ns = times.passage - (0 if waits_s else ring.gap)
-    return max(least_s, min(waits_s + gap_ns / NS_PER_S, over_s), 0.0) + PROMISED_S
+    from_s, passage_s = max(0.0, least_s), times.passage / NS_PER_S
+    until_s = worth_until_s(site, ring.phase, view, from_s)
+    is_alone = until_s == from_s  # the gap runs already
+    gap_s = (times.passage - ring.gap) / NS_PER_S if is_alone else until_s + passage_s
+    return max(from_s, min(gap_s, over_s)) + PROMISED_S
 
 
 def _green_s(site: Site, phase: int, view: JunctionView) -> float:
@@ -152,6 +154,8 @@ def named(site: Site, phases: frozenset[int]) -> frozenset[str]:
 
 
 POLICY = Policy(
-    "actuated: green for whoever is there, as long as they come", start, step,
+    "actuated: green for whoever is there, as long as they come",
+    start,
+    step,
     foresee=foresee,
 )

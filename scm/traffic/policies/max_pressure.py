@@ -21,7 +21,7 @@ from scm.traffic.detectors import Detector
 from scm.traffic.kernel import Phase, Program
 from scm.traffic.plan import stages, times_of
 from scm.traffic.policy import Answer, JunctionView, Mode, Policy, Site, Turn
-from scm.traffic.waiting import PROMISED_S, coming, green_s, is_worth_waiting, worth_s
+from scm.traffic.waiting import PROMISED_S, coming, green_s, is_worth_waiting, worth_until_s
 
 STARVED_NS = 60 * NS_PER_S
 UNSEEN_NS = 120 * NS_PER_S
@@ -88,11 +88,12 @@ def foresee(site: Site, memory: Memory, view: JunctionView) -> tuple[Turn, ...]:
     most_s = max(site.layout.phases[i].max1 for i in numbers) / NS_PER_S
     if is_green:
         spent_s = memory.green_ns / NS_PER_S
-        worth = max(worth_s(site, i, view) for i in numbers)
-        left_s = max(0.0, least_s - spent_s, min(worth, most_s - spent_s)) + PROMISED_S
+        from_s = max(0.0, least_s - spent_s)
+        until_s = max(worth_until_s(site, i, view, from_s) for i in numbers)
+        left_s = max(from_s, min(until_s, most_s - spent_s)) + PROMISED_S
     else:
         takes_s = max(green_s(site, i, view.detectors[site.program.groups[i]]) for i in numbers)
-        left_s = max(least_s, min(takes_s, most_s)) + PROMISED_S
+        left_s = max(least_s + PROMISED_S, min(takes_s, most_s))
     gone = {name: _later(site, view.detectors[name], left_s) for name in memory.stage}
     then = replace(view, detectors={**view.detectors, **gone})
     following = _choose(site, memory.stage, then, _called(site, memory, then), memory.waits_ns)

@@ -121,6 +121,8 @@ def _status(
 
 
 POLICY = Policy(
-    "priority: actuated, and help for buses and emergency vehicles", start, step,
+    "priority: actuated, and help for buses and emergency vehicles",
+    start,
+    step,
     foresee=foresee,
 )
