@@ -98,8 +98,11 @@ class GreenAdvisor:
         if not told:
             return None
         first = min(told, key=lambda one: (one.colour != "green", one.min_end_s or 0.0))
-        ends = (_later(end, age_s) for end in first[1:4])
-        return Told(first.colour, *ends, first.likely_confidence)
+        return first._replace(
+            min_end_s=_later(first.min_end_s, age_s),
+            max_end_s=_later(first.max_end_s, age_s),
+            likely_end_s=_later(first.likely_end_s, age_s),
+        )
 
     def _advice(self, distance: float, number: int, lane: MapLane, told: Told) -> Advice:
         limits = self._maps[number].speed_limits
