@@ -16,6 +16,7 @@ from scm.traffic import asked, kernel
 from scm.traffic.asked import NEED_RINGS, Asked
 from scm.traffic.detectors import Detector
 from scm.traffic.kernel import Phase, Program
+from scm.traffic.likely import forecasts, within
 from scm.traffic.plan import FLASH, load_timetable, plan_names
 from scm.traffic.policy import (
     FIXED,
@@ -43,6 +44,7 @@ from scm.v2x.messages.signal_request import SignalRequest
 from scm.v2x.messages.spat import Colour, SignalGroup, Spat
 
 LATE_NS = 3 * STEP_NS
+FORESEE_EVERY_NS = 5 * STEP_NS
 BY_HAND = "actuated"
 
 _COLOUR: dict[Phase, Colour] = {
@@ -147,6 +149,8 @@ class Controller:
         self._shown_ns: int | None = None
         self._is_late = False
         self._seq = 0
+        self._foreseen_ns = 0
+        self._forecasts: dict[str, int] = {}
         self._restart_ns = max(times.clearance for times in program.times) + STEP_NS
 
     @property
@@ -223,6 +227,8 @@ class Controller:
             self._program, self._state, wishes, dt_ns, flash=self.mode == FLASH
         )
         self._show(now_ns)
+        if self.changed or now_ns - self._foreseen_ns >= FORESEE_EVERY_NS:
+            self._foresee(now_ns, heard)
 
     def spat(self, now_ns: int) -> Spat:
         """Return what is shown, for the step that was just made."""
@@ -233,7 +239,7 @@ class Controller:
             seq=self._seq,
             mode=self.mode,
             plan=self.running,
-            groups=tuple(self._tell(name, shown) for name, shown in self._shown.items()),
+            groups=tuple(self._tell(name, shown, now_ns) for name, shown in self._shown.items()),
             revision=self._revision,
         )
 
@@ -321,7 +327,23 @@ class Controller:
         self._timetables.clear(now_ns, now_ns + max(left) + 3 * STEP_NS)
 
     def _ask_policy(self, now_ns: int, dt_ns: int, heard: Heard) -> frozenset[str]:
-        view = JunctionView(
+        view = self._view(now_ns, dt_ns, heard)
+        try:
+            self._memory, answer = self._policies[self.policy].step(self._site, self._memory, view)
+            self._check(answer)
+        except Exception as cause:  # noqa: BLE001 a policy is a plug-in: whatever it does, cars go on
+            self._fail(cause)
+            self._return_to_timetable(now_ns)
+            return frozenset()
+        self.mode, self.priority = answer.mode, answer.priority
+        return self._as_asked(answer.groups)
+
+    def _fail(self, cause: Exception) -> None:
+        self._failed = self.policy
+        self.failure = f"policy {self.policy}: {type(cause).__name__}: {cause}"
+
+    def _view(self, now_ns: int, dt_ns: int, heard: Heard) -> JunctionView:
+        return JunctionView(
             now_ns,
             dt_ns,
             self._state,
@@ -331,16 +353,25 @@ class Controller:
             heard.priority,
             self._timetables.wishes(now_ns),
         )
+
+    def _foresee(self, now_ns: int, heard: Heard) -> None:
+        """Ask timetable or policy when the present colours will likely end."""
+        self._foreseen_ns = now_ns
+        self._forecasts = {}
+        if self.mode == FLASH:
+            return
+        if self.policy == FIXED:
+            if self._wanted() == FIXED:
+                start_ns = self._timetables.next_start_ns
+                reds = [name for name, shown in self._shown.items() if shown.colour == "red"]
+                self._forecasts = {name: start_ns(name) for name in reds}
+            return
+        view, promises = self._view(now_ns, 0, heard), self._promises()
         try:
-            self._memory, answer = self._policies[self.policy].step(self._site, self._memory, view)
-            self._check(answer)
-        except Exception as cause:  # noqa: BLE001 a policy is a plug-in: whatever it does, cars go on
-            self._failed = self.policy
-            self.failure = f"policy {self.policy}: {type(cause).__name__}: {cause}"
-            self._return_to_timetable(now_ns)
-            return frozenset()
-        self.mode, self.priority = answer.mode, answer.priority
-        return self._as_asked(answer.groups)
+            turns = self._policies[self.policy].foresee(self._site, self._memory, view)
+            self._forecasts = forecasts(self._program, self._state, promises, turns, now_ns)
+        except Exception as cause:  # noqa: BLE001 as above; the next step gives it up
+            self._fail(cause)
 
     def _as_asked(self, wishes: frozenset[str]) -> frozenset[str]:
         """Return a policy's wishes with those of people in them, which it may have overlooked."""
@@ -413,7 +444,12 @@ class Controller:
             case _:
                 return Promise(now_ns, None)
 
-    def _tell(self, name: str, shown: _Shown) -> SignalGroup:
+    def _tell(self, name: str, shown: _Shown, now_ns: int) -> SignalGroup:
+        likely = None
+        if self.mode != FLASH:
+            forecast_ns, is_red = self._forecasts.get(name), shown.colour == "red"
+            planned = self.policy == FIXED
+            likely = within(shown.promise, forecast_ns, now_ns, red=is_red, planned=planned)
         return SignalGroup(
             group=name,
             colour=shown.colour,
@@ -421,4 +457,6 @@ class Controller:
             min_end_ns=shown.promise.min_end_ns,
             max_end_ns=shown.promise.max_end_ns,
             next_colour=_NEXT[shown.colour],
+            likely_end_ns=likely and likely.end_ns,
+            likely_confidence=likely and likely.confidence,
         )

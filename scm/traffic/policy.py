@@ -101,6 +101,25 @@ class Answer:
     mode: Mode = "adaptive"
 
 
+class Turn(NamedTuple):
+    """What a policy foresees: groups that are green together, and for how long.
+
+    Attributes:
+        groups: Without conflict.
+        green_s: From now, of groups that are green; else from their begin. None: for ever, or
+            nobody knows.
+    """
+
+    groups: frozenset[str]
+    green_s: float | None
+
+
+def foresees_nothing(site: Site, memory: Any, view: JunctionView) -> tuple[Turn, ...]:
+    """Return the outlook of a policy that has none."""
+    del site, memory, view
+    return ()
+
+
 @dataclass(frozen=True, slots=True)
 class Policy:
     """A plug-in: what it is for, in one sentence, and what it does.
@@ -108,6 +127,8 @@ class Policy:
     Attributes:
         start: Makes its memory.
         step: From memory and view to the next memory and an answer.
+        foresee: From the memory after a step and its view to the turns to come, those of whoever is
+            green now first, as if nobody came whom it does not see yet. SPaT tells it as likely.
         is_timed: It keeps to the timetable, so Spat may promise what that says.
         is_flash: It is no policy but flashing red.
         needs_detectors: Cars must be listened to for it.
@@ -119,6 +140,7 @@ class Policy:
     is_timed: bool = False
     is_flash: bool = False
     needs_detectors: bool = True
+    foresee: Callable[[Site, Any, JunctionView], tuple[Turn, ...]] = foresees_nothing
 
 
 def policy_names() -> list[str]:

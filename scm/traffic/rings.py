@@ -179,6 +179,27 @@ def step(layout: Layout, state: Rings, told: Inputs, green: frozenset[int], dt: 
     return _go_on(layout, state, told, called)
 
 
+def order_of(layout: Layout, state: Rings, called: frozenset[int]) -> list[frozenset[int]]:
+    """Return which phases are wished together, one set after the other, the present one first.
+
+    It is the order of `step` while these stay called, each until it has been served once.
+    """
+    order = [wishes(state)]
+    left = called - order[0]
+    while left:
+        sequences = layout.sections[state.section]
+        wraps = left <= {i for sequence in sequences for i in sequence}
+        after = tuple(
+            _advance(sequence, ring, left, wraps=wraps)
+            for sequence, ring in zip(sequences, state.rings, strict=True)
+        )
+        is_last = after == state.rings
+        state = _cross(layout, state, left) if is_last else state._replace(rings=after)
+        order.append(wishes(state))
+        left -= order[-1]
+    return [phases for phases in order if phases]
+
+
 def _called(layout: Layout, state: Rings, told: Inputs) -> frozenset[int]:
     """Return who is called: by vehicles, by memory, by recall; not who is left out."""
     always = {i for i, p in enumerate(layout.phases) if p.recall in (Recall.MIN, Recall.MAX)}

@@ -45,6 +45,11 @@ class Timetables:
         table = self.cycle.timetable
         return table.wishes(now_ns - self.cycle.began_ns) if table else frozenset()
 
+    def next_start_ns(self, group: str) -> int:
+        """Return when a group's green begins in the next cycle, of the plan that is to come."""
+        coming = dict(zip(self._tables, self.coming, strict=True))[self.pending or self.plan]
+        return self.cycle.ends_ns + coming.first_start_ns(group)
+
     def _beginning(self, plan: str, began_ns: int) -> Timetable:
         """Return a plan's timetable for a cycle that begins at a time."""
         table, wave = self._tables[plan]

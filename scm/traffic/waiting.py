@@ -23,14 +23,42 @@ PROMISED_S = AHEAD_NS / NS_PER_S
 
 def is_worth_waiting(site: Site, number: int, view: JunctionView) -> bool:
     """Return whether the green of a group should go on, by its number."""
-    own = view.detectors[site.program.groups[number]]
-    comes = coming(own, site.headway_s)
-    if not comes:
-        return False
-    rivals = rivals_of(site, number, view)
+    comes = coming(view.detectors[site.program.groups[number]], site.headway_s)
+    return bool(comes) and _is_worth(comes, *_rivalry(site, number, view))
+
+
+def worth_until_s(site: Site, number: int, view: JunctionView, from_s: float) -> float:
+    """Return until when the green of a group will be worth going on from a time on [s from now].
+
+    It is decided again whenever one of the cars that are known by now needs no more of it.
+    """
+    comes = coming(view.detectors[site.program.groups[number]], site.headway_s)
+    red_s, change_s, waiting = _rivalry(site, number, view)
+    until_s = from_s
+    for place, at_s in enumerate(comes):
+        if at_s - until_s <= PROMISED_S:
+            continue
+        left = [one - until_s for one in comes[place:]]
+        there = [max(0.0, one - until_s) for one in waiting]
+        if not _is_worth(left, red_s, change_s, there):
+            break
+        until_s = at_s - PROMISED_S
+    return until_s
+
+
+def _rivalry(
+    site: Site, number: int, view: JunctionView
+) -> tuple[float, float, list[float]]:  # fmt: skip
+    """Return the red that follows a green, the change before it, and when the others' cars come."""
     change_s = _change_s(site, number)
+    rivals = rivals_of(site, number, view)
     red_s = change_s + sum(_served_s(site, i, view) for i in rivals)
     waiting = [at_s for i in rivals for at_s in _arrivals(view.detectors[site.program.groups[i]])]
+    return red_s, change_s, waiting
+
+
+def _is_worth(comes: list[float], red_s: float, change_s: float, waiting: list[float]) -> bool:
+    """Return whether there is a first of those who come that is worth waiting for."""
     saved = 0.0
     for at_s in comes:
         saved += max(0.0, red_s - at_s) + START_S
@@ -76,5 +104,10 @@ def _served_s(site: Site, number: int, view: JunctionView) -> float:
     detector = view.detectors[site.program.groups[number]]
     if not detector.call:
         return 0.0
+    return green_s(site, number, detector) + _change_s(site, number)
+
+
+def green_s(site: Site, number: int, detector: Detector) -> float:
+    """Return the green that a group's cars take to leave, no less than its least [s]."""
     least_s = site.program.times[number].min_green / NS_PER_S
-    return max(least_s, detector.near * site.headway_s) + _change_s(site, number)
+    return max(least_s, detector.near * site.headway_s)

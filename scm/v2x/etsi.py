@@ -71,6 +71,9 @@ STATUS_BITS = (
 )
 """IntersectionStatusObject, first bit first; two more are reserved."""
 
+TIME_CONFIDENCES = (21, 36, 47, 56, 62, 68, 73, 77, 81, 85, 88, 91, 94, 96, 98, 100)
+"""SAE J2735 TimeIntervalConfidence in percent; the place in the list is the number on the air."""
+
 # A value beyond the standard's range is refused when read: it comes from the air.
 _TimeMark = Annotated[int, Meta(ge=0, le=TIME_MARK_UNKNOWN)]
 
@@ -191,11 +194,15 @@ class CamBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
 
 
 class Timing(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """When a phase ends: 0.1 s within the hour, 36000 far, 36001 unknown."""
+    """When a phase ends: 0.1 s within the hour, 36000 far, 36001 unknown.
+
+    `confidence` in `likely_time` is its place in `TIME_CONFIDENCES`.
+    """
 
     min_end_time: _TimeMark
     max_end_time: _TimeMark | None = None
     likely_time: _TimeMark | None = None
+    confidence: Annotated[int, Meta(ge=0, le=15)] | None = None
     next_time: _TimeMark | None = None
 
 
@@ -236,6 +243,13 @@ class MovementState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=Tru
         timing = self.state_time_speed[0].timing
         told = None if timing is None else timing.likely_time
         return TIME_MARK_UNKNOWN if told is None else told
+
+    @property
+    def confidence(self) -> float | None:
+        """How sure `likely_time` is, a share of 1; None: it is not told."""
+        timing = self.state_time_speed[0].timing
+        told = None if timing is None else timing.confidence
+        return None if told is None else TIME_CONFIDENCES[told] / 100.0
 
 
 class IntersectionState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):

@@ -9,6 +9,7 @@ field is written as the field's largest value, what is not known as its own unkn
 Field sets and values: EN 302 637-2 v1.4.1 with TS 102 894-2, TS 103 301 with SAE J2735.
 """
 
+import bisect
 import hashlib
 import math
 from datetime import UTC, datetime
@@ -23,6 +24,7 @@ from scm.v2x.etsi import (
     REFERENCE_LONGITUDE_DEG,
     SCALE,
     STATUS_BITS,
+    TIME_CONFIDENCES,
     TIME_MARK_UNKNOWN,
     Acceleration,
     BasicContainer,
@@ -117,6 +119,7 @@ class Told(NamedTuple):
     min_end_s: float | None
     max_end_s: float | None
     likely_end_s: float | None = None
+    likely_confidence: float | None = None
 
 
 def station_id(name: str) -> int:
@@ -263,12 +266,23 @@ def _mark(end_ns: int | None, now_ns: int, *, up: bool) -> int:
 
 def _movement(group: SignalGroup, number: int, spat: Spat) -> MovementState:
     promised = spat.mode != "flash" and group.colour in ("red", "green", "yellow")
+    likely_ns = group.likely_end_ns if promised else None
     timing = Timing(
         min_end_time=_mark(group.min_end_ns if promised else None, spat.t_ns, up=False),
         max_end_time=_mark(group.max_end_ns if promised else None, spat.t_ns, up=True),
+        likely_time=_mark(likely_ns, spat.t_ns, up=False) if likely_ns is not None else None,
+        confidence=_confidence(group) if likely_ns is not None else None,
     )
     event = MovementEvent(event_state=PHASE_STATES.index(_STATE_OF[group.colour]), timing=timing)
     return MovementState(signal_group=number, state_time_speed=(event,))
+
+
+def _confidence(group: SignalGroup) -> int | None:
+    """Return the highest class that promises no more than the group does; None: it tells none."""
+    if group.likely_confidence is None:
+        return None
+    percent = group.likely_confidence * 100.0
+    return max(0, bisect.bisect_right(TIME_CONFIDENCES, percent + 1e-9) - 1)
 
 
 def moment_of(t_ns: int) -> tuple[int, int]:
@@ -326,6 +340,7 @@ def colours_of(body: SpatemBody) -> dict[int, Told]:
             _until_s(state.min_end_time, body.intersections[0]),
             _until_s(state.max_end_time, body.intersections[0]),
             _until_s(state.likely_time, body.intersections[0]),
+            state.confidence,
         )
         for state in body.states
     }

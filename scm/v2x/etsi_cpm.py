@@ -69,10 +69,10 @@ class CartesianVelocity(msgspec.Struct, kw_only=True, frozen=True):
     y_velocity: VelocityComponent
 
 
-class Velocity(msgspec.Struct, kw_only=True, frozen=True):
-    """The standard's choice between two forms; this one."""
+class Velocity(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
+    """The standard's choice between two forms; None: the polar one, which is not read here."""
 
-    cartesian_velocity: CartesianVelocity
+    cartesian_velocity: CartesianVelocity | None = None
 
 
 class Angles(msgspec.Struct, kw_only=True, frozen=True):
@@ -81,10 +81,10 @@ class Angles(msgspec.Struct, kw_only=True, frozen=True):
     z_angle: Angle
 
 
-class ObjectClass(msgspec.Struct, kw_only=True, frozen=True):
-    """Kind of road vehicle: 5 a passenger car."""
+class ObjectClass(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
+    """Kind of road vehicle: 5 a passenger car. None: no road vehicle, but a person, a group ..."""
 
-    vehicle: Byte = PASSENGER_CAR
+    vehicle: Byte | None = None
 
 
 class Classification(msgspec.Struct, kw_only=True, frozen=True):
@@ -95,7 +95,7 @@ class Classification(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class PerceivedObject(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """One car that was seen.
+    """One car that was seen; of what other people's stations see, all but the place may be None.
 
     Attributes:
         measurement_delta_time: From the reference time to when this was true [ms].
@@ -105,10 +105,10 @@ class PerceivedObject(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=T
 
     measurement_delta_time: _Span
     position: Position
-    object_id: Word
-    velocity: Velocity
-    angles: Angles
-    z_angular_velocity: AngularVelocity
+    object_id: Word | None = None
+    velocity: Velocity | None = None
+    angles: Angles | None = None
+    z_angular_velocity: AngularVelocity | None = None
     object_dimension_x: Dimension | None = None
     object_dimension_y: Dimension | None = None
     sensor_id_list: tuple[Byte, ...] | None = None

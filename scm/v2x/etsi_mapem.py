@@ -79,6 +79,32 @@ _VehicleLane = Literal[
 ]
 
 
+_SpeedLimit = Literal[
+    "unknown",
+    "maxSpeedInSchoolZone",
+    "maxSpeedInSchoolZoneWhenChildrenArePresent",
+    "maxSpeedInConstructionZone",
+    "vehicleMinSpeed",
+    "vehicleMaxSpeed",
+    "vehicleNightMaxSpeed",
+    "truckMinSpeed",
+    "truckMaxSpeed",
+    "truckNightMaxSpeed",
+    "vehiclesWithTrailersMinSpeed",
+    "vehiclesWithTrailersMaxSpeed",
+    "vehiclesWithTrailersNightMaxSpeed",
+]
+_Layer = Literal[
+    "none",
+    "mixedContent",
+    "intersectionData",
+    "curveData",
+    "roadwaySectionData",
+    "parkingAreaData",
+    "sharedLaneData",
+]
+
+
 class Position3d(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """1e-7 degree of the enlarged city; elevation 0.1 m."""
 
@@ -90,7 +116,7 @@ class Position3d(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
 class SpeedLimit(msgspec.Struct, kw_only=True, frozen=True):
     """0.02 m/s."""
 
-    type: Literal["vehicleMaxSpeed", "vehicleMinSpeed", "unknown"] = "vehicleMaxSpeed"
+    type: _SpeedLimit = "vehicleMaxSpeed"
     speed: Annotated[int, Meta(ge=0, le=8191)]
 
 
@@ -119,10 +145,10 @@ class NodeList(msgspec.Struct, kw_only=True, frozen=True):
     nodes: Annotated[tuple[Node, ...], Meta(min_length=2, max_length=MOST_NODES)]
 
 
-class LaneType(msgspec.Struct, kw_only=True, frozen=True):
-    """The standard's choice between kinds of lanes; one for vehicles."""
+class LaneType(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
+    """The standard's choice between kinds of lanes; None: none for vehicles, a crosswalk say."""
 
-    vehicle: Annotated[tuple[_VehicleLane, ...], Meta(max_length=8)] = ()
+    vehicle: Annotated[tuple[_VehicleLane, ...], Meta(max_length=8)] | None = None
 
 
 class LaneAttributes(msgspec.Struct, kw_only=True, frozen=True):
@@ -132,7 +158,7 @@ class LaneAttributes(msgspec.Struct, kw_only=True, frozen=True):
         tuple[Literal["ingressPath", "egressPath"], ...], Meta(min_length=1, max_length=2)
     ]
     shared_with: Annotated[tuple[_Shared, ...], Meta(max_length=10)] = ()
-    lane_type: LaneType = LaneType()
+    lane_type: LaneType = LaneType(vehicle=())
 
 
 class ConnectingLane(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
@@ -184,7 +210,7 @@ class MapemBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     station_id: StationId
     timestamp: MinuteOfYear | None = None
     msg_issue_revision: Revision
-    layer_type: Literal["intersectionData"] | None = None
+    layer_type: _Layer | None = None
     intersections: (
         Annotated[tuple[IntersectionGeometry, ...], Meta(min_length=1, max_length=32)] | None
     ) = None

@@ -10,6 +10,7 @@ from scm.v2x.etsi import REFERENCE_LATITUDE_DEG, REFERENCE_LONGITUDE_DEG, SCALE
 from scm.v2x.etsi_convert import its_ms, station_id
 from scm.v2x.etsi_cpm import (
     MOST_OBJECTS,
+    PASSENGER_CAR,
     Angle,
     Angles,
     AngularVelocity,
@@ -102,7 +103,7 @@ def _perceived(track: Track, cameras: list[str], t_ns: int, body: CarBody) -> Pe
         object_dimension_x=_dimension(body.x_span),
         object_dimension_y=_dimension(body.y_span),
         sensor_id_list=tuple(cameras.index(name) for name in track.cameras) or None,
-        classification=(Classification(object_class=ObjectClass()),),
+        classification=(Classification(object_class=ObjectClass(vehicle=PASSENGER_CAR)),),
     )
 
 

@@ -13,11 +13,12 @@ from typing import NamedTuple
 
 from scm.clock import NS_PER_S
 from scm.traffic import rings
-from scm.traffic.asked import groups_of
+from scm.traffic.asked import NEED_RINGS, groups_of
 from scm.traffic.kernel import Phase
-from scm.traffic.policy import Answer, JunctionView, Mode, Policy, Site
-from scm.traffic.rings import Inputs, Recall, Rings
-from scm.traffic.waiting import is_worth_waiting
+from scm.traffic.policy import Answer, JunctionView, Mode, Policy, Site, Turn
+from scm.traffic.promise import AHEAD_NS
+from scm.traffic.rings import Inputs, Recall, Ring, Rings
+from scm.traffic.waiting import PROMISED_S, green_s, is_worth_waiting, worth_until_s
 
 UNSEEN_NS = 120 * NS_PER_S
 LONG_QUEUE = 4
@@ -95,9 +96,66 @@ def numbers(site: Site, groups: frozenset[str]) -> frozenset[int]:
     return frozenset(site.program.groups.index(group) for group in groups)
 
 
+def foresee(site: Site, memory: Memory, view: JunctionView) -> tuple[Turn, ...]:
+    """Return the turns of the rings as they are called now; wishes of people end it."""
+    if any(one.verb in NEED_RINGS for one in view.asked):
+        return ()
+    inputs = told_of(site, memory, view).inputs
+    layout, state = site.layout, memory.rings
+    called = inputs.calls if view.sees else frozenset(range(len(layout.phases)))
+    left_s = {
+        ring.phase: _left_s(site, ring, inputs, view)
+        for ring in state.rings
+        if ring.phase is not None
+    }
+    queue = rings.order_of(layout, state, called)
+    if len(queue) == 1:
+        return (Turn(named(site, queue[0]), None),)
+    turns, before = [], frozenset[int]()
+    for phases in queue:
+        lasts_s = (left_s.pop(i, _green_s(site, i, view)) for i in phases - before)
+        turns.append(Turn(named(site, phases), max(lasts_s, default=0.0)))
+        before = phases
+    return tuple(turns)
+
+
+def _left_s(site: Site, ring: Ring, inputs: Inputs, view: JunctionView) -> float:
+    """Return for how long a ring's phase stays green while others are called [s]."""
+    if ring.phase is None:
+        return 0.0
+    if view.state[ring.phase].phase is not Phase.GREEN:
+        return _green_s(site, ring.phase, view)
+    times = site.layout.phases[ring.phase]
+    most_ns = times.max2 if ring.phase in inputs.max2 else times.max1
+    over_s = (most_ns - ring.waited) / NS_PER_S
+    least_s = (times.min_green - ring.green) / NS_PER_S
+    if not view.sees:
+        return max(least_s, over_s) + PROMISED_S
+    from_s, passage_s = max(0.0, least_s), times.passage / NS_PER_S
+    until_s = worth_until_s(site, ring.phase, view, from_s)
+    is_alone = until_s == from_s  # the gap runs already
+    gap_s = (times.passage - ring.gap) / NS_PER_S if is_alone else until_s + passage_s
+    return max(from_s, min(gap_s, over_s)) + PROMISED_S
+
+
+def _green_s(site: Site, phase: int, view: JunctionView) -> float:
+    """Return how long a green that is to come takes [s]."""
+    times = site.layout.phases[phase]
+    detector = view.detectors.get(site.program.groups[phase])
+    if not view.sees or detector is None:
+        return (times.max1 + AHEAD_NS) / NS_PER_S
+    wished_s = min(green_s(site, phase, detector), times.max1 / NS_PER_S)
+    return max(wished_s, times.min_green / NS_PER_S + PROMISED_S)
+
+
 def named(site: Site, phases: frozenset[int]) -> frozenset[str]:
     """Return phases as names of groups."""
     return frozenset(site.program.groups[phase] for phase in phases)
 
 
-POLICY = Policy("actuated: green for whoever is there, as long as they come", start, step)
+POLICY = Policy(
+    "actuated: green for whoever is there, as long as they come",
+    start,
+    step,
+    foresee=foresee,
+)

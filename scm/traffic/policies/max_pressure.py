@@ -11,15 +11,17 @@ Rule: Varaiya 2013, Max pressure control of a network of signalized intersection
 wait is ours. It needs no knowledge of demand, and nothing of other junctions but the queues.
 """
 
+from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
 from scm.clock import NS_PER_S
-from scm.traffic.asked import groups_of
+from scm.traffic.asked import NEED_RINGS, groups_of
+from scm.traffic.detectors import Detector
 from scm.traffic.kernel import Phase, Program
 from scm.traffic.plan import stages, times_of
-from scm.traffic.policy import Answer, JunctionView, Mode, Policy, Site
-from scm.traffic.waiting import is_worth_waiting
+from scm.traffic.policy import Answer, JunctionView, Mode, Policy, Site, Turn
+from scm.traffic.waiting import PROMISED_S, coming, green_s, is_worth_waiting, worth_until_s
 
 STARVED_NS = 60 * NS_PER_S
 UNSEEN_NS = 120 * NS_PER_S
@@ -74,6 +76,36 @@ def _goes_on(site: Site, memory: Memory, view: JunctionView, green_ns: int) -> b
     numbers = [site.program.groups.index(name) for name in memory.stage if name in view.detectors]
     most_ns = max((site.layout.phases[i].max1 for i in numbers), default=0)
     return green_ns < most_ns and any(is_worth_waiting(site, i, view) for i in numbers)
+
+
+def foresee(site: Site, memory: Memory, view: JunctionView) -> tuple[Turn, ...]:
+    """Return what is left of the present stage, and which one follows by the pressure then."""
+    if any(one.verb in NEED_RINGS for one in view.asked) or not view.sees or not memory.stage:
+        return ()
+    numbers = [site.program.groups.index(name) for name in memory.stage]
+    is_green = all(view.state[i].phase is Phase.GREEN for i in numbers)
+    least_s = max(site.program.times[i].min_green for i in numbers) / NS_PER_S
+    most_s = max(site.layout.phases[i].max1 for i in numbers) / NS_PER_S
+    if is_green:
+        spent_s = memory.green_ns / NS_PER_S
+        from_s = max(0.0, least_s - spent_s)
+        until_s = max(worth_until_s(site, i, view, from_s) for i in numbers)
+        left_s = max(from_s, min(until_s, most_s - spent_s)) + PROMISED_S
+    else:
+        takes_s = max(green_s(site, i, view.detectors[site.program.groups[i]]) for i in numbers)
+        left_s = max(least_s + PROMISED_S, min(takes_s, most_s))
+    gone = {name: _later(site, view.detectors[name], left_s) for name in memory.stage}
+    then = replace(view, detectors={**view.detectors, **gone})
+    following = _choose(site, memory.stage, then, _called(site, memory, then), memory.waits_ns)
+    if following == memory.stage:
+        return (Turn(memory.stage, None),)
+    return (Turn(memory.stage, left_s), Turn(following, None))
+
+
+def _later(site: Site, detector: Detector, after_s: float) -> Detector:
+    """Return what is left of the cars of a green after a time."""
+    leaves = [at_s for at_s in coming(detector, site.headway_s) if at_s > after_s]
+    return Detector(call=bool(leaves), near=len(leaves), ahead=detector.ahead)
 
 
 def stages_of(program: Program) -> list[frozenset[str]]:
@@ -143,4 +175,9 @@ def _pressure(stage: frozenset[str], view: JunctionView, called: frozenset[str])
     return total
 
 
-POLICY = Policy("max pressure: the longest queues first, where there is room for them", start, step)
+POLICY = Policy(
+    "max pressure: the longest queues first, where there is room for them",
+    start,
+    step,
+    foresee=foresee,
+)

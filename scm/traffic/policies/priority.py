@@ -21,7 +21,7 @@ from scm.traffic.asked import groups_of
 from scm.traffic.kernel import Phase
 from scm.traffic.policies import actuated
 from scm.traffic.policies.actuated import Told, named, numbers, told_of
-from scm.traffic.policy import Answer, JunctionView, Mode, Policy, PriorityCall, Site, Status
+from scm.traffic.policy import Answer, JunctionView, Mode, Policy, PriorityCall, Site, Status, Turn
 
 LEAD_NS = 20 * NS_PER_S
 LATE_NS = 10 * NS_PER_S
@@ -57,6 +57,13 @@ def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer
     is_preempted = told.inputs.preempt is not None
     mode: Mode = "preempt" if is_preempted else "priority" if near else "adaptive"
     return Memory(after, _count(site, memory, view, near)), Answer(wished, status, mode)
+
+
+def foresee(site: Site, memory: Memory, view: JunctionView) -> tuple[Turn, ...]:
+    """Return the turns of the rings, as long as nobody is to be helped."""
+    if any(_is_due(one, view.now_ns) for one in view.priority):
+        return ()
+    return actuated.foresee(site, memory.actuated, view)
 
 
 def _is_due(one: PriorityCall, now_ns: int) -> bool:
@@ -113,4 +120,9 @@ def _status(
     return "granted" if is_green and one.group in wished and is_first else "processing"
 
 
-POLICY = Policy("priority: actuated, and help for buses and emergency vehicles", start, step)
+POLICY = Policy(
+    "priority: actuated, and help for buses and emergency vehicles",
+    start,
+    step,
+    foresee=foresee,
+)

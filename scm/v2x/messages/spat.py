@@ -1,6 +1,6 @@
 """Signal phase and timing of a junction, native form: colours and promised change times."""
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 
@@ -16,6 +16,9 @@ class SignalGroup(msgspec.Struct, kw_only=True, frozen=True):
         min_end_ns: The colour will not change before; never moves earlier.
         max_end_ns: It will have changed by then, never moves later; None: not known.
         next_colour: What comes then; None: not known.
+        likely_end_ns: A forecast between the two, no promise: it moves as cars come. None: nobody
+            knows.
+        likely_confidence: The share of such forecasts that come true within a second, 0 to 1.
     """
 
     group: str
@@ -24,6 +27,8 @@ class SignalGroup(msgspec.Struct, kw_only=True, frozen=True):
     min_end_ns: int
     max_end_ns: int | None = None
     next_colour: Colour | None = None
+    likely_end_ns: int | None = None
+    likely_confidence: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] | None = None
 
 
 class Spat(Message, kw_only=True, frozen=True):

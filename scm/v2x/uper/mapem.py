@@ -37,11 +37,26 @@ class _NodeXy:
         return {"node_xy": value[1]}
 
 
+class _LaneType:
+    """A lane for vehicles; of any other kind the record says nothing."""
+
+    _flags = Flags(VEHICLE_LANE)
+
+    def to_asn(self, record: Mapping[str, Any]) -> tuple[str, tuple[int, int]]:
+        if "vehicle" not in record:
+            msg = "lane_type: got a lane that is none for vehicles, which is not written here"
+            raise MessageError(msg)
+        return "vehicle", self._flags.to_asn(record["vehicle"])
+
+    def of_asn(self, value: tuple[str, Any]) -> dict[str, list[str]]:
+        return {"vehicle": self._flags.of_asn(value[1])} if value[0] == "vehicle" else {}
+
+
 _MANOEUVRES = Bits(12)
 _ATTRIBUTES = Fields(
     ("directional_use", "directionalUse", Flags(DIRECTIONS)),
     ("shared_with", "sharedWith", Flags(SHARED)),
-    ("lane_type", "laneType", Chosen("vehicle", Only("vehicle", Flags(VEHICLE_LANE)))),
+    ("lane_type", "laneType", _LaneType()),
 )
 _CONNECTION = Fields(
     (

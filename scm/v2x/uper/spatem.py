@@ -23,6 +23,7 @@ _EVENT = Fields(
             ("min_end_time", "minEndTime"),
             ("max_end_time", "maxEndTime"),
             ("likely_time", "likelyTime"),
+            ("confidence", "confidence"),
             ("next_time", "nextTime"),
         ),
     ),

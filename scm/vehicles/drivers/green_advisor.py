@@ -29,6 +29,7 @@ class Advice(NamedTuple):
         distance_m: From the front bumper to the stop line.
         speed_mps: To drive now, at most the lane's limit.
         earliest_s, latest_s, likely_s: When the lights change; None: not told.
+        confidence: The share of such likely ends that come true; None: not told.
         is_green: What they are now.
     """
 
@@ -39,6 +40,7 @@ class Advice(NamedTuple):
     earliest_s: float | None
     latest_s: float | None
     likely_s: float | None
+    confidence: float | None
     is_green: bool
 
 
@@ -96,8 +98,11 @@ class GreenAdvisor:
         if not told:
             return None
         first = min(told, key=lambda one: (one.colour != "green", one.min_end_s or 0.0))
-        ends = (_later(end, age_s) for end in first[1:])
-        return Told(first.colour, *ends)
+        return first._replace(
+            min_end_s=_later(first.min_end_s, age_s),
+            max_end_s=_later(first.max_end_s, age_s),
+            likely_end_s=_later(first.likely_end_s, age_s),
+        )
 
     def _advice(self, distance: float, number: int, lane: MapLane, told: Told) -> Advice:
         limits = self._maps[number].speed_limits
@@ -106,7 +111,7 @@ class GreenAdvisor:
         room = distance - SHORT_OF_LINE
         decel, floor = self._limits.decel, self._floor * allowed
         speed = allowed if math.isinf(allowed) else _speed(room, wait, decel, allowed, floor)
-        ends = told.min_end_s, told.max_end_s, told.likely_end_s
+        ends = told.min_end_s, told.max_end_s, told.likely_end_s, told.likely_confidence
         is_green = told.colour == "green"
         return Advice(number, lane.lane_id, distance, speed, *ends, is_green)
 
@@ -119,7 +124,8 @@ def _distance(
     geometry: IntersectionGeometry, lane: MapLane, x: float, y: float, yaw: float
 ) -> float | None:
     """Return how far a place on a lane that leads in is from the stop line [m]; None: beside it."""
-    if "ingressPath" not in lane.lane_attributes.directional_use:
+    attributes = lane.lane_attributes
+    if "ingressPath" not in attributes.directional_use or attributes.lane_type.vehicle is None:
         return None
     near_x, near_y = place_of(geometry.ref_point.latitude, geometry.ref_point.longitude)
     half, begin = 0.5 * (geometry.lane_width or 0) / _CM, 0.0

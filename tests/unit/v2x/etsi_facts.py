@@ -143,7 +143,12 @@ SPATEM = HEAD | {
                     "state_time_speed": [
                         {
                             "event_state": (0, 9),
-                            "timing?": {"min_end_time": MARK, "max_end_time?": MARK},
+                            "timing?": {
+                                "min_end_time": MARK,
+                                "max_end_time?": MARK,
+                                "likely_time?": MARK,
+                                "confidence?": (0, 15),
+                            },
                         },
                         1,
                         16,

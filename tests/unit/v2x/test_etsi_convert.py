@@ -206,6 +206,43 @@ def test_a_spatem_read_back_is_the_spat_also_across_the_hour(t_s, t_ms, to_min_m
     assert most <= told.max_end_s < most + 0.1
 
 
+@given(
+    t_ms=st.integers(0, 10**10),
+    to_min_ms=st.integers(0, 3_000_000),
+    likely_ms=st.integers(0, 50_000),
+    more_ms=st.integers(0, 50_000),
+)
+def test_a_likely_end_stays_between_the_two_promised_ones(t_ms, to_min_ms, likely_ms, more_ms):
+    t_ns, least_ns = t_ms * NS_PER_MS, (t_ms + to_min_ms) * NS_PER_MS
+    likely_ns = least_ns + likely_ms * NS_PER_MS
+    spat = a_spat(t_ns, min_end_ns=least_ns, max_end_ns=likely_ns + more_ms * NS_PER_MS)
+    first = replace(spat.groups[0], likely_end_ns=likely_ns, likely_confidence=0.6)
+    told = ec.colours_of(ec.spatem_of(replace(spat, groups=(first,)), JUNCTION))[1]
+    assert told.min_end_s <= told.likely_end_s <= told.max_end_s
+    assert told.likely_end_s == pytest.approx((likely_ns - t_ns) / NS_PER_S, abs=0.1001)
+
+
+@pytest.mark.parametrize(
+    ("share", "number", "read"),
+    [(1.0, 15, 1.0), (0.98, 14, 0.98), (0.75, 6, 0.73), (0.3, 0, 0.21), (0.1, 0, 0.21)],
+)
+def test_confidence_is_the_class_that_promises_no_more(share, number, read):
+    (group, _) = a_spat().groups
+    spat = replace(
+        a_spat(),
+        groups=(replace(group, likely_end_ns=group.min_end_ns, likely_confidence=share),),
+    )
+    body = ec.spatem_of(spat, JUNCTION)
+    assert body.states[0].state_time_speed[0].timing.confidence == number
+    assert ec.colours_of(body)[1].likely_confidence == read
+
+
+def test_who_foresees_nothing_sends_no_likely_end():
+    timing = ec.spatem_of(a_spat(), JUNCTION).states[0].state_time_speed[0].timing
+    assert (timing.likely_time, timing.confidence) == (None, None)
+    assert b"likely" not in msgspec.json.encode(timing)
+
+
 @pytest.mark.parametrize("ahead_s", [56 * 60, 7200])
 def test_an_end_of_an_hour_or_so_ahead_is_far_and_read_as_unknown(ahead_s):
     body = ec.spatem_of(a_spat(max_end_ns=NOW + ahead_s * NS_PER_S), JUNCTION)
@@ -217,7 +254,7 @@ def test_an_end_of_an_hour_or_so_ahead_is_far_and_read_as_unknown(ahead_s):
 def test_flash_promises_nothing_and_says_failure(colour):
     body = ec.spatem_of(a_spat(mode="flash", colour=colour, max_end_ns=NOW), JUNCTION)
     assert body.status == ("failureFlash",)
-    assert ec.colours_of(body)[1] == (colour, None, None, None)
+    assert ec.colours_of(body)[1] == (colour, None, None, None, None)
     assert (body.states[0].min_end_time, body.states[0].max_end_time) == (36001, 36001)
 
 
@@ -231,7 +268,7 @@ def test_only_a_protected_movement_is_green(state):
     group = replace(spatem.states[0], state_time_speed=(event,))
     junction = replace(spatem.intersections[0], states=(group,))
     body = replace(spatem, intersections=(junction,))
-    assert ec.colours_of(body)[1] == ("dark", None, None, None)
+    assert ec.colours_of(body)[1] == ("dark", None, None, None, None)
 
 
 def test_the_records_travel_as_json_with_the_names_of_the_open_json_schemas():

@@ -80,6 +80,35 @@ def test_an_envelope_is_read_back(kind):
         assert read == (f"scm_{one.station}", one.t_ns // 1_000_000, one.body)
 
 
+def test_a_cpm_of_which_only_places_are_known_is_read_and_a_person_is_no_car():
+    whole = (one for one in envelopes("cpm") if "perceived_object_container" in one["message"])
+    envelope = next(whole)
+    seen, *_ = envelope["message"]["perceived_object_container"]
+    del envelope["message"]["perceived_object_container"][1:]
+    least = {name: seen[name] for name in ("measurement_delta_time", "position")}
+    person = {"object_class": {"vru": {"pedestrian": 1}}, "confidence": 90}
+    speed = {"polar_velocity": {}}
+    seen.clear()
+    seen.update(least, velocity=speed, classification=[person])
+    (read,) = unwrap(json.dumps(envelope).encode()).body.perceived_object_container
+    assert (read.object_id, read.angles, read.z_angular_velocity) == (None, None, None)
+    assert read.velocity.cartesian_velocity is None
+    assert read.classification[0].object_class.vehicle is None
+
+
+def test_a_mapem_with_a_crosswalk_and_limits_for_trucks_is_read():
+    envelope = envelopes("mapem")[0]
+    junction = envelope["message"]["intersections"][0]
+    junction["lane_set"][0]["lane_attributes"]["lane_type"] = {"crosswalk": ["audioSupport"]}
+    junction["speed_limits"].append({"type": "truckMaxSpeed", "speed": 100})
+    envelope["message"]["layer_type"] = "mixedContent"
+    read = unwrap(json.dumps(envelope).encode()).body
+    lanes = read.intersections[0].lane_set
+    assert lanes[0].lane_attributes.lane_type.vehicle is None
+    assert lanes[1].lane_attributes.lane_type.vehicle == ()
+    assert (read.layer_type, len(read.intersections[0].speed_limits)) == ("mixedContent", 2)
+
+
 def test_only_those_that_must_tell_their_origin_do():
     told = {kind for kind in KINDS if "origin" in envelopes(kind)[0]}
     assert told == {"mapem", "spatem"}

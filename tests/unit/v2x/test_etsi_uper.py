@@ -2,10 +2,12 @@
 
 import sys
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
 from scm.errors import MessageError
+from scm.v2x.etsi_mapem import MapemBody
 from scm.v2x.uper import codec
 from tests.unit.v2x.asn1_text import for_asn1tools, module_of
 from tests.unit.v2x.etsi_city import city_says, everything
@@ -79,6 +81,31 @@ def test_a_node_takes_as_few_bits_as_its_offset_needs():
         far = max(abs(offset["x"]), abs(offset["y"]))
         assert far <= limits[size]
         assert smaller not in limits or far >= limits[smaller]
+
+
+def test_a_spatem_tells_likely_ends_and_their_confidence():
+    timings = [
+        codec.CODINGS["spatem"].to_asn(said.body)["spat"]["intersections"][0]["states"][0][
+            "state-time-speed"
+        ][0]["timing"]
+        for said in city_says()["spatem"]
+    ]
+    assert any(t.get("likelyTime") == t["minEndTime"] and t["confidence"] == 15 for t in timings)
+
+
+def test_a_lane_that_is_none_for_vehicles_is_read_as_such_and_never_written():
+    coding, body = codec.CODINGS["mapem"], city_says()["mapem"][0].body
+    value = coding.to_asn(body)
+    value["map"]["intersections"][0]["laneSet"][0]["laneAttributes"]["laneType"] = (
+        "crosswalk",
+        (0, 16),
+    )
+    read = msgspec.convert(coding.of_asn(value), MapemBody)
+    first, second = read.intersections[0].lane_set[:2]
+    assert first.lane_attributes.lane_type.vehicle is None
+    assert second.lane_attributes.lane_type.vehicle == ()
+    with pytest.raises(MessageError, match="none for vehicles, which is not written here"):
+        coding.to_asn(read)
 
 
 def test_a_cpm_has_no_uper_and_says_so():

@@ -183,7 +183,8 @@ def test_a_car_without_a_map_is_advised_by_what_the_air_tells():
         groups=tuple(
             SignalGroup(
                 group=g.name, colour="red", since_ns=0, min_end_ns=now_ns + 9 * 10**9,
-                max_end_ns=now_ns + 10**10,
+                max_end_ns=now_ns + 12 * 10**9, likely_end_ns=now_ns + 10**10,
+                likely_confidence=0.78,
             )
             for g in junction.groups
         ),
@@ -194,8 +195,9 @@ def test_a_car_without_a_map_is_advised_by_what_the_air_tells():
     told = advisor.advise(pose, now_ns)
     assert told.lane == topology_of(roads, junction).lane_in(line.group)
     assert told.distance_m == pytest.approx(1.6, abs=0.005)
-    assert (told.earliest_s, told.latest_s) == pytest.approx((9.0, 10.0), abs=0.11)
-    assert (told.likely_s, told.is_green) == (None, False)
+    assert (told.earliest_s, told.latest_s) == pytest.approx((9.0, 12.0), abs=0.11)
+    assert told.likely_s == pytest.approx(10.0, abs=0.11)
+    assert (told.confidence, told.is_green) == (0.77, False)
     assert told.speed_mps == pytest.approx(arriving_speed(1.56, told.earliest_s, 0.5), abs=0.001)
     assert advisor.advise(pose, now_ns + 2 * 10**9) is None
     assert advisor.advise(Pose2(pose.x, pose.y, pose.yaw + math.pi), now_ns) is None
