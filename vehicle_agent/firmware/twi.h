@@ -22,37 +22,46 @@ class Twi {
   }
 
   bool write(uint8_t address, uint8_t where, uint8_t value) {
-    return end(start(address, TW_WRITE) && put(where) && put(value));
+    return end(start(address, TW_WRITE, TW_START) && put(where) && put(value));
   }
 
   bool read(uint8_t address, uint8_t where, uint8_t* into, uint8_t count) {
-    if (!(start(address, TW_WRITE) && put(where) && start(address, TW_READ))) return end(false);
+    if (!(start(address, TW_WRITE, TW_START) && put(where) &&
+          start(address, TW_READ, TW_REP_START))) {
+      return end(false);
+    }
     for (uint8_t left = count; left > 0; --left) {
-      if (!go(left > 1 ? _BV(TWEA) : 0)) return end(false);
+      if (left > 1 ? !go(_BV(TWEA), TW_MR_DATA_ACK) : !go(0, TW_MR_DATA_NACK)) return end(false);
       *into++ = TWDR;
     }
     return end(true);
   }
 
  private:
-  // Let the hardware do one step; about 300 us at most, where a byte takes 23.
-  static bool go(uint8_t how) {
+  // Let the hardware do one step and return whether it ended as `wanted`; 500 us at most, where a
+  // byte takes 23.
+  static bool go(uint8_t how, uint8_t wanted, uint8_t or_else) {
     TWCR = _BV(TWINT) | _BV(TWEN) | how;
     for (uint16_t left = 700; left > 0; --left) {
-      if (TWCR & _BV(TWINT)) return true;
+      if ((TWCR & _BV(TWINT)) && (TW_STATUS == wanted || TW_STATUS == or_else)) {
+        return true;
+      }
     }
     return false;
   }
 
-  static bool start(uint8_t address, uint8_t direction) {
-    if (!go(_BV(TWSTA))) return false;
+  static bool go(uint8_t how, uint8_t wanted) { return go(how, wanted, wanted); }
+
+  static bool start(uint8_t address, uint8_t direction, uint8_t wanted) {
+    if (!go(_BV(TWSTA), wanted)) return false;
     TWDR = static_cast<uint8_t>(address << 1) | direction;
-    return go(0) && TW_STATUS == (direction == TW_READ ? TW_MR_SLA_ACK : TW_MT_SLA_ACK);
+    if (direction == TW_READ) return go(0, TW_MR_SLA_ACK);
+    return go(0, TW_MT_SLA_ACK, TW_MT_DATA_ACK);  // simavr 1.6 tells the second of an address
   }
 
-  static bool put(uint8_t byte) {
-    TWDR = byte;
-    return go(0) && TW_STATUS == TW_MT_DATA_ACK;
+  static bool put(uint8_t value) {
+    TWDR = value;
+    return go(0, TW_MT_DATA_ACK);
   }
 
   static bool end(bool is_good) {

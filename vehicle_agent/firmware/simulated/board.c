@@ -56,14 +56,13 @@ static void on_sent(struct avr_irq_t *irq, uint32_t value, void *param) {
         perror("board: pty");
 }
 
-static avr_cycle_count_t deliver(avr_t *a, avr_cycle_count_t when, void *param) {
-    (void)param;
-    if (queue_head != queue_tail) {
-        avr_irq_t *in = avr_io_getirq(a, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
-        avr_raise_irq(in, queue[queue_head++ % sizeof queue]);
-        if (queue_head == queue_tail) tell("heard", queue_head);
-    }
-    return when + BYTE_US * US;
+static void deliver(void) {
+    static avr_cycle_count_t next;
+    if (queue_head == queue_tail || avr->cycle < next) return;
+    next = avr->cycle + BYTE_US * US;
+    avr_irq_t *in = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
+    avr_raise_irq(in, queue[queue_head++ % sizeof queue]);
+    if (queue_head == queue_tail) tell("heard", queue_head);
 }
 
 static void receive(uint8_t byte) {
@@ -182,6 +181,7 @@ static void watch(void) {
 
 static void run_until(avr_cycle_count_t end) {
     while (avr->cycle < end) {
+        deliver();
         int state = avr_run(avr);
         watch();
         if (state == cpu_Done || state == cpu_Crashed) {
@@ -198,9 +198,14 @@ static void receive_hex(const char *hex) {
     for (; sscanf(hex, "%2x", &byte) == 1; hex += 2) receive(byte);
 }
 
+// Drive an input pin from outside, for good: each write to the port would pull it up again.
 static void set_pin(const char *text) {
+    static avr_ioport_external_t outside = {.name = 'D'};
     int number, level;
     if (sscanf(text, "%d %d", &number, &level) != 2 || number < 0 || number > 7) return;
+    outside.mask |= 1 << number;
+    outside.value = (outside.value & ~(1 << number)) | (level != 0) << number;
+    avr_ioctl(avr, AVR_IOCTL_IOPORT_SET_EXTERNAL('D'), &outside);
     avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), number), level);
 }
 
@@ -314,7 +319,6 @@ static void set_up(const char *hex_path) {
                             on_sent, NULL);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_TWI_GETIRQ(0), TWI_IRQ_OUTPUT), on_twi,
                             NULL);
-    avr_cycle_timer_register(avr, BYTE_US * US, deliver, NULL);
     imu_reset();
 }
 
