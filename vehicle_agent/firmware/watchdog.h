@@ -10,14 +10,13 @@ class CommandWatchdog {
  public:
   void feed(uint32_t now_ms) {
     fed_ms_ = now_ms;
-    is_fed_ = has_heard_ = true;
+    has_heard_ = true;
   }
 
-  // Return whether the last command still holds. Once it does not, only a new one helps: the
-  // clock's wrap after 49.7 days brings nothing back.
-  bool holds(uint32_t now_ms) {
-    if (now_ms - fed_ms_ >= settings::command_patience_ms) is_fed_ = false;
-    return is_fed_;
+  // Return whether the last command still holds. Ask more often than the clock wraps (49.7 days)
+  // and forget the command when it does not.
+  bool holds(uint32_t now_ms) const {
+    return has_heard_ && now_ms - fed_ms_ < settings::command_patience_ms;
   }
 
   // Return the command's age [ms], NaN before the first one.
@@ -27,5 +26,5 @@ class CommandWatchdog {
 
  private:
   uint32_t fed_ms_ = 0;
-  bool is_fed_ = false, has_heard_ = false;
+  bool has_heard_ = false;
 };

@@ -176,6 +176,21 @@ def test_telemetry_is_told_every_20_ms_on_the_average_and_after_a_stop_no_more(c
     assert car.send(now_ms + 100) == b""
 
 
+def test_a_host_is_asked_for_the_time_and_told_no_more_once_it_has_not_answered_for_11_s(car):
+    car.receive(pack(REQUEST_TOPICS), 0)
+    car.receive(pack(Frame(TIME, bytes(8))), 2000)
+    decoder, told_ms, asked_ms = Decoder(), [], []
+    for now_ms in range(0, 15_000, 2):
+        car.library.car_tell(0, 0, 7.5, now_ms)
+        for frame in decoder.feed(car.send(now_ms), 0):
+            if frame.topic in {TIME, TELEMETRY}:
+                (asked_ms if frame.topic == TIME else told_ms).append(now_ms)
+    assert asked_ms == pytest.approx([0, 2502, 5004, 7506, 10_008, 12_510], abs=2)
+    assert told_ms[-1] == pytest.approx(13_000, abs=20)
+    car.receive(pack(REQUEST_TOPICS), 16_000)
+    assert {frame.topic for frame in decoder.feed(car.send(16_000), 0)} >= {TIME, PUBLISHER_INFO}
+
+
 def test_the_age_of_the_last_command_is_told(car):
     car.receive(pack(REQUEST_TOPICS), 0)
     car.send(0)
@@ -183,6 +198,24 @@ def test_the_age_of_the_last_command_is_told(car):
     car.library.car_tell(0, 0, 0.0, 175)
     (frame,) = Decoder().feed(car.send(175), 0)
     assert struct.unpack("<f", frame.payload[-4:]) == (75,)
+
+
+def test_lamps_burn_as_asked_and_what_asks_for_none_of_them_changes_nothing(car):
+    def burning(now_ms=0):
+        told = car.step(now_ms)
+        return tuple(told[name] for name in ("tail", "low", "high", "rear", "left", "right"))
+
+    assert burning() == (255, 0, 0, 0, 0, 0)
+    car.command(DRIVE, 0.06)
+    assert burning() == (0, 0, 0, 0, 0, 0)
+    car.command(LIGHT, 1 + 4)
+    for refused in (16, -1, -0.5, math.nan, math.inf, 1e9):
+        car.command(LIGHT, refused)
+        assert burning() == (15, 1, 0, 0, 1, 0), refused
+    car.command(LIGHT, 2 + 8)
+    car.command(DRIVE, -0.04)
+    assert burning() == (255, 1, 1, 1, 0, 1)
+    assert [burning(ms)[5] for ms in (499, 500, 999, 1000)] == [1, 0, 0, 1]
 
 
 def found_by(library, stream):
@@ -284,6 +317,9 @@ def test_the_imu_is_woken_and_the_mean_of_its_samples_told_in_si_units(library):
     assert take(library) == pytest.approx(expected, rel=1e-5)
     library.imu_step(25)
     assert take(library) == pytest.approx(expected, rel=1e-5)
+    set_readings(library, 0, 0, 100)
+    library.imu_step(30)
+    assert take(library) == pytest.approx((math.radians(100 / 131.072), 0, 0), rel=1e-5)
 
 
 def test_an_imu_that_is_not_there_is_asked_once_a_second_and_gives_nan(library):
