@@ -31,9 +31,10 @@ from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
+from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.vehicles.car import Car, load_car
 
-SIMULATED = "simulated"
+SIMULATED, EYE, REAL = "simulated", "eye", "real"
 RADIUS, LIMIT = "wheel.radius_m", "steering.limit_rad"
 CAMERAS = ("front", "rear")
 STATES = {"dark": OFF, "red": RED, "flashing_red": RED, "yellow": YELLOW, "green": GREEN}
@@ -48,15 +49,17 @@ _KINDS: tuple[tuple[re.Pattern[str], type[Message]], ...] = tuple(
         (r"eye/pose/[^/]+", EyeTrack),
         (r"tl/[^/]+/spat", Spat),
         (r"world/def", WorldDefinition),
+        (r"world/snapshot", WorldSnapshot),
     )
 )
 
 
 @dataclass(slots=True)
 class _Heard:
-    """What a run tells of one car, in the order in which it was heard."""
+    """What a run tells of one car; `placed` is what the world's snapshots tell."""
 
     states: list[VehicleState] = field(default_factory=list)
+    placed: list[VehicleState] = field(default_factory=list)
     tracks: list[EyeTrack] = field(default_factory=list)
     sensors: list[VehicleSensors] = field(default_factory=list)
     scans: list[LidarScan] = field(default_factory=list)
@@ -94,10 +97,15 @@ def read_tracks(path: Path, vehicle: str | None = None) -> Run:
         match told:
             case WorldDefinition():
                 lights, is_level = told.map.lights, told.map.floor.is_level
+            case WorldSnapshot():
+                for state in _states_of(told):
+                    cars.setdefault(state.vehicle, _Heard()).placed.append(state)
             case Spat():
                 spats.setdefault(told.junction, []).append(told)
             case _:
                 _take(cars, told)
+    for heard in cars.values():
+        heard.states = heard.states or heard.placed
     reporting = sorted((name for name, heard in cars.items() if heard.states), key=_natural)
     chosen = [name for name in reporting if vehicle in (None, name)]
     if not chosen:
@@ -139,6 +147,25 @@ def _told(message: Recorded, kind: type[Message]) -> Message | None:
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return None
     return told
+
+
+def _states_of(snapshot: WorldSnapshot) -> Iterator[VehicleState]:
+    """Yield the cars of a snapshot as reports: they stand in where a sparse run has none."""
+    for car in snapshot.vehicles:
+        yield VehicleState(
+            vehicle=car.vehicle,
+            t_ns=snapshot.t_ns - round(car.age_ms * NS_PER_MS),
+            seq=snapshot.tick,
+            x_m=car.x_m,
+            y_m=car.y_m,
+            yaw_rad=car.yaw_rad,
+            speed_mps=car.speed_mps,
+            yaw_rate_radps=math.nan,
+            steering_rad=car.steering_rad,
+            throttle=math.nan if car.throttle is None else car.throttle,
+            source=EYE if car.kind == REAL else SIMULATED,
+            car=car.car,
+        )
 
 
 def _take(cars: dict[str, _Heard], told: Any) -> None:
@@ -282,13 +309,14 @@ def _without_gravity(
 
 def _ranges(scan: LidarScan) -> Floats:
     """Return a range for every degree from straight ahead to the left; infinite: no beam, miss."""
-    ranges = np.frombuffer(scan.payload, "<f4").astype(np.float64)
-    step = scan.bearing_step_rad or math.tau / max(len(ranges), 1)
+    ranges = np.frombuffer(scan.payload[: len(scan.payload) // 4 * 4], "<f4").astype(np.float64)
+    if not len(ranges):
+        return np.full(BEAMS, np.inf)
+    step = scan.bearing_step_rad or math.tau / len(ranges)
     wanted = np.arange(BEAMS) * math.tau / BEAMS
-    beam = np.round(((wanted - scan.bearing_first_rad) % math.tau) / step).astype(np.int64)
-    beam %= max(round(math.tau / step), 1)
-    there = beam < len(ranges)
-    return np.where(there, ranges[np.minimum(beam, len(ranges) - 1)], np.inf)
+    turn = (math.copysign(1.0, step) * (wanted - scan.bearing_first_rad)) % math.tau
+    beam = np.round(turn / abs(step)).astype(np.int64) % max(round(math.tau / abs(step)), 1)
+    return np.where(beam < len(ranges), ranges[np.minimum(beam, len(ranges) - 1)], np.inf)
 
 
 def _light_tracks(

@@ -112,7 +112,7 @@ def read_log(path: Path, kind: str, number: int) -> Log:
     for i, line, cells in rows:
         reader.take(i, line, cells)
     if not reader.lines:
-        why = f": line {reader.left_out[0].line}: {reader.left_out[0].why}" * bool(reader.left_out)
+        why = "".join(f": line {one.line}: {one.why}" for one in reader.left_out[:1])
         msg = f"{path}: no row of AutoDRIVE's recorder{why}"
         raise RecordingError(msg)
     scans = reader.all_scans()
@@ -139,7 +139,7 @@ def _layout(path: Path, rows: list[Row], layouts: Layouts) -> tuple[tuple[str, .
         return names, rows[1:]
     widths = Counter(len(cells) for _, _, cells in rows).most_common()
     for width, _ in widths:
-        if width in layouts:
+        if width in layouts and _shows_pictures(layouts[width], rows):
             return layouts[width], rows
     pictures = max(line.lower().count(".jpg,") for _, line, _ in rows)
     if pictures and len(CAR) + 1 + pictures in layouts:
@@ -150,6 +150,13 @@ def _layout(path: Path, rows: list[Row], layouts: Layouts) -> tuple[tuple[str, .
         "comma?"
     )
     raise RecordingError(msg)
+
+
+def _shows_pictures(layout: tuple[str, ...], rows: Sequence[Row]) -> bool:
+    """Say whether, where pictures should be, there are: a comma in a path shifts them."""
+    cells = next(cells for _, _, cells in rows if len(cells) == len(layout))
+    columns = [cells[k] for k, name in enumerate(layout) if name in PICTURES]
+    return all(_PICTURE.search(cell) for cell in columns if cell.strip())
 
 
 class _Rows:
