@@ -37,7 +37,8 @@ from scm.vehicles.car import Car, load_car
 SIMULATED, EYE, REAL = "simulated", "eye", "real"
 RADIUS, LIMIT = "wheel.radius_m", "steering.limit_rad"
 CAMERAS = ("front", "rear")
-STATES = {"dark": OFF, "red": RED, "flashing_red": RED, "yellow": YELLOW, "green": GREEN}
+STATES = {"dark": OFF, "red": RED, "yellow": YELLOW, "green": GREEN}
+FLASH_NS = 500 * NS_PER_MS
 _PREFIX = r"scm/@v\d+/[^/]+/"
 _KINDS: tuple[tuple[re.Pattern[str], type[Message]], ...] = tuple(
     (re.compile(_PREFIX + key), kind)
@@ -319,6 +320,13 @@ def _ranges(scan: LidarScan) -> Floats:
     return np.where(beam < len(ranges), ranges[np.minimum(beam, len(ranges) - 1)], np.inf)
 
 
+def _state(colour: str, t_ns: int) -> int:
+    """Return a colour as the recorder numbers it; flashing red is on and off by turns."""
+    if colour == "flashing_red":
+        return RED if t_ns // FLASH_NS % 2 == 0 else OFF
+    return STATES[colour]
+
+
 def _light_tracks(
     spats: dict[str, list[Spat]], lights: Sequence[Light], start_ns: int
 ) -> list[LightTrack]:
@@ -326,7 +334,7 @@ def _light_tracks(
     tracks = []
     for light in sorted(lights, key=lambda one: one.light_id):
         shown = [
-            (spat.t_ns, STATES[group.colour])
+            (spat.t_ns, _state(group.colour, spat.t_ns))
             for spat in sorted(spats.get(light.junction, []), key=lambda one: one.t_ns)
             for group in spat.groups
             if group.group == light.group

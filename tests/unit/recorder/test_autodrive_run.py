@@ -123,6 +123,13 @@ def test_a_run_becomes_rows_at_the_rate_asked_for(tmp_path: Path) -> None:
     assert not (out / "TL2 Log.csv").exists(), "nobody told what group south_west shows"
 
 
+def test_flashing_red_is_red_and_off_by_turns(tmp_path: Path) -> None:
+    world = WorldDefinition(t_ns=START_NS, seed=0, map=load_map("driving_school"))
+    lights = [spat(ms, "flashing_red") for ms in range(0, 2000, 100)]
+    run = read_tracks(said(tmp_path / "a.mcap", world, *states(), *lights))
+    assert run.lights[0].states.values.tolist() == ([1.0] * 5 + [0.0] * 5) * 2
+
+
 def test_what_was_exported_is_imported_with_its_poses(tmp_path: Path) -> None:
     other = [state(ms, "n10", y_m=9.0) for ms in range(0, 1001, 20)]
     out = exported(said(tmp_path / "a.mcap", *states(), *other))
