@@ -52,7 +52,7 @@ def state(ms: int, name: str = "n2", **other) -> VehicleState:
 def sensors(ms: int) -> VehicleSensors:
     felt = (-G * math.sin(TILT) + 0.3, 0.0, G * math.cos(TILT))
     return VehicleSensors(
-        vehicle="n2", t_ns=START_NS + ms * MS, encoder_left=ms, encoder_right=7_654_321,
+        vehicle="n2", t_ns=START_NS + ms * MS, encoder_left=ms, encoder_right=87_654_321,
         accel_mps2=felt, gyro_radps=(0.0, 0.0, 0.25), orientation_rad=(0.0, TILT, 0.0),
     )  # fmt: skip
 
@@ -113,7 +113,7 @@ def test_a_run_becomes_rows_at_the_rate_asked_for(tmp_path: Path) -> None:
     assert_allclose(at["throttle"], t + 0.02, err_msg="in force is what leads to the next report")
     assert_allclose(at["steering"], -(t + 0.02) * LIMIT, atol=1e-7)
     assert at["leftTicks"] == list(range(0, 1000, 100))
-    assert rows[3]["rightTicks"] == "7654321"
+    assert rows[3]["rightTicks"] == "87654321"
     assert_allclose(at["accX"], 0.3, atol=1e-6)
     assert_allclose(at["accZ"], 0.0, atol=1e-6)
     assert rows[0]["lidar"] == ""

@@ -110,6 +110,14 @@ def test_pictures_and_scans_come_along_though_a_path_has_commas(
     assert any("may be stale" in line for line in told)
 
 
+def test_a_scan_of_many_beams_is_read(tmp_path: Path) -> None:
+    scan = " ".join(["1.234567"] * 20_000)
+    folder = logs(tmp_path / "log", f"{row(0)},,,{scan}")
+    imported(folder)
+    with np.load(folder / "out/V1_lidar.npz") as scans:
+        assert scans["ranges"].shape == (1, 20_000)
+
+
 BAD = [
     (row(9, posX="north"), "posX: got 'north', expected a number"),
     (row(9, timestamp="2023_13_08_10_05_59_360"), "expected a time yyyy_MM_dd_HH_mm_ss_fff"),
@@ -234,7 +242,7 @@ def drive(n: int, speed: float, turn: float) -> CarTrack:
             "yaw": Series(t, yaw),
             "throttle": Series(told, np.round(np.cos(7.0 * told), 6)),
             "steering": Series(told, steering),
-            "leftTicks": Series(t, np.arange(n) * 12_345.0),
+            "leftTicks": Series(t, np.arange(n) * 1_234_567.0),
         },
     )
 
@@ -262,7 +270,7 @@ def test_there_and_back_keeps_poses_and_commands(
     for name in ("throttle", "steering"):
         assert read[f"command.{name}"].tolist() == car.columns[name].values[held].tolist()
     newest = np.searchsorted(car.columns["leftTicks"].t, t, "right") - 1
-    assert read["encoder.left"].tolist() == (newest * 12_345.0).tolist()
+    assert read["encoder.left"].tolist() == (newest * 1_234_567.0).tolist()
     lit = np.where(t < 0.05, 1.0, 3.0)
     assert read["light.TL2"].tolist() == lit.tolist()
 
