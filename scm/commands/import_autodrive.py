@@ -1,0 +1,66 @@
+"""`scm import autodrive`: logs of AutoDRIVE's data recorder as a recording."""
+
+import argparse
+import math
+from pathlib import Path
+
+from scm.command import Command
+
+MOST_TOLD = 10
+RADIUS, COUNTS = "wheel.radius_m", "encoder.counts_per_revolution"
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="where 'V1 Log.csv' is")
+    parser.add_argument("--out", type=Path, required=True, metavar="NAME", help="folder to write")
+    parser.add_argument(
+        "--car", default="nigel", metavar="FILE", help="car file or name (%(default)s)"
+    )
+    parser.add_argument(
+        "--steering-positive",
+        choices=("left", "right"),
+        default="left",
+        help="where positive steering turns in the logs (%(default)s)",
+    )
+    parser.add_argument(
+        "--axes",
+        choices=("ros", "unity"),
+        default="ros",
+        help="of the logs: ros has z up, as the recorder writes it; unity has y up (%(default)s)",
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.recording.autodrive_import import LEFT_OUT, import_logs
+    from scm.vehicles.car import load_car
+
+    car = load_car(arguments.car)
+    radius_m = car.value(RADIUS) if car.has(RADIUS) else 0.0
+    m_per_count = math.tau * radius_m / car.value(COUNTS) if car.has(COUNTS) else None
+    is_file = Path(arguments.car).suffix == ".toml"
+    made = import_logs(
+        arguments.folder,
+        arguments.out,
+        car=str(car.path.resolve()) if is_file else arguments.car,
+        car_file=car.path,
+        steering_sign=1 if arguments.steering_positive == "left" else -1,
+        unity_axes=arguments.axes == "unity",
+        m_per_count=m_per_count,
+        axle_m=radius_m,
+    )
+    print("\n".join(made.told))
+    for one in made.left_out[:MOST_TOLD]:
+        print(f"{one.file}: line {one.line}: {one.why}")
+    if made.left_out:
+        told = f", the first {MOST_TOLD} above" if len(made.left_out) > MOST_TOLD else ""
+        print(f"{len(made.left_out)} lines are no rows{told}: kept in {arguments.out / LEFT_OUT}")
+    print(f"scm replay {arguments.out}")
+    return 0
+
+
+COMMAND = Command(
+    help="Logs of AutoDRIVE's data recorder as a recording for scm replay and scm mismatch.",
+    example="scm import autodrive data/eight_30_hz --out runs/eight",
+    arguments=_arguments,
+    run=_run,
+)
