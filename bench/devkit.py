@@ -60,8 +60,7 @@ def pictures():
             x_m=pose.x, y_m=pose.y, yaw_rad=pose.yaw,
         )  # fmt: skip
         image = studio.picture(optics_of(CAR, camera), own, (own,), shown, camera, number)
-        good, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 80])
-        assert good
+        _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 80])
         out[camera].append(data.tobytes())
     return out
 
@@ -176,8 +175,8 @@ class Bench:
         pace = self.socket.pace
         before = time.monotonic(), pace.replies, cpu_s(self.script.pid), time.process_time()
         time.sleep(span_s)
-        pace_now = self.socket.pace
-        assert pace_now is pace, f"the conversation broke off: {self.socket.detail}"
+        if self.socket.pace is not pace:
+            raise SystemExit(f"the conversation broke off: {self.socket.detail}")
         after = time.monotonic(), pace.replies, cpu_s(self.script.pid), time.process_time()
         passed, replies, theirs, ours = (b - a for a, b in zip(before, after, strict=True))
         return replies / passed, 1e3 * theirs / max(1, replies), 1e3 * ours / max(1, replies)
@@ -191,8 +190,8 @@ def rates(generation, span_s, max_hz, seen):
             again, size = bench.socket.pace.again, bench.frame_bytes
         print(
             f"{generation:4} {name:18}{rate:7.0f} /s {size / 1e3:7.0f} kB a packet"
-            f"{theirs:7.2f} ms CPU script {ours:6.2f} ms ours {1e3 / (theirs + ours):6.0f} /s a core"
-            f"{again:4} again"
+            f"{theirs:7.2f} ms CPU script {ours:6.2f} ms ours"
+            f"{1e3 / (theirs + ours):6.0f} /s a core{again:4} again"
         )
 
 

@@ -12,6 +12,7 @@ import json
 import struct
 import sys
 import time
+from pathlib import Path
 
 import eventlet
 import eventlet.wsgi
@@ -70,7 +71,7 @@ class Student:
     def __init__(self, options):
         self.options = options
         self.packets = 0
-        self.log = open(options.log, "w")  # noqa: SIM115  it is written for as long as it runs
+        self.log = Path(options.log).open("w")  # noqa: SIM115  it is written while it runs
 
     def control(self, data):
         """Read one packet and return the commands that answer it."""
@@ -82,7 +83,7 @@ class Student:
         commands, noted = {}, {"t": time.time(), "keys": len(data), "pid_packets": self.packets}
         assert all(isinstance(value, str) for value in data.values())
         for number in range(1, self.options.cars + 1):
-            name = "V%d" % number
+            name = f"V{number}"
             seen = parse_data(data, name)
             steering = self.options.steering
             if self.options.drive == "walls":
@@ -121,12 +122,11 @@ def serve(options):
         if data:
             sio.emit("Bridge", data=student.control(data))
 
-    wrap = getattr(socketio, "Middleware", None)
-    if wrap is not None:
+    try:
         from flask import Flask
 
-        app = wrap(sio, Flask(__name__))
-    else:
+        app = socketio.Middleware(sio, Flask(__name__))
+    except ImportError:
         app = socketio.WSGIApp(sio)
     listener = eventlet.listen(("127.0.0.1", options.port))
     print("port", listener.getsockname()[1], flush=True)
