@@ -2,7 +2,8 @@
 
     all packets answered                the next may go
     none answered for `patience`        one more goes; each further time twice as long, 8 s at most
-    some answered, then none            the others are waited for, `patience` at most: then lost
+    some answered, then none            the others are waited for: half as long again as the first
+                                        answer took, from `patience` to 30 s; then they are lost
     the others come after all           the script was slow: the patience doubles, 8 s at most
     a quick reply                       halves it, down to 1 s
 
@@ -14,6 +15,7 @@ from scm.clock import NS_PER_S
 
 PATIENCE_NS = NS_PER_S
 LONGEST_NS = 8 * NS_PER_S
+LONGEST_WAIT_NS = 30 * NS_PER_S
 
 
 class PingPong:
@@ -34,7 +36,7 @@ class PingPong:
         self._under_way = 0
         self._in_doubt = False
         self._patience_ns = self._wait_ns = PATIENCE_NS
-        self._sent_ns = self._heard_ns = 0
+        self._first_ns = self._sent_ns = self._heard_ns = 0
 
     def due_ns(self, now_ns: int) -> int:
         """Return when the next packet may go; not after now: it may go now [ns]."""
@@ -45,17 +47,17 @@ class PingPong:
     def sent(self, now_ns: int) -> None:
         """Note that a packet went out, because it was due."""
         if self._under_way:
-            self._send_again()
+            self._send_again(now_ns)
         else:
-            self._under_way = 1
+            self._under_way, self._first_ns = 1, now_ns
         self._sent_ns = now_ns
         on_grid = self._next_ns is not None and now_ns - self._next_ns <= self._gap_ns
         self._next_ns = (self._next_ns if on_grid and self._next_ns else now_ns) + self._gap_ns
 
-    def _send_again(self) -> None:
+    def _send_again(self, now_ns: int) -> None:
         self.again += 1
         if self._in_doubt and self._heard_ns > self._sent_ns:
-            self._under_way, self._in_doubt = 1, False
+            self._under_way, self._first_ns, self._in_doubt = 1, now_ns, False
             self._patience_ns = min(2 * self._patience_ns, LONGEST_NS)
             self._wait_ns = self._patience_ns
         else:
@@ -69,8 +71,9 @@ class PingPong:
             return
         self._heard_ns = now_ns
         self._under_way -= 1
-        self._wait_ns = self._patience_ns
         if self._under_way:
+            took_ns = min(3 * (now_ns - self._first_ns) // 2, LONGEST_WAIT_NS)
+            self._wait_ns = max(self._patience_ns, took_ns)
             return
         if self._in_doubt:
             self._in_doubt = False
