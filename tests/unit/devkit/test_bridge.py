@@ -1,0 +1,356 @@
+"""The bridge beside a real world on a stepped clock; the script is what the test says."""
+
+import json
+import math
+
+import pytest
+
+from scm.errors import RunError
+from scm.lockstep import Lockstep
+from scm.maps.load import load_map
+from scm.part import Hears
+from scm.traffic.monitor_part import MonitorPart
+from scm.traffic.part import TrafficPart
+from scm.v2x.exchange import Call
+from scm.v2x.message import Refused
+from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
+from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.signal_request import SignalRequest
+from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.world_snapshot import WorldSnapshot
+from scm.world.part import WorldPart
+from vehicle_agent.devkit.bridge import DevkitPart, Wanted
+from vehicle_agent.devkit.heads import Heads
+
+CITY = load_map("driving_school")
+ROTATION = {"PosZ": "0", "RotX": "0", "RotY": "0", "RotZ": "0", "RotW": "1"}
+
+
+class HeldScript:
+    is_open = True
+    detail = "talks with the test"
+
+
+class Stage:
+    def __init__(self, wanted, hosted=1, traffic=False):
+        self.script = HeldScript()
+        cars = tuple((f"n{number + 1}", "nigel") for number in range(hosted))
+        parts = [WorldPart(CITY, hosted=cars)]
+        if traffic:
+            parts += [TrafficPart(CITY), MonitorPart(CITY)]
+        self.lockstep = Lockstep(parts)
+        self.part = DevkitPart("devkit-4567", wanted, "session")
+        self.part.meet(self.script)
+        self.snapshots = self.lockstep.hear(Hears(WorldSnapshot))
+        self.spats = self.lockstep.hear(Hears(Spat))
+        self.statuses = self.lockstep.hear(Hears(PartStatus, {"station": "devkit-4567"}))
+        self.commands = self.lockstep.hear(Hears(DriveCommand))
+        self.cars = {}
+        self.lockstep.run_for(0.2)
+        self.lockstep.add(self.part)
+        self.lockstep.run_for(0.1)
+
+    def say(self, span_s, each_s=0.05, **keys):
+        """Reply at a rate, as a script does; return the first car."""
+        said = {key.replace("_", " "): str(value) for key, value in keys.items()}
+        for _ in range(round(span_s / each_s)):
+            self.part.said(said, self.lockstep.now_ns)
+            self.lockstep.run_for(each_s)
+        return self.car()
+
+    def wait(self, span_s):
+        self.lockstep.run_for(span_s)
+        return self.car()
+
+    def car(self, name="n1"):
+        for item in self.snapshots.drain():
+            self.cars = {row.vehicle: row for row in item.message.vehicles}
+        return self.cars.get(name)
+
+    def lamps(self):
+        groups = [item.message.groups for item in self.spats.drain()][-1]
+        return {group.group: group.colour for group in groups}
+
+
+@pytest.fixture
+def stage(request):
+    made = Stage(*getattr(request, "param", (Wanted(("n1",)),)))
+    with made.lockstep:
+        yield made
+
+
+def told(stage):
+    return stage.statuses.drain()[-1].message.detail
+
+
+def test_a_script_drives_a_car_by_its_lease(stage):
+    assert stage.car().owner == "world"
+    car = stage.say(2.0, V1_Throttle=0.6, V1_Steering=0.5)
+    assert (car.owner, car.mode) == ("devkit-4567", "drive")
+    assert car.speed_mps > 0.1
+    assert car.steering_rad == pytest.approx(0.5 * 0.5236, abs=0.01)
+    assert "n1 drives" in told(stage)
+
+
+@pytest.mark.parametrize("stage", [(Wanted(("n1",), sign="right"),)], indirect=True)
+def test_plus_can_be_right(stage):
+    assert stage.say(1.0, V1_Throttle=0.6, V1_Steering=0.5).steering_rad < -0.2
+
+
+def test_headlights_and_indicators_reach_the_car(stage):
+    stage.say(1.0, V1_Throttle=0.5, V1_Steering=0, V1_Headlights=2, V1_Indicators=3)
+    lights = {name for item in stage.snapshots.drain() for name in item.message.vehicles[0].lights}
+    stage.say(0.5, V1_Throttle=0.5, V1_Steering=0, V1_Headlights=2, V1_Indicators=3)
+    lights |= {name for item in stage.snapshots.drain() for name in item.message.vehicles[0].lights}
+    lights |= set(stage.car().lights)
+    assert {"head_high", "head_low", "tail"} <= lights
+
+
+def test_each_reply_is_one_command_and_a_slow_script_keeps_its_car_going(stage):
+    stage.say(0.5, V1_Throttle=0.5, V1_Steering=1)
+    stage.commands.drain()
+    stage.say(1.0, each_s=0.02, V1_Throttle=0.5, V1_Steering=1)
+    assert len(stage.commands.drain()) == pytest.approx(50, abs=4)
+    car = stage.say(1.8, each_s=0.9, V1_Throttle=0.5, V1_Steering=1)
+    assert len(stage.commands.drain()) == pytest.approx(36, abs=5)
+    assert car.mode == "drive"
+    assert car.speed_mps > 0.1
+
+
+def test_a_script_that_is_silent_for_a_second_stops_its_car_and_keeps_it(stage):
+    stage.say(1.0, V1_Throttle=0.6, V1_Steering=0.3)
+    assert stage.wait(0.8).speed_mps > 0.1
+    car = stage.wait(1.5)
+    assert car.speed_mps == pytest.approx(0.0, abs=0.01)
+    assert car.owner == "devkit-4567"
+    assert car.steering_rad > 0.1
+
+
+def test_a_script_that_goes_gives_the_car_back(stage):
+    stage.say(1.0, V1_Throttle=0.6, V1_Steering=0)
+    stage.script.is_open = False
+    car = stage.wait(0.5)
+    assert car.owner == "world"
+    assert car.speed_mps == pytest.approx(0.0, abs=0.05)
+
+
+def test_the_bridge_that_ends_gives_the_car_back(stage):
+    stage.say(1.0, V1_Throttle=0.6, V1_Steering=0)
+    stage.lockstep.remove(stage.part)
+    assert stage.wait(0.2).owner == "world"
+
+
+def steal(stage):
+    request = LeaseRequest(
+        vehicle="n1", owner="ada", verb="steal", reason="too fast", ttl_ms=60_000
+    )
+    reply = stage.lockstep.call(request)
+    assert isinstance(reply, LeaseReply)
+    return reply.epoch
+
+
+def test_who_takes_the_car_keeps_it_until_the_script_connects_anew(stage):
+    stage.say(1.0, V1_Throttle=0.6, V1_Steering=0)
+    epoch = steal(stage)
+    assert stage.say(0.7, V1_Throttle=0.6, V1_Steering=0).owner == "ada"
+    release = LeaseRequest(vehicle="n1", owner="ada", verb="release", epoch=epoch)
+    assert not isinstance(stage.lockstep.call(release), Refused)
+    assert stage.say(3.0, V1_Throttle=0.6, V1_Steering=0).owner == "world"
+    assert "taken over" in told(stage)
+    stage.script.is_open = False
+    stage.wait(0.1)
+    stage.script.is_open = True
+    assert stage.say(1.0, V1_Throttle=0.6, V1_Steering=0).owner == "devkit-4567"
+
+
+def test_a_lease_that_lapsed_is_asked_for_again(stage):
+    stage.say(1.0, V1_Throttle=0.6, V1_Steering=0)
+    stage.lockstep.kill(stage.part)
+    stage.wait(1.5)
+    assert stage.car().owner == "world"
+    stage.lockstep.add(stage.part)
+    assert stage.say(1.0, V1_Throttle=0.6, V1_Steering=0).owner == "devkit-4567"
+
+
+@pytest.mark.parametrize("stage", [(Wanted(("n2", "n1")), 2)], indirect=True)
+def test_two_cars_are_v1_and_v2_in_the_order_of_the_options(stage):
+    keys = {"V1_Throttle": 0.8, "V2_Throttle": 0.0, "V1_Steering": 1, "V2_Steering": 0}
+    stage.say(1.0, **keys)
+    assert stage.car("n2").speed_mps > 0.15
+    assert stage.car("n1").speed_mps == pytest.approx(0.0, abs=0.01)
+    data = json.loads(stage.part.packet()[2:])[1]
+    for number, name in ((1, "n2"), (2, "n1")):
+        x, y, _ = (float(word) for word in data[f"V{number} Position"].split())
+        assert math.hypot(x - stage.car(name).x_m, y - stage.car(name).y_m) < 0.02
+
+
+def test_the_packet_is_what_the_car_says(stage):
+    stage.wait(0.5)
+    data = json.loads(stage.part.packet()[2:])[1]
+    assert len(data) == 15 + len(CITY.lights)
+    before = [int(word) for word in data["V1 Encoder Ticks"].split()]
+    stage.say(1.0, V1_Throttle=0.8, V1_Steering=0)
+    data = json.loads(stage.part.packet()[2:])[1]
+    after = [int(word) for word in data["V1 Encoder Ticks"].split()]
+    assert all(b > a + 500 for a, b in zip(before, after, strict=True))
+    ranges = [float(word) for word in data["V1 LIDAR Range Array"].split()]
+    assert sum(map(math.isfinite, ranges)) > 300
+
+
+def test_nothing_costly_is_heard_while_no_script_is_there(stage):
+    kinds = {hears.kind for hears in stage.part.hears}
+    assert {LidarScan, CameraFrame} <= kinds
+    stage.script.is_open = False
+    stage.wait(0.1)
+    assert not {LidarScan, CameraFrame} & {hears.kind for hears in stage.part.hears}
+
+
+@pytest.mark.parametrize("stage", [(Wanted(("n1",), cameras=("front",)),)], indirect=True)
+def test_only_the_cameras_that_are_wanted_are_asked_for(stage):
+    wished = [h.where["camera"] for h in stage.part.hears if h.kind is CameraFrame]
+    assert wished == ["front"]
+
+
+@pytest.mark.parametrize("stage", [(Wanted(("ghost",)),)], indirect=True)
+def test_a_car_that_is_not_there_is_told_and_waited_for(stage, caplog):
+    stage.wait(3.0)
+    assert stage.part.packet() is None
+    assert "no car ghost in this city" in caplog.text
+    assert "waits for ghost" in told(stage)
+
+
+@pytest.mark.parametrize("stage", [(Wanted(("v1",), spawns=()), 0)], indirect=True)
+def test_a_car_can_be_brought_and_is_taken_away_again(stage):
+    car = stage.wait(1.0)
+    assert stage.car("v1") is not None
+    stage.say(1.0, V1_Throttle=0.6, V1_Steering=0)
+    assert stage.car("v1").speed_mps > 0.1
+    stage.lockstep.remove(stage.part)
+    stage.wait(0.2)
+    assert stage.car("v1") is None
+    assert car is None
+
+
+@pytest.mark.parametrize("stage", [(Wanted(("v1",), spawns=()), 0)], indirect=True)
+def test_reset_puts_a_car_back_to_where_it_began_once_for_each_rise(stage):
+    stage.wait(0.5)
+    began = stage.car("v1")
+    keys = {"V1_Throttle": 0.8, "V1_Steering": 0}
+    stage.say(3.0, **keys)
+    far = stage.car("v1")
+    assert math.hypot(far.x_m - began.x_m, far.y_m - began.y_m) > 0.3
+    stage.say(0.4, **keys, V1_Reset="True")
+    near = stage.car("v1")
+    assert math.hypot(near.x_m - began.x_m, near.y_m - began.y_m) < 0.1
+    stage.say(2.5, **keys, V1_Reset="True")
+    again = stage.car("v1")
+    assert math.hypot(again.x_m - began.x_m, again.y_m - began.y_m) > 0.2
+    assert again.owner == "devkit-4567"
+
+
+def test_a_car_of_the_citys_own_is_not_reset(stage, caplog):
+    stage.say(1.0, V1_Throttle=0.6, V1_Steering=0)
+    before = stage.car()
+    stage.say(0.3, V1_Throttle=0.6, V1_Steering=0, V1_Reset=1)
+    after = stage.car()
+    assert math.hypot(after.x_m - before.x_m, after.y_m - before.y_m) < 0.2
+    assert caplog.text.count("was not brought by this bridge") == 1
+
+
+@pytest.mark.parametrize("stage", [(Wanted(("n1",), spawns=()),)], indirect=True)
+def test_a_car_that_was_there_before_stays_when_the_bridge_ends(stage):
+    stage.say(1.0, V1_Throttle=0.6, V1_Steering=0)
+    assert stage.car().owner == "devkit-4567"
+    stage.lockstep.remove(stage.part)
+    assert stage.wait(0.2) is not None
+
+
+@pytest.mark.parametrize("stage", [(Wanted(("ghost",)), 0, True)], indirect=True)
+def test_a_scripts_green_is_an_operators_hold(stage):
+    keys = {"V1_Throttle": 0, "V1_Steering": 0}
+    own = CITY.lights[0].group
+    other = {"south_east": "south_west", "south_west": "south_east"}[own]
+    stage.say(45.0, each_s=0.5, **keys, TL1_State=3)
+    seen = set()
+    for _ in range(12):
+        stage.say(1.0, each_s=0.5, **keys, TL1_State=3)
+        lamps = stage.lamps()
+        seen.add((lamps[own], lamps[other]))
+    assert seen == {("green", "red")}
+    for _ in range(60):
+        stage.say(0.5, each_s=0.5, **keys, TL1_State=0)
+        if stage.lamps()[other] == "green":
+            return  # it is taken back: the other way has its turn again
+    pytest.fail(f"{other} was not green within 30 s")
+
+
+def test_lights_by_option_have_their_order(stage):
+    part = DevkitPart("d", Wanted(("n1",), lights=(3, 1)))
+    stage.lockstep.add(part)
+    stage.wait(0.1)
+    heads = part._heads._heads
+    by_id = {light.light_id: light for light in CITY.lights}
+    assert heads == tuple((by_id[i].junction, by_id[i].group) for i in (3, 1))
+
+
+def test_an_unknown_light_stops_the_bridge_in_words(stage):
+    stage.lockstep.add(DevkitPart("d", Wanted(("n1",), lights=(9,))))
+    with pytest.raises(RunError, match="--light 9: map driving_school has no such light, only 1"):
+        stage.wait(0.1)
+
+
+def asked(calls):
+    return [(call.request.verb, call.request.groups) for call in calls if isinstance(call, Call)]
+
+
+def test_wishes_of_lights_are_made_renewed_and_taken_back():
+    heads = Heads("script")
+    heads.learn([("j", "a"), ("j", "b"), ("j", "a")])
+    assert heads.step(0, [None, None, None]) == []
+    assert asked(heads.step(0, [3, 1, None])) == [
+        ("omit", ("b",)), ("force_off", ("b",)), ("hold", ("a",)), ("call", ("a",)),
+    ]  # fmt: skip
+    assert heads.step(9_999_999_999, [3, 1, None]) == []
+    assert len(heads.step(10_000_000_000, [3, 1, None])) == 4
+    assert asked(heads.step(10_000_000_001, [2, 1, 0])) == [
+        ("clear", ("a",)), ("omit", ("b",)), ("force_off", ("b",)),
+    ]  # fmt: skip
+    assert asked(heads.step(10_000_000_002, [3, 0, 1])) == [
+        ("clear", ("b",)), ("omit", ("a",)), ("force_off", ("a",)),
+    ]  # fmt: skip
+    assert asked(heads.release()) == [("clear", ("a",))]
+    assert heads.release() == []
+
+
+def test_what_a_junction_refuses_is_told_once(caplog):
+    heads = Heads("script")
+    request = SignalRequest(junction="j", verb="hold", by="script")
+    for _ in range(3):
+        heads.replied(request, Refused(code="invalid", detail="they conflict"))
+    assert caplog.text.count("they conflict") == 1
+
+
+@pytest.mark.parametrize("stage", [(Wanted(("p1",), cosim=True), 1)], indirect=True)
+def test_a_script_can_place_a_car_itself(stage):
+    keys = {"V1_Throttle": 0, "V1_Steering": 0, "V1_CoSim": 1}
+    keys |= {f"V1_{key}": value for key, value in ROTATION.items()}
+    for number in range(40):
+        stage.say(0.05, **keys, V1_PosX=0.5 + 0.01 * number, V1_PosY=1.2)
+    car = stage.car("p1")
+    assert car.kind == "remote"
+    assert (car.x_m, car.y_m) == (pytest.approx(0.89, abs=0.02), 1.2)
+    assert car.speed_mps == pytest.approx(0.2, abs=0.01)
+    data = json.loads(stage.part.packet()[2:])[1]
+    assert float(data["V1 Position"].split()[1]) == 1.2
+    stage.lockstep.remove(stage.part)
+    stage.wait(0.2)
+    assert stage.car("p1") is None
+
+
+def test_cosim_of_a_car_that_is_driven_is_refused_in_words(stage, caplog):
+    keys = {f"V1_{key}": value for key, value in ROTATION.items()}
+    stage.say(0.5, V1_Throttle=0, V1_Steering=0, V1_CoSim=1, V1_PosX=0, V1_PosY=0, **keys)
+    assert caplog.text.count("start the bridge with --cosim") == 1

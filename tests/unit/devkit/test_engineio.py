@@ -1,0 +1,214 @@
+"""Both generations of the protocol, frame by frame; then a socket whose script comes and goes."""
+
+import json
+import socket
+import threading
+import time
+
+import pytest
+from websockets.sync.server import serve
+
+from scm.clock import NS_PER_MS, NS_PER_S, WallClock
+from vehicle_agent.devkit.engineio import Dialogue, ScriptSocket
+
+OLD = '0{"sid":"a","upgrades":[],"pingTimeout":60000,"pingInterval":25000}'
+NEW = '0{"sid":"a","upgrades":[],"pingTimeout":20000,"pingInterval":25000,"maxPayload":1000000}'
+REPLY = '42["Bridge",{"V1 Throttle":"0.5"}]'
+
+
+def opened(welcome):
+    dialogue = Dialogue(0)
+    dialogue.take(welcome, 0)
+    dialogue.due(0)
+    dialogue.take("40", 0)
+    return dialogue
+
+
+def test_the_old_server_connects_us_unasked():
+    dialogue = Dialogue(0)
+    assert dialogue.take(OLD, 0) == []
+    assert dialogue.due(100 * NS_PER_MS) == []
+    dialogue.take("40", 100 * NS_PER_MS)
+    assert (dialogue.is_open, dialogue.generation) == (True, 3)
+    assert dialogue.due(300 * NS_PER_MS) == []
+
+
+def test_the_new_server_is_asked_at_once():
+    dialogue = Dialogue(0)
+    dialogue.take(NEW, 0)
+    assert dialogue.due(0) == ["40"]
+    assert not dialogue.is_open
+    dialogue.take('40{"sid":"b"}', 1)
+    assert (dialogue.is_open, dialogue.generation) == (True, 4)
+
+
+def test_a_new_server_that_does_not_say_so_is_asked_a_moment_later():
+    dialogue = Dialogue(0)
+    dialogue.take(OLD, 0)
+    assert dialogue.due_ns == 200 * NS_PER_MS
+    assert dialogue.due(200 * NS_PER_MS) == ["40"]
+    assert dialogue.due(201 * NS_PER_MS) == []
+
+
+def test_the_old_server_is_pinged_each_twenty_seconds():
+    dialogue = opened(OLD)
+    assert dialogue.due_ns == 20 * NS_PER_S
+    assert dialogue.due(20 * NS_PER_S - 1) == []
+    assert dialogue.due(20 * NS_PER_S) == ["2"]
+    dialogue.take("3", 21 * NS_PER_S)
+    assert dialogue.due_ns == 41 * NS_PER_S
+    assert not dialogue.ended
+
+
+def test_an_old_server_without_a_pong_is_given_up():
+    dialogue = opened(OLD)
+    dialogue.due(20 * NS_PER_S)
+    assert dialogue.due(40 * NS_PER_S) == []
+    assert "ping" in dialogue.ended
+
+
+def test_the_new_servers_ping_is_answered_and_missed():
+    dialogue = opened(NEW)
+    dialogue.take("2", 25 * NS_PER_S)
+    assert dialogue.due(25 * NS_PER_S) == ["3"]
+    assert dialogue.due(70 * NS_PER_S - 1) == []
+    assert not dialogue.ended
+    dialogue.due(70 * NS_PER_S)
+    assert "asked" in dialogue.ended
+
+
+@pytest.mark.parametrize("text", [REPLY, '4213["Bridge",{"V1 Throttle":"0.5"}]'])
+def test_an_event_is_read_whether_it_wants_to_be_confirmed_or_not(text):
+    assert opened(OLD).take(text, 0) == [{"V1 Throttle": "0.5"}]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "4", "42", "42[", "42[]", '42["Bridge"]', '42["Other",{}]', "42{}", "9", "6", "x", "3"],
+)
+def test_what_is_no_event_is_none_and_harms_nothing(text):
+    dialogue = opened(OLD)
+    assert dialogue.take(text, 0) == []
+    assert not dialogue.ended
+
+
+@pytest.mark.parametrize(
+    ("text", "words"), [("1", "closed"), ("41", "disconnected"), ('44{"message":"no"}', "no")]
+)
+def test_an_end_is_told_in_words(text, words):
+    dialogue = opened(NEW)
+    dialogue.take(text, 0)
+    assert words in dialogue.ended
+
+
+def test_who_speaks_no_socketio_is_given_up_after_five_seconds():
+    dialogue = Dialogue(0)
+    dialogue.due(5 * NS_PER_S - 1)
+    assert not dialogue.ended
+    dialogue.due(5 * NS_PER_S)
+    assert "no socket.io server" in dialogue.ended
+
+
+class FakeScript:
+    """A script's server of the new generation, in this process."""
+
+    def __init__(self, port, answers=True):
+        self.answers, self.heard, self.asked = answers, [], []
+        self.server = serve(self._talk, "127.0.0.1", port, compression=None, max_size=None)
+        self.port = self.server.socket.getsockname()[1]
+        self.thread = threading.Thread(target=self.server.serve_forever)
+        self.thread.start()
+
+    def _talk(self, connection):
+        self.asked.append(connection.request.path)
+        connection.send(NEW)
+        for text in connection:
+            if text == "40":
+                connection.send('40{"sid":"b"}')
+            elif text.startswith("42"):
+                self.heard.append(json.loads(text[2:])[1])
+                if self.answers:
+                    connection.send(REPLY)
+
+    def close(self):
+        self.server.shutdown()
+        self.thread.join()
+
+
+def free_port():
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        return held.getsockname()[1]
+
+
+class Ours:
+    def __init__(self, port, gap_ms=5):
+        self.replies, self.number, self.knows = [], 0, True
+        self.socket = ScriptSocket(
+            ("127.0.0.1", port), self.packet, self.said, WallClock(), gap_ms * NS_PER_MS
+        )
+        self.socket.start()
+
+    def packet(self):
+        self.number += 1
+        return f'42["Bridge",{{"number":"{self.number}"}}]' if self.knows else None
+
+    def said(self, data, _t_ns):
+        self.replies.append(data)
+
+
+def soon(condition, what, within_s=10.0):
+    end = time.monotonic() + within_s
+    while not condition():
+        assert time.monotonic() < end, what
+        time.sleep(0.005)
+
+
+def test_a_script_that_starts_later_ends_and_starts_again_is_found_each_time():
+    port = free_port()
+    ours = Ours(port)
+    try:
+        soon(lambda: "nothing listens" in ours.socket.detail, "it says that nobody is there")
+        assert not ours.socket.is_open
+        for _ in range(2):
+            script, before = FakeScript(port), len(ours.replies)
+            soon(lambda b=before: len(ours.replies) > b + 3, "it converses")
+            assert ours.socket.is_open
+            assert "talks with" in ours.socket.detail
+            script.close()
+            soon(lambda: not ours.socket.is_open, "it notices the end")
+        assert script.asked == ["/socket.io/?EIO=4&transport=websocket"]
+    finally:
+        ours.socket.stop()
+    assert set(map(str, ours.replies)) == {"{'V1 Throttle': '0.5'}"}
+
+
+def test_each_packet_is_the_newest_and_none_goes_before_there_is_one():
+    script = FakeScript(0)
+    ours = Ours(script.port)
+    ours.knows = False
+    try:
+        soon(lambda: ours.socket.is_open, "it is open")
+        time.sleep(0.1)
+        assert script.heard == []
+        ours.knows = True
+        soon(lambda: len(script.heard) > 5, "packets come")
+        numbers = [int(heard["number"]) for heard in script.heard]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    finally:
+        ours.socket.stop()
+        script.close()
+
+
+def test_an_unanswered_packet_is_sent_again_after_a_second():
+    script = FakeScript(0, answers=False)
+    ours = Ours(script.port)
+    try:
+        soon(lambda: len(script.heard) == 1, "the first packet")
+        began = time.monotonic()
+        soon(lambda: len(script.heard) == 2, "the second packet")
+        assert time.monotonic() - began == pytest.approx(1.0, abs=0.3)
+        assert ours.replies == []
+    finally:
+        ours.socket.stop()
+        script.close()

@@ -1,0 +1,249 @@
+"""Every key of the simulator's packet: what it carries, and that it is always there."""
+
+import base64
+import json
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.vehicle_sensors import VehicleSensors
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.vehicles.car import load_car
+from vehicle_agent.devkit.telemetry import Telemetry, quaternion
+
+KEYS = {
+    "Throttle", "Steering", "Speed", "Encoder Ticks", "Encoder Angles", "Position",
+    "Orientation Quaternion", "Orientation Euler Angles", "Angular Velocity",
+    "Linear Acceleration", "LIDAR Scan Rate", "LIDAR Range Array", "LIDAR Intensity Array",
+    "Front Camera Image", "Rear Camera Image",
+}  # fmt: skip
+G = 9.80665
+
+
+def state(vehicle="n1", **more):
+    told = {
+        "vehicle": vehicle, "t_ns": 1, "seq": 1, "x_m": 1.25, "y_m": -0.5, "yaw_rad": -0.25,
+        "speed_mps": -0.125, "yaw_rate_radps": 0.75, "steering_rad": 0.375, "throttle": -0.5,
+        "accel_mps2": 0.0625, "source": "simulated",
+    }  # fmt: skip
+    return VehicleState(**told | more)
+
+
+def sensors(**more):
+    told = {
+        "vehicle": "n1", "t_ns": 1, "encoder_left": 960, "encoder_right": -1920,
+        "accel_mps2": (1.0, 2.0, G + 3.0), "gyro_radps": (0.1, 0.2, 0.3),
+        "orientation_rad": (0.0, 0.0, -0.25), "throttle": 0.25, "steering_rad": -0.125,
+    }  # fmt: skip
+    return VehicleSensors(**told | more)
+
+
+def scan(ranges, **more):
+    told = {"vehicle": "n1", "t_ns": 1, "range_min_m": 0.15, "range_max_m": 12.0}
+    payload = np.array(ranges, "<f4").tobytes()
+    return LidarScan(**told, beams=len(ranges), payload=payload, **more)
+
+
+def frame(camera, payload):
+    return CameraFrame(
+        vehicle="n1", camera=camera, t_ns=1, width_px=2, height_px=2, payload=payload
+    )
+
+
+def telemetry(*messages, names=("n1",), heads=(("crossing", "a"), ("crossing", "b"))):
+    made = Telemetry(names)
+    made.show_lights(heads)
+    for name in names:
+        made.welcome(name, "nigel", load_car("nigel"))
+        made.hear(state(name))
+    for message in messages:
+        made.hear(message)
+    return made
+
+
+def packet(made):
+    text = made.frame()
+    assert text.startswith("42")
+    name, data = json.loads(text[2:])
+    assert name == "Bridge"
+    return data
+
+
+def told(*messages):
+    return {key[3:]: value for key, value in packet(telemetry(*messages)).items()}
+
+
+def test_every_key_is_in_the_first_packet_as_a_string():
+    data = packet(telemetry())
+    assert set(data) == {f"V1 {key}" for key in KEYS} | {"TL1 State", "TL2 State"}
+    assert {type(value) for value in data.values()} == {str}
+
+
+def test_every_car_and_light_has_its_number():
+    data = packet(telemetry(names=("n7", "n1"), heads=()))
+    assert set(data) == {f"V{number} {key}" for key in KEYS for number in (1, 2)}
+    made = telemetry(state("n1", speed_mps=0.5), state("n7", speed_mps=1.0), names=("n7", "n1"))
+    assert [packet(made)[f"V{n} Speed"] for n in (1, 2)] == ["1.0000", "0.5000"]
+
+
+def test_there_is_no_packet_before_all_cars_are_known():
+    made = Telemetry(["n1", "n2"])
+    made.welcome("n1", "nigel", load_car("nigel"))
+    made.hear(state("n1"))
+    assert made.frame() is None
+    assert made.unknown == ["n2"]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("Throttle", "0.2500"),
+        ("Steering", "-0.1250"),
+        ("Speed", "-0.1250"),
+        ("Encoder Ticks", "960 -1920"),
+        ("Encoder Angles", "3.1416 -6.2832"),
+        ("Position", "1.2500 -0.5000 0.0325"),
+        ("Orientation Quaternion", "0.0000 0.0000 -0.1247 0.9922"),
+        ("Orientation Euler Angles", "0.0000 0.0000 6.0332"),
+        ("Angular Velocity", "0.1000 0.2000 0.3000"),
+        ("Linear Acceleration", "1.0000 2.0000 3.0000"),
+        ("LIDAR Scan Rate", "7.0000"),
+    ],
+)
+def test_a_key_carries_what_the_sensors_say(key, value):
+    assert told(sensors())[key] == value
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("Throttle", "-0.5000"),
+        ("Steering", "0.3750"),
+        ("Encoder Ticks", "0 0"),
+        ("Orientation Euler Angles", "0.0000 0.0000 6.0332"),
+        ("Angular Velocity", "0.0000 0.0000 0.7500"),
+        ("Linear Acceleration", "0.0625 0.0000 0.0000"),
+    ],
+)
+def test_a_car_without_sensors_tells_what_it_believes(key, value):
+    assert told()[key] == value
+
+
+def test_gravity_is_taken_out_of_a_car_that_leans():
+    roll, pitch = 0.2, -0.1
+    up = (
+        -G * math.sin(pitch),
+        G * math.cos(pitch) * math.sin(roll),
+        G * math.cos(pitch) * math.cos(roll),
+    )
+    data = told(sensors(accel_mps2=up, orientation_rad=(roll, pitch, 1.0)))
+    assert [float(word) for word in data["Linear Acceleration"].split()] == [0.0, 0.0, 0.0]
+
+
+def test_the_quaternion_turns_about_z_then_y_then_x():
+    half = math.sqrt(0.5)
+    assert quaternion((math.pi / 2, 0.0, 0.0)) == pytest.approx((half, 0.0, 0.0, half))
+    assert quaternion((0.0, 0.0, math.pi / 2)) == pytest.approx((0.0, 0.0, half, half))
+    # Pitch first about y, then yaw: forward (x) ends up looking down, not sideways.
+    x, y, z, w = quaternion((0.0, math.pi / 2, math.pi / 2))
+    forward = (1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w))
+    assert forward == pytest.approx((0.0, 0.0, -1.0), abs=1e-12)
+
+
+def test_what_is_no_number_is_zero():
+    assert told(sensors(throttle=math.nan))["Throttle"] == "0.0000"
+
+
+def test_ranges_are_360_counter_clockwise_from_ahead():
+    ranges = [1.0 + 0.001 * degree for degree in range(360)]
+    ranges[90] = math.inf
+    words = told(scan(ranges))["LIDAR Range Array"].split(" ")
+    assert (words[0], words[1], words[90], words[359]) == ("1.0000", "1.0010", "inf", "1.3590")
+    assert len(words) == 360
+
+
+def test_without_a_scan_all_ranges_are_inf():
+    assert set(told()["LIDAR Range Array"].split(" ")) == {"inf"}
+
+
+def test_a_scanner_of_part_of_a_circle_leaves_the_rest_inf():
+    count, first = 1081, -0.75 * math.pi
+    ranges = [5.0 + k for k in range(count)]
+    made = scan(ranges, bearing_first_rad=first, bearing_step_rad=math.radians(0.25))
+    words = told(made)["LIDAR Range Array"].split(" ")
+    assert words[0] == f"{5.0 + 540:.4f}"  # the middle beam looks ahead
+    assert words[90] == f"{5.0 + 540 + 360:.4f}"  # left is 90 degrees on
+    assert words[270] == f"{5.0 + 540 - 360:.4f}"
+    assert set(words[136:225]) == {"inf"}
+    assert "inf" not in words[:136] + words[225:]
+
+
+def test_intensities_are_the_simulators_constant():
+    assert set(told()["LIDAR Intensity Array"].split(" ")) == {"47.0000"}
+    assert len(told()["LIDAR Intensity Array"].split(" ")) == 360
+
+
+def test_pictures_are_the_newest_jpeg():
+    data = told(frame("front", b"old"), frame("front", b"new"), frame("rear", b"back"))
+    assert base64.b64decode(data["Front Camera Image"]) == b"new"
+    assert base64.b64decode(data["Rear Camera Image"]) == b"back"
+
+
+@pytest.mark.parametrize("key", ["Front Camera Image", "Rear Camera Image"])
+def test_before_the_first_picture_there_is_a_small_black_one_of_full_size_in_colour(key):
+    jpeg = base64.b64decode(told()[key])
+    assert len(jpeg) < 8000
+    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert image.shape == (720, 1280, 3)
+    assert not image.any()
+
+
+def test_what_a_new_script_sees_is_not_the_last_ones_picture():
+    made = telemetry(frame("front", b"old"), scan([1.0] * 360))
+    packet(made)
+    made.forget_views()
+    data = packet(made)
+    assert base64.b64decode(data["V1 Front Camera Image"]) != b"old"
+    assert set(data["V1 LIDAR Range Array"].split(" ")) == {"inf"}
+
+
+def test_news_is_in_the_next_packet():
+    made = telemetry()
+    packet(made)
+    made.hear(state(speed_mps=0.25))
+    assert packet(made)["V1 Speed"] == "0.2500"
+    made.hear(sensors(encoder_left=5))
+    assert packet(made)["V1 Encoder Ticks"] == "5 -1920"
+
+
+def spat(a, b="dark", t_ns=0):
+    groups = [
+        SignalGroup(group=name, colour=colour, since_ns=0, min_end_ns=0)
+        for name, colour in (("a", a), ("b", b))
+    ]
+    return Spat(junction="crossing", t_ns=t_ns, seq=1, mode="plan", plan="p", groups=tuple(groups))
+
+
+@pytest.mark.parametrize(
+    ("colour", "number"), [("dark", "0"), ("red", "1"), ("yellow", "2"), ("green", "3")]
+)
+def test_a_light_shows_its_groups_colour(colour, number):
+    data = packet(telemetry(spat("red", colour)))
+    assert (data["TL1 State"], data["TL2 State"]) == ("1", number)
+
+
+def test_a_flashing_light_is_red_for_half_of_each_second():
+    shown = [
+        packet(telemetry(spat("flashing_red", t_ns=t_ns)))["TL1 State"]
+        for t_ns in (0, 499_999_999, 500_000_000, 1_000_000_000)
+    ]
+    assert shown == ["1", "1", "0", "1"]
+
+
+def test_a_light_that_nobody_told_of_is_off():
+    assert packet(telemetry())["TL1 State"] == "0"

@@ -1,0 +1,108 @@
+"""`vehicle-agent devkit`: let an AutoDRIVE Devkit script drive cars of a city."""
+
+import argparse
+import gc
+import threading
+
+from scm.command import Command, credentials_argument, credentials_of
+
+DEFAULT_PORT = 4567
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+FASTEST_HZ = 250.0
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--car", dest="cars", action="append", required=True, metavar="NAME",
+        help="a car of the city to drive; the first is the script's V1, the next V2",
+    )  # fmt: skip
+    parser.add_argument(
+        "--script-port", type=int, default=DEFAULT_PORT, help="where it serves (%(default)s)"
+    )
+    parser.add_argument("--script-host", default="127.0.0.1", help="on which host (%(default)s)")
+    parser.add_argument(
+        "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT",
+        help="the city's router (%(default)s)",
+    )  # fmt: skip
+    credentials_argument(parser)
+    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument(
+        "--light", dest="lights", type=int, action="append", default=[], metavar="ID",
+        help="a light of the map; the first is TL1; default: all, in the map's order",
+    )  # fmt: skip
+    parser.add_argument(
+        "--steering-sign", choices=("left", "right"), default="left",
+        help="which way a steering of +1 turns (%(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--cameras", nargs="*", choices=("front", "rear"), default=["front", "rear"],
+        help="which cameras are pictured; the others stay black (both)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--max-hz", type=float, default=FASTEST_HZ,
+        help="most packets a second; 0: as fast as the script answers (%(default)s)",
+    )  # fmt: skip
+    brought = parser.add_mutually_exclusive_group()
+    brought.add_argument(
+        "--spawn", nargs="*", metavar="PLACE",
+        help="bring the cars, to these places of the map or to free ones, and take them away after",
+    )  # fmt: skip
+    brought.add_argument(
+        "--cosim", action="store_true", help="the script places the cars itself, by PosX ... RotW"
+    )
+    parser.add_argument(
+        "--car-file", default="nigel", help="of the cars that are brought or placed (%(default)s)"
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.clock import NS_PER_S, WallClock
+    from scm.errors import RunError
+    from scm.live import run, stop_on_signal
+    from scm.v2x.bus_zenoh import ZenohBus
+    from scm.v2x.key import check_name
+    from vehicle_agent.devkit.bridge import DevkitPart, Wanted
+    from vehicle_agent.devkit.engineio import ScriptSocket
+    from vehicle_agent.leaving import Leaving
+
+    for car in arguments.cars:
+        check_name(car, "--car")
+    if len(set(arguments.cars)) < len(arguments.cars) or not 0.0 <= arguments.max_hz < 1e6:
+        msg = f"expected different cars and --max-hz from 0: got {arguments.cars}, "
+        raise RunError(msg + f"{arguments.max_hz:g}")
+    check_name(arguments.city, "--city")
+    credentials = credentials_of(arguments)
+    name = f"devkit-{arguments.script_port}" if credentials is None else credentials.station
+    wanted = Wanted(
+        cars=tuple(arguments.cars),
+        lights=tuple(arguments.lights),
+        sign=arguments.steering_sign,
+        cameras=tuple(arguments.cameras),
+        spawns=None if arguments.spawn is None else tuple(arguments.spawn),
+        cosim=arguments.cosim,
+        car=arguments.car_file,
+    )
+    gap_ns = round(NS_PER_S / arguments.max_hz) if arguments.max_hz else 0
+    wish, done, clock = stop_on_signal(), threading.Event(), WallClock()
+    with ZenohBus(
+        arguments.city, name, arguments.connect, clock=clock, credentials=credentials
+    ) as bus:
+        part = DevkitPart(name, wanted, bus.session)
+        address = (arguments.script_host, arguments.script_port)
+        script = ScriptSocket(address, part.packet, part.said, clock, gap_ns)
+        part.meet(script)
+        script.start()
+        try:
+            run(Leaving(part, wish, done), bus, clock, done)
+        finally:
+            script.stop()
+    gc.freeze()  # taking the compiler's objects apart one by one would take a quarter of a second
+    return 0
+
+
+COMMAND = Command(
+    help="let an AutoDRIVE Devkit script drive cars of the city, until Ctrl-C",
+    example="vehicle-agent devkit --script-port 4567 --car v1 --spawn",
+    arguments=_arguments,
+    run=_run,
+)

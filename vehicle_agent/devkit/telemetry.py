@@ -1,0 +1,286 @@
+"""What a script is told: every key of the simulator's packet, in every packet, as strings.
+
+    V1 Throttle                  what the motors are told, -1 to 1
+    V1 Steering                  mean angle of the front wheels [rad], + = left
+    V1 Speed                     along the car [m/s], + = forward
+    V1 Encoder Ticks, Angles     "left right", counts and wheel angle [rad]
+    V1 Position                  "x y z" of the rear axle's centre [m], map frame
+    V1 Orientation ...           of the IMU: "x y z w", and "roll pitch yaw" in [0, 2 pi) [rad]
+    V1 Angular Velocity          of the IMU [rad/s]
+    V1 Linear Acceleration       of the IMU without gravity [m/s^2]
+    V1 LIDAR ...                 rate [Hz]; 360 ranges [m] from straight ahead, counter-clockwise
+    V1 Front, Rear Camera Image  JPEG in base64; a black one before there is one
+    TL1 State                    0 off, 1 red, 2 yellow, 3 green
+
+Position is the rear axle's, not the roof's: in a log of the simulator the course fits a point
+0.002 m ahead of the axle, at the height of a wheel's radius; the roof's tag is 0.035 m ahead.
+Of everything the newest is held and nothing else; what has not changed is not written anew.
+"""
+
+import base64
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+
+from scm.clock import NS_PER_MS
+from scm.v2x.message import Message
+from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.vehicle_sensors import VehicleSensors
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.vehicles.car import Car
+from vehicle_agent.devkit.engineio import EVENT
+
+BEAMS = 360
+INTENSITY = 47.0
+GRAVITY = 9.80665
+FLASH_NS = 500 * NS_PER_MS
+CAMERAS = {"front": "Front Camera Image", "rear": "Rear Camera Image"}
+_DARK_PX = (1280, 720)
+_NOTHING = " ".join(["inf"] * BEAMS)
+_SHINE = " ".join([f"{INTENSITY:.4f}"] * BEAMS)
+_COLOURS = {"red": 1, "yellow": 2, "green": 3, "dark": 0}
+
+
+@dataclass(slots=True)
+class _Kept:
+    """The newest message of a kind, and what it made of the packet."""
+
+    message: Message | None = None
+    written: Message | None = None
+    text: str = ""
+
+
+class CarTelemetry:
+    """One car's share of the packet.
+
+    Args:
+        prefix: `V1`.
+        car: Its car file.
+    """
+
+    def __init__(self, prefix: str, car: Car) -> None:
+        self._prefix = prefix
+        self._car = car
+        self._turn = 2.0 * math.pi / _number(car, "encoder.counts_per_revolution", 1920.0)
+        self._radius_m = _number(car, "wheel.radius_m", 0.0325)
+        self._rate_hz = _number(car, "lidar.rate_hz", 7.0)
+        self._own, self._scan = _Kept(), _Kept()
+        self._cameras = {camera: _Kept() for camera in CAMERAS}
+        self._state: VehicleState | None = None
+        self._sensors: VehicleSensors | None = None
+
+    def forget_views(self) -> None:
+        """Forget the scan and the pictures: nothing keeps them new from now on."""
+        self._scan = _Kept()
+        self._cameras = {camera: _Kept() for camera in CAMERAS}
+
+    def hear(self, message: Message) -> None:
+        """Take what the city says of the car; from any one thread."""
+        if isinstance(message, VehicleState):
+            self._state = self._own.message = message
+        elif isinstance(message, VehicleSensors):
+            self._sensors = self._own.message = message
+        elif isinstance(message, LidarScan):
+            self._scan.message = message
+        elif isinstance(message, CameraFrame) and message.camera in self._cameras:
+            self._cameras[message.camera].message = message
+
+    def texts(self) -> list[str]:
+        """Return its keys and values as pieces of JSON; from any one thread."""
+        state, sensors = self._state, self._sensors
+        own, scan = self._own, self._scan
+        newest = own.message
+        if state is not None and newest is not own.written:
+            own.text, own.written = self._tell_own(state, sensors), newest
+        newest = scan.message
+        if not scan.text or newest is not scan.written:
+            scan.text, scan.written = self._tell_scan(newest), newest
+        out = [own.text, scan.text]
+        for camera, kept in self._cameras.items():
+            newest = kept.message
+            if not kept.text or newest is not kept.written:
+                kept.text, kept.written = self._tell_picture(camera, newest), newest
+            out.append(kept.text)
+        return out
+
+    def _pairs(self, told: Mapping[str, str]) -> str:
+        return ",".join(f'"{self._prefix} {key}":"{value}"' for key, value in told.items())
+
+    def _tell_own(self, state: VehicleState, sensors: VehicleSensors | None) -> str:
+        throttle, steering, ticks = state.throttle, state.steering_rad, (0, 0)
+        rpy, rates, accel = (0.0, 0.0, state.yaw_rad), (0.0, 0.0, state.yaw_rate_radps), None
+        if sensors is not None:
+            throttle = throttle if sensors.throttle is None else sensors.throttle
+            steering = steering if sensors.steering_rad is None else sensors.steering_rad
+            ticks, rates = (sensors.encoder_left, sensors.encoder_right), sensors.gyro_radps
+            rpy, accel = sensors.orientation_rad or rpy, sensors.accel_mps2
+        moved = (state.accel_mps2, 0.0, 0.0) if accel is None else without_gravity(accel, rpy)
+        return self._pairs(
+            {
+                "Throttle": _text(throttle),
+                "Steering": _text(steering),
+                "Speed": _text(state.speed_mps),
+                "Encoder Ticks": f"{ticks[0]} {ticks[1]}",
+                "Encoder Angles": _text(*(tick * self._turn for tick in ticks)),
+                "Position": _text(state.x_m, state.y_m, self._radius_m),
+                "Orientation Quaternion": _text(*quaternion(rpy)),
+                "Orientation Euler Angles": _text(*(angle % (2.0 * math.pi) for angle in rpy)),
+                "Angular Velocity": _text(*rates),
+                "Linear Acceleration": _text(*moved),
+            }
+        )
+
+    def _tell_scan(self, scan: Message | None) -> str:
+        ranges = ranges_of(scan) if isinstance(scan, LidarScan) else _NOTHING
+        return self._pairs(
+            {
+                "LIDAR Scan Rate": _text(self._rate_hz),
+                "LIDAR Range Array": ranges,
+                "LIDAR Intensity Array": _SHINE,
+            }
+        )
+
+    def _tell_picture(self, camera: str, frame: Message | None) -> str:
+        if isinstance(frame, CameraFrame):
+            jpeg = frame.payload
+        else:
+            has = self._car.has("camera.resolution_px")
+            size = self._car.vector("camera.resolution_px") if has else _DARK_PX
+            jpeg = black_jpeg(round(size[0]), round(size[1]))
+        return self._pairs({CAMERAS[camera]: base64.b64encode(jpeg).decode()})
+
+
+class Telemetry:
+    """The packet of several cars and lights.
+
+    Args:
+        names: Of the vehicles, in the order of V1, V2...
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = tuple(names)
+        self._cars: dict[str, CarTelemetry] = {}
+        self._files: dict[str, str] = {}
+        self._heads: Sequence[tuple[str, str]] = ()
+        self._spats: dict[str, Spat] = {}
+
+    def knows(self, vehicle: str, car_file: str) -> bool:
+        """Return whether a car is welcome already, as one of this file."""
+        return self._files.get(vehicle) == car_file
+
+    def welcome(self, vehicle: str, car_file: str, car: Car) -> None:
+        """Learn what a car is; what it tells of itself follows."""
+        self._files[vehicle] = car_file
+        self._cars[vehicle] = CarTelemetry(f"V{self._names.index(vehicle) + 1}", car)
+
+    def show_lights(self, heads: Sequence[tuple[str, str]]) -> None:
+        """Tell of these lights, by junction and group, as TL1, TL2..."""
+        self._heads = tuple(heads)
+
+    def forget_views(self) -> None:
+        """Forget the scans and the pictures of all cars."""
+        for car in self._cars.values():
+            car.forget_views()
+
+    def hear(self, message: Message) -> None:
+        """Take what the city says; what concerns nobody here is ignored."""
+        if isinstance(message, Spat):
+            if any(junction == message.junction for junction, _ in self._heads):
+                self._spats[message.junction] = message
+            return
+        car = self._cars.get(str(getattr(message, "vehicle", "")))
+        if car is not None:
+            car.hear(message)
+
+    @property
+    def unknown(self) -> list[str]:
+        """The cars that are not welcome yet."""
+        return [name for name in self._names if name not in self._cars]
+
+    def frame(self) -> str | None:
+        """Return the packet as a Socket.IO event; None until all cars are known."""
+        if self.unknown:
+            return None
+        texts = [text for name in self._names for text in self._cars[name].texts()]
+        texts += [
+            f'"TL{number} State":"{self._shown(*head)}"'
+            for number, head in enumerate(self._heads, 1)
+        ]
+        return f'42["{EVENT}",{{{",".join(texts)}}}]'
+
+    def _shown(self, junction: str, group: str) -> int:
+        spat = self._spats.get(junction)
+        if spat is None:
+            return 0
+        colour = next((one.colour for one in spat.groups if one.group == group), "dark")
+        if colour == "flashing_red":
+            return 1 if spat.t_ns // FLASH_NS % 2 == 0 else 0
+        return _COLOURS[colour]
+
+
+def _number(car: Car, key: str, otherwise: float) -> float:
+    return car.value(key) if car.has(key) else otherwise
+
+
+def _text(*numbers: float) -> str:
+    """Return numbers with four decimals, apart by spaces; what is no number is 0."""
+    return " ".join(f"{number if math.isfinite(number) else 0.0:.4f}" for number in numbers)
+
+
+def quaternion(rpy: tuple[float, float, float]) -> tuple[float, float, float, float]:
+    """Return x, y, z, w of roll, pitch and yaw [rad], turned about z, y, x in this order."""
+    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a / 2.0), math.cos(a / 2.0)) for a in rpy)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def without_gravity(
+    accel_mps2: tuple[float, float, float], rpy: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Return what an accelerometer would read if it did not feel the floor's push."""
+    (roll, pitch, _), (x, y, z) = rpy, accel_mps2
+    up = math.cos(pitch)
+    return (
+        x + GRAVITY * math.sin(pitch),
+        y - GRAVITY * up * math.sin(roll),
+        z - GRAVITY * up * math.cos(roll),
+    )
+
+
+def ranges_of(scan: LidarScan) -> str:
+    """Return 360 ranges a degree apart from straight ahead, counter-clockwise; "inf" is none."""
+    ranges = np.frombuffer(scan.payload, "<f4")[: scan.beams].astype(float)
+    step = 2.0 * math.pi / max(1, scan.beams)
+    step = step if scan.bearing_step_rad is None else scan.bearing_step_rad
+    wished = np.radians(np.arange(BEAMS, dtype=float)) - scan.bearing_first_rad
+    turned = np.mod(wished, 2.0 * math.pi) if step > 0.0 else -np.mod(-wished, 2.0 * math.pi)
+    beams = np.rint(turned / step).astype(int)
+    around = round(2.0 * math.pi / abs(step))
+    beams = np.where(beams >= around, beams - around, beams)
+    seen = beams < len(ranges)
+    found = np.full(BEAMS, math.inf)
+    found[seen] = ranges[beams[seen]]
+    return " ".join("inf" if not math.isfinite(r) else f"{r:.4f}" for r in found.tolist())
+
+
+@lru_cache(maxsize=8)
+def black_jpeg(width_px: int, height_px: int) -> bytes:
+    """Return a black colour picture as a JPEG: of full size, for scripts that cut out a part.
+
+    Progressive and with codes of its own it takes a fifth of the bytes, and a script's server
+    unmasks byte by byte.
+    """
+    black = np.zeros((height_px, width_px, 3), np.uint8)
+    small = [cv2.IMWRITE_JPEG_PROGRESSIVE, 1, cv2.IMWRITE_JPEG_OPTIMIZE, 1]
+    _, data = cv2.imencode(".jpg", black, small)
+    return data.tobytes()
