@@ -64,17 +64,17 @@ class Sketch:
 def servo_pulse(value: int) -> int:
     """Return what Arduino's `Servo.write` makes of an int [us]: from 544 on it is no angle."""
     if value < SHORTEST_US:
-        value = SHORTEST_US + min(max(value, 0), 180) * (LONGEST_US - SHORTEST_US) // 180
+        value = SHORTEST_US + max(value, 0) * (LONGEST_US - SHORTEST_US) // 180
     return min(value, LONGEST_US)
 
 
 def analog_write(value: int) -> tuple[int, float]:
     """Return what Arduino's `analogWrite` makes of an int: the timer's 8 bits, and the duty.
 
-    0 and 255 switch the pin; any other number, of whatever size, leaves 8 bits to the timer.
+    0 switches the pin off; of any other number, whatever its size, the timer gets 8 bits.
     """
-    if value in (0, 255):
-        return value, value / 255.0
+    if value == 0:
+        return 0, 0.0
     return value % 256, (value % 256 + 1) / 256.0
 
 
