@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING
 
 from scm.clock import NS_PER_MS
 from scm.command import Command, credentials_argument, credentials_of
+from vehicle_agent.emulate.sketches import DEADBAND, SKETCHES, Sketch
 
 if TYPE_CHECKING:
     from threading import Event
 
     from scm.clock import Clock
     from vehicle_agent.emulate.device import Device
-    from vehicle_agent.emulate.sketches import Sketch
 
-DEADBAND = 0.2
 EVERY_NS = 5 * NS_PER_MS
 
 
@@ -25,7 +24,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="path for hosts, as /dev/ttyUSB0 would be (%(default)s)",
     )  # fmt: skip
     parser.add_argument(
-        "--baud-of", choices=["2wd", "4wd"], default="2wd",
+        "--baud-of", choices=sorted(SKETCHES), default="2wd",
         help="whose firmware: 2wd at 57600 baud, 4wd at 115200 (%(default)s)",
     )  # fmt: skip
     parser.add_argument(
@@ -54,7 +53,6 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
     from scm.errors import RunError
     from scm.live import stop_on_signal
-    from vehicle_agent.emulate.sketches import SKETCHES
 
     if (arguments.connect is None) != (arguments.name is None):
         raise RunError("--connect and --name: expected both or none of them")
@@ -76,7 +74,7 @@ def _run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _device(arguments: argparse.Namespace, sketch: "Sketch", clock: "Clock") -> "Device":
+def _device(arguments: argparse.Namespace, sketch: Sketch, clock: "Clock") -> "Device":
     from vehicle_agent.emulate.device import Device
     from vehicle_agent.emulate.faults import Spoiler, read_faults
     from vehicle_agent.emulate.firmware import Firmware
@@ -101,7 +99,7 @@ def _serve(device: "Device", clock: "Clock", stop: "Event") -> None:
 
 
 def _join(
-    arguments: argparse.Namespace, device: "Device", sketch: "Sketch", clock: "Clock", stop: "Event"
+    arguments: argparse.Namespace, device: "Device", sketch: Sketch, clock: "Clock", stop: "Event"
 ) -> None:
     from scm.live import run
     from scm.v2x.bus_zenoh import ZenohBus

@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 
 from vehicle_agent.emulate.avr import float32, int16, int_of, plus, times
 
+DEADBAND = 0.2
+"""Duty below which a real Nigel's motor does not turn, about: its authors add so much."""
 SHORTEST_US, LONGEST_US = 544, 2400
 """Pulses that Arduino's Servo gives, for 0 and 180 degrees."""
 

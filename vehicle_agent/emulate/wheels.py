@@ -13,10 +13,7 @@ from scm.geometry import Pose2
 from scm.maps.model import CityMap
 from vehicle_agent.bodies.simulated import SimulatedBody
 from vehicle_agent.body import Motion
-from vehicle_agent.emulate.sketches import Outputs
-
-DEADBAND = 0.2
-"""Of the real Nigel, about: its authors add so much to the throttle."""
+from vehicle_agent.emulate.sketches import DEADBAND, Outputs
 
 
 def throttle_of(pins: Outputs, deadband: float) -> float:

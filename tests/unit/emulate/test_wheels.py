@@ -1,6 +1,7 @@
 """From the pins to the floor, and what is told of it; in virtual time."""
 
 import math
+from fnmatch import fnmatchcase
 from itertools import pairwise
 
 import pytest
@@ -10,9 +11,11 @@ from scm.errors import MapError
 from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.v2x.exchange import Incoming
+from scm.v2x.key import key_of, prefix, selector
 from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.world_definition import WorldDefinition
-from vehicle_agent.emulate.part import EmulatorPart, place_of
+from scm.v2x.rights import rights_of
+from vehicle_agent.emulate.part import EmulatorPart, place_of, station_of
 from vehicle_agent.emulate.sketches import SKETCHES, Outputs
 from vehicle_agent.emulate.wheels import Wheels, throttle_of, wheel_angle
 
@@ -140,3 +143,14 @@ def test_it_takes_the_cable_away_at_the_end():
     emulator = part()
     emulator.finish(0)
     assert emulator._device.closed
+
+
+def test_a_guarded_city_lets_it_say_the_truth_and_no_vehicle_hear_it():
+    key = key_of("city", EmulatedPose(vehicle="n7", t_ns=0, x_m=0, y_m=0, yaw_rad=0, speed_mps=0))
+    key = key.removeprefix(prefix("city"))
+    rights = rights_of("emulator", station_of("n7"))
+    assert any(fnmatchcase(key, pattern) for pattern in rights.says)
+    heard = [selector("city", wish.kind, wish.where) for wish in part().hears]
+    assert [prefix("city") + pattern for pattern in rights.hears] == heard
+    assert not any(fnmatchcase(key, pattern) for pattern in rights_of("vehicle", "n7").hears)
+    assert any(fnmatchcase(key, pattern) for pattern in rights_of("part", "eye").hears)
