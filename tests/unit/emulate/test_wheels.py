@@ -1,0 +1,156 @@
+"""From the pins to the floor, and what is told of it; in virtual time."""
+
+import math
+from fnmatch import fnmatchcase
+from itertools import pairwise
+
+import pytest
+
+from scm.clock import NS_PER_MS
+from scm.errors import MapError
+from scm.geometry import Pose2
+from scm.maps.load import load_map
+from scm.v2x.exchange import Incoming
+from scm.v2x.key import key_of, prefix, selector
+from scm.v2x.messages.emulated_pose import EmulatedPose
+from scm.v2x.messages.world_definition import WorldDefinition
+from scm.v2x.rights import rights_of
+from vehicle_agent.emulate.part import EmulatorPart, place_of, station_of
+from vehicle_agent.emulate.sketches import SKETCHES, Outputs
+from vehicle_agent.emulate.wheels import Wheels, throttle_of, wheel_angle
+
+CITY = load_map("driving_school")
+TWO, FOUR = SKETCHES["2wd"], SKETCHES["4wd"]
+
+
+def pins(u, steer=0.0, sketch=TWO):
+    return sketch.drive(sketch.steer(sketch.at_setup, steer), u)
+
+
+def drive(wheels, now_ns, seconds, state):
+    for _ in range(int(seconds / 0.02)):
+        now_ns += 20 * NS_PER_MS
+        wheels.advance(state, now_ns)
+    return now_ns
+
+
+def placed(deadband=0.2):
+    wheels = Wheels(TWO.at_setup, deadband=deadband)
+    wheels.place(Pose2(0.0, 0.0, 0.0), 0)
+    return wheels
+
+
+@pytest.mark.parametrize(
+    ("u", "left"),
+    [(0.1, 0.0), (0.19, 0.0), (0.4, 0.2), (-0.4, -0.2), (1.0, 0.8), (-1.0, -0.8), (0.0, 0.0)],
+)
+def test_the_dead_band_takes_its_share(u, left):
+    assert throttle_of(pins(u), 0.2) == pytest.approx(left, abs=0.005)
+
+
+def test_a_wrapped_throttle_creeps():
+    assert throttle_of(pins(1.2), 0.0) == pytest.approx(51 / 256)
+
+
+@pytest.mark.parametrize("u", [1.0, 0.5, -0.5, -1.0])
+def test_the_road_wheels_turn_30_degrees_at_full_command(u):
+    assert wheel_angle(pins(0.0, u), TWO.at_setup) == pytest.approx(math.radians(30 * u), abs=0.01)
+    mean = wheel_angle(pins(0.0, u, FOUR), FOUR.at_setup)
+    assert mean == pytest.approx(math.radians(30 * u), abs=0.02)
+
+
+def test_it_drives_as_fast_as_the_motor_is_driven_beyond_the_dead_band():
+    wheels = placed()
+    drive(wheels, 0, 2.0, pins(0.6))
+    assert wheels.motion().speed == pytest.approx(0.112, abs=0.002)  # the table's speed at 0.4
+
+
+@pytest.mark.parametrize("stop", [pins(0.0), TWO.at_setup, Outputs()])
+def test_it_stops_when_braked_and_when_the_motor_is_off(stop):
+    wheels = placed()
+    now_ns = drive(wheels, 0, 1.0, pins(1.0))
+    assert wheels.motion().speed > 0.2
+    drive(wheels, now_ns, 0.5, stop)
+    assert wheels.motion().speed == pytest.approx(0.0, abs=1e-3)
+
+
+def test_positive_steering_is_left_and_a_servo_without_pulses_stays():
+    wheels = placed()
+    now_ns = drive(wheels, 0, 1.0, pins(1.0, 0.5))
+    assert wheels.motion().yaw_rate > 0.2
+    drive(wheels, now_ns, 0.5, Outputs())
+    assert wheels.motion().steering == pytest.approx(math.radians(15.0), abs=0.01)
+
+
+class Board:
+    """A board whose pins a test sets."""
+
+    outputs = pins(1.0)
+
+
+class Desk:
+    """What a part needs of a device."""
+
+    firmware = Board()
+    closed = False
+
+    def step(self, now_ns):
+        del now_ns
+
+    def close(self):
+        self.closed = True
+
+
+def part(**more):
+    return EmulatorPart("n7", Desk(), Wheels(TWO.at_setup), **more)
+
+
+def world():
+    return Incoming(WorldDefinition(t_ns=1, map=CITY, seed=0), 0)
+
+
+def test_it_tells_where_it_is_fifty_times_a_second_once_it_knows_the_floor():
+    emulator, told = part(tag_id=4), []
+    for ms in range(0, 1000, 5):
+        told += emulator.step(ms * NS_PER_MS, [])
+    assert told == []
+    for ms in range(1000, 2000, 5):
+        told += emulator.step(ms * NS_PER_MS, [world()] if ms == 1000 else [])
+    assert {type(message) for message in told} == {EmulatedPose}
+    assert len(told) in (50, 51)
+    start = place_of(CITY, "")
+    gone = math.hypot(told[-1].x_m - start.x, told[-1].y_m - start.y)
+    assert 0.15 < gone < 0.25
+    assert (told[0].vehicle, told[0].tag_id, told[0].car) == ("n7", 4, "nigel")
+
+
+def test_a_city_that_begins_anew_does_not_carry_the_car_away():
+    emulator, told = part(), []
+    for ms in range(0, 1000, 5):
+        told += emulator.step(ms * NS_PER_MS, [world()] if ms in (0, 500) else [])
+    steps = [math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in pairwise(told)]
+    assert max(steps) < 0.01
+
+
+def test_it_is_put_down_at_a_named_place_or_refuses():
+    first, second = CITY.spawns[0], CITY.spawns[1]
+    assert place_of(CITY, "") == place_of(CITY, first.name) != place_of(CITY, second.name)
+    with pytest.raises(MapError, match="no spawn place 'nowhere'"):
+        place_of(CITY, "nowhere")
+
+
+def test_it_takes_the_cable_away_at_the_end():
+    emulator = part()
+    emulator.finish(0)
+    assert emulator._device.closed
+
+
+def test_a_guarded_city_lets_it_say_the_truth_and_no_vehicle_hear_it():
+    key = key_of("city", EmulatedPose(vehicle="n7", t_ns=0, x_m=0, y_m=0, yaw_rad=0, speed_mps=0))
+    key = key.removeprefix(prefix("city"))
+    rights = rights_of("emulator", station_of("n7"))
+    assert any(fnmatchcase(key, pattern) for pattern in rights.says)
+    heard = [selector("city", wish.kind, wish.where) for wish in part().hears]
+    assert [prefix("city") + pattern for pattern in rights.hears] == heard
+    assert not any(fnmatchcase(key, pattern) for pattern in rights_of("vehicle", "n7").hears)
+    assert any(fnmatchcase(key, pattern) for pattern in rights_of("part", "eye").hears)
