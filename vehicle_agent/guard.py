@@ -156,7 +156,7 @@ class Passed:
 class _Seen(NamedTuple):
     track: EyeTrack
     at_ns: int
-    delay_ns: int
+    lead_ns: int
 
 
 class RealGuard:
@@ -165,7 +165,6 @@ class RealGuard:
     def __init__(self, limits: GuardLimits) -> None:
         self._limits = limits
         self._seen: _Seen | None = None
-        self._lead_ns = 0
         self._now_ns: int | None = None
         self._throttle = self._steering = 0.0
         self._reasons: tuple[str, ...] = ()
@@ -187,9 +186,8 @@ class RealGuard:
             if track.t_ns <= self._seen.track.t_ns:
                 return
             drift_ns = (now_ns - self._seen.at_ns) // DRIFT
-            lead_ns = min(lead_ns, self._lead_ns + drift_ns)
-        self._lead_ns = lead_ns
-        self._seen = _Seen(track, now_ns, now_ns - track.t_ns - lead_ns)
+            lead_ns = min(lead_ns, self._seen.lead_ns + drift_ns)
+        self._seen = _Seen(track, now_ns, lead_ns)
 
     def pass_on(self, guarded: Guarded, now_ns: int) -> Passed:
         """Return what may reach the actuators at `now_ns` of what the first guard let pass."""
@@ -239,8 +237,8 @@ class RealGuard:
         seen = self._seen
         if seen is None:
             return 0.0, "pose"
-        since_s = seconds(max(0, now_ns - seen.at_ns) + seen.delay_ns)
         track = seen.track
+        since_s = seconds(max(now_ns, seen.at_ns) - track.t_ns - seen.lead_ns)
         age_s = since_s + track.age_s
         if track.stale or not (track.age_s >= 0.0 and age_s < self._limits.pose_age_s):
             return 0.0, "pose"
@@ -274,7 +272,7 @@ class RealGuard:
         after = self._after(crawl, pose, bend, speed)
         stays = inside and after <= 0.0
         returns = after < here and speed * crawl >= -STANDSTILL_MPS * abs(crawl)
-        return (crawl, "crawl") if stays or returns else (0.0, "fence")
+        return (crawl, "crawl") if crawl and (stays or returns) else (0.0, "fence")
 
     def _after(self, throttle: float, pose: Pose2, bend: float, speed: float) -> float:
         """Return how far outside it would stop if it obeyed a throttle first [m]."""
