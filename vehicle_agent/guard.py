@@ -246,7 +246,7 @@ class RealGuard:
             return 0.0, "doubt"
         pose = Pose2(track.x_m, track.y_m, track.yaw_rad)
         bend = self._limits.curvature_per_m * steering
-        here = _along(pose, bend, track.speed_mps * since_s)
+        here = along(pose, bend, track.speed_mps * since_s)
         return self._fenced(throttle, here, bend, track.speed_mps)
 
     def _is_doubtful(self, track: EyeTrack) -> bool:
@@ -265,7 +265,7 @@ class RealGuard:
     ) -> tuple[float, str | None]:
         limits = self._limits
         here = limits.outside_m(pose)
-        inside = max(here, limits.outside_m(_along(pose, bend, self._stop_m(speed)))) <= 0.0
+        inside = max(here, limits.outside_m(along(pose, bend, self._stop_m(speed)))) <= 0.0
         if inside and self._after(throttle, pose, bend, speed) <= 0.0:
             return throttle, None
         crawl = _within(throttle, -limits.crawl, limits.crawl)
@@ -278,7 +278,7 @@ class RealGuard:
         """Return how far outside it would stop if it obeyed a throttle first [m]."""
         way = math.copysign(1.0, throttle)
         speed = max(way * speed, self._limits.top_speed_mps * abs(throttle))
-        return self._limits.outside_m(_along(pose, bend, way * self._stop_m(speed)))
+        return self._limits.outside_m(along(pose, bend, way * self._stop_m(speed)))
 
     def _stop_m(self, speed: float) -> float:
         """Return the way to rest from a speed, + = forward [m]."""
@@ -286,7 +286,7 @@ class RealGuard:
         return speed * limits.reaction_s + speed * abs(speed) / (2.0 * limits.decel_mps2)
 
 
-def _along(pose: Pose2, bend: float, way: float) -> Pose2:
+def along(pose: Pose2, bend: float, way: float) -> Pose2:
     """Return a pose moved along an arc by a signed length [m]."""
     half = 0.5 * bend * way
     chord = way * (math.sin(half) / half if half else 1.0)
