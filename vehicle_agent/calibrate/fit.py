@@ -22,7 +22,8 @@ from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
 
 TERMS = ("steer_trim", "steer_gain", "drive_deadband", "drive_gain")
-STEP_S = 0.005
+STEP_S = 0.001  # a servo at its rate moves by when it is told: coarser steps shift its delay
+KEPT = 10  # steps from pose to pose that is kept
 WINDOW_S = 2.5
 LEAST_S = 20.0
 DELAYS = ("drive.delay_s", "steering.delay_s")
@@ -105,8 +106,9 @@ class _Model:
         self._poses = poses[inside].copy()
         self._poses[:, 3] = np.unwrap(self._poses[:, 3])
         self.begin_s = float(commands[0, 0])
-        steps = int((commands[-1, 0] - self.begin_s) / STEP_S)
+        steps = KEPT * int((commands[-1, 0] - self.begin_s) / (KEPT * STEP_S))
         self._edges = self.begin_s + STEP_S * np.arange(steps + 1)
+        self._kept = self._edges[::KEPT]
         t = self._poses[:, 0]
         which = ((t - self.begin_s) / WINDOW_S).astype(int)
         parts = [np.flatnonzero(which == w) for w in np.unique(which)]
@@ -126,7 +128,7 @@ class _Model:
         t = self._poses[:, 0]
         out = []
         for row in range(len(sets)):
-            path = np.column_stack([np.interp(t, self._edges, each[:, row]) for each in driven])
+            path = np.column_stack([np.interp(t, self._kept, each[:, row]) for each in driven])
             out.append([self._left(path[part], self._poses[part, 1:]) for part in self.windows])
         return out
 
@@ -148,10 +150,9 @@ class _Model:
             for key in at.keys() - set(DELAYS):
                 fleet.set_parameter(row, key, float(values[row, at[key]]))
         done = fleet.rollout(commands[0], commands[1], STEP_S, ("x", "y", "yaw"))
-        first = np.array(start)[:, None]
         x, y, yaw = (
-            np.vstack([np.full((1, len(values)), one), done[name]])
-            for one, name in zip(first.ravel(), ("x", "y", "yaw"), strict=True)
+            np.vstack([np.full((1, len(values)), at_start), done[name][KEPT - 1 :: KEPT]])
+            for name, at_start in zip(("x", "y", "yaw"), start, strict=True)
         )
         return [x, y, np.unwrap(yaw, axis=0)]
 
