@@ -1,0 +1,119 @@
+"""Hidden numbers are found again, with intervals that say how well."""
+
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scm.errors import CarError, RecordingError
+from scm.recording.read import read_recordings
+from scm.vehicles.car import load_car
+from tests.unit.calibrate.rig import Hidden, calibrated
+from vehicle_agent.calibrate.car_file import write_car
+from vehicle_agent.calibrate.fit import NUMBERS, fit
+
+NEAR = {
+    "steering.trim_rad": 0.002,
+    "steering.gain": 0.01,
+    "drive.deadband": 0.004,
+    "drive.gain": 0.01,
+    "drive.delay_s": 0.004,
+    "steering.delay_s": 0.008,
+    "steering.rate_rad_s": 0.01,
+}
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    part, _ = calibrated(Hidden())
+    return part.recorded
+
+
+@pytest.fixture(scope="module")
+def found(recorded):
+    return fit(load_car("nigel"), *recorded.arrays())
+
+
+def test_each_hidden_number_is_found_near_and_inside_a_few_deviations(found):
+    for key, truth in Hidden().numbers.items():
+        one = found.numbers[key]
+        assert one.low < one.value < one.high
+        assert abs(one.value - truth) < NEAR[key], key
+        assert abs(one.value - truth) < 4.0 * one.std, key
+        assert one.std < NEAR[key], key
+
+
+def test_what_is_left_over_is_the_noise_of_the_eye(found):
+    assert found.position_rms_m == pytest.approx(0.002, rel=0.1)
+    assert found.yaw_rms_rad == pytest.approx(0.005, rel=0.1)
+
+
+def test_an_eye_without_noise_leaves_no_error():
+    hidden = replace(Hidden(), position_std=1e-6, yaw_std=1e-6)
+    part, _ = calibrated(hidden)
+    exact = fit(load_car("nigel"), *part.recorded.arrays())
+    for key, truth in hidden.numbers.items():
+        assert abs(exact.numbers[key].value - truth) < 0.05 * NEAR[key], key
+
+
+def test_the_eyes_own_delay_is_taken_off(recorded, found):
+    late = fit(load_car("nigel"), *recorded.arrays(), eye_delay_s=0.06)
+    for key in NEAR:
+        off = 0.06 if key.endswith("delay_s") else 0.0
+        assert late.numbers[key].value == pytest.approx(found.numbers[key].value - off)
+        assert late.numbers[key].high == pytest.approx(found.numbers[key].high - off)
+
+
+def test_of_a_car_that_stood_still_next_to_nothing_is_known(recorded):
+    commands, poses = recorded.arrays()
+    rng = np.random.default_rng(3)
+    poses[:, 1:] = poses[0, 1:] + rng.normal(0.0, 0.002, (len(poses), 3))
+    commands[:, 1] = 0.0
+    still = fit(load_car("nigel"), commands, poses)
+    for number in NUMBERS:
+        if number.key != "steering.rate_rad_s":
+            assert still.numbers[number.key].std > 10.0 * NEAR[number.key]
+
+
+def test_a_short_drive_and_one_without_poses_are_refused(recorded):
+    commands, poses = recorded.arrays()
+    with pytest.raises(RecordingError, match=r"got a drive of 10\.0 s, expected at least 20 s"):
+        fit(load_car("nigel"), commands[commands[:, 0] <= 10.0], poses)
+    with pytest.raises(RecordingError, match=r"got a drive of 0\.0 s"):
+        fit(load_car("nigel"), commands[:0], poses)
+    with pytest.raises(RecordingError, match=r"poses in 2 windows of 2\.5 s, expected more than 7"):
+        fit(load_car("nigel"), commands, poses[poses[:, 0] < 5.0])
+
+
+def test_the_car_file_loads_with_what_was_found_and_keeps_the_rest(found, tmp_path):
+    path = tmp_path / "car.toml"
+    made = write_car(load_car("nigel"), found, path, "n7")
+    text = path.read_text(encoding="utf-8")
+    for key, one in found.numbers.items():
+        assert made.value(key) == pytest.approx(one.value, rel=1e-5)
+        assert made.quantity(key).std == pytest.approx(one.std, rel=1e-2)
+    assert made.value("body.mass_kg") == load_car("nigel").value("body.mass_kg")
+    assert "# sprung and unsprung together" in text
+    entry = tomllib.loads(text)["steering"]["trim_rad"]
+    one = found.numbers["steering.trim_rad"]
+    assert entry["source"] == f"calibrated: n7, 90 % {one.low:.4g}..{one.high:.4g}"
+
+
+def test_a_number_outside_its_bounds_is_refused(found, tmp_path):
+    wrong = replace(found.numbers["drive.gain"], value=9.0)
+    with pytest.raises(CarError, match="gain"):
+        write_car(
+            load_car("nigel"),
+            replace(found, numbers={**found.numbers, "drive.gain": wrong}),
+            tmp_path / "car.toml",
+            "n7",
+        )
+
+
+def test_the_drive_is_a_recording_like_any_other(recorded, tmp_path):
+    recorded.write(tmp_path, "nigel")
+    (read,) = read_recordings(tmp_path)
+    assert {"command.throttle", "command.steering", "pose.x", "pose.y", "pose.yaw"} <= set(
+        read.channels
+    )

@@ -1,0 +1,90 @@
+"""The calibration drive as a part: it waits where it must, and records what passed."""
+
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.v2x.exchange import Incoming
+from scm.v2x.messages.city_stop import CityStop
+from tests.unit.calibrate.rig import LIMITS, START, STEP_NS, T0, Eye, Hidden, HiddenBody, drive
+from tests.unit.test_real_guard import track
+from vehicle_agent.calibrate.part import CalibrationPart
+
+
+class Wheels:
+    def __init__(self):
+        self.told = []
+
+    def advance(self, now_ns):
+        pass
+
+    def command(self, throttle, steering):
+        self.told.append((throttle, steering))
+
+
+def stepped(part, count, first=0, more=()):
+    """Step with a pose every time, and `more` before the first; return what was sent."""
+    sent = []
+    for i in range(first, first + count):
+        now_ns = T0 + i * STEP_NS
+        inbox = [Incoming(track(now_ns, START.x, START.y), now_ns)]
+        if i == first:
+            inbox += [Incoming(message, now_ns) for message in more]
+        sent += part.step(now_ns, inbox)
+    return sent
+
+
+def test_without_a_pose_it_stands_and_records_nothing():
+    wheels = Wheels()
+    part = CalibrationPart("n7", wheels, LIMITS)
+    sent = [each for i in range(200) for each in part.step(T0 + i * STEP_NS, [])]
+    assert set(wheels.told) == {(0.0, 0.0)}
+    assert part.recorded.command == []
+    assert not part.done.is_set()
+    assert sent[-1].detail == "calibrates: waits (pose); held up: pose 1"
+
+
+def test_the_city_wide_stop_holds_it_and_it_goes_on_afterwards():
+    wheels = Wheels()
+    part = CalibrationPart("n7", wheels, LIMITS)
+    stepped(part, 60)
+    assert wheels.told[-1][0] != 0.0
+    sent = stepped(part, 200, 60, [CityStop(t_ns=0, engaged=True)])
+    assert {throttle for throttle, _ in wheels.told[60:]} == {0.0}
+    assert sent[-1].detail.startswith("calibrates: waits (stop)")
+    before = part._pattern.progress
+    stepped(part, 30, 260, [CityStop(t_ns=0, engaged=False)])
+    assert wheels.told[-1][0] != 0.0
+    assert part._pattern.progress == before
+
+
+def test_what_is_recorded_is_what_passed_the_guard():
+    wheels = Wheels()
+    part = CalibrationPart("n7", wheels, LIMITS)
+    stepped(part, 100)
+    assert [row[1:] for row in part.recorded.command] == wheels.told
+    assert [row[0] for row in part.recorded.command[:3]] == [0.0, 0.02, 0.04]
+
+
+def test_a_pose_that_is_stale_or_told_twice_is_not_recorded():
+    part = CalibrationPart("n7", Wheels(), LIMITS)
+    inbox = [track(T0), track(T0), track(T0 + 1, stale=True), track(T0 + NS_PER_MS)]
+    part.step(T0, [Incoming(message, T0) for message in inbox])
+    assert [row[0] for row in part.recorded.pose] == [0.0, 0.001]
+
+
+def test_it_ends_at_rest():
+    wheels = Wheels()
+    part = CalibrationPart("n7", wheels, LIMITS)
+    stepped(part, 100)
+    part.finish(T0 + NS_PER_S)
+    assert wheels.told[-1] == (0.0, 0.0)
+
+
+def test_an_eye_that_is_blind_for_a_while_holds_it_up_for_as_long():
+    hidden = Hidden()
+    took = {}
+    for blind in ((), (20, 21, 22)):
+        body = HiddenBody(hidden, START)
+        part = CalibrationPart("n7", body, LIMITS)
+        took[blind], farthest = drive(part, body, Eye(hidden), LIMITS, blind)
+        assert farthest < 0.0
+    assert 2.0 < took[20, 21, 22] - took[()] < 4.0
+    assert part.guard.counts["pose"] == 2

@@ -1,0 +1,76 @@
+"""The pattern shows all it must, small throttles first, and stays where it may."""
+
+from itertools import pairwise
+
+import pytest
+
+from scm.geometry import Pose2
+from tests.unit.calibrate.rig import Hidden, calibrated
+from vehicle_agent.calibrate.pattern import LEG_S, SHARES, STEERINGS, Pattern
+from vehicle_agent.guard import GuardLimits, rectangle
+
+WIDE = GuardLimits(rectangle(-100.0, -100.0, 100.0, 100.0), throttle=0.8)
+
+
+def driven(limits, pose):
+    """What the pattern commands to a car that never moves, step by step."""
+    pattern, wishes, progress = Pattern(limits), [], []
+    for i in range(20_000):
+        wish = pattern.step(pose, i * 0.02)
+        if wish is None:
+            return wishes, progress
+        wishes.append(wish)
+        progress.append(pattern.progress)
+    pytest.fail("the pattern does not end")
+
+
+def test_every_throttle_is_driven_both_ways_with_every_steering_and_small_ones_first():
+    wishes, _ = driven(WIDE, Pose2(0.0, 0.0, 0.0))
+    moving = [wish for wish in wishes if wish[0]]
+    levels = [abs(throttle) for throttle, _ in moving]
+    assert levels == sorted(levels)
+    expected = {
+        (way * share * 0.8, steering)
+        for share in SHARES
+        for way in (1.0, -1.0)
+        for both in STEERINGS
+        for steering in both
+    }
+    assert set(moving) == expected
+    seconds = len(moving) * 0.02
+    assert seconds == pytest.approx(LEG_S * len(SHARES) * 2 * len(STEERINGS), rel=0.03)
+
+
+def test_the_wheels_turn_while_it_moves():
+    wishes, _ = driven(WIDE, Pose2(0.0, 0.0, 0.0))
+    pairs = list(pairwise(wishes))
+    assert sum(a[0] == b[0] != 0.0 and a[1] != b[1] for a, b in pairs) == 2 * 2 * len(SHARES)
+
+
+def test_progress_never_falls_and_ends_at_one():
+    _, progress = driven(WIDE, Pose2(0.0, 0.0, 0.0))
+    assert progress == sorted(progress)
+    assert (progress[0], progress[-1]) == (0.0, 1.0)
+
+
+def test_with_its_nose_at_the_fence_it_drives_back_first():
+    limits = GuardLimits(rectangle(0.0, 0.0, 2.0, 1.5))
+    wishes, _ = driven(limits, Pose2(1.71, 0.75, 0.0))
+    first = next(wish for wish in wishes if wish[0])
+    assert first[0] < 0.0
+    assert all(throttle <= 0.0 for throttle, _ in wishes)
+
+
+@pytest.mark.parametrize(
+    ("floor", "start", "held"),
+    [
+        ((0.0, 0.0, 2.0, 1.5), Pose2(1.6, 1.3, 0.2), 0),
+        ((0.0, 0.0, 1.2, 1.0), Pose2(0.5, 0.5, 1.0), 1),
+    ],
+)
+def test_the_outline_never_leaves_and_the_guard_hardly_ever_helps(floor, start, held):
+    limits = GuardLimits(rectangle(*floor))
+    part, farthest = calibrated(Hidden(drive=1.0), start, limits)
+    assert farthest < 0.0
+    assert part.guard.counts["fence"] <= held
+    assert part.guard.counts["crawl"] == 0

@@ -1,0 +1,42 @@
+"""The given car file with the numbers that a calibration found, each with where it comes from."""
+
+from pathlib import Path
+
+from scm.errors import CarError
+from scm.mismatch.report.toml_text import number, quoted, set_entry, set_list
+from scm.vehicles.car import Car, load_car
+from vehicle_agent.calibrate.fit import TERMS, WIDE, Fit
+
+COMMENT = "found by vehicle-agent calibrate"
+DELAYING = ("drive_delay", "steer_delay")
+DIGITS = 6
+
+
+def write_car(car: Car, found: Fit, path: Path, drive: str) -> Car:
+    """Write a car file, and return the car that it loads as.
+
+    Args:
+        car: As given: all its text stays but for what was found.
+        found: What the drive says.
+        path: Of the new file.
+        drive: Name of the drive, for the numbers' sources.
+
+    Raises:
+        CarError: when the file cannot be written so that it loads again.
+    """
+    have = [term.name for term in car.terms]
+    names = [*have, *(name for name in (*TERMS, *DELAYING) if name not in have)]
+    text = set_list(car.path.read_text(encoding="utf-8"), "terms", names, COMMENT)
+    for key, one in found.numbers.items():
+        section, _, name = key.partition(".")
+        source = quoted(f"calibrated: {drive}, 90 % {one.low:.4g}..{one.high:.4g}")
+        value, std = number(one.value, DIGITS), number((one.high - one.low) / (2.0 * WIDE), 3)
+        entry = f"{{ value = {value}, std = {std}, source = {source} }}"
+        text = set_entry(text, section, name, entry)
+    path.write_text(text, encoding="utf-8")
+    made = load_car(path)
+    for key, one in found.numbers.items():
+        if abs(made.value(key) - one.value) > 10.0**-DIGITS * max(1.0, abs(one.value)):
+            msg = f"{path}: {key}: got {made.value(key)}, expected {one.value}: written wrongly"
+            raise CarError(msg)
+    return made

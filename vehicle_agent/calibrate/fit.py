@@ -1,0 +1,282 @@
+"""A car's own numbers from its commands and the Eye's poses.
+
+The drive is driven again by the car's own kernel, with other numbers in every row of one fleet,
+and cut into windows. In each window the drive may lie wherever it fits best, so that errors of
+long ago do not count; what is left over is the residual. Gauss-Newton moves the numbers.
+
+Intervals are 90 %: the wider of what white residuals say and of what the windows' own scatter says
+(White's sandwich, a window a cluster), so that an Eye whose errors last for a while does not make
+them too narrow. The Eye's own delay cannot be told from that of both actuators: the delays found
+are sums, and `eye_delay_s` of them is taken off as the Eye's.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.errors import RecordingError
+from scm.geometry import Pose2
+from scm.vehicles.car import Car
+from scm.vehicles.fleet import Fleet
+
+TERMS = ("steer_trim", "steer_gain", "drive_deadband", "drive_gain")
+STEP_S = 0.001  # a servo at its rate moves by when it is told: coarser steps shift its delay
+KEPT = 10  # steps from pose to pose that is kept
+WINDOW_S = 2.5
+LEAST_S = 20.0
+DELAYS = ("drive.delay_s", "steering.delay_s")
+PRIOR = 100.0  # steps of its derivative that a number may be from where it begins
+FEWEST = 5  # poses of a window that counts
+ROUNDS = 12
+SHARES = (1.0, 0.5, 0.2, 0.05)
+WIDE = 1.645  # standard deviations from the middle to the end of a 90 % interval
+TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild poses prove nothing
+OF_NORMAL = 0.7572  # mean of r^2 / (1 + r^2 / TAIL) over a normal r
+SETTLED = 0.02  # standard deviations that a last step may move a number
+POSITION_STD_M, YAW_STD_RAD = 5e-3, 1e-2
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """One number that is fitted.
+
+    Attributes:
+        key: In the car file; `start`: where the fit begins, times the file's value if `scales`.
+        step: Of its derivative.
+    """
+
+    key: str
+    start: float
+    step: float
+    low: float
+    high: float
+    scales: bool = False
+
+
+NUMBERS = (
+    Number("steering.trim_rad", 0.0, 2e-3, -0.3, 0.3),
+    Number("steering.gain", 1.0, 1e-2, 0.2, 2.0),
+    Number("drive.deadband", 0.1, 4e-3, 0.0, 0.6),
+    Number("drive.gain", 1.0, 1e-2, 0.1, 3.0),
+    Number("drive.delay_s", 0.1, 4e-3, 0.0, 0.5),
+    Number("steering.delay_s", 0.1, 4e-3, 0.0, 0.5),
+    Number("steering.rate_rad_s", 1.0, 2e-2, 0.2, 20.0, scales=True),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One number as it was fitted, with its 90 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of a normal belief with this interval."""
+        return (self.high - self.low) / (2.0 * WIDE)
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """What a drive says.
+
+    Attributes:
+        numbers: By key of the car file.
+        position_rms_m: What is left over; likewise `yaw_rms_rad`.
+        windows: How many counted.
+    """
+
+    numbers: Mapping[str, Found]
+    position_rms_m: float
+    yaw_rms_rad: float
+    windows: int
+
+
+class _Model:
+    """The drive by the car's kernel: residuals of many sets of numbers at once."""
+
+    def __init__(self, car: Car, commands: Floats, poses: Floats) -> None:
+        self._car = car.with_terms(TERMS)
+        self._commands = commands
+        inside = (poses[:, 0] >= commands[0, 0]) & (poses[:, 0] <= commands[-1, 0])
+        self._poses = poses[inside].copy()
+        self._poses[:, 3] = np.unwrap(self._poses[:, 3])
+        self.begin_s = float(commands[0, 0])
+        steps = KEPT * int((commands[-1, 0] - self.begin_s) / (KEPT * STEP_S))
+        self._edges = self.begin_s + STEP_S * np.arange(steps + 1)
+        self._kept = self._edges[::KEPT]
+        t = self._poses[:, 0]
+        which = ((t - self.begin_s) / WINDOW_S).astype(int)
+        parts = [np.flatnonzero(which == w) for w in np.unique(which)]
+        self.windows = [part for part in parts if len(part) >= FEWEST]
+        self.stds = np.array([POSITION_STD_M, POSITION_STD_M, YAW_STD_RAD])
+        self._fleets: dict[int, Fleet] = {}
+
+    def values(self, z: Floats) -> Floats:
+        """Return the numbers of the car file for numbers in units of their steps."""
+        own = [self._car.value(n.key) if n.scales else 1.0 for n in NUMBERS]
+        scaled = [n.start + n.step * each for n, each in zip(NUMBERS, z, strict=True)]
+        return np.asarray(np.array(scaled) * np.array(own))
+
+    def residuals(self, sets: Sequence[Floats]) -> list[list[Floats]]:
+        """Return the residuals of each set, window by window, in standard deviations."""
+        driven = self._drive(np.array([self.values(z) for z in sets]))
+        t = self._poses[:, 0]
+        out = []
+        for row in range(len(sets)):
+            path = np.column_stack([np.interp(t, self._kept, each[:, row]) for each in driven])
+            out.append([self._left(path[part], self._poses[part, 1:]) for part in self.windows])
+        return out
+
+    def _drive(self, values: Floats) -> list[Floats]:
+        if len(values) not in self._fleets:
+            self._fleets[len(values)] = Fleet(self._car, len(values))
+        fleet = self._fleets[len(values)]
+        at = {n.key: i for i, n in enumerate(NUMBERS)}
+        start = Pose2(*self._poses[0, 1:])
+        commands = []
+        for column, key in enumerate(DELAYS, start=1):
+            late = [self._late(column, float(each)) for each in values[:, at[key]]]
+            commands.append(np.column_stack(late))
+        for row in range(len(values)):
+            if fleet.alive[row]:
+                fleet.remove(row)
+        for row in range(len(values)):
+            fleet.add(start)
+            for key in at.keys() - set(DELAYS):
+                fleet.set_parameter(row, key, float(values[row, at[key]]))
+        done = fleet.rollout(commands[0], commands[1], STEP_S, ("x", "y", "yaw"))
+        x, y, yaw = (
+            np.vstack([np.full((1, len(values)), at_start), done[name][KEPT - 1 :: KEPT]])
+            for name, at_start in zip(("x", "y", "yaw"), start, strict=True)
+        )
+        return [x, y, np.unwrap(yaw, axis=0)]
+
+    def _late(self, column: int, delay_s: float) -> Floats:
+        """Return the mean of a command over each step, so much later, (steps,)."""
+        t, held = self._commands[:, 0], self._commands[:-1, column]
+        whole = np.concatenate([[0.0], np.cumsum(held * np.diff(t))])
+        return np.asarray(np.diff(np.interp(self._edges - delay_s, t, whole)) / STEP_S)
+
+    def _left(self, path: Floats, seen: Floats) -> Floats:
+        """Return what is left over once the path lies where it fits best, (n, 3)."""
+        middle, there = path[:, :2].mean(axis=0), seen[:, :2].mean(axis=0)
+        turn = float((seen[:, 2] - path[:, 2]).mean())
+        for _ in range(3):
+            c, s = np.cos(turn), np.sin(turn)
+            xy = (path[:, :2] - middle) @ np.array([[c, s], [-s, c]])
+            yaw = seen[:, 2] - path[:, 2] - turn
+            rest = np.column_stack([seen[:, :2] - there - xy, yaw]) / self.stds
+            lever = np.column_stack([-xy[:, 1], xy[:, 0], np.ones(len(xy))]) / self.stds
+            slip = float((lever * rest).sum() / (lever * lever).sum())
+            turn += slip
+        return np.asarray(rest - slip * lever)
+
+
+def fit(car: Car, commands: Floats, poses: Floats, eye_delay_s: float = 0.0) -> Fit:
+    """Return the numbers that a drive shows.
+
+    Args:
+        car: Whose file is to be made better.
+        commands: Time [s], throttle and steering from then on, (n, 3).
+        poses: Time [s] and pose of the rear axle [m, m, rad], (m, 4), on the same clock.
+        eye_delay_s: Of the delays found so much is the Eye's.
+
+    Raises:
+        RecordingError: when the drive is too short to say anything.
+    """
+    length_s = float(commands[-1, 0] - commands[0, 0]) if len(commands) else 0.0
+    if length_s < LEAST_S:
+        msg = f"calibration: got a drive of {length_s:.1f} s, expected at least {LEAST_S:g} s"
+        raise RecordingError(msg)
+    model = _Model(car, commands, poses)
+    if len(model.windows) <= len(NUMBERS):
+        msg = (
+            f"calibration: got poses in {len(model.windows)} windows of {WINDOW_S:g} s, "
+            f"expected more than {len(NUMBERS)}"
+        )
+        raise RecordingError(msg)
+    z = np.zeros(len(NUMBERS))
+    for _ in range(ROUNDS):
+        left, slopes = _slopes(model, z)
+        step, spread = _solve(left, slopes, z)
+        moved = _stepped(model, z, step) - z
+        z = z + moved
+        model.stds = model.stds * _rms(left)
+        if (np.abs(moved) < SETTLED * np.sqrt(spread.diagonal())).all():
+            break
+    left, slopes = _slopes(model, z)
+    _, spread = _solve(left, slopes, z)
+    return _told(model, z, spread, left, eye_delay_s)
+
+
+def _slopes(model: _Model, z: Floats) -> tuple[list[Floats], list[Floats]]:
+    """Return residuals and their derivatives, window by window, (3 n,) and (3 n, numbers)."""
+    units = np.eye(len(z))
+    driven = model.residuals([z, *(z + units), *(z - units)])
+    sides = driven[1 : len(z) + 1], driven[len(z) + 1 :]
+    slopes = [
+        np.column_stack([0.5 * (up - down).ravel() for up, down in zip(*both, strict=True)])
+        for both in zip(*(zip(*side, strict=True) for side in sides), strict=True)
+    ]
+    return driven[0], slopes
+
+
+def _solve(left: Sequence[Floats], slopes: Sequence[Floats], z: Floats) -> tuple[Floats, Floats]:
+    """Return the Gauss-Newton step, and the covariance of the numbers, in units of their steps."""
+    prior = np.eye(len(z)) / PRIOR**2
+    normal, pull = prior.copy(), prior @ z
+    clusters = np.zeros_like(prior)
+    count, total = 0, 0.0
+    for rest, slope in zip(left, slopes, strict=True):
+        r = rest.ravel()
+        weight = 1.0 / (1.0 + r * r / TAIL)
+        normal += (slope * weight[:, None]).T @ slope
+        mine = slope.T @ (weight * r)
+        pull += mine
+        clusters += np.outer(mine, mine)
+        count, total = count + len(r) - 3, total + float((weight * r * r).sum())
+    inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
+    white = inverse * max(1.0, total / (count - len(z)))
+    clustered = inverse @ clusters @ inverse * len(left) / (len(left) - len(z))
+    wider = np.sqrt(np.maximum(white.diagonal(), clustered.diagonal()) / white.diagonal())
+    return -inverse @ pull, white * np.outer(wider, wider)
+
+
+def _stepped(model: _Model, z: Floats, step: Floats) -> Floats:
+    """Return the best of several lengths of a step, none included."""
+    low = np.array([(n.low - n.start) / n.step for n in NUMBERS])
+    high = np.array([(n.high - n.start) / n.step for n in NUMBERS])
+    trials = [np.clip(z + share * step, low + 1.0, high - 1.0) for share in SHARES]
+    losses = [_loss(windows) for windows in model.residuals([z, *trials])]
+    return [z, *trials][int(np.argmin(losses))]
+
+
+def _loss(windows: Sequence[Floats]) -> float:
+    return float(sum(TAIL * np.log1p(rest * rest / TAIL).sum() for rest in windows))
+
+
+def _rms(left: Sequence[Floats]) -> Floats:
+    """Return the root mean square of what is left over, in x and y together and in yaw, (3,)."""
+    rest = np.concatenate(left)
+    weighted = rest * rest / (1.0 + rest * rest / TAIL)
+    mean = weighted.mean(axis=0)
+    position = (mean[0] + mean[1]) / 2.0
+    return np.asarray(np.sqrt(np.array([position, position, mean[2]]) / OF_NORMAL))
+
+
+def _told(
+    model: _Model, z: Floats, spread: Floats, left: Sequence[Floats], eye_delay_s: float
+) -> Fit:
+    values = model.values(z)
+    ends = [model.values(z + way * WIDE * np.sqrt(spread.diagonal())) for way in (-1.0, 1.0)]
+    found = {}
+    for n, value, low, high in zip(NUMBERS, values, *ends, strict=True):
+        off = eye_delay_s if n.key in DELAYS else 0.0
+        found[n.key] = Found(max(0.0, value - off) if off else value, low - off, high - off)
+    position, _, yaw = model.stds * _rms(left)
+    return Fit(found, float(position), float(yaw), len(left))

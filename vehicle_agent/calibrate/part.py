@@ -1,0 +1,120 @@
+"""The calibration drive as a part: poses in, guarded commands to the body, all of it recorded.
+
+hear -> move the body up to now -> pattern -> guard -> guard of the real car -> body -> record
+
+The car does not join the city: put it on a floor where nothing else drives. The pattern waits while
+a guard lets nothing through for want of a pose or because of the city-wide stop.
+"""
+
+import threading
+from collections.abc import Sequence
+
+from scm.clock import NS_PER_MS, NS_PER_S, seconds
+from scm.geometry import Pose2
+from scm.part import Hears, Serves
+from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.eye_track import EyeTrack
+from scm.v2x.messages.part_status import PartStatus
+from scm.vehicles.guard import Guard
+from vehicle_agent.body import Body
+from vehicle_agent.calibrate.pattern import Pattern
+from vehicle_agent.calibrate.recorded import Recorded
+from vehicle_agent.guard import GuardLimits, Passed, RealGuard
+
+WAITS = frozenset({"pose", "doubt", "stop", "lost"})
+
+
+class CalibrationPart:
+    """One car that drives the pattern.
+
+    Attributes:
+        recorded: What was commanded and seen.
+        done: Set when the pattern is over.
+        guard: Of the real car: why it was held up, and how often.
+    """
+
+    role = "v"
+    period_ns = 20 * NS_PER_MS
+    serves: Sequence[Serves] = ()
+
+    def __init__(
+        self, name: str, body: Body, limits: GuardLimits, done: threading.Event | None = None
+    ) -> None:
+        self.name = name
+        self.hears: Sequence[Hears] = (Hears(EyeTrack, {"vehicle": name}), Hears(CityStop))
+        self.recorded = Recorded()
+        self.done = done or threading.Event()
+        self.guard = RealGuard(limits)
+        self._body = body
+        self._commander = Guard(1)
+        self._pattern = Pattern(limits)
+        self._track: EyeTrack | None = None
+        self._seq = 0
+        self._waits = True
+        self._paused_ns = 0
+        self._now_ns: int | None = None
+        self._status_ns: int | None = None
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Hear, drive, record."""
+        for item in inbox:
+            if isinstance(item.message, EyeTrack):
+                self._see(item.message, item.t_ns)
+            elif isinstance(item.message, CityStop):
+                self._commander.stop(item.message.engaged)
+        self._body.advance(now_ns)
+        passed = self._command(now_ns)
+        self._body.command(passed.throttle, passed.steering)
+        if self._track is not None:
+            self.recorded.commanded(now_ns, passed.throttle, passed.steering)
+        return self._status(now_ns, passed)
+
+    def finish(self, now_ns: int) -> list[Outgoing]:
+        """Stop the car."""
+        self._body.command(0.0, 0.0)
+        return []
+
+    def _see(self, track: EyeTrack, now_ns: int) -> None:
+        self.guard.see(track, now_ns)
+        self._track = track
+        if not track.stale:
+            self.recorded.seen(track)
+
+    def _command(self, now_ns: int) -> Passed:
+        throttle, steering = self._wish(now_ns)
+        self._seq += 1
+        command = DriveCommand(
+            vehicle=self.name,
+            t_ns=now_ns,
+            epoch=1,
+            seq=self._seq,
+            throttle=throttle,
+            steering=steering,
+        )
+        self._commander.take(command, now_ns)
+        passed = self.guard.pass_on(self._commander.output(now_ns), now_ns)
+        self._waits = not WAITS.isdisjoint(passed.reasons)
+        return passed
+
+    def _wish(self, now_ns: int) -> tuple[float, float]:
+        since_ns = 0 if self._now_ns is None else now_ns - self._now_ns
+        self._now_ns = now_ns
+        if self._waits or self._track is None:
+            self._paused_ns += since_ns
+            return 0.0, 0.0
+        pose = Pose2(self._track.x_m, self._track.y_m, self._track.yaw_rad)
+        wish = self._pattern.step(pose, seconds(now_ns - self._paused_ns))
+        if wish is None:
+            self.done.set()
+        return wish or (0.0, 0.0)
+
+    def _status(self, now_ns: int, passed: Passed) -> list[Outgoing]:
+        if self._status_ns is not None and now_ns - self._status_ns < NS_PER_S:
+            return []
+        self._status_ns = now_ns
+        why = f" ({', '.join(passed.reasons)})" if self._waits else ""
+        doing = f"waits{why}" if self._waits else f"{100.0 * self._pattern.progress:.0f} % driven"
+        detail = f"calibrates: {doing}; held up: {self.guard.told or 'never'}"
+        return [PartStatus(station=self.name, t_ns=now_ns, detail=detail)]

@@ -1,0 +1,69 @@
+"""What a calibration drive leaves: commands and poses, as tables that every tool here reads."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.clock import seconds
+from scm.v2x.messages.eye_track import EyeTrack
+
+DESCRIPTION = """recording: 1
+vehicle: {car}
+frame: world
+tables:
+  - file: command.csv
+    time: {{column: t, unit: s}}
+    channels:
+      command.throttle: {{column: throttle}}
+      command.steering: {{column: steering}}
+  - file: pose.csv
+    time: {{column: t, unit: s}}
+    channels:
+      pose.x: {{column: x, unit: m}}
+      pose.y: {{column: y, unit: m}}
+      pose.yaw: {{column: yaw, unit: rad}}
+"""
+
+
+@dataclass(slots=True)
+class Recorded:
+    """Commands that passed the guard, (t, throttle, steering), and poses, (t, x, y, yaw)."""
+
+    command: list[tuple[float, float, float]] = field(default_factory=list)
+    pose: list[tuple[float, float, float, float]] = field(default_factory=list)
+    first_ns: int | None = None
+
+    def at(self, t_ns: int) -> float:
+        """Return a time since the first that was asked for [s]."""
+        if self.first_ns is None:
+            self.first_ns = t_ns
+        return seconds(t_ns - self.first_ns)
+
+    def commanded(self, t_ns: int, throttle: float, steering: float) -> None:
+        """Note what the actuators are told from now on."""
+        self.command.append((self.at(t_ns), throttle, steering))
+
+    def seen(self, track: EyeTrack) -> None:
+        """Note a pose, once."""
+        row = self.at(track.t_ns), track.x_m, track.y_m, track.yaw_rad
+        if not self.pose or row[0] > self.pose[-1][0]:
+            self.pose.append(row)
+
+    def arrays(self) -> tuple[Floats, Floats]:
+        """Return commands, (n, 3), and poses, (m, 4)."""
+        return np.array(self.command).reshape(-1, 3), np.array(self.pose).reshape(-1, 4)
+
+    def write(self, folder: Path, car: str) -> None:
+        """Write `recording.yaml` and its tables; the folder is made."""
+        folder.mkdir(parents=True, exist_ok=True)
+        _write(folder / "command.csv", "t,throttle,steering", self.command)
+        _write(folder / "pose.csv", "t,x,y,yaw", self.pose)
+        (folder / "recording.yaml").write_text(DESCRIPTION.format(car=car), encoding="utf-8")
+
+
+def _write(path: Path, header: str, rows: Sequence[Sequence[float]]) -> None:
+    lines = (",".join(f"{value:.6f}" for value in row) for row in rows)
+    path.write_text("\n".join([header, *lines, ""]), encoding="utf-8")
