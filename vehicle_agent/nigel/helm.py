@@ -1,8 +1,6 @@
 """The agent's end of the cable: it starts the keeper, gives it wishes, and knows what it told."""
 
 import logging
-import os
-import signal
 import socket
 import subprocess
 import sys
@@ -17,6 +15,7 @@ from vehicle_agent.nigel.keeper import LONGEST, Asked, Told
 
 RESTART_NS = NS_PER_S
 SILENCE_NS = NS_PER_S
+HANGS_NS = 2 * NS_PER_S
 LEAVE_S = 2.0
 
 _log = logging.getLogger(__name__)
@@ -57,6 +56,7 @@ class Helm:
         if self._line is None:
             return
         self._hear(now_ns)
+        self._end_hanging(now_ns)
         self._send(Asked(now_ns, wish))
         trouble = self.trouble(now_ns)
         if trouble != self._said:
@@ -75,12 +75,14 @@ class Helm:
             self._process.wait(LEAVE_S)
         except subprocess.TimeoutExpired:
             event(_log, "keeper_hangs", level=logging.ERROR, path=self._path)
-            with suppress(ProcessLookupError):
-                os.kill(self._process.pid, signal.SIGTERM)
+            self._process.kill()
+            self._process.wait()
 
     def _keep_one(self, now_ns: int) -> None:
         if self._line is not None or self._is_closed:
             return
+        if self._process is not None and self._process.poll() is None:
+            return  # it still holds the port
         if self._started_ns is not None and now_ns - self._started_ns < RESTART_NS:
             return
         self._started_ns = self._heard_ns = now_ns
@@ -106,6 +108,14 @@ class Helm:
                 event(_log, "keeper_died", level=logging.ERROR, path=self._path)
                 return
             self.told, self._heard_ns = _told.decode(data), now_ns
+
+    def _end_hanging(self, now_ns: int) -> None:
+        """Kill a keeper that does nothing: the next one resets the Arduino by opening the port."""
+        if self._process is None or now_ns - self._heard_ns <= HANGS_NS or self.told is None:
+            return
+        event(_log, "keeper_hangs", level=logging.ERROR, path=self._path)
+        self._process.kill()
+        self._hang_up()
 
     def _send(self, asked: Asked) -> None:
         if self._line is None:
