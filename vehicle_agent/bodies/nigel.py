@@ -21,7 +21,7 @@ from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.lights import Switches
 from vehicle_agent.body import Body, BodyKind, Motion, Wiring
 from vehicle_agent.nigel.helm import Helm
-from vehicle_agent.nigel.host import REST, Wish
+from vehicle_agent.nigel.host import Wish
 
 STALE_NS = 300 * NS_PER_MS
 LIFTED_M = 0.25
@@ -103,7 +103,7 @@ class NigelBody:
     def command(self, throttle: float, steering: float) -> None:
         """Pass a command on; where it is unfit, whatever is commanded, zeros."""
         if self.unfit(self._now_ns):
-            self._helm.steer(REST, self._now_ns)
+            self._helm.steer(Wish(lamps=self._lamps), self._now_ns)
             self._wanted = 0.0
             return
         self._wanted = steering * self.limits.steer_limit
