@@ -1,0 +1,131 @@
+"""`vehicle-agent emulate`: the published Nigel firmware behind a pseudo-terminal."""
+
+import argparse
+import gc
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scm.clock import NS_PER_MS
+from scm.command import Command, credentials_argument, credentials_of
+
+if TYPE_CHECKING:
+    from threading import Event
+
+    from scm.clock import Clock
+    from vehicle_agent.emulate.device import Device
+    from vehicle_agent.emulate.sketches import Sketch
+
+DEADBAND = 0.2
+EVERY_NS = 5 * NS_PER_MS
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--link", type=Path, default=Path("/tmp/nigel"), metavar="PATH",
+        help="path for hosts, as /dev/ttyUSB0 would be (%(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--baud-of", choices=["2wd", "4wd"], default="2wd",
+        help="whose firmware: 2wd at 57600 baud, 4wd at 115200 (%(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--connect", metavar="ENDPOINT", help="a city's router: its emulated camera sees the car"
+    )
+    parser.add_argument("--name", help="of the vehicle in the city: a-z 0-9 _ -")
+    credentials_argument(parser)
+    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument("--car", default="nigel", help="car file (%(default)s)")
+    parser.add_argument("--spawn", default="", help="place to start at; default: the map's first")
+    parser.add_argument(
+        "--tag", type=int, metavar="ID", help="on its roof; default: as the city gives it"
+    )
+    parser.add_argument(
+        "--deadband", type=float, default=DEADBAND,
+        help="share of the throttle that does not turn the motor (%(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--faults", nargs="+", default=[], metavar="FAULT",
+        help="what goes wrong: noise=HZ flip=P lose=P cut=P, reset=HZ or reset@T, brownout, unplug",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, help="of the faults (%(default)s)")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.clock import WallClock
+    from scm.errors import RunError
+    from scm.live import stop_on_signal
+    from vehicle_agent.emulate.sketches import SKETCHES
+
+    if (arguments.connect is None) != (arguments.name is None):
+        raise RunError("--connect and --name: expected both or none of them")
+    if not 0.0 <= arguments.deadband < 1.0:
+        raise RunError(f"--deadband: got {arguments.deadband}, expected 0 to 1")
+    clock, sketch, stop = WallClock(), SKETCHES[arguments.baud_of], stop_on_signal()
+    device = _device(arguments, sketch, clock)
+    print(
+        f"an emulated Nigel ({arguments.baud_of}, {sketch.baud} baud) at {arguments.link}",
+        flush=True,
+    )
+    try:
+        if arguments.connect is None:
+            _serve(device, clock, stop)
+        else:
+            _join(arguments, device, sketch, clock, stop)
+    finally:
+        device.close()
+    return 0
+
+
+def _device(arguments: argparse.Namespace, sketch: "Sketch", clock: "Clock") -> "Device":
+    from vehicle_agent.emulate.device import Device
+    from vehicle_agent.emulate.faults import Spoiler, read_faults
+    from vehicle_agent.emulate.firmware import Firmware
+    from vehicle_agent.emulate.pty import Cable
+
+    now_ns = clock.now_ns()
+    spoiler = Spoiler(read_faults(arguments.faults), arguments.seed, now_ns)
+    return Device(Firmware(sketch, now_ns), Cable(arguments.link), spoiler)
+
+
+def _serve(device: "Device", clock: "Clock", stop: "Event") -> None:
+    """Run without a city, and say whenever the pins change."""
+    told = None
+    while not clock.wait_until(clock.now_ns() + EVERY_NS, stop):
+        device.step(clock.now_ns())
+        pins = device.firmware.outputs
+        if pins != told:
+            told = pins
+            angles = " ".join(f"{angle:.1f}" for angle in pins.servos_deg) or "none"
+            print(f"servo {angles}  DIR {pins.reverse}  BRK {pins.brake}  PWM {pins.pwm}",
+                  flush=True)  # fmt: skip
+
+
+def _join(
+    arguments: argparse.Namespace, device: "Device", sketch: "Sketch", clock: "Clock", stop: "Event"
+) -> None:
+    from scm.live import run
+    from scm.v2x.bus_zenoh import ZenohBus
+    from scm.v2x.key import check_name
+    from vehicle_agent.emulate.part import EmulatorPart, station_of
+    from vehicle_agent.emulate.wheels import Wheels
+
+    station = check_name(station_of(check_name(arguments.name, "--name")), "--name")
+    check_name(arguments.city, "--city")
+    credentials = credentials_of(arguments, station)
+    wheels = Wheels(sketch.at_setup, arguments.car, arguments.deadband)
+    part = EmulatorPart(
+        arguments.name, device, wheels, arguments.spawn, arguments.car, arguments.tag
+    )
+    with ZenohBus(
+        arguments.city, station, arguments.connect, clock=clock, credentials=credentials
+    ) as bus:
+        run(part, bus, clock, stop)
+    gc.freeze()  # taking the compiler's objects apart one by one would take a quarter of a second
+
+
+COMMAND = Command(
+    help="be a Nigel's Arduino on a pseudo-terminal, and the car that it moves",
+    example="vehicle-agent emulate --link /tmp/nigel --connect tcp/127.0.0.1:7447 --name n7",
+    arguments=_arguments,
+    run=_run,
+)

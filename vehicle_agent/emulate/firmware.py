@@ -1,0 +1,98 @@
+"""The device: the published firmware on its Arduino, byte for byte and millisecond for millisecond.
+
+No thread, no clock, no port: bytes and the present time in, bytes and the states of the pins out.
+
+    no power, or in the bootloader (2 s after each reset): pins at rest, deaf
+    -- boots -->  servo straight, motor neither driven nor braked
+    -- a message -->  as it says, until the next one, for ever
+"""
+
+from scm.clock import NS_PER_MS, NS_PER_S
+from vehicle_agent.emulate.node_handle import NodeHandle
+from vehicle_agent.emulate.sketches import Outputs, Sketch
+from vehicle_agent.emulate.uart import Uart
+
+BOOT_NS = 2 * NS_PER_S
+"""For which the bootloader waits for a new sketch."""
+LOOP_NS = NS_PER_MS
+"""The sketch's `delay(1)`; what it does between takes some ten microseconds."""
+
+
+class Firmware:
+    """One board with one sketch, switched on at `now_ns`.
+
+    Attributes:
+        outputs: The pins now.
+        resets: How often it began anew since it was switched on.
+    """
+
+    def __init__(self, sketch: Sketch, now_ns: int = 0) -> None:
+        self.sketch = sketch
+        self.resets = -1
+        self._uart = Uart(sketch.baud)
+        self.reset(now_ns)
+
+    @property
+    def configured(self) -> bool:
+        """Whether the device believes that a host is there; it obeys either way."""
+        return self._node.configured
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the sketch runs, and not the bootloader."""
+        return self._runs
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether it runs no code of its own any more, until the next reset; pins stay."""
+        return self._node.lost_itself
+
+    @property
+    def lost_bytes(self) -> int:
+        """How many bytes it had no room for."""
+        return self._uart.lost
+
+    def backlog_ns(self, now_ns: int) -> int:
+        """Return for how long the line is taken by what the host sent already."""
+        return self._uart.backlog_ns(now_ns)
+
+    def reset(self, now_ns: int) -> None:
+        """Begin anew: when a host opens the port (DTR), when the power comes back."""
+        self.resets += 1
+        self.outputs = Outputs()
+        self._runs = False
+        self._booted_ns = self._next_ns = now_ns + BOOT_NS
+        self._uart.clear(now_ns)
+        self._node = NodeHandle(
+            self.sketch.topics, self.sketch.buffer, self._on_message, self._write
+        )
+
+    def step(self, now_ns: int, data: bytes = b"") -> bytes:
+        """Bring the device up to now; return what has come out of it since the last time.
+
+        Args:
+            now_ns: The present time [ns].
+            data: What the host sends from now on, at the line's pace.
+        """
+        while self._next_ns <= now_ns:
+            self._loop()
+        self._uart.arrive(now_ns, deaf=not self._runs)
+        self._uart.put(data, now_ns)
+        return self._uart.sent(now_ns)
+
+    def _loop(self) -> None:
+        t_ns = self._next_ns
+        self._uart.arrive(t_ns, deaf=not self._runs)
+        if not self._runs:
+            self._runs, self.outputs = True, self.sketch.at_setup
+        self._free_ns = t_ns
+        if not self.is_lost:
+            self._node.spin((t_ns - self._booted_ns) // NS_PER_MS, self._uart.read)
+        self._next_ns = self._free_ns + LOOP_NS
+
+    def _write(self, data: bytes) -> None:
+        self._free_ns = self._uart.write(data, self._free_ns)
+
+    def _on_message(self, place: int, data: float) -> None:
+        respond = (self.sketch.steer, self.sketch.drive)[place]
+        self.outputs = respond(self.outputs, data)

@@ -1,0 +1,109 @@
+"""The cable: a pseudo-terminal behind a path that stays the same, as `/dev/ttyUSB0` would."""
+
+import errno
+import os
+import re
+import select
+import termios
+import tty
+from pathlib import Path
+
+from scm.errors import LinkError
+
+AT_ONCE = 4096
+_BAUD = {
+    getattr(termios, name): int(name[1:])
+    for name in dir(termios)
+    if re.fullmatch(r"B[1-9]\d*", name)
+}
+
+
+class Cable:
+    """A pseudo-terminal and the link to it.
+
+    The far end is only open while a host has it open, so that one sees it come and go.
+
+    Args:
+        link: Path for hosts. A link that is left over there is replaced.
+
+    Raises:
+        LinkError: when the path is taken by something else, or cannot be written.
+    """
+
+    def __init__(self, link: Path) -> None:
+        if link.exists() and not link.is_symlink():
+            msg = f"--link {link}: got a file that is there already, expected a free path or a link"
+            raise LinkError(msg)
+        self.link = link
+        self._master: int | None = None
+        self._poll = select.poll()
+        self.target = ""
+        self.plug()
+
+    @property
+    def is_plugged(self) -> bool:
+        """Whether the path leads anywhere."""
+        return self._master is not None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a host has it open now."""
+        return self._master is not None and not any(
+            event & select.POLLHUP for _, event in self._poll.poll(0)
+        )
+
+    @property
+    def baud(self) -> int | None:
+        """The speed that the host has set; None: none that termios has a name for."""
+        if self._master is None:
+            return None
+        return _BAUD.get(termios.tcgetattr(self._master)[5])
+
+    def plug(self) -> None:
+        """Make a new pseudo-terminal, and let the path lead to it."""
+        if self._master is not None:
+            return
+        self._master, far = os.openpty()
+        tty.setraw(far)
+        self.target = os.ttyname(far)
+        os.close(far)
+        os.set_blocking(self._master, False)
+        self._poll.register(self._master, select.POLLIN)
+        try:
+            self.link.unlink(missing_ok=True)
+            self.link.symlink_to(self.target)
+        except OSError as cause:
+            self.pull()
+            msg = f"--link {self.link}: {cause.strerror}"
+            raise LinkError(msg) from cause
+
+    def pull(self) -> None:
+        """Take it away: a host that has it open gets an error, and the path is gone."""
+        if self._master is None:
+            return
+        if self.link.is_symlink() and str(self.link.readlink()) == self.target:
+            self.link.unlink()
+        self._poll.unregister(self._master)
+        os.close(self._master)
+        self._master = None
+
+    def read(self, most: int = AT_ONCE) -> bytes:
+        """Return what the host has sent, if anything."""
+        if self._master is None or most <= 0:
+            return b""
+        try:
+            return os.read(self._master, most)
+        except OSError as none:
+            if none.errno in (errno.EIO, errno.EAGAIN):
+                return b""
+            raise
+
+    def write(self, data: bytes) -> None:
+        """Send to the host; what it has not read for too long is lost."""
+        if self._master is None or not data:
+            return
+        try:
+            os.write(self._master, data)
+        except OSError as full:
+            if full.errno not in (errno.EIO, errno.EAGAIN):
+                raise

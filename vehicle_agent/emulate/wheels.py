@@ -1,0 +1,80 @@
+"""From the pins to the floor: what servo and motor make of the pins, and the kernel of that.
+
+    throttle = duty - clip(duty, 0, deadband), with the sign of DIR; 0 with BRK
+    steering = mean road-wheel angle / greatest one
+
+The dead-band's law is that of the effect `drive_deadband`. Nothing turns the 120:1 gears from
+outside, so a motor that is off holds the car with and without BRK, as the paper says.
+"""
+
+import math
+
+from scm.geometry import Pose2
+from scm.maps.model import CityMap
+from vehicle_agent.bodies.simulated import SimulatedBody
+from vehicle_agent.body import Motion
+from vehicle_agent.emulate.sketches import Outputs
+
+DEADBAND = 0.2
+"""Of the real Nigel, about: its authors add so much to the throttle."""
+
+
+def throttle_of(pins: Outputs, deadband: float) -> float:
+    """Return what is left of the motor's command, -1 to 1, + forward."""
+    if pins.brake:
+        return 0.0
+    live = pins.duty - min(pins.duty, deadband)
+    return -live if pins.reverse else live
+
+
+def wheel_angle(pins: Outputs, straight: Outputs) -> float | None:
+    """Return the mean road-wheel angle [rad], + = left; None: the servos get no pulses.
+
+    Args:
+        pins: Now.
+        straight: With the wheels straight ahead.
+    """
+    turned = [a - b for a, b in zip(pins.servos_deg, straight.servos_deg, strict=False)]
+    if not turned:
+        return None
+    if len(turned) == 1:
+        return math.radians(turned[0])
+    left, right = (-math.radians(angle) for angle in turned)  # mounted the other way up
+    if abs(math.sin(left) * math.sin(right)) < 1e-9:
+        return (left + right) / 2.0
+    return math.atan(2.0 / (1.0 / math.tan(left) + 1.0 / math.tan(right)))
+
+
+class Wheels:
+    """A simulated car under the pins of a board.
+
+    Args:
+        straight: The pins with its wheels straight ahead.
+        car: Car file's name.
+        deadband: Duty below which the motor does not turn.
+    """
+
+    def __init__(self, straight: Outputs, car: str = "nigel", deadband: float = DEADBAND) -> None:
+        self._straight, self._deadband = straight, deadband
+        self._body = SimulatedBody(car, 0)
+        self._steering = 0.0
+
+    def learn(self, city_map: CityMap, seed: int) -> None:
+        """Know the city's floor and air."""
+        self._body.learn(city_map, seed)
+
+    def place(self, pose: Pose2, now_ns: int) -> None:
+        """Be put down somewhere, at rest."""
+        self._body.place(pose, now_ns)
+
+    def advance(self, pins: Outputs, now_ns: int) -> None:
+        """Move as the pins were until now; a servo without pulses stays where it is."""
+        angle = wheel_angle(pins, self._straight)
+        if angle is not None:
+            self._steering = max(-1.0, min(1.0, angle / self._body.limits.steer_limit))
+        self._body.command(throttle_of(pins, self._deadband), self._steering)
+        self._body.advance(now_ns)
+
+    def motion(self) -> Motion:
+        """Return how the car truly moves now."""
+        return self._body.motion()
