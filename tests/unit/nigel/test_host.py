@@ -23,6 +23,7 @@ from tests.unit.nigel.fake_device import (
 from tests.unit.nigel.fuzzed_line import RECOVERY_NS, fuzz
 from vehicle_agent.nigel.host import BOOT_NS, COMMAND_EVERY_NS, REST, Host, Wish
 from vehicle_agent.nigel.rosserial import (
+    PUBLISHER_INFO,
     REQUEST_TOPICS,
     STOP_SENDING,
     TIME,
@@ -31,6 +32,7 @@ from vehicle_agent.nigel.rosserial import (
     TopicInfo,
     pack,
     pack_float,
+    pack_topic_info,
 )
 
 TURN_NS = 5 * NS_PER_MS
@@ -118,6 +120,16 @@ def test_two_topics_never_share_a_number():
     line.run(4.0, Wish(1.0, 1.0))
     assert "number 100 is taken" in line.host.trouble
     assert {frame.topic for frame in line.device.said} <= {0, 10, 11}
+
+
+def test_what_the_device_publishes_under_a_commands_name_is_no_command():
+    line = Line()
+    line.run(2.2)
+    info = pack_topic_info(TopicInfo(125, "drive_cmd", DRIVE.kind, DRIVE.md5, 280))
+    published = pack(Frame(PUBLISHER_INFO, info))
+    line.host.hear((announced(STEER) + published) * 2, line.now_ns)
+    line.run(0.1)
+    assert line.host.phase == "asks"
 
 
 def test_a_topic_of_another_type_is_refused_in_words():
