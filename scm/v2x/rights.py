@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 from scm.errors import AccessError, nearest
 
-Role = Literal["vehicle", "part", "viewer", "operator", "driver", "camera"]
+Role = Literal["vehicle", "part", "viewer", "operator", "driver", "camera", "emulator"]
 ROLES: tuple[str, ...] = get_args(Role)
 
 
@@ -102,6 +102,8 @@ _OF_ROLE: dict[str, Rights] = {
     "operator": _WATCHES + Rights(asks=EVERY_REQUEST),
     "driver": _WATCHES + Rights(says=("v/*/cmd/drive",), asks=EVERY_REQUEST),
     "camera": Rights(says=("eye/{me}/@picture",)),
+    # Of no vehicle's name: the car that it emulates is another station, and knows less.
+    "emulator": Rights(says=("v/*/emulated",), hears=("world/def",)),
 }
 
 _OF_PART: dict[str, Rights] = {
@@ -136,7 +138,7 @@ _OF_PART: dict[str, Rights] = {
     "monitor": Rights(says=("tl/*/mon",), hears=("tl/*/spat",), serves=("tl/*/mon/reset",)),
     "eye": Rights(
         says=("eye/*/*", "eye/*/pose/*", "eye/pose/*", "eye/*/@preview", "v2x/tx/*/cpm"),
-        hears=("world/snapshot", "eye/*/pose/*", "eye/*/@picture"),
+        hears=("world/snapshot", "v/*/emulated", "eye/*/pose/*", "eye/*/@picture"),
     ),
     "camera": Rights(says=("v/*/@camera/*",), hears=("world/snapshot", "world/def", "tl/*/spat")),
     "record": _WATCHES,

@@ -31,7 +31,7 @@ class Device:
     def __init__(self, firmware: Firmware, cable: Cable, spoiler: Spoiler) -> None:
         self.firmware, self._cable, self._spoiler = firmware, cable, spoiler
         self._was_open = False
-        self._told_baud: int | None = None
+        self._told_baud = 0
         self._plug_ns: int | None = None
 
     def step(self, now_ns: int) -> None:
@@ -58,7 +58,7 @@ class Device:
         is_open = self._cable.is_open
         if is_open != self._was_open:
             event(_log, "host_opens_resets" if is_open else "host_closes", link=self._cable.link)
-            self._told_baud = None
+            self._told_baud = 0
             if is_open:
                 self.firmware.reset(now_ns)
         self._was_open = is_open
@@ -74,10 +74,10 @@ class Device:
         if theirs not in (ours, self._told_baud):
             event(_log, "wrong_baud", level=logging.WARNING, got=theirs, expected=ours)
             self._told_baud = theirs
-        return heard(data, theirs or 1, ours)
+        return heard(data, theirs, ours)
 
     def _to_host(self, data: bytes) -> bytes:
-        return heard(data, self.firmware.sketch.baud, self._cable.baud or 1)
+        return heard(data, self.firmware.sketch.baud, self._cable.baud)
 
     def _suffer(self, one: Event, now_ns: int) -> None:
         event(_log, f"fault_{one.kind}", level=logging.WARNING)

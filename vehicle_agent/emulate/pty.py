@@ -1,21 +1,19 @@
 """The cable: a pseudo-terminal behind a path that stays the same, as `/dev/ttyUSB0` would."""
 
 import errno
+import fcntl
 import os
-import re
 import select
-import termios
+import struct
 import tty
 from pathlib import Path
 
 from scm.errors import LinkError
 
 AT_ONCE = 4096
-_BAUD = {
-    getattr(termios, name): int(name[1:])
-    for name in dir(termios)
-    if re.fullmatch(r"B[1-9]\d*", name)
-}
+TCGETS2 = 0x802C542A
+TERMIOS2 = struct.Struct("=4IB19s2I")
+"""Linux's ioctl that tells speeds which have no name in termios, and what it fills in."""
 
 
 class Cable:
@@ -53,11 +51,13 @@ class Cable:
         )
 
     @property
-    def baud(self) -> int | None:
-        """The speed that the host has set; None: none that termios has a name for."""
+    def baud(self) -> int:
+        """The speed that the host has set."""
         if self._master is None:
-            return None
-        return _BAUD.get(termios.tcgetattr(self._master)[5])
+            return 0
+        filled = fcntl.ioctl(self._master, TCGETS2, bytes(TERMIOS2.size))
+        speed: int = TERMIOS2.unpack(filled)[-1]
+        return speed
 
     def plug(self) -> None:
         """Make a new pseudo-terminal, and let the path lead to it."""

@@ -1,5 +1,7 @@
 """The emulated overhead camera: renders what a real one would see of a snapshot of the world.
 
+Emulated real cars it sees where they truly are, see `scm.eye.emulated`.
+
 Cars have height, so they shift outwards as in a real picture; tags go through the true lens; edges
 are averaged over each pixel's area; the sensor adds Gaussian noise. The noise is cut at a random
 place from a sheet that is drawn once: fresh noise would cost more than the whole picture.
@@ -13,11 +15,15 @@ import numpy as np
 from scm.arrays import Image
 from scm.clock import NS_PER_S
 from scm.eye.camera import CameraModel
+from scm.eye.emulated import EmulatedCars
 from scm.eye.render.car import draw_car
 from scm.eye.render.floor import draw_box, draw_scenery
 from scm.eye.source import Frame
 from scm.geometry import Pose2
 from scm.maps.model import CityMap
+from scm.part import Hears
+from scm.v2x.exchange import Incoming
+from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 NOISE_SHEETS = 2
@@ -30,9 +36,11 @@ class SyntheticSource:
 
     Attributes:
         trouble: None: nothing can go wrong.
+        hears: What tells it where emulated cars are.
     """
 
     trouble: str | None = None
+    hears = (Hears(EmulatedPose),)
 
     def __init__(self, city_map: CityMap, model: CameraModel, rng: np.random.Generator) -> None:
         self._model = model
@@ -42,6 +50,12 @@ class SyntheticSource:
         self._frame: Image = self._scenery.picture.copy()
         self._brighter, self._darker = self._noise()
         self._taken_ns: int | None = None
+        self._emulated = EmulatedCars()
+
+    def hear(self, item: Incoming) -> None:
+        """Remember where an emulated car is."""
+        if isinstance(item.message, EmulatedPose):
+            self._emulated.hear(item.message)
 
     def take(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
         """Return the picture at the snapshot's time, None if the camera took one just before."""
@@ -49,7 +63,7 @@ class SyntheticSource:
         if light is None or not self._is_due(light.t_ns):
             return None
         self._taken_ns = light.t_ns
-        return Frame(light.t_ns, self.render(light))
+        return Frame(light.t_ns, self.render(self._emulated.seen(light)))
 
     def _is_due(self, t_ns: int) -> bool:
         """Say whether a camera of this rate takes a picture now; snapshots come as they like."""

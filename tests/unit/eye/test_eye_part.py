@@ -13,6 +13,7 @@ from scm.maps.load import load_map
 from scm.v2x.exchange import Incoming
 from scm.v2x.key import key_of
 from scm.v2x.messages.cpm_tx import CpmTx
+from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_preview import EyePreview
@@ -47,11 +48,11 @@ def eye():
     return EyePart(CITY, seed=3)
 
 
-def test_it_steps_often_enough_for_tracks_and_hears_the_snapshot(eye):
+def test_it_steps_often_enough_for_tracks_and_hears_the_snapshot_and_emulated_cars(eye):
     assert eye.period_ns == PERIOD_NS // 2
     fast = msgspec.structs.replace(CITY.cameras[0], rate_hz=40.0)
     assert EyePart(msgspec.structs.replace(CITY, cameras=(fast,))).period_ns == PERIOD_NS // 4
-    assert [hears.kind for hears in eye.hears] == [WorldSnapshot]
+    assert [hears.kind for hears in eye.hears] == [WorldSnapshot, EmulatedPose]
 
 
 def test_a_step_without_a_snapshot_is_silent():
