@@ -26,6 +26,8 @@ from vehicle_agent.nigel.host import Wish
 STALE_NS = 300 * NS_PER_MS
 LIFTED_M = 0.25
 """Farther from where it must be, a car was carried by hand: the Eye is right within 3 cm."""
+SMOOTH_S = 0.15
+"""Over so long the differences of the Eye's speeds are averaged: one is 5 mm/s unsure."""
 DEADBAND = "drive.deadband"
 LEVEL_MPS2 = 9.80665
 """Upwards on a level floor: the firmware tells only what lies in the plane."""
@@ -53,7 +55,7 @@ class NigelBody:
         self._heard_ns = self._now_ns = 0
         self._was_lifted = False
         self._lamps = 0
-        self._wheels = self._wanted = 0.0
+        self._wheels = self._wanted = self._accel = 0.0
         self._readings = 0
 
     def learn(self, city_map: CityMap, seed: int) -> None:
@@ -75,6 +77,7 @@ class NigelBody:
             old = self._pose(now_ns)
             away = math.hypot(track.x_m - old.x, track.y_m - old.y)
             self._was_lifted |= self._track is None or away > LIFTED_M
+        self._accel = 0.0 if track.stale else self._gained(track)
         self._track, self._heard_ns = track, now_ns
 
     def was_lifted(self) -> bool:
@@ -120,15 +123,14 @@ class NigelBody:
 
     def motion(self) -> Motion:
         """Return where the Eye saw it, carried forward to now."""
-        track, told = self._track, self._helm.told
-        reading = None if told is None else told.telemetry
+        track = self._track
         is_seen = track is not None and not track.stale
         return Motion(
             pose=self._pose(self._now_ns),
             speed=track.speed_mps if track is not None and is_seen else 0.0,
             lateral_speed=track.lateral_speed_mps if track is not None and is_seen else 0.0,
             yaw_rate=track.yaw_rate_radps if track is not None and is_seen else 0.0,
-            accel=reading.accel_mps2[0] if reading is not None and reading.has_imu else 0.0,
+            accel=self._accel,
             steering=self._wheels,
             source="eye",
         )
@@ -170,6 +172,14 @@ class NigelBody:
         c, s = math.cos(half) * dt, math.sin(half) * dt
         vx, vy = track.speed_mps, track.lateral_speed_mps
         return seen @ Pose2(c * vx - s * vy, s * vx + c * vy, 2.0 * half)
+
+    def _gained(self, track: EyeTrack) -> float:
+        """Return the acceleration of the last tracks' speeds, smoothed [m/s^2]."""
+        if self._track is None or self._track.stale:
+            return 0.0
+        dt = seconds(track.t_ns - self._track.t_ns)
+        gained = (track.speed_mps - self._track.speed_mps) / dt
+        return self._accel + (gained - self._accel) * dt / (dt + SMOOTH_S)
 
     def _undone(self, throttle: float) -> float:
         """Return the throttle that leaves `throttle` beyond the dead-band."""

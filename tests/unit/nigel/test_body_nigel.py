@@ -153,6 +153,15 @@ def test_without_a_calibration_nothing_is_added():
     assert newest(body).throttle == 0.1
 
 
+def test_it_tells_its_acceleration_from_its_speeds(body):
+    for step in range(1, 41):
+        seen = track(BEGIN_NS + 50 * step * NS_PER_MS, speed_mps=0.01 * step)
+        body.see(seen, seen.t_ns)
+    assert body.motion().accel == pytest.approx(0.2, rel=0.01)
+    body.see(msgspec.structs.replace(seen, t_ns=seen.t_ns + 1, stale=True), seen.t_ns)
+    assert body.motion().accel == 0.0
+
+
 def test_wheels_turn_as_fast_as_the_servo(body):
     body.command(0.1, 1.0)
     body.advance(BEGIN_NS + 100 * NS_PER_MS)
@@ -268,7 +277,7 @@ def test_zeros_when_the_city_forgets_the_car(desk):
 
 def test_a_car_put_beside_the_lanes_stands_until_it_is_put_on_one(desk):
     desk.see_for(2.0)
-    desk.at = Pose2(1.384, 0.655 + 0.72, 0.0)
+    desk.at = Pose2(1.384 + 0.728, 0.655, 0.0)
     assert desk.see_for(1.0).throttle == 0.0
     assert desk.part._stay.astray
     desk.at = desk.spawn
@@ -283,4 +292,5 @@ def test_its_fence_stops_it(desk, monkeypatch):
     fenced.step(WorldDefinition(t_ns=1, seed=0, map=desk.map))
     fenced.step(replies=[(fenced.asked[0], welcome(fenced.spawn))])
     assert fenced.see_for(2.0).throttle == 0.0
+    assert fenced.state.mode == "stop"
     assert "fence" in fenced.status.detail
