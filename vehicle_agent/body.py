@@ -101,12 +101,14 @@ class Wiring:
     Attributes:
         port: Path of its serial port.
         baud: Of this.
+        calibration: Path of this very car's file; empty: it is as its kind.
         throttle: Most throttle either way, 0 to 1, beyond the dead-band.
         fence: Corners it stays within, counter-clockwise, map frame [m]; empty: the whole floor.
     """
 
     port: str = ""
     baud: int = 57600
+    calibration: str = ""
     throttle: float = 1.0
     fence: tuple[tuple[float, float], ...] = ()
 

@@ -1,8 +1,8 @@
 """A real Nigel: moved over a serial cable, its motion told by the overhead cameras.
 
 The published firmware tells nothing of the car, so all that is known of its motion comes from the
-Eye, carried forward to now on the arc of its speed and yaw rate. What the wheels need beyond what
-is wished, the dead-band of the real gear, is the car file's: `drive.deadband`, of a calibration.
+Eye, carried forward to now on the arc of its speed and yaw rate. What this one car needs to be told
+for what is wished, its dead-band, gains and trim, are numbers of its calibration: `nigel/undo.py`.
 """
 
 import logging
@@ -22,13 +22,13 @@ from scm.vehicles.lights import Switches
 from vehicle_agent.body import Body, BodyKind, Motion, Wiring
 from vehicle_agent.nigel.helm import Helm
 from vehicle_agent.nigel.host import Wish
+from vehicle_agent.nigel.undo import DEADBAND, undo_of
 
 STALE_NS = 300 * NS_PER_MS
 LIFTED_M = 0.25
 """Farther from where it must be, a car was carried by hand: the Eye is right within 3 cm."""
 SMOOTH_S = 0.15
 """Over so long the differences of the Eye's speeds are averaged: one is 5 mm/s unsure."""
-DEADBAND = "drive.deadband"
 LEVEL_MPS2 = 9.80665
 """Upwards on a level floor: the firmware tells only what lies in the plane."""
 
@@ -39,15 +39,15 @@ class NigelBody:
     """One car on a cable.
 
     Args:
-        car: Its file.
+        car: Its file, calibrated.
         helm: What gives wishes to the cable's keeper.
     """
 
     def __init__(self, car: Car, helm: Helm) -> None:
         self.limits = limits_of(car)
         self.wants_eye = True
-        self._deadband = car.value(DEADBAND) if car.has(DEADBAND) else 0.0
-        if not self._deadband:
+        self._undo = undo_of(car, self.limits.steer_limit)
+        if not self._undo.deadband:
             event(_log, "no_deadband", level=logging.WARNING, car=car.name, key=DEADBAND)
         self._helm = helm
         self._start = Pose2(0.0, 0.0, 0.0)
@@ -110,7 +110,8 @@ class NigelBody:
             self._wanted = 0.0
             return
         self._wanted = steering * self.limits.steer_limit
-        self._helm.steer(Wish(self._undone(throttle), steering, self._lamps), self._now_ns)
+        told = Wish(self._undo.throttle(throttle), self._undo.steering(steering), self._lamps)
+        self._helm.steer(told, self._now_ns)
 
     def show(self, switches: Switches) -> None:
         """Switch the lamps; the firmware does the flashing."""
@@ -181,19 +182,13 @@ class NigelBody:
         gained = (track.speed_mps - self._track.speed_mps) / dt
         return self._accel + (gained - self._accel) * dt / (dt + SMOOTH_S)
 
-    def _undone(self, throttle: float) -> float:
-        """Return the throttle that leaves `throttle` beyond the dead-band."""
-        if throttle == 0.0:
-            return 0.0
-        return throttle + math.copysign(self._deadband, throttle)
-
 
 def _open(car: str, seed: int, wiring: Wiring) -> Body:
     del seed
     if not wiring.port:
         msg = "body nigel: no serial port given; expected a path such as /dev/ttyUSB0"
         raise RunError(msg)
-    return NigelBody(load_car(car), Helm(wiring.port, wiring.baud))
+    return NigelBody(load_car(wiring.calibration or car), Helm(wiring.port, wiring.baud))
 
 
 BODY = BodyKind(kind="real", open=_open)

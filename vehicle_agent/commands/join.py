@@ -21,6 +21,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--baud", type=int, default=57600, help="of the port; a 4WD Nigel's Mega: 115200"
     )
     real.add_argument(
+        "--calibration",
+        default="",
+        metavar="FILE",
+        help="this very car's file: dead-band, gains, trim",
+    )
+    real.add_argument(
         "--throttle-limit",
         type=float,
         default=1.0,
@@ -63,6 +69,7 @@ def _run(arguments: argparse.Namespace) -> int:
             Wiring(
                 port=arguments.serial,
                 baud=arguments.baud,
+                calibration=arguments.calibration,
                 throttle=arguments.throttle_limit,
                 fence=rectangle(*arguments.fence) if arguments.fence else (),
             ),

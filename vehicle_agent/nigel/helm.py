@@ -16,6 +16,8 @@ from vehicle_agent.nigel.keeper import LONGEST, Asked, Told
 RESTART_NS = NS_PER_S
 SILENCE_NS = NS_PER_S
 HANGS_NS = 2 * NS_PER_S
+UNHEARD = 10
+"""Turns without a word before it counts as silence: who stalled himself has not listened."""
 LEAVE_S = 2.0
 
 _log = logging.getLogger(__name__)
@@ -35,7 +37,7 @@ class Helm:
         self._line: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._started_ns: int | None = None
-        self._heard_ns = 0
+        self._heard_ns = self._unheard = 0
         self._said = ""
         self._is_closed = False
         self.told: Told | None = None
@@ -46,7 +48,7 @@ class Helm:
             return "nobody keeps the cable"
         if self.told is None:
             return "the keeper of the cable starts"
-        if now_ns - self._heard_ns > SILENCE_NS:
+        if self._is_silent(now_ns, SILENCE_NS):
             return "the keeper of the cable is silent"
         return self.told.trouble
 
@@ -86,7 +88,7 @@ class Helm:
         if self._started_ns is not None and now_ns - self._started_ns < RESTART_NS:
             return
         self._started_ns = self._heard_ns = now_ns
-        self.told = None
+        self._unheard, self.told = 0, None
         ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with its:
             self._process = subprocess.Popen(  # its own session: who kills the agent's spares it
@@ -95,7 +97,11 @@ class Helm:
         ours.setblocking(False)
         self._line = ours
 
+    def _is_silent(self, now_ns: int, span_ns: int) -> bool:
+        return self._unheard >= UNHEARD and now_ns - self._heard_ns > span_ns
+
     def _hear(self, now_ns: int) -> None:
+        self._unheard += 1
         while self._line is not None:
             try:
                 data = self._line.recv(LONGEST)
@@ -107,11 +113,11 @@ class Helm:
                 self._hang_up()
                 event(_log, "keeper_died", level=logging.ERROR, path=self._path)
                 return
-            self.told, self._heard_ns = _told.decode(data), now_ns
+            self.told, self._heard_ns, self._unheard = _told.decode(data), now_ns, 0
 
     def _end_hanging(self, now_ns: int) -> None:
         """Kill a keeper that does nothing: the next one resets the Arduino by opening the port."""
-        if self._process is None or now_ns - self._heard_ns <= HANGS_NS or self.told is None:
+        if self._process is None or self.told is None or not self._is_silent(now_ns, HANGS_NS):
             return
         event(_log, "keeper_hangs", level=logging.ERROR, path=self._path)
         self._process.kill()

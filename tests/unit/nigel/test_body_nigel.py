@@ -52,15 +52,16 @@ def track(t_ns=BEGIN_NS, x=1.0, y=0.5, yaw=0.0, **more):
                     stale=False, **{**known, **more})  # fmt: skip
 
 
-def calibrated(deadband):
+def calibrated(**numbers):
     car = load_car("nigel")
-    number = Quantity(deadband, 0.01, "1", "calibration")
-    return replace(car, values={**car.values, "drive.deadband": number})
+    given = {key.replace("_", ".", 1): Quantity(value, None, "1", "calibration")
+             for key, value in numbers.items()}  # fmt: skip
+    return replace(car, values={**car.values, **given})
 
 
 @pytest.fixture
 def body():
-    made = NigelBody(calibrated(0.2), FakeHelm())
+    made = NigelBody(calibrated(drive_deadband=0.2), FakeHelm())
     made.place(Pose2(0.3, 0.3, 0.0), BEGIN_NS)
     made.see(track(), BEGIN_NS)
     made.was_lifted()
@@ -88,7 +89,7 @@ def test_a_seen_pose_is_carried_forward_on_its_arc(body):
 
 
 def test_before_the_eye_has_seen_it_it_stands_where_the_city_put_it():
-    body = NigelBody(calibrated(0.2), FakeHelm())
+    body = NigelBody(calibrated(drive_deadband=0.2), FakeHelm())
     body.place(Pose2(0.3, 0.4, 0.5), BEGIN_NS)
     assert body.motion().pose == (0.3, 0.4, 0.5)
     assert body.unfit(BEGIN_NS) == "the Eye has not seen it yet"
@@ -143,6 +144,17 @@ def test_trouble_with_the_cable_comes_first(body):
 def test_the_cars_own_deadband_is_undone(body, wished, given):
     body.command(wished, 0.25)
     assert newest(body) == Wish(pytest.approx(given), 0.25, 0)
+
+
+def test_gains_and_trim_are_undone():
+    car = calibrated(drive_gain=0.5, steering_gain=0.8, steering_trim_rad=0.1)
+    body = NigelBody(car, FakeHelm())
+    body.see(track(), BEGIN_NS)
+    body.advance(BEGIN_NS)
+    body.command(0.2, 0.4)
+    assert newest(body).throttle == pytest.approx(0.4)
+    angle = 0.8 * newest(body).steering * body.limits.steer_limit + 0.1
+    assert angle == pytest.approx(0.4 * body.limits.steer_limit)
 
 
 def test_without_a_calibration_nothing_is_added():

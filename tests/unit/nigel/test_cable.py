@@ -4,11 +4,14 @@ import errno
 import os
 import pty
 import signal
+import socket
 import subprocess
 import sys
 import time
 import tty
+import types
 
+import msgspec
 import pytest
 import serial
 
@@ -18,7 +21,7 @@ from tests.unit.nigel.pty_device import PtyDevice
 from vehicle_agent.nigel.cable import FULL_BYTES, REOPEN_NS, Cable
 from vehicle_agent.nigel.helm import Helm
 from vehicle_agent.nigel.host import Host, Wish
-from vehicle_agent.nigel.keeper import PATIENCE_NS, Asked, Keeper
+from vehicle_agent.nigel.keeper import PATIENCE_NS, Asked, Keeper, Told
 from vehicle_agent.nigel.rosserial import pack_float
 
 ZERO, HALF = pack_float(0.0), pack_float(0.5)
@@ -280,3 +283,19 @@ def test_an_agent_that_is_killed_or_stopped_leaves_zeros(plugged, way):
     finally:
         agent.kill()
         agent.wait(5.0)
+
+
+def test_an_agent_that_stalled_does_not_take_the_keeper_for_dead():
+    ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.setblocking(False)
+    helm = Helm("x", 57600)
+    helm._line, helm._process = ours, types.SimpleNamespace(kill=lambda: killed.append(1))
+    killed, told = [], msgspec.msgpack.encode(Told("ready", "", 1, 0, None, None))
+    its.send(told)
+    helm.steer(Wish(), 0)
+    for turn in range(9):
+        helm.steer(Wish(), 3 * NS_PER_S + turn)
+    assert (helm.trouble(3 * NS_PER_S), killed) == ("", [])
+    helm.steer(Wish(), 3 * NS_PER_S + 9)
+    assert killed == [1]
+    its.close()
