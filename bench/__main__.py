@@ -27,6 +27,7 @@ LONG = (
     "glosa",
     "misbehaviour",
     "mismatch",
+    "serial",
 )  # takes minutes: only where it is asked for, alone, with its own arguments
 
 

@@ -22,6 +22,7 @@ from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.denm_rx import DenmRx
 from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
@@ -30,7 +31,7 @@ from scm.v2x.messages.radio_status import RadioStatus
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spatem_rx import SpatemRx
 from scm.v2x.messages.world_definition import WorldDefinition
-from vehicle_agent.body import BodyKind
+from vehicle_agent.body import BodyKind, Wiring
 from vehicle_agent.link import Link
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ class AgentPart:
         session: str = "",
         seed: int = 0,
         body: str = "simulated",
+        wiring: Wiring | None = None,
     ) -> None:
         """Prepare to join.
 
@@ -73,10 +75,12 @@ class AgentPart:
             session: Of the agent's bus; empty: learned from its own presence on the bus.
             seed: Of the sensors' noise.
             body: Kind of body: a file of `vehicle_agent/bodies`.
+            wiring: How a real body is connected, and what it may do.
         """
         self.name = check_name(name, "vehicle")
         kind = registry.load(BODIES, body, "BODY", BodyKind, RunError)
-        self._body = kind.open(car, seed)
+        self._wiring, self._is_real = wiring or Wiring(), kind.kind == "real"
+        self._body = kind.open(car, seed, self._wiring)
         self._link = Link(name, car, kind.kind, spawn, session)
         self._car = car
         self._map: CityMap | None = None
@@ -99,6 +103,7 @@ class AgentPart:
             DriveCommand: self._on_command,
             RouteRequest: self._on_route,
             LightRequest: self._on_lights,
+            EyeTrack: self._on_eye,
         }
         self.hears: Sequence[Hears] = (
             Hears(WorldDefinition),
@@ -111,6 +116,7 @@ class AgentPart:
             Hears(CityStop),
             Hears(Contact, own),
             Hears(DriveCommand, own),
+            *([Hears(EyeTrack, own)] if self._body.wants_eye else []),
         )
         self.serves: Sequence[Serves] = (Serves(RouteRequest, own), Serves(LightRequest, own))
 
@@ -128,11 +134,19 @@ class AgentPart:
         if self._stay is not None:
             own = self._link.epoch if self._link.standing == "own" else None
             outbox += self._stay.step(now_ns, own)
+        elif self._is_real:  # its port is opened at once, and it rests from the first second
+            self._body.advance(now_ns)
+            self._body.command(0.0, 0.0)
         return outbox + self._status(now_ns)
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """Leave the city."""
+        """Leave the city, at rest."""
+        self._body.command(0.0, 0.0)
         return [*self._link.goodbye()]
+
+    def close(self) -> None:
+        """Let go of the body, however the agent ends."""
+        self._body.close()
 
     def _check_losses(self, now_ns: int) -> None:
         if self._stay is None:
@@ -156,8 +170,13 @@ class AgentPart:
     def _begin_stay(self, city_map: CityMap, now_ns: int) -> None:
         from vehicle_agent.stay import Stay  # noqa: PLC0415 drivers bring the compiler with them
 
+        body, real = self._body, None
+        if self._is_real:
+            from vehicle_agent.last_word import real_guard  # noqa: PLC0415
+
+            real = real_guard(body.limits, city_map, self._wiring)
         try:
-            stay = Stay(self.name, self._car, self._body, city_map, self._link.epoch, now_ns)
+            stay = Stay(self.name, self._car, body, city_map, self._link.epoch, now_ns, real)
         except MapError as error:
             event(_log, "cannot_drive", level=logging.ERROR, reason=error)
             raise
@@ -238,6 +257,11 @@ class AgentPart:
                 self._link.give_way()
         return []
 
+    def _on_eye(self, item: Incoming) -> list[Outgoing]:
+        if isinstance(item.message, EyeTrack) and self._stay is not None:
+            self._stay.see(item.message, item.t_ns)
+        return []
+
     def _on_route(self, item: Incoming) -> list[Outgoing]:
         request = item.message
         if not isinstance(request, RouteRequest):
@@ -279,6 +303,8 @@ class AgentPart:
     def _detail(self) -> str:
         if self._stay is None:
             return f"outside: {self._link.reason}" if self._map else "waits for the world"
+        if self._is_real and self._stay.last_word.why:
+            return f"{self._stay.last_word.why} ({self._stay.last_word.told})"
         if self._link.standing == "foreign":
             return "driven by somebody else"
         if self._link.standing == "regaining":

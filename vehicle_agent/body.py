@@ -7,8 +7,10 @@ from typing import Protocol
 from scm.geometry import Pose2
 from scm.maps.model import CityMap
 from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.driver import CarLimits
+from scm.vehicles.lights import Switches
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +39,11 @@ class Body(Protocol):
 
     Attributes:
         limits: What its driver must know of it.
+        wants_eye: Whether it must be told where the overhead cameras see it.
     """
 
     limits: CarLimits
+    wants_eye: bool
 
     def learn(self, city_map: CityMap, seed: int) -> None:
         """Know the city's floor and air; everybody with the same seed feels the same gusts."""
@@ -49,12 +53,28 @@ class Body(Protocol):
         """Be at rest with the rear axle at a pose: called at each joining."""
         ...
 
+    def see(self, track: EyeTrack, now_ns: int) -> None:
+        """Learn where the overhead cameras see it: only where it `wants_eye`."""
+        ...
+
+    def was_lifted(self) -> bool:
+        """Return, once, whether it is somewhere that it did not drive to: its way begins anew."""
+        ...
+
+    def unfit(self, now_ns: int) -> str:
+        """Return why it must not move now, in words; empty: it may."""
+        ...
+
     def advance(self, now_ns: int) -> None:
         """Bring the motion up to now."""
         ...
 
     def command(self, throttle: float, steering: float) -> None:
         """Obey until the next command: -1 to 1, + = forward, + = left; guarded already."""
+        ...
+
+    def show(self, switches: Switches) -> None:
+        """Switch its lamps, where it has some of its own."""
         ...
 
     def push(self, contact: Contact) -> None:
@@ -69,6 +89,29 @@ class Body(Protocol):
         """Return what its own sensors have read since the last time."""
         ...
 
+    def close(self) -> None:
+        """Come to rest and let go of whatever it holds, however its agent ends."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """How a real car is connected, and what it may do.
+
+    Attributes:
+        port: Path of its serial port.
+        baud: Of this.
+        calibration: Path of this very car's file; empty: it is as its kind.
+        throttle: Most throttle either way, 0 to 1, beyond the dead-band.
+        fence: Corners it stays within, counter-clockwise, map frame [m]; empty: the whole floor.
+    """
+
+    port: str = ""
+    baud: int = 57600
+    calibration: str = ""
+    throttle: float = 1.0
+    fence: tuple[tuple[float, float], ...] = ()
+
 
 @dataclass(frozen=True, slots=True)
 class BodyKind:
@@ -76,8 +119,8 @@ class BodyKind:
 
     Attributes:
         kind: What the city calls it when it joins: `remote` or `real`.
-        open: Makes one from the car file's name and a seed.
+        open: Makes one from the car file's name, a seed, and how it is connected.
     """
 
     kind: str
-    open: Callable[[str, int], Body]
+    open: Callable[[str, int, Wiring], Body]

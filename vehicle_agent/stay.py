@@ -3,6 +3,11 @@
 hear -> move the body up to now -> decide -> guard -> command the body -> report
 """
 
+import logging
+
+from scm.clock import NS_PER_S
+from scm.errors import MapError
+from scm.log import event
 from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.v2x.cam_trigger import CamTrigger
@@ -15,6 +20,7 @@ from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.denm_tx import DenmTx
 from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.driver import RouteView
@@ -26,6 +32,10 @@ from scm.vehicles.guard import Guard, Guarded
 from scm.vehicles.lights import OFF, TURNS, Headlights, Indicators, Switches, lamps
 from scm.vehicles.signal_view import SignalView
 from vehicle_agent.body import Body
+from vehicle_agent.guard import RealGuard
+from vehicle_agent.last_word import LastWord
+
+_log = logging.getLogger(__name__)
 
 
 class Stay:
@@ -38,12 +48,21 @@ class Stay:
         trips: Where it is sent.
         switches: How its headlights and indicators are switched.
         air: How busy it is, and how seldom the car may speak.
+        last_word: Between the guard and the body.
+        astray: Why it cannot drive from where it was put; empty: it can.
     """
 
     def __init__(
-        self, vehicle: str, car: str, body: Body, city_map: CityMap, epoch: int, now_ns: int
+        self,
+        vehicle: str,
+        car: str,
+        body: Body,
+        city_map: CityMap,
+        epoch: int,
+        now_ns: int,
+        real: RealGuard | None = None,
     ) -> None:
-        """Begin with the body where the city wants it.
+        """Begin with the body where the city wants it; `real` guards a real car.
 
         Raises:
             MapError: when it stands where no lane leads anywhere.
@@ -52,7 +71,11 @@ class Stay:
         self.signals = SignalView(city_map)
         self.cars = HeardCars()
         self.guard = Guard(epoch)
-        self.trips = Trips(vehicle, Roads(city_map), body.limits, body.motion().pose, now_ns)
+        self._roads = Roads(city_map)
+        self.trips = Trips(vehicle, self._roads, body.limits, body.motion().pose, now_ns)
+        self.last_word = LastWord(body, real)
+        self.astray = ""
+        self._tried_ns = now_ns
         self.switches = OFF
         radio = city_map.radio
         self.air = OwnControl(radio.data_rate_mbps, is_on=radio.congestion_control)
@@ -64,6 +87,10 @@ class Stay:
         self._seq = self._felt = 0
         self._commanded = 0.0, 0.0
         self._turn: Indicators = "off"
+
+    def see(self, track: EyeTrack, now_ns: int) -> None:
+        """Learn where the overhead cameras see the car."""
+        self.last_word.see(track, now_ns)
 
     def push(self, contact: Contact) -> None:
         """Let the body feel a contact; the next report says so."""
@@ -88,13 +115,32 @@ class Stay:
             epoch: Under which the car's own driver commands; None: it must not.
         """
         self._body.advance(now_ns)
+        self._begin_anew_if_lifted(now_ns)
         led_here, self._turn = self._commanded, "off"
         if epoch is not None:
             self.guard.take(self._own_command(now_ns, epoch), now_ns)
-        guarded = self.guard.output(now_ns)
+        self._body.show(self._shown(hazard=self.guard.lost))
+        guarded = self.last_word.pass_on(self.guard.output(now_ns), self.astray, now_ns)
         self._commanded = guarded.throttle, guarded.steering
-        self._body.command(*self._commanded)
         return self._reports(guarded, led_here, now_ns)
+
+    def _begin_anew_if_lifted(self, now_ns: int) -> None:
+        """Look for the lane again where the car was put down, until it stands on one."""
+        is_due = self.astray and now_ns - self._tried_ns >= NS_PER_S
+        if not (self._body.was_lifted() or is_due):
+            return
+        self._tried_ns, pose = now_ns, self._body.motion().pose
+        try:
+            self.trips = Trips(self._vehicle, self._roads, self._body.limits, pose, now_ns)
+            self.astray = ""
+        except MapError as error:
+            self.astray = str(error)
+        event(_log, "put_down", x_m=round(pose.x, 3), y_m=round(pose.y, 3), trouble=self.astray)
+
+    def _shown(self, *, hazard: bool) -> Switches:
+        """Return what a body's own lamps are to show."""
+        indicators = self._turn if self.switches.indicators == "off" else self.switches.indicators
+        return Switches(self.switches.headlights, "hazard" if hazard else indicators)
 
     def _own_command(self, now_ns: int, epoch: int) -> DriveCommand:
         motion = self._body.motion()

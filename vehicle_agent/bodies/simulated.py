@@ -12,15 +12,17 @@ from scm.clock import NS_PER_MS, seconds
 from scm.geometry import Pose2
 from scm.maps.model import CityMap
 from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.bank import Bank
 from scm.vehicles.car import load_car
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
+from scm.vehicles.lights import Switches
 from scm.vehicles.sensed import ENCODERS, KINDS, sensors_message
 from scm.vehicles.sensor import Sensor
-from vehicle_agent.body import Body, BodyKind, Motion
+from vehicle_agent.body import Body, BodyKind, Motion, Wiring
 
 LONGEST_NS = 100 * NS_PER_MS
 FEEL_NS = 5 * NS_PER_MS
@@ -30,6 +32,8 @@ SENSORS = "scm.vehicles.sensors"
 
 class SimulatedBody:
     """One car in a kernel of its own."""
+
+    wants_eye = False
 
     def __init__(self, car: str, seed: int) -> None:
         self._car = load_car(car)
@@ -59,6 +63,18 @@ class SimulatedBody:
             self._ground.settle(self._fleet, self._row)
         self._now_ns = now_ns
 
+    def see(self, track: EyeTrack, now_ns: int) -> None:
+        """Nothing: it knows better."""
+
+    def was_lifted(self) -> bool:
+        """Return that nobody can lift it."""
+        return False
+
+    def unfit(self, now_ns: int) -> str:
+        """Return that nothing keeps it."""
+        del now_ns
+        return ""
+
     def advance(self, now_ns: int) -> None:
         """Move by whole milliseconds up to now; what is left over is for the next time."""
         if self._now_ns is None or now_ns - self._now_ns > LONGEST_NS:
@@ -75,6 +91,9 @@ class SimulatedBody:
         """Set the kernel's commands."""
         self._fleet.throttle[self._row] = throttle
         self._fleet.steering[self._row] = steering
+
+    def show(self, switches: Switches) -> None:
+        """Nothing: its lamps are those of its reports."""
 
     def push(self, contact: Contact) -> None:
         """Change velocity and place as the contact did; the next readings feel it."""
@@ -124,8 +143,12 @@ class SimulatedBody:
         said = [sensors_message(vehicle, t_ns, self._newest) for t_ns in counted[-1:]]
         return [message for message in said if message is not None]
 
+    def close(self) -> None:
+        """Nothing is held."""
 
-def _open(car: str, seed: int) -> Body:
+
+def _open(car: str, seed: int, wiring: Wiring) -> Body:
+    del wiring
     return SimulatedBody(car, seed)
 
 

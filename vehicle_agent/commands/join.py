@@ -1,4 +1,4 @@
-"""`vehicle-agent join`: be one car of a city."""
+"""`vehicle-agent join`: be one car of a city, simulated or real."""
 
 import argparse
 import gc
@@ -15,6 +15,31 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--car", default="nigel", help="car file (%(default)s)")
     parser.add_argument("--spawn", default="", help="place to start at; default: any free one")
     parser.add_argument("--seed", type=int, default=0, help="of the sensors' noise (%(default)s)")
+    real = parser.add_argument_group("a real car", "see docs/real_nigel.md")
+    real.add_argument("--serial", default="", metavar="PORT", help="drive a real Nigel over it")
+    real.add_argument(
+        "--baud", type=int, default=57600, help="of the port; a 4WD Nigel's Mega: 115200"
+    )
+    real.add_argument(
+        "--calibration",
+        default="",
+        metavar="FILE",
+        help="this very car's file: dead-band, gains, trim",
+    )
+    real.add_argument(
+        "--throttle-limit",
+        type=float,
+        default=1.0,
+        metavar="SHARE",
+        help="most throttle beyond the dead-band, 0 to 1 (%(default)s)",
+    )
+    real.add_argument(
+        "--fence",
+        type=float,
+        nargs=4,
+        metavar=("X0", "Y0", "X1", "Y1"),
+        help="rectangle it stays within [m]; default: the city's floor",
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -23,6 +48,8 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name
     from vehicle_agent.agent import AgentPart
+    from vehicle_agent.body import Wiring
+    from vehicle_agent.guard import rectangle
     from vehicle_agent.leaving import Leaving
 
     check_name(arguments.name, "--name")
@@ -33,9 +60,24 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.city, arguments.name, arguments.connect, clock=clock, credentials=credentials
     ) as bus:
         part = AgentPart(
-            arguments.name, arguments.car, arguments.spawn, bus.session, arguments.seed
+            arguments.name,
+            arguments.car,
+            arguments.spawn,
+            bus.session,
+            arguments.seed,
+            "nigel" if arguments.serial else "simulated",
+            Wiring(
+                port=arguments.serial,
+                baud=arguments.baud,
+                calibration=arguments.calibration,
+                throttle=arguments.throttle_limit,
+                fence=rectangle(*arguments.fence) if arguments.fence else (),
+            ),
         )
-        run(Leaving(part, wish, done), bus, clock, done, on_beat=True)
+        try:
+            run(Leaving(part, wish, done), bus, clock, done, on_beat=True)
+        finally:
+            part.close()
     gc.freeze()  # taking the compiler's objects apart one by one would take a quarter of a second
     return 0
 

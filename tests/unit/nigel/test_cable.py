@@ -1,0 +1,301 @@
+"""A port that is pulled, forbidden, busy or full; and the process that keeps it."""
+
+import errno
+import os
+import pty
+import signal
+import socket
+import subprocess
+import sys
+import time
+import tty
+import types
+
+import msgspec
+import pytest
+import serial
+
+from scm.clock import NS_PER_MS, NS_PER_S, StepClock, WallClock
+from tests.unit.nigel.fake_device import Device
+from tests.unit.nigel.pty_device import PtyDevice
+from vehicle_agent.nigel.cable import FULL_BYTES, REOPEN_NS, Cable
+from vehicle_agent.nigel.helm import Helm
+from vehicle_agent.nigel.host import Host, Wish
+from vehicle_agent.nigel.keeper import PATIENCE_NS, Asked, Keeper, Told
+from vehicle_agent.nigel.rosserial import pack_float
+
+ZERO, HALF = pack_float(0.0), pack_float(0.5)
+
+
+@pytest.fixture
+def ends():
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    yield master, slave
+    for end in (master, slave):
+        try:
+            os.close(end)
+        except OSError:
+            continue
+
+
+def failing(number):
+    def opens(path, baud):
+        raise serial.SerialException(number, "no")
+
+    return opens
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (errno.ENOENT, "is the cable plugged in"),
+        (errno.EACCES, "usermod -aG dialout"),
+        (errno.EBUSY, "in use by another program"),
+        (errno.EAGAIN, "in use by another program"),
+        (errno.ENOTTY, "no serial port"),
+    ],
+)
+def test_a_port_that_does_not_open_says_what_to_do_and_is_tried_again(number, words):
+    cable = Cable("/dev/x", 57600, failing(number))
+    assert not cable.keep_open(0)
+    assert cable.trouble.startswith("/dev/x: ")
+    assert words in cable.trouble
+    cable._opens = lambda path, baud: FakePort(-1)
+    assert not cable.keep_open(REOPEN_NS - 1)
+    assert cable.keep_open(REOPEN_NS)
+    assert cable.trouble == ""
+
+
+def test_a_path_that_is_not_there_a_folder_and_a_file_are_told_apart(tmp_path):
+    (tmp_path / "file").write_text("")
+    said = []
+    for name in ("nothing", "file", ""):
+        cable = Cable(str(tmp_path / name), 57600)
+        cable.keep_open(0)
+        said.append(cable.trouble.partition(": ")[2])
+    assert said[0].startswith("no such device")
+    assert said[2] == "this is no serial port"
+    assert "could not configure" in said[1].lower()
+
+
+def test_a_second_program_does_not_get_the_port(ends):
+    path = os.ttyname(ends[1])
+    first, second = Cable(path, 57600), Cable(path, 57600)
+    assert first.keep_open(0)
+    assert not second.keep_open(0)
+    assert "in use by another program" in second.trouble
+    first.close()
+
+
+def test_bytes_pass_both_ways_and_a_pulled_cable_is_noticed(ends):
+    master, slave = ends
+    cable = Cable(os.ttyname(slave), 57600)
+    cable.keep_open(0)
+    assert cable.read() == b""
+    cable.write([b"abc", b"de"])
+    assert os.read(master, 9) == b"abcde"
+    os.write(master, b"xyz")
+    assert cable.read() == b"xyz"
+    os.close(master)
+    assert cable.read() == b""
+    assert cable.fd is None
+    assert "unplugged" in cable.trouble
+
+
+class FakePort:
+    """A port whose driver takes so many bytes."""
+
+    def __init__(self, fd):
+        self.fd, self.out_waiting = fd, 0
+
+    def close(self):
+        """Nothing."""
+
+    def reset_output_buffer(self):
+        """Nothing."""
+
+
+def test_a_full_line_drops_whole_frames_and_ends_those_it_began(monkeypatch):
+    room, out = [5], bytearray()
+
+    def write(fd, data):
+        if not room[0]:
+            raise BlockingIOError
+        taken = data[: room[0]]
+        room[0] -= len(taken)
+        out.extend(taken)
+        return len(taken)
+
+    monkeypatch.setattr(os, "write", write)
+    cable = Cable("x", 1, lambda path, baud: FakePort(9))
+    cable.keep_open(0)
+    cable.write([b"aaa", b"bbb", b"ccc"])
+    assert (bytes(out), cable.held_back) == (b"aaabb", 1)
+    cable.write([b"ddd"])
+    room[0] = 9
+    cable.write([b"eee"])
+    assert (bytes(out), cable.held_back) == (b"aaabbbeee", 2)
+    cable._port.out_waiting = FULL_BYTES + 1
+    cable.write([b"fff"])
+    assert (bytes(out), cable.held_back) == (b"aaabbbeee", 3)
+
+
+class LoopCable(Cable):
+    """A cable to a device in this process."""
+
+    def __init__(self, device):
+        super().__init__("loop", 57600, lambda path, baud: FakePort(9))
+        self.device, self._back, self.now_ns = device, b"", 0
+
+    def read(self):
+        back, self._back = self._back, b""
+        return back
+
+    def write(self, frames):
+        self._back += self.device.hear(b"".join(frames), self.now_ns)
+
+
+class Kept:
+    """A keeper in virtual time."""
+
+    def __init__(self):
+        self.device = Device()
+        self.cable = LoopCable(self.device)
+        self.keeper = Keeper(self.cable, Host())
+        self.now_ns = 10**18
+
+    def run(self, span_ns, wish=None, age_ns=0):
+        for _ in range(span_ns // (5 * NS_PER_MS)):
+            self.now_ns += 5 * NS_PER_MS
+            self.cable.now_ns = self.now_ns
+            asked = None if wish is None else Asked(self.now_ns - age_ns, wish)
+            self.keeper.step(self.now_ns, asked)
+        return self.device.values
+
+
+def test_the_keeper_says_zero_once_the_agent_has_been_silent_for_150_ms():
+    kept = Kept()
+    kept.run(3 * NS_PER_S, Wish(0.5, -0.5))
+    assert kept.device.values == {"steer_cmd": -0.5, "drive_cmd": 0.5}
+    assert kept.run(PATIENCE_NS - 25 * NS_PER_MS) == {"steer_cmd": -0.5, "drive_cmd": 0.5}
+    assert kept.run(50 * NS_PER_MS) == {"steer_cmd": 0.0, "drive_cmd": 0.0}
+
+
+@pytest.mark.parametrize("age_ns", [PATIENCE_NS + 1, -PATIENCE_NS - 1, 10**18])
+def test_a_wish_that_waited_in_the_queue_or_has_no_honest_stamp_is_not_obeyed(age_ns):
+    kept = Kept()
+    assert kept.run(3 * NS_PER_S, Wish(0.5, 0.5), age_ns) == {"steer_cmd": 0.0, "drive_cmd": 0.0}
+
+
+def test_the_keeper_ends_with_zeros_said_five_times():
+    kept = Kept()
+    kept.run(3 * NS_PER_S, Wish(0.5, 0.5))
+    before = len(kept.device.said)
+    clock = StepClock(kept.now_ns)
+    kept.keeper.finish(clock)
+    assert [frame.payload for frame in kept.device.said[before:]] == [ZERO] * 10
+    assert kept.cable.fd is None
+    assert clock.now_ns() - kept.now_ns <= NS_PER_S
+
+
+@pytest.fixture
+def plugged(tmp_path):
+    device = PtyDevice(tmp_path / "nigel")
+    yield device
+    device.pull()
+
+
+def wait(condition, timeout_s=20.0, every=lambda: None):
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        every()
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def driving(plugged):
+    helm, clock = Helm(str(plugged.path), 57600), WallClock()
+    steer = lambda: helm.steer(Wish(0.5, 0.5), clock.now_ns())  # noqa: E731
+    wait(lambda: plugged.newest(101) == HALF, every=steer)
+    yield helm, steer, plugged
+    helm.close()
+    helm._process.wait(5.0)
+
+
+def test_a_silent_agent_is_zeroed_from_outside_and_close_leaves_zeros(driving):
+    helm, steer, device = driving
+    wait(lambda: device.newest(101) == ZERO, 2.0)
+    wait(lambda: device.newest(101) == HALF, 2.0, steer)
+    helm.close()
+    assert helm._process.returncode == 0
+    time.sleep(0.05)
+    last = [(topic, payload) for _, topic, payload in device.log][-10:]
+    assert last == [(101, ZERO), (100, ZERO)] * 5
+
+
+def test_a_pulled_cable_is_told_and_drives_again_when_it_is_back(driving):
+    helm, steer, device = driving
+    device.pull()
+    clock = WallClock()
+    gone = ("unplugged", "no such device")
+    wait(lambda: any(w in helm.trouble(clock.now_ns()) for w in gone), 5.0, steer)
+    device.log.clear()
+    device.plug()
+    wait(lambda: device.newest(101) == HALF, every=steer)
+
+
+@pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_keeper_that_dies_or_hangs_is_replaced(driving, way):
+    helm, steer, device = driving
+    old = helm._process
+    old.send_signal(way)
+    wait(lambda: helm._process is not old, 8.0, steer)
+    device.log.clear()
+    wait(lambda: device.newest(101) == HALF, every=steer)
+
+
+AGENT = """
+import sys, threading
+from scm.clock import WallClock
+from vehicle_agent.nigel.helm import Helm
+from vehicle_agent.nigel.host import Wish
+helm, clock, never = Helm(sys.argv[1], 57600), WallClock(), threading.Event()
+while True:
+    helm.steer(Wish(0.5, 0.5), clock.now_ns())
+    never.wait(0.02)
+"""
+
+
+@pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGSTOP])
+def test_an_agent_that_is_killed_or_stopped_leaves_zeros(plugged, way):
+    agent = subprocess.Popen([sys.executable, "-c", AGENT, str(plugged.path)])
+    try:
+        wait(lambda: plugged.newest(101) == HALF)
+        agent.send_signal(way)
+        struck_ns = plugged.clock.now_ns()
+        wait(lambda: plugged.newest(101) == ZERO, 3.0)
+        zero_ns = next(t for t, topic, p in plugged.log if topic == 101 and p == ZERO
+                       and t > struck_ns)  # fmt: skip
+        assert zero_ns - struck_ns < 400 * NS_PER_MS
+    finally:
+        agent.kill()
+        agent.wait(5.0)
+
+
+def test_an_agent_that_stalled_does_not_take_the_keeper_for_dead():
+    ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.setblocking(False)
+    helm = Helm("x", 57600)
+    helm._line, helm._process = ours, types.SimpleNamespace(kill=lambda: killed.append(1))
+    killed, told = [], msgspec.msgpack.encode(Told("ready", "", 1, 0, None, None))
+    its.send(told)
+    helm.steer(Wish(), 0)
+    for turn in range(9):
+        helm.steer(Wish(), 3 * NS_PER_S + turn)
+    assert (helm.trouble(3 * NS_PER_S), killed) == ("", [])
+    helm.steer(Wish(), 3 * NS_PER_S + 9)
+    assert killed == [1]
+    its.close()

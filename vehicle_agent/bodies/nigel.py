@@ -1,0 +1,194 @@
+"""A real Nigel: moved over a serial cable, its motion told by the overhead cameras.
+
+The published firmware tells nothing of the car, so all that is known of its motion comes from the
+Eye, carried forward to now on the arc of its speed and yaw rate. What this one car needs to be told
+for what is wished, its dead-band, gains and trim, are numbers of its calibration: `nigel/undo.py`.
+"""
+
+import logging
+import math
+
+from scm.clock import NS_PER_MS, seconds
+from scm.errors import RunError
+from scm.geometry import Pose2
+from scm.log import event
+from scm.maps.model import CityMap
+from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.eye_track import EyeTrack
+from scm.v2x.messages.vehicle_sensors import VehicleSensors
+from scm.vehicles.car import Car, load_car
+from scm.vehicles.drivers.limits import limits_of
+from scm.vehicles.lights import Switches
+from vehicle_agent.body import Body, BodyKind, Motion, Wiring
+from vehicle_agent.nigel.helm import Helm
+from vehicle_agent.nigel.host import Wish
+from vehicle_agent.nigel.undo import DEADBAND, undo_of
+
+STALE_NS = 300 * NS_PER_MS
+LIFTED_M = 0.25
+"""Farther from where it must be, a car was carried by hand: the Eye is right within 3 cm."""
+SMOOTH_S = 0.15
+"""Over so long the differences of the Eye's speeds are averaged: one is 5 mm/s unsure."""
+LEVEL_MPS2 = 9.80665
+"""Upwards on a level floor: the firmware tells only what lies in the plane."""
+
+_log = logging.getLogger(__name__)
+
+
+class NigelBody:
+    """One car on a cable.
+
+    Args:
+        car: Its file, calibrated.
+        helm: What gives wishes to the cable's keeper.
+    """
+
+    def __init__(self, car: Car, helm: Helm) -> None:
+        self.limits = limits_of(car)
+        self.wants_eye = True
+        self._undo = undo_of(car, self.limits.steer_limit)
+        if not self._undo.deadband:
+            event(_log, "no_deadband", level=logging.WARNING, car=car.name, key=DEADBAND)
+        self._helm = helm
+        self._start = Pose2(0.0, 0.0, 0.0)
+        self._track: EyeTrack | None = None
+        self._heard_ns = self._now_ns = 0
+        self._was_lifted = False
+        self._lamps = 0
+        self._wheels = self._wanted = self._accel = 0.0
+        self._readings = 0
+
+    def learn(self, city_map: CityMap, seed: int) -> None:
+        """Nothing: the real floor needs no model."""
+
+    def place(self, pose: Pose2, now_ns: int) -> None:
+        """Be thought at a pose until the Eye tells better."""
+        self._start, self._track, self._now_ns = pose, None, now_ns
+        self.command(0.0, 0.0)
+
+    def see(self, track: EyeTrack, now_ns: int) -> None:
+        """Learn where the Eye sees it; numbers that are none are not heard."""
+        numbers = (track.x_m, track.y_m, track.yaw_rad, track.speed_mps, track.lateral_speed_mps)
+        if not all(map(math.isfinite, (*numbers, track.yaw_rate_radps, track.age_s))):
+            return
+        if self._track is not None and track.t_ns <= self._track.t_ns:
+            return
+        if not track.stale:
+            old = self._pose(now_ns)
+            away = math.hypot(track.x_m - old.x, track.y_m - old.y)
+            self._was_lifted |= self._track is None or away > LIFTED_M
+        self._accel = 0.0 if track.stale else self._gained(track)
+        self._track, self._heard_ns = track, now_ns
+
+    def was_lifted(self) -> bool:
+        """Return, once, whether it was seen somewhere that it did not drive to."""
+        lifted, self._was_lifted = self._was_lifted, False
+        return lifted
+
+    def unfit(self, now_ns: int) -> str:
+        """Return why it must not move, in words; empty: it may."""
+        trouble = self._helm.trouble(now_ns)
+        if trouble:
+            return trouble
+        if self._track is None:
+            return "the Eye has not seen it yet"
+        age_ns = now_ns - self._heard_ns + round(1e9 * self._track.age_s)
+        if self._track.stale or age_ns > STALE_NS:
+            return f"the Eye has not seen it for {seconds(age_ns):.1f} s"
+        return ""
+
+    def advance(self, now_ns: int) -> None:
+        """Turn the wheels, as they are thought to, up to now."""
+        most = self.limits.steer_rate * seconds(max(0, now_ns - self._now_ns))
+        self._wheels += min(most, max(-most, self._wanted - self._wheels))
+        self._now_ns = now_ns
+
+    def command(self, throttle: float, steering: float) -> None:
+        """Pass a command on; where it is unfit, whatever is commanded, zeros."""
+        if self.unfit(self._now_ns):
+            self._helm.steer(Wish(lamps=self._lamps), self._now_ns)
+            self._wanted = 0.0
+            return
+        self._wanted = steering * self.limits.steer_limit
+        told = Wish(self._undo.throttle(throttle), self._undo.steering(steering), self._lamps)
+        self._helm.steer(told, self._now_ns)
+
+    def show(self, switches: Switches) -> None:
+        """Switch the lamps; the firmware does the flashing."""
+        beams = {"off": 0, "low": 1, "high": 3}[switches.headlights]
+        sides = {"off": 0, "left": 4, "right": 8, "hazard": 12}[switches.indicators]
+        self._lamps = beams | sides
+
+    def push(self, contact: Contact) -> None:
+        """Nothing: a real car feels real contacts."""
+
+    def motion(self) -> Motion:
+        """Return where the Eye saw it, carried forward to now."""
+        track = self._track
+        is_seen = track is not None and not track.stale
+        return Motion(
+            pose=self._pose(self._now_ns),
+            speed=track.speed_mps if track is not None and is_seen else 0.0,
+            lateral_speed=track.lateral_speed_mps if track is not None and is_seen else 0.0,
+            yaw_rate=track.yaw_rate_radps if track is not None and is_seen else 0.0,
+            accel=self._accel,
+            steering=self._wheels,
+            source="eye",
+        )
+
+    def sensors(self, vehicle: str, now_ns: int) -> list[VehicleSensors]:
+        """Return the newest telemetry where the firmware has encoders and an IMU."""
+        told = self._helm.told
+        if told is None or told.telemetry is None or told.readings == self._readings:
+            return []
+        self._readings = told.readings
+        reading = told.telemetry
+        if not reading.has_imu:
+            return []
+        return [
+            VehicleSensors(
+                vehicle=vehicle,
+                t_ns=now_ns,
+                encoder_left=reading.left,
+                encoder_right=reading.right,
+                accel_mps2=(*reading.accel_mps2, LEVEL_MPS2),
+                gyro_radps=(0.0, 0.0, reading.gyro_radps),
+            )
+        ]
+
+    def close(self) -> None:
+        """Have zeros sent, and let go of the cable."""
+        self._helm.close()
+
+    def _pose(self, now_ns: int) -> Pose2:
+        """Return the last seen pose, carried forward by at most `STALE_NS`."""
+        track = self._track
+        if track is None:
+            return self._start
+        seen = Pose2(track.x_m, track.y_m, track.yaw_rad)
+        if track.stale:
+            return seen
+        dt = seconds(min(max(0, now_ns - self._heard_ns), STALE_NS))
+        half = 0.5 * track.yaw_rate_radps * dt
+        c, s = math.cos(half) * dt, math.sin(half) * dt
+        vx, vy = track.speed_mps, track.lateral_speed_mps
+        return seen @ Pose2(c * vx - s * vy, s * vx + c * vy, 2.0 * half)
+
+    def _gained(self, track: EyeTrack) -> float:
+        """Return the acceleration of the last tracks' speeds, smoothed [m/s^2]."""
+        if self._track is None or self._track.stale:
+            return 0.0
+        dt = seconds(track.t_ns - self._track.t_ns)
+        gained = (track.speed_mps - self._track.speed_mps) / dt
+        return self._accel + (gained - self._accel) * dt / (dt + SMOOTH_S)
+
+
+def _open(car: str, seed: int, wiring: Wiring) -> Body:
+    del seed
+    if not wiring.port:
+        msg = "body nigel: no serial port given; expected a path such as /dev/ttyUSB0"
+        raise RunError(msg)
+    return NigelBody(load_car(wiring.calibration or car), Helm(wiring.port, wiring.baud))
+
+
+BODY = BodyKind(kind="real", open=_open)

@@ -1,0 +1,135 @@
+"""The agent's end of the cable: it starts the keeper, gives it wishes, and knows what it told."""
+
+import logging
+import socket
+import subprocess
+import sys
+from contextlib import suppress
+
+import msgspec
+
+from scm.clock import NS_PER_S
+from scm.log import event
+from vehicle_agent.nigel.host import REST, Wish
+from vehicle_agent.nigel.keeper import LONGEST, Asked, Told
+
+RESTART_NS = NS_PER_S
+SILENCE_NS = NS_PER_S
+HANGS_NS = 2 * NS_PER_S
+UNHEARD = 10
+"""Turns without a word before it counts as silence: who stalled himself has not listened."""
+LEAVE_S = 2.0
+
+_log = logging.getLogger(__name__)
+_told = msgspec.msgpack.Decoder(Told)
+
+
+class Helm:
+    """One keeper at a time, started again when it dies.
+
+    Attributes:
+        told: The newest of what it told; None: nothing yet.
+    """
+
+    def __init__(self, path: str, baud: int) -> None:
+        self._command = [sys.executable, "-m", "vehicle_agent.nigel.keeper", path, str(baud)]
+        self._path = path
+        self._line: socket.socket | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._started_ns: int | None = None
+        self._heard_ns = self._unheard = 0
+        self._said = ""
+        self._is_closed = False
+        self.told: Told | None = None
+
+    def trouble(self, now_ns: int) -> str:
+        """Return what keeps the car from being driven, in words; empty: nothing."""
+        if self._line is None:
+            return "nobody keeps the cable"
+        if self.told is None:
+            return "the keeper of the cable starts"
+        if self._is_silent(now_ns, SILENCE_NS):
+            return "the keeper of the cable is silent"
+        return self.told.trouble
+
+    def steer(self, wish: Wish, now_ns: int) -> None:
+        """Give the keeper a wish and take what it told; start it where there is none."""
+        self._keep_one(now_ns)
+        if self._line is None:
+            return
+        self._hear(now_ns)
+        self._end_hanging(now_ns)
+        self._send(Asked(now_ns, wish))
+        trouble = self.trouble(now_ns)
+        if trouble != self._said:
+            self._said = trouble
+            level = logging.WARNING if trouble else logging.INFO
+            event(_log, "serial", level=level, path=self._path, trouble=trouble or "none")
+
+    def close(self) -> None:
+        """Have zeros sent, and wait until the keeper has ended."""
+        self._is_closed = True
+        self._send(Asked(0, REST))
+        self._hang_up()
+        if self._process is None:
+            return
+        try:
+            self._process.wait(LEAVE_S)
+        except subprocess.TimeoutExpired:
+            event(_log, "keeper_hangs", level=logging.ERROR, path=self._path)
+            self._process.kill()
+            self._process.wait()
+
+    def _keep_one(self, now_ns: int) -> None:
+        if self._line is not None or self._is_closed:
+            return
+        if self._process is not None and self._process.poll() is None:
+            return  # it still holds the port
+        if self._started_ns is not None and now_ns - self._started_ns < RESTART_NS:
+            return
+        self._started_ns = self._heard_ns = now_ns
+        self._unheard, self.told = 0, None
+        ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with its:
+            self._process = subprocess.Popen(  # its own session: who kills the agent's spares it
+                [*self._command, str(its.fileno())], pass_fds=[its.fileno()], start_new_session=True
+            )
+        ours.setblocking(False)
+        self._line = ours
+
+    def _is_silent(self, now_ns: int, span_ns: int) -> bool:
+        return self._unheard >= UNHEARD and now_ns - self._heard_ns > span_ns
+
+    def _hear(self, now_ns: int) -> None:
+        self._unheard += 1
+        while self._line is not None:
+            try:
+                data = self._line.recv(LONGEST)
+            except BlockingIOError:
+                return
+            except OSError:
+                data = b""
+            if not data:
+                self._hang_up()
+                event(_log, "keeper_died", level=logging.ERROR, path=self._path)
+                return
+            self.told, self._heard_ns, self._unheard = _told.decode(data), now_ns, 0
+
+    def _end_hanging(self, now_ns: int) -> None:
+        """Kill a keeper that does nothing: the next one resets the Arduino by opening the port."""
+        if self._process is None or self.told is None or not self._is_silent(now_ns, HANGS_NS):
+            return
+        event(_log, "keeper_hangs", level=logging.ERROR, path=self._path)
+        self._process.kill()
+        self._hang_up()
+
+    def _send(self, asked: Asked) -> None:
+        if self._line is None:
+            return
+        with suppress(BlockingIOError, BrokenPipeError, ConnectionResetError):
+            self._line.send(msgspec.msgpack.encode(asked))
+
+    def _hang_up(self) -> None:
+        if self._line is not None:
+            self._line.close()
+            self._line = None
