@@ -25,11 +25,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
     from scm.traffic.demand import DemandPart
-    from scm.traffic.demand_table import load_demand, seconds_of_day
+    from scm.traffic.demand_table import DemandError, load_demand, seconds_of_day
 
     begin_s = None if arguments.time is None else seconds_of_day(arguments.time, "--time")
     flows = load_demand(arguments.table)
-    part = DemandPart(load_map(arguments.map), flows, begin_s)
+    city_map = load_map(arguments.map)
+    try:
+        part = DemandPart(city_map, flows, begin_s)
+    except DemandError as error:
+        raise DemandError(f"{arguments.table}: {error}") from error
     code = run_part(part, arguments)
     told = part.status
     print(

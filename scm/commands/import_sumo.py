@@ -37,6 +37,8 @@ def _run(arguments: argparse.Namespace) -> int:
 
     if arguments.scale is not None and not arguments.scale > 0.0:
         raise MapError(f"--scale: got {arguments.scale}, expected above 0")
+    if not arguments.out.parent.is_dir():
+        raise MapError(f"--out: no folder {arguments.out.parent} for {arguments.out.name}")
     made = import_sumo(arguments.net, scale=arguments.scale, floor_m=arguments.floor)
     built, unsafe = adopted(made.city_map)
     arguments.out.write_text(map_toml(built), encoding="utf-8")

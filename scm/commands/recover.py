@@ -6,6 +6,8 @@ from pathlib import Path
 from scm.command import Command
 from scm.errors import RecordingError
 
+MAGIC = b"\x89MCAP0\r\n"
+
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path, metavar="FILE", help="the .mcap that was cut off")
@@ -18,11 +20,29 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.recording.is_dir():
         msg = f"{arguments.recording}: got a folder, expected the .mcap that was cut off"
         raise RecordingError(msg)
+    _check(arguments.recording, arguments.out)
     result = recover(arguments.recording, arguments.out)
     state = "was whole" if result.whole else "was cut off"
     print(f"{arguments.recording} {state}: {result.messages} messages over {result.span_s:.1f} s")
     print(f"written to {result.path}")
     return 0
+
+
+def _check(broken: Path, mended: Path | None) -> None:
+    """Refuse what is no recording, and to write over a file that somebody named.
+
+    Raises:
+        RecordingError: saying which of both.
+    """
+    if broken.is_file():
+        with broken.open("rb") as stream:
+            begin = stream.read(len(MAGIC))
+        if begin and not MAGIC.startswith(begin):
+            msg = f"{broken}: got a file that does not begin as an .mcap, expected one cut off"
+            raise RecordingError(msg)
+    if mended is not None and mended.exists() and mended.resolve() != broken.resolve():
+        msg = f"--out: {mended} is there already, expected a new name"
+        raise RecordingError(msg)
 
 
 COMMAND = Command(

@@ -34,6 +34,8 @@ def _run(arguments: argparse.Namespace) -> int:
     said = OnAir(arguments.recording)
     for path, write in ((arguments.pcap, write_pcap), (arguments.json, write_json)):
         if path is not None:
+            if not path.parent.is_dir():
+                raise ScmError(f"{path}: cannot be written: no folder {path.parent}")
             with path.open("wb") as stream:
                 count = write(said, stream)
             without = ("cpm",) if write is write_pcap else ()

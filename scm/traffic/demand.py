@@ -246,7 +246,8 @@ class Ways:
             if lane.startswith(f"{name}_") and lane[len(name) + 1 :].isdigit()
         )  # fmt: skip
         if not found:
-            hint = nearest(name, [*self._lanes, *self._spawns])
+            edges = {lane.rpartition("_")[0] or lane for lane in self._lanes}
+            hint = nearest(name, [*self._lanes, *self._spawns, *sorted(edges)])
             msg = f"{where}: map {self._map} has no lane or edge {name!r}{hint}"
             raise DemandError(msg)
         return found

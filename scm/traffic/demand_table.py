@@ -114,7 +114,8 @@ def _flow(row: Mapping[str, Any], where: str) -> Flow:
     told = {key: value for key, value in row.items() if value not in (None, "")}
     for key in told:
         if key not in COLUMNS:
-            raise DemandError(f"{where}: no key {key!r}{nearest(str(key), COLUMNS)}")
+            hint = nearest(str(key), COLUMNS)
+            raise DemandError(f"{where}: no key {key!r}{hint}, only {', '.join(COLUMNS)}")
     for key in COLUMNS[:3]:
         if key not in told:
             raise DemandError(f"{where}: key {key!r} is missing")
@@ -145,13 +146,19 @@ def seconds_of_day(given: object, where: str) -> float:
         DemandError: it is neither.
     """
     text = str(given)
-    if ":" not in text:
-        return _number(given, where)
+    wrong = f"{where}: expected 07:30, 07:30:15 or seconds of the day, got {text!r}"
     parts = text.split(":")
-    if len(parts) > 3 or not all(part.isdigit() for part in parts):
-        raise DemandError(f"{where}: expected 07:30, 07:30:15 or seconds, got {text!r}")
-    numbers = [int(part) for part in (*parts, "0")[:3]]
-    return float(numbers[0] * 3600 + numbers[1] * 60 + numbers[2])
+    if len(parts) == 1:
+        try:
+            return _number(given, where)
+        except DemandError as error:
+            raise DemandError(wrong) from error
+    if len(parts) > 3 or not all(part.isdecimal() for part in parts):
+        raise DemandError(wrong)
+    hours, minutes, seconds = (int(part) for part in (*parts, "0")[:3])
+    if hours > 24 or minutes > 59 or seconds > 59:
+        raise DemandError(wrong)
+    return float(hours * 3600 + minutes * 60 + seconds)
 
 
 def _number(given: object, where: str) -> float:
