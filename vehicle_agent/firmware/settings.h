@@ -27,6 +27,7 @@ constexpr float servo_centre_deg = 97.0f, servo_throw_deg = 30.0f;
 constexpr float steer_slew_per_s = 0.0f;  // of the command's range of 2; 0: as fast as it can
 
 constexpr uint16_t command_patience_ms = 250;
+constexpr float absurd_command = 10.0f;  // beyond it a command is refused and not clamped
 constexpr uint8_t telemetry_period_ms = 20;
 
 // Wheels turning forward count up; the two encoders are mounted mirrored.
