@@ -1,5 +1,5 @@
-// I2C by the ATmega's own registers. Every wait is bounded: a bus that hangs costs a millisecond per
-// call at most, and never the car.
+// I2C by the ATmega's own registers. Every wait is bounded: a bus that hangs costs a millisecond
+// per call at most, and never the car.
 #pragma once
 
 #include <Arduino.h>
