@@ -1,7 +1,6 @@
 // From commands in [-1, 1] to what the motor's driver and the servo get.
 #pragma once
 
-#include <math.h>
 #include <stdint.h>
 
 #include "settings.h"
@@ -10,6 +9,12 @@ inline float clamp_command(float value) {
   if (value > 1.0f) return 1.0f;
   if (value < -1.0f) return -1.0f;
   return value;
+}
+
+// A little too much is clamped. What is absurd or no number is no command: of the damaged frames
+// that pass rosserial's 8-bit check, nearly all that would move the car carry such a value.
+inline bool is_command(float value) {
+  return value <= settings::absurd_command && value >= -settings::absurd_command;
 }
 
 struct MotorOutput {

@@ -85,6 +85,7 @@ static void apply(const Outputs& outputs) {
 static float battery_v() {
   constexpr float volts_per_bit = settings::adc_reference_v / 1024.0f *
       (settings::battery_upper_ohm + settings::battery_lower_ohm) / settings::battery_lower_ohm;
+  if (!settings::has_battery_divider) return NAN;
   return volts_per_bit * analogRead(settings::battery_pin);
 }
 
@@ -96,9 +97,11 @@ static Readings read_all() {
 }
 
 static const uint8_t output_pins[] = {
-    settings::brake_pin,          settings::pwm_pin,          settings::direction_pin,
-    settings::tail_pin,           settings::low_beam_pin,     settings::high_beam_pin,
-    settings::reverse_pin,        settings::left_indicator_pin, settings::right_indicator_pin};
+    settings::brake_pin,    settings::pwm_pin,
+    settings::direction_pin, settings::tail_pin,
+    settings::low_beam_pin, settings::high_beam_pin,
+    settings::reverse_pin,  settings::left_indicator_pin,
+    settings::right_indicator_pin};
 static const uint8_t input_pins[] = {settings::left_a_pin, settings::left_b_pin,
                                      settings::right_a_pin, settings::right_b_pin};
 

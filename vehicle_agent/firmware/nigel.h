@@ -1,7 +1,6 @@
 // The whole car without its pins: bytes and time in, what the pins shall do and bytes out.
 #pragma once
 
-#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -87,10 +86,9 @@ class Nigel {
     float value;
     if (frame.length != sizeof value) return;
     memcpy(&value, frame.payload, sizeof value);
-    if (!isfinite(value)) return;
-    if (frame.topic == topics::steer) {
+    if (frame.topic == topics::steer && is_command(value)) {
       steer_.aim(clamp_command(value));
-    } else if (frame.topic == topics::drive) {
+    } else if (frame.topic == topics::drive && is_command(value)) {
       drive_ = clamp_command(value);
       watchdog_.feed(now_ms);
     } else if (frame.topic == topics::light) {

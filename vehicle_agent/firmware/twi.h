@@ -1,5 +1,5 @@
-// I2C by the ATmega's own registers. Every wait is bounded: a bus that hangs costs at most some
-// hundred microseconds per call, and never the car.
+// I2C by the ATmega's own registers. Every wait is bounded: a bus that hangs costs a millisecond
+// per call at most, and never the car.
 #pragma once
 
 #include <Arduino.h>
@@ -38,8 +38,8 @@ class Twi {
   }
 
  private:
-  // Let the hardware do one step and return whether it ended as `wanted`; 500 us at most, where a
-  // byte takes 23.
+  // Let the hardware do one step and return whether it ended as `wanted`; 0.7 ms at most, where a
+  // byte takes 0.023.
   static bool go(uint8_t how, uint8_t wanted, uint8_t or_else) {
     TWCR = _BV(TWINT) | _BV(TWEN) | how;
     for (uint16_t left = 700; left > 0; --left) {

@@ -119,8 +119,8 @@ def test_a_command_that_ran_out_does_not_come_back_when_the_clock_has_wrapped(ca
     assert car.step(1000 + WHEN_WRAPS + 10)["pwm"] == 0
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_no_number_is_no_command(car, bad):
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 10.5, -11.0, 3e38])
+def test_no_number_and_an_absurd_one_are_no_command(car, bad):
     car.command(DRIVE, 0.6, 0)
     car.command(STEER, 0.5, 0)
     before = car.step(0)
@@ -263,6 +263,15 @@ def test_a_command_with_any_one_bit_flipped_is_no_command(car):
         flipped[bit // 8] ^= 1 << bit % 8
         car.receive(flipped, 100 * bit)
         assert car.step(100 * bit)["pwm"] == 0, bit
+
+
+def test_of_damaged_frames_that_pass_the_check_few_move_the_car(library):
+    draw, moved = random.Random(1), 0
+    for _ in range(20_000):
+        car = Car(library)
+        car.receive(b"\xff\xfe\x04\x00\xfb\x65\x00" + draw.randbytes(5), 0)
+        moved += car.step()["brake"] == 0
+    assert moved <= 5  # one in 256 passes, and 41 would have moved it by absurd values
 
 
 def test_what_was_cut_off_is_forgotten_after_20_ms(car):

@@ -30,8 +30,8 @@ enum { HZ = 16000000, US = HZ / 1000000, MS = HZ / 1000 };
 enum { BYTE_US = 200 };  // a little slower than 57600 baud, so that simavr's own queue stays short
 enum { IMU_ADDRESS = 0x68, RAM_END = 0x8FF, HANGS_AT = 0x7000 };
 // Registers of the ATmega328P, as addresses of its data space.
-enum { DDRB = 0x24, PORTB = 0x25, PORTC = 0x28, PORTD = 0x2B, TCCR0A = 0x44, OCR0A = 0x47, SPL = 0x5D,
-       TIMSK2 = 0x70, TCCR1A = 0x80, OCR1A = 0x88, OCR2A = 0xB3, TWCR = 0xBC };
+enum { DDRB = 0x24, PORTB = 0x25, PORTC = 0x28, PORTD = 0x2B, TCCR0A = 0x44, OCR0A = 0x47,
+       SPL = 0x5D, TIMSK2 = 0x70, TCCR1A = 0x80, OCR1A = 0x88, OCR2A = 0xB3, TWCR = 0xBC };
 
 static avr_t *avr;
 static uint8_t queue[1 << 16];
