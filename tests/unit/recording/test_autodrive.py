@@ -152,6 +152,7 @@ def test_a_light_that_shows_what_is_no_state_is_told(tmp_path: Path) -> None:
         ([""], "empty"),
         (["timestamp,posX,posx"], "columns named twice: posX"),
         (["timestamp,posX"], "no row of AutoDRIVE's recorder"),
+        ([stamp_of(0) + "," * 17], "1 rows without a number"),
     ],
 )
 def test_a_file_of_something_else_is_refused(tmp_path: Path, lines: list[str], why: str) -> None:
@@ -282,6 +283,13 @@ def test_no_rows_are_made_up_in_a_gap(tmp_path: Path) -> None:
     stamps = [line[-7:-4] for line in (tmp_path / "log/V1 Log.csv").read_text().split(",,,,")]
     assert log.rows == len([k for k in range(27) if k <= 4 or k >= 24]), stamps
     assert "throttle" in log.empty
+
+
+def test_a_gap_of_a_thousand_years_costs_nothing(tmp_path: Path) -> None:
+    t = np.array([0.0, 0.1, 3e10, 3e10 + 0.1])
+    car = CarTrack("n1", {name: Series(t, t) for name in ("posX", "posY", "yaw")})
+    (log,) = write_logs(tmp_path / "log", [car], start_ms=0, rate_hz=20.0)
+    assert log.rows == 6
 
 
 def test_scans_and_pictures_are_shown_until_they_are_old(tmp_path: Path) -> None:
