@@ -123,6 +123,7 @@ BAD = [
     (row(9, timestamp="2023_13_08_10_05_59_360"), "expected a time yyyy_MM_dd_HH_mm_ss_fff"),
     (row(9)[:40], "cells, expected 18"),
     ("\0", "got 1 cells, expected 18"),
+    (row(9, posX="1\r2"), "posX: got '1\\r2', expected a number"),
     (row(9) + ",7,8", "got 20 cells, expected 18"),
 ]
 
@@ -135,7 +136,8 @@ def test_a_bad_line_is_told_and_kept_aside(tmp_path: Path, line: str, why: str) 
     assert left_out.line == 3
     assert why in left_out.why
     assert len(read_one(folder).channel("pose.x").t) == 4
-    assert line in (folder / "out/left_out.csv").read_text()
+    with (folder / "out/left_out.csv").open(newline="") as stream:
+        assert [cells[3] for cells in csv.reader(stream)] == ["text", line]
 
 
 def test_a_light_that_shows_what_is_no_state_is_told(tmp_path: Path) -> None:
