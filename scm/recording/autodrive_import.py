@@ -116,6 +116,10 @@ def import_logs(
         RecordingError: when there is nothing to read, or `out` is in use.
     """
     logs = read_logs(folder)
+    for log in logs:
+        if log.kind == "V" and not _channels(log, steering_sign, axle_m):
+            msg = f"{log.path}: {len(log.lines)} rows without a number"
+            raise RecordingError(msg)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         msg = f"{out}: is there already: a recording is never written over"
         raise RecordingError(msg)

@@ -120,19 +120,26 @@ def write_logs(
         raise RecordingError(msg)
     out.mkdir(parents=True, exist_ok=True)
     known = [car.columns["posX"].t for car in cars]
-    since_ms, until_ms = _grid_ends(known)
-    ms = since_ms + np.round(np.arange((until_ms - since_ms) * rate_hz / 1e3 + 1) * 1e3 / rate_hz)
-    ms = ms[ms <= until_ms].astype(np.int64)
+    ms = _grid_ms(known, rate_hz)
     stamps = [stamp_of(start_ms + int(at)) for at in ms]
     t: Floats = ms / 1000.0
     written = [_write_car(out, i, car, t, stamps) for i, car in enumerate(cars, start=1)]
     return written + [_write_light(out, light, t, stamps) for light in lights]
 
 
-def _grid_ends(known: Sequence[Floats]) -> tuple[int, int]:
-    """Return the first and the last whole millisecond at which a car's pose is known."""
-    first, last = min(float(t[0]) for t in known), max(float(t[-1]) for t in known)
-    return math.ceil(first * 1000.0 - 1e-6), math.floor(last * 1000.0 + 1e-6)
+def _grid_ms(known: Sequence[Floats], rate_hz: float) -> Ints:
+    """Return the stamps [ms] from the first pose on, less those at which no car is known."""
+    first_ms = math.ceil(min(float(t[0]) for t in known) * 1000.0 - 1e-6)
+    found = []
+    for t in known:
+        ends = np.flatnonzero(np.diff(t) > LONGEST_GAP_S)
+        starts = np.concatenate(([0], ends + 1))
+        for start, end in zip(t[starts], t[np.append(ends, len(t) - 1)], strict=True):
+            low = math.floor((start * 1000.0 - first_ms) * rate_hz / 1000.0) - 1
+            high = math.ceil((end * 1000.0 - first_ms) * rate_hz / 1000.0) + 1
+            found.append(first_ms + np.round(np.arange(max(low, 0), high + 1) * 1000.0 / rate_hz))
+    ms = np.unique(np.concatenate(found)).astype(np.int64)
+    return ms[np.any([_is_known(t, ms / 1000.0) for t in known], axis=0)]
 
 
 def _write_car(out: Path, number: int, car: CarTrack, t: Floats, stamps: list[str]) -> Written:

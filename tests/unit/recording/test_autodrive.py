@@ -123,6 +123,7 @@ BAD = [
     (row(9, timestamp="2023_13_08_10_05_59_360"), "expected a time yyyy_MM_dd_HH_mm_ss_fff"),
     (row(9)[:40], "cells, expected 18"),
     ("\0", "got 1 cells, expected 18"),
+    (row(9, posX="1\r2"), "posX: got '1\\r2', expected a number"),
     (row(9) + ",7,8", "got 20 cells, expected 18"),
 ]
 
@@ -135,7 +136,8 @@ def test_a_bad_line_is_told_and_kept_aside(tmp_path: Path, line: str, why: str) 
     assert left_out.line == 3
     assert why in left_out.why
     assert len(read_one(folder).channel("pose.x").t) == 4
-    assert line in (folder / "out/left_out.csv").read_text()
+    with (folder / "out/left_out.csv").open(newline="") as stream:
+        assert [cells[3] for cells in csv.reader(stream)] == ["text", line]
 
 
 def test_a_light_that_shows_what_is_no_state_is_told(tmp_path: Path) -> None:
@@ -152,6 +154,7 @@ def test_a_light_that_shows_what_is_no_state_is_told(tmp_path: Path) -> None:
         ([""], "empty"),
         (["timestamp,posX,posx"], "columns named twice: posX"),
         (["timestamp,posX"], "no row of AutoDRIVE's recorder"),
+        ([stamp_of(0) + "," * 17], "1 rows without a number"),
     ],
 )
 def test_a_file_of_something_else_is_refused(tmp_path: Path, lines: list[str], why: str) -> None:
@@ -282,6 +285,13 @@ def test_no_rows_are_made_up_in_a_gap(tmp_path: Path) -> None:
     stamps = [line[-7:-4] for line in (tmp_path / "log/V1 Log.csv").read_text().split(",,,,")]
     assert log.rows == len([k for k in range(27) if k <= 4 or k >= 24]), stamps
     assert "throttle" in log.empty
+
+
+def test_a_gap_of_a_thousand_years_costs_nothing(tmp_path: Path) -> None:
+    t = np.array([0.0, 0.1, 3e10, 3e10 + 0.1])
+    car = CarTrack("n1", {name: Series(t, t) for name in ("posX", "posY", "yaw")})
+    (log,) = write_logs(tmp_path / "log", [car], start_ms=0, rate_hz=20.0)
+    assert log.rows == 6
 
 
 def test_scans_and_pictures_are_shown_until_they_are_old(tmp_path: Path) -> None:
