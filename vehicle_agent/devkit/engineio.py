@@ -240,7 +240,8 @@ class ScriptSocket:
     def _say(self, what: str) -> None:
         if what != self._said:
             self._said = what
-            event(_log, "devkit_script", level=logging.WARNING, state=repr(what))
+            level = logging.INFO if self.is_open else logging.WARNING
+            event(_log, "devkit_script", level=level, state=repr(what))
 
     def _talk(self, connection: ClientConnection) -> str:
         """Converse until it is over; return why it is."""
