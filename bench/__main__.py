@@ -23,6 +23,7 @@ BENCHMARKS = (
 
 
 LONG = (
+    "devkit",
     "flow",
     "glosa",
     "misbehaviour",

@@ -11,13 +11,20 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 FASTEST_HZ = 250.0
 
 
+def _port(text: str) -> int:
+    if not text.isdecimal() or not 0 < int(text) < 65536:
+        msg = f"got {text!r}, expected 1 to 65535"
+        raise argparse.ArgumentTypeError(msg)
+    return int(text)
+
+
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--car", dest="cars", action="append", required=True, metavar="NAME",
         help="a car of the city to drive; the first is the script's V1, the next V2",
     )  # fmt: skip
     parser.add_argument(
-        "--script-port", type=int, default=DEFAULT_PORT, help="where it serves (%(default)s)"
+        "--script-port", type=_port, default=DEFAULT_PORT, help="where it serves (%(default)s)"
     )
     parser.add_argument("--script-host", default="127.0.0.1", help="on which host (%(default)s)")
     parser.add_argument(
@@ -25,6 +32,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="the city's router (%(default)s)",
     )  # fmt: skip
     credentials_argument(parser)
+    parser.add_argument(
+        "--name", help="of this bridge, which holds the leases: one a bridge (devkit-PORT)"
+    )
     parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
     parser.add_argument(
         "--light", dest="lights", type=int, action="append", default=[], metavar="ID",
@@ -72,7 +82,8 @@ def _run(arguments: argparse.Namespace) -> int:
         raise RunError(msg + f"{arguments.max_hz:g}")
     check_name(arguments.city, "--city")
     credentials = credentials_of(arguments)
-    name = f"devkit-{arguments.script_port}" if credentials is None else credentials.station
+    name = arguments.name or f"devkit-{arguments.script_port}"
+    name = check_name(name if credentials is None else credentials.station, "--name")
     wanted = Wanted(
         cars=tuple(arguments.cars),
         lights=tuple(arguments.lights),

@@ -51,6 +51,7 @@ class Script(Protocol):
     """The script as the bridge sees it: `ScriptSocket`, or a test's."""
 
     is_open: bool
+    failure: Exception | None
 
     @property
     def detail(self) -> str:
@@ -148,6 +149,8 @@ class DevkitPart:
         """Hear the city; send what the script wants."""
         for item in inbox:
             self._hear(item, now_ns)
+        if self._script is not None and self._script.failure is not None:
+            raise self._script.failure
         is_open = self._script is not None and self._script.is_open
         if is_open != self._was_open:
             self._open(is_open)

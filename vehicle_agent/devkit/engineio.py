@@ -13,6 +13,7 @@ up with one script: whichever starts first, and however often the script ends an
 """
 
 import contextlib
+import json
 import logging
 import socket
 import threading
@@ -138,9 +139,14 @@ class Dialogue:
 
 
 def _decoded(text: str) -> Any:
+    """Return what JSON says, NaN and Infinity allowed as Python writes them; None: it is none."""
     try:
         return msgspec.json.decode(text)
-    except (msgspec.DecodeError, UnicodeError):
+    except (msgspec.DecodeError, UnicodeError, RecursionError):
+        pass
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
         return None
 
 
@@ -159,6 +165,11 @@ class ScriptSocket:
         on_reply: Takes what the script said, and when.
         clock: Of this process.
         gap_ns: Least time between two packets; 0: as fast as the script answers.
+
+    Attributes:
+        pace: Of the conversation that runs, or of the last one.
+        is_open: Whether a script is there.
+        failure: What ended the thread: a fault of ours; None: nothing did.
     """
 
     def __init__(
@@ -175,11 +186,12 @@ class ScriptSocket:
         self._clock = clock
         self._gap_ns = gap_ns
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="devkit-script", daemon=True)
+        self._thread = threading.Thread(target=self._live, name="devkit-script", daemon=True)
         self._open: socket.socket | None = None
         self._said = ""
         self.pace = PingPong(gap_ns)
         self.is_open = False
+        self.failure: Exception | None = None
 
     def start(self) -> None:
         """Begin to look for the script."""
@@ -198,6 +210,12 @@ class ScriptSocket:
     def detail(self) -> str:
         """How it stands with the script, in words."""
         return self._said
+
+    def _live(self) -> None:
+        try:
+            self._run()
+        except Exception as cause:  # noqa: BLE001  the edge of a thread: the bridge's own one raises it
+            self.failure, self.is_open = cause, False
 
     def _run(self) -> None:
         host, port = self._address
@@ -222,7 +240,8 @@ class ScriptSocket:
     def _say(self, what: str) -> None:
         if what != self._said:
             self._said = what
-            event(_log, "devkit_script", level=logging.WARNING, state=repr(what))
+            level = logging.INFO if self.is_open else logging.WARNING
+            event(_log, "devkit_script", level=level, state=repr(what))
 
     def _talk(self, connection: ClientConnection) -> str:
         """Converse until it is over; return why it is."""

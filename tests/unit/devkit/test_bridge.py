@@ -31,6 +31,7 @@ ROTATION = {"PosZ": "0", "RotX": "0", "RotY": "0", "RotZ": "0", "RotW": "1"}
 
 class HeldScript:
     is_open = True
+    failure = None
     detail = "talks with the test"
 
 
@@ -300,6 +301,13 @@ def test_an_unknown_light_stops_the_bridge_in_words(stage):
     stage.lockstep.add(DevkitPart("d", Wanted(("n1",), lights=(9,))))
     with pytest.raises(RunError, match="--light 9: map driving_school has no such light, only 1"):
         stage.wait(0.1)
+
+
+def test_a_fault_on_the_scripts_thread_ends_the_bridge(stage):
+    stage.script.failure = ZeroDivisionError("a fault of ours")
+    with pytest.raises(ZeroDivisionError):
+        stage.wait(0.1)
+    stage.script.failure = None
 
 
 def asked(calls):

@@ -1,6 +1,7 @@
 """Both generations of the protocol, frame by frame; then a socket whose script comes and goes."""
 
 import json
+import math
 import socket
 import threading
 import time
@@ -82,9 +83,41 @@ def test_an_event_is_read_whether_it_wants_to_be_confirmed_or_not(text):
     assert opened(OLD).take(text, 0) == [{"V1 Throttle": "0.5"}]
 
 
+def test_an_event_with_a_nan_as_python_writes_it_is_an_event():
+    (told,) = opened(OLD).take('42["Bridge",{"V1 Throttle":NaN}]', 0)
+    assert math.isnan(told["V1 Throttle"])
+
+
+def test_a_fault_of_ours_on_the_thread_is_kept_for_the_other_one():
+    script = FakeScript(0)
+    ours = Ours(script.port)
+    try:
+        ours.socket._packet = lambda: 1 // 0
+        soon(lambda: ours.socket.failure is not None, "it is kept")
+        assert isinstance(ours.socket.failure, ZeroDivisionError)
+        assert not ours.socket.is_open
+    finally:
+        ours.socket.stop()
+        script.close()
+
+
 @pytest.mark.parametrize(
     "text",
-    ["", "4", "42", "42[", "42[]", '42["Bridge"]', '42["Other",{}]', "42{}", "9", "6", "x", "3"],
+    [
+        "",
+        "4",
+        "42",
+        "42[",
+        "42[]",
+        "42" + "[" * 100_000,
+        '42["Bridge"]',
+        '42["Other",{}]',
+        "42{}",
+        "9",
+        "6",
+        "x",
+        "3",
+    ],
 )
 def test_what_is_no_event_is_none_and_harms_nothing(text):
     dialogue = opened(OLD)

@@ -78,6 +78,15 @@ def told(*messages):
     return {key[3:]: value for key, value in packet(telemetry(*messages)).items()}
 
 
+def test_there_is_no_packet_before_the_lights_are_known():
+    made = Telemetry(["n1"])
+    made.welcome("n1", "nigel", load_car("nigel"))
+    made.hear(state("n1"))
+    assert made.frame() is None
+    made.show_lights([])
+    assert made.frame() is not None
+
+
 def test_every_key_is_in_the_first_packet_as_a_string():
     data = packet(telemetry())
     assert set(data) == {f"V1 {key}" for key in KEYS} | {"TL1 State", "TL2 State"}
