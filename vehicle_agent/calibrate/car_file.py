@@ -1,8 +1,10 @@
 """The given car file with the numbers that a calibration found, each with where it comes from."""
 
+import math
 from pathlib import Path
 
 from scm.errors import CarError
+from scm.mismatch.report.own_files import listed_terms
 from scm.mismatch.report.toml_text import number, quoted, set_entry, set_list
 from scm.vehicles.car import Car, load_car
 from vehicle_agent.calibrate.fit import TERMS, WIDE, Fit
@@ -24,8 +26,7 @@ def write_car(car: Car, found: Fit, path: Path, drive: str) -> Car:
     Raises:
         CarError: when the file cannot be written so that it loads again.
     """
-    have = [term.name for term in car.terms]
-    names = [*have, *(name for name in (*TERMS, *DELAYING) if name not in have)]
+    names = listed_terms(car.with_terms((*TERMS, *DELAYING)))
     text = set_list(car.path.read_text(encoding="utf-8"), "terms", names, COMMENT)
     for key, one in found.numbers.items():
         section, _, name = key.partition(".")
@@ -36,7 +37,7 @@ def write_car(car: Car, found: Fit, path: Path, drive: str) -> Car:
     path.write_text(text, encoding="utf-8")
     made = load_car(path)
     for key, one in found.numbers.items():
-        if abs(made.value(key) - one.value) > 10.0**-DIGITS * max(1.0, abs(one.value)):
+        if not math.isclose(made.value(key), one.value, rel_tol=10.0 ** (1 - DIGITS)):
             msg = f"{path}: {key}: got {made.value(key)}, expected {one.value}: written wrongly"
             raise CarError(msg)
     return made

@@ -275,8 +275,9 @@ def _told(
     values = model.values(z)
     ends = [model.values(z + way * WIDE * np.sqrt(spread.diagonal())) for way in (-1.0, 1.0)]
     found = {}
-    for n, value, low, high in zip(NUMBERS, values, *ends, strict=True):
+    for n, *numbers in zip(NUMBERS, values, *ends, strict=True):
         off = eye_delay_s if n.key in DELAYS else 0.0
-        found[n.key] = Found(max(0.0, value - off) if off else value, low - off, high - off)
+        value, low, high = (float(number) - off for number in numbers)
+        found[n.key] = Found(max(0.0, value) if off else value, low, high)
     position, _, yaw = model.stds * _rms(left)
     return Fit(found, float(position), float(yaw), len(left))
