@@ -89,7 +89,6 @@ class AgentPart:
         self._stopped = False
         self._faults: dict[str, MonitorStatus] = {}
         self._status_ns: int | None = None
-        here, own = {"receiver": name}, {"vehicle": name}
         self._on: dict[type[Message], Callable[[Incoming], list[Outgoing]]] = {
             WorldDefinition: self._on_definition,
             Presence: self._on_presence,
@@ -105,19 +104,8 @@ class AgentPart:
             LightRequest: self._on_lights,
             EyeTrack: self._on_eye,
         }
-        self.hears: Sequence[Hears] = (
-            Hears(WorldDefinition),
-            Hears(Presence, {"role": self.role, "station": name}),
-            Hears(SpatemRx, here),
-            Hears(CamRx, here),
-            Hears(DenmRx, here),
-            Hears(MonitorStatus),
-            Hears(RadioStatus),
-            Hears(CityStop),
-            Hears(Contact, own),
-            Hears(DriveCommand, own),
-            *([Hears(EyeTrack, own)] if self._body.wants_eye else []),
-        )
+        self.hears: Sequence[Hears] = self._hears()
+        own = {"vehicle": name}
         self.serves: Sequence[Serves] = (Serves(RouteRequest, own), Serves(LightRequest, own))
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -147,6 +135,22 @@ class AgentPart:
     def close(self) -> None:
         """Let go of the body, however the agent ends."""
         self._body.close()
+
+    def _hears(self) -> Sequence[Hears]:
+        here, own = {"receiver": self.name}, {"vehicle": self.name}
+        return (
+            Hears(WorldDefinition),
+            Hears(Presence, {"role": self.role, "station": self.name}),
+            Hears(SpatemRx, here),
+            Hears(CamRx, here),
+            Hears(DenmRx, here),
+            Hears(MonitorStatus),
+            Hears(RadioStatus),
+            Hears(CityStop),
+            Hears(Contact, own),
+            Hears(DriveCommand, own),
+            *([Hears(EyeTrack, own)] if self._body.wants_eye else []),
+        )
 
     def _check_losses(self, now_ns: int) -> None:
         if self._stay is None:

@@ -1,6 +1,6 @@
 """The contract of a body: what an agent drives. To add one, copy `bodies/simulated.py`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -8,6 +8,7 @@ from scm.geometry import Pose2
 from scm.maps.model import CityMap
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.eye_track import EyeTrack
+from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.lights import Switches
@@ -85,7 +86,7 @@ class Body(Protocol):
         """Return how it moves now."""
         ...
 
-    def sensors(self, vehicle: str, now_ns: int) -> list[VehicleSensors]:
+    def sensors(self, vehicle: str, now_ns: int) -> Sequence[VehicleSensors | LidarScan]:
         """Return what its own sensors have read since the last time."""
         ...
 
@@ -102,6 +103,8 @@ class Wiring:
         port: Path of its serial port.
         baud: Of this.
         calibration: Path of this very car's file; empty: it is as its kind.
+        lidar: Path of its scanner's serial port; empty: it has none.
+        lidar_kind: A file of `vehicle_agent/lidars`.
         throttle: Most throttle either way, 0 to 1, beyond the dead-band.
         fence: Corners it stays within, counter-clockwise, map frame [m]; empty: the whole floor.
     """
@@ -109,6 +112,8 @@ class Wiring:
     port: str = ""
     baud: int = 57600
     calibration: str = ""
+    lidar: str = ""
+    lidar_kind: str = "rplidar_a1"
     throttle: float = 1.0
     fence: tuple[tuple[float, float], ...] = ()
 

@@ -7,6 +7,7 @@ for what is wished, its dead-band, gains and trim, are numbers of its calibratio
 
 import logging
 import math
+from collections.abc import Sequence
 
 from scm.clock import NS_PER_MS, seconds
 from scm.errors import RunError
@@ -15,11 +16,13 @@ from scm.log import event
 from scm.maps.model import CityMap
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.eye_track import EyeTrack
+from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.lights import Switches
 from vehicle_agent.body import Body, BodyKind, Motion, Wiring
+from vehicle_agent.lidar_port import LidarPort, open_lidar
 from vehicle_agent.nigel.helm import Helm
 from vehicle_agent.nigel.host import Wish
 from vehicle_agent.nigel.undo import DEADBAND, undo_of
@@ -41,15 +44,16 @@ class NigelBody:
     Args:
         car: Its file, calibrated.
         helm: What gives wishes to the cable's keeper.
+        lidar: Its scanner; None: it has none.
     """
 
-    def __init__(self, car: Car, helm: Helm) -> None:
+    def __init__(self, car: Car, helm: Helm, lidar: LidarPort | None = None) -> None:
         self.limits = limits_of(car)
         self.wants_eye = True
         self._undo = undo_of(car, self.limits.steer_limit)
         if not self._undo.deadband:
             event(_log, "no_deadband", level=logging.WARNING, car=car.name, key=DEADBAND)
-        self._helm = helm
+        self._helm, self._lidar = helm, lidar
         self._start = Pose2(0.0, 0.0, 0.0)
         self._track: EyeTrack | None = None
         self._heard_ns = self._now_ns = 0
@@ -136,8 +140,18 @@ class NigelBody:
             source="eye",
         )
 
-    def sensors(self, vehicle: str, now_ns: int) -> list[VehicleSensors]:
-        """Return the newest telemetry where the firmware has encoders and an IMU."""
+    def sensors(self, vehicle: str, now_ns: int) -> Sequence[VehicleSensors | LidarScan]:
+        """Return the scanner's turns, and the newest telemetry of a firmware that has some."""
+        scans = [] if self._lidar is None else self._lidar.step(vehicle, now_ns)
+        return [*scans, *self._telemetry(vehicle, now_ns)]
+
+    def close(self) -> None:
+        """Have zeros sent, and let go of the cables."""
+        self._helm.close()
+        if self._lidar is not None:
+            self._lidar.close()
+
+    def _telemetry(self, vehicle: str, now_ns: int) -> list[VehicleSensors]:
         told = self._helm.told
         if told is None or told.telemetry is None or told.readings == self._readings:
             return []
@@ -155,10 +169,6 @@ class NigelBody:
                 gyro_radps=(0.0, 0.0, reading.gyro_radps),
             )
         ]
-
-    def close(self) -> None:
-        """Have zeros sent, and let go of the cable."""
-        self._helm.close()
 
     def _pose(self, now_ns: int) -> Pose2:
         """Return the last seen pose, carried forward by at most `STALE_NS`."""
@@ -188,7 +198,8 @@ def _open(car: str, seed: int, wiring: Wiring) -> Body:
     if not wiring.port:
         msg = "body nigel: no serial port given; expected a path such as /dev/ttyUSB0"
         raise RunError(msg)
-    return NigelBody(load_car(wiring.calibration or car), Helm(wiring.port, wiring.baud))
+    lidar = open_lidar(wiring.lidar, wiring.lidar_kind) if wiring.lidar else None
+    return NigelBody(load_car(wiring.calibration or car), Helm(wiring.port, wiring.baud), lidar)
 
 
 BODY = BodyKind(kind="real", open=_open)

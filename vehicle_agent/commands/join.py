@@ -15,6 +15,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--car", default="nigel", help="car file (%(default)s)")
     parser.add_argument("--spawn", default="", help="place to start at; default: any free one")
     parser.add_argument("--seed", type=int, default=0, help="of the sensors' noise (%(default)s)")
+    _real_arguments(parser)
+
+
+def _real_arguments(parser: argparse.ArgumentParser) -> None:
     real = parser.add_argument_group("a real car", "see docs/real_nigel.md")
     real.add_argument("--serial", default="", metavar="PORT", help="drive a real Nigel over it")
     real.add_argument(
@@ -25,6 +29,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         metavar="FILE",
         help="this very car's file: dead-band, gains, trim",
+    )
+    real.add_argument("--lidar", default="", metavar="PORT", help="its scanner's port")
+    real.add_argument(
+        "--lidar-kind", default="rplidar_a1", help="a file of vehicle_agent/lidars (%(default)s)"
     )
     real.add_argument(
         "--throttle-limit",
@@ -70,6 +78,8 @@ def _run(arguments: argparse.Namespace) -> int:
                 port=arguments.serial,
                 baud=arguments.baud,
                 calibration=arguments.calibration,
+                lidar=arguments.lidar,
+                lidar_kind=arguments.lidar_kind,
                 throttle=arguments.throttle_limit,
                 fence=rectangle(*arguments.fence) if arguments.fence else (),
             ),

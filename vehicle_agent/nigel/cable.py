@@ -48,10 +48,19 @@ class Opens(Protocol):
         ...
 
 
-def open_serial(path: str, baud: int) -> Port:
-    """Open a port for ourselves alone: 8 data bits, no parity, 1 stop bit, no flow control."""
-    port: Port = serial.Serial(path, baud, timeout=0, write_timeout=0, exclusive=True)
-    return port
+def open_serial(path: str, baud: int, *, dtr: bool = True) -> Port:
+    """Open a port for ourselves alone: 8 data bits, no parity, 1 stop bit, no flow control.
+
+    Args:
+        path: Of the port.
+        baud: Of the line.
+        dtr: Whether to raise DTR, which resets an Arduino.
+    """
+    port = serial.Serial(baudrate=baud, timeout=0, write_timeout=0, exclusive=True)
+    port.port, port.dtr = path, dtr
+    port.open()
+    opened: Port = port
+    return opened
 
 
 class Cable:
@@ -120,7 +129,8 @@ class Cable:
         """Close at once; what the driver could not send by now is thrown away."""
         if self._port is not None:
             with suppress(*FAILURES):
-                self._port.reset_output_buffer()
+                if not self.is_drained():
+                    self._port.reset_output_buffer()
             with suppress(*FAILURES):
                 self._port.close()
             self._port, self.trouble = None, "closed"

@@ -1,0 +1,105 @@
+"""A scanner's bytes become turns, whatever else is on the line."""
+
+import os
+import pty
+import random
+import tty
+
+import numpy as np
+import pytest
+
+from scm import registry
+from scm.clock import NS_PER_S
+from scm.errors import RunError
+from vehicle_agent.lidar import LidarKind, Turn, scan_of
+from vehicle_agent.lidar_port import LIDARS, open_lidar
+from vehicle_agent.lidars.rplidar_a1 import DESCRIPTOR, LIDAR, SCAN, STOP, RplidarA1
+
+
+def node(degrees, metres, first=False):
+    """Return one measurement of the scanner: clockwise degrees."""
+    angle, distance = round(degrees * 64) << 1 | 1, round(metres * 4000)
+    head = 15 << 2 | (1 if first else 2)
+    return bytes([head]) + angle.to_bytes(2, "little") + distance.to_bytes(2, "little")
+
+
+def turn(metres=lambda degrees: 2.0):
+    return b"".join(node(d, metres(d), d == 0) for d in range(360))
+
+
+def test_a_node_has_the_makers_bits():
+    assert node(90.0, 1.0, first=True) == bytes.fromhex("3d 01 2d a0 0f")
+
+
+def test_turns_are_whole_and_left_is_left():
+    wall = turn(lambda d: 1.0 if d == 270 else 3.0)
+    (first, second) = RplidarA1().hear(DESCRIPTOR + wall * 2 + node(0, 1, first=True))
+    assert len(first.ranges) == len(second.ranges) == 360
+    near = int(np.argmin(first.ranges))
+    assert np.degrees(first.bearings[near]) % 360.0 == 90.0
+    ranges = np.frombuffer(scan_of(first, LIDAR, "n7", 5).payload, dtype="<f4")
+    assert (ranges[90], ranges[89], ranges[270]) == (1.0, 3.0, 3.0)
+
+
+def test_no_answer_and_what_it_cannot_see_are_misses():
+    one = Turn(np.zeros(4), np.array([np.inf, 0.01, 99.0, np.nan]))
+    scan = scan_of(one, LIDAR, "n7", 5)
+    assert np.isinf(np.frombuffer(scan.payload, dtype="<f4")).all()
+    (seen, *_) = RplidarA1().hear(turn(lambda d: 0.0) + node(0, 1, first=True) * 9)
+    assert np.isinf(seen.ranges).all()
+
+
+def test_bytes_that_come_one_by_one_are_the_same_turn():
+    driver, stream = RplidarA1(), DESCRIPTOR + turn() + node(0, 2, first=True)
+    found = [one for at in range(len(stream)) for one in driver.hear(stream[at : at + 1])]
+    assert [len(one.ranges) for one in found] == [360]
+    assert driver.skipped == 0
+
+
+def test_after_rubbish_the_second_clean_turn_is_right():
+    rng = random.Random(3)
+    for _ in range(30):
+        driver = RplidarA1()
+        driver.hear(DESCRIPTOR + turn()[: rng.randrange(1800)] + rng.randbytes(rng.randrange(99)))
+        found = driver.hear(turn() * 3)
+        assert np.array_equal(found[-1].ranges, np.full(360, 2.0))
+
+
+def test_rubbish_is_never_raised_and_never_kept():
+    rng, driver = random.Random(5), RplidarA1()
+    for _ in range(500):
+        for one in driver.hear(rng.randbytes(200)):
+            assert np.all(np.isinf(one.ranges) | (one.ranges < 17.0))
+    assert driver.skipped > 50_000
+    assert len(driver._held) < 50
+
+
+@pytest.mark.parametrize("name", registry.names(LIDARS))
+def test_every_driver_keeps_the_contract(name):
+    kind = registry.load(LIDARS, name, "LIDAR", LidarKind)
+    driver = kind.open()
+    assert driver.begin()
+    assert driver.end()
+    assert list(driver.hear(b"")) == []
+    assert 0.0 < kind.range_min_m < kind.range_max_m
+
+
+def test_over_a_port_it_is_begun_read_and_ended():
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    port = open_lidar(os.ttyname(slave), "rplidar_a1")
+    assert port.step("n7", 0) == []
+    assert os.read(master, 99) == STOP + SCAN
+    os.write(master, DESCRIPTOR + turn() + node(0, 2, first=True))
+    (scan,) = port.step("n7", NS_PER_S)
+    assert (scan.vehicle, scan.beams, scan.t_ns) == ("n7", 360, NS_PER_S)
+    port.close()
+    assert os.read(master, 99) == STOP
+    os.close(master)
+    os.close(slave)
+
+
+def test_an_unknown_scanner_names_those_there_are():
+    with pytest.raises(RunError, match="rplidar_a1"):
+        open_lidar("x", "rplidar")

@@ -1,0 +1,66 @@
+"""A LIDAR on a port of its own: opened, begun, read in every step of the agent, ended."""
+
+import logging
+import threading
+from functools import partial
+
+from scm import registry
+from scm.errors import RunError
+from scm.log import event
+from scm.v2x.messages.lidar_scan import LidarScan
+from vehicle_agent.lidar import Lidar, LidarKind, scan_of
+from vehicle_agent.nigel.cable import Cable, open_serial
+
+LIDARS = "vehicle_agent.lidars"
+DRAIN_TURNS, DRAIN_S = 10, 0.005
+
+_log = logging.getLogger(__name__)
+
+
+class LidarPort:
+    """One scanner behind one port, pulled and plugged back as it likes.
+
+    Args:
+        kind: Of the scanner.
+        cable: To it.
+    """
+
+    def __init__(self, kind: LidarKind, cable: Cable) -> None:
+        self._kind, self._cable = kind, cable
+        self._driver: Lidar | None = None
+        self._opened = 0
+        self._said = ""
+
+    def step(self, vehicle: str, now_ns: int) -> list[LidarScan]:
+        """Return a message for each turn that has come; a trouble is told when it changes."""
+        if self._cable.keep_open(now_ns) and self._cable.opened != self._opened:
+            self._opened, self._driver = self._cable.opened, self._kind.open()
+            self._cable.write([self._driver.begin()])
+        data = self._cable.read()
+        if self._cable.trouble != self._said:
+            self._said = self._cable.trouble
+            event(_log, "lidar", level=logging.WARNING, trouble=self._said or "none")
+        if self._driver is None or not data:
+            return []
+        return [scan_of(turn, self._kind, vehicle, now_ns) for turn in self._driver.hear(data)]
+
+    def close(self) -> None:
+        """Stop the scanner and let go of the port."""
+        if self._driver is not None:
+            self._cable.write([self._driver.end()])
+        never = threading.Event()
+        for _ in range(DRAIN_TURNS):
+            if self._cable.is_drained():
+                break
+            never.wait(DRAIN_S)
+        self._cable.close()
+
+
+def open_lidar(port: str, kind: str) -> LidarPort:
+    """Return a scanner of a kind, a file of `vehicle_agent/lidars`, behind a port.
+
+    Raises:
+        RunError: when there is no such kind.
+    """
+    found = registry.load(LIDARS, kind, "LIDAR", LidarKind, RunError)
+    return LidarPort(found, Cable(port, found.baud, partial(open_serial, dtr=found.dtr)))
