@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--name", required=True, help="of the vehicle, as the Eye calls it")
+    parser.add_argument("--name", required=True, help="as the Eye calls it: n1, or tag-7")
     parser.add_argument("--connect", required=True, metavar="ENDPOINT", help="the city's router")
     credentials_argument(parser)
     parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
@@ -81,6 +81,7 @@ def _limits(arguments: argparse.Namespace) -> "GuardLimits":
     from vehicle_agent.guard import GuardLimits, rectangle
 
     own = limits_of(load_car(arguments.car))
+    of_nobody = arguments.name.startswith("tag-")
     return GuardLimits(
         rectangle(*arguments.floor),
         throttle=arguments.speed_limit,
@@ -89,6 +90,7 @@ def _limits(arguments: argparse.Namespace) -> "GuardLimits":
         front_m=own.front,
         rear_m=own.rear,
         width_m=own.width,
+        harmless=frozenset({"unknown"} if of_nobody else ()),
     )
 
 

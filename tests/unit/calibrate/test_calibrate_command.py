@@ -63,6 +63,14 @@ def test_the_limits_are_the_cars_own(bodies):
     assert limits.fence == ((0.0, 0.0), (2.0, 0.0), (2.0, 1.5), (0.0, 1.5))
 
 
+def test_a_tag_that_belongs_to_nobody_may_be_meant(bodies):
+    from vehicle_agent.__main__ import build_parser
+
+    for name, harmless in (("n7", set()), ("tag-7", {"unknown"})):
+        arguments = build_parser().parse_args([*ARGUMENTS, *FLOOR, "--name", name])
+        assert calibrate._limits(arguments).harmless == harmless
+
+
 def test_a_floor_of_no_size_is_refused(bodies, tmp_path, capsys):
     assert main([*ARGUMENTS, "--floor", "0", "0", "0", "1", "--out", str(tmp_path)]) == 2
     assert "expected a convex polygon" in capsys.readouterr().err
