@@ -1,10 +1,11 @@
 """From the pins to the floor: what servo and motor make of the pins, and the kernel of that.
 
-    throttle = duty - clip(duty, 0, deadband), with the sign of DIR; 0 with BRK
+    throttle = duty - clip(duty, 0, deadband), with the sign of DIR
     steering = mean road-wheel angle / greatest one
 
 The dead-band's law is that of the effect `drive_deadband`. Nothing turns the 120:1 gears from
-outside, so a motor that is off holds the car with and without BRK, as the paper says.
+outside, so a motor that is off holds the car, as the paper says, with BRK (which comes with PWM 0)
+and without.
 """
 
 import math
@@ -18,8 +19,6 @@ from vehicle_agent.emulate.sketches import DEADBAND, Outputs
 
 def throttle_of(pins: Outputs, deadband: float) -> float:
     """Return what is left of the motor's command, -1 to 1, + forward."""
-    if pins.brake:
-        return 0.0
     live = pins.duty - min(pins.duty, deadband)
     return -live if pins.reverse else live
 
