@@ -65,6 +65,11 @@ def test_after_rubbish_the_second_clean_turn_is_right():
         assert np.array_equal(found[-1].ranges, np.full(360, 2.0))
 
 
+def test_a_turn_that_was_joined_in_its_middle_is_not_told():
+    found = RplidarA1().hear(turn()[500:] + turn() * 2)
+    assert [len(one.ranges) for one in found] == [360]
+
+
 def test_rubbish_is_never_raised_and_never_kept():
     rng, driver = random.Random(5), RplidarA1()
     for _ in range(500):
