@@ -41,6 +41,7 @@ from vehicle_agent.nigel.telemetry import (
     FLOATS,
     FLOATS_MD5,
     Telemetry,
+    carried_on,
     telemetry_of,
     unpack_floats,
 )
@@ -203,7 +204,8 @@ class Host:
                 value = unpack_float(frame.payload)
                 self.battery_v = value if math.isfinite(value) else None
             elif frame.topic == self._topics.get("telemetry"):
-                self.telemetry = telemetry_of(unpack_floats(frame.payload))
+                told = telemetry_of(unpack_floats(frame.payload))
+                self.telemetry = carried_on(told, self.telemetry)
                 self.readings += 1
                 self._telemetry_ns = now_ns
         except MessageError:

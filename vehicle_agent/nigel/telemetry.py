@@ -3,7 +3,7 @@
 import math
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scm.errors import MessageError
 
@@ -12,6 +12,7 @@ FLOATS_MD5 = "6a40e0ffa6a17a503ac3f8616991b1f6"
 
 VALUES = 8
 _LARGEST_TICKS = 2**31
+_WRAP = 2**24  # of the counts: as many whole numbers as a float32 tells apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,3 +73,14 @@ def telemetry_of(values: Sequence[float]) -> Telemetry:
         raise MessageError(msg)
     left, right, gyro, ax, ay, volts, version, age_ms = values[:VALUES]
     return Telemetry(int(left), int(right), gyro, (ax, ay), volts, version, age_ms)
+
+
+def carried_on(reading: Telemetry, before: Telemetry | None) -> Telemetry:
+    """Return a reading whose counts go on from those before, where the firmware's have wrapped."""
+    if before is None:
+        return reading
+    left, right = (
+        old + (new - old + _WRAP // 2) % _WRAP - _WRAP // 2
+        for new, old in ((reading.left, before.left), (reading.right, before.right))
+    )
+    return replace(reading, left=left, right=right)
