@@ -122,7 +122,7 @@ def test_each_reply_is_one_command_and_a_slow_script_keeps_its_car_going(stage):
 
 
 def test_a_script_that_is_silent_for_a_second_stops_its_car_and_keeps_it(stage):
-    stage.say(1.0, V1_Throttle=0.6, V1_Steering=0.3)
+    stage.say(1.0, V1_Throttle=0.6, V1_Steering=1)
     assert stage.wait(0.8).speed_mps > 0.1
     car = stage.wait(1.5)
     assert car.speed_mps == pytest.approx(0.0, abs=0.01)
@@ -329,6 +329,7 @@ def test_wishes_of_lights_are_made_renewed_and_taken_back():
     assert asked(heads.step(10_000_000_002, [3, 0, 1])) == [
         ("clear", ("b",)), ("omit", ("a",)), ("force_off", ("a",)),
     ]  # fmt: skip
+    assert heads.step(10_000_000_003, [1, 0, 3]) == []
     assert asked(heads.release()) == [("clear", ("a",))]
     assert heads.release() == []
 

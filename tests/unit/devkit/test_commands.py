@@ -70,10 +70,10 @@ POSE = {"CoSim": "1", "PosX": "1.5", "PosY": "-2", "PosZ": "0", "RotX": "0", "Ro
 POSE = {f"V1 {key}": value for key, value in POSE.items()}
 
 
-def test_cosim_is_a_pose_of_a_quaternion():
-    half = math.sqrt(0.5)
-    wish = car({**POSE, "V1 RotZ": str(half), "V1 RotW": str(half)})
-    assert wish.pose == pytest.approx((1.5, -2.0, math.pi / 2))
+@pytest.mark.parametrize("yaw", [0.5, -2.5])
+def test_cosim_is_a_pose_of_a_quaternion(yaw):
+    more = {"V1 RotZ": str(math.sin(yaw / 2)), "V1 RotW": str(math.cos(yaw / 2))}
+    assert car({**POSE, **more}).pose == pytest.approx((1.5, -2.0, yaw))
 
 
 def test_cosim_zero_is_no_pose():

@@ -158,10 +158,18 @@ def test_the_quaternion_turns_about_z_then_y_then_x():
     half = math.sqrt(0.5)
     assert quaternion((math.pi / 2, 0.0, 0.0)) == pytest.approx((half, 0.0, 0.0, half))
     assert quaternion((0.0, 0.0, math.pi / 2)) == pytest.approx((0.0, 0.0, half, half))
-    # Pitch first about y, then yaw: forward (x) ends up looking down, not sideways.
-    x, y, z, w = quaternion((0.0, math.pi / 2, math.pi / 2))
-    forward = (1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w))
-    assert forward == pytest.approx((0.0, 0.0, -1.0), abs=1e-12)
+    # Roll first, pitch then, yaw last: three turns in a row are one turn by the quaternion.
+    angles = (0.3, -0.4, 1.1)
+    x, y, z, w = quaternion(angles)
+    turned = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    roll, pitch, yaw = (cv2.Rodrigues(np.eye(3)[k] * angles[k])[0] for k in range(3))
+    np.testing.assert_allclose(turned, yaw @ pitch @ roll, atol=1e-12)
 
 
 def test_what_is_no_number_is_zero():
