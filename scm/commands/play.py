@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 
 from scm.command import Command, credentials_argument, credentials_of
+from scm.errors import RunError
 
 NAME = "played"
 
@@ -35,6 +36,9 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.world.part import WorldPart
 
+    if arguments.vehicle and not arguments.connect:
+        msg = f"--vehicle {arguments.vehicle}: only a running city has such a car: --connect ROUTER"
+        raise RunError(msg)
     drive, rows = read_drive(arguments.drive)
     beside = arguments.drive.parent / drive.car
     car = arguments.car or (str(beside) if beside.is_file() else drive.car)

@@ -17,6 +17,7 @@ from scm.v2x.message import Delivery, Message, Request, decode, encode, is_bulk
 PACKAGE = "scm.v2x.messages"
 
 PLAIN_NUMBERS = {
+    "likely_confidence": "a share",
     "seq": "a count",
     "epoch": "a count",
     "tick": "a count",

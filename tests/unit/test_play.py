@@ -156,3 +156,9 @@ def test_a_table_without_a_course_of_time_is_refused(tmp_path, rows):
         read_drive(tmp_path / "none.yaml")
     with pytest.raises(ScmError, match=r"a\.csv"):
         read_drive(tmp_path / "drive.yaml")
+
+
+def test_a_car_of_a_running_city_is_refused_where_no_city_is_named(tmp_path, capsys):
+    drive = str(tmp_path / "drive.yaml")
+    assert main(["play", drive, "--vehicle", "n3"]) != 0
+    assert "--vehicle n3: only a running city has such a car" in capsys.readouterr().err

@@ -1,6 +1,6 @@
 """Signal phase and timing of a junction, native form: colours and promised change times."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import msgspec
 
@@ -28,7 +28,7 @@ class SignalGroup(msgspec.Struct, kw_only=True, frozen=True):
     max_end_ns: int | None = None
     next_colour: Colour | None = None
     likely_end_ns: int | None = None
-    likely_confidence: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] | None = None
+    likely_confidence: float | None = None
 
 
 class Spat(Message, kw_only=True, frozen=True):

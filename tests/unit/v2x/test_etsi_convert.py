@@ -237,6 +237,13 @@ def test_confidence_is_the_class_that_promises_no_more(share, number, read):
     assert ec.colours_of(body)[1].likely_confidence == read
 
 
+def test_a_likely_end_that_is_the_earliest_one_is_so_on_the_air():
+    spat = a_spat(min_end_ns=NOW + 1_050_000_000)
+    group = replace(spat.groups[0], likely_end_ns=NOW + 1_050_000_000, likely_confidence=1.0)
+    told = ec.spatem_of(replace(spat, groups=(group,)), JUNCTION).states[0]
+    assert (told.min_end_time, told.likely_time) == (1860, 1860)
+
+
 def test_who_foresees_nothing_sends_no_likely_end():
     timing = ec.spatem_of(a_spat(), JUNCTION).states[0].state_time_speed[0].timing
     assert (timing.likely_time, timing.confidence) == (None, None)
