@@ -106,6 +106,7 @@ class Wiring:
         lidar: Path of its scanner's serial port; empty: it has none.
         lidar_kind: A file of `vehicle_agent/lidars`.
         throttle: Most throttle either way, 0 to 1, beyond the dead-band.
+        raw: Whether commands go to the wheels as they are, nothing of its file undone.
         fence: Corners it stays within, counter-clockwise, map frame [m]; empty: the whole floor.
     """
 
@@ -115,6 +116,7 @@ class Wiring:
     lidar: str = ""
     lidar_kind: str = "rplidar_a1"
     throttle: float = 1.0
+    raw: bool = False
     fence: tuple[tuple[float, float], ...] = ()
 
 

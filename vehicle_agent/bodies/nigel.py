@@ -25,7 +25,7 @@ from vehicle_agent.body import Body, BodyKind, Motion, Wiring
 from vehicle_agent.lidar_port import LidarPort, open_lidar
 from vehicle_agent.nigel.helm import Helm
 from vehicle_agent.nigel.host import Wish
-from vehicle_agent.nigel.undo import DEADBAND, undo_of
+from vehicle_agent.nigel.undo import DEADBAND, Undo, undo_of
 
 STALE_NS = 300 * NS_PER_MS
 LIFTED_M = 0.25
@@ -45,13 +45,16 @@ class NigelBody:
         car: Its file, calibrated.
         helm: What gives wishes to the cable's keeper.
         lidar: Its scanner; None: it has none.
+        raw: Whether commands go to the wheels as they are.
     """
 
-    def __init__(self, car: Car, helm: Helm, lidar: LidarPort | None = None) -> None:
+    def __init__(
+        self, car: Car, helm: Helm, lidar: LidarPort | None = None, *, raw: bool = False
+    ) -> None:
         self.limits = limits_of(car)
         self.wants_eye = True
-        self._undo = undo_of(car, self.limits.steer_limit)
-        if not self._undo.deadband:
+        self._undo = Undo() if raw else undo_of(car, self.limits.steer_limit)
+        if not (raw or self._undo.deadband):
             event(_log, "no_deadband", level=logging.WARNING, car=car.name, key=DEADBAND)
         self._helm, self._lidar = helm, lidar
         self._start = Pose2(0.0, 0.0, 0.0)
@@ -199,7 +202,8 @@ def _open(car: str, seed: int, wiring: Wiring) -> Body:
         msg = "body nigel: no serial port given; expected a path such as /dev/ttyUSB0"
         raise RunError(msg)
     lidar = open_lidar(wiring.lidar, wiring.lidar_kind) if wiring.lidar else None
-    return NigelBody(load_car(wiring.calibration or car), Helm(wiring.port, wiring.baud), lidar)
+    helm = Helm(wiring.port, wiring.baud)
+    return NigelBody(load_car(wiring.calibration or car), helm, lidar, raw=wiring.raw)
 
 
 BODY = BodyKind(kind="real", open=_open)

@@ -3,11 +3,13 @@
 hear -> move the body up to now -> pattern -> guard -> guard of the real car -> body -> record
 
 The car does not join the city: put it on a floor where nothing else drives. The pattern waits while
-a guard lets nothing through for want of a pose or because of the city-wide stop.
+a guard lets nothing through for want of a pose or because of the city-wide stop, and while the
+body is unfit to move. A car that was carried away goes on where it was put, with another leg.
 """
 
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.geometry import Pose2
@@ -33,6 +35,7 @@ class CalibrationPart:
         recorded: What was commanded and seen.
         done: Set when the pattern is over.
         guard: Of the real car: why it was held up, and how often.
+        unfit: Why the body must not move, in words; empty: it may.
     """
 
     role = "v"
@@ -47,6 +50,7 @@ class CalibrationPart:
         self.recorded = Recorded()
         self.done = done or threading.Event()
         self.guard = RealGuard(limits)
+        self.unfit = ""
         self._body = body
         self._commander = Guard(1)
         self._pattern = Pattern(limits)
@@ -65,6 +69,9 @@ class CalibrationPart:
             elif isinstance(item.message, CityStop):
                 self._commander.stop(item.message.engaged)
         self._body.advance(now_ns)
+        self.unfit = self._body.unfit(now_ns)
+        if self._body.was_lifted():
+            self._pattern.give_up(seconds(now_ns - self._paused_ns))
         passed = self._command(now_ns)
         self._body.command(passed.throttle, passed.steering)
         if self._track is not None:
@@ -76,8 +83,14 @@ class CalibrationPart:
         self._body.command(0.0, 0.0)
         return []
 
+    def close(self) -> None:
+        """Let go of the body, however the drive ends."""
+        self._body.close()
+
     def _see(self, track: EyeTrack, now_ns: int) -> None:
         self.guard.see(track, now_ns)
+        if self._body.wants_eye:
+            self._body.see(track, now_ns)
         self._track = track
         if not track.stale:
             self.recorded.seen(track)
@@ -95,13 +108,13 @@ class CalibrationPart:
         )
         self._commander.take(command, now_ns)
         passed = self.guard.pass_on(self._commander.output(now_ns), now_ns)
-        self._waits = not WAITS.isdisjoint(passed.reasons)
-        return passed
+        self._waits = bool(self.unfit) or not WAITS.isdisjoint(passed.reasons)
+        return replace(passed, throttle=0.0, steering=0.0) if self.unfit else passed
 
     def _wish(self, now_ns: int) -> tuple[float, float]:
         since_ns = 0 if self._now_ns is None else now_ns - self._now_ns
         self._now_ns = now_ns
-        if self._waits or self._track is None:
+        if self._waits or self.unfit or self._track is None:
             self._paused_ns += since_ns
             return 0.0, 0.0
         pose = Pose2(self._track.x_m, self._track.y_m, self._track.yaw_rad)
@@ -114,7 +127,8 @@ class CalibrationPart:
         if self._status_ns is not None and now_ns - self._status_ns < NS_PER_S:
             return []
         self._status_ns = now_ns
-        why = f" ({', '.join(passed.reasons)})" if self._waits else ""
+        reasons = [self.unfit] if self.unfit else passed.reasons
+        why = f" ({', '.join(reasons)})" if self._waits else ""
         doing = f"waits{why}" if self._waits else f"{100.0 * self._pattern.progress:.0f} % driven"
         detail = f"calibrates: {doing}; held up: {self.guard.told or 'never'}"
         return [PartStatus(station=self.name, t_ns=now_ns, detail=detail)]

@@ -68,6 +68,10 @@ class Pattern:
             return 0.0, steering
         return leg.throttle, steering
 
+    def give_up(self, t_s: float) -> None:
+        """End the leg: the car is not where it drove to [s]."""
+        self._leg, self._ended_s = None, t_s
+
     def _begin(self, pose: Pose2, t_s: float) -> bool:
         self._levels = [legs for legs in self._levels if legs]
         if not self._levels:

@@ -8,18 +8,28 @@ from typing import TYPE_CHECKING
 from scm.command import Command, credentials_argument, credentials_of
 
 if TYPE_CHECKING:
+    from vehicle_agent.body import Body
     from vehicle_agent.calibrate.fit import Fit
     from vehicle_agent.calibrate.part import CalibrationPart
     from vehicle_agent.guard import GuardLimits
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--name", required=True, help="as the Eye calls it: n1, or tag-7")
+    parser.add_argument(
+        "--name", required=True,
+        help="of the vehicle, as the Eye calls it: tag-ID where it has not joined the city",
+    )  # fmt: skip
     parser.add_argument("--connect", required=True, metavar="ENDPOINT", help="the city's router")
     credentials_argument(parser)
     parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
     parser.add_argument("--car", default="nigel", help="car file to begin with (%(default)s)")
-    parser.add_argument("--body", default="simulated", help="kind of body (%(default)s)")
+    parser.add_argument("--serial", default="", metavar="PORT", help="drive a real Nigel over it")
+    parser.add_argument(
+        "--baud", type=int, default=57600, help="of the port; a 4WD Nigel's Mega: 115200"
+    )
+    parser.add_argument(
+        "--body", default="", help="kind of body; default: nigel with --serial, else simulated"
+    )
     parser.add_argument(
         "--floor", nargs=4, type=float, required=True, metavar=("X0", "Y0", "X1", "Y1"),
         help="two corners of a free rectangle, map frame [m]: the car's outline stays inside",
@@ -44,35 +54,45 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from scm import registry
     from scm.clock import WallClock
-    from scm.errors import RunError
     from scm.live import run, stop_on_signal
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name
     from scm.vehicles.car import load_car
-    from vehicle_agent.agent import BODIES
-    from vehicle_agent.body import BodyKind
     from vehicle_agent.calibrate.part import CalibrationPart
 
     check_name(arguments.name, "--name")
     check_name(arguments.city, "--city")
     out = arguments.out or Path("runs") / f"calibrate-{arguments.name}"
     car = load_car(arguments.car)
-    body = registry.load(BODIES, arguments.body, "BODY", BodyKind, RunError).open(arguments.car, 0)
     limits = _limits(arguments)
     credentials = credentials_of(arguments, arguments.name)
     wish, clock = stop_on_signal(), WallClock()
-    part = CalibrationPart(arguments.name, body, limits, wish)
     with ZenohBus(
         arguments.city, arguments.name, arguments.connect, clock=clock, credentials=credentials
     ) as bus:
-        print(f"waits for the Eye to see {arguments.name}; Ctrl-C ends the drive", flush=True)
-        run(part, bus, clock, wish)
+        part = CalibrationPart(arguments.name, _body(arguments), limits, wish)
+        try:
+            print(f"waits for the Eye to see {arguments.name}; Ctrl-C ends the drive", flush=True)
+            run(part, bus, clock, wish)
+        finally:
+            part.close()
     drive = out / "drive"
     part.recorded.write(drive, car.name)
     print(_said(part, drive))
     return _fit(arguments, part, out)
+
+
+def _body(arguments: argparse.Namespace) -> "Body":
+    from scm import registry
+    from scm.errors import RunError
+    from vehicle_agent.agent import BODIES
+    from vehicle_agent.body import BodyKind, Wiring
+
+    name = arguments.body or ("nigel" if arguments.serial else "simulated")
+    kind = registry.load(BODIES, name, "BODY", BodyKind, RunError)
+    wiring = Wiring(port=arguments.serial, baud=arguments.baud, raw=True)
+    return kind.open(arguments.car, 0, wiring)
 
 
 def _limits(arguments: argparse.Namespace) -> "GuardLimits":

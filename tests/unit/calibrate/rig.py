@@ -75,6 +75,8 @@ def drawn(seed, **eye):
 class HiddenBody:
     """The kernel's car, with its hidden numbers; it obeys each command exactly so much later."""
 
+    wants_eye = is_closed = False
+
     def __init__(self, hidden, pose):
         numbers = {k: v for k, v in hidden.numbers.items() if k not in DELAYS}
         self.fleet = Fleet(load_car("nigel").with_terms(TERMS, numbers), 1)
@@ -93,6 +95,18 @@ class HiddenBody:
             self.fleet.advance(seconds(EXACT_NS))
             self._now_ns += EXACT_NS
         self._now_ns = now_ns
+
+    def see(self, track, now_ns):
+        raise AssertionError("it does not want the Eye")
+
+    def was_lifted(self):
+        return False
+
+    def unfit(self, now_ns):
+        return ""
+
+    def close(self):
+        self.is_closed = True
 
     def command(self, throttle, steering):
         for (_, _, told), value in zip(self._obeyed, (throttle, steering), strict=True):

@@ -9,7 +9,7 @@ from scm.v2x import bus_zenoh
 from scm.vehicles.car import load_car
 from tests.unit.calibrate.rig import START, Eye, Hidden, HiddenBody, drive
 from vehicle_agent.__main__ import main
-from vehicle_agent.body import BodyKind
+from vehicle_agent.body import BodyKind, Wiring
 from vehicle_agent.commands import calibrate
 
 ARGUMENTS = ("calibrate", "--name", "n7", "--connect", "tcp/127.0.0.1:1")
@@ -19,15 +19,19 @@ FLOOR = ("--floor", "2", "1.5", "0", "0")
 @pytest.fixture
 def bodies(monkeypatch):
     """Let a car with hidden numbers be the body, under an Eye, in virtual time."""
-    made = []
+    made, name_of_body = [], ""
 
     def load(package, name, *more):
+        nonlocal name_of_body
         if package != "vehicle_agent.bodies":
             return loaded(package, name, *more)
-        return BodyKind(kind="real", open=lambda *_: made.append(opened()) or made[-1])
+        name_of_body = name
+        return BodyKind(kind="real", open=opened)
 
-    def opened():
-        return HiddenBody(Hidden(), START)
+    def opened(car, seed, wiring):
+        made.append(HiddenBody(Hidden(), START))
+        made[-1].wired = name_of_body, wiring
+        return made[-1]
 
     def run(part, _bus, _clock, _stop):
         drive(part, made[0], Eye(Hidden()), part.guard._limits)
@@ -50,6 +54,20 @@ def test_it_drives_writes_the_drive_and_the_car_and_says_what_it_found(bodies, t
     said = capsys.readouterr().out
     assert "  drive.deadband" in said
     assert "the guard held the car up: pose 1" in said
+    assert bodies[0].wired == ("simulated", Wiring(raw=True))
+    assert bodies[0].is_closed
+
+
+@pytest.mark.parametrize("cause", [RuntimeError, KeyboardInterrupt])
+def test_a_real_car_is_let_go_of_however_the_drive_ends(bodies, monkeypatch, cause):
+    def fails(*_):
+        raise cause
+
+    monkeypatch.setattr(live, "run", fails)
+    with pytest.raises(cause):
+        main([*ARGUMENTS, *FLOOR, "--serial", "/dev/ttyUSB7", "--baud", "115200"])
+    assert bodies[0].wired == ("nigel", Wiring(port="/dev/ttyUSB7", baud=115200, raw=True))
+    assert bodies[0].is_closed
 
 
 def test_the_limits_are_the_cars_own(bodies):
@@ -59,6 +77,7 @@ def test_the_limits_are_the_cars_own(bodies):
     limits = calibrate._limits(build_parser().parse_args([*ARGUMENTS, *FLOOR, *more]))
     assert (limits.throttle, limits.top_speed_mps) == (0.5, 0.4)
     assert (limits.front_m, limits.rear_m, limits.width_m) == pytest.approx((0.42, 0.08, 0.27))
+    assert limits.harmless == {"unknown"}
     assert limits.curvature_per_m == pytest.approx(0.5774 / 0.324, rel=1e-3)
     assert limits.fence == ((0.0, 0.0), (2.0, 0.0), (2.0, 1.5), (0.0, 1.5))
 
