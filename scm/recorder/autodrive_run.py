@@ -21,8 +21,7 @@ from scm.errors import CarError, RecordingError
 from scm.maps.model import Light
 from scm.recorder.mcap_file import Recorded, read_keys, read_run
 from scm.recording.autodrive import ACCELERATION, GREEN, OFF, RATES, RED, YELLOW
-from scm.recording.autodrive_write import BEAMS, CarTrack, LightTrack, Series
-from scm.recording.units import G
+from scm.recording.autodrive_write import CarTrack, LightTrack, Series
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.eye_track import EyeTrack
@@ -32,6 +31,7 @@ from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
+from scm.vehicles.autodrive_senses import BEAMS, ranges_of, without_gravity
 from scm.vehicles.car import Car, load_car
 
 SIMULATED, EYE, REAL = "simulated", "eye", "real"
@@ -205,7 +205,7 @@ class _Car:
     def track(self) -> CarTrack:
         """Return the car by the recorder's columns."""
         columns = self._poses() | self._commands() | self._sensed()
-        scans = [(one.t_ns, _ranges(one)) for one in self._heard.scans]
+        scans = [(one.t_ns, ranges_of(one)) for one in self._heard.scans]
         return CarTrack(
             self._name,
             columns,
@@ -282,7 +282,7 @@ class _Car:
         for k, name in enumerate(("roll", "pitch")):
             tilt = self._series([(one.t_ns, rpy[k]) for one, rpy in level])
             columns[name] = tilt._replace(values=np.unwrap(tilt.values))
-        felt = [(one.t_ns, _without_gravity(one.accel_mps2, rpy)) for one, rpy in level]
+        felt = [(one.t_ns, without_gravity(one.accel_mps2, rpy)) for one, rpy in level]
         for k, name in enumerate(ACCELERATION):
             columns[name] = self._series([(t_ns, accel[k]) for t_ns, accel in felt])
         return columns
@@ -294,30 +294,6 @@ def _car_of(car: str, name: str, notes: list[str]) -> Car | None:
     except CarError as problem:
         notes.append(f"{name}: {problem}")
         return None
-
-
-def _without_gravity(
-    accel: tuple[float, float, float], rpy: tuple[float, float, float]
-) -> tuple[float, float, float]:
-    """Return an acceleration on the body's axes without what gravity adds at rest [m/s^2]."""
-    roll, pitch, _ = rpy
-    return (
-        accel[0] + G * math.sin(pitch),
-        accel[1] - G * math.cos(pitch) * math.sin(roll),
-        accel[2] - G * math.cos(pitch) * math.cos(roll),
-    )
-
-
-def _ranges(scan: LidarScan) -> Floats:
-    """Return a range for every degree from straight ahead to the left; infinite: no beam, miss."""
-    ranges = np.frombuffer(scan.payload[: len(scan.payload) // 4 * 4], "<f4").astype(np.float64)
-    if not len(ranges):
-        return np.full(BEAMS, np.inf)
-    step = scan.bearing_step_rad or math.tau / len(ranges)
-    wanted = np.arange(BEAMS) * math.tau / BEAMS
-    turn = (math.copysign(1.0, step) * (wanted - scan.bearing_first_rad)) % math.tau
-    beam = np.round(turn / abs(step)).astype(np.int64) % max(round(math.tau / abs(step)), 1)
-    return np.where(beam < len(ranges), ranges[np.minimum(beam, len(ranges) - 1)], np.inf)
 
 
 def _state(colour: str, t_ns: int) -> int:

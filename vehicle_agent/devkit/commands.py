@@ -20,7 +20,8 @@ from typing import Any, Literal
 from scm.log import event
 from scm.vehicles.lights import Headlights, Indicators
 
-MOST_TOLD = 100
+MOST_STRANGE = 100
+MOST_SHOWN = 40
 Sign = Literal["left", "right"]
 _HEADLIGHTS: tuple[Headlights, ...] = ("off", "low", "high")
 _INDICATORS: tuple[Indicators, ...] = ("off", "left", "right", "hazard")
@@ -72,8 +73,9 @@ class Commands:
         self._cars = cars
         self._sign = 1.0 if sign == "left" else -1.0
         self._steering = [0.0] * cars
-        self._keys: frozenset[str] = frozenset()
+        self._keys = hash(frozenset[str]())
         self._told: set[str] = set()
+        self._strange = 0
         self.lights = 0
 
     @property
@@ -87,9 +89,9 @@ class Commands:
             self._complain(f"a reply is {type(data).__name__}, expected an object of keys")
             data = {}
         keys = frozenset(str(key) for key in data)
-        if keys != self._keys:
+        if hash(keys) != self._keys:
             self._check_keys(keys)
-            self._keys = keys
+            self._keys = hash(keys)
         said = {str(key): value for key, value in data.items()}
         return Wishes(
             tuple(self._car(said, number) for number in range(self._cars)),
@@ -106,10 +108,10 @@ class Commands:
             if key in _NOT_CARRIED:
                 self._complain(f"{key!r}: not carried, the city has no such thing")
             elif what in known and name not in known[what]:
-                self._complain(f"{key!r}: not known, expected one of {', '.join(_OF_CAR)}")
+                self._complain_strange(key, f"not known, expected one of {', '.join(_OF_CAR)}")
             elif what not in known and not self._is_light(key):
                 here = f"V1 to V{self._cars}, TL1 to TL{self.lights}"
-                self._complain(f"{key!r}: nothing here is called so, only {here}")
+                self._complain_strange(key, f"nothing here is called so, only {here}")
 
     def _is_light(self, key: str) -> bool:
         return key in {f"TL{n} State" for n in range(1, self.lights + 1)}
@@ -151,12 +153,14 @@ class Commands:
     def _number(self, said: Mapping[str, Any], key: str) -> float | None:
         if key not in said:
             return None
+        value = said[key]
         try:
-            number = float(said[key])
+            number = float(value)
         except (TypeError, ValueError, OverflowError):
             number = math.nan
         if not math.isfinite(number):
-            self._complain(f"{key}: got {str(said[key])[:40]!r}, expected a number")
+            got = repr(value[:MOST_SHOWN]) if isinstance(value, str) else type(value).__name__
+            self._complain(f"{key}: got {got}, expected a number")
             return None
         return number
 
@@ -179,14 +183,22 @@ class Commands:
             return None
         return int(number)
 
-    def _complain(self, what: str) -> None:
+    def _complain_strange(self, key: str, why: str) -> None:
+        """Tell of a key that nobody knows, cut; there may be no end of them."""
+        if self._strange < MOST_STRANGE:
+            self._strange += self._complain(f"{key[:MOST_SHOWN]!r}: {why}")
+
+    def _complain(self, what: str) -> bool:
+        """Tell it once; return whether it is new."""
         where = what.partition(": got")[0]
-        if where not in self._told and len(self._told) < MOST_TOLD:
+        is_new = where not in self._told
+        if is_new:
             self._told.add(where)
             event(_log, "devkit_command", level=logging.WARNING, why=repr(what))
+        return is_new
 
 
 def _is_yes(value: Any) -> bool:
     if isinstance(value, int | float):
         return value == 1
-    return str(value).strip().lower() in _YES
+    return isinstance(value, str) and value.strip().lower() in _YES

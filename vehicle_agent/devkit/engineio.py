@@ -4,6 +4,8 @@
     0{"sid": ...}           Engine.IO: welcome              server                  server
     40                      Socket.IO: connected            server, unasked         asked by ours
     42["Bridge", {...}]     an event                        both                    both
+    4217["Bridge", {...}]   one that wants to be confirmed  ours                    ours
+    4317[...]               its handler has returned        server                  server
     2, answered by 3        still there?                    client asks             server asks
     41, 1                   leaves                          server                  server
     44...                   refuses                         server                  server
@@ -22,7 +24,7 @@ from typing import Any
 
 import msgspec
 from websockets.exceptions import WebSocketException
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection, reconnect
 
 from scm.clock import NS_PER_MS, NS_PER_S, Clock, seconds
 from scm.log import event
@@ -35,6 +37,9 @@ ASK_AFTER_NS = 200 * NS_PER_MS
 JOIN_WITHIN_NS = 5 * NS_PER_S
 RETRY_NS = NS_PER_S // 2
 LOOK_NS = 50 * NS_PER_MS
+MOST_DIGITS = 40
+LONGEST_SPAN_MS = 86_400_000
+MOST_BYTES = 2**20
 OPEN_S = 5.0
 
 _log = logging.getLogger(__name__)
@@ -47,12 +52,16 @@ class Dialogue:
         is_open: Whether events may be sent.
         ended: Why it is over, in words; empty: it is not.
         generation: Of the server's protocol: 3, 4, or 0 while that is not known.
+        unread: What it last said that could not be read, in words; empty: nothing.
+        eaten: Number of the newest packet whose handler has returned, as far as told; 0: none.
     """
 
     def __init__(self, now_ns: int) -> None:
         self.is_open = False
         self.ended = ""
         self.generation = 0
+        self.unread = ""
+        self.eaten = 0
         self._began_ns = now_ns
         self._welcome_ns: int | None = None
         self._out: list[str] = []
@@ -113,11 +122,14 @@ class Dialogue:
 
     def _welcome(self, text: str, now_ns: int) -> None:
         self._welcome_ns = now_ns
-        told = _decoded(text)
-        told = told if isinstance(told, dict) else {}
+        told = self._decoded(text, dict, "its welcome") or {}
         self.generation = 4 if "maxPayload" in told else 0
         spans = [told.get(key) for key in ("pingInterval", "pingTimeout")]
-        spans_ms = [span for span in spans if isinstance(span, int | float) and span > 0]
+        spans_ms = [
+            min(span, LONGEST_SPAN_MS)
+            for span in spans
+            if isinstance(span, int | float) and span > 0
+        ]
         self._server_asks_ns = round((sum(spans_ms) or 45_000) * NS_PER_MS)
 
     def _take_message(self, text: str, now_ns: int) -> list[Any]:
@@ -132,10 +144,29 @@ class Dialogue:
         elif kind == "4":
             self.ended = f"it refused us: {rest[:100] or 'it does not say why'}"
         elif kind == "2":
-            told = _decoded(rest.lstrip("0123456789"))
-            if isinstance(told, list) and len(told) > 1 and told[0] == EVENT:
-                return [told[1]]
+            return self._take_event(rest.lstrip("0123456789"))
+        elif kind == "3":
+            number = rest[:MOST_DIGITS].partition("[")[0]
+            self.eaten = int(number) if number.isascii() and number.isdecimal() else self.eaten
         return []
+
+    def _take_event(self, text: str) -> list[Any]:
+        told = self._decoded(text, list, "an event")
+        if told is None:
+            return []
+        if len(told) > 1 and told[0] == EVENT:
+            return [told[1]]
+        name = told[0][:MOST_DIGITS] if told and isinstance(told[0], str) else ""
+        self.unread = f"an event {name!r} with {len(told[1:])} values, expected {EVENT!r} with one"
+        return []
+
+    def _decoded(self, text: str, wanted: type, what: str) -> Any:
+        """Return what JSON says if it is of the wanted type; else None, and say so."""
+        told = _decoded(text)
+        if isinstance(told, wanted):
+            return told
+        self.unread = f"{what} is no JSON {wanted.__name__}: {text[:MOST_DIGITS]!r}"
+        return None
 
 
 def _decoded(text: str) -> Any:
@@ -153,7 +184,15 @@ def _decoded(text: str) -> Any:
 def _reason(cause: Exception) -> str:
     if isinstance(cause, ConnectionRefusedError):
         return "nothing listens there yet"
-    return str(cause) or type(cause).__name__
+    return str(cause)[:200] or type(cause).__name__
+
+
+class _Straight(reconnect):
+    """A connection to the address that was asked for and to no other."""
+
+    def process_redirect(self, exc: Exception) -> Exception:
+        """Refuse to follow."""
+        return exc
 
 
 class ScriptSocket:
@@ -189,6 +228,8 @@ class ScriptSocket:
         self._thread = threading.Thread(target=self._live, name="devkit-script", daemon=True)
         self._open: socket.socket | None = None
         self._said = ""
+        self._packets = 0
+        self._was_unread = False
         self.pace = PingPong(gap_ns)
         self.is_open = False
         self.failure: Exception | None = None
@@ -223,14 +264,18 @@ class ScriptSocket:
         while not self._stop.is_set():
             why = "it went away"
             try:
-                with connect(
-                    url, compression=None, max_size=None, ping_interval=None, proxy=None,
+                with _Straight(
+                    url, compression=None, max_size=MOST_BYTES, ping_interval=None, proxy=None,
                     open_timeout=OPEN_S, close_timeout=1.0,
                 ) as connection:  # fmt: skip
                     self._open = connection.socket
                     why = self._talk(connection)
             except (OSError, WebSocketException) as cause:
                 why = _reason(cause)
+            except Exception as cause:
+                if self.failure is not None:
+                    raise
+                why = f"{type(cause).__name__}: {_reason(cause)}"
             self._open, self.is_open = None, False
             if self._stop.is_set():
                 return
@@ -246,7 +291,7 @@ class ScriptSocket:
     def _talk(self, connection: ClientConnection) -> str:
         """Converse until it is over; return why it is."""
         dialogue = Dialogue(self._clock.now_ns())
-        self.pace = PingPong(self._gap_ns)
+        self.pace, self._was_unread = PingPong(self._gap_ns), False
         while not self._stop.is_set() and not dialogue.ended:
             now_ns = self._clock.now_ns()
             for text in dialogue.due(now_ns):
@@ -261,6 +306,9 @@ class ScriptSocket:
                 continue
             if isinstance(got, str):
                 self._hear(dialogue, got)
+            else:
+                dialogue.unread = f"{len(got)} bytes that are no text"
+            self._tell_unread(dialogue)
         return dialogue.ended
 
     def _push(self, connection: ClientConnection, now_ns: int) -> int:
@@ -268,19 +316,32 @@ class ScriptSocket:
         due_ns = self.pace.due_ns(now_ns)
         if due_ns > now_ns:
             return due_ns
-        packet = self._packet()
+        try:
+            packet = self._packet()
+        except Exception as cause:
+            self.failure = cause
+            raise
         if packet is None:
             return now_ns + LOOK_NS
-        connection.send(packet)
+        self._packets += 1
+        connection.send(f"{packet[:2]}{self._packets}{packet[2:]}")
         self.pace.sent(now_ns)
         return self.pace.due_ns(now_ns)
 
     def _hear(self, dialogue: Dialogue, text: str) -> None:
         now_ns = self._clock.now_ns()
+        eaten = dialogue.eaten
         for told in dialogue.take(text, now_ns):
             self.pace.replied(now_ns)
             self._on_reply(told, now_ns)
+        if dialogue.eaten != eaten:
+            self.pace.eaten(is_newest=dialogue.eaten == self._packets)
         if dialogue.is_open and not self.is_open:
             self.is_open = True
             host, port = self._address
             self._say(f"talks with the script at {host}:{port}, protocol {dialogue.generation}")
+
+    def _tell_unread(self, dialogue: Dialogue) -> None:
+        if dialogue.unread and not self._was_unread:
+            self._was_unread = True
+            event(_log, "devkit_unread", level=logging.WARNING, why=repr(dialogue.unread))

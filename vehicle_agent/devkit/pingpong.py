@@ -6,7 +6,10 @@
                                         answer took, from `patience` to 30 s; then they are lost
     the others come after all           the script was slow: the patience doubles, 8 s at most
     a quick reply                       halves it, down to 1 s
+    answered, and the script's handler  waited for, as long as for a reply; a script that never
+    has not returned                    tells of its handler is not waited for
 
+A script that answers each packet twice would else be given two for each that it eats.
 So a script that answers late is not given more than it can eat, and one that lost a packet, or
 failed on it, is asked again. The simulator would wait for ever.
 """
@@ -34,13 +37,13 @@ class PingPong:
         self._gap_ns = gap_ns
         self._next_ns: int | None = None
         self._under_way = 0
-        self._in_doubt = False
+        self._in_doubt = self._tells = self._eats = False
         self._patience_ns = self._wait_ns = PATIENCE_NS
         self._first_ns = self._sent_ns = self._heard_ns = 0
 
     def due_ns(self, now_ns: int) -> int:
         """Return when the next packet may go; not after now: it may go now [ns]."""
-        if self._under_way:
+        if self._under_way or (self._tells and self._eats):
             return max(self._sent_ns, self._heard_ns) + self._wait_ns
         return now_ns if self._next_ns is None else self._next_ns
 
@@ -49,8 +52,9 @@ class PingPong:
         if self._under_way:
             self._send_again(now_ns)
         else:
+            self._tells = self._tells and not self._eats
             self._under_way, self._first_ns = 1, now_ns
-        self._sent_ns = now_ns
+        self._sent_ns, self._eats = now_ns, True
         on_grid = self._next_ns is not None and now_ns - self._next_ns <= self._gap_ns
         self._next_ns = (self._next_ns if on_grid and self._next_ns else now_ns) + self._gap_ns
 
@@ -63,6 +67,11 @@ class PingPong:
         else:
             self._under_way, self._in_doubt = self._under_way + 1, True
             self._wait_ns = min(2 * self._wait_ns, LONGEST_NS)
+
+    def eaten(self, *, is_newest: bool) -> None:
+        """Note that the handler of a packet returned; of the newest, or of an earlier one."""
+        self._tells = True
+        self._eats = self._eats and not is_newest
 
     def replied(self, now_ns: int) -> None:
         """Note that a reply came; one that nothing under way can have asked for changes nothing."""

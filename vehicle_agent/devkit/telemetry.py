@@ -33,12 +33,11 @@ from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
+from scm.vehicles.autodrive_senses import BEAMS, ranges_of, without_gravity
 from scm.vehicles.car import Car
 from vehicle_agent.devkit.engineio import EVENT
 
-BEAMS = 360
 INTENSITY = 47.0
-GRAVITY = 9.80665
 FLASH_NS = 500 * NS_PER_MS
 CAMERAS = {"front": "Front Camera Image", "rear": "Rear Camera Image"}
 _DARK_PX = (1280, 720)
@@ -137,7 +136,7 @@ class CarTelemetry:
         )
 
     def _tell_scan(self, scan: Message | None) -> str:
-        ranges = ranges_of(scan) if isinstance(scan, LidarScan) else _NOTHING
+        ranges = _listed(scan) if isinstance(scan, LidarScan) else _NOTHING
         return self._pairs(
             {
                 "LIDAR Scan Rate": _text(self._rate_hz),
@@ -233,6 +232,12 @@ def _text(*numbers: float) -> str:
     return " ".join(f"{number if math.isfinite(number) else 0.0:.4f}" for number in numbers)
 
 
+def _listed(scan: LidarScan) -> str:
+    """Return the ranges as text; "inf" is none."""
+    ranges = ranges_of(scan).tolist()
+    return " ".join(f"{one:.4f}" if math.isfinite(one) else "inf" for one in ranges)
+
+
 def quaternion(rpy: tuple[float, float, float]) -> tuple[float, float, float, float]:
     """Return x, y, z, w of roll, pitch and yaw [rad], turned about z, y, x in this order."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a / 2.0), math.cos(a / 2.0)) for a in rpy)
@@ -242,35 +247,6 @@ def quaternion(rpy: tuple[float, float, float]) -> tuple[float, float, float, fl
         cr * cp * sy - sr * sp * cy,
         cr * cp * cy + sr * sp * sy,
     )
-
-
-def without_gravity(
-    accel_mps2: tuple[float, float, float], rpy: tuple[float, float, float]
-) -> tuple[float, float, float]:
-    """Return what an accelerometer would read if it did not feel the floor's push."""
-    (roll, pitch, _), (x, y, z) = rpy, accel_mps2
-    up = math.cos(pitch)
-    return (
-        x + GRAVITY * math.sin(pitch),
-        y - GRAVITY * up * math.sin(roll),
-        z - GRAVITY * up * math.cos(roll),
-    )
-
-
-def ranges_of(scan: LidarScan) -> str:
-    """Return 360 ranges a degree apart from straight ahead, counter-clockwise; "inf" is none."""
-    ranges = np.frombuffer(scan.payload, "<f4")[: scan.beams].astype(float)
-    step = 2.0 * math.pi / max(1, scan.beams)
-    step = step if scan.bearing_step_rad is None else scan.bearing_step_rad
-    wished = np.radians(np.arange(BEAMS, dtype=float)) - scan.bearing_first_rad
-    turned = np.mod(wished, 2.0 * math.pi) if step > 0.0 else -np.mod(-wished, 2.0 * math.pi)
-    beams = np.rint(turned / step).astype(int)
-    around = round(2.0 * math.pi / abs(step))
-    beams = np.where(beams >= around, beams - around, beams)
-    seen = beams < len(ranges)
-    found = np.full(BEAMS, math.inf)
-    found[seen] = ranges[beams[seen]]
-    return " ".join("inf" if not math.isfinite(r) else f"{r:.4f}" for r in found.tolist())
 
 
 @lru_cache(maxsize=8)

@@ -153,3 +153,26 @@ def test_a_choice_beyond_the_known_ones_is_none_and_told(key, value):
     assert complaint == key
     assert wishes.cars[0].throttle == 0.5
     assert wishes.lights == (None,)
+
+
+@pytest.mark.parametrize("key", ["Throttle", "Brake", "Headlights", "Reset", "CoSim"])
+def test_a_value_of_any_depth_is_none(key):
+    deep = []
+    for _ in range(2000):
+        deep = [deep]
+    wishes, complaints = read({f"V1 {key}": deep})
+    assert wishes.cars[0].pose is None
+    assert complaints == ([f"V1 {key}"] if key not in ("Reset", "CoSim") else [])
+
+
+def test_a_long_key_is_cut():
+    _, (complaint,) = read({"k" * 1_000_000: "1"})
+    assert len(complaint) < 120
+
+
+def test_a_missing_throttle_is_told_after_any_number_of_strange_keys():
+    commands = Commands(1)
+    for number in range(300):
+        commands.read({**SAID, f"x{number}": "1"})
+    commands.read({"V1 Steering": "0"})
+    assert any(what.startswith("V1 Throttle: not said") for what in commands.complaints)

@@ -159,13 +159,97 @@ class FakeScript:
             if text == "40":
                 connection.send('40{"sid":"b"}')
             elif text.startswith("42"):
-                self.heard.append(json.loads(text[2:])[1])
+                self.heard.append(json.loads(text[2:].lstrip("0123456789"))[1])
                 if self.answers:
                     connection.send(REPLY)
 
     def close(self):
         self.server.shutdown()
         self.thread.join()
+
+
+@pytest.mark.parametrize("spans", ["1e308", "1" + "0" * 400, "NaN", "Infinity"])
+def test_no_span_of_a_welcome_is_too_long(spans):
+    dialogue = opened(f'0{{"pingInterval":{spans},"pingTimeout":{spans},"maxPayload":1}}')
+    dialogue.take("2", NS_PER_S)
+    assert dialogue.due(NS_PER_S) == ["3"]
+    assert NS_PER_S < dialogue.due_ns <= (2 * 86_400 + 1) * NS_PER_S
+
+
+@pytest.mark.parametrize(
+    "text", ["42[", '42["Bridge"]', '42["Other",{}]', "42{}", "0[]", "42" + "[" * 100_000]
+)
+def test_what_cannot_be_read_is_said_and_cut(text):
+    dialogue = opened(OLD)
+    dialogue.take(REPLY, 0)
+    assert dialogue.unread == ""
+    dialogue.take(text, 0)
+    assert 0 < len(dialogue.unread) < 150
+
+
+def test_the_number_of_an_eaten_packet_is_read():
+    dialogue = opened(OLD)
+    for text in ("4317[]", "43[]", "43x[]"):
+        dialogue.take(text, 0)
+        assert dialogue.eaten == 17
+    dialogue.take("43" + "9" * 9999 + "[]", 0)
+
+
+class Hostile:
+    """Says the same to whoever connects, and counts them."""
+
+    def __init__(self, *words):
+        self.words, self.times = words, 0
+        self.server = serve(self._talk, "127.0.0.1", 0, compression=None, max_size=None)
+        self.port = self.server.socket.getsockname()[1]
+        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+
+    def _talk(self, connection):
+        self.times += 1
+        for text in (NEW, "40", *self.words):
+            connection.send(text)
+        for _ in connection:
+            pass
+
+
+def test_too_much_at_once_ends_that_connection_and_another_begins():
+    script = Hostile('42["Bridge",{"' + "k" * 2**20 + '":"1"}]')
+    ours = Ours(script.port)
+    try:
+        soon(lambda: script.times > 1, "it connects anew")
+        assert ours.replies == []
+        assert ours.socket.failure is None
+    finally:
+        ours.socket.stop()
+        script.server.shutdown()
+
+
+def test_a_reply_that_cannot_be_taken_ends_that_connection_and_another_begins(caplog):
+    script = Hostile(REPLY)
+    ours = Ours(script.port)
+    ours.socket._on_reply = lambda *_: {}["no such key"]
+    try:
+        soon(lambda: script.times > 1, "it connects anew")
+        soon(lambda: "KeyError" in caplog.text, "it is told")
+        assert ours.socket.failure is None
+    finally:
+        ours.socket.stop()
+        script.server.shutdown()
+
+
+def test_a_redirection_is_refused_whatever_its_place():
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        ours = Ours(listening.getsockname()[1])
+        try:
+            for place in ("http://[::bad", "ws://127.0.0.1:9/"):
+                with listening.accept()[0] as held:
+                    held.recv(4096)
+                    words = f"HTTP/1.1 302 Found\r\nLocation: {place}\r\n"
+                    held.sendall((words + "Content-Length: 0\r\n\r\n").encode())
+                soon(lambda: "302" in ours.socket.detail, "it says so")
+            assert ours.socket.failure is None
+        finally:
+            ours.socket.stop()
 
 
 def free_port():

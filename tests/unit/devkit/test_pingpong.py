@@ -97,3 +97,37 @@ def test_a_script_that_answers_twice_changes_nothing():
     pace.replied(2 * NS_PER_MS)
     pace.sent(3 * NS_PER_MS)
     assert pace.due_ns(3 * NS_PER_MS) == 3 * NS_PER_MS + NS_PER_S
+
+
+def test_a_script_that_answers_twice_is_given_no_more_than_it_eats():
+    pace, now_ns, free_ns, sent, events = PingPong(), 0, 0, 0, []
+    takes_ns, lags = 20 * NS_PER_MS, []
+    while now_ns < 10 * NS_PER_S:
+        if pace.due_ns(now_ns) <= now_ns:
+            pace.sent(now_ns)
+            sent += 1
+            begins_ns, free_ns = max(now_ns, free_ns), max(now_ns, free_ns) + 2 * takes_ns
+            heapq.heappush(events, (begins_ns + takes_ns, 0, sent))
+            heapq.heappush(events, (free_ns, 0, sent))
+            heapq.heappush(events, (free_ns, 1, sent))
+            lags.append(free_ns - now_ns)
+        now_ns, is_end, number = heapq.heappop(events)
+        if is_end:
+            pace.eaten(is_newest=number == sent)
+        else:
+            pace.replied(now_ns)
+    assert set(lags[3:]) == {2 * takes_ns}
+    assert sent == pytest.approx(250, abs=3)
+
+
+def test_a_handler_that_is_not_told_of_any_more_is_waited_for_once():
+    pace = PingPong()
+    pace.sent(0)
+    pace.replied(1)
+    pace.eaten(is_newest=True)
+    pace.sent(2)
+    pace.replied(3)
+    assert pace.due_ns(3) == 3 + NS_PER_S
+    pace.sent(3 + NS_PER_S)
+    pace.replied(4 + NS_PER_S)
+    assert pace.due_ns(4 + NS_PER_S) <= 4 + NS_PER_S
