@@ -77,7 +77,7 @@ def test_the_limits_are_the_cars_own(bodies):
     limits = calibrate._limits(build_parser().parse_args([*ARGUMENTS, *FLOOR, *more]))
     assert (limits.throttle, limits.top_speed_mps) == (0.5, 0.4)
     assert (limits.front_m, limits.rear_m, limits.width_m) == pytest.approx((0.42, 0.08, 0.27))
-    assert limits.harmless == {"unknown"}
+    assert limits.harmless == frozenset()
     assert limits.curvature_per_m == pytest.approx(0.5774 / 0.324, rel=1e-3)
     assert limits.fence == ((0.0, 0.0), (2.0, 0.0), (2.0, 1.5), (0.0, 1.5))
 
