@@ -187,6 +187,12 @@ def _reason(cause: Exception) -> str:
     return str(cause)[:200] or type(cause).__name__
 
 
+def _answer_at_once(held: socket.socket) -> None:
+    """Let TCP confirm without delay: until then a script's next small frame is held back."""
+    if hasattr(socket, "TCP_QUICKACK"):
+        held.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
+
+
 class _Straight(reconnect):
     """A connection to the address that was asked for and to no other."""
 
@@ -228,7 +234,6 @@ class ScriptSocket:
         self._thread = threading.Thread(target=self._live, name="devkit-script", daemon=True)
         self._open: socket.socket | None = None
         self._said = ""
-        self._packets = 0
         self._was_unread = False
         self.pace = PingPong(gap_ns)
         self.is_open = False
@@ -309,6 +314,7 @@ class ScriptSocket:
             else:
                 dialogue.unread = f"{len(got)} bytes that are no text"
             self._tell_unread(dialogue)
+            _answer_at_once(connection.socket)
         return dialogue.ended
 
     def _push(self, connection: ClientConnection, now_ns: int) -> int:
@@ -323,8 +329,7 @@ class ScriptSocket:
             raise
         if packet is None:
             return now_ns + LOOK_NS
-        self._packets += 1
-        connection.send(f"{packet[:2]}{self._packets}{packet[2:]}")
+        connection.send(f"{packet[:2]}{self.pace.packets + 1}{packet[2:]}")
         self.pace.sent(now_ns)
         return self.pace.due_ns(now_ns)
 
@@ -335,7 +340,7 @@ class ScriptSocket:
             self.pace.replied(now_ns)
             self._on_reply(told, now_ns)
         if dialogue.eaten != eaten:
-            self.pace.eaten(is_newest=dialogue.eaten == self._packets)
+            self.pace.eaten(min(dialogue.eaten, self.pace.packets))
         if dialogue.is_open and not self.is_open:
             self.is_open = True
             host, port = self._address

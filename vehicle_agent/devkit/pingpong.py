@@ -6,10 +6,8 @@
                                         answer took, from `patience` to 30 s; then they are lost
     the others come after all           the script was slow: the patience doubles, 8 s at most
     a quick reply                       halves it, down to 1 s
-    answered, and the script's handler  waited for, as long as for a reply; a script that never
-    has not returned                    tells of its handler is not waited for
-
-A script that answers each packet twice would else be given two for each that it eats.
+    more replies than handlers that     the handler is waited for too, as long as for a reply: else
+    returned                            a script that answers twice were given two for one it eats
 So a script that answers late is not given more than it can eat, and one that lost a packet, or
 failed on it, is asked again. The simulator would wait for ever.
 """
@@ -19,6 +17,7 @@ from scm.clock import NS_PER_S
 PATIENCE_NS = NS_PER_S
 LONGEST_NS = 8 * NS_PER_S
 LONGEST_WAIT_NS = 30 * NS_PER_S
+TOO_MANY = 3
 
 
 class PingPong:
@@ -29,6 +28,7 @@ class PingPong:
 
     Attributes:
         replies: How many came.
+        packets: How many went.
         again: How many packets went because no reply came.
     """
 
@@ -37,13 +37,14 @@ class PingPong:
         self._gap_ns = gap_ns
         self._next_ns: int | None = None
         self._under_way = 0
-        self._in_doubt = self._tells = self._eats = False
+        self.packets = self._eaten = self._excess = self._counted = 0
+        self._in_doubt = self._waits = False
         self._patience_ns = self._wait_ns = PATIENCE_NS
         self._first_ns = self._sent_ns = self._heard_ns = 0
 
     def due_ns(self, now_ns: int) -> int:
         """Return when the next packet may go; not after now: it may go now [ns]."""
-        if self._under_way or (self._tells and self._eats):
+        if self._under_way or (self._waits and self._eaten < self.packets):
             return max(self._sent_ns, self._heard_ns) + self._wait_ns
         return now_ns if self._next_ns is None else self._next_ns
 
@@ -52,9 +53,10 @@ class PingPong:
         if self._under_way:
             self._send_again(now_ns)
         else:
-            self._tells = self._tells and not self._eats
+            self._waits = self._waits and self._eaten == self.packets
             self._under_way, self._first_ns = 1, now_ns
-        self._sent_ns, self._eats = now_ns, True
+        self._sent_ns = now_ns
+        self.packets += 1
         on_grid = self._next_ns is not None and now_ns - self._next_ns <= self._gap_ns
         self._next_ns = (self._next_ns if on_grid and self._next_ns else now_ns) + self._gap_ns
 
@@ -68,10 +70,13 @@ class PingPong:
             self._under_way, self._in_doubt = self._under_way + 1, True
             self._wait_ns = min(2 * self._wait_ns, LONGEST_NS)
 
-    def eaten(self, *, is_newest: bool) -> None:
-        """Note that the handler of a packet returned; of the newest, or of an earlier one."""
-        self._tells = True
-        self._eats = self._eats and not is_newest
+    def eaten(self, number: int) -> None:
+        """Note that the handler of a packet returned; the first is 1."""
+        more = (self.replies - self._counted) - (number - self._eaten)
+        self._excess = max(0, self._excess + more)
+        self._eaten, self._counted = number, self.replies
+        if self._excess >= TOO_MANY:
+            self._waits, self._excess = True, 0
 
     def replied(self, now_ns: int) -> None:
         """Note that a reply came; one that nothing under way can have asked for changes nothing."""
