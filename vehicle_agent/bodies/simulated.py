@@ -120,7 +120,7 @@ class SimulatedBody:
             speed=float(fleet.speed[row]),
             lateral_speed=float(fleet.lateral_speed[row]),
             yaw_rate=float(fleet.yaw_rate[row]),
-            accel=float(fleet.accel_x[row]),
+            accel=float(fleet.accel_x[row] + fleet.impact_x[row]),
             steering=float(fleet.steer_angle[row]),
             source="simulated",
         )

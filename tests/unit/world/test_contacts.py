@@ -5,6 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from scm.maps.model import Box, CityMap, Floor, MapTag, Wall
+from scm.v2x.messages.lease_request import LeaseRequest
+from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.contacts import Contacts, Hull
 
 HULL = Hull(2.4, 0.0229, -0.14, 0.16, -0.0875, 0.0875, restitution=0.3, friction=0.5)
@@ -110,3 +112,16 @@ def test_slots_may_come_in_any_order_and_go_away():
     backward = contacts.step(np.array([5, 2]), motion[::-1])
     assert_allclose(forward.dv, backward.dv[::-1], atol=1e-12)
     assert forward.dv[0, 0] < 0.0
+
+
+def test_a_car_that_presses_against_a_wall_does_not_say_that_it_speeds_up(make_city):
+    city = make_city(hosted=(("n1", "nigel"),))
+    lease = city.lease()
+    renewal = LeaseRequest(vehicle="n1", owner="ann", verb="renew", epoch=lease.epoch)
+    for seq in range(1, 120):
+        news = (city.command(lease, seq, 1.0), *((renewal,) if seq % 20 == 0 else ()))
+        city.run(1, *news)
+    slot = city.world.hosted["n1"].slot
+    assert abs(city.world.slots.speed[slot]) < 0.01
+    assert city.world.garage.signal("accel_x")[slot] > 1.0, "what its wheels alone would do"
+    assert abs(city.heard(VehicleState)[-1].accel_mps2) < 0.3
