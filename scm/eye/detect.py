@@ -3,9 +3,9 @@
 In two looks: tags are found in the frame made smaller, which is fast, and each is then measured in
 a full-size cut-out of its own, which is exact (corners 0.035 px off against 0.055 px).
 
-The library's detector crashes the process when it is freed and built again (pupil-apriltags 1.0.4:
-after 1 to 60 times). So there is one for the life of the process, never freed, and its settings are
-changed in place.
+The library writes into memory that is not its own (pupil-apriltags 1.0.4) in two places. Freeing a
+detector does, after which the process dies at any later time: there is one for the life of the
+process, never freed, and its settings are changed in place. A small picture does: see `_roomy`.
 """
 
 import atexit
@@ -31,6 +31,10 @@ MEASURE_SIGMA = 0.8
 """Blur of the exact look [px]: without it corners are 0.053 px off."""
 CUT_MARGIN = 0.4
 """Of a cut-out around a tag, in parts of the tag's larger side."""
+
+ROOMY_PX = 5120
+"""Pixels of the picture in which squares are sought; seen to be enough under a checking allocator,
+where 4900 are not."""
 
 _lock = threading.Lock()
 _detectors: list[pupil_apriltags.Detector] = []
@@ -86,12 +90,26 @@ def look(grey: Image, settings: Settings, decimate: float, sigma: float) -> list
         options = detector.tag_detector_ptr.contents
         options.quad_decimate = decimate
         options.quad_sigma = sigma
-        found = detector.detect(np.ascontiguousarray(grey))
+        found = detector.detect(_roomy(grey, decimate))
     good = [
         one for one in found
         if one.hamming <= settings.max_hamming and one.decision_margin >= settings.min_margin
     ]  # fmt: skip
     return [_seen(one) for one in sorted(good, key=lambda one: -one.decision_margin)]
+
+
+def _roomy(grey: Image, decimate: float) -> Image:
+    """Return the picture, continued to the right and below as its edges are if it is small.
+
+    The library's table of outlines is too small, and written beyond its end, when there are fewer
+    than `ROOMY_PX` pixels to seek squares in.
+    """
+    height, width = grey.shape
+    if (height // decimate) * (width // decimate) >= ROOMY_PX:
+        return np.ascontiguousarray(grey)
+    least = math.ceil(decimate * (math.sqrt(ROOMY_PX) + 1.0))
+    below, right = max(0, least - height), max(0, least - width)
+    return np.pad(grey, ((0, below), (0, right)), mode="edge")
 
 
 def measure_again(grey: Image, settings: Settings, rough: TagSeen) -> TagSeen:
