@@ -30,6 +30,7 @@ from scm.v2x.mailbox import Mailbox, RawMailbox
 from scm.v2x.message import Delivery, Message, Refused, Request, decode, encode, is_bulk
 from scm.v2x.messages.presence import Presence
 from scm.v2x.reader import Reader
+from scm.v2x.thread_state import THREAD_STATES
 from scm.v2x.yielding import yielding
 from scm.v2x.zenoh_events import declare_event_publisher, declare_event_subscriber
 
@@ -345,6 +346,7 @@ class ZenohBus:
         """Wrap a callback so that it runs on Zenoh's thread and its errors are counted."""
 
         def guarded(item: object) -> None:
+            THREAD_STATES.keep()
             try:
                 callback(item)
             except Exception:  # noqa: BLE001  the edge of a thread that is not ours
