@@ -26,9 +26,11 @@ LONG = (
     "devkit",
     "flow",
     "glosa",
+    "kill",
     "misbehaviour",
     "mismatch",
     "serial",
+    "stop",
 )  # takes minutes: only where it is asked for, alone, with its own arguments
 
 

@@ -7,17 +7,23 @@ One Nigel in the driving school: states and measurements at 50 Hz, scans at 7 Hz
 script.py` under its own libraries, share one core. A round trip is packet, reply, next packet.
 Beside the rate stands the CPU time that a round trip takes, of the script and of us: on a machine
 that others use, its inverse is what a free core does.
+
+A soak tells ten times in its span, since the line before: the rate, what is resident of us and of
+the script, the longest time from one reply to the next, and how old the newest state of a packet
+was when its reply came.
 """
 
 import argparse
 import gc
 import itertools
+import math
 import os
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+from array import array
 from pathlib import Path
 
 import cv2
@@ -26,7 +32,7 @@ import numpy as np
 from scm.camera.daylight import Daylight
 from scm.camera.optics import optics_of
 from scm.camera.studio import Studio
-from scm.clock import NS_PER_S, WallClock
+from scm.clock import NS_PER_MS, NS_PER_S, WallClock
 from scm.maps.load import load_map
 from scm.maps.route import Path as Way
 from scm.maps.route import Roads
@@ -43,6 +49,7 @@ from vehicle_agent.devkit.engineio import ScriptSocket
 from vehicle_agent.devkit.telemetry import Telemetry
 
 PICTURES = 30
+SOAK_PARTS = 10
 WARM_S = 2.0
 TICK = os.sysconf("SC_CLK_TCK")
 CITY, CAR = load_map("driving_school"), load_car("nigel")
@@ -68,10 +75,10 @@ def pictures():
 class FedCity:
     """Says what a city would say of one car, at its rates, on a thread of its own."""
 
-    def __init__(self, telemetry, jpegs):
-        self.telemetry, self.jpegs = telemetry, jpegs
+    def __init__(self, telemetry, jpegs, clock):
+        self.telemetry, self.jpegs, self.clock = telemetry, jpegs, clock
         self.stop = threading.Event()
-        self.clock = WallClock()
+        self.state_ns = 0
         telemetry.welcome("n1", "nigel", CAR)
         telemetry.show_lights([(light.junction, light.group) for light in CITY.lights])
         self.tick(0)
@@ -93,6 +100,7 @@ class FedCity:
                 source="simulated",
             )
         )  # fmt: skip
+        self.state_ns = t_ns
         hear(
             VehicleSensors(
                 vehicle="n1", t_ns=t_ns, encoder_left=tick, encoder_right=tick,
@@ -129,8 +137,30 @@ def cpu_s(pid):
     return (int(fields[11]) + int(fields[12])) / TICK
 
 
-def resident_mb():
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+def resident_mb(pid):
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+class Watch:
+    """Notes the time between replies and the age of what they answer, in milliseconds."""
+
+    def __init__(self):
+        self.told_ns = 0
+        self.last_ns = None
+        self.gaps, self.ages = array("f"), array("f")
+
+    def note(self, now_ns):
+        if self.last_ns is not None:
+            self.gaps.append((now_ns - self.last_ns) / NS_PER_MS)
+        self.last_ns = now_ns
+        self.ages.append((now_ns - self.told_ns) / NS_PER_MS)
+
+    def tell(self):
+        """Return the longest gap, and the median, 99 % and greatest age; begin anew."""
+        gaps, ages = self.gaps, self.ages
+        self.gaps, self.ages = array("f"), array("f")
+        return max(gaps, default=math.nan), *np.percentile(ages, (50, 99, 100))
 
 
 class Bench:
@@ -142,20 +172,22 @@ class Bench:
         command = [python_of(generation), "-W", "ignore", str(SCRIPT), "0", log]
         self.script = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         port = int(self.script.stdout.readline().split()[1])
-        self.commands, telemetry = Commands(1), Telemetry(["n1"])
+        self.commands, self.telemetry = Commands(1), Telemetry(["n1"])
         self.commands.lights = len(CITY.lights)
-        self.fed = FedCity(telemetry, jpegs)
-        self.frame_bytes = 0
-
-        def packet():
-            frame = telemetry.frame()
-            self.frame_bytes = len(frame)
-            return frame
-
+        clock, self.watch = WallClock(), Watch()
+        self.fed = FedCity(self.telemetry, jpegs, clock)
         self.socket = ScriptSocket(
-            ("127.0.0.1", port), packet, lambda data, _: self.commands.read(data),
-            WallClock(), round(NS_PER_S / max_hz) if max_hz else 0,
+            ("127.0.0.1", port), self.packet, self.replied, clock,
+            round(NS_PER_S / max_hz) if max_hz else 0,
         )  # fmt: skip
+
+    def packet(self):
+        self.watch.told_ns = self.fed.state_ns
+        return self.telemetry.packet()
+
+    def replied(self, data, t_ns):
+        self.commands.read(data)
+        self.watch.note(t_ns)
 
     def __enter__(self):
         self.fed.thread.start()
@@ -187,28 +219,40 @@ def rates(generation, span_s, max_hz, seen):
         with Bench(generation, jpegs, max_hz) as bench:
             time.sleep(WARM_S)
             rate, theirs, ours = bench.measure(span_s)
-            again, size = bench.socket.pace.again, bench.frame_bytes
+        again, last = bench.socket.pace.again, bench.packet()
+        size, sent = len(last.text(1)) / 1e3, len(last.deflated(1)) / 1e3
         print(
-            f"{generation:4} {name:18}{rate:7.0f} /s {size / 1e3:7.0f} kB a packet"
+            f"{generation:4} {name:18}{rate:7.0f} /s {size:7.0f} kB a packet, {sent:.0f} deflated"
             f"{theirs:7.2f} ms CPU script {ours:6.2f} ms ours"
             f"{1e3 / (theirs + ours):6.0f} /s a core{again:4} again"
         )
 
 
 def soak(generation, span_s, max_hz, seen):
+    """Converse for long; say whether memory stays flat, and the worst stall and lag."""
     with Bench(generation, seen, max_hz) as bench:
+        pids = {"ours": os.getpid(), "script": bench.script.pid}
         time.sleep(min(30.0, span_s / 10.0))
         gc.collect()
-        begin = resident_mb()
-        most, count = begin, 10
-        for part in range(count):
-            rate, _, _ = bench.measure(span_s / count)
-            now = resident_mb()
-            most = max(most, now)
-            print(f"{span_s * (part + 1) / count:7.0f} s {rate:5.0f} /s {now:7.1f} MB", flush=True)
-        grown = now - begin
-        print(f"grew by {grown:+.1f} MB in {span_s:.0f} s, {most - begin:+.1f} MB at most", end="")
-        print(f": {'flat' if most - begin <= 5.0 else 'NOT flat'} within 5 MB")
+        begin = {who: resident_mb(pid) for who, pid in pids.items()}
+        most = dict(begin)
+        bench.watch.tell()
+        for part in range(SOAK_PARTS):
+            rate, _, _ = bench.measure(span_s / SOAK_PARTS)
+            now = {who: resident_mb(pid) for who, pid in pids.items()}
+            most = {who: max(most[who], now[who]) for who in now}
+            gap, *ages = bench.watch.tell()
+            held = ", ".join(f"{who} {mb:.1f} MB" for who, mb in now.items())
+            print(
+                f"{generation:4}{span_s * (part + 1) / SOAK_PARTS:6.0f} s{rate:5.0f} /s, {held}, "
+                f"gap {gap:.0f} ms, age {ages[0]:.0f}, {ages[1]:.0f}, {ages[2]:.0f} ms "
+                f"(50, 99, 100 %), {bench.socket.pace.again} again",
+                flush=True,
+            )
+        for who, before in begin.items():
+            grown = most[who] - before
+            verdict = "flat" if grown <= 5.0 else "NOT flat"
+            print(f"{who}: {grown:+.1f} MB at most in {span_s:.0f} s: {verdict} within 5 MB")
 
 
 def main() -> None:
