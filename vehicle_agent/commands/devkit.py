@@ -3,8 +3,12 @@
 import argparse
 import gc
 import threading
+from typing import TYPE_CHECKING
 
 from scm.command import Command, credentials_argument, credentials_of
+
+if TYPE_CHECKING:
+    from scm.v2x.credentials import Credentials
 
 DEFAULT_PORT = 4567
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -45,6 +49,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="which way a steering of +1 turns (%(default)s)",
     )  # fmt: skip
     parser.add_argument(
+        "--packet", choices=("0.1", "0.3", "newest"), default="0.3",
+        help="for which simulator the script was written: 0.1 has no V1 in its keys, "
+        "the newest compresses scans (%(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
         "--cameras", nargs="*", choices=("front", "rear"), default=["front", "rear"],
         help="which cameras are pictured; the others stay black (both)",
     )  # fmt: skip
@@ -65,6 +74,16 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _check_is_the_car(cars: list[str], credentials: "Credentials") -> None:
+    """Refuse a placed car without the rights of that vehicle: it joins and reports as one."""
+    from scm.errors import AccessError
+
+    if credentials.role != "vehicle" or cars != [credentials.station]:
+        msg = f"--credentials: got {credentials.station!r}, a {credentials.role}; --cosim expects "
+        msg += f"those of the one --car: scm fleet add {cars[0]} --role vehicle"
+        raise AccessError(msg)
+
+
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import NS_PER_S, WallClock
     from scm.errors import RunError
@@ -80,8 +99,12 @@ def _run(arguments: argparse.Namespace) -> int:
     if len(set(arguments.cars)) < len(arguments.cars) or not 0.0 <= arguments.max_hz < 1e6:
         msg = f"expected different cars and --max-hz from 0: got {arguments.cars}, "
         raise RunError(msg + f"{arguments.max_hz:g}")
+    if arguments.packet == "0.1" and len(arguments.cars) > 1:
+        raise RunError("--packet 0.1: its keys know one car only, got more than one --car")
     check_name(arguments.city, "--city")
     credentials = credentials_of(arguments)
+    if arguments.cosim and credentials is not None:
+        _check_is_the_car(arguments.cars, credentials)
     name = arguments.name or f"devkit-{arguments.script_port}"
     name = check_name(name if credentials is None else credentials.station, "--name")
     wanted = Wanted(
@@ -92,6 +115,7 @@ def _run(arguments: argparse.Namespace) -> int:
         spawns=None if arguments.spawn is None else tuple(arguments.spawn),
         cosim=arguments.cosim,
         car=arguments.car_file,
+        packet=arguments.packet,
     )
     gap_ns = round(NS_PER_S / arguments.max_hz) if arguments.max_hz else 0
     wish, done, clock = stop_on_signal(), threading.Event(), WallClock()

@@ -1,6 +1,7 @@
 """AutoDRIVE Devkit scripts, unchanged, drive cars of a city: our side is the simulator's.
 
 engineio   the script's socket.io server as its client sees it: pure protocol, and one thread
+deflate    a packet as pieces that are deflated once, for servers that inflate
 pingpong   one packet, one reply; what is to be done when none comes
 telemetry  what the city says of cars and lights, as the script's packet
 commands   what the script says, read key by key

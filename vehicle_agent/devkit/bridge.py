@@ -34,8 +34,9 @@ from scm.v2x.messages.world_definition import WorldDefinition
 from scm.vehicles.car import load_car
 from vehicle_agent.devkit.commands import CarWish, Commands, Sign, Wishes
 from vehicle_agent.devkit.cosim import CosimCar
+from vehicle_agent.devkit.deflate import Packet
 from vehicle_agent.devkit.heads import Heads
-from vehicle_agent.devkit.telemetry import CAMERAS, Telemetry
+from vehicle_agent.devkit.telemetry import CAMERAS, Telemetry, Version
 from vehicle_agent.devkit.wheel import Wheel
 
 ABSENT_NS = 2 * NS_PER_S
@@ -72,6 +73,7 @@ class Wanted:
             they begin, in the order of the cars, any free one for those beyond.
         cosim: Whether the script places the cars itself.
         car: Car file of those that it brings.
+        packet: Of which version of the simulator.
     """
 
     cars: tuple[str, ...]
@@ -81,6 +83,7 @@ class Wanted:
     spawns: tuple[str, ...] | None = None
     cosim: bool = False
     car: str = UNKNOWN_CAR
+    packet: Version = "0.3"
 
 
 class DevkitPart:
@@ -99,7 +102,8 @@ class DevkitPart:
     def __init__(self, name: str, wanted: Wanted, session: str = "") -> None:
         self.name = name
         self._wanted = wanted
-        self._telemetry = Telemetry(wanted.cars)
+        self._defined_ns: int | None = None
+        self._telemetry = Telemetry(wanted.cars, wanted.packet)
         self._commands = Commands(len(wanted.cars), wanted.sign)
         self._heads = Heads(name)
         self._wheels = {car: Wheel(car, name) for car in wanted.cars}
@@ -131,9 +135,9 @@ class DevkitPart:
         """Be given the script."""
         self._script = script
 
-    def packet(self) -> str | None:
+    def packet(self) -> Packet | None:
         """Return the newest telemetry; called on the script's thread."""
-        return self._telemetry.frame()
+        return self._telemetry.packet()
 
     def said(self, data: Any, t_ns: int) -> None:
         """Take what the script says; called on the script's thread."""
@@ -156,7 +160,7 @@ class DevkitPart:
             self._open(is_open)
         out: list[Outgoing] = [*self._spawns.step(now_ns, self._absent(now_ns))]
         for placed in self._placed.values():
-            out += placed.step(now_ns)
+            out += self._placed_now(placed, now_ns)
         if not is_open:
             out += self._released()
         elif self._said is not None:
@@ -177,13 +181,26 @@ class DevkitPart:
             asked = item.call.request
             self._on_reply[type(asked)](asked, message, now_ns)
         elif isinstance(message, WorldDefinition):
-            self._learn(message.map)
+            if message.t_ns != self._defined_ns:
+                self._defined_ns = message.t_ns
+                self._learn(message.map)
         else:
-            if isinstance(message, VehicleState):
-                self._heard_ns[message.vehicle] = now_ns
-                if not self._telemetry.knows(message.vehicle, message.car):
-                    self._telemetry.welcome(message.vehicle, message.car, self._car(message.car))
-            self._telemetry.hear(message)
+            self._tell_script(message, now_ns)
+
+    def _tell_script(self, message: Message, now_ns: int) -> None:
+        if isinstance(message, VehicleState):
+            self._heard_ns[message.vehicle] = now_ns
+            if not self._telemetry.knows(message.vehicle, message.car):
+                self._telemetry.welcome(message.vehicle, message.car, self._car(message.car))
+        self._telemetry.hear(message)
+
+    def _placed_now(self, placed: CosimCar, now_ns: int) -> list[Outgoing]:
+        """Let a placed car report; what is said of it is known without the city's telling."""
+        out = placed.step(now_ns)
+        for said in out:
+            if isinstance(said, VehicleState):
+                self._tell_script(said, now_ns)
+        return out
 
     def _leased(self, asked: LeaseRequest, reply: Message, now_ns: int) -> None:
         del now_ns

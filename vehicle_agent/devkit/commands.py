@@ -8,6 +8,7 @@
     V1 CoSim, PosX ... RotW       1: the pose of the car [m], a quaternion
     TL1 State                     0 no wish, 1 red, 2 yellow, 3 green
 
+Scripts of version 0.1 say `Throttle` and `Traffic Light 1` for `V1 Throttle` and `TL1 State`.
 Everything is a string; numbers are taken too. A car whose throttle cannot be read gets none.
 """
 
@@ -30,6 +31,8 @@ _OF_CAR = (
     "Throttle", "Steering", "Headlights", "Indicators", "Brake", "Handbrake", "Reset", "CoSim",
     *_COSIM,
 )  # fmt: skip
+_OLD = {key: f"V1 {key}" for key in ("Throttle", "Steering", "Headlights", "Indicators")}
+_OLD |= {f"Traffic Light {number}": f"TL{number} State" for number in range(1, 5)}
 _NOT_CARRIED = ("Auto Time", "Time Scale", "Time", "Weather", "Clouds", "Fog", "Rain", "Snow")
 _YES = ("1", "true")
 
@@ -88,11 +91,11 @@ class Commands:
         if not isinstance(data, Mapping):
             self._complain(f"a reply is {type(data).__name__}, expected an object of keys")
             data = {}
-        keys = frozenset(str(key) for key in data)
+        said = {_OLD.get(str(key), str(key)): value for key, value in data.items()}
+        keys = frozenset(said)
         if hash(keys) != self._keys:
             self._check_keys(keys)
             self._keys = hash(keys)
-        said = {str(key): value for key, value in data.items()}
         return Wishes(
             tuple(self._car(said, number) for number in range(self._cars)),
             tuple(

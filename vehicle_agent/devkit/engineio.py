@@ -10,6 +10,9 @@
     41, 1                   leaves                          server                  server
     44...                   refuses                         server                  server
 
+A server that says nothing for a second, as the Devkit's C++ and MATLAB examples, knows events
+alone: it is sent bare ones, and no pings.
+
 `Dialogue` is the protocol without a socket or a clock; `ScriptSocket` is the thread that keeps it
 up with one script: whichever starts first, and however often the script ends and comes back.
 """
@@ -28,6 +31,7 @@ from websockets.sync.client import ClientConnection, reconnect
 
 from scm.clock import NS_PER_MS, NS_PER_S, Clock, seconds
 from scm.log import event
+from vehicle_agent.devkit.deflate import OfferToDeflate, Packet, inflates
 from vehicle_agent.devkit.pingpong import PingPong
 
 EVENT = "Bridge"
@@ -35,6 +39,8 @@ PING_EVERY_NS = 20 * NS_PER_S
 PONG_WITHIN_NS = 20 * NS_PER_S
 ASK_AFTER_NS = 200 * NS_PER_MS
 JOIN_WITHIN_NS = 5 * NS_PER_S
+SILENT_NS = NS_PER_S
+ANSWER_WITHIN_NS = 30 * NS_PER_S
 RETRY_NS = NS_PER_S // 2
 LOOK_NS = 50 * NS_PER_MS
 MOST_DIGITS = 40
@@ -53,11 +59,12 @@ class Dialogue:
         ended: Why it is over, in words; empty: it is not.
         generation: Of the server's protocol: 3, 4, or 0 while that is not known.
         unread: What it last said that could not be read, in words; empty: nothing.
+        is_bare: Whether it said nothing, so that it is told bare events.
         eaten: Number of the newest packet whose handler has returned, as far as told; 0: none.
     """
 
     def __init__(self, now_ns: int) -> None:
-        self.is_open = False
+        self.is_open = self.is_bare = False
         self.ended = ""
         self.generation = 0
         self.unread = ""
@@ -77,6 +84,8 @@ class Dialogue:
             return self._began_ns
         if self._welcome_ns is not None and not self.is_open and not self._asked:
             return min(self._alarm_ns, self._welcome_ns + ASK_AFTER_NS)
+        if self._welcome_ns is None and not self.is_open:
+            return min(self._alarm_ns, self._began_ns + SILENT_NS)
         return self._alarm_ns
 
     def due(self, now_ns: int) -> list[str]:
@@ -85,13 +94,20 @@ class Dialogue:
             if self.generation == 4 or now_ns - self._welcome_ns >= ASK_AFTER_NS:
                 self._asked, self.generation = True, 4
                 self._out.append("40")
+        elif self._is_silent(now_ns):
+            self.is_open = self.is_bare = True
+            self._alarm_ns = now_ns + ANSWER_WITHIN_NS
         elif now_ns >= self._alarm_ns and not self.ended:
             self._ring(now_ns)
         out, self._out = self._out, []
         return out
 
+    def _is_silent(self, now_ns: int) -> bool:
+        unheard = self._welcome_ns is None and not self.is_open
+        return unheard and now_ns - self._began_ns >= SILENT_NS
+
     def _ring(self, now_ns: int) -> None:
-        if not self.is_open:
+        if not self.is_open or self.is_bare:
             waited_s = seconds(now_ns - self._began_ns)
             self.ended = f"it is no socket.io server, or does not answer: waited {waited_s:.0f} s"
         elif self.generation == 4:
@@ -121,6 +137,9 @@ class Dialogue:
         return []
 
     def _welcome(self, text: str, now_ns: int) -> None:
+        if self.is_bare:  # it was only slow
+            self.is_open = self.is_bare = False
+            self._alarm_ns = now_ns + JOIN_WITHIN_NS
         self._welcome_ns = now_ns
         told = self._decoded(text, dict, "its welcome") or {}
         self.generation = 4 if "maxPayload" in told else 0
@@ -144,6 +163,8 @@ class Dialogue:
         elif kind == "4":
             self.ended = f"it refused us: {rest[:100] or 'it does not say why'}"
         elif kind == "2":
+            if self.is_bare:
+                self._alarm_ns = now_ns + ANSWER_WITHIN_NS
             return self._take_event(rest.lstrip("0123456789"))
         elif kind == "3":
             number = rest[:MOST_DIGITS].partition("[")[0]
@@ -206,7 +227,7 @@ class ScriptSocket:
 
     Args:
         address: Host and port of the script's server.
-        packet: Returns the newest telemetry as a frame; None: there is nothing to tell yet.
+        packet: Returns the newest telemetry; None: there is nothing to tell yet.
         on_reply: Takes what the script said, and when.
         clock: Of this process.
         gap_ns: Least time between two packets; 0: as fast as the script answers.
@@ -220,7 +241,7 @@ class ScriptSocket:
     def __init__(
         self,
         address: tuple[str, int],
-        packet: Callable[[], str | None],
+        packet: Callable[[], Packet | None],
         on_reply: Callable[[Any, int], None],
         clock: Clock,
         gap_ns: int = 0,
@@ -270,8 +291,8 @@ class ScriptSocket:
             why = "it went away"
             try:
                 with _Straight(
-                    url, compression=None, max_size=MOST_BYTES, ping_interval=None, proxy=None,
-                    open_timeout=OPEN_S, close_timeout=1.0,
+                    url, compression=None, extensions=[OfferToDeflate()], max_size=MOST_BYTES,
+                    ping_interval=None, proxy=None, open_timeout=OPEN_S, close_timeout=1.0,
                 ) as connection:  # fmt: skip
                     self._open = connection.socket
                     why = self._talk(connection)
@@ -303,7 +324,7 @@ class ScriptSocket:
                 connection.send(text)
             wake_ns = dialogue.due_ns
             if dialogue.is_open:
-                wake_ns = min(wake_ns, self._push(connection, now_ns))
+                wake_ns = min(wake_ns, self._push(connection, dialogue.is_bare, now_ns))
             wait_s = seconds(wake_ns - self._clock.now_ns())
             try:
                 got = connection.recv(timeout=max(0.0, wait_s))
@@ -317,7 +338,7 @@ class ScriptSocket:
             _answer_at_once(connection.socket)
         return dialogue.ended
 
-    def _push(self, connection: ClientConnection, now_ns: int) -> int:
+    def _push(self, connection: ClientConnection, is_bare: bool, now_ns: int) -> int:
         """Send a packet if one is due; return when to look again [ns]."""
         due_ns = self.pace.due_ns(now_ns)
         if due_ns > now_ns:
@@ -329,7 +350,11 @@ class ScriptSocket:
             raise
         if packet is None:
             return now_ns + LOOK_NS
-        connection.send(f"{packet[:2]}{self.pace.packets + 1}{packet[2:]}")
+        number = None if is_bare else self.pace.packets + 1
+        if inflates(connection):
+            connection.send(packet.deflated(number), text=True)
+        else:
+            connection.send(packet.text(number))
         self.pace.sent(now_ns)
         return self.pace.due_ns(now_ns)
 
@@ -344,7 +369,8 @@ class ScriptSocket:
         if dialogue.is_open and not self.is_open:
             self.is_open = True
             host, port = self._address
-            self._say(f"talks with the script at {host}:{port}, protocol {dialogue.generation}")
+            protocol = "events alone" if dialogue.is_bare else f"protocol {dialogue.generation}"
+            self._say(f"talks with the script at {host}:{port}, {protocol}")
 
     def _tell_unread(self, dialogue: Dialogue) -> None:
         if dialogue.unread and not self._was_unread:

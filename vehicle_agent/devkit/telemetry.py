@@ -8,9 +8,13 @@
     V1 Orientation ...           of the IMU: "x y z w", and "roll pitch yaw" in [0, 2 pi) [rad]
     V1 Angular Velocity          of the IMU [rad/s]
     V1 Linear Acceleration       of the IMU without gravity [m/s^2]
-    V1 LIDAR ...                 rate [Hz]; 360 ranges [m] from straight ahead, counter-clockwise
+    V1 LIDAR ...                 rate [Hz]; 360 ranges [m] from straight ahead, counter-clockwise; a
+                                 scanner of part of a circle: its own beams, from the right
     V1 Front, Rear Camera Image  JPEG in base64; a black one before there is one
     TL1 State                    0 off, 1 red, 2 yellow, 3 green
+
+Of the simulator's versions 0.1 has keys without `V1` and tells of no lights; the newest packs the
+ranges: one a line, gzip, base64.
 
 Position is the rear axle's, not the roof's: in a log of the simulator the course fits a point
 0.002 m ahead of the axle, at the height of a wheel's radius; the roof's tag is 0.035 m ahead.
@@ -18,10 +22,12 @@ Of everything the newest is held and nothing else; what has not changed is not w
 """
 
 import base64
+import gzip
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -35,14 +41,17 @@ from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.autodrive_senses import BEAMS, ranges_of, without_gravity
 from scm.vehicles.car import Car
+from vehicle_agent.devkit.deflate import Packet, Piece
 from vehicle_agent.devkit.engineio import EVENT
 
 INTENSITY = 47.0
+Version = Literal["0.1", "0.3", "newest"]
+"""Of which version of the simulator."""
+
 FLASH_NS = 500 * NS_PER_MS
 CAMERAS = {"front": "Front Camera Image", "rear": "Rear Camera Image"}
 _DARK_PX = (1280, 720)
-_NOTHING = " ".join(["inf"] * BEAMS)
-_SHINE = " ".join([f"{INTENSITY:.4f}"] * BEAMS)
+_SHINE = f"{INTENSITY:.4f}"
 _COLOURS = {"red": 1, "yellow": 2, "green": 3, "dark": 0}
 
 
@@ -52,23 +61,27 @@ class _Kept:
 
     message: Message | None = None
     written: Message | None = None
-    text: str = ""
+    piece: Piece = field(default_factory=Piece)
 
 
 class CarTelemetry:
     """One car's share of the packet.
 
     Args:
-        prefix: `V1`.
+        prefix: `V1 `.
         car: Its car file.
+        is_packed: Whether ranges are compressed.
     """
 
-    def __init__(self, prefix: str, car: Car) -> None:
-        self._prefix = prefix
+    def __init__(self, prefix: str, car: Car, *, is_packed: bool = False) -> None:
+        self._prefix, self._is_packed = prefix, is_packed
         self._car = car
         self._turn = 2.0 * math.pi / _number(car, "encoder.counts_per_revolution", 1920.0)
         self._radius_m = _number(car, "wheel.radius_m", 0.0325)
         self._rate_hz = _number(car, "lidar.rate_hz", 7.0)
+        view_rad = _number(car, "lidar.field_of_view_rad", math.tau)
+        beams = round(_number(car, "lidar.beams", BEAMS))
+        self._nothing = ["inf"] * (beams if _is_part(view_rad, beams) else BEAMS)
         self._own, self._scan = _Kept(), _Kept()
         self._cameras = {camera: _Kept() for camera in CAMERAS}
         self._state: VehicleState | None = None
@@ -90,28 +103,29 @@ class CarTelemetry:
         elif isinstance(message, CameraFrame) and message.camera in self._cameras:
             self._cameras[message.camera].message = message
 
-    def texts(self) -> list[str]:
+    def pieces(self) -> list[Piece]:
         """Return its keys and values as pieces of JSON; from any one thread."""
         state, sensors = self._state, self._sensors
         own, scan = self._own, self._scan
         newest = own.message
         if state is not None and newest is not own.written:
-            own.text, own.written = self._tell_own(state, sensors), newest
+            own.piece, own.written = self._tell_own(state, sensors), newest
         newest = scan.message
-        if not scan.text or newest is not scan.written:
-            scan.text, scan.written = self._tell_scan(newest), newest
-        out = [own.text, scan.text]
+        if not scan.piece.text or newest is not scan.written:
+            scan.piece, scan.written = self._tell_scan(newest), newest
+        out = [own.piece, scan.piece]
         for camera, kept in self._cameras.items():
             newest = kept.message
-            if not kept.text or newest is not kept.written:
-                kept.text, kept.written = self._tell_picture(camera, newest), newest
-            out.append(kept.text)
+            if not kept.piece.text or newest is not kept.written:
+                kept.piece, kept.written = self._tell_picture(camera, newest), newest
+            out.append(kept.piece)
         return out
 
-    def _pairs(self, told: Mapping[str, str]) -> str:
-        return ",".join(f'"{self._prefix} {key}":"{value}"' for key, value in told.items())
+    def _pairs(self, told: Mapping[str, str], is_picture: bool = False) -> Piece:
+        pairs = (f'"{self._prefix}{key}":"{value}"' for key, value in told.items())
+        return Piece(",".join(pairs), is_picture)
 
-    def _tell_own(self, state: VehicleState, sensors: VehicleSensors | None) -> str:
+    def _tell_own(self, state: VehicleState, sensors: VehicleSensors | None) -> Piece:
         throttle, steering, ticks = state.throttle, state.steering_rad, (0, 0)
         rpy, rates, accel = (0.0, 0.0, state.yaw_rad), (0.0, 0.0, state.yaw_rate_radps), None
         if sensors is not None:
@@ -135,24 +149,25 @@ class CarTelemetry:
             }
         )
 
-    def _tell_scan(self, scan: Message | None) -> str:
-        ranges = _listed(scan) if isinstance(scan, LidarScan) else _NOTHING
+    def _tell_scan(self, scan: Message | None) -> Piece:
+        listed = _listed(scan) if isinstance(scan, LidarScan) else self._nothing
+        ranges = " ".join(listed)
         return self._pairs(
             {
                 "LIDAR Scan Rate": _text(self._rate_hz),
-                "LIDAR Range Array": ranges,
-                "LIDAR Intensity Array": _SHINE,
+                "LIDAR Range Array": packed(ranges) if self._is_packed else ranges,
+                "LIDAR Intensity Array": " ".join([_SHINE] * len(listed)),
             }
         )
 
-    def _tell_picture(self, camera: str, frame: Message | None) -> str:
+    def _tell_picture(self, camera: str, frame: Message | None) -> Piece:
         if isinstance(frame, CameraFrame):
             jpeg = frame.payload
         else:
             has = self._car.has("camera.resolution_px")
             size = self._car.vector("camera.resolution_px") if has else _DARK_PX
             jpeg = black_jpeg(round(size[0]), round(size[1]))
-        return self._pairs({CAMERAS[camera]: base64.b64encode(jpeg).decode()})
+        return self._pairs({CAMERAS[camera]: base64.b64encode(jpeg).decode()}, is_picture=True)
 
 
 class Telemetry:
@@ -160,14 +175,16 @@ class Telemetry:
 
     Args:
         names: Of the vehicles, in the order of V1, V2...
+        version: Which version of it.
     """
 
-    def __init__(self, names: Sequence[str]) -> None:
-        self._names = tuple(names)
+    def __init__(self, names: Sequence[str], version: Version = "0.3") -> None:
+        self._names, self._version = tuple(names), version
         self._cars: dict[str, CarTelemetry] = {}
         self._files: dict[str, str] = {}
         self._heads: Sequence[tuple[str, str]] | None = None
         self._spats: dict[str, Spat] = {}
+        self._lights = Piece()
 
     def knows(self, vehicle: str, car_file: str) -> bool:
         """Return whether a car is welcome already, as one of this file."""
@@ -176,7 +193,9 @@ class Telemetry:
     def welcome(self, vehicle: str, car_file: str, car: Car) -> None:
         """Learn what a car is; what it tells of itself follows."""
         self._files[vehicle] = car_file
-        self._cars[vehicle] = CarTelemetry(f"V{self._names.index(vehicle) + 1}", car)
+        prefix = "" if self._version == "0.1" else f"V{self._names.index(vehicle) + 1} "
+        is_packed = self._version == "newest"
+        self._cars[vehicle] = CarTelemetry(prefix, car, is_packed=is_packed)
 
     def show_lights(self, heads: Sequence[tuple[str, str]]) -> None:
         """Tell of these lights, by junction and group, as TL1, TL2..."""
@@ -202,16 +221,22 @@ class Telemetry:
         """The cars that are not welcome yet."""
         return [name for name in self._names if name not in self._cars]
 
-    def frame(self) -> str | None:
-        """Return the packet as a Socket.IO event; None until all cars and the lights are known."""
+    def packet(self) -> Packet | None:
+        """Return the packet; None until all cars and the lights are known."""
         if self.unknown or self._heads is None:
             return None
-        texts = [text for name in self._names for text in self._cars[name].texts()]
-        texts += [
-            f'"TL{number} State":"{self._shown(*head)}"'
-            for number, head in enumerate(self._heads, 1)
-        ]
-        return f'42["{EVENT}",{{{",".join(texts)}}}]'
+        pieces = [piece for name in self._names for piece in self._cars[name].pieces()]
+        if self._heads and self._version != "0.1":
+            pieces.append(self._tell_lights(self._heads))
+        return Packet(EVENT, pieces)
+
+    def _tell_lights(self, heads: Sequence[tuple[str, str]]) -> Piece:
+        """Return what the lights show; the piece is the one before while they show the same."""
+        shown = enumerate((self._shown(*head) for head in heads), 1)
+        text = ",".join(f'"TL{number} State":"{colour}"' for number, colour in shown)
+        if text != self._lights.text:
+            self._lights = Piece(text)
+        return self._lights
 
     def _shown(self, junction: str, group: str) -> int:
         spat = self._spats.get(junction)
@@ -232,10 +257,26 @@ def _text(*numbers: float) -> str:
     return " ".join(f"{number if math.isfinite(number) else 0.0:.4f}" for number in numbers)
 
 
-def _listed(scan: LidarScan) -> str:
-    """Return the ranges as text; "inf" is none."""
-    ranges = ranges_of(scan).tolist()
-    return " ".join(f"{one:.4f}" if math.isfinite(one) else "inf" for one in ranges)
+def _is_part(view_rad: float, beams: int) -> bool:
+    """Return whether beams leave a gap of more than one of them in the circle."""
+    return beams > 0 and view_rad + view_rad / beams < math.tau
+
+
+def _listed(scan: LidarScan) -> list[str]:
+    """Return the ranges as words; "inf" is none."""
+    step_rad = scan.bearing_step_rad
+    if step_rad is not None and _is_part(abs(step_rad) * (scan.beams - 1), scan.beams):
+        payload = scan.payload[: len(scan.payload) // 4 * 4]
+        ranges = np.frombuffer(payload, "<f4")[: scan.beams][:: 1 if step_rad > 0.0 else -1]
+    else:
+        ranges = ranges_of(scan)
+    return [f"{one:.4f}" if math.isfinite(one) else "inf" for one in ranges.tolist()]
+
+
+def packed(ranges: str) -> str:
+    """Return ranges as the newest simulator packs them."""
+    lines = ranges.replace(" ", "\n").encode()
+    return base64.b64encode(gzip.compress(lines, compresslevel=1, mtime=0)).decode()
 
 
 def quaternion(rpy: tuple[float, float, float]) -> tuple[float, float, float, float]:

@@ -11,15 +11,17 @@ from scm.maps.load import load_map
 from scm.part import Hears
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
-from scm.v2x.exchange import Call
+from scm.v2x.exchange import Call, Incoming
 from scm.v2x.message import Refused
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.join_request import JoinReply
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.signal_request import SignalRequest
 from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.world.part import WorldPart
 from vehicle_agent.devkit.bridge import DevkitPart, Wanted
@@ -102,12 +104,9 @@ def test_plus_can_be_right(stage):
 
 
 def test_headlights_and_indicators_reach_the_car(stage):
-    stage.say(1.0, V1_Throttle=0.5, V1_Steering=0, V1_Headlights=2, V1_Indicators=3)
-    lights = {name for item in stage.snapshots.drain() for name in item.message.vehicles[0].lights}
-    stage.say(0.5, V1_Throttle=0.5, V1_Steering=0, V1_Headlights=2, V1_Indicators=3)
-    lights |= {name for item in stage.snapshots.drain() for name in item.message.vehicles[0].lights}
-    lights |= set(stage.car().lights)
-    assert {"head_high", "head_low", "tail"} <= lights
+    keys = {"V1_Throttle": 0.5, "V1_Steering": 0, "V1_Headlights": 2, "V1_Indicators": 3}
+    lights = {name for _ in range(30) for name in stage.say(0.05, **keys).lights}
+    assert {"head_high", "head_low", "tail", "left", "right"} <= lights
 
 
 def test_each_reply_is_one_command_and_a_slow_script_keeps_its_car_going(stage):
@@ -182,7 +181,7 @@ def test_two_cars_are_v1_and_v2_in_the_order_of_the_options(stage):
     stage.say(1.0, **keys)
     assert stage.car("n2").speed_mps > 0.15
     assert stage.car("n1").speed_mps == pytest.approx(0.0, abs=0.01)
-    data = json.loads(stage.part.packet()[2:])[1]
+    data = json.loads(stage.part.packet().text(1)[3:])[1]
     for number, name in ((1, "n2"), (2, "n1")):
         x, y, _ = (float(word) for word in data[f"V{number} Position"].split())
         assert math.hypot(x - stage.car(name).x_m, y - stage.car(name).y_m) < 0.02
@@ -190,11 +189,11 @@ def test_two_cars_are_v1_and_v2_in_the_order_of_the_options(stage):
 
 def test_the_packet_is_what_the_car_says(stage):
     stage.wait(0.5)
-    data = json.loads(stage.part.packet()[2:])[1]
+    data = json.loads(stage.part.packet().text(1)[3:])[1]
     assert len(data) == 15 + len(CITY.lights)
     before = [int(word) for word in data["V1 Encoder Ticks"].split()]
     stage.say(1.0, V1_Throttle=0.8, V1_Steering=0)
-    data = json.loads(stage.part.packet()[2:])[1]
+    data = json.loads(stage.part.packet().text(1)[3:])[1]
     after = [int(word) for word in data["V1 Encoder Ticks"].split()]
     assert all(b > a + 500 for a, b in zip(before, after, strict=True))
     ranges = [float(word) for word in data["V1 LIDAR Range Array"].split()]
@@ -352,11 +351,22 @@ def test_a_script_can_place_a_car_itself(stage):
     assert car.kind == "remote"
     assert (car.x_m, car.y_m) == (pytest.approx(0.89, abs=0.02), 1.2)
     assert car.speed_mps == pytest.approx(0.2, abs=0.01)
-    data = json.loads(stage.part.packet()[2:])[1]
+    data = json.loads(stage.part.packet().text(1)[3:])[1]
     assert float(data["V1 Position"].split()[1]) == 1.2
     stage.lockstep.remove(stage.part)
     stage.wait(0.2)
     assert stage.car("p1") is None
+
+
+def test_a_placed_car_is_told_to_its_script_though_the_city_lets_it_hear_nothing():
+    part = DevkitPart("p1", Wanted(("p1",), cosim=True), "session")
+    part.meet(HeldScript())
+    welcome = JoinReply(vehicle="p1", x_m=1.0, y_m=2.0, yaw_rad=0.0, tag_id=1, epoch=1, t_ns=0)
+    (call,) = [out for out in part.step(0, []) if isinstance(out, Call)]
+    known = Incoming(WorldDefinition(t_ns=0, seed=0, map=CITY), 1)
+    part.step(1, [known, Incoming(welcome, 1, call)])
+    data = json.loads(part.packet().text(None)[2:])[1]
+    assert data["V1 Position"].startswith("1.0000 2.0000")
 
 
 def test_cosim_of_a_car_that_is_driven_is_refused_in_words(stage, caplog):

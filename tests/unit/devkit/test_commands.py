@@ -26,6 +26,16 @@ def test_throttle_and_steering_are_taken_plus_is_forward_and_left():
     assert read()[1] == []
 
 
+def test_the_keys_of_the_oldest_scripts_are_understood():
+    old = {"Throttle": "0.5", "Steering": "-0.25", "Headlights": "1", "Indicators": "3"}
+    wishes, complaints = read({"Traffic Light 2": "3"}, lights=2, base=old)
+    wish = wishes.cars[0]
+    assert (wish.throttle, wish.steering) == (0.5, -0.25)
+    assert (wish.headlights, wish.indicators) == ("low", "hazard")
+    assert wishes.lights == (None, 3)
+    assert complaints == []
+
+
 def test_the_steering_sign_can_be_turned():
     assert car(sign="right").steering == 0.25
 
@@ -64,6 +74,7 @@ def test_reset(value, wished):
 def test_a_brake_is_no_throttle(key):
     assert car({f"V1 {key}": "0.3"}).throttle == 0.0
     assert car({f"V1 {key}": "0"}).throttle == 0.5
+    assert read({f"V1 {key}": "0"})[1] == []
 
 
 POSE = {"CoSim": "1", "PosX": "1.5", "PosY": "-2", "PosZ": "0", "RotX": "0", "RotY": "0"}
@@ -123,6 +134,7 @@ def test_a_car_of_which_nothing_is_said_gets_nothing():
         ("V1 Thruttle", "expected one of Throttle"),
         ("TL1 State", "only V1"),
         ("Weather", "not carried"),
+        ("Fog", "not carried"),
         ("", "nothing here"),
     ],
 )

@@ -10,7 +10,8 @@ import pytest
 from websockets.sync.server import serve
 
 from scm.clock import NS_PER_MS, NS_PER_S, WallClock
-from vehicle_agent.devkit.engineio import Dialogue, ScriptSocket
+from vehicle_agent.devkit.deflate import Packet, Piece
+from vehicle_agent.devkit.engineio import EVENT, Dialogue, ScriptSocket
 
 OLD = '0{"sid":"a","upgrades":[],"pingTimeout":60000,"pingInterval":25000}'
 NEW = '0{"sid":"a","upgrades":[],"pingTimeout":20000,"pingInterval":25000,"maxPayload":1000000}'
@@ -134,20 +135,76 @@ def test_an_end_is_told_in_words(text, words):
     assert words in dialogue.ended
 
 
-def test_who_speaks_no_socketio_is_given_up_after_five_seconds():
+def test_who_welcomes_us_and_never_connects_us_is_given_up_after_five_seconds():
     dialogue = Dialogue(0)
+    dialogue.take(NEW, 0)
+    dialogue.due(0)
     dialogue.due(5 * NS_PER_S - 1)
     assert not dialogue.ended
     dialogue.due(5 * NS_PER_S)
     assert "no socket.io server" in dialogue.ended
 
 
+def test_a_server_that_says_nothing_is_told_bare_events_and_never_pinged():
+    dialogue = Dialogue(0)
+    assert dialogue.due_ns == NS_PER_S
+    assert dialogue.due(NS_PER_S - 1) == []
+    assert not dialogue.is_open
+    assert dialogue.due(NS_PER_S) == []
+    assert (dialogue.is_open, dialogue.is_bare) == (True, True)
+    for second in range(20, 100, 20):
+        assert dialogue.take(REPLY, second * NS_PER_S) == [{"V1 Throttle": "0.5"}]
+        assert dialogue.due((second + 20) * NS_PER_S) == []
+    assert not dialogue.ended
+
+
+def test_a_server_that_never_answers_a_bare_event_is_given_up():
+    dialogue = Dialogue(0)
+    dialogue.due(NS_PER_S)
+    dialogue.due(31 * NS_PER_S - 1)
+    assert not dialogue.ended
+    dialogue.due(31 * NS_PER_S)
+    assert "no socket.io server" in dialogue.ended
+
+
+def test_a_server_that_was_only_slow_to_welcome_us_is_talked_to_as_ever():
+    dialogue = Dialogue(0)
+    dialogue.due(NS_PER_S)
+    dialogue.take(NEW, 3 * NS_PER_S)
+    assert (dialogue.is_open, dialogue.is_bare) == (False, False)
+    assert dialogue.due(3 * NS_PER_S) == ["40"]
+    dialogue.take("40", 4 * NS_PER_S)
+    assert dialogue.is_open
+
+
+def test_a_silent_script_gets_the_event_without_a_number():
+    heard = []
+
+    def talk(connection):
+        for text in connection:
+            heard.append(text)
+            connection.send(REPLY)
+
+    with serve(talk, "127.0.0.1", 0, compression=None) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        ours = Ours(server.socket.getsockname()[1])
+        try:
+            soon(lambda: ours.replies and ours.socket.is_open, "it answers")
+            assert "events alone" in ours.socket.detail
+            assert all(text.startswith('42["Bridge",{') for text in heard)
+        finally:
+            ours.socket.stop()
+            server.shutdown()
+            thread.join()
+
+
 class FakeScript:
     """A script's server of the new generation, in this process."""
 
-    def __init__(self, port, answers=True):
+    def __init__(self, port, answers=True, compression=None):
         self.answers, self.heard, self.asked = answers, [], []
-        self.server = serve(self._talk, "127.0.0.1", port, compression=None, max_size=None)
+        self.server = serve(self._talk, "127.0.0.1", port, compression=compression, max_size=None)
         self.port = self.server.socket.getsockname()[1]
         self.thread = threading.Thread(target=self.server.serve_forever)
         self.thread.start()
@@ -198,9 +255,9 @@ def test_the_number_of_an_eaten_packet_is_read():
 class Hostile:
     """Says the same to whoever connects, and counts them."""
 
-    def __init__(self, *words):
+    def __init__(self, *words, compression=None):
         self.words, self.times = words, 0
-        self.server = serve(self._talk, "127.0.0.1", 0, compression=None, max_size=None)
+        self.server = serve(self._talk, "127.0.0.1", 0, compression=compression, max_size=None)
         self.port = self.server.socket.getsockname()[1]
         threading.Thread(target=self.server.serve_forever, daemon=True).start()
 
@@ -212,8 +269,9 @@ class Hostile:
             pass
 
 
-def test_too_much_at_once_ends_that_connection_and_another_begins():
-    script = Hostile('42["Bridge",{"' + "k" * 2**20 + '":"1"}]')
+@pytest.mark.parametrize("compression", [None, "deflate"])
+def test_too_much_at_once_ends_that_connection_and_another_begins(compression):
+    script = Hostile('42["Bridge",{"' + "k" * 2**20 + '":"1"}]', compression=compression)
     ours = Ours(script.port)
     try:
         soon(lambda: script.times > 1, "it connects anew")
@@ -268,7 +326,7 @@ class Ours:
 
     def packet(self):
         self.number += 1
-        return f'42["Bridge",{{"number":"{self.number}"}}]' if self.knows else None
+        return Packet(EVENT, [Piece(f'"number":"{self.number}"')]) if self.knows else None
 
     def said(self, data, _t_ns):
         self.replies.append(data)
@@ -312,6 +370,24 @@ def test_each_packet_is_the_newest_and_none_goes_before_there_is_one():
         soon(lambda: len(script.heard) > 5, "packets come")
         numbers = [int(heard["number"]) for heard in script.heard]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    finally:
+        ours.socket.stop()
+        script.close()
+
+
+@pytest.mark.parametrize("compression", [None, "deflate"])
+def test_a_server_that_inflates_is_sent_deflated_packets_and_any_other_text(
+    compression, monkeypatch
+):
+    sent, deflated = [], Packet.deflated
+    monkeypatch.setattr(Packet, "deflated", lambda *told: sent.append(told) or deflated(*told))
+    script = FakeScript(0, compression=compression)
+    ours = Ours(script.port)
+    try:
+        soon(lambda: len(ours.replies) > 5, "it converses")
+        assert [heard["number"] for heard in script.heard[:3]] == ["1", "2", "3"]
+        assert ours.replies[0] == {"V1 Throttle": "0.5"}
+        assert bool(sent) == (compression is not None)
     finally:
         ours.socket.stop()
         script.close()

@@ -1,8 +1,10 @@
 """Every key of the simulator's packet: what it carries, and that it is always there."""
 
 import base64
+import gzip
 import json
 import math
+import zlib
 
 import cv2
 import numpy as np
@@ -55,8 +57,10 @@ def frame(camera, payload):
     )
 
 
-def telemetry(*messages, names=("n1",), heads=(("crossing", "a"), ("crossing", "b"))):
-    made = Telemetry(names)
+def telemetry(
+    *messages, names=("n1",), heads=(("crossing", "a"), ("crossing", "b")), version="0.3"
+):
+    made = Telemetry(names, version)
     made.show_lights(heads)
     for name in names:
         made.welcome(name, "nigel", load_car("nigel"))
@@ -66,10 +70,16 @@ def telemetry(*messages, names=("n1",), heads=(("crossing", "a"), ("crossing", "
     return made
 
 
+def inflated(message):
+    return zlib.decompressobj(-zlib.MAX_WBITS).decompress(message + b"\0\0\xff\xff").decode()
+
+
 def packet(made):
-    text = made.frame()
-    assert text.startswith("42")
-    name, data = json.loads(text[2:])
+    told = made.packet()
+    text = told.text(7)
+    assert inflated(told.deflated(7)) == text
+    assert text.startswith("427")
+    name, data = json.loads(text[3:])
     assert name == "Bridge"
     return data
 
@@ -82,15 +92,29 @@ def test_there_is_no_packet_before_the_lights_are_known():
     made = Telemetry(["n1"])
     made.welcome("n1", "nigel", load_car("nigel"))
     made.hear(state("n1"))
-    assert made.frame() is None
+    assert made.packet() is None
     made.show_lights([])
-    assert made.frame() is not None
+    assert made.packet() is not None
 
 
 def test_every_key_is_in_the_first_packet_as_a_string():
     data = packet(telemetry())
     assert set(data) == {f"V1 {key}" for key in KEYS} | {"TL1 State", "TL2 State"}
     assert {type(value) for value in data.values()} == {str}
+
+
+def test_the_oldest_packet_has_bare_keys_and_no_lights():
+    assert set(packet(telemetry(version="0.1"))) == KEYS
+
+
+def test_the_newest_packet_has_its_ranges_packed_one_a_line():
+    heard = scan([0.5, math.inf, 12.0] + [1.0] * 357)
+    newest, plain = (packet(telemetry(heard, version=v)) for v in ("newest", "0.3"))
+    lines = gzip.decompress(base64.b64decode(newest["V1 LIDAR Range Array"])).decode()
+    assert "\n" in lines
+    ranges, known = np.fromstring(lines, sep="\n"), plain["V1 LIDAR Range Array"].split()
+    assert ranges.tolist() == [float(one) for one in known]
+    assert set(newest) == set(plain)
 
 
 def test_every_car_and_light_has_its_number():
@@ -104,7 +128,7 @@ def test_there_is_no_packet_before_all_cars_are_known():
     made = Telemetry(["n1", "n2"])
     made.welcome("n1", "nigel", load_car("nigel"))
     made.hear(state("n1"))
-    assert made.frame() is None
+    assert made.packet() is None
     assert made.unknown == ["n2"]
 
 
@@ -188,16 +212,29 @@ def test_without_a_scan_all_ranges_are_inf():
     assert set(told()["LIDAR Range Array"].split(" ")) == {"inf"}
 
 
-def test_a_scanner_of_part_of_a_circle_leaves_the_rest_inf():
-    count, first = 1081, -0.75 * math.pi
-    ranges = [5.0 + k for k in range(count)]
-    made = scan(ranges, bearing_first_rad=first, bearing_step_rad=math.radians(0.25))
+@pytest.mark.parametrize("turns", [1, -1])
+def test_a_scanner_of_part_of_a_circle_tells_its_own_beams_from_the_right(turns):
+    ranges = [5.0, math.inf, *range(7, 1086)]
+    step, first = turns * math.radians(0.25), -turns * 0.75 * math.pi
+    made = scan(ranges[::turns], bearing_first_rad=first, bearing_step_rad=step)
     words = told(made)["LIDAR Range Array"].split(" ")
-    assert words[0] == f"{5.0 + 540:.4f}"  # the middle beam looks ahead
-    assert words[90] == f"{5.0 + 540 + 360:.4f}"  # left is 90 degrees on
-    assert words[270] == f"{5.0 + 540 - 360:.4f}"
-    assert set(words[136:225]) == {"inf"}
-    assert "inf" not in words[:136] + words[225:]
+    assert words == ["5.0000", "inf", *(f"{one:.4f}" for one in range(7, 1086))]
+    assert len(told(made)["LIDAR Intensity Array"].split(" ")) == len(ranges)
+
+
+def test_before_its_first_scan_an_f1tenth_has_as_many_beams_as_after():
+    made = Telemetry(("n1",))
+    made.show_lights(())
+    made.welcome("n1", "f1tenth", load_car("f1tenth"))
+    made.hear(state("n1"))
+    beams = load_car("f1tenth").value("lidar.beams")
+    assert packet(made)["V1 LIDAR Range Array"].split(" ") == ["inf"] * round(beams)
+
+
+@pytest.mark.parametrize("ranges", [[], [1.0]])
+def test_a_scan_of_hardly_any_beams_is_told(ranges):
+    made = scan(ranges, bearing_step_rad=math.radians(0.25))
+    assert told(made)["LIDAR Range Array"]
 
 
 def test_intensities_are_the_simulators_constant():
@@ -264,3 +301,19 @@ def test_a_flashing_light_is_red_for_half_of_each_second():
 
 def test_a_light_that_nobody_told_of_is_off():
     assert packet(telemetry())["TL1 State"] == "0"
+
+
+def test_deflated_a_packet_is_hardly_larger_than_its_pictures_and_numbers_are_few():
+    noise = np.random.default_rng(1).integers(0, 256, 20_000, np.uint8).tobytes()
+    without, with_one = telemetry(), telemetry(frame("front", noise), scan([1.5] * 360))
+    assert len(without.packet().deflated(1)) < 2500 < 15_000 < len(without.packet().text(1))
+    assert len(with_one.packet().deflated(1)) < 1.03 * len(noise) + 2500
+    assert len(with_one.packet().text(1)) > 1.3 * len(noise) + 10_000
+
+
+def test_what_did_not_change_is_not_deflated_anew():
+    made = telemetry(frame("front", b"jpeg"))
+    before = [piece.deflated for piece in made.packet()._pieces]
+    made.hear(state(speed_mps=0.25))
+    after = [piece.deflated for piece in made.packet()._pieces]
+    assert [a is b for a, b in zip(after, before, strict=True)] == [False, *[True] * 4]
