@@ -14,7 +14,7 @@ DELAYING = ("drive_delay", "steer_delay")
 DIGITS = 6
 
 
-def write_car(car: Car, found: Fit, path: Path, drive: str) -> Car:
+def write_car(car: Car, found: Fit, path: Path, drive: str, tag_id: int | None = None) -> Car:
     """Write a car file, and return the car that it loads as.
 
     Args:
@@ -22,6 +22,7 @@ def write_car(car: Car, found: Fit, path: Path, drive: str) -> Car:
         found: What the drive says.
         path: Of the new file.
         drive: Name of the drive, for the numbers' sources.
+        tag_id: On the roof of the car that drove; None: not known.
 
     Raises:
         CarError: when the file cannot be written so that it loads again.
@@ -34,6 +35,9 @@ def write_car(car: Car, found: Fit, path: Path, drive: str) -> Car:
         value, std = number(one.value, DIGITS), number((one.high - one.low) / (2.0 * WIDE), 3)
         entry = f"{{ value = {value}, std = {std}, source = {source} }}"
         text = set_entry(text, section, name, entry)
+    if tag_id is not None:
+        source = quoted(f"seen on its roof: {drive}")
+        text = set_entry(text, "ips", "tag_id", f"{{ value = {tag_id}, source = {source} }}")
     path.write_text(text, encoding="utf-8")
     made = load_car(path)
     for key, one in found.numbers.items():

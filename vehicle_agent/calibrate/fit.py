@@ -1,13 +1,15 @@
 """A car's own numbers from its commands and the Eye's poses.
 
 The drive is driven again by the car's own kernel, with other numbers in every row of one fleet,
-and cut into windows. In each window the drive may lie wherever it fits best, so that errors of
-long ago do not count; what is left over is the residual. Gauss-Newton moves the numbers.
+and cut into windows, a leg each. In each window the drive may lie wherever it fits best, so that
+errors of long ago do not count; what is left over is the residual. Gauss-Newton moves the numbers.
 
 Intervals are 90 %: the wider of what white residuals say and of what the windows' own scatter says
-(White's sandwich, a window a cluster), so that an Eye whose errors last for a while does not make
-them too narrow. The Eye's own delay cannot be told from that of both actuators: the delays found
-are sums, and `eye_delay_s` of them is taken off as the Eye's.
+(a jackknife that leaves out a window at a time), so that an Eye whose errors last for a while does
+not make them too narrow; Student's t of as many windows as bear on a number. The numbers are those
+of the line that lies best through what a firmware that rounds makes of commands; by how much it
+rounds is part of the scatter. The Eye's own delay cannot be told from that of both actuators: the
+delays found are sums, and `eye_delay_s` of them is taken off as the Eye's.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,17 +26,22 @@ from scm.vehicles.fleet import Fleet
 TERMS = ("steer_trim", "steer_gain", "drive_deadband", "drive_gain")
 STEP_S = 0.001  # a servo at its rate moves by when it is told: coarser steps shift its delay
 KEPT = 10  # steps from pose to pose that is kept
-WINDOW_S = 2.5
+WINDOW_S = 2.5  # of what no rest parts
+SHORTEST_S, LONGEST_S = 1.0, 3.0
 LEAST_S = 20.0
 DELAYS = ("drive.delay_s", "steering.delay_s")
 PRIOR = 100.0  # steps of its derivative that a number may be from where it begins
+SILENT_S = 0.1  # without a command: who stalled does not know what the wheels were told meanwhile
+SETTLES_S = 0.2
 FEWEST = 5  # poses of a window that counts
-ROUNDS = 12
+NEAREST = 0.05  # of those steps: nearer than that differences are the kernel's own rounding
+ROUNDS = 20
 SHARES = (1.0, 0.5, 0.2, 0.05)
 WIDE = 1.645  # standard deviations from the middle to the end of a 90 % interval
 TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild poses prove nothing
 OF_NORMAL = 0.7572  # mean of r^2 / (1 + r^2 / TAIL) over a normal r
-SETTLED = 0.02  # standard deviations that a last step may move a number
+MANY = 1e6  # windows, where none bears on a number
+SETTLED = 0.01  # of half an interval that a last step may move a number
 POSITION_STD_M, YAW_STD_RAD = 5e-3, 1e-2
 
 
@@ -81,6 +88,29 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True)
+class Again:
+    """The drive as seen, and driven again window by window by the file and by what was found.
+
+    Attributes:
+        commands: Time [s], throttle and steering from then on, (n, 3).
+        t: Of all poses that count [s], (m,).
+        paths: As seen, by the file (the delays found count there too), as found: poses that lie in
+            each window where they fit best [m, m, rad], (3, m, 3).
+    """
+
+    commands: Floats
+    t: Floats
+    paths: Floats
+
+    @property
+    def missed_m(self) -> tuple[float, float]:
+        """Root mean square distance from what was seen [m]: by the file, and as found."""
+        away = self.paths[1:, :, :2] - self.paths[0, :, :2]
+        by_file, found = np.sqrt((away**2).sum(axis=2).mean(axis=1))
+        return float(by_file), float(found)
+
+
+@dataclass(frozen=True, slots=True)
 class Fit:
     """What a drive says.
 
@@ -88,12 +118,14 @@ class Fit:
         numbers: By key of the car file.
         position_rms_m: What is left over; likewise `yaw_rms_rad`.
         windows: How many counted.
+        again: The drive, driven again.
     """
 
     numbers: Mapping[str, Found]
     position_rms_m: float
     yaw_rms_rad: float
     windows: int
+    again: Again
 
 
 class _Model:
@@ -110,9 +142,16 @@ class _Model:
         self._edges = self.begin_s + STEP_S * np.arange(steps + 1)
         self._kept = self._edges[::KEPT]
         t = self._poses[:, 0]
-        which = ((t - self.begin_s) / WINDOW_S).astype(int)
+        which = np.searchsorted(_window_edges(commands), t, side="right")
         parts = [np.flatnonzero(which == w) for w in np.unique(which)]
-        self.windows = [part for part in parts if len(part) >= FEWEST]
+        told = np.diff(commands[:, 0])
+        silent = commands[:-1, 0][told > SILENT_S], commands[1:, 0][told > SILENT_S] + SETTLES_S
+        self.windows = [
+            part
+            for part in parts
+            if len(part) >= FEWEST
+            and not ((t[part[0]] < silent[1]) & (t[part[-1]] > silent[0])).any()
+        ]
         self.stds = np.array([POSITION_STD_M, POSITION_STD_M, YAW_STD_RAD])
         self._fleets: dict[int, Fleet] = {}
 
@@ -131,6 +170,19 @@ class _Model:
             path = np.column_stack([np.interp(t, self._kept, each[:, row]) for each in driven])
             out.append([self._left(path[part], self._poses[part, 1:]) for part in self.windows])
         return out
+
+    def again(self, z: Floats) -> Again:
+        """Return the drive as seen, by the file's own numbers, and by these."""
+        by_file = z.copy()
+        for i, n in enumerate(NUMBERS):
+            if n.key not in DELAYS:
+                own = 1.0 if n.scales else self._car.value(n.key)
+                by_file[i] = (own - n.start) / n.step
+        which = np.concatenate(self.windows)
+        seen = self._poses[which, 1:]
+        left = [np.concatenate(each) for each in self.residuals([np.array(by_file), z])]
+        paths = np.array([seen, *(seen - self.stds * each for each in left)])
+        return Again(self._commands, self._poses[which, 0], paths)
 
     def _drive(self, values: Floats) -> list[Floats]:
         if len(values) not in self._fleets:
@@ -196,55 +248,85 @@ def fit(car: Car, commands: Floats, poses: Floats, eye_delay_s: float = 0.0) -> 
     model = _Model(car, commands, poses)
     if len(model.windows) <= len(NUMBERS):
         msg = (
-            f"calibration: got poses in {len(model.windows)} windows of {WINDOW_S:g} s, "
+            f"calibration: got poses in {len(model.windows)} windows of 1 to 3 s, "
             f"expected more than {len(NUMBERS)}"
         )
         raise RecordingError(msg)
-    z = np.zeros(len(NUMBERS))
+    z, apart = np.zeros(len(NUMBERS)), np.ones(len(NUMBERS))
     for _ in range(ROUNDS):
-        left, slopes = _slopes(model, z)
-        step, spread = _solve(left, slopes, z)
+        left, slopes = _slopes(model, z, apart)
+        step, halves = _solve(left, slopes, z)
         moved = _stepped(model, z, step) - z
         z = z + moved
         model.stds = model.stds * _rms(left)
-        if (np.abs(moved) < SETTLED * np.sqrt(spread.diagonal())).all():
+        apart = np.clip(halves, NEAREST, 1.0)
+        if (np.abs(moved) < SETTLED * halves).all():
             break
-    left, slopes = _slopes(model, z)
-    _, spread = _solve(left, slopes, z)
-    return _told(model, z, spread, left, eye_delay_s)
+    left, slopes = _slopes(model, z, apart)
+    _, halves = _solve(left, slopes, z)
+    return _told(model, z, halves, left, eye_delay_s)
 
 
-def _slopes(model: _Model, z: Floats) -> tuple[list[Floats], list[Floats]]:
-    """Return residuals and their derivatives, window by window, (3 n,) and (3 n, numbers)."""
-    units = np.eye(len(z))
+def _window_edges(commands: Floats) -> list[float]:
+    """Return where windows begin: with each leg, for what a rounded command is wrong by lasts one.
+
+    A leg begins where throttle follows upon none; what lasts longer without is cut by the clock.
+    """
+    t, throttle = commands[:, 0], commands[:, 1]
+    begins = t[1:][(throttle[:-1] == 0.0) & (throttle[1:] != 0.0)]
+    edges = [float(t[0])]
+    for begin in (*begins.tolist(), float(t[-1])):
+        while begin - edges[-1] > LONGEST_S:
+            edges.append(edges[-1] + WINDOW_S)
+        if begin - edges[-1] >= SHORTEST_S:
+            edges.append(begin)
+    return edges
+
+
+def _slopes(model: _Model, z: Floats, apart: Floats) -> tuple[list[Floats], list[Floats]]:
+    """Return residuals and their derivatives, window by window, (3 n,) and (3 n, numbers).
+
+    Derivatives are differences between numbers `apart` on either side, in units of their steps.
+    """
+    units = np.diag(apart)
     driven = model.residuals([z, *(z + units), *(z - units)])
     sides = driven[1 : len(z) + 1], driven[len(z) + 1 :]
     slopes = [
-        np.column_stack([0.5 * (up - down).ravel() for up, down in zip(*both, strict=True)])
+        np.column_stack([(up - down).ravel() for up, down in zip(*both, strict=True)])
+        / (2.0 * apart)
         for both in zip(*(zip(*side, strict=True) for side in sides), strict=True)
     ]
     return driven[0], slopes
 
 
 def _solve(left: Sequence[Floats], slopes: Sequence[Floats], z: Floats) -> tuple[Floats, Floats]:
-    """Return the Gauss-Newton step, and the covariance of the numbers, in units of their steps."""
+    """Return the Gauss-Newton step, and half of each 90 % interval, in units of their steps."""
     prior = np.eye(len(z)) / PRIOR**2
-    normal, pull = prior.copy(), prior @ z
-    clusters = np.zeros_like(prior)
+    normals, pulls = [], []
     count, total = 0, 0.0
     for rest, slope in zip(left, slopes, strict=True):
         r = rest.ravel()
         weight = 1.0 / (1.0 + r * r / TAIL)
-        normal += (slope * weight[:, None]).T @ slope
-        mine = slope.T @ (weight * r)
-        pull += mine
-        clusters += np.outer(mine, mine)
+        normals.append((slope * weight[:, None]).T @ slope)
+        pulls.append(slope.T @ (weight * r))
         count, total = count + len(r) - 3, total + float((weight * r * r).sum())
+    normal = prior + sum(normals)
     inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
-    white = inverse * max(1.0, total / (count - len(z)))
-    clustered = inverse @ clusters @ inverse * len(left) / (len(left) - len(z))
-    wider = np.sqrt(np.maximum(white.diagonal(), clustered.diagonal()) / white.diagonal())
-    return -inverse @ pull, white * np.outer(wider, wider)
+    white = inverse.diagonal() * max(1.0, total / (count - len(z)))
+    without = [np.linalg.solve(normal - n, p) for n, p in zip(normals, pulls, strict=True)]
+    scatter = (len(left) - 1) * np.var(without, axis=0)
+    share = np.array([(inverse @ n @ inverse).diagonal() for n in normals]) / inverse.diagonal()
+    free = 1.0 / np.maximum((share * share).sum(axis=0), 1.0 / MANY) - 1.0
+    halves = np.maximum(WIDE * np.sqrt(white), _student(free) * np.sqrt(scatter))
+    return -inverse @ (prior @ z + sum(pulls)), halves
+
+
+def _student(free: Floats) -> Floats:
+    """Return the 95 % point of Student's t, by its expansion about the normal's; two at least."""
+    n, z = np.maximum(free, 2.0), WIDE
+    second = (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0
+    third = (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0
+    return np.asarray(z + (z**3 + z) / (4.0 * n) + second / n**2 + third / n**3)
 
 
 def _stepped(model: _Model, z: Floats, step: Floats) -> Floats:
@@ -270,14 +352,14 @@ def _rms(left: Sequence[Floats]) -> Floats:
 
 
 def _told(
-    model: _Model, z: Floats, spread: Floats, left: Sequence[Floats], eye_delay_s: float
+    model: _Model, z: Floats, halves: Floats, left: Sequence[Floats], eye_delay_s: float
 ) -> Fit:
     values = model.values(z)
-    ends = [model.values(z + way * WIDE * np.sqrt(spread.diagonal())) for way in (-1.0, 1.0)]
+    ends = [model.values(z + way * halves) for way in (-1.0, 1.0)]
     found = {}
     for n, *numbers in zip(NUMBERS, values, *ends, strict=True):
         off = eye_delay_s if n.key in DELAYS else 0.0
         value, low, high = (float(number) - off for number in numbers)
         found[n.key] = Found(max(0.0, value) if off else value, low, high)
     position, _, yaw = model.stds * _rms(left)
-    return Fit(found, float(position), float(yaw), len(left))
+    return Fit(found, float(position), float(yaw), len(left), model.again(z))

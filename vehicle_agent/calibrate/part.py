@@ -4,11 +4,12 @@ hear -> move the body up to now -> pattern -> guard -> guard of the real car -> 
 
 The car does not join the city: put it on a floor where nothing else drives. The pattern waits while
 a guard lets nothing through for want of a pose or because of the city-wide stop, and while the
-body is unfit to move. A car that was carried away goes on where it was put, with another leg.
+body is unfit to move, or its outline beyond the floor. A car that was carried away goes on where it
+was put, with another leg.
 """
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
@@ -17,15 +18,17 @@ from scm.part import Hears, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.part_status import PartStatus
 from scm.vehicles.guard import Guard
 from vehicle_agent.body import Body
-from vehicle_agent.calibrate.pattern import Pattern
+from vehicle_agent.calibrate.pattern import FULL, Pattern, Plan
 from vehicle_agent.calibrate.recorded import Recorded
 from vehicle_agent.guard import GuardLimits, Passed, RealGuard
 
 WAITS = frozenset({"pose", "doubt", "stop", "lost"})
+OUTSIDE = "outside the floor"
 
 
 class CalibrationPart:
@@ -34,6 +37,7 @@ class CalibrationPart:
     Attributes:
         recorded: What was commanded and seen.
         done: Set when the pattern is over.
+        doing: What it does now, in words: `37 % driven`, or `waits (pose)` and the like.
         guard: Of the real car: why it was held up, and how often.
         unfit: Why the body must not move, in words; empty: it may.
     """
@@ -43,29 +47,46 @@ class CalibrationPart:
     serves: Sequence[Serves] = ()
 
     def __init__(
-        self, name: str, body: Body, limits: GuardLimits, done: threading.Event | None = None
-    ) -> None:
+        self, name: str, body: Body, limits: GuardLimits, done: threading.Event | None = None,
+        plan: Plan = FULL, say: Callable[[str], None] | None = None,
+    ) -> None:  # fmt: skip
+        """Prepare the drive.
+
+        Args:
+            name: Of the vehicle, as the Eye calls it.
+            body: What is driven.
+            limits: Of the guard; its fence is the floor.
+            done: To be set when the pattern is over.
+            plan: How much is driven.
+            say: Is told `doing` once a second.
+        """
         self.name = name
-        self.hears: Sequence[Hears] = (Hears(EyeTrack, {"vehicle": name}), Hears(CityStop))
+        mine = {"vehicle": name}
+        self.hears: Sequence[Hears] = (
+            Hears(EyeTrack, mine), Hears(EyePose, mine), Hears(CityStop)
+        )  # fmt: skip
         self.recorded = Recorded()
         self.done = done or threading.Event()
         self.guard = RealGuard(limits)
-        self.unfit = ""
-        self._body = body
+        self.unfit = self.doing = ""
+        self._body, self._limits = body, limits
         self._commander = Guard(1)
-        self._pattern = Pattern(limits)
+        self._pattern = Pattern(limits, plan)
         self._track: EyeTrack | None = None
         self._seq = 0
         self._waits = True
         self._paused_ns = 0
         self._now_ns: int | None = None
         self._status_ns: int | None = None
+        self._say = say
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Hear, drive, record."""
         for item in inbox:
             if isinstance(item.message, EyeTrack):
                 self._see(item.message, item.t_ns)
+            elif isinstance(item.message, EyePose) and not item.message.flags:
+                self.recorded.seen(item.message)
             elif isinstance(item.message, CityStop):
                 self._commander.stop(item.message.engaged)
         self._body.advance(now_ns)
@@ -76,7 +97,7 @@ class CalibrationPart:
         self._body.command(passed.throttle, passed.steering)
         if self._track is not None:
             self.recorded.commanded(now_ns, passed.throttle, passed.steering)
-        return self._status(now_ns, passed)
+        return self._status(now_ns)
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """Stop the car."""
@@ -108,8 +129,25 @@ class CalibrationPart:
         )
         self._commander.take(command, now_ns)
         passed = self.guard.pass_on(self._commander.output(now_ns), now_ns)
-        self._waits = bool(self.unfit) or not WAITS.isdisjoint(passed.reasons)
+        why = self._why(passed)
+        self._waits = bool(why)
+        self.doing = f"waits ({why})" if why else f"{100.0 * self._pattern.progress:.0f} % driven"
         return replace(passed, throttle=0.0, steering=0.0) if self.unfit else passed
+
+    def _why(self, passed: Passed) -> str:
+        """Return why it waits, in words; empty: it does not."""
+        if self.unfit:
+            return self.unfit
+        if not WAITS.isdisjoint(passed.reasons):
+            return ", ".join(passed.reasons)
+        return OUTSIDE if self._is_outside() else ""
+
+    def _is_outside(self) -> bool:
+        """Return whether the outline is beyond the floor itself: it never drove there."""
+        if self._track is None:
+            return False
+        pose = Pose2(self._track.x_m, self._track.y_m, self._track.yaw_rad)
+        return self._limits.outside_m(pose) > self._limits.margin_m
 
     def _wish(self, now_ns: int) -> tuple[float, float]:
         since_ns = 0 if self._now_ns is None else now_ns - self._now_ns
@@ -123,12 +161,11 @@ class CalibrationPart:
             self.done.set()
         return wish or (0.0, 0.0)
 
-    def _status(self, now_ns: int, passed: Passed) -> list[Outgoing]:
+    def _status(self, now_ns: int) -> list[Outgoing]:
         if self._status_ns is not None and now_ns - self._status_ns < NS_PER_S:
             return []
         self._status_ns = now_ns
-        reasons = [self.unfit] if self.unfit else passed.reasons
-        why = f" ({', '.join(reasons)})" if self._waits else ""
-        doing = f"waits{why}" if self._waits else f"{100.0 * self._pattern.progress:.0f} % driven"
-        detail = f"calibrates: {doing}; held up: {self.guard.told or 'never'}"
+        if self._say is not None:
+            self._say(self.doing)
+        detail = f"calibrates: {self.doing}; held up: {self.guard.told or 'never'}"
         return [PartStatus(station=self.name, t_ns=now_ns, detail=detail)]

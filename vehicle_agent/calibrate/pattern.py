@@ -4,6 +4,11 @@ Pure: poses and seconds in, commands out. A leg is a throttle and two steering c
 each half, so that the wheels turn while it moves; between legs the car rests. Of the legs that are
 left at one throttle the next is the one that ends farthest inside the fence, and a leg ends early
 where the car could not stop inside.
+
+No leg holds its commands: each is a little less throttle and a little more or less steering for
+every piece of it, spread evenly over several steps of any firmware that rounds. A firmware that
+cuts a servo's angle off to whole degrees steers half a degree to one side in the mean: that is a
+trim, and only commands between its steps show it. At rest too: a swing of the wheels begins there.
 """
 
 import math
@@ -12,14 +17,35 @@ from dataclasses import dataclass
 from scm.geometry import Pose2
 from vehicle_agent.guard import GuardLimits, along
 
-SHARES = (0.3, 0.45, 0.6, 0.8)
-"""Of the throttle that the car may have."""
 STEERINGS = ((0.0, 0.0), (0.5, 0.5), (-0.5, -0.5), (1.0, -1.0), (-1.0, 1.0))
-LEG_S = 1.8
-REST_S = 0.5
+PIECE_S = 0.12
+THROTTLE_SPREAD = 0.02
+"""So much less at most: five steps of an 8-bit timer."""
+STEERING_SPREAD = 0.1
+"""From the least to the most: three degrees of a servo."""
+EVEN = (0.7548776662, 0.1458980338)
+"""Steps whose multiples' fractions are spread evenly: irrational, of throttle and of steering."""
 AHEAD_S = 0.2
 """How far ahead of the guard the pattern gives way."""
 NEARER_M = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How much is driven.
+
+    Attributes:
+        shares: Of the throttle that the car may have.
+        leg_s: How long a leg lasts at most; likewise `rest_s` between two.
+    """
+
+    shares: tuple[float, ...]
+    leg_s: float
+    rest_s: float
+
+
+FULL = Plan((0.3, 0.45, 0.6, 0.8), 1.8, 0.5)
+SHORT = Plan((0.4, 0.8), 1.0, 0.3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,16 +59,17 @@ class Leg:
 class Pattern:
     """Where a calibration has got to."""
 
-    def __init__(self, limits: GuardLimits) -> None:
-        self._limits = limits
+    def __init__(self, limits: GuardLimits, plan: Plan = FULL) -> None:
+        self._limits, self._plan = limits, plan
         self._levels = [
             [Leg(way * share * limits.throttle, both) for both in STEERINGS for way in (1.0, -1.0)]
-            for share in SHARES
+            for share in plan.shares
         ]
         self._all = sum(map(len, self._levels))
         self._leg: Leg | None = None
         self._begun_s = -math.inf
         self._ended_s: float | None = None
+        self._pieces = 0
 
     @property
     def progress(self) -> float:
@@ -54,22 +81,40 @@ class Pattern:
         if self._ended_s is None:
             self._ended_s = t_s
         if self._leg is None:
-            if t_s - self._ended_s < REST_S:
-                return 0.0, 0.0
+            if t_s - self._ended_s < self._plan.rest_s:
+                return 0.0, self._spread(self._pieces)
             if not self._begin(pose, t_s):
                 return None
         leg = self._leg
         since_s = t_s - self._begun_s
         if leg is None:
             return 0.0, 0.0
-        steering = leg.steering[since_s >= LEG_S / 2.0]
-        if since_s >= LEG_S or not self._has_room(pose, leg.throttle, steering):
-            self._leg, self._ended_s = None, t_s
+        throttle, steering = self._between(leg, since_s)
+        if since_s >= self._plan.leg_s or not self._has_room(pose, leg.throttle, steering):
+            self._end_leg(t_s)
             return 0.0, steering
-        return leg.throttle, steering
+        return throttle, steering
 
     def give_up(self, t_s: float) -> None:
         """End the leg: the car is not where it drove to [s]."""
+        self._end_leg(t_s)
+
+    def _between(self, leg: Leg, since_s: float) -> tuple[float, float]:
+        """Return the commands of this piece of a leg."""
+        piece = self._pieces + 1 + int(since_s / PIECE_S)
+        steering = leg.steering[since_s >= self._plan.leg_s / 2.0]
+        middle = math.copysign(min(abs(steering), 1.0 - STEERING_SPREAD / 2.0), steering)
+        less = EVEN[0] * piece % 1.0 * THROTTLE_SPREAD
+        throttle = math.copysign(max(0.0, abs(leg.throttle) - less), leg.throttle)
+        return throttle, middle + self._spread(piece)
+
+    def _spread(self, piece: int) -> float:
+        to_and_fro = abs(2.0 * (EVEN[1] * piece % 1.0) - 1.0)  # a jump would take the servo long
+        return (to_and_fro - 0.5) * STEERING_SPREAD
+
+    def _end_leg(self, t_s: float) -> None:
+        if self._leg is not None:
+            self._pieces += 2 + int((t_s - self._begun_s) / PIECE_S)
         self._leg, self._ended_s = None, t_s
 
     def _begin(self, pose: Pose2, t_s: float) -> bool:
@@ -83,7 +128,7 @@ class Pattern:
         return True
 
     def _end(self, pose: Pose2, leg: Leg) -> Pose2:
-        half_m = leg.throttle * self._limits.top_speed_mps * LEG_S / 2.0
+        half_m = leg.throttle * self._limits.top_speed_mps * self._plan.leg_s / 2.0
         for steering in leg.steering:
             pose = along(pose, self._limits.curvature_per_m * steering, half_m)
         return pose

@@ -8,6 +8,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.clock import seconds
+from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_track import EyeTrack
 
 DESCRIPTION = """recording: 1
@@ -30,11 +31,16 @@ tables:
 
 @dataclass(slots=True)
 class Recorded:
-    """Commands that passed the guard, (t, throttle, steering), and poses, (t, x, y, yaw)."""
+    """Commands that passed the guard, (t, throttle, steering), and poses, (t, x, y, yaw).
+
+    Poses are the cameras' own as soon as one comes: a track is smoothed, overshoots where the car
+    stops, and makes a leg a percent too long.
+    """
 
     command: list[tuple[float, float, float]] = field(default_factory=list)
     pose: list[tuple[float, float, float, float]] = field(default_factory=list)
     first_ns: int | None = None
+    is_sighted: bool = False
 
     def at(self, t_ns: int) -> float:
         """Return a time since the first that was asked for [s]."""
@@ -46,9 +52,14 @@ class Recorded:
         """Note what the actuators are told from now on."""
         self.command.append((self.at(t_ns), throttle, steering))
 
-    def seen(self, track: EyeTrack) -> None:
+    def seen(self, told: EyeTrack | EyePose) -> None:
         """Note a pose, once."""
-        row = self.at(track.t_ns), track.x_m, track.y_m, track.yaw_rad
+        if isinstance(told, EyePose) and not self.is_sighted:
+            self.is_sighted = True
+            self.pose.clear()
+        if isinstance(told, EyeTrack) and self.is_sighted:
+            return
+        row = self.at(told.t_ns), told.x_m, told.y_m, told.yaw_rad
         if not self.pose or row[0] > self.pose[-1][0]:
             self.pose.append(row)
 

@@ -8,10 +8,21 @@ from typing import TYPE_CHECKING
 from scm.command import Command, credentials_argument, credentials_of
 
 if TYPE_CHECKING:
+    from scm.vehicles.car import Car
     from vehicle_agent.body import Body
     from vehicle_agent.calibrate.fit import Fit
     from vehicle_agent.calibrate.part import CalibrationPart
     from vehicle_agent.guard import GuardLimits
+
+TAG = "tag-"
+"""What the Eye puts before the id of a tag that it knows no vehicle for."""
+ADVICE = {
+    "pose": "the Eye tells no pose of that name; a car that has not joined is called tag-ID",
+    "doubt": "the Eye sees it and is not sure: is the tag flat, whole and in the light?",
+    "stop": "the red button is pressed",
+    "outside the floor": "put it inside the rectangle of --floor, bumpers and all",
+}
+LONG_SIDE, SHORT_SIDE = 4.0, 3.3
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,6 +44,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--floor", nargs=4, type=float, required=True, metavar=("X0", "Y0", "X1", "Y1"),
         help="two corners of a free rectangle, map frame [m]: the car's outline stays inside",
+    )  # fmt: skip
+    parser.add_argument(
+        "--short", action="store_true",
+        help="drive 20 legs of 1 s instead of 40 of 1.8 s: half a minute, wider intervals",
     )  # fmt: skip
     parser.add_argument(
         "--speed-limit", type=float, default=1.0, metavar="THROTTLE", help="most throttle, 0 to 1"
@@ -60,27 +75,47 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.v2x.key import check_name
     from scm.vehicles.car import load_car
     from vehicle_agent.calibrate.part import CalibrationPart
+    from vehicle_agent.calibrate.pattern import FULL, SHORT
 
     check_name(arguments.name, "--name")
     check_name(arguments.city, "--city")
     out = arguments.out or Path("runs") / f"calibrate-{arguments.name}"
     car = load_car(arguments.car)
     limits = _limits(arguments)
+    _check_floor(arguments, limits)
     credentials = credentials_of(arguments, arguments.name)
     wish, clock = stop_on_signal(), WallClock()
     with ZenohBus(
         arguments.city, arguments.name, arguments.connect, clock=clock, credentials=credentials
     ) as bus:
-        part = CalibrationPart(arguments.name, _body(arguments), limits, wish)
+        plan = SHORT if arguments.short else FULL
+        part = CalibrationPart(arguments.name, _body(arguments), limits, wish, plan, _Console())
         try:
             print(f"waits for the Eye to see {arguments.name}; Ctrl-C ends the drive", flush=True)
             run(part, bus, clock, wish)
         finally:
             part.close()
-    drive = out / "drive"
-    part.recorded.write(drive, car.name)
-    print(_said(part, drive))
+            if part.recorded.command:
+                part.recorded.write(out / "drive", car.name)
+                print(_said(part, out / "drive"), flush=True)
     return _fit(arguments, part, out)
+
+
+class _Console:
+    """What is printed while it drives: each reason to wait once, and every tenth of the way."""
+
+    def __init__(self) -> None:
+        self._said = ""
+
+    def __call__(self, doing: str) -> None:
+        percent, is_driven, _ = doing.partition(" % driven")
+        line = f"{int(percent) // 10 * 10}{is_driven}" if is_driven else doing
+        if line == self._said:
+            return
+        self._said = line
+        why = doing.removeprefix("waits (").removesuffix(")")
+        advice = [words for reason, words in ADVICE.items() if reason in why.split(", ")]
+        print(": ".join([line, *advice]), flush=True)
 
 
 def _body(arguments: argparse.Namespace) -> "Body":
@@ -95,13 +130,17 @@ def _body(arguments: argparse.Namespace) -> "Body":
     return kind.open(arguments.car, 0, wiring)
 
 
+def _is_of_nobody(name: str) -> bool:
+    """Return whether the Eye calls a car so by the tag that it sees, for want of a vehicle."""
+    return name.startswith(TAG) and name[len(TAG) :].isdecimal()
+
+
 def _limits(arguments: argparse.Namespace) -> "GuardLimits":
     from scm.vehicles.car import load_car
     from scm.vehicles.drivers.limits import limits_of
     from vehicle_agent.guard import GuardLimits, rectangle
 
     own = limits_of(load_car(arguments.car))
-    of_nobody = arguments.name.startswith("tag-")
     return GuardLimits(
         rectangle(*arguments.floor),
         throttle=arguments.speed_limit,
@@ -110,8 +149,27 @@ def _limits(arguments: argparse.Namespace) -> "GuardLimits":
         front_m=own.front,
         rear_m=own.rear,
         width_m=own.width,
-        harmless=frozenset({"unknown"} if of_nobody else ()),
+        harmless=frozenset({"unknown"} if _is_of_nobody(arguments.name) else ()),
     )
+
+
+def _check_floor(arguments: argparse.Namespace, limits: "GuardLimits") -> None:
+    """Refuse a floor on which hardly a leg has room.
+
+    Raises:
+        RunError: naming both sizes.
+    """
+    from scm.errors import RunError
+
+    x0, y0, x1, y1 = arguments.floor
+    short, long = sorted((abs(x1 - x0), abs(y1 - y0)))
+    length = limits.front_m + limits.rear_m
+    if short < SHORT_SIDE * length or long < LONG_SIDE * length:
+        msg = (
+            f"--floor: got {long:.2f} m by {short:.2f} m, expected at least "
+            f"{LONG_SIDE * length:.2f} m by {SHORT_SIDE * length:.2f} m: room for this car to turn"
+        )
+        raise RunError(msg)
 
 
 def _said(part: "CalibrationPart", drive: Path) -> str:
@@ -124,23 +182,34 @@ def _fit(arguments: argparse.Namespace, part: "CalibrationPart", out: Path) -> i
     from scm.vehicles.car import load_car
     from vehicle_agent.calibrate.car_file import write_car
     from vehicle_agent.calibrate.fit import fit
+    from vehicle_agent.calibrate.picture import write_picture
 
     car = load_car(arguments.car)
     found = fit(car, *part.recorded.arrays(), arguments.eye_delay_ms / 1000.0)
     path = out / "car.toml"
-    write_car(car, found, path, f"{arguments.name}, {found.windows} windows")
-    print(_table(found))
-    print(f"{path}: `scm replay {out / 'drive'} --car {path}` shows how well it drives again")
+    tag_id = int(arguments.name[len(TAG) :]) if _is_of_nobody(arguments.name) else None
+    write_car(car, found, path, f"{arguments.name}, {found.windows} windows", tag_id)
+    deadband = car.value("drive.deadband") if car.has("drive.deadband") else 0.0
+    write_picture(found, deadband, out / "fit.svg")
+    print(_table(car, found))
+    print(f"{path}: for `vehicle-agent join --calibration`; {out / 'fit.svg'} shows the fit")
+    print(f"`scm replay {out / 'drive'} --car {path}` shows how well it drives again")
     return 0
 
 
-def _table(found: "Fit") -> str:
-    rows = [
-        f"  {key:<22}{one.value:>9.4f}   90 % {one.low:.4f} .. {one.high:.4f}"
-        for key, one in found.numbers.items()
-    ]
+def _table(car: "Car", found: "Fit") -> str:
+    rows = [f"  {'number':<22}{'file':>9}{'found':>9}   90 %"]
+    for key, one in found.numbers.items():
+        given = f"{car.value(key):.4f}" if car.has(key) else "-"
+        rows.append(f"  {key:<22}{given:>9}{one.value:>9.4f}   {one.low:.4f} .. {one.high:.4f}")
+    before, after = (1e3 * missed for missed in found.again.missed_m)
     left = f"left over: {1e3 * found.position_rms_m:.1f} mm, {1e3 * found.yaw_rms_rad:.1f} mrad"
-    return "\n".join([*rows, f"  {left} (rms, the Eye's noise included)"])
+    rows += [
+        f"  each leg driven again misses what was seen by {before:.1f} mm with the file's numbers,"
+        f" by {after:.1f} mm with those found (rms)",
+        f"  {left} (rms, the Eye's noise included)",
+    ]
+    return "\n".join(rows)
 
 
 COMMAND = Command(

@@ -13,46 +13,25 @@ import numpy as np
 from scm.clock import NS_PER_S
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.mismatch.report.own_files import listed_terms
-from scm.mismatch.report.toml_text import set_entry, set_list
 from scm.vehicles.car import load_car
-from tests.unit.calibrate.rig import START, STEP_NS, T0, Eye, Hidden
-from tests.unit.calibrate.test_calibrate_by_cable import DEADBAND, Line, Street
+from tests.unit.calibrate.cable import SHARP, Emulated, Line, Street
+from tests.unit.calibrate.rig import STEP_NS, T0, Eye
 from vehicle_agent.bodies.nigel import NigelBody
 from vehicle_agent.body import Wiring
 from vehicle_agent.calibrate.car_file import write_car
 from vehicle_agent.calibrate.fit import fit
 from vehicle_agent.emulate.part import place_of
-from vehicle_agent.emulate.sketches import SKETCHES
-from vehicle_agent.emulate.wheels import Wheels
 from vehicle_agent.last_word import real_guard
 from vehicle_agent.stay import Stay
 
 LASTS_S = 70
 MOVES_MPS = 0.02
-TERMS = ("steer_trim", "steer_gain", "drive_gain")
-HIDDEN = (("steering", "trim_rad", 0.05), ("steering", "gain", 0.9), ("drive", "gain", 0.85))
+MOVED = Emulated(trim=0.05, gain=0.9, drive=0.85)
 
 
-def hidden_car(path):
-    """Write the file of the car that the cable moves."""
-    car = load_car("nigel")
-    text = set_list(car.path.read_text(), "terms", listed_terms(car.with_terms(TERMS)), "hidden")
-    for section, name, value in HIDDEN:
-        text = set_entry(text, section, name, f'{{ value = {value}, source = "hidden" }}')
-    path.write_text(text)
-
-
-def put(line, car, pose):
-    """Let the cable move such a car, from there."""
-    line.wheels = Wheels(SKETCHES["2wd"].at_setup, str(car), DEADBAND)
-    line.wheels.place(pose, T0)
-
-
-def calibrated(hidden, path):
-    """Calibrate the hidden car, and write what was found."""
-    street = Street()
-    put(street.line, hidden, START)
+def calibrated(path):
+    """Calibrate the car, and write what was found."""
+    street = Street(moved=MOVED)
     street.step()
     found = fit(load_car("nigel"), *street.part.recorded.arrays())
     for key, one in found.numbers.items():
@@ -60,12 +39,12 @@ def calibrated(hidden, path):
     write_car(load_car("nigel"), found, path, "lane")
 
 
-def distances(hidden, known):
-    """Drive the hidden car by what is known of it; return distances from the middle [m], (n,)."""
+def distances(known):
+    """Drive the car by what is known of it; return distances from the middle [m], (n,)."""
     city_map = load_map("proving_ground")
-    lanes, line, eye = Roads(city_map).lanes, Line(), Eye(Hidden(late_ms=0.0))
+    lanes, line, eye = Roads(city_map).lanes, Line(MOVED), Eye(SHARP)
     pose = place_of(city_map, "")
-    put(line, hidden, pose)
+    line.wheels.place(pose, T0)
     body = NigelBody(load_car(known), line)
     body.place(pose, T0)
     stay = Stay("n7", "nigel", body, city_map, 1, T0, real_guard(body.limits, city_map, Wiring()))
@@ -84,11 +63,10 @@ def distances(hidden, known):
 
 def main():
     with tempfile.TemporaryDirectory() as folder:
-        hidden, found = Path(folder) / "hidden.toml", Path(folder) / "car.toml"
-        hidden_car(hidden)
-        calibrated(hidden, found)
+        found = Path(folder) / "car.toml"
+        calibrated(found)
         for name, known in (("uncalibrated", "nigel"), ("calibrated", found)):
-            mm = 1000.0 * distances(hidden, known)
+            mm = 1000.0 * distances(known)
             print(f"| {name} | mean {mm.mean():.1f} mm | largest {mm.max():.1f} mm |")
 
 

@@ -14,6 +14,7 @@ from scm.vehicles.fleet import Fleet
 from tests.unit.test_real_guard import track
 from vehicle_agent.calibrate.fit import DELAYS, TERMS, fit
 from vehicle_agent.calibrate.part import CalibrationPart
+from vehicle_agent.calibrate.pattern import FULL
 from vehicle_agent.guard import GuardLimits, rectangle
 
 LIMITS = GuardLimits(rectangle(0.0, 0.0, 2.0, 1.5))
@@ -163,10 +164,10 @@ def drive(part, body, eye, limits, blind=()):
     return seconds(now_ns - T0), farthest - limits.margin_m
 
 
-def calibrated(hidden, start=START, limits=LIMITS):
+def calibrated(hidden, start=START, limits=LIMITS, plan=FULL):
     """Drive the pattern; return the part and the farthest that the outline was outside [m]."""
     body = HiddenBody(hidden, start)
-    part = CalibrationPart("n7", body, limits)
+    part = CalibrationPart("n7", body, limits, plan=plan)
     _, farthest = drive(part, body, Eye(hidden), limits)
     return part, farthest
 

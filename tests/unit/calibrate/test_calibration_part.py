@@ -3,6 +3,7 @@
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.eye_pose import EyePose
 from tests.unit.calibrate.rig import LIMITS, START, STEP_NS, T0, Eye, Hidden, HiddenBody, drive
 from tests.unit.test_real_guard import track
 from vehicle_agent.calibrate.part import CalibrationPart
@@ -63,6 +64,19 @@ def test_the_city_wide_stop_holds_it_and_it_goes_on_afterwards():
     assert part._pattern.progress == before
 
 
+def test_beyond_the_floor_it_waits_until_it_is_put_inside():
+    wheels, said = Wheels(), []
+    part = CalibrationPart("n7", wheels, LIMITS, say=said.append)
+    for i in range(100):
+        now_ns = T0 + i * STEP_NS
+        part.step(now_ns, [Incoming(track(now_ns, 1.9, 0.7), now_ns)])
+    assert {throttle for throttle, _ in wheels.told} == {0.0}
+    assert said[-1] == "waits (outside the floor)"
+    stepped(part, 60, 100)
+    assert wheels.told[-1][0] != 0.0
+    assert said[-1] == "3 % driven"
+
+
 def test_what_is_recorded_is_what_passed_the_guard():
     wheels = Wheels()
     part = CalibrationPart("n7", wheels, LIMITS)
@@ -76,6 +90,21 @@ def test_a_pose_that_is_stale_or_told_twice_is_not_recorded():
     inbox = [track(T0), track(T0), track(T0 + 1, stale=True), track(T0 + NS_PER_MS)]
     part.step(T0, [Incoming(message, T0) for message in inbox])
     assert [row[0] for row in part.recorded.pose] == [0.0, 0.001]
+
+
+def sighting(t_ns, x_m, flags=()):
+    return EyePose(camera="top", vehicle="n7", tag_id=1, t_ns=t_ns, x_m=x_m, y_m=0.7, yaw_rad=0.0,
+                   covariance=(1e-6,) * 9, flags=flags)  # fmt: skip
+
+
+def test_what_a_camera_saw_itself_is_recorded_in_place_of_smoothed_tracks():
+    part = CalibrationPart("n7", Wheels(), LIMITS)
+    inbox = [
+        track(T0, 1.0), sighting(T0, 0.99), track(T0 + NS_PER_MS, 1.1),
+        sighting(T0 + 2 * NS_PER_MS, 0.98, ("moved",)), sighting(T0 + 3 * NS_PER_MS, 0.97),
+    ]  # fmt: skip
+    part.step(T0, [Incoming(message, T0) for message in inbox])
+    assert [row[:2] for row in part.recorded.pose] == [(0.0, 0.99), (0.003, 0.97)]
 
 
 def test_it_ends_at_rest():

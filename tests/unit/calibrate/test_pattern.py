@@ -6,15 +6,22 @@ import pytest
 
 from scm.geometry import Pose2
 from tests.unit.calibrate.rig import Hidden, calibrated
-from vehicle_agent.calibrate.pattern import LEG_S, SHARES, STEERINGS, Pattern
+from vehicle_agent.calibrate.pattern import (
+    FULL,
+    SHORT,
+    STEERING_SPREAD,
+    STEERINGS,
+    THROTTLE_SPREAD,
+    Pattern,
+)
 from vehicle_agent.guard import GuardLimits, rectangle
 
 WIDE = GuardLimits(rectangle(-100.0, -100.0, 100.0, 100.0), throttle=0.8)
 
 
-def driven(limits, pose):
+def driven(limits, pose, plan=FULL):
     """What the pattern commands to a car that never moves, step by step."""
-    pattern, wishes, progress = Pattern(limits), [], []
+    pattern, wishes, progress = Pattern(limits, plan), [], []
     for i in range(20_000):
         wish = pattern.step(pose, i * 0.02)
         if wish is None:
@@ -24,27 +31,59 @@ def driven(limits, pose):
     pytest.fail("the pattern does not end")
 
 
+def meant(wishes):
+    """The wishes as if none were spread: each the nearest of the plan's throttle and steering."""
+    levels = [way * share * 0.8 for share in FULL.shares for way in (1.0, -1.0)]
+    middles = sorted({steering for both in STEERINGS for steering in both})
+    return [
+        (min(levels, key=lambda u: abs(u - a)), min(middles, key=lambda s: abs(s - b)))
+        for a, b in wishes
+    ]
+
+
 def test_every_throttle_is_driven_both_ways_with_every_steering_and_small_ones_first():
     wishes, _ = driven(WIDE, Pose2(0.0, 0.0, 0.0))
-    moving = [wish for wish in wishes if wish[0]]
+    moving = meant(wish for wish in wishes if wish[0])
     levels = [abs(throttle) for throttle, _ in moving]
     assert levels == sorted(levels)
     expected = {
         (way * share * 0.8, steering)
-        for share in SHARES
+        for share in FULL.shares
         for way in (1.0, -1.0)
         for both in STEERINGS
         for steering in both
     }
     assert set(moving) == expected
     seconds = len(moving) * 0.02
-    assert seconds == pytest.approx(LEG_S * len(SHARES) * 2 * len(STEERINGS), rel=0.03)
+    assert seconds == pytest.approx(FULL.leg_s * len(FULL.shares) * 2 * len(STEERINGS), rel=0.03)
+
+
+def test_the_short_plan_drives_as_many_ways_in_half_a_minute():
+    wishes, _ = driven(WIDE, Pose2(0.0, 0.0, 0.0), SHORT)
+    assert 20.0 < len(wishes) * 0.02 < 30.0
+    assert len({(a > 0.0, b) for a, b in meant(wish for wish in wishes if wish[0])}) == 10
 
 
 def test_the_wheels_turn_while_it_moves():
     wishes, _ = driven(WIDE, Pose2(0.0, 0.0, 0.0))
-    pairs = list(pairwise(wishes))
-    assert sum(a[0] == b[0] != 0.0 and a[1] != b[1] for a, b in pairs) == 2 * 2 * len(SHARES)
+    moving = meant(wish for wish in wishes if wish[0])
+    turned = sum(a[0] == b[0] and a[1] == -b[1] != 0.0 for a, b in pairwise(moving))
+    assert turned >= 2 * 2 * len(FULL.shares)
+
+
+def test_what_a_firmware_cuts_off_is_half_a_step_in_the_mean():
+    wishes = [wish for wish in driven(WIDE, Pose2(0.0, 0.0, 0.0))[0] if wish[0]]
+    for at, unspread, spread, steps in (
+        (0, 0.8, THROTTLE_SPREAD, 255), (1, 1.0, STEERING_SPREAD, 30),
+    ):  # fmt: skip
+        told = [wish[at] for wish in wishes]
+        assert max(map(abs, told)) <= unspread
+        cut = [steps * value % 1.0 for value in told]
+        assert sum(cut) / len(cut) == pytest.approx(0.5, abs=0.03)
+        quarters = [sum(quarter == int(4.0 * each) for each in cut) for quarter in range(4)]
+        assert min(quarters) > 0.2 * len(cut)
+        near = [abs(a - b[at]) for a, b in zip(told, meant(wishes), strict=True)]
+        assert max(near) <= spread + 1e-9
 
 
 def test_progress_never_falls_and_ends_at_one():
