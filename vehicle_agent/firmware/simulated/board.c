@@ -5,7 +5,7 @@
 //   board firmware.hex --pty LINK   runs in real time; the serial line is a pseudo-terminal
 //
 // Commands:  run MS | rx HEX | pin D0..D7 LEVEL | battery MILLIVOLT | imu on|off|stuck
-//            reading AX AY AZ GX GY GZ (raw) | hang | quit
+//            reading AX AY AZ GX GY GZ (raw) | hang | pull | plug (the pseudo-terminal) | quit
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -36,7 +36,8 @@ enum { DDRB = 0x24, PORTB = 0x25, PORTC = 0x28, PORTD = 0x2B, TCCR0A = 0x44, OCR
 static avr_t *avr;
 static uint8_t queue[1 << 16];
 static unsigned queue_head, queue_tail;
-static int pty = -1;
+static int pty = -1, pty_far = -1;
+static int is_live;
 static unsigned lowest_sp = RAM_END;
 
 static unsigned long long now_us(void) { return avr->cycle / US; }
@@ -50,9 +51,9 @@ static void tell(const char *name, double value) {
 static void on_sent(struct avr_irq_t *irq, uint32_t value, void *param) {
     (void)irq, (void)param;
     uint8_t byte = value;
-    if (pty < 0)
+    if (!is_live)
         printf("%llu tx %02x\n", now_us(), byte);
-    else if (write(pty, &byte, 1) < 0 && errno != EAGAIN && errno != EIO)
+    else if (pty >= 0 && write(pty, &byte, 1) < 0 && errno != EAGAIN && errno != EIO)
         perror("board: pty");
 }
 
@@ -191,6 +192,45 @@ static void run_until(avr_cycle_count_t end) {
     }
 }
 
+// ---- the pseudo-terminal -----------------------------------------------------------------------
+
+static const char *link_path;
+
+static void pull(void) {
+    if (pty < 0) return;
+    unlink(link_path);
+    close(pty_far);
+    close(pty);
+    pty = -1;
+}
+
+static void leave(int number) {
+    (void)number;
+    unlink(link_path);
+    _exit(0);
+}
+
+static void plug(void) {
+    if (pty >= 0 || link_path == NULL) return;
+    char name[64];
+    if (openpty(&pty, &pty_far, name, NULL, NULL) < 0) {
+        perror("board: openpty");
+        exit(1);
+    }
+    struct termios raw;
+    tcgetattr(pty_far, &raw);
+    cfmakeraw(&raw);
+    tcsetattr(pty_far, TCSANOW, &raw);
+    fcntl(pty, F_SETFL, O_NONBLOCK);
+    unlink(link_path);
+    if (symlink(name, link_path) < 0) {
+        perror(link_path);
+        exit(1);
+    }
+    signal(SIGTERM, leave);
+    signal(SIGINT, leave);
+}
+
 // ---- commands ------------------------------------------------------------------------------
 
 static void receive_hex(const char *hex) {
@@ -227,6 +267,10 @@ static int obey(char *line) {
         set_readings(rest);
     else if (strcmp(line, "hang") == 0)
         avr->pc = HANGS_AT;
+    else if (strcmp(line, "pull") == 0)
+        pull();
+    else if (strcmp(line, "plug") == 0)
+        plug();
     else if (strcmp(line, "quit") == 0)
         return 0;
     else
@@ -244,37 +288,8 @@ static void run_stepped(void) {
     }
 }
 
-static const char *link_path;
-
-static void leave(int number) {
-    (void)number;
-    unlink(link_path);
-    _exit(0);
-}
-
-static void open_pty(void) {
-    int slave;
-    char name[64];
-    if (openpty(&pty, &slave, name, NULL, NULL) < 0) {
-        perror("board: openpty");
-        exit(1);
-    }
-    struct termios raw;
-    tcgetattr(slave, &raw);
-    cfmakeraw(&raw);
-    tcsetattr(slave, TCSANOW, &raw);
-    fcntl(pty, F_SETFL, O_NONBLOCK);
-    unlink(link_path);
-    if (symlink(name, link_path) < 0) {
-        perror(link_path);
-        exit(1);
-    }
-    signal(SIGTERM, leave);
-    signal(SIGINT, leave);
-}
-
 static void run_live(void) {
-    open_pty();
+    plug();
     tell("ready", 1);
     fflush(stdout);
     struct timespec next;
@@ -331,6 +346,7 @@ int main(int argc, char **argv) {
     set_up(argv[1]);
     if (argc == 4) {
         link_path = argv[3];
+        is_live = 1;
         run_live();
     }
     run_stepped();
