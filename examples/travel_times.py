@@ -11,6 +11,7 @@ from scm.fleet import open_city
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("--live", action="store_true", help="use the city that `make run` started")
 parser.add_argument("--connect", default="tcp/127.0.0.1:7447", help="its router (%(default)s)")
+parser.add_argument("--cars", type=int, default=2, help="how many (%(default)s)")
 parser.add_argument("--plans", nargs="+", default=["calm", "brisk"], help="(%(default)s)")
 parser.add_argument("--via", nargs="+", default=["east_loop", "west_loop"], metavar="LANE",
                     help="where to drive (%(default)s)")  # fmt: skip
@@ -19,7 +20,7 @@ arguments = parser.parse_args()
 began, speeds = time.perf_counter(), {}
 with open_city("driving_school", connect=arguments.connect if arguments.live else None) as city:
     start_s = city.time_s
-    cars = [city.spawn("nigel") for _ in range(2)]
+    cars = [city.spawn("nigel") for _ in range(arguments.cars)]
     for plan in arguments.plans:
         city.use_plan(plan)
         trips = [car.drive(*arguments.via) for car in cars]

@@ -65,6 +65,7 @@ class AgentPart:
         seed: int = 0,
         body: str = "simulated",
         wiring: Wiring | None = None,
+        tag_id: int | None = None,
     ) -> None:
         """Prepare to join.
 
@@ -76,12 +77,13 @@ class AgentPart:
             seed: Of the sensors' noise.
             body: Kind of body: a file of `vehicle_agent/bodies`.
             wiring: How a real body is connected, and what it may do.
+            tag_id: Glued onto its roof; None: whatever the city gives.
         """
         self.name = check_name(name, "vehicle")
         kind = registry.load(BODIES, body, "BODY", BodyKind, RunError)
         self._wiring, self._is_real = wiring or Wiring(), kind.kind == "real"
         self._body = kind.open(car, seed, self._wiring)
-        self._link = Link(name, car, kind.kind, spawn, session)
+        self._link = Link(name, car, kind.kind, spawn, session, tag_id)
         self._car = car
         self._map: CityMap | None = None
         self._defined_ns: int | None = None
@@ -109,7 +111,14 @@ class AgentPart:
         self.serves: Sequence[Serves] = (Serves(RouteRequest, own), Serves(LightRequest, own))
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Hear, drive, report."""
+        """Hear, drive, report; a failure lets go of the body before anybody is told of it."""
+        try:
+            return self._stepped(now_ns, inbox)
+        except Exception:
+            self._body.close()
+            raise
+
+    def _stepped(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         outbox: list[Outgoing] = []
         for item in inbox:
             if item.call is not None:
@@ -164,12 +173,15 @@ class AgentPart:
             self._link.regain()
 
     def _on_reply(self, item: Incoming, now_ns: int) -> None:
+        was_own = self._link.standing == "own"
         came_in = self._link.take(item)
         if came_in and self._map is not None:
             self._body.place(self._link.start, now_ns)
             self._begin_stay(self._map, now_ns)
         elif self._stay is not None and self._link.standing == "own":
             self._stay.guard.set_epoch(self._link.epoch, now_ns)
+        elif self._stay is not None and was_own and self._link.standing == "foreign":
+            self._stay.guard.set_epoch(self._link.epoch + 1, now_ns)  # whoever has it may speak now
 
     def _begin_stay(self, city_map: CityMap, now_ns: int) -> None:
         from vehicle_agent.stay import Stay  # noqa: PLC0415 drivers bring the compiler with them

@@ -46,8 +46,17 @@ class Link:
         session: Of the agent's bus; no joining before it is known.
     """
 
-    def __init__(self, vehicle: str, car: str, kind: str, spawn: str, session: str) -> None:
+    def __init__(
+        self,
+        vehicle: str,
+        car: str,
+        kind: str,
+        spawn: str,
+        session: str,
+        tag_id: int | None = None,
+    ) -> None:
         self._vehicle, self._car, self._kind, self._spawn = vehicle, car, kind, spawn
+        self._tag_id = tag_id
         self.session = session
         self.standing: Standing = "outside"
         self.epoch = 0
@@ -146,6 +155,7 @@ class Link:
             kind=self._kind,
             car=self._car,
             spawn=self._spawn,
+            tag_id=self._tag_id,
         )
 
     def _leased(self, lease: LeaseReply) -> None:

@@ -4,7 +4,6 @@ import math
 import tomllib
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from scm.arrays import Floats
 from scm.scenery.canvas import Colour, colour_of
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
+from scm.vehicles.car_files import car_files
 
 PALETTE = tuple(
     colour_of(text)
@@ -57,14 +57,14 @@ KEYS = {
 
 @lru_cache(maxsize=64)
 def car_body(car: str) -> CarBody:
-    """Return the body of a car file of that name; a car that is not among ours is a Nigel to us.
+    """Return the body of the car file of a name; a car whose file is not here is a Nigel to us.
 
     Every measure that a file leaves out is a Nigel's.
     """
-    path = files("scm.vehicles") / "types" / f"{car}.toml"
-    if not car.replace("-", "_").isidentifier() or not path.is_file():
+    path = car_files().get(car)
+    if path is None:
         return NIGEL
-    values = tomllib.loads(path.read_text())
+    values = tomllib.loads(path.read_text(encoding="utf-8"))
     given = {field: _value(values, key) for field, key in KEYS.items()}
     known = {field: value for field, value in given.items() if value is not None}
     return replace(NIGEL, **known, has_tag="ips" in values)

@@ -29,6 +29,7 @@ class CarRecord(msgspec.Struct, kw_only=True, frozen=True):
         owner: Who owns it.
         epoch: Of this ownership.
         ttl_ms: How long the lease lives without renewal.
+        tag_id: On its roof; None: kept before tags were.
     """
 
     car_file: str
@@ -40,6 +41,7 @@ class CarRecord(msgspec.Struct, kw_only=True, frozen=True):
     owner: str
     epoch: int
     ttl_ms: int
+    tag_id: int | None = None
 
 
 class StopRecord(msgspec.Struct, kw_only=True, frozen=True):

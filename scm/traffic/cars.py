@@ -14,11 +14,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-import scm.vehicles
 from scm.errors import CarError, nearest
 from scm.traffic.timing import NIGEL, CarFacts
+from scm.vehicles.car_files import car_files
 
-TYPES_DIR = Path(scm.vehicles.__file__).parent / "types"
 CRUISE_THROTTLE = 0.8
 
 
@@ -29,10 +28,11 @@ def facts_of(name_or_path: str) -> CarFacts:
         CarError: when there is no such file, or it has no footprint.
     """
     path = Path(name_or_path)
+    named = car_files()
     if path.suffix != ".toml":
-        path = TYPES_DIR / f"{name_or_path}.toml"
+        path = named.get(name_or_path, path)
     if not path.is_file():
-        known = sorted(found.stem for found in TYPES_DIR.glob("*.toml"))
+        known = sorted(named)
         hint = nearest(path.stem, known)
         raise CarError(f"{name_or_path}: no such car{hint}; cars by name: {', '.join(known)}")
     try:

@@ -1,6 +1,7 @@
 """A car as its file says: the effects it uses, and each number with its spread, unit and source.
 
-`types/<name>.toml` holds the cars shipped; any other TOML file is loaded by its path.
+`types/<name>.toml` holds the cars shipped; those of the folder in the environment's `SCM_CARS` have
+names too; any other TOML file is loaded by its path.
 """
 
 import re
@@ -15,13 +16,13 @@ from scm import registry
 from scm.errors import CarError, TermError, nearest
 from scm.vehicles import body14
 from scm.vehicles.assemble import setters_of
+from scm.vehicles.car_files import TYPES_DIR, car_files
 from scm.vehicles.facts import FACTS, Fact
 from scm.vehicles.measure import Fault, all_measures, read_faults
 from scm.vehicles.own_term import SUFFIX, load_own_term
 from scm.vehicles.param import Param
 from scm.vehicles.term import Term, flat
 
-TYPES_DIR = Path(__file__).parent / "types"
 TERMS = "scm.vehicles.terms"
 STANDARD_TERMS = (
     "suspension_spring", "suspension_damper", "bump_stop", "tyre_contact", "tyre_longitudinal",
@@ -160,8 +161,8 @@ def _filled(
 
 
 def car_names() -> list[str]:
-    """Return the names of the cars shipped, sorted."""
-    return sorted(path.stem for path in TYPES_DIR.glob("*.toml"))
+    """Return the names of the cars that have one, sorted: those shipped, and one's own."""
+    return sorted(car_files())
 
 
 @cache
@@ -171,7 +172,7 @@ def all_terms() -> Mapping[str, Term]:
 
 
 def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
-    """Read a car by the name of a shipped one, or by the path of any car file.
+    """Read a car by its name, or by the path of any car file.
 
     Args:
         name_or_path: Of the car.
@@ -183,7 +184,7 @@ def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
-        path = TYPES_DIR / f"{name_or_path}.toml"
+        path = car_files().get(str(name_or_path), TYPES_DIR / f"{name_or_path}.toml")
     if not path.is_file():
         hint = nearest(Path(name_or_path).stem, car_names())
         what = "file" if Path(name_or_path).suffix == ".toml" else "car"

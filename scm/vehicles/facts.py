@@ -99,6 +99,7 @@ FACTS: dict[str, Fact] = {
     "ips.noise_m": Fact("m", 1, (0.0, 1.0), default=0.0),
     "ips.noise_rad": Fact("rad", 1, (0.0, 1.0), default=0.0),
     "ips.tag_family": Fact("", 0),
+    "ips.tag_id": Fact("1", 1, (0.0, 586.0)),
     "ips.tag_size_m": Fact("m", 1, (0.001, 2.0)),
     "ips.map_tag_id": Fact("1", 1, (0.0, 1e6)),
 }

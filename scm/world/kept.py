@@ -71,7 +71,7 @@ def _bring_back(world: World, name: str, record: CarRecord, now_ns: int) -> None
         text = f"{name} could not be put back onto the map: no place is free"
         world.say("warning", "vehicle_removed", text, now_ns, name)
         return
-    car = world.host(name, record.car_file, pose, now_ns)
+    car = world.host(name, record.car_file, pose, now_ns, record.tag_id)
     car.lease = Lease(record.home, record.home, record.epoch)
     if record.owner != record.home:
         _lease_again(world, car, record, now_ns)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from scm.clock import NS_PER_S
 from scm.errors import RunError, ScmError
 from scm.maps.model import CityMap, Spawn
 from scm.part import Hears, IsWanted, Serves
@@ -20,6 +21,9 @@ from scm.world.step import tick
 from scm.world.world import DEFAULT_CAR, NAME, PERIOD_NS, World
 
 ROOM = 256
+SAY_AGAIN_NS = 10 * NS_PER_S
+"""What the city is, is said again so often: the bus keeps it for late joiners, and rarely one of
+them asked in vain."""
 
 
 class WorldPart:
@@ -54,14 +58,21 @@ class WorldPart:
         self.world = World(city_map, seed, capacity=capacity, prepare=sorted(cars))
         self.hears: Sequence[Hears] = hears_of(())
         self._to_spawn = hosted
-        self._is_open = False
+        self._definition: WorldDefinition | None = None
+        self._say_again_ns = 0
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Advance to `now_ns`; the first step also says what the city is and spawns its cars."""
         first: list[Outgoing] = []
-        if not self._is_open:
-            self._is_open = True
-            first = self._open(now_ns)
+        if self._definition is None:
+            self._definition = WorldDefinition(
+                t_ns=now_ns, seed=self.world.seed, map=self.world.city_map
+            )
+            first = [self._definition, *self._open(now_ns)]
+            self._say_again_ns = now_ns + SAY_AGAIN_NS
+        elif now_ns >= self._say_again_ns:
+            first = [self._definition]
+            self._say_again_ns = now_ns + SAY_AGAIN_NS
         joined = set(self.world.remote)
         said = tick(self.world, now_ns, inbox)
         if joined != set(self.world.remote):
@@ -89,8 +100,7 @@ class WorldPart:
             car = world.hosted.get(name)
             if car is not None and car.lease.is_at_home:
                 self._circulate(car, now_ns)
-        definition = WorldDefinition(t_ns=now_ns, seed=world.seed, map=world.city_map)
-        return [definition, *world.outbox]
+        return list(world.outbox)
 
     def _spawn_all(self, now_ns: int) -> None:
         places = iter(self.world.city_map.spawns)

@@ -15,7 +15,7 @@ from scm.v2x.key import check_name
 from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
 from scm.v2x.messages.city_stop import CityStop
-from scm.v2x.messages.join_request import JoinReply, JoinRequest
+from scm.v2x.messages.join_request import LAST_TAG_ID, JoinReply, JoinRequest
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
@@ -76,8 +76,11 @@ def _join(world: World, request: JoinRequest, now_ns: int) -> JoinReply:
     if before is not None and not before.alive:
         world.remove(name)
     _check_new(world, name, request.car)
+    _check_tag(world, request.tag_id)
     pose = _place(world, request.spawn)
-    car = world.admit(name, request.kind, request.session, request.car, pose, now_ns)
+    car = world.admit(
+        name, request.kind, request.session, request.car, pose, now_ns, request.tag_id
+    )
     world.say("info", "vehicle_joined", f"{name}, a {request.car}, joined the city", now_ns, name)
     return _welcome(car, now_ns)
 
@@ -182,6 +185,21 @@ def _check_new(world: World, name: str, car_file: str) -> None:
         known = ", ".join(car_names())
         detail = f"car: got {car_file!r}, expected one of {known}{nearest(car_file, car_names())}"
         raise _RefusedError("invalid", detail)
+
+
+def _check_tag(world: World, tag_id: int | None) -> None:
+    """Refuse a tag that does not exist, lies on the floor, or is on another car's roof."""
+    if tag_id is None:
+        return
+    if not 0 <= tag_id <= LAST_TAG_ID:
+        detail = f"tag_id: got {tag_id}, expected 0 to {LAST_TAG_ID}: tag36h11 has no other"
+        raise _RefusedError("invalid", detail)
+    if tag_id == world.city_map.tag.tag_id:
+        raise _RefusedError("invalid", f"tag_id: {tag_id} is the map's own, on the floor")
+    wearer = next((car.name for car in world.cars() if car.tag_id == tag_id), None)
+    if wearer is not None:
+        detail = f"tag_id: {wearer} has tag {tag_id}: take it off the map first, or raise the "
+        raise _RefusedError("owned", detail + "map's first_vehicle_tag_id")
 
 
 def _place(world: World, spawn: str) -> Pose2:

@@ -22,21 +22,32 @@ class Numbers:
     """Gives out whole numbers from `first` on, the lowest free one first."""
 
     def __init__(self, first: int = 0, never: int | None = None) -> None:
-        self._next = first
+        self._first = self._next = first
         self._never = never
         self._returned: list[int] = []
+        self._claimed: set[int] = set()
 
     def take(self) -> int:
         """Return a number and keep it from others."""
-        if self._returned:
-            return heapq.heappop(self._returned)
-        self._next += self._next == self._never
+        while self._returned:
+            number = heapq.heappop(self._returned)
+            if number not in self._claimed:
+                return number
+        while self._next == self._never or self._next in self._claimed:
+            self._next += 1
         self._next += 1
         return self._next - 1
 
+    def claim(self, number: int) -> int:
+        """Keep a number that nobody has from others, and return it."""
+        self._claimed.add(number)
+        return number
+
     def give_back(self, number: int) -> None:
         """Let a number be taken again."""
-        heapq.heappush(self._returned, number)
+        self._claimed.discard(number)
+        if self._first <= number < self._next:
+            heapq.heappush(self._returned, number)
 
 
 class Slots:

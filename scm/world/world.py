@@ -215,8 +215,12 @@ class World:
             )
         )
 
-    def host(self, name: str, car_name: str, pose: Pose2, now_ns: int) -> HostedCar:
+    def host(
+        self, name: str, car_name: str, pose: Pose2, now_ns: int, tag_id: int | None = None
+    ) -> HostedCar:
         """Put a car onto the map that the world simulates; it stands until it is sent.
+
+        `tag_id` is the tag that it had before, if it had one.
 
         Raises:
             CarError: when there is no such car file.
@@ -233,7 +237,7 @@ class World:
             name=name,
             car=model,
             car_file=car_name,
-            tag_id=self._tags.take(),
+            tag_id=self._tag(tag_id),
             slot=slot,
             slots=self.slots,
             fleet=fleet,
@@ -244,9 +248,16 @@ class World:
         return self.hosted[name]
 
     def admit(
-        self, name: str, kind: str, session: str, car_name: str, pose: Pose2, now_ns: int
+        self,
+        name: str,
+        kind: str,
+        session: str,
+        car_name: str,
+        pose: Pose2,
+        now_ns: int,
+        tag_id: int | None = None,
     ) -> RemoteCar:
-        """Take a car with dynamics of its own into the city.
+        """Take a car with dynamics of its own into the city; `tag_id`: that it wears, if any.
 
         Raises:
             CarError: when there is no such car file.
@@ -262,7 +273,7 @@ class World:
             session=session,
             car=model,
             car_file=car_name,
-            tag_id=self._tags.take(),
+            tag_id=self._tag(tag_id),
             slot=slot,
             lease=rules.grant(name, self._first_epoch(now_ns)),
             pose=pose,
@@ -295,6 +306,7 @@ class World:
             owner=lease.owner,
             epoch=lease.epoch,
             ttl_ms=lease.ttl_ms,
+            tag_id=car.tag_id,
         )
         self.outbox.append(Keep("leases", car.name, record))
 
@@ -337,6 +349,10 @@ class World:
         self.contacts.add(slot, hull)
         _, self.front[slot] = self.garage.car(car_name).vector("body.footprint_x_m")
         return slot
+
+    def _tag(self, worn: int | None) -> int:
+        """Return the tag on a new car's roof: the one that it wears, or the lowest free one."""
+        return self._tags.take() if worn is None else self._tags.claim(worn)
 
     def _first_epoch(self, now_ns: int) -> int:
         """Return an epoch above all that any car of this city has had so far."""

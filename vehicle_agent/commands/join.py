@@ -6,6 +6,8 @@ import threading
 
 from scm.command import Command, credentials_argument, credentials_of
 
+TAG_KEY = "ips.tag_id"
+
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--name", required=True, help="of the vehicle: a-z 0-9 _ -")
@@ -14,6 +16,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
     parser.add_argument("--car", default="nigel", help="car file (%(default)s)")
     parser.add_argument("--spawn", default="", help="place to start at; default: any free one")
+    parser.add_argument(
+        "--tag", type=int, metavar="ID",
+        help="glued onto its roof; default: as its --calibration says, else as the city gives it",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help="of the sensors' noise (%(default)s)")
     _real_arguments(parser)
 
@@ -50,6 +56,17 @@ def _real_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _tag_of(arguments: argparse.Namespace) -> int | None:
+    """Return the tag on the car's roof as told, else as this very car's file says it."""
+    if arguments.tag is not None or not arguments.calibration:
+        told: int | None = arguments.tag
+        return told
+    from scm.vehicles.car import load_car
+
+    car = load_car(arguments.calibration)
+    return round(car.value(TAG_KEY)) if car.has(TAG_KEY) else None
+
+
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
     from scm.live import run, stop_on_signal
@@ -83,6 +100,7 @@ def _run(arguments: argparse.Namespace) -> int:
                 throttle=arguments.throttle_limit,
                 fence=rectangle(*arguments.fence) if arguments.fence else (),
             ),
+            _tag_of(arguments),
         )
         try:
             run(Leaving(part, wish, done), bus, clock, done, on_beat=True)

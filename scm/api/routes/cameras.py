@@ -15,7 +15,7 @@ from scm.v2x.message import Refused
 from scm.v2x.messages.camera_frame import CameraFrame
 
 LOOK_S = 0.02
-PATIENCE_S = 8.0  # the first picture also paints the floor: seconds on a busy computer
+PATIENCE_S = 15.0  # the first picture also paints the floor: seconds on a busy computer
 BOUNDARY = "frame"
 
 

@@ -4,6 +4,9 @@ from typing import ClassVar
 
 from scm.v2x.message import Message, Request
 
+LAST_TAG_ID = 586
+"""Of the family tag36h11."""
+
 
 class JoinReply(Message, kw_only=True, frozen=True):
     """Welcome: where to start, and the lease under which the agent drives its own car.
@@ -32,6 +35,7 @@ class JoinRequest(Request, kw_only=True, frozen=True):
         kind: `remote` (own dynamics) or `real`.
         car: Car file's name: what the city draws and lets others collide with.
         spawn: Wished spawn place; empty: the first free one.
+        tag_id: The AprilTag that is glued onto its roof; None: it gets the lowest free one.
     """
 
     KEY: ClassVar[str] = "v/{vehicle}/join"
@@ -42,6 +46,7 @@ class JoinRequest(Request, kw_only=True, frozen=True):
     kind: str = "remote"
     car: str = "nigel"
     spawn: str = ""
+    tag_id: int | None = None
 
 
 MESSAGE = JoinRequest

@@ -7,7 +7,7 @@ from scm.v2x.message import Delivery, Message
 
 
 class WorldDefinition(Message, kw_only=True, frozen=True):
-    """The map and the scale of the city; sent at the start, late joiners get it."""
+    """The map and the scale of the city; late joiners get it. The same is sent every 10 s."""
 
     KEY: ClassVar[str] = "world/def"
     DELIVERY: ClassVar[Delivery] = Delivery.EVENT

@@ -49,6 +49,11 @@ def test_it_asks_to_join_once_a_second_with_the_same_id_until_it_is_answered(lin
     assert ask(link, 1000) == first
 
 
+def test_it_asks_for_the_tag_that_the_car_wears():
+    assert ask(Link("n7", "nigel", "real", "", "s1", 7), 0).tag_id == 7
+    assert ask(Link("n7", "nigel", "real", "", "s1"), 0).tag_id is None
+
+
 def test_it_does_not_ask_before_it_knows_its_session():
     assert ask(Link("n7", "nigel", "remote", "", ""), 0) is None
 

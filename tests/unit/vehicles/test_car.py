@@ -1,7 +1,8 @@
 import pytest
 
 from scm.errors import CarError
-from scm.vehicles.car import TYPES_DIR, load_car
+from scm.vehicles.car import car_names, load_car
+from scm.vehicles.car_files import TYPES_DIR
 
 NIGEL = (TYPES_DIR / "nigel.toml").read_text(encoding="utf-8")
 
@@ -179,3 +180,30 @@ def test_front_wheel_drive_follows_from_the_layout(tmp_path):
     )
     car = load_car(path)
     assert (car.value("drive.front_driven"), car.value("drive.rear_driven")) == (1.0, 0.0)
+
+
+@pytest.fixture
+def garage(tmp_path, monkeypatch):
+    """Return a folder whose car files have names."""
+    monkeypatch.setenv("SCM_CARS", str(tmp_path))
+    return tmp_path
+
+
+def test_a_car_of_ones_own_folder_has_a_name(garage):
+    shipped = car_names()
+    (garage / "buggy.toml").write_text((TYPES_DIR / "nigel.toml").read_text())
+    assert car_names() == sorted([*shipped, "buggy"])
+    assert load_car("buggy").path == garage / "buggy.toml"
+    assert load_car("nigel").path == TYPES_DIR / "nigel.toml"
+
+
+def test_a_shipped_cars_name_is_not_given_twice(garage):
+    (garage / "nigel.toml").write_text("")
+    with pytest.raises(CarError, match="'nigel' is a shipped car's name"):
+        load_car("nigel")
+
+
+def test_a_folder_that_is_not_there_is_refused(garage, monkeypatch):
+    monkeypatch.setenv("SCM_CARS", str(garage / "none"))
+    with pytest.raises(CarError, match="expected a folder of car files"):
+        car_names()

@@ -18,6 +18,25 @@ def test_numbers_come_back_lowest_first_and_the_forbidden_one_never():
     assert [numbers.take() for _ in range(3)] == [4, 6, 8]
 
 
+def test_a_claimed_number_is_nobody_elses_until_it_is_given_back():
+    numbers = Numbers(1, never=2)
+    assert numbers.claim(3) == 3
+    assert [numbers.take() for _ in range(3)] == [1, 4, 5]
+    numbers.give_back(3)
+    numbers.give_back(4)
+    numbers.claim(4)
+    assert [numbers.take(), numbers.take()] == [3, 6]
+    numbers.give_back(4)
+    assert numbers.take() == 4
+
+
+def test_a_number_below_the_first_is_claimed_and_never_given():
+    numbers = Numbers(5)
+    numbers.give_back(numbers.claim(2))
+    numbers.give_back(numbers.claim(9))
+    assert [numbers.take() for _ in range(6)] == [5, 6, 7, 8, 9, 10]
+
+
 def test_a_slot_is_given_again_clean():
     slots = Slots(2)
     first = slots.take("n1", SOMEWHERE, hosted=True)

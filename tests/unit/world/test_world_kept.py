@@ -125,6 +125,17 @@ def test_the_epoch_grows_across_a_kill_though_the_clock_was_set_back():
     city.close()
 
 
+def test_a_car_that_comes_back_has_its_tag_so_that_a_real_one_keeps_its_own(reborn):
+    before = reborn.world.hosted["n1"].tag_id
+    reborn.city.call(RemoveRequest(vehicle="n1"))
+    reborn.city.call(JoinRequest(vehicle="r1", session="s1", tag_id=before))
+    reborn.city.call(SpawnRequest(vehicle="n2"))
+    worn = reborn.world.hosted["n2"].tag_id
+    reborn.kill()
+    assert reborn.world.hosted["n2"].tag_id == worn != before
+    assert reborn.city.call(JoinRequest(vehicle="r1", session="s2", tag_id=before)).tag_id == before
+
+
 def test_the_red_button_stays_pressed_over_a_kill_and_released_once_released(reborn):
     reborn.city.call(StopRequest(engaged=True, by="ann"))
     reborn.kill()

@@ -6,6 +6,7 @@ import pytest
 
 from scm.geometry import Pose2
 from scm.maps.load import load_map
+from scm.scenery.bodies import car_body
 from scm.v2x.exchange import Answer
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
@@ -21,6 +22,7 @@ from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.world_definition import WorldDefinition
+from scm.vehicles.car import load_car
 from scm.world.requests import is_free
 
 MAP = load_map("driving_school")
@@ -28,6 +30,14 @@ MAP = load_map("driving_school")
 
 def test_the_first_step_tells_what_the_city_is(city):
     assert city.heard(WorldDefinition)[0].map == MAP
+
+
+def test_who_asked_in_vain_for_what_the_city_is_hears_it_ten_seconds_later(city):
+    first = city.heard(WorldDefinition)
+    city.run_for(11.0)
+    told = city.heard(WorldDefinition)
+    assert len(told) == len(first) + 1
+    assert told[-1] is told[0]
 
 
 def test_a_spawned_car_stands_at_the_wished_place_with_the_lowest_free_tag(city):
@@ -41,6 +51,32 @@ def test_a_tag_is_given_again_after_its_car_left(city):
     first, second = (city.ask(SpawnRequest()) for _ in range(2))
     city.ask(RemoveRequest(vehicle=first.vehicle))
     assert city.ask(SpawnRequest()).tag_id == first.tag_id != second.tag_id
+
+
+def test_a_car_keeps_the_tag_that_is_glued_onto_its_roof(city):
+    joined = city.ask(JoinRequest(vehicle="r1", session="s", kind="real", tag_id=2))
+    others = [city.ask(SpawnRequest()).tag_id for _ in range(2)]
+    assert (joined.tag_id, others) == (2, [1, 3])
+    assert city.world.remote["r1"].tag_id == 2
+    city.ask(RemoveRequest(vehicle="r1"))
+    assert city.ask(JoinRequest(vehicle="r2", session="s", tag_id=2)).tag_id == 2
+
+
+def test_the_agent_that_asks_again_after_its_death_gets_its_tag_again(city):
+    city.ask(JoinRequest(vehicle="r1", session="s1", tag_id=9))
+    city.run(1, Presence(role="v", station="r1", session="s1", alive=False))
+    assert city.ask(JoinRequest(vehicle="r1", session="s2", tag_id=9)).tag_id == 9
+
+
+def test_a_car_of_ones_own_folder_comes_by_its_name(make_city, monkeypatch):
+    monkeypatch.setenv("SCM_CARS", "examples/own_car")
+    city = make_city()
+    joined = city.ask(JoinRequest(vehicle="b1", session="s", kind="real", car="buggy"))
+    assert joined.vehicle == "b1"
+    assert city.world.remote["b1"].car.value("body.mass_kg") == load_car("buggy").value(
+        "body.mass_kg"
+    )
+    assert car_body("buggy") != car_body("nigel")
 
 
 def test_cars_without_a_name_get_one_each(city):
@@ -59,6 +95,10 @@ def test_cars_without_a_name_get_one_each(city):
         (JoinRequest(vehicle="n1", session="s"), "owned", "n1"),
         (JoinRequest(vehicle="world", session="s"), "owned", "world"),
         (JoinRequest(vehicle="n9", session="s", kind="ghost"), "invalid", "ghost"),
+        (JoinRequest(vehicle="n9", session="s", tag_id=1), "owned", "n1 has tag 1"),
+        (JoinRequest(vehicle="n9", session="s", tag_id=0), "invalid", "the map's own"),
+        (JoinRequest(vehicle="n9", session="s", tag_id=587), "invalid", "expected 0 to 586"),
+        (JoinRequest(vehicle="n9", session="s", tag_id=-1), "invalid", "expected 0 to 586"),
         (RemoveRequest(vehicle="n8"), "not_found", "n8"),
         (RouteRequest(vehicle="n1", via=("nowhere",)), "invalid", "nowhere"),
         (RouteRequest(vehicle="n1", speed_mps=-1.0), "invalid", "-1.0"),

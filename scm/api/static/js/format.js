@@ -4,7 +4,9 @@ export const UNKNOWN = "—";
 
 /** @param {number | null | undefined} value */
 export function fixed(value, digits, unit = "") {
-  return value === null || value === undefined ? UNKNOWN : value.toFixed(digits) + unit;
+  if (value === null || value === undefined) return UNKNOWN;
+  const text = value.toFixed(digits);
+  return (Number(text) === 0 ? text.replace("-", "") : text) + unit;  // a car that stands: not -0.00
 }
 
 /** Names in the order people count: n2 before n17. */
