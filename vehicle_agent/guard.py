@@ -11,7 +11,7 @@ the floor ends, and whether the Eye still knows where the car is. It is pure: no
     stop      300 ms old, or the city-wide stop                 zero throttle, brake
     lost      1 s old: the lease is gone                        zero throttle, brake
     slew      a change that is too quick                        as quick as allowed
-    pose      no pose of the last 0.3 s                         zero throttle, brake
+    pose      no pose of the last 0.25 s                        zero throttle, brake
     doubt     a pose that the Eye itself doubts                 zero throttle, brake
     fence     it is outside, or could not stop inside           zero throttle, brake
     crawl     near the fence, or outside and on its way in      as much throttle as to crawl
@@ -85,7 +85,7 @@ class GuardLimits:
     rear_m: float = 0.07
     width_m: float = 0.175
     crawl: float = 0.35
-    pose_age_s: float = 0.3
+    pose_age_s: float = 0.25
     position_std_m: float = 0.05
     yaw_std_rad: float = 0.15
     harmless: frozenset[str] = frozenset()

@@ -1,10 +1,14 @@
-"""A LIDAR on a port of its own: opened, begun, read in every step of the agent, ended."""
+"""A LIDAR on a port of its own: opened, begun, read in every step of the agent, ended.
+
+One that tells no turn for three seconds is told to begin again, and that is said.
+"""
 
 import logging
 import threading
 from functools import partial
 
 from scm import registry
+from scm.clock import NS_PER_S
 from scm.errors import RunError
 from scm.log import event
 from scm.v2x.messages.lidar_scan import LidarScan
@@ -13,6 +17,7 @@ from vehicle_agent.nigel.cable import Cable, open_serial
 
 LIDARS = "vehicle_agent.lidars"
 DRAIN_TURNS, DRAIN_S = 10, 0.005
+QUIET_NS = 3 * NS_PER_S
 
 _log = logging.getLogger(__name__)
 
@@ -28,21 +33,32 @@ class LidarPort:
     def __init__(self, kind: LidarKind, cable: Cable) -> None:
         self._kind, self._cable = kind, cable
         self._driver: Lidar | None = None
-        self._opened = 0
-        self._said = ""
+        self._opened = self._heard_ns = 0
+        self._said = self._quiet = ""
 
     def step(self, vehicle: str, now_ns: int) -> list[LidarScan]:
         """Return a message for each turn that has come; a trouble is told when it changes."""
-        if self._cable.keep_open(now_ns) and self._cable.opened != self._opened:
-            self._opened, self._driver = self._cable.opened, self._kind.open()
+        is_open = self._cable.keep_open(now_ns)
+        is_new = self._cable.opened != self._opened
+        if is_open and (is_new or now_ns - self._heard_ns >= QUIET_NS):
+            self._quiet = "" if is_new else "no turn for 3 s: does it spin, is it of this kind?"
+            self._opened, self._driver, self._heard_ns = (
+                self._cable.opened,
+                self._kind.open(),
+                now_ns,
+            )
             self._cable.write([self._driver.begin()])
         data = self._cable.read()
-        if self._cable.trouble != self._said:
-            self._said = self._cable.trouble
-            event(_log, "lidar", level=logging.WARNING, trouble=self._said or "none")
-        if self._driver is None or not data:
-            return []
-        return [scan_of(turn, self._kind, vehicle, now_ns) for turn in self._driver.hear(data)]
+        turns = self._driver.hear(data) if self._driver is not None and data else ()
+        if turns:
+            self._heard_ns, self._quiet = now_ns, ""
+        self._tell(self._cable.trouble or self._quiet)
+        return [scan_of(turn, self._kind, vehicle, now_ns) for turn in turns]
+
+    def _tell(self, trouble: str) -> None:
+        if trouble != self._said:
+            self._said = trouble
+            event(_log, "lidar", level=logging.WARNING, trouble=trouble or "none")
 
     def close(self) -> None:
         """Stop the scanner and let go of the port."""

@@ -27,7 +27,7 @@ from vehicle_agent.nigel.helm import Helm
 from vehicle_agent.nigel.host import Wish
 from vehicle_agent.nigel.undo import DEADBAND, Undo, undo_of
 
-STALE_NS = 300 * NS_PER_MS
+STALE_NS = 250 * NS_PER_MS
 LIFTED_M = 0.25
 """Farther from where it must be, a car was carried by hand: the Eye is right within 3 cm."""
 SMOOTH_S = 0.15

@@ -68,6 +68,7 @@ class EmulatorPart:
         self.name = station_of(vehicle)
         self._vehicle, self._device, self._wheels = vehicle, device, wheels
         self._spawn, self._car, self._tag_id = spawn, car, tag_id
+        self._defined_ns: int | None = None
         self._is_placed = False
         self._told_ns = 0
 
@@ -93,6 +94,9 @@ class EmulatorPart:
 
     def _learn(self, world: WorldDefinition, now_ns: int) -> None:
         """Know the floor; a city that begins anew does not carry the car away."""
+        if world.t_ns == self._defined_ns:
+            return
+        self._defined_ns = world.t_ns
         self._wheels.learn(world.map, world.seed)
         if not self._is_placed:
             self._wheels.place(place_of(world.map, self._spawn), now_ns)

@@ -48,15 +48,16 @@ class Opens(Protocol):
         ...
 
 
-def open_serial(path: str, baud: int, *, dtr: bool = True) -> Port:
-    """Open a port for ourselves alone: 8 data bits, no parity, 1 stop bit, no flow control.
+def open_serial(path: str, baud: int, *, dtr: bool = True, exclusive: bool = True) -> Port:
+    """Open a port: 8 data bits, no parity, 1 stop bit, no flow control.
 
     Args:
         path: Of the port.
         baud: Of the line.
         dtr: Whether to raise DTR, which resets an Arduino.
+        exclusive: Whether for ourselves alone.
     """
-    port = serial.Serial(baudrate=baud, timeout=0, write_timeout=0, exclusive=True)
+    port = serial.Serial(baudrate=baud, timeout=0, write_timeout=0, exclusive=exclusive)
     port.port, port.dtr = path, dtr
     port.open()
     opened: Port = port

@@ -1,4 +1,9 @@
-"""The agent's end of the cable: it starts the keeper, gives it wishes, and knows what it told."""
+"""The agent's end of the cable: it starts the keeper, gives it wishes, and knows what it told.
+
+When the keeper is gone nobody can say zero to the Arduino, and a new keeper takes a while to start.
+So the port is opened here at once, which resets the Arduino: its motor rests. It is held until the
+new keeper speaks.
+"""
 
 import logging
 import socket
@@ -8,14 +13,15 @@ from contextlib import suppress
 
 import msgspec
 
-from scm.clock import NS_PER_S
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.log import event
+from vehicle_agent.nigel.cable import FAILURES, Port, open_serial
 from vehicle_agent.nigel.host import REST, Wish
 from vehicle_agent.nigel.keeper import LONGEST, Asked, Told
 
 RESTART_NS = NS_PER_S
-SILENCE_NS = NS_PER_S
-HANGS_NS = 2 * NS_PER_S
+HANGS_NS = 500 * NS_PER_MS
+"""It speaks ten times a second. One that hangs could not say zero either."""
 UNHEARD = 10
 """Turns without a word before it counts as silence: who stalled himself has not listened."""
 LEAVE_S = 2.0
@@ -33,7 +39,8 @@ class Helm:
 
     def __init__(self, path: str, baud: int) -> None:
         self._command = [sys.executable, "-m", "vehicle_agent.nigel.keeper", path, str(baud)]
-        self._path = path
+        self._path, self._baud = path, baud
+        self._held: Port | None = None
         self._line: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._started_ns: int | None = None
@@ -48,17 +55,17 @@ class Helm:
             return "nobody keeps the cable"
         if self.told is None:
             return "the keeper of the cable starts"
-        if self._is_silent(now_ns, SILENCE_NS):
+        if self._is_silent(now_ns):
             return "the keeper of the cable is silent"
         return self.told.trouble
 
     def steer(self, wish: Wish, now_ns: int) -> None:
         """Give the keeper a wish and take what it told; start it where there is none."""
+        self._hear(now_ns)
+        self._end_hanging(now_ns)
         self._keep_one(now_ns)
         if self._line is None:
             return
-        self._hear(now_ns)
-        self._end_hanging(now_ns)
         self._send(Asked(now_ns, wish))
         trouble = self.trouble(now_ns)
         if trouble != self._said:
@@ -71,6 +78,7 @@ class Helm:
         self._is_closed = True
         self._send(Asked(0, REST))
         self._hang_up()
+        self._release()
         if self._process is None:
             return
         try:
@@ -85,6 +93,7 @@ class Helm:
             return
         if self._process is not None and self._process.poll() is None:
             return  # it still holds the port
+        self._hold()
         if self._started_ns is not None and now_ns - self._started_ns < RESTART_NS:
             return
         self._started_ns = self._heard_ns = now_ns
@@ -97,8 +106,21 @@ class Helm:
         ours.setblocking(False)
         self._line = ours
 
-    def _is_silent(self, now_ns: int, span_ns: int) -> bool:
-        return self._unheard >= UNHEARD and now_ns - self._heard_ns > span_ns
+    def _hold(self) -> None:
+        """Open the port of a keeper that is gone: that resets the Arduino."""
+        if self._process is None or self._held is not None:
+            return
+        with suppress(*FAILURES):
+            self._held = open_serial(self._path, self._baud, exclusive=False)
+
+    def _release(self) -> None:
+        if self._held is not None:
+            with suppress(*FAILURES):
+                self._held.close()
+            self._held = None
+
+    def _is_silent(self, now_ns: int) -> bool:
+        return self._unheard >= UNHEARD and now_ns - self._heard_ns > HANGS_NS
 
     def _hear(self, now_ns: int) -> None:
         self._unheard += 1
@@ -114,10 +136,13 @@ class Helm:
                 event(_log, "keeper_died", level=logging.ERROR, path=self._path)
                 return
             self.told, self._heard_ns, self._unheard = _told.decode(data), now_ns, 0
+            self._release()
 
     def _end_hanging(self, now_ns: int) -> None:
         """Kill a keeper that does nothing: the next one resets the Arduino by opening the port."""
-        if self._process is None or self.told is None or not self._is_silent(now_ns, HANGS_NS):
+        if self._line is None or self._process is None or self.told is None:
+            return
+        if not self._is_silent(now_ns):
             return
         event(_log, "keeper_hangs", level=logging.ERROR, path=self._path)
         self._process.kill()

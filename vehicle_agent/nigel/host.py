@@ -127,6 +127,7 @@ class Host:
         self._asked_ns: int | None = None
         self._timed_ns: int | None = None
         self._due_ns: int | None = None
+        self._moves = False
         self._refusal = ""
         self._must_ask = False
 
@@ -146,7 +147,10 @@ class Host:
         return answers
 
     def say(self, wish: Wish, now_ns: int) -> list[bytes]:
-        """Return the frames that are due: questions, and commands at 50 Hz once it is ready."""
+        """Return the frames that are due: questions, and once it is ready commands at 50 Hz.
+
+        Throttle that falls to zero waits for nothing.
+        """
         if self.phase == "closed":
             return []
         if self.phase == "boots":
@@ -155,8 +159,9 @@ class Host:
             self.phase, self._since_ns = "asks", now_ns
         self._judge(now_ns)
         frames = self._questions(now_ns)
-        if self._is_command_due(now_ns):
-            frames += self._commands(wish if self.phase == "ready" else REST)
+        said = wish if self.phase == "ready" else REST
+        if self._is_command_due(now_ns, said):
+            frames += self._commands(said)
         return frames
 
     def rest(self) -> list[bytes]:
@@ -257,9 +262,12 @@ class Host:
             return late_ns >= SILENCE_NS or quiet_ns >= TELEMETRY_SILENCE_NS
         return late_ns >= SILENCE_NS
 
-    def _is_command_due(self, now_ns: int) -> bool:
+    def _is_command_due(self, now_ns: int, wish: Wish) -> bool:
+        """Return whether a command must go out now: at 50 Hz, and at once to stop a car."""
+        stops = self._moves and limited(wish.throttle) == 0.0
+        self._moves = limited(wish.throttle) != 0.0
         if self._due_ns is not None and now_ns < self._due_ns:
-            return False
+            return stops
         behind = self._due_ns is None or now_ns - self._due_ns >= COMMAND_EVERY_NS
         self._due_ns = (now_ns if behind else self._due_ns or 0) + COMMAND_EVERY_NS
         return True

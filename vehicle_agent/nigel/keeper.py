@@ -171,14 +171,10 @@ def serve(keeper: Keeper, agent: _Agent, cable: Cable, clock: Clock, ended: list
 
 
 def note_signals() -> list[int]:
-    """Return a list that gets the number of each signal that asks to end; Ctrl-C is not one.
-
-    Ctrl-C reaches the agent, which says goodbye to the city first.
-    """
+    """Return a list that gets the number of each signal that asks to end."""
     ended: list[int] = []
     note: Callable[[int, object], None] = lambda number, _frame: ended.append(number)  # noqa: E731
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, note)
     return ended
 

@@ -247,12 +247,14 @@ def test_a_pulled_cable_is_told_and_drives_again_when_it_is_back(driving):
     wait(lambda: device.newest(101) == HALF, every=steer)
 
 
-@pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_keeper_that_dies_or_hangs_is_replaced(driving, way):
+@pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGSTOP, signal.SIGINT])
+def test_a_keeper_that_dies_or_hangs_is_replaced_and_its_port_is_opened_at_once(driving, way):
     helm, steer, device = driving
     old = helm._process
     old.send_signal(way)
+    wait(lambda: helm._held is not None, 2.0, steer)
     wait(lambda: helm._process is not old, 8.0, steer)
+    wait(lambda: helm._held is None, 8.0, steer)
     device.log.clear()
     wait(lambda: device.newest(101) == HALF, every=steer)
 
@@ -289,7 +291,10 @@ def test_an_agent_that_stalled_does_not_take_the_keeper_for_dead():
     ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.setblocking(False)
     helm = Helm("x", 57600)
-    helm._line, helm._process = ours, types.SimpleNamespace(kill=lambda: killed.append(1))
+    helm._line, helm._process = (
+        ours,
+        types.SimpleNamespace(kill=lambda: killed.append(1), poll=lambda: None),
+    )
     killed, told = [], msgspec.msgpack.encode(Told("ready", "", 1, 0, None, None))
     its.send(told)
     helm.steer(Wish(), 0)

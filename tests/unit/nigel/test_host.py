@@ -179,6 +179,22 @@ def test_a_port_that_opens_again_is_learned_again():
     line.ready()
 
 
+def test_rest_is_zeros_at_once_whatever_was_said():
+    line = Line(Device()).ready()
+    line.run(0.1, Wish(0.5, 0.5, lamps=1))
+    assert [Frame(DRIVE.number, pack_float(0.0)), Frame(STEER.number, pack_float(0.0))] == [
+        frame for data in line.host.rest() for frame in Decoder().feed(data, 0)
+    ]
+    line.host.close()
+    assert line.host.rest() == []
+
+
+def test_while_it_asks_it_says_so():
+    line = Line()
+    line.run(2.2)
+    assert line.host.trouble == "asks the Arduino for its topics"
+
+
 def test_bytes_without_a_frame_look_like_the_wrong_baud_rate():
     noise = random.Random(1)
     line = Line()
@@ -234,3 +250,13 @@ def test_rubbish_never_makes_a_wrong_command_and_is_over_in_100_ms():
     assert found.rounds > 50
     assert found.wrong == 0
     assert found.slowest_ns <= RECOVERY_NS
+
+
+def test_throttle_that_falls_to_zero_waits_for_no_turn():
+    line = Line(Device()).ready()
+    line.run(1.0, Wish(0.5, 0.1))
+    (sent_ns, _), *_ = line.run(COMMAND_EVERY_NS / NS_PER_S, Wish(0.5, 0.1))
+    line.run((sent_ns + COMMAND_EVERY_NS - line.now_ns) / NS_PER_S, Wish(0.5, 0.1))
+    drive, *_ = frames_of(line.run(TURN_NS / NS_PER_S, Wish(0.0, 0.1)))
+    assert drive == Frame(DRIVE.number, pack_float(0.0))
+    assert line.run(2 * TURN_NS / NS_PER_S, Wish(0.0, 0.1)) == []

@@ -13,7 +13,7 @@ from scm.clock import NS_PER_S
 from scm.errors import RunError
 from vehicle_agent.lidar import LidarKind, Turn, scan_of
 from vehicle_agent.lidar_port import LIDARS, open_lidar
-from vehicle_agent.lidars.rplidar_a1 import DESCRIPTOR, LIDAR, SCAN, STOP, RplidarA1
+from vehicle_agent.lidars.rplidar_a1 import DESCRIPTOR, LIDAR, PAUSE, SCAN, STOP, RplidarA1
 
 
 def node(degrees, metres, first=False):
@@ -95,12 +95,41 @@ def test_over_a_port_it_is_begun_read_and_ended():
     os.set_blocking(master, False)
     port = open_lidar(os.ttyname(slave), "rplidar_a1")
     assert port.step("n7", 0) == []
-    assert os.read(master, 99) == STOP + SCAN
+    assert os.read(master, 99) == STOP + PAUSE + SCAN
     os.write(master, DESCRIPTOR + turn() + node(0, 2, first=True))
     (scan,) = port.step("n7", NS_PER_S)
     assert (scan.vehicle, scan.beams, scan.t_ns) == ("n7", 360, NS_PER_S)
     port.close()
     assert os.read(master, 99) == STOP
+    os.close(master)
+    os.close(slave)
+
+
+def test_the_scanner_is_given_its_millisecond_between_stop_and_scan():
+    assert len(PAUSE) * 10 / LIDAR.baud > 0.001
+    assert b"\xa5" not in PAUSE
+
+
+def test_one_that_stays_silent_is_told_to_begin_again_and_that_is_said(caplog):
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    port = open_lidar(os.ttyname(slave), "rplidar_a1")
+    port.step("n7", 0)
+    os.read(master, 99)
+    port.step("n7", 3 * NS_PER_S - 1)
+    with pytest.raises(BlockingIOError):
+        os.read(master, 99)
+    port.step("n7", 3 * NS_PER_S)
+    assert os.read(master, 99) == STOP + PAUSE + SCAN
+    assert "no turn for 3 s" in caplog.text
+    os.write(master, DESCRIPTOR + turn() + node(0, 2, first=True))
+    assert port.step("n7", 4 * NS_PER_S)
+    assert "none" in caplog.records[-1].getMessage()
+    port.step("n7", 7 * NS_PER_S - 1)
+    with pytest.raises(BlockingIOError):
+        os.read(master, 99)
+    port.close()
     os.close(master)
     os.close(slave)
 

@@ -43,6 +43,11 @@ def test_frames_have_the_bytes_of_rosserial(frame, known):
     assert Decoder().feed(bytes.fromhex(known), 0) == [frame]
 
 
+def test_the_longest_frame_comes_back():
+    longest = Frame(7, bytes(LONGEST))
+    assert Decoder().feed(pack(longest), 0) == [longest]
+
+
 def test_what_is_too_long_is_not_packed():
     with pytest.raises(MessageError, match=f"got topic 7 with {LONGEST + 1} bytes"):
         pack(Frame(7, bytes(LONGEST + 1)))
