@@ -10,7 +10,7 @@ run: $(STAMP)
 	@$(VENV)/bin/scm up $(MAP) $(UP_ARGS)
 
 test: $(STAMP)
-	$(VENV)/bin/python -m pytest -n auto --dist loadgroup --no-loadscope-reorder $(PYTEST_ARGS)
+	$(VENV)/bin/python -m pytest -n auto --no-loadscope-reorder --max-worker-restart=0 $(PYTEST_ARGS)
 
 bench: $(STAMP)
 	$(VENV)/bin/pip install --quiet -e '.[bench]'

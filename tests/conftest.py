@@ -2,6 +2,7 @@
 
 import gc
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,17 +11,28 @@ SHARED = ROOT.parent / "shared"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark every test of `tests/e2e` as such, and let one process run them, from the start on.
-
-    They mostly wait for cities, two of which would starve each other; the tests of any other file
-    stay together too, for what they share.
-    """
+    """Mark every test of `tests/e2e` as such, and let them come first."""
     items.sort(key=lambda item: "e2e" not in item.path.parts)
     for item in items:
-        of_city = "e2e" in item.path.parts
-        if of_city:
+        if "e2e" in item.path.parts:
             item.add_marker(pytest.mark.e2e)
-        item.add_marker(pytest.mark.xdist_group("cities" if of_city else str(item.path)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Let one process run all of `tests/e2e`, and one process all tests of any other file.
+
+    The first mostly wait for cities, two of which would starve each other; the others stay
+    together for what they share.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByFile(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            path = nodeid.partition("::")[0]
+            return "tests/e2e" if path.startswith("tests/e2e/") else path
+
+    return ByFile(config, log)
 
 
 def pytest_collection_finish() -> None:

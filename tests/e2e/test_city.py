@@ -98,7 +98,7 @@ def test_another_car_joins_and_leaves_cleanly(running: CityProcess) -> None:
         agent.send_signal(signal.SIGINT)
         assert agent.wait(timeout=5.0) == 0
         assert time.monotonic() - began < 1.5
-        wait_for(lambda: "n7" not in cars_of(running), 2.0, "n7 has left the map")
+        wait_for(lambda: "n7" not in cars_of(running), 5.0, "n7 has left the map")
     finally:
         end(agent)
 

@@ -60,7 +60,7 @@ def here(command: str, running: CityProcess, root: Path) -> str:
     command = command.replace("tcp/127.0.0.1:7447", running.endpoint)
     command = command.replace("http://127.0.0.1:8000", running.url)
     command = command.replace("../shared", str(root.parent / "shared"))
-    shorter = "--plans brisk --via east_loop"  # two plans and a whole lap take two minutes
+    shorter = "--cars 1 --plans brisk --via east_loop"  # all of it takes two minutes
     live = command.endswith("--live")
     return f"{command} --connect {running.endpoint} {shorter}" if live else command
 
