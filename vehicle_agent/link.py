@@ -66,6 +66,7 @@ class Link:
         self._asked_ns: int | None = None
         self._answered_ns = 0
         self._was_inside = False
+        self._may_be_in = False
         self._taken_ns: int | None = None
 
     @property
@@ -84,6 +85,7 @@ class Link:
             return []
         self._asked_ns = now_ns
         if not self.is_inside:
+            self._may_be_in = True
             return [Call(self._join(), timeout_s=1.0)]
         return [Call(self._beat(), timeout_s=1.0)]
 
@@ -126,10 +128,14 @@ class Link:
             self._attempt += 1
 
     def goodbye(self) -> list[Call]:
-        """Return the last words of a car that leaves."""
-        if not self.is_inside:
+        """Return the last words of a car that leaves.
+
+        Whoever asked to join and has no answer yet says them too: the city may have let it in.
+        """
+        if not (self.is_inside or self._may_be_in):
             return []
-        return [Call(RemoveRequest(vehicle=self._vehicle, reason="its agent leaves"))]
+        reason = "its agent leaves"
+        return [Call(RemoveRequest(vehicle=self._vehicle, reason=reason, session=self.session))]
 
     def _beat(self) -> LeaseRequest:
         """Return a renewal, or the one request for a newer lease, the same however often asked."""
@@ -171,6 +177,7 @@ class Link:
         self._answered_ns = max(self._answered_ns, reply.t_ns)
         asked = reply.call.request if reply.call is not None else None
         if isinstance(asked, JoinRequest):
+            self._may_be_in = False
             if refused.code == "invalid" or self._is_taken_for_good(refused, reply.t_ns):
                 raise RunError(refused.detail)
             self._attempt += 1

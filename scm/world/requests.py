@@ -100,6 +100,9 @@ def _welcome(car: RemoteCar, now_ns: int) -> JoinReply:
 
 def _remove(world: World, request: RemoveRequest, now_ns: int) -> RemoveReply:
     car = _known(world, request.vehicle)
+    if request.session and getattr(car, "session", "") != request.session:
+        detail = f"{car.name} did not join by session {request.session!r}: it is somebody else's"
+        raise _RefusedError("owned", detail)
     world.remove(car.name)
     name = "vehicle_removed" if isinstance(car, HostedCar) else "vehicle_left"
     reason = f": {request.reason}" if request.reason else ""

@@ -14,13 +14,18 @@ class RemoveReply(Message, kw_only=True, frozen=True):
 
 
 class RemoveRequest(Request, kw_only=True, frozen=True):
-    """Remove a car, with a reason for the event log."""
+    """Remove a car, with a reason for the event log.
+
+    Attributes:
+        session: The car that joined by this session, and no other of its name; empty: any.
+    """
 
     KEY: ClassVar[str] = "v/{vehicle}/remove"
     REPLY: ClassVar[type[Message]] = RemoveReply
 
     vehicle: str
     reason: str = ""
+    session: str = ""
 
 
 MESSAGE = RemoveRequest

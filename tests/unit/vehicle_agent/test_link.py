@@ -179,8 +179,24 @@ def test_a_second_welcome_changes_nothing(inside):
     assert inside.epoch == 10
 
 
-def test_it_says_goodbye_only_from_inside(link):
+def test_whoever_never_asked_to_join_leaves_without_a_word(link):
     assert link.goodbye() == []
-    answer(link, welcome(), ask(link, 0))
-    (call,) = link.goodbye()
-    assert call.request == RemoveRequest(vehicle="n7", reason="its agent leaves")
+
+
+def test_it_takes_its_own_car_off_the_map_and_no_other_of_that_name(inside):
+    (call,) = inside.goodbye()
+    expected = RemoveRequest(vehicle="n7", reason="its agent leaves", session="s1")
+    assert call.request == expected
+
+
+@pytest.mark.parametrize("lost", ["timeout", "offline"])
+def test_it_says_goodbye_too_where_the_city_may_have_let_it_in_unheard(link, lost):
+    asked = ask(link, 0)
+    assert len(link.goodbye()) == 1
+    answer(link, Refused(code=lost, detail="no answer"), asked)
+    assert len(link.goodbye()) == 1
+
+
+def test_whoever_was_refused_leaves_without_a_word(link):
+    answer(link, Refused(code="full", detail="no place is free"), ask(link, 0))
+    assert link.goodbye() == []

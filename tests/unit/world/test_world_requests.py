@@ -328,6 +328,17 @@ def test_a_clean_leave_takes_the_car_off_at_once(city):
     assert city.events()[-1] == "vehicle_left"
 
 
+def test_a_session_takes_its_own_car_off_and_no_other_of_that_name(city):
+    city.ask(SpawnRequest(vehicle="n1"))
+    city.join(session="s1")
+    for name, session in (("n7", "s2"), ("n1", "s1")):
+        assert city.ask(RemoveRequest(vehicle=name, session=session)).code == "owned"
+    city.ask(RemoveRequest(vehicle="n7", session="s1"))
+    city.run(3)
+    assert city.shown("n7") is None
+    assert city.shown("n1") is not None
+
+
 def test_a_remote_car_that_drives_into_a_standing_one_is_told_of_the_contact(city):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
     city.join()
