@@ -29,6 +29,11 @@ def cars_of(running: CityProcess) -> dict[str, Any]:
     return {row["vehicle"]: row for row in running.get("/cars")["cars"]}
 
 
+def events_of(running: CityProcess, vehicle: str) -> list[str]:
+    told = running.get("/events")["events"]
+    return [event["name"] for event in told if event.get("vehicle") == vehicle]
+
+
 def alive_stations(running: CityProcess) -> set[str]:
     return {row["name"] for row in running.get("/stations")["stations"] if row["alive"]}
 
@@ -98,7 +103,9 @@ def test_another_car_joins_and_leaves_cleanly(running: CityProcess) -> None:
         agent.send_signal(signal.SIGINT)
         assert agent.wait(timeout=5.0) == 0
         assert time.monotonic() - began < 1.5
-        wait_for(lambda: "n7" not in cars_of(running), 5.0, "n7 has left the map")
+        wait_for(lambda: "n7" not in cars_of(running), 2.0, "n7 has left the map")
+        assert "vehicle_left" in events_of(running, "n7")
+        assert "vehicle_lost" not in events_of(running, "n7")
     finally:
         end(agent)
 
@@ -110,8 +117,7 @@ def test_a_killed_car_is_noticed_within_one_and_a_half_seconds(running: CityProc
         os.kill(agent.pid, signal.SIGKILL)
         noticed = "the city shows n8 as lost"
         wait_for(lambda: not cars_of(running).get("n8", {"alive": False})["alive"], 1.5, noticed)
-        events = running.get("/events")["events"]
-        assert any(e["name"] == "vehicle_lost" and e.get("vehicle") == "n8" for e in events)
+        assert "vehicle_lost" in events_of(running, "n8")
     finally:
         end(agent)
 
