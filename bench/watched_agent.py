@@ -1,4 +1,4 @@
-"""Real cars' agents that tell when they notice that their keeper died, and fail when asked.
+"""Real cars' agents that tell when they find their keeper dead or silent, and fail when asked.
 
 A line of arguments on stdin forks one, so that everything is loaded but once; its number is told.
 SIGUSR1: its next step raises. SIGUSR2: its next step takes three seconds. All else is as it is;
@@ -18,11 +18,13 @@ from scm.parent_watch import PR_SET_PDEATHSIG
 from scm.world.part import WorldPart
 from vehicle_agent.__main__ import main
 from vehicle_agent.agent import AgentPart
+from vehicle_agent.nigel.hand import Hand
 from vehicle_agent.nigel.helm import Helm
 
 STALL_S = 3.0
 _asked: list[int] = []
 _look, _hang_up, _init = AgentPart._check_losses, Helm._hang_up, Helm.__init__  # noqa: SLF001
+_say = Hand.say
 
 
 def _failing_look(self, now_ns):
@@ -38,6 +40,11 @@ def _telling_hang_up(self):
     if self._line is not None:
         say("keeper gone")
     _hang_up(self)
+
+
+def _telling_say(self, frames):
+    say("keeper gone")
+    _say(self, frames)
 
 
 def _watched_init(self, *args):
@@ -80,5 +87,6 @@ if __name__ == "__main__":
         signal.signal(number, lambda got, _frame: _asked.append(got))
     setattr(AgentPart, "_check_losses", _failing_look)  # noqa: B010
     setattr(Helm, "_hang_up", _telling_hang_up)  # noqa: B010
+    setattr(Hand, "say", _telling_say)  # noqa: B010
     setattr(Helm, "__init__", _watched_init)  # noqa: B010
     serve()

@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Sequence
 
+from scm.clock import Clock
 from vehicle_agent.nigel import keeper
 from vehicle_agent.nigel.cable import Cable
 from vehicle_agent.nigel.host import Host, Wish
@@ -21,18 +22,22 @@ class WatchedHost(Host):
     owes = False
 
     def say(self, wish: Wish, now_ns: int) -> list[bytes]:
-        self._note(wish.throttle)
+        self.note(wish.throttle)
         return super().say(wish, now_ns)
 
-    def rest(self) -> list[bytes]:
-        self._note(0.0)
-        return super().rest()
-
-    def _note(self, throttle: float) -> None:
+    def note(self, throttle: float) -> None:
         if self._watched_moves and throttle == 0.0:
             say("notice")
             WatchedHost.owes = True
         self._watched_moves = throttle != 0.0
+
+
+class WatchedKeeper(keeper.Keeper):
+    """A keeper that tells when it is to end."""
+
+    def finish(self, clock: Clock) -> None:
+        self._host.note(0.0)
+        super().finish(clock)
 
 
 class WatchedCable(Cable):
@@ -47,5 +52,6 @@ class WatchedCable(Cable):
 
 if __name__ == "__main__":
     setattr(keeper, "Cable", WatchedCable)  # noqa: B010
+    setattr(keeper, "Keeper", WatchedKeeper)  # noqa: B010
     setattr(keeper, "Host", WatchedHost)  # noqa: B010 what the keeper makes its host of
     keeper.main(sys.argv[1:])

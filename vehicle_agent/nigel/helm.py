@@ -1,8 +1,9 @@
 """The agent's end of the cable: it starts the keeper, gives it wishes, and knows what it told.
 
-When the keeper is gone nobody can say zero to the Arduino, and a new keeper takes a while to start.
-So the port is opened here at once, which resets the Arduino: its motor rests. It is held until the
-new keeper speaks.
+The keeper answers every wish. One that leaves a few unanswered may only be late, so the zeros are
+said here, beside him, which costs nothing if he is well; only one that stays silent is killed. When
+he is gone nobody can say zero, and a new keeper takes a while to start. So the port is opened here
+at once, which resets the Arduino: its motor rests. It is held until the new keeper speaks.
 """
 
 import logging
@@ -15,15 +16,15 @@ import msgspec
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.log import event
-from vehicle_agent.nigel.cable import FAILURES, Port, open_serial
+from vehicle_agent.nigel.hand import Hand
 from vehicle_agent.nigel.host import REST, Wish
 from vehicle_agent.nigel.keeper import LONGEST, Asked, Told
 
 RESTART_NS = NS_PER_S
-HANGS_NS = 500 * NS_PER_MS
-"""It speaks ten times a second. One that hangs could not say zero either."""
-UNHEARD = 10
-"""Turns without a word before it counts as silence: who stalled himself has not listened."""
+DOUBT_NS, DOUBT_TURNS = 55 * NS_PER_MS, 3
+"""Without a word for both, zeros are said beside it: who stalled himself has not listened."""
+HANGS_NS, HANGS_TURNS = 500 * NS_PER_MS, 10
+"""Likewise until it is killed, which costs the car two seconds of rest."""
 LEAVE_S = 2.0
 
 _log = logging.getLogger(__name__)
@@ -39,8 +40,7 @@ class Helm:
 
     def __init__(self, path: str, baud: int) -> None:
         self._command = [sys.executable, "-m", "vehicle_agent.nigel.keeper", path, str(baud)]
-        self._path, self._baud = path, baud
-        self._held: Port | None = None
+        self._path, self._hand = path, Hand(path, baud)
         self._line: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._started_ns: int | None = None
@@ -55,13 +55,14 @@ class Helm:
             return "nobody keeps the cable"
         if self.told is None:
             return "the keeper of the cable starts"
-        if self._is_silent(now_ns):
+        if self._is_silent(now_ns, DOUBT_NS, DOUBT_TURNS):
             return "the keeper of the cable is silent"
         return self.told.trouble
 
     def steer(self, wish: Wish, now_ns: int) -> None:
         """Give the keeper a wish and take what it told; start it where there is none."""
         self._hear(now_ns)
+        self._speak_for_silent(now_ns)
         self._end_hanging(now_ns)
         self._keep_one(now_ns)
         if self._line is None:
@@ -78,7 +79,7 @@ class Helm:
         self._is_closed = True
         self._send(Asked(0, REST))
         self._hang_up()
-        self._release()
+        self._hand.release()
         if self._process is None:
             return
         try:
@@ -93,7 +94,8 @@ class Helm:
             return
         if self._process is not None and self._process.poll() is None:
             return  # it still holds the port
-        self._hold()
+        if self._process is not None:
+            self._hand.hold()
         if self._started_ns is not None and now_ns - self._started_ns < RESTART_NS:
             return
         self._started_ns = self._heard_ns = now_ns
@@ -106,21 +108,8 @@ class Helm:
         ours.setblocking(False)
         self._line = ours
 
-    def _hold(self) -> None:
-        """Open the port of a keeper that is gone: that resets the Arduino."""
-        if self._process is None or self._held is not None:
-            return
-        with suppress(*FAILURES):
-            self._held = open_serial(self._path, self._baud, exclusive=False)
-
-    def _release(self) -> None:
-        if self._held is not None:
-            with suppress(*FAILURES):
-                self._held.close()
-            self._held = None
-
-    def _is_silent(self, now_ns: int) -> bool:
-        return self._unheard >= UNHEARD and now_ns - self._heard_ns > HANGS_NS
+    def _is_silent(self, now_ns: int, span_ns: int, turns: int) -> bool:
+        return self._unheard >= turns and now_ns - self._heard_ns > span_ns
 
     def _hear(self, now_ns: int) -> None:
         self._unheard += 1
@@ -136,15 +125,23 @@ class Helm:
                 event(_log, "keeper_died", level=logging.ERROR, path=self._path)
                 return
             self.told, self._heard_ns, self._unheard = _told.decode(data), now_ns, 0
-            self._release()
+            self._hand.release()
+
+    def _speak_for_silent(self, now_ns: int) -> None:
+        """Say zeros beside a keeper that may hang, if it told how they are said."""
+        if self.told is None or not self.told.rest or self._line is None:
+            return
+        if self._is_silent(now_ns, DOUBT_NS, DOUBT_TURNS):
+            self._hand.say(self.told.rest)
 
     def _end_hanging(self, now_ns: int) -> None:
         """Kill a keeper that does nothing: the next one resets the Arduino by opening the port."""
         if self._line is None or self._process is None or self.told is None:
             return
-        if not self._is_silent(now_ns):
+        if not self._is_silent(now_ns, HANGS_NS, HANGS_TURNS):
             return
         event(_log, "keeper_hangs", level=logging.ERROR, path=self._path)
+        self._hand.withdraw()
         self._process.kill()
         self._hang_up()
 

@@ -28,7 +28,6 @@ from vehicle_agent.nigel.telemetry import Telemetry
 PATIENCE_NS = 150 * NS_PER_MS
 """As the guard's: for so long a wish holds."""
 TURN_NS = 5 * NS_PER_MS
-REPORT_NS = 100 * NS_PER_MS
 GOODBYES = 5
 GOODBYE_NS = 20 * NS_PER_MS
 DRAIN_NS = 200 * NS_PER_MS
@@ -50,6 +49,7 @@ class Told(msgspec.Struct, frozen=True, array_like=True):
     Attributes:
         trouble: What keeps the car from being driven, in words; empty: nothing.
         readings: How many telemetries have come.
+        rest: Frames that say zero to the Arduino as it is now; empty: it could not be told.
     """
 
     phase: Phase
@@ -58,6 +58,7 @@ class Told(msgspec.Struct, frozen=True, array_like=True):
     readings: int
     battery_v: float | None
     telemetry: Telemetry | None
+    rest: bytes = b""
 
 
 _asked = msgspec.msgpack.Decoder(Asked)
@@ -71,12 +72,12 @@ class Keeper:
         self._asked = Asked(0, REST)
         self._opened = 0
         self._reported: tuple[str, str, int] | None = None
-        self._reported_ns = 0
+        self._owes = False
 
     def step(self, now_ns: int, asked: Asked | None = None) -> None:
         """Read, answer, command; `asked` is what the agent said since the last step."""
         if asked is not None:
-            self._asked = asked
+            self._asked, self._owes = asked, True
         if self._cable.keep_open(now_ns) and self._cable.opened != self._opened:
             self._opened = self._cable.opened
             self._host.open(now_ns)
@@ -86,13 +87,13 @@ class Keeper:
         else:
             self._cable.write(answers + self._host.say(self._wish(now_ns), now_ns))
 
-    def report(self, now_ns: int) -> Told | None:
-        """Return what the agent is to know: at each change, and ten times a second."""
+    def report(self) -> Told | None:
+        """Return what the agent is to know: at each change, and as an answer to each wish."""
         trouble = self._cable.trouble or self._host.trouble
         news = (self._host.phase, trouble, self._host.readings)
-        if news == self._reported and now_ns - self._reported_ns < REPORT_NS:
+        if news == self._reported and not self._owes:
             return None
-        self._reported, self._reported_ns = news, now_ns
+        self._reported, self._owes = news, False
         return Told(
             phase=self._host.phase,
             trouble=trouble,
@@ -100,6 +101,7 @@ class Keeper:
             readings=self._host.readings,
             battery_v=self._host.battery_v,
             telemetry=self._host.telemetry,
+            rest=b"".join(self._host.rest()),
         )
 
     def finish(self, clock: Clock) -> None:
@@ -165,7 +167,7 @@ def serve(keeper: Keeper, agent: _Agent, cable: Cable, clock: Clock, ended: list
             asked = agent.newest()
             now_ns = clock.now_ns()
             keeper.step(now_ns, asked)
-            agent.tell(keeper.report(now_ns))
+            agent.tell(keeper.report())
     finally:
         keeper.finish(clock)
 

@@ -19,7 +19,7 @@ from scm.clock import NS_PER_MS, NS_PER_S, StepClock, WallClock
 from tests.unit.nigel.fake_device import Device
 from tests.unit.nigel.pty_device import PtyDevice
 from vehicle_agent.nigel.cable import FULL_BYTES, REOPEN_NS, Cable
-from vehicle_agent.nigel.helm import Helm
+from vehicle_agent.nigel.helm import DOUBT_NS, Helm
 from vehicle_agent.nigel.host import Host, Wish
 from vehicle_agent.nigel.keeper import PATIENCE_NS, Asked, Keeper, Told
 from vehicle_agent.nigel.rosserial import pack_float
@@ -189,6 +189,21 @@ def test_a_wish_that_waited_in_the_queue_or_has_no_honest_stamp_is_not_obeyed(ag
     assert kept.run(3 * NS_PER_S, Wish(0.5, 0.5), age_ns) == {"steer_cmd": 0.0, "drive_cmd": 0.0}
 
 
+def test_the_keeper_answers_every_wish_and_tells_how_to_say_zero_once_it_knows():
+    kept = Kept()
+    kept.run(5 * NS_PER_MS, Wish())
+    assert kept.keeper.report().rest == b""
+    assert kept.keeper.report() is None
+    kept.run(3 * NS_PER_S, Wish(0.5, 0.5))
+    assert kept.keeper.report() is not None
+    kept.run(5 * NS_PER_MS)
+    assert kept.keeper.report() is None
+    kept.run(5 * NS_PER_MS, Wish(0.5, 0.5))
+    rest = kept.keeper.report().rest
+    kept.device.hear(rest, kept.now_ns)
+    assert kept.device.values == {"steer_cmd": 0.0, "drive_cmd": 0.0}
+
+
 def test_the_keeper_ends_with_zeros_said_five_times():
     kept = Kept()
     kept.run(3 * NS_PER_S, Wish(0.5, 0.5))
@@ -252,17 +267,29 @@ def test_a_keeper_that_dies_or_hangs_is_replaced_and_its_port_is_opened_at_once(
     helm, steer, device = driving
     old = helm._process
     old.send_signal(way)
-    wait(lambda: helm._held is not None, 2.0, steer)
+    wait(lambda: helm._hand._port is not None, 2.0, steer)
     wait(lambda: helm._process is not old, 8.0, steer)
-    wait(lambda: helm._held is None, 8.0, steer)
+    wait(lambda: helm._hand._port is None, 8.0, steer)
     device.log.clear()
     wait(lambda: device.newest(101) == HALF, every=steer)
+
+
+def test_a_stopped_keeper_has_zeros_said_beside_it_and_drives_on_without_a_reset(driving):
+    helm, steer, device = driving
+    old = helm._process
+    os.kill(old.pid, signal.SIGSTOP)
+    device.log.clear()
+    wait(lambda: device.newest(101) == ZERO, 2.0, steer)
+    os.kill(old.pid, signal.SIGCONT)
+    wait(lambda: device.newest(101) == HALF, 2.0, steer)
+    assert helm._process is old
+    assert helm._hand._port is None
 
 
 AGENT = """
 import sys, threading
 from scm.clock import WallClock
-from vehicle_agent.nigel.helm import Helm
+from vehicle_agent.nigel.helm import DOUBT_NS, Helm
 from vehicle_agent.nigel.host import Wish
 helm, clock, never = Helm(sys.argv[1], 57600), WallClock(), threading.Event()
 while True:
@@ -287,20 +314,60 @@ def test_an_agent_that_is_killed_or_stopped_leaves_zeros(plugged, way):
         agent.wait(5.0)
 
 
-def test_an_agent_that_stalled_does_not_take_the_keeper_for_dead():
-    ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    ours.setblocking(False)
-    helm = Helm("x", 57600)
-    helm._line, helm._process = (
-        ours,
-        types.SimpleNamespace(kill=lambda: killed.append(1), poll=lambda: None),
-    )
-    killed, told = [], msgspec.msgpack.encode(Told("ready", "", 1, 0, None, None))
-    its.send(told)
-    helm.steer(Wish(), 0)
-    for turn in range(9):
-        helm.steer(Wish(), 3 * NS_PER_S + turn)
-    assert (helm.trouble(3 * NS_PER_S), killed) == ("", [])
-    helm.steer(Wish(), 3 * NS_PER_S + 9)
-    assert killed == [1]
-    its.close()
+class Alone:
+    """The agent's end of a line on which only the test speaks."""
+
+    def __init__(self, told):
+        self.said, self.killed = [], []
+        ours, self.its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        ours.setblocking(False)
+        self.helm = Helm("x", 57600)
+        self.helm._line, self.helm._process = (
+            ours,
+            types.SimpleNamespace(kill=lambda: self.killed.append(1), poll=lambda: None),
+        )
+        self.helm._hand.say = self.said.append
+        self.its.send(msgspec.msgpack.encode(told))
+        self.helm.steer(Wish(), 0)
+
+    def steer(self, turns, at_ns):
+        """Steer some turns with hardly any time between them; return the trouble after them."""
+        for turn in range(turns):
+            self.helm.steer(Wish(), at_ns + turn)
+        return self.helm.trouble(at_ns + turns)
+
+
+@pytest.fixture
+def alone():
+    made = []
+
+    def make(rest=b"zeros"):
+        made.append(Alone(Told("ready", "", 1, 0, None, None, rest)))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.its.close()
+        one.helm._hang_up()
+
+
+def test_an_agent_that_stalled_does_not_take_the_keeper_for_silent_or_dead(alone):
+    one = alone()
+    assert (one.steer(2, 3 * NS_PER_S), one.said, one.killed) == ("", [], [])
+    assert "silent" in one.steer(7, 3 * NS_PER_S)
+    assert (len(one.said), one.killed) == (7, [])
+    one.steer(1, 3 * NS_PER_S)
+    assert one.killed == [1]
+
+
+def test_zeros_are_said_beside_a_keeper_that_left_three_wishes_unanswered(alone):
+    one = alone()
+    assert one.steer(9, DOUBT_NS - 9) == ""
+    assert "silent" in one.steer(1, DOUBT_NS + 1)
+    assert (one.said, one.killed) == ([b"zeros"], [])
+
+
+def test_nothing_is_said_to_an_arduino_that_starts_and_could_take_it_for_a_program(alone):
+    one = alone(rest=b"")
+    one.steer(4, NS_PER_S)
+    assert one.said == []
