@@ -23,6 +23,8 @@ def _run(arguments: argparse.Namespace) -> int:
     _check(arguments.recording, arguments.out)
     result = recover(arguments.recording, arguments.out)
     state = "was whole" if result.whole else "was cut off"
+    if result.grew:
+        state = "is still being written; up to the start of this command"
     print(f"{arguments.recording} {state}: {result.messages} messages over {result.span_s:.1f} s")
     print(f"written to {result.path}")
     return 0

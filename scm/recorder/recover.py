@@ -1,8 +1,9 @@
 """Mend a recording whose writer was killed: copy every whole message into a file with an index."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, cast
 
 from mcap.records import Channel, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
@@ -20,12 +21,14 @@ class Recovered:
         messages: How many were copied.
         span_s: From the first to the last of them [s].
         whole: Whether the file was complete to begin with.
+        grew: Whether somebody wrote on meanwhile: only what was there at the start is copied.
     """
 
     path: Path
     messages: int
     span_s: float
     whole: bool
+    grew: bool = False
 
 
 def recover(broken: Path, mended: Path | None = None) -> Recovered:
@@ -54,20 +57,35 @@ def recover(broken: Path, mended: Path | None = None) -> Recovered:
             msg = f"{target}: cannot be written: {cause.strerror}"
             raise RecordingError(msg) from cause
         try:
-            whole = _copy_all(stream, copy)
+            size = os.fstat(stream.fileno()).st_size
+            whole = _copy_all(stream, size, copy)
+            grew = os.fstat(stream.fileno()).st_size > size
         finally:
             copy.close()
     if copy.messages == 0:
         target.unlink()
         msg = f"{broken}: holds no whole message"
         raise RecordingError(msg)
-    return Recovered(target, copy.messages, (copy.last_ns - copy.first_ns) * 1e-9, whole)
+    return Recovered(target, copy.messages, (copy.last_ns - copy.first_ns) * 1e-9, whole, grew)
 
 
-def _copy_all(stream: IO[bytes], copy: "_Copy") -> bool:
-    """Copy until the file ends or stops making sense; return whether it has its end record."""
+class _Begin:
+    """The first bytes of a file, however it grows: who read to its end could read for ever."""
+
+    def __init__(self, stream: IO[bytes], size: int) -> None:
+        self._stream, self._left = stream, size
+
+    def read(self, length: int) -> bytes:
+        """Return so many bytes, or what is left."""
+        data = self._stream.read(min(length, self._left))
+        self._left -= len(data)
+        return data
+
+
+def _copy_all(stream: IO[bytes], size: int, copy: "_Copy") -> bool:
+    """Copy until `size` or where it stops making sense; return whether it has its end record."""
     try:
-        for record in StreamReader(stream).records:
+        for record in StreamReader(cast("IO[bytes]", _Begin(stream, size))).records:
             copy.add(record)
     except UNREADABLE:
         return False

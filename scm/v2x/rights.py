@@ -103,7 +103,9 @@ _OF_ROLE: dict[str, Rights] = {
     "driver": _WATCHES + Rights(says=("v/*/cmd/drive",), asks=EVERY_REQUEST),
     "camera": Rights(says=("eye/{me}/@picture",)),
     # Of no vehicle's name: the car that it emulates is another station, and knows less.
-    "emulator": Rights(says=("v/*/emulated",), hears=("world/def",)),
+    "emulator": Rights(
+        says=("v/*/emulated",), hears=("world/def", "world/snapshot", "v/*/emulated")
+    ),
 }
 
 _OF_PART: dict[str, Rights] = {

@@ -2,6 +2,12 @@
 
 from scm.__main__ import main
 from scm.commands.recover import MAGIC
+from scm.recorder import recover as recovery
+from scm.recorder.mcap_file import RunFile
+from scm.v2x.exchange import RawSample
+from scm.v2x.key import key_of
+from scm.v2x.message import encode
+from scm.v2x.messages.part_status import PartStatus
 
 
 def said(capsys, *words):
@@ -27,3 +33,25 @@ def test_a_file_that_is_there_is_not_written_over(tmp_path, capsys):
     assert code != 0
     assert "other.mcap is there already, expected a new name" in text
     assert other.read_bytes() == b"precious"
+
+
+def test_a_run_that_is_still_being_written_is_copied_up_to_where_it_was(
+    tmp_path, capsys, monkeypatch
+):
+    run, status = tmp_path / "run.mcap", PartStatus(station="eye", t_ns=0)
+    sample = RawSample(key_of("city", status), *encode(status), t_ns=0)
+    with RunFile(run, "city") as file:
+        for _ in range(50):
+            file.write(sample)
+        file.flush()
+
+        def copied_while_one_more_comes(copy, record, add=recovery._Copy.add):
+            if copy.messages < 200:  # or it would never end
+                file.write(sample)
+                file.flush()
+            add(copy, record)
+
+        monkeypatch.setattr(recovery._Copy, "add", copied_while_one_more_comes)
+        assert main(["recover", str(run)]) == 0
+    told = capsys.readouterr().out
+    assert "is still being written; up to the start of this command: 50 messages" in told

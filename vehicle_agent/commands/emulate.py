@@ -35,7 +35,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     credentials_argument(parser)
     parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
     parser.add_argument("--car", default="nigel", help="car file (%(default)s)")
-    parser.add_argument("--spawn", default="", help="place to start at; default: the map's first")
+    parser.add_argument("--spawn", default="", help="place to start at; default: any free one")
     parser.add_argument(
         "--tag", type=int, metavar="ID", help="on its roof; default: as the city gives it"
     )

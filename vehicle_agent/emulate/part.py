@@ -3,22 +3,32 @@
 Its board hears the serial line only. Nothing that goes over the bus can move it.
 """
 
-from collections.abc import Sequence
+import logging
+import math
+from collections.abc import Iterable, Sequence
 
 from scm.clock import NS_PER_MS
 from scm.errors import MapError, nearest
 from scm.geometry import Pose2
-from scm.maps.model import CityMap
+from scm.log import event
+from scm.maps.model import CityMap, Spawn
 from scm.maps.route import Roads
 from scm.part import Hears
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.world_definition import WorldDefinition
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 from vehicle_agent.emulate.device import Device
 from vehicle_agent.emulate.wheels import Wheels
 
 STEP_NS = 5 * NS_PER_MS
 TELL_NS = 20 * NS_PER_MS
+LOOK_NS = 300 * NS_PER_MS
+"""For so long it looks where others stand: each tells it several times meanwhile."""
+CLEARANCE_M, AHEAD_S = 0.45, 1.5
+"""From rear axle to rear axle, and from where a car can be by then, as the world keeps it."""
+
+_log = logging.getLogger(__name__)
 
 
 def station_of(vehicle: str) -> str:
@@ -34,13 +44,27 @@ def place_of(city_map: CityMap, spawn: str) -> Pose2:
     """
     for place in city_map.spawns:
         if spawn in ("", place.name):
-            if place.pose is not None:
-                return Pose2(*place.pose)
-            line = Roads(city_map).lanes[place.lane or ""]
-            return Pose2(*line.at(place.at_m or 0.0))
+            return _pose_of(city_map, place)
     known = [place.name for place in city_map.spawns]
     msg = f"map {city_map.name}: no spawn place {spawn!r}{nearest(spawn, known)}"
     raise MapError(msg)
+
+
+def free_place(city_map: CityMap, others: Iterable[SnapshotVehicle | EmulatedPose]) -> Pose2 | None:
+    """Return the first spawn place where no car stands or soon may; None: there is none."""
+    cars = [(car.x_m, car.y_m, CLEARANCE_M + AHEAD_S * abs(car.speed_mps)) for car in others]
+    for place in city_map.spawns:
+        pose = _pose_of(city_map, place)
+        if all(math.hypot(x - pose.x, y - pose.y) >= far for x, y, far in cars):
+            return pose
+    return None
+
+
+def _pose_of(city_map: CityMap, place: Spawn) -> Pose2:
+    if place.pose is not None:
+        return Pose2(*place.pose)
+    line = Roads(city_map).lanes[place.lane or ""]
+    return Pose2(*line.at(place.at_m or 0.0))
 
 
 class EmulatorPart:
@@ -49,7 +73,6 @@ class EmulatorPart:
     role = "client"
     period_ns = STEP_NS
     serves = ()
-    hears = (Hears(WorldDefinition),)
 
     def __init__(
         self, vehicle: str, device: Device, wheels: Wheels, spawn: str = "", car: str = "nigel",
@@ -61,24 +84,36 @@ class EmulatorPart:
             vehicle: Whose car this is.
             device: Its board and cable.
             wheels: What the board moves.
-            spawn: Spawn place; empty: the map's first.
+            spawn: Spawn place; empty: the first at which no other car stands.
             car: Car file's name.
             tag_id: Printed on its roof; None: the one that the city gives to the vehicle.
         """
         self.name = station_of(vehicle)
         self._vehicle, self._device, self._wheels = vehicle, device, wheels
         self._spawn, self._car, self._tag_id = spawn, car, tag_id
+        self.hears: Sequence[Hears] = (
+            Hears(WorldDefinition), Hears(WorldSnapshot), Hears(EmulatedPose),
+        )  # fmt: skip
+        self._map: CityMap | None = None
         self._defined_ns: int | None = None
-        self._is_placed = False
+        self._snapshot: WorldSnapshot | None = None
+        self._emulated: dict[str, EmulatedPose] = {}
+        self._looks_since_ns: int | None = None
+        self._is_full = self._is_placed = False
         self._told_ns = 0
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Let the board run, the car roll; tell where it is, 50 times a second."""
         for item in inbox:
             if isinstance(item.message, WorldDefinition):
-                self._learn(item.message, now_ns)
+                self._learn(item.message)
+            elif isinstance(item.message, WorldSnapshot):
+                self._snapshot = item.message
+            elif isinstance(item.message, EmulatedPose):
+                self._emulated[item.message.vehicle] = item.message
         self._device.step(now_ns)
         if not self._is_placed:
+            self._put_down(now_ns)
             return []
         self._wheels.advance(self._device.firmware.outputs, now_ns)
         if now_ns - self._told_ns < TELL_NS - STEP_NS // 2:
@@ -92,15 +127,38 @@ class EmulatorPart:
         self._device.close()
         return []
 
-    def _learn(self, world: WorldDefinition, now_ns: int) -> None:
+    def _learn(self, world: WorldDefinition) -> None:
         """Know the floor; a city that begins anew does not carry the car away."""
         if world.t_ns == self._defined_ns:
             return
-        self._defined_ns = world.t_ns
+        self._defined_ns, self._map = world.t_ns, world.map
         self._wheels.learn(world.map, world.seed)
-        if not self._is_placed:
-            self._wheels.place(place_of(world.map, self._spawn), now_ns)
-            self._is_placed = True
+
+    def _put_down(self, now_ns: int) -> None:
+        """Put the car at its place, or look for a free one until there is one."""
+        if self._map is None:
+            return
+        pose = place_of(self._map, self._spawn) if self._spawn else self._found(self._map, now_ns)
+        if pose is None:
+            return
+        self._wheels.place(pose, now_ns)
+        self._is_placed, self.hears = True, self.hears[:1]
+        self._snapshot, self._emulated = None, {}
+
+    def _found(self, city_map: CityMap, now_ns: int) -> Pose2 | None:
+        if self._snapshot is None:
+            return None
+        if self._looks_since_ns is None:
+            self._looks_since_ns = now_ns
+        if now_ns - self._looks_since_ns < LOOK_NS:
+            return None
+        seen = {car.vehicle: car for car in self._snapshot.vehicles} | self._emulated
+        seen.pop(self._vehicle, None)
+        pose = free_place(city_map, seen.values())
+        if pose is None and not self._is_full:
+            self._is_full = True
+            event(_log, "no_free_place", level=logging.WARNING, map=city_map.name)
+        return pose
 
     def _pose(self, now_ns: int) -> EmulatedPose:
         motion = self._wheels.motion()

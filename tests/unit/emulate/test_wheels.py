@@ -14,6 +14,7 @@ from scm.v2x.exchange import Incoming
 from scm.v2x.key import key_of, prefix, selector
 from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.world_definition import WorldDefinition
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 from scm.v2x.rights import rights_of
 from vehicle_agent.emulate.part import EmulatorPart, place_of, station_of
 from vehicle_agent.emulate.sketches import SKETCHES, Outputs
@@ -101,8 +102,8 @@ class Desk:
         self.closed = True
 
 
-def part(**more):
-    return EmulatorPart("n7", Desk(), Wheels(TWO.at_setup), **more)
+def part(spawn=CITY.spawns[0].name, **more):
+    return EmulatorPart("n7", Desk(), Wheels(TWO.at_setup), spawn, **more)
 
 
 def world():
@@ -137,6 +138,52 @@ def test_it_is_put_down_at_a_named_place_or_refuses():
     assert place_of(CITY, "") == place_of(CITY, first.name) != place_of(CITY, second.name)
     with pytest.raises(MapError, match="no spawn place 'nowhere'"):
         place_of(CITY, "nowhere")
+
+
+def car_at(place, vehicle="n1", speed_mps=0.0):
+    pose = place_of(CITY, place.name)
+    return SnapshotVehicle(
+        vehicle=vehicle, kind="hosted", car="nigel", tag_id=1, x_m=pose.x, y_m=pose.y,
+        yaw_rad=pose.yaw, speed_mps=speed_mps, steering_rad=0.0,
+    )  # fmt: skip
+
+
+def put_down(*cars, emulated=()):
+    """Have an emulator look for a place for half a second; return its first word, if any."""
+    emulator, told = part(""), []
+    seen = WorldSnapshot(t_ns=1, tick=1, vehicles=cars)
+    for ms in range(0, 500, 5):
+        heard = [world(), Incoming(seen, 0), *(Incoming(one, 0) for one in emulated)]
+        told += emulator.step(ms * NS_PER_MS, heard)
+    return told[0] if told else None
+
+
+def is_at(told, place):
+    pose = place_of(CITY, place.name)
+    return math.hypot(told.x_m - pose.x, told.y_m - pose.y) < 0.01
+
+
+def test_without_a_named_place_it_is_put_down_where_no_car_stands():
+    first, second, third = CITY.spawns[:3]
+    assert is_at(put_down(), first)
+    assert is_at(put_down(car_at(first)), second)
+    pose = place_of(CITY, second.name)
+    other = EmulatedPose(
+        vehicle="n8", t_ns=0, x_m=pose.x, y_m=pose.y, yaw_rad=pose.yaw, speed_mps=0.0
+    )
+    assert is_at(put_down(car_at(first), emulated=[other]), third)
+    assert is_at(put_down(car_at(first, "n7")), first)  # its own agent's idea of it
+
+
+def test_where_no_place_is_free_it_waits_and_says_so_once(caplog):
+    assert put_down(*(car_at(place, place.name) for place in CITY.spawns)) is None
+    assert caplog.text.count("no_free_place") == 1
+
+
+def test_it_does_not_listen_to_other_cars_once_it_stands():
+    emulator = part()
+    emulator.step(0, [world()])
+    assert [hears.kind for hears in emulator.hears] == [WorldDefinition]
 
 
 def test_it_takes_the_cable_away_at_the_end():
