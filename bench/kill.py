@@ -4,9 +4,9 @@
 
 A city, an Eye, an agent with its keeper, and a device: the published firmware emulated, or ours on
 a simulated chip. Times count to the line in which the device tells PWM 0: from the deed, and from
-when the host first knew (its keeper, or for a keeper that is gone, its agent); "to the port" from
-there until its zeros were written. Bars: ours 300 ms
-from the deed, whatever happens; the published one 20 ms, a frame, from when the host knew.
+when the host first knew (its keeper, or its agent that finds the keeper gone or silent); "to the
+port" from there until the keeper's zeros were written. Bars: ours 300 ms from the deed, whatever
+happens; the published one 20 ms, a frame, from when the host knew.
 Some ten minutes for each firmware; `--only` takes the rows with a word in their name.
 """
 
@@ -33,6 +33,8 @@ PATIENCE_S = 4.0
 SETTLE_S = 1.0
 PULLED = tuple(f"unplug@{t}:5" for t in range(16, 400, 10))
 NOBODY = "nobody can say it"
+KEEPER_GONE = "keeper gone"
+"""What an agent prints that finds its keeper dead or silent: late ones look like it too."""
 
 
 class Town:
@@ -228,7 +230,7 @@ def signals_of(who: str, deed: Callable[[int], Callable[[Rig, Town], int]]) -> l
                 f"{who}: {number.name}",
                 deed(number),
                 undo=wake if number is signal.SIGSTOP else Row.undo,
-                knows="keeper gone" if is_gone else "notice",
+                knows=KEEPER_GONE if is_gone else "notice",
                 ends=who == "agent" and number is not signal.SIGSTOP,
             )
         )
@@ -271,7 +273,9 @@ def tried(row: Row, made: Rig, town: Town) -> Trial:
     stopped_ns = made.motor.stopped(did_ns)
     row.undo(made, town)
     time.sleep(0.05)
-    knew_ns, sent_ns = (made.agents.said(word, did_ns) for word in (row.knows, "written"))
+    said = [made.agents.said(word, did_ns) for word in (row.knows, KEEPER_GONE)]
+    knew_ns = min((t_ns for t_ns in said if t_ns is not None), default=None)
+    sent_ns = made.agents.said("written", did_ns)
     if row.ends:
         made.end_agent()
     if stopped_ns is None:
