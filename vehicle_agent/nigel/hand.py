@@ -23,11 +23,6 @@ class Hand:
         self._beside: int | None = None
         self._port: Port | None = None
 
-    @property
-    def holds(self) -> bool:
-        """Whether it keeps the port open itself."""
-        return self._port is not None
-
     def say(self, frames: bytes) -> None:
         """Write beside a keeper that holds the port; what finds no room is not kept."""
         with suppress(OSError):

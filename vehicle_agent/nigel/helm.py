@@ -75,19 +75,19 @@ class Helm:
             event(_log, "serial", level=level, path=self._path, trouble=trouble or "none")
 
     def close(self) -> None:
-        """Have zeros sent, and wait until the keeper has ended."""
+        """Say zeros and have them said, and wait until the keeper has ended."""
         self._is_closed = True
         self._send(Asked(0, REST))
+        self._say_rest()
         self._hang_up()
+        if self._process is not None:
+            try:
+                self._process.wait(LEAVE_S)
+            except subprocess.TimeoutExpired:
+                event(_log, "keeper_hangs", level=logging.ERROR, path=self._path)
+                self._process.kill()
+                self._process.wait()
         self._hand.release()
-        if self._process is None:
-            return
-        try:
-            self._process.wait(LEAVE_S)
-        except subprocess.TimeoutExpired:
-            event(_log, "keeper_hangs", level=logging.ERROR, path=self._path)
-            self._process.kill()
-            self._process.wait()
 
     def _keep_one(self, now_ns: int) -> None:
         if self._line is not None or self._is_closed:
@@ -128,10 +128,12 @@ class Helm:
             self._hand.release()
 
     def _speak_for_silent(self, now_ns: int) -> None:
-        """Say zeros beside a keeper that may hang, if it told how they are said."""
-        if self.told is None or not self.told.rest or self._line is None:
-            return
+        """Say zeros beside a keeper that may hang."""
         if self._is_silent(now_ns, DOUBT_NS, DOUBT_TURNS):
+            self._say_rest()
+
+    def _say_rest(self) -> None:
+        if self._line is not None and self.told is not None and self.told.rest:
             self._hand.say(self.told.rest)
 
     def _end_hanging(self, now_ns: int) -> None:

@@ -234,7 +234,7 @@ def wait(condition, timeout_s=20.0, every=lambda: None):
 def driving(plugged):
     helm, clock = Helm(str(plugged.path), 57600), WallClock()
     steer = lambda: helm.steer(Wish(0.5, 0.5), clock.now_ns())  # noqa: E731
-    wait(lambda: plugged.newest(101) == HALF, every=steer)
+    wait(lambda: plugged.newest(101) == HALF and helm.told.rest, every=steer)
     yield helm, steer, plugged
     helm.close()
     helm._process.wait(5.0)
@@ -284,6 +284,16 @@ def test_a_stopped_keeper_has_zeros_said_beside_it_and_drives_on_without_a_reset
     wait(lambda: device.newest(101) == HALF, 2.0, steer)
     assert helm._process is old
     assert helm._hand._port is None
+
+
+def test_an_agent_that_leaves_while_its_keeper_hangs_says_the_zeros_itself(driving):
+    helm, _, device = driving
+    os.kill(helm._process.pid, signal.SIGSTOP)
+    device.log.clear()
+    began_ns = device.clock.now_ns()
+    helm.close()
+    zero_ns = next(t for t, topic, payload in device.log if (topic, payload) == (101, ZERO))
+    assert zero_ns - began_ns < NS_PER_S  # the keeper is waited for twice as long
 
 
 AGENT = """
@@ -342,7 +352,7 @@ def alone():
     made = []
 
     def make(rest=b"zeros"):
-        made.append(Alone(Told("ready", "", 1, 0, None, None, rest)))
+        made.append(Alone(Told("ready", "", 1, 0, None, None, rest=rest)))
         return made[-1]
 
     yield make
