@@ -7,77 +7,55 @@ import math
 import re
 import signal
 import subprocess
-import sys
 import threading
 import time
-from pathlib import Path
+from typing import Any
 
 import pytest
 import serial
 
-from scm.parent_watch import with_parent
 from scm.v2x.bus import Mailbox
-from scm.v2x.bus_zenoh import ZenohBus
-from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.eye_pose import EyePose
-from scm.v2x.router import Router, free_endpoint
-from tests.e2e.city_process import wait_for
+from tests.e2e.city_process import START_S, wait_for
+from tests.e2e.emulated_stage import EmulatedStage
 from vehicle_agent.nigel.rosserial import REQUEST_TOPICS, Decoder, Frame, pack, pack_float
 
-START_S = 90.0  # a cold start compiles the physics
 BOOTED_S = 2.2
 TAG = 9
 
 
-class Stage:
-    """A router in this process, world, Eye and emulated car as children, and an ear on the bus."""
+class Stage(EmulatedStage):
+    """World, Eye and the car, what the Eye sees of it and what the emulator prints."""
 
-    def __init__(self, endpoint: str, folder: Path) -> None:
-        self.link = folder / "nigel"
-        self.bus = ZenohBus("city", "test", endpoint)
-        self.eye, self.truth = Mailbox(5000), Mailbox(5000)
+    def __init__(self, *args: Any, **more: Any) -> None:
+        super().__init__(*args, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **more)
+        self.eye = Mailbox(5000)
         self.bus.subscribe(EyePose, {"vehicle": f"tag-{TAG}"}, self.eye)
-        self.bus.subscribe(EmulatedPose, {"vehicle": "n7"}, self.truth)
-        parts = [
-            ["scm", part, "driving_school", "--connect", endpoint] for part in ("world", "eye")
-        ]
-        car = ["vehicle_agent", "emulate", "--link", str(self.link), "--connect", endpoint,
-               "--name", "n7", "--tag", str(TAG), "--spawn", "a"]  # fmt: skip
-        self.children = [self._start(command, subprocess.DEVNULL) for command in parts]
-        self.children.append(self._start(car, subprocess.PIPE))
         self.lines: list[str] = []
-        threading.Thread(target=self._read, daemon=True).start()
-
-    def _start(self, command: list[str], out: int) -> subprocess.Popen[str]:
-        call = with_parent([sys.executable, "-m", *command])
-        return subprocess.Popen(call, stdout=out, stderr=subprocess.STDOUT, text=True)
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
 
     def _read(self) -> None:
-        self.lines += (line.rstrip() for line in self.children[-1].stdout)
+        self.lines += (line.rstrip() for line in self.car.stdout)
+
+    def close(self) -> None:
+        self.car.kill()
+        self._reader.join(5.0)
+        super().close()
 
     def newest(self, box: Mailbox):
         """Return the newest that came since the last look."""
         items = box.drain()
         return items[-1].message if items else None
 
-    def close(self) -> None:
-        for child in self.children:
-            child.send_signal(signal.SIGINT)
-        for child in self.children:
-            child.wait(timeout=10.0)
-        self.bus.close()
-
 
 @pytest.fixture
 def stage(tmp_path):
-    with Router(free_endpoint()) as router:
-        made = Stage(router.listen, tmp_path)
-        try:
-            yield made
-        finally:
-            made.close()
-    assert not made.link.is_symlink()
-    made.children[-1].stdout.close()
+    with Stage.open(tmp_path, "--name", "n7", "--tag", str(TAG), "--spawn", "a") as made:
+        yield made
+        made.car.send_signal(signal.SIGINT)
+        made.car.wait(timeout=10.0)
+        assert not made.link.is_symlink()
 
 
 def say(port, throttle, steering, seconds):

@@ -3,50 +3,35 @@
 import math
 import re
 import signal
-import subprocess
-import sys
 
 import pytest
 
 from scm.v2x.bus import Mailbox
-from scm.v2x.bus_zenoh import ZenohBus
-from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.vehicle_state import VehicleState
-from scm.v2x.router import Router, free_endpoint
 from scm.vehicles.car import TYPES_DIR
 from tests.e2e.city_process import START_S, wait_for
+from tests.e2e.emulated_stage import EmulatedStage
 
 STOP_S = 1.0
 
 
-class Street:
-    """Parts of a city, a car behind a cable, and its agent, all processes of their own."""
+class Street(EmulatedStage):
+    """Parts of a city, a car behind a cable, and its agent."""
 
-    def __init__(self, endpoint, folder):
-        self.endpoint, self.link = endpoint, folder / "nigel"
-        self.children, self.way = [], []
-        self.truth, self.states = Mailbox(5000), Mailbox(5000)
-        self.bus = ZenohBus("city", "test", endpoint)
-        self.bus.subscribe(EmulatedPose, {}, self.truth)
+    def __init__(self, endpoint, folder, *args):
+        super().__init__(endpoint, folder, *args)
+        self.way, self.states = [], Mailbox(5000)
         self.bus.subscribe(VehicleState, {}, self.states)
         self.calibration = folder / "car.toml"
         plain = (TYPES_DIR / "nigel.toml").read_text()
         found = '[drive]\ndeadband = { value = 0.2, std = 0.02, source = "the emulator\'s" }'
         self.calibration.write_text(re.sub(r"^\[drive\].*$", found, plain, flags=re.MULTILINE))
-        for part in ("world", "traffic", "eye"):
-            self.start("scm", part, "driving_school", "--connect", endpoint)
-        self.start("vehicle_agent", "emulate", "--link", str(self.link), *self.car())
-
-    def start(self, *command):
-        self.children.append(subprocess.Popen([sys.executable, "-m", *command]))
-        return self.children[-1]
-
-    def car(self):
-        return ("--connect", self.endpoint, "--name", "r1")
 
     def drive(self):
-        return self.start("vehicle_agent", "join", *self.car(), "--serial", str(self.link),
-                          "--calibration", str(self.calibration))  # fmt: skip
+        return self.start(
+            "vehicle_agent", "join", "--name", "r1", "--connect", self.endpoint,
+            "--serial", str(self.link), "--calibration", str(self.calibration),
+        )  # fmt: skip
 
     def pose(self):
         """Return the newest true pose, or None; all of them stay in `way`."""
@@ -70,22 +55,12 @@ class Street:
         pose = self.pose()
         return pose is not None and abs(pose.speed_mps) < 0.005 and pose
 
-    def close(self):
-        for child in self.children:
-            if child.poll() is None:
-                child.kill()
-            child.wait(timeout=5.0)
-        self.bus.close()
-
 
 @pytest.fixture(scope="module")
 def street(tmp_path_factory):
-    with Router(free_endpoint()) as router:
-        made = Street(router.listen, tmp_path_factory.mktemp("street"))
-        try:
-            yield made
-        finally:
-            made.close()
+    folder = tmp_path_factory.mktemp("street")
+    with Street.open(folder, "--name", "r1", parts=("world", "traffic", "eye")) as made:
+        yield made
 
 
 @pytest.mark.parametrize("way", [signal.SIGINT, signal.SIGKILL, signal.SIGSTOP])
