@@ -8,6 +8,7 @@ from typing import Any
 
 from scm.errors import LeaseError, RunError, ScmError, nearest
 from scm.geometry import Pose2
+from scm.maps.room import AHEAD_S, CLEARANCE_M
 from scm.part import Serves
 from scm.store.records import StopRecord
 from scm.v2x.exchange import Keep
@@ -30,8 +31,6 @@ from scm.world.remote import RemoteCar
 from scm.world.world import NAME, AnyCar, World
 
 KINDS = ("remote", "real")
-CLEARANCE_M = 0.45  # between rear axles: half a Nigel stays free between two of them
-AHEAD_S = 1.5  # until a car that comes has heard of the new one and stands
 
 
 class _RefusedError(ScmError):

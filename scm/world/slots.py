@@ -5,13 +5,12 @@ read from the fleets once a tick; what only a person asks for is read from them 
 """
 
 import heapq
-import math
 
 import numpy as np
 
-from scm.arrays import Floats
 from scm.errors import RunError
 from scm.geometry import Pose2
+from scm.maps.room import distances_m
 
 MODES = ("drive", "hold", "stop", "idle")
 DRIVE, HOLD, STOP, IDLE = range(4)
@@ -112,16 +111,6 @@ class Slots:
         self._numbers.give_back(slot)
 
     def nearest_m(self, pose: Pose2, *, ahead_s: float = 0.0) -> float:
-        """Return how far the nearest car's rear axle is [m]; infinity in an empty city.
-
-        What lies to the side counts double: cars are longer than wide. A car that comes nearer
-        counts from where it will be within the next `ahead_s`, where that is nearest.
-        """
-        x, y, c, s = self.x - pose.x, self.y - pose.y, math.cos(pose.yaw), math.sin(pose.yaw)
-        along, across = c * x + s * y, 2.0 * (c * y - s * x)
-        u = self.speed * np.cos(self.yaw - pose.yaw)
-        v = 2.0 * self.speed * np.sin(self.yaw - pose.yaw)
-        squared = np.maximum(u * u + v * v, 1e-12)
-        when = np.clip(-(along * u + across * v) / squared, 0.0, ahead_s)
-        away: Floats = np.hypot(along + u * when, across + v * when)[self.used]
+        """Return how far the nearest car is [m], as `maps.room` counts; infinity: there is none."""
+        away = distances_m(pose, self.x, self.y, self.yaw, self.speed, ahead_s=ahead_s)[self.used]
         return float(away.min()) if len(away) else float("inf")

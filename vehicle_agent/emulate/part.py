@@ -4,14 +4,15 @@ Its board hears the serial line only. Nothing that goes over the bus can move it
 """
 
 import logging
-import math
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from scm.clock import NS_PER_MS
-from scm.errors import MapError, nearest
 from scm.geometry import Pose2
 from scm.log import event
-from scm.maps.model import CityMap, Spawn
+from scm.maps.model import CityMap
+from scm.maps.room import CLEARANCE_M, distances_m
 from scm.maps.route import Roads
 from scm.part import Hears
 from scm.v2x.exchange import Incoming, Outgoing
@@ -25,8 +26,6 @@ STEP_NS = 5 * NS_PER_MS
 TELL_NS = 20 * NS_PER_MS
 LOOK_NS = 300 * NS_PER_MS
 """For so long it looks where others stand: each tells it several times meanwhile."""
-CLEARANCE_M, AHEAD_S = 0.45, 1.5
-"""From rear axle to rear axle, and from where a car can be by then, as the world keeps it."""
 
 _log = logging.getLogger(__name__)
 
@@ -42,29 +41,17 @@ def place_of(city_map: CityMap, spawn: str) -> Pose2:
     Raises:
         MapError: when the map has none of that name.
     """
-    for place in city_map.spawns:
-        if spawn in ("", place.name):
-            return _pose_of(city_map, place)
-    known = [place.name for place in city_map.spawns]
-    msg = f"map {city_map.name}: no spawn place {spawn!r}{nearest(spawn, known)}"
-    raise MapError(msg)
+    return Roads(city_map).spawn_pose(spawn or city_map.spawns[0].name)
 
 
 def free_place(city_map: CityMap, others: Iterable[SnapshotVehicle | EmulatedPose]) -> Pose2 | None:
     """Return the first spawn place where no car stands or soon may; None: there is none."""
-    cars = [(car.x_m, car.y_m, CLEARANCE_M + AHEAD_S * abs(car.speed_mps)) for car in others]
-    for place in city_map.spawns:
-        pose = _pose_of(city_map, place)
-        if all(math.hypot(x - pose.x, y - pose.y) >= far for x, y, far in cars):
-            return pose
-    return None
-
-
-def _pose_of(city_map: CityMap, place: Spawn) -> Pose2:
-    if place.pose is not None:
-        return Pose2(*place.pose)
-    line = Roads(city_map).lanes[place.lane or ""]
-    return Pose2(*line.at(place.at_m or 0.0))
+    cars = [(car.x_m, car.y_m, car.yaw_rad, car.speed_mps) for car in others]
+    x, y, yaw, speed = np.array(cars, dtype=float).reshape(-1, 4).T
+    roads = Roads(city_map)
+    poses = (roads.spawn_pose(place.name) for place in city_map.spawns)
+    free = (pose for pose in poses if np.all(distances_m(pose, x, y, yaw, speed) >= CLEARANCE_M))
+    return next(free, None)
 
 
 class EmulatorPart:

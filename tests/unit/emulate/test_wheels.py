@@ -136,7 +136,7 @@ def test_a_city_that_begins_anew_does_not_carry_the_car_away():
 def test_it_is_put_down_at_a_named_place_or_refuses():
     first, second = CITY.spawns[0], CITY.spawns[1]
     assert place_of(CITY, "") == place_of(CITY, first.name) != place_of(CITY, second.name)
-    with pytest.raises(MapError, match="no spawn place 'nowhere'"):
+    with pytest.raises(MapError, match="no spawn 'nowhere'"):
         place_of(CITY, "nowhere")
 
 
