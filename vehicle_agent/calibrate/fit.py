@@ -41,6 +41,8 @@ WIDE = 1.645  # standard deviations from the middle to the end of a 90 % interva
 TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild poses prove nothing
 OF_NORMAL = 0.7572  # mean of r^2 / (1 + r^2 / TAIL) over a normal r
 MANY = 1e6  # windows, where none bears on a number
+SCALE_STD = 1e-3  # of the Eye's metre: what every pose is wrong by alike, residuals do not show
+METRES = ("steering.gain", "drive.gain")  # curvature and speed: numbers that are read off it
 SETTLED = 0.01  # of half an interval that a last step may move a number
 POSITION_STD_M, YAW_STD_RAD = 5e-3, 1e-2
 
@@ -67,8 +69,8 @@ NUMBERS = (
     Number("steering.gain", 1.0, 1e-2, 0.2, 2.0),
     Number("drive.deadband", 0.1, 4e-3, 0.0, 0.6),
     Number("drive.gain", 1.0, 1e-2, 0.1, 3.0),
-    Number("drive.delay_s", 0.1, 4e-3, 0.0, 0.5),
-    Number("steering.delay_s", 0.1, 4e-3, 0.0, 0.5),
+    Number("drive.delay_s", 0.1, 4e-3, -0.1, 0.5),  # below 0: the clocks of car and Eye differ
+    Number("steering.delay_s", 0.1, 4e-3, -0.1, 0.5),
     Number("steering.rate_rad_s", 1.0, 2e-2, 0.2, 20.0, scales=True),
 )
 
@@ -355,11 +357,14 @@ def _told(
     model: _Model, z: Floats, halves: Floats, left: Sequence[Floats], eye_delay_s: float
 ) -> Fit:
     values = model.values(z)
+    scale = [WIDE * SCALE_STD * v / n.step for v, n in zip(values, NUMBERS, strict=True)]
+    metres = np.array([n.key in METRES for n in NUMBERS])
+    halves = np.hypot(halves, metres * scale)
     ends = [model.values(z + way * halves) for way in (-1.0, 1.0)]
     found = {}
     for n, *numbers in zip(NUMBERS, values, *ends, strict=True):
         off = eye_delay_s if n.key in DELAYS else 0.0
         value, low, high = (float(number) - off for number in numbers)
-        found[n.key] = Found(max(0.0, value) if off else value, low, high)
+        found[n.key] = Found(max(0.0, value) if n.key in DELAYS else value, low, high)
     position, _, yaw = model.stds * _rms(left)
     return Fit(found, float(position), float(yaw), len(left), model.again(z))

@@ -9,6 +9,7 @@ import logging
 import socket
 import subprocess
 import sys
+from collections import deque
 from contextlib import suppress
 
 import msgspec
@@ -17,7 +18,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.log import event
 from vehicle_agent.nigel.cable import FAILURES, Port, open_serial
 from vehicle_agent.nigel.host import REST, Wish
-from vehicle_agent.nigel.keeper import LONGEST, Asked, Told
+from vehicle_agent.nigel.keeper import LONGEST, Asked, Told, Written
 
 RESTART_NS = NS_PER_S
 HANGS_NS = 500 * NS_PER_MS
@@ -25,6 +26,8 @@ HANGS_NS = 500 * NS_PER_MS
 UNHEARD = 10
 """Turns without a word before it counts as silence: who stalled himself has not listened."""
 LEAVE_S = 2.0
+MOST_WRITTEN = 1000
+"""Commands that nobody asks for are forgotten after so many: 20 s."""
 
 _log = logging.getLogger(__name__)
 _told = msgspec.msgpack.Decoder(Told)
@@ -48,6 +51,7 @@ class Helm:
         self._said = ""
         self._is_closed = False
         self.told: Told | None = None
+        self._written: deque[Written] = deque(maxlen=MOST_WRITTEN)
 
     def trouble(self, now_ns: int) -> str:
         """Return what keeps the car from being driven, in words; empty: nothing."""
@@ -72,6 +76,12 @@ class Helm:
             self._said = trouble
             level = logging.WARNING if trouble else logging.INFO
             event(_log, "serial", level=level, path=self._path, trouble=trouble or "none")
+
+    def written(self) -> list[Written]:
+        """Return, once, the commands that the keeper has written to the port, and when."""
+        written = list(self._written)
+        self._written.clear()
+        return written
 
     def close(self) -> None:
         """Have zeros sent, and wait until the keeper has ended."""
@@ -136,6 +146,7 @@ class Helm:
                 event(_log, "keeper_died", level=logging.ERROR, path=self._path)
                 return
             self.told, self._heard_ns, self._unheard = _told.decode(data), now_ns, 0
+            self._written += self.told.written
             self._release()
 
     def _end_hanging(self, now_ns: int) -> None:
