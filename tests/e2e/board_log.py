@@ -1,4 +1,4 @@
-"""An emulated Nigel that notes what its board obeys: `python -m tests.e2e.board_log FILE emulate ...`.
+"""An emulated Nigel that notes what its board obeys: `python -m tests.e2e.board_log FILE ...`.
 
 A line of FILE is a change of the pins: when the sketch made it [ns], the throttle that its motor
 was given and the angle that its servo was given [rad].

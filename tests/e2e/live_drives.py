@@ -1,7 +1,7 @@
 """Live calibrations, again and again: `python -m tests.e2e.live_drives OUT [KEY=VALUE ...]`.
 
-Each drives an emulated Nigel with hidden numbers of its own, on the board's firmware behind a
-pseudo-terminal, under an Eye of real processes. Keys: `draws=10`, `first=1`, `plan=short` or `full`.
+Each drives an emulated Nigel with hidden numbers of its own, on the firmware of its board behind a
+pseudo-terminal, under an Eye of real processes. Keys: `draws=10`, `first=1`, `plan=short|full`.
 Left in OUT/SEED: the drive; `truth.csv`, where the car truly was; `eye.csv`, where the Eye said it
 was; `board.csv`, what the board obeyed and when; `numbers.json`, the hidden numbers.
 """
@@ -21,7 +21,7 @@ from tests.unit.calibrate.cable import emulated
 
 FLOOR = (1.3, 0.1, 2.8, 1.35)
 TAG = 9
-LONGEST_S = {"short": 120.0, "full": 300.0}
+LONGEST_S = {"short": 240.0, "full": 500.0}
 POSES = "t_ns,x,y,yaw"
 
 
