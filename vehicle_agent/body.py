@@ -35,6 +35,15 @@ class Motion:
     source: str
 
 
+@dataclass(frozen=True, slots=True)
+class Obeyed:
+    """A command as it left for the actuators, and when, on this computer's clock [ns]."""
+
+    t_ns: int
+    throttle: float
+    steering: float
+
+
 class Body(Protocol):
     """A car under the hands of its agent.
 
@@ -72,6 +81,10 @@ class Body(Protocol):
 
     def command(self, throttle: float, steering: float) -> None:
         """Obey until the next command: -1 to 1, + = forward, + = left; guarded already."""
+        ...
+
+    def obeyed(self) -> Sequence[Obeyed] | None:
+        """Return, once, what has left for the actuators; None: each command did when given."""
         ...
 
     def show(self, switches: Switches) -> None:

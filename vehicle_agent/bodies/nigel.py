@@ -21,7 +21,7 @@ from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.lights import Switches
-from vehicle_agent.body import Body, BodyKind, Motion, Wiring
+from vehicle_agent.body import Body, BodyKind, Motion, Obeyed, Wiring
 from vehicle_agent.lidar_port import LidarPort, open_lidar
 from vehicle_agent.nigel.helm import Helm
 from vehicle_agent.nigel.host import Wish
@@ -119,6 +119,10 @@ class NigelBody:
         self._wanted = steering * self.limits.steer_limit
         told = Wish(self._undo.throttle(throttle), self._undo.steering(steering), self._lamps)
         self._helm.steer(told, self._now_ns)
+
+    def obeyed(self) -> list[Obeyed]:
+        """Return what the keeper of the cable wrote to the port, and when."""
+        return [Obeyed(one.t_ns, one.throttle, one.steering) for one in self._helm.written()]
 
     def show(self, switches: Switches) -> None:
         """Switch the lamps; the firmware does the flashing."""

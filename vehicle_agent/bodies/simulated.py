@@ -92,6 +92,9 @@ class SimulatedBody:
         self._fleet.throttle[self._row] = throttle
         self._fleet.steering[self._row] = steering
 
+    def obeyed(self) -> None:
+        """Tell nothing: each command counts from the moment that it is given."""
+
     def show(self, switches: Switches) -> None:
         """Nothing: its lamps are those of its reports."""
 

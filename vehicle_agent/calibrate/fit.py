@@ -7,13 +7,16 @@ errors of long ago do not count; what is left over is the residual. Gauss-Newton
 Intervals are 90 %: the wider of what white residuals say and of what the windows' own scatter says
 (a jackknife that leaves out a window at a time), so that an Eye whose errors last for a while does
 not make them too narrow; Student's t of as many windows as bear on a number. The numbers are those
-of the line that lies best through what a firmware that rounds makes of commands; by how much it
-rounds is part of the scatter. The Eye's own delay cannot be told from that of both actuators: the
-delays found are sums, and `eye_delay_s` of them is taken off as the Eye's.
+of the line that lies best through what a firmware that rounds makes of commands: no interval is
+narrower than what the published one's steps would do to this drive, and both gains bear that the
+Eye's metre is unsure. The Eye's own delay cannot be told from that of both actuators: the delays
+found are sums, and `eye_delay_s` of them is taken off as the Eye's.
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -41,6 +44,10 @@ WIDE = 1.645  # standard deviations from the middle to the end of a 90 % interva
 TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild poses prove nothing
 OF_NORMAL = 0.7572  # mean of r^2 / (1 + r^2 / TAIL) over a normal r
 MANY = 1e6  # windows, where none bears on a number
+SCALE_STD = 2e-3  # of the Eye's metre: what all poses are wrong by alike, no residual shows
+METRES = ("steering.gain", "drive.gain")  # curvature and speed: numbers that are read off it
+STEPS = np.array([1.0 / 255.0, 1.0 / 30.0])  # of the published firmware: throttle, steering
+FIRMWARES = 8
 SETTLED = 0.01  # of half an interval that a last step may move a number
 POSITION_STD_M, YAW_STD_RAD = 5e-3, 1e-2
 
@@ -67,8 +74,8 @@ NUMBERS = (
     Number("steering.gain", 1.0, 1e-2, 0.2, 2.0),
     Number("drive.deadband", 0.1, 4e-3, 0.0, 0.6),
     Number("drive.gain", 1.0, 1e-2, 0.1, 3.0),
-    Number("drive.delay_s", 0.1, 4e-3, 0.0, 0.5),
-    Number("steering.delay_s", 0.1, 4e-3, 0.0, 0.5),
+    Number("drive.delay_s", 0.1, 4e-3, -0.1, 0.5),  # below 0: the clocks of car and Eye differ
+    Number("steering.delay_s", 0.1, 4e-3, -0.1, 0.5),
     Number("steering.rate_rad_s", 1.0, 2e-2, 0.2, 20.0, scales=True),
 )
 
@@ -118,6 +125,7 @@ class Fit:
         numbers: By key of the car file.
         position_rms_m: What is left over; likewise `yaw_rms_rad`.
         windows: How many counted.
+        silent: How many did not, because nothing was commanded for a while.
         again: The drive, driven again.
     """
 
@@ -125,6 +133,7 @@ class Fit:
     position_rms_m: float
     yaw_rms_rad: float
     windows: int
+    silent: int
     again: Again
 
 
@@ -133,7 +142,7 @@ class _Model:
 
     def __init__(self, car: Car, commands: Floats, poses: Floats) -> None:
         self._car = car.with_terms(TERMS)
-        self._commands = commands
+        self.commands = commands
         inside = (poses[:, 0] >= commands[0, 0]) & (poses[:, 0] <= commands[-1, 0])
         self._poses = poses[inside].copy()
         self._poses[:, 3] = np.unwrap(self._poses[:, 3])
@@ -146,12 +155,12 @@ class _Model:
         parts = [np.flatnonzero(which == w) for w in np.unique(which)]
         told = np.diff(commands[:, 0])
         silent = commands[:-1, 0][told > SILENT_S], commands[1:, 0][told > SILENT_S] + SETTLES_S
+        whole = [part for part in parts if len(part) >= FEWEST]
         self.windows = [
-            part
-            for part in parts
-            if len(part) >= FEWEST
-            and not ((t[part[0]] < silent[1]) & (t[part[-1]] > silent[0])).any()
-        ]
+            part for part in whole
+            if not ((t[part[0]] < silent[1]) & (t[part[-1]] > silent[0])).any()
+        ]  # fmt: skip
+        self.silent = len(whole) - len(self.windows)
         self.stds = np.array([POSITION_STD_M, POSITION_STD_M, YAW_STD_RAD])
         self._fleets: dict[int, Fleet] = {}
 
@@ -182,7 +191,20 @@ class _Model:
         seen = self._poses[which, 1:]
         left = [np.concatenate(each) for each in self.residuals([np.array(by_file), z])]
         paths = np.array([seen, *(seen - self.stds * each for each in left)])
-        return Again(self._commands, self._poses[which, 0], paths)
+        return Again(self.commands, self._poses[which, 0], paths)
+
+    def rounded(self, offset: float) -> Self:
+        """Return the drive as a firmware would obey that cuts off behind each of its steps.
+
+        Args:
+            offset: Of its steps from the commands, 0 to 1 of one; the mean is put back.
+        """
+        other = copy(self)
+        told = self.commands[:, 1:]
+        cut = STEPS * (np.floor(told / STEPS + offset) + 0.5 - offset)
+        rests = (told == 0.0) & np.array([True, False])
+        other.commands = np.column_stack([self.commands[:, 0], np.where(rests, 0.0, cut)])
+        return other
 
     def _drive(self, values: Floats) -> list[Floats]:
         if len(values) not in self._fleets:
@@ -210,7 +232,7 @@ class _Model:
 
     def _late(self, column: int, delay_s: float) -> Floats:
         """Return the mean of a command over each step, so much later, (steps,)."""
-        t, held = self._commands[:, 0], self._commands[:-1, column]
+        t, held = self.commands[:, 0], self.commands[:-1, column]
         whole = np.concatenate([[0.0], np.cumsum(held * np.diff(t))])
         return np.asarray(np.diff(np.interp(self._edges - delay_s, t, whole)) / STEP_S)
 
@@ -264,6 +286,7 @@ def fit(car: Car, commands: Floats, poses: Floats, eye_delay_s: float = 0.0) -> 
             break
     left, slopes = _slopes(model, z, apart)
     _, halves = _solve(left, slopes, z)
+    halves = np.maximum(halves, WIDE * _rounding(model, z, left, slopes))
     return _told(model, z, halves, left, eye_delay_s)
 
 
@@ -321,6 +344,23 @@ def _solve(left: Sequence[Floats], slopes: Sequence[Floats], z: Floats) -> tuple
     return -inverse @ (prior @ z + sum(pulls)), halves
 
 
+def _rounding(model: _Model, z: Floats, left: Sequence[Floats], slopes: Sequence[Floats]) -> Floats:
+    """Return how far off the numbers are where the firmware rounds, in units of their steps (rms).
+
+    Each of several firmwares moves the residuals, and so the numbers by one Gauss-Newton step.
+    """
+    slope = np.concatenate(slopes)
+    weight = 1.0 / (1.0 + np.concatenate([rest.ravel() for rest in left]) ** 2 / TAIL)
+    normal = np.eye(len(z)) / PRIOR**2 + (slope * weight[:, None]).T @ slope
+    before = np.concatenate([rest.ravel() for rest in left])
+    shifts = []
+    for offset in (np.arange(FIRMWARES) + 0.5) / FIRMWARES:
+        after = model.rounded(float(offset)).residuals([z])[0]
+        moved = np.concatenate([rest.ravel() for rest in after]) - before
+        shifts.append(np.linalg.solve(normal, slope.T @ (weight * moved)))
+    return np.asarray(np.sqrt(np.mean(np.square(shifts), axis=0)))
+
+
 def _student(free: Floats) -> Floats:
     """Return the 95 % point of Student's t, by its expansion about the normal's; two at least."""
     n, z = np.maximum(free, 2.0), WIDE
@@ -355,11 +395,14 @@ def _told(
     model: _Model, z: Floats, halves: Floats, left: Sequence[Floats], eye_delay_s: float
 ) -> Fit:
     values = model.values(z)
+    scale = [WIDE * SCALE_STD * v / n.step for v, n in zip(values, NUMBERS, strict=True)]
+    metres = np.array([n.key in METRES for n in NUMBERS])
+    halves = np.hypot(halves, metres * scale)
     ends = [model.values(z + way * halves) for way in (-1.0, 1.0)]
     found = {}
     for n, *numbers in zip(NUMBERS, values, *ends, strict=True):
         off = eye_delay_s if n.key in DELAYS else 0.0
         value, low, high = (float(number) - off for number in numbers)
-        found[n.key] = Found(max(0.0, value) if off else value, low, high)
+        found[n.key] = Found(max(0.0, value) if n.key in DELAYS else value, low, high)
     position, _, yaw = model.stds * _rms(left)
-    return Fit(found, float(position), float(yaw), len(left), model.again(z))
+    return Fit(found, float(position), float(yaw), len(left), model.silent, model.again(z))

@@ -22,7 +22,7 @@ from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.part_status import PartStatus
 from scm.vehicles.guard import Guard
-from vehicle_agent.body import Body
+from vehicle_agent.body import Body, Obeyed
 from vehicle_agent.calibrate.pattern import FULL, Pattern, Plan
 from vehicle_agent.calibrate.recorded import Recorded
 from vehicle_agent.guard import GuardLimits, Passed, RealGuard
@@ -95,8 +95,7 @@ class CalibrationPart:
             self._pattern.give_up(seconds(now_ns - self._paused_ns))
         passed = self._command(now_ns)
         self._body.command(passed.throttle, passed.steering)
-        if self._track is not None:
-            self.recorded.commanded(now_ns, passed.throttle, passed.steering)
+        self._record(now_ns, passed)
         return self._status(now_ns)
 
     def finish(self, now_ns: int) -> list[Outgoing]:
@@ -107,6 +106,16 @@ class CalibrationPart:
     def close(self) -> None:
         """Let go of the body, however the drive ends."""
         self._body.close()
+
+    def _record(self, now_ns: int, passed: Passed) -> None:
+        """Note what left for the actuators, and when; what was said here is not yet there."""
+        obeyed = self._body.obeyed()
+        if self._track is None:
+            return
+        if obeyed is None:
+            obeyed = [Obeyed(now_ns, passed.throttle, passed.steering)]
+        for one in obeyed:
+            self.recorded.commanded(one.t_ns, one.throttle, one.steering)
 
     def _see(self, track: EyeTrack, now_ns: int) -> None:
         self.guard.see(track, now_ns)

@@ -49,8 +49,10 @@ class Recorded:
         return seconds(t_ns - self.first_ns)
 
     def commanded(self, t_ns: int, throttle: float, steering: float) -> None:
-        """Note what the actuators are told from now on."""
-        self.command.append((self.at(t_ns), throttle, steering))
+        """Note what the actuators are told from then on; never back in time."""
+        at_s = self.at(t_ns)
+        if not self.command or at_s > self.command[-1][0]:
+            self.command.append((at_s, throttle, steering))
 
     def seen(self, told: EyeTrack | EyePose) -> None:
         """Note a pose, once."""

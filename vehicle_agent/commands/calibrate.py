@@ -22,6 +22,8 @@ ADVICE = {
     "stop": "the red button is pressed",
     "outside the floor": "put it inside the rectangle of --floor, bumpers and all",
 }
+AGAIN = "drive again"
+"""What a drive is told by that leaves too much unsure."""
 LONG_SIDE, SHORT_SIDE = 4.0, 3.3
 
 
@@ -183,6 +185,7 @@ def _fit(arguments: argparse.Namespace, part: "CalibrationPart", out: Path) -> i
     from vehicle_agent.calibrate.car_file import write_car
     from vehicle_agent.calibrate.fit import fit
     from vehicle_agent.calibrate.picture import write_picture
+    from vehicle_agent.calibrate.unsure import unsure
 
     car = load_car(arguments.car)
     found = fit(car, *part.recorded.arrays(), arguments.eye_delay_ms / 1000.0)
@@ -192,6 +195,8 @@ def _fit(arguments: argparse.Namespace, part: "CalibrationPart", out: Path) -> i
     deadband = car.value("drive.deadband") if car.has("drive.deadband") else 0.0
     write_picture(found, deadband, out / "fit.svg")
     print(_table(car, found))
+    for line in unsure(found):
+        print(f"{AGAIN}: {line}")
     print(f"{path}: for `vehicle-agent join --calibration`; {out / 'fit.svg'} shows the fit")
     print(f"`scm replay {out / 'drive'} --car {path}` shows how well it drives again")
     return 0

@@ -14,6 +14,7 @@ from vehicle_agent.emulate.uart import Uart
 
 BOOT_NS = 2 * NS_PER_S
 """For which the bootloader waits for a new sketch."""
+MOST_PAST = 1000
 LOOP_NS = NS_PER_MS
 """The sketch's `delay(1)`; what it does between takes some ten microseconds."""
 
@@ -24,11 +25,13 @@ class Firmware:
     Attributes:
         outputs: The pins now.
         resets: How often it began anew since it was switched on.
+        past: Pins that commands have ended, and when [ns], oldest first; who has read them forgets.
     """
 
     def __init__(self, sketch: Sketch, now_ns: int = 0) -> None:
         self.sketch = sketch
         self.resets = -1
+        self.past: list[tuple[int, Outputs]] = []
         self._uart = Uart(sketch.baud)
         self.reset(now_ns)
 
@@ -95,4 +98,6 @@ class Firmware:
 
     def _on_message(self, place: int, data: float) -> None:
         respond = (self.sketch.steer, self.sketch.drive)[place]
-        self.outputs = respond(self.outputs, data)
+        before, self.outputs = self.outputs, respond(self.outputs, data)
+        if self.outputs != before:
+            self.past = [*self.past[-MOST_PAST:], (self._next_ns, before)]

@@ -102,7 +102,7 @@ class EmulatorPart:
         if not self._is_placed:
             self._put_down(now_ns)
             return []
-        self._wheels.advance(self._device.firmware.outputs, now_ns)
+        self._wheels.follow(self._device.firmware, now_ns)
         if now_ns - self._told_ns < TELL_NS - STEP_NS // 2:
             return []
         self._told_ns = now_ns

@@ -10,11 +10,17 @@ and without.
 
 import math
 
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import Pose2
 from scm.maps.model import CityMap
 from vehicle_agent.bodies.simulated import SimulatedBody
 from vehicle_agent.body import Motion
+from vehicle_agent.emulate.firmware import Firmware
 from vehicle_agent.emulate.sketches import DEADBAND, Outputs
+
+SLICE_NS = 50 * NS_PER_MS
+LONGEST_NS = 10 * NS_PER_S
+"""A real car rolls on while a computer stalls: so long a stall is caught up with."""
 
 
 def throttle_of(pins: Outputs, deadband: float) -> float:
@@ -54,6 +60,7 @@ class Wheels:
         self._straight, self._deadband = straight, deadband
         self._body = SimulatedBody(car, 0)
         self._steering = 0.0
+        self._now_ns: int | None = None
 
     def learn(self, city_map: CityMap, seed: int) -> None:
         """Know the city's floor and air."""
@@ -61,6 +68,7 @@ class Wheels:
 
     def place(self, pose: Pose2, now_ns: int) -> None:
         """Be put down somewhere, at rest."""
+        self._now_ns = now_ns
         self._body.place(pose, now_ns)
 
     def advance(self, pins: Outputs, now_ns: int) -> None:
@@ -69,7 +77,19 @@ class Wheels:
         if angle is not None:
             self._steering = max(-1.0, min(1.0, angle / self._body.limits.steer_limit))
         self._body.command(throttle_of(pins, self._deadband), self._steering)
+        begin_ns = now_ns if self._now_ns is None else max(self._now_ns, now_ns - LONGEST_NS)
+        for t_ns in range(begin_ns, now_ns, SLICE_NS):
+            self._body.advance(t_ns)
         self._body.advance(now_ns)
+        self._now_ns = now_ns
+
+    def follow(self, firmware: Firmware, now_ns: int) -> None:
+        """Move up to now, each pin for as long as it was so."""
+        past, firmware.past = firmware.past, []
+        for ended_ns, pins in past:
+            if self._now_ns is None or ended_ns > self._now_ns:
+                self.advance(pins, min(ended_ns, now_ns))
+        self.advance(firmware.outputs, now_ns)
 
     def motion(self) -> Motion:
         """Return how the car truly moves now."""

@@ -10,6 +10,7 @@ import logging
 import socket
 import subprocess
 import sys
+from collections import deque
 from contextlib import suppress
 
 import msgspec
@@ -18,7 +19,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.log import event
 from vehicle_agent.nigel.hand import Hand
 from vehicle_agent.nigel.host import REST, Wish
-from vehicle_agent.nigel.keeper import LONGEST, Asked, Told
+from vehicle_agent.nigel.keeper import LONGEST, Asked, Told, Written
 
 RESTART_NS = NS_PER_S
 DOUBT_NS, DOUBT_TURNS = 55 * NS_PER_MS, 3
@@ -26,6 +27,8 @@ DOUBT_NS, DOUBT_TURNS = 55 * NS_PER_MS, 3
 HANGS_NS, HANGS_TURNS = 500 * NS_PER_MS, 10
 """Likewise until it is killed, which costs the car two seconds of rest."""
 LEAVE_S = 2.0
+MOST_WRITTEN = 1000
+"""Commands that nobody asks for are forgotten after so many: 20 s."""
 
 _log = logging.getLogger(__name__)
 _told = msgspec.msgpack.Decoder(Told)
@@ -48,6 +51,7 @@ class Helm:
         self._said = ""
         self._is_closed = False
         self.told: Told | None = None
+        self._written: deque[Written] = deque(maxlen=MOST_WRITTEN)
 
     def trouble(self, now_ns: int) -> str:
         """Return what keeps the car from being driven, in words; empty: nothing."""
@@ -73,6 +77,12 @@ class Helm:
             self._said = trouble
             level = logging.WARNING if trouble else logging.INFO
             event(_log, "serial", level=level, path=self._path, trouble=trouble or "none")
+
+    def written(self) -> list[Written]:
+        """Return, once, the commands that the keeper has written to the port, and when."""
+        written = list(self._written)
+        self._written.clear()
+        return written
 
     def close(self) -> None:
         """Say zeros and have them said, and wait until the keeper has ended."""
@@ -125,6 +135,7 @@ class Helm:
                 event(_log, "keeper_died", level=logging.ERROR, path=self._path)
                 return
             self.told, self._heard_ns, self._unheard = _told.decode(data), now_ns, 0
+            self._written += self.told.written
             self._hand.release()
 
     def _speak_for_silent(self, now_ns: int) -> None:

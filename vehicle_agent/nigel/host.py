@@ -100,6 +100,7 @@ class Host:
         battery_v: As the firmware says it; None: it does not.
         telemetry: The newest; None: this firmware has none.
         readings: How many telemetries have come.
+        commanded: By the frames of the last `say`; None: they command nothing.
     """
 
     def __init__(self, baud: int = NANO_BAUD) -> None:
@@ -127,6 +128,7 @@ class Host:
         self._asked_ns: int | None = None
         self._timed_ns: int | None = None
         self._due_ns: int | None = None
+        self.commanded: Wish | None = None
         self._moves = False
         self._refusal = ""
         self._must_ask = False
@@ -151,6 +153,7 @@ class Host:
 
         Throttle that falls to zero waits for nothing.
         """
+        self.commanded = None
         if self.phase == "closed":
             return []
         if self.phase == "boots":
@@ -161,7 +164,9 @@ class Host:
         frames = self._questions(now_ns)
         said = wish if self.phase == "ready" else REST
         if self._is_command_due(now_ns, said):
-            frames += self._commands(said)
+            commands = self._commands(said)
+            self.commanded = said if commands else None
+            frames += commands
         return frames
 
     def rest(self) -> list[bytes]:

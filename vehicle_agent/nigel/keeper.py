@@ -22,7 +22,7 @@ import msgspec
 from scm.clock import NS_PER_MS, Clock, WallClock
 from scm.log import event
 from vehicle_agent.nigel.cable import Cable
-from vehicle_agent.nigel.host import REST, Host, Phase, Wish
+from vehicle_agent.nigel.host import REST, Host, Phase, Wish, limited
 from vehicle_agent.nigel.telemetry import Telemetry
 
 PATIENCE_NS = 150 * NS_PER_MS
@@ -43,6 +43,14 @@ class Asked(msgspec.Struct, frozen=True, array_like=True):
     wish: Wish
 
 
+class Written(msgspec.Struct, frozen=True, array_like=True):
+    """A command that was written to the port, and when, on this computer's clock [ns]."""
+
+    t_ns: int
+    throttle: float
+    steering: float
+
+
 class Told(msgspec.Struct, frozen=True, array_like=True):
     """What the keeper sends.
 
@@ -50,6 +58,7 @@ class Told(msgspec.Struct, frozen=True, array_like=True):
         trouble: What keeps the car from being driven, in words; empty: nothing.
         readings: How many telemetries have come.
         rest: Frames that say zero to the Arduino as it is now; empty: it could not be told.
+        written: All since the last report, oldest first.
     """
 
     phase: Phase
@@ -59,6 +68,7 @@ class Told(msgspec.Struct, frozen=True, array_like=True):
     battery_v: float | None
     telemetry: Telemetry | None
     rest: bytes = b""
+    written: tuple[Written, ...] = ()
 
 
 _asked = msgspec.msgpack.Decoder(Asked)
@@ -73,6 +83,7 @@ class Keeper:
         self._opened = 0
         self._reported: tuple[str, str, int] | None = None
         self._owes = False
+        self._written: list[Written] = []
 
     def step(self, now_ns: int, asked: Asked | None = None) -> None:
         """Read, answer, command; `asked` is what the agent said since the last step."""
@@ -85,7 +96,7 @@ class Keeper:
         if self._cable.fd is None:
             self._host.close()
         else:
-            self._cable.write(answers + self._host.say(self._wish(now_ns), now_ns))
+            self._write(answers + self._host.say(self._wish(now_ns), now_ns), now_ns)
 
     def report(self) -> Told | None:
         """Return what the agent is to know: at each change, and as an answer to each wish."""
@@ -94,6 +105,7 @@ class Keeper:
         if news == self._reported and not self._owes:
             return None
         self._reported, self._owes = news, False
+        written, self._written = tuple(self._written), []
         return Told(
             phase=self._host.phase,
             trouble=trouble,
@@ -102,6 +114,7 @@ class Keeper:
             battery_v=self._host.battery_v,
             telemetry=self._host.telemetry,
             rest=b"".join(self._host.rest()),
+            written=written,
         )
 
     def finish(self, clock: Clock) -> None:
@@ -114,6 +127,14 @@ class Keeper:
         while not self._cable.is_drained() and clock.now_ns() < end_ns:
             clock.wait_until(clock.now_ns() + TURN_NS, never)
         self._cable.close()
+
+    def _write(self, frames: Sequence[bytes], now_ns: int) -> None:
+        """Send frames, and note the command among them if all found room."""
+        held_back, command = self._cable.held_back, self._host.commanded
+        self._cable.write(frames)
+        if command is not None and self._cable.held_back == held_back:
+            said = limited(command.throttle), limited(command.steering)
+            self._written.append(Written(now_ns, *said))
 
     def _wish(self, now_ns: int) -> Wish:
         return self._asked.wish if abs(now_ns - self._asked.t_ns) <= PATIENCE_NS else REST

@@ -19,6 +19,7 @@ from vehicle_agent.emulate.firmware import Firmware
 from vehicle_agent.emulate.sketches import SKETCHES
 from vehicle_agent.emulate.wheels import Wheels, throttle_of, wheel_angle
 from vehicle_agent.nigel.host import REST, Host
+from vehicle_agent.nigel.keeper import Written
 
 LINE_NS = 10 * NS_PER_MS
 DEADBAND = 0.2
@@ -100,12 +101,17 @@ class Line:
         self.wheels = moved.wheels()
         self.host.open(T0)
         self.wish, self.told, self._now_ns, self._back = REST, None, T0, b""
+        self._written = []
 
     def trouble(self, now_ns):
         return self.host.trouble
 
     def steer(self, wish, now_ns):
         self.wish = wish
+
+    def written(self):
+        written, self._written = self._written, []
+        return written
 
     def close(self):
         self.wish = REST
@@ -115,8 +121,10 @@ class Line:
             self._now_ns += LINE_NS
             frames = self.host.hear(self._back, self._now_ns)
             frames += self.host.say(self.wish, self._now_ns)
+            if said := self.host.commanded:
+                self._written.append(Written(self._now_ns, said.throttle, said.steering))
             self._back = self.board.step(self._now_ns, b"".join(frames))
-            self.wheels.advance(self.board.outputs, self._now_ns)
+            self.wheels.follow(self.board, self._now_ns)
 
     @property
     def seen(self):
@@ -132,7 +140,7 @@ class Street:
     """The part, its body, the line and the Eye, step by step."""
 
     def __init__(self, car="nigel", moved=PLAIN, eye=SHARP, plan=FULL):
-        self.line, self.eye = Line(moved), Eye(eye)
+        self.moved, self.line, self.eye = moved, Line(moved), Eye(eye)
         body = NigelBody(load_car(car), self.line, raw=True)
         self.part = CalibrationPart("n7", body, LIMITS, plan=plan)
         self.now_ns, self.said = T0, []

@@ -106,6 +106,9 @@ class HiddenBody:
     def unfit(self, now_ns):
         return ""
 
+    def obeyed(self):
+        return None
+
     def close(self):
         self.is_closed = True
 

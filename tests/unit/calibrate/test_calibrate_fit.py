@@ -13,6 +13,7 @@ from tests.unit.calibrate.rig import Hidden, calibrated
 from vehicle_agent.calibrate.car_file import write_car
 from vehicle_agent.calibrate.fit import NUMBERS, _Model, _student, _window_edges, fit
 from vehicle_agent.calibrate.picture import settled
+from vehicle_agent.calibrate.unsure import unsure
 
 NEAR = {
     "steering.trim_rad": 0.002,
@@ -58,6 +59,27 @@ def test_an_eye_without_noise_leaves_no_error():
         assert abs(exact.numbers[key].value - truth) < 0.05 * NEAR[key], key
 
 
+def test_no_drive_is_surer_than_a_firmware_that_rounds_and_the_eyes_metre_allow():
+    """An exact drive leaves nothing over, and yet a servo of whole degrees may have steered it."""
+    hidden = replace(Hidden(), position_std=1e-6, yaw_std=1e-6)
+    part, _ = calibrated(hidden)
+    exact = fit(load_car("nigel"), *part.recorded.arrays()).numbers
+    assert 3e-4 < exact["steering.trim_rad"].std < 3e-3
+    assert exact["steering.gain"].std > 0.002 * hidden.gain
+    assert 0.002 * hidden.drive < exact["drive.gain"].std < 0.004 * hidden.drive
+
+
+def test_a_drive_that_leaves_too_much_unsure_says_what_and_one_that_does_not_nothing(found):
+    assert unsure(found) == []
+    wide = replace(found.numbers["drive.gain"], low=1.0, high=1.2)
+    assert unsure(replace(found, numbers={**found.numbers, "drive.gain": wide})) == [
+        "drive.gain is known to 0.1 only, expected 0.02"
+    ]
+    (silent,) = unsure(replace(found, silent=found.windows))
+    legs = 2 * found.windows
+    assert silent.startswith(f"in {found.windows} of {legs} legs no command left for the board")
+
+
 def test_the_eyes_own_delay_is_taken_off(recorded, found):
     late = fit(load_car("nigel"), *recorded.arrays(), eye_delay_s=0.06)
     for key in NEAR:
@@ -101,6 +123,7 @@ def test_a_leg_in_which_nothing_was_commanded_for_a_while_does_not_count(recorde
     rest = _Model(load_car("nigel"), commands[~silent], poses)
     t = poses[:, 0]
     assert len(whole.windows) - len(rest.windows) in (1, 2)
+    assert rest.silent == len(whole.windows) - len(rest.windows)
     assert not any(t[part[0]] < 20.0 < t[part[-1]] for part in rest.windows)
 
 

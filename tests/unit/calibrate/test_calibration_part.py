@@ -6,6 +6,7 @@ from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_pose import EyePose
 from tests.unit.calibrate.rig import LIMITS, START, STEP_NS, T0, Eye, Hidden, HiddenBody, drive
 from tests.unit.test_real_guard import track
+from vehicle_agent.body import Obeyed
 from vehicle_agent.calibrate.part import CalibrationPart
 
 
@@ -20,6 +21,9 @@ class Wheels:
 
     def unfit(self, now_ns):
         return ""
+
+    def obeyed(self):
+        return None
 
     def advance(self, now_ns):
         pass
@@ -83,6 +87,19 @@ def test_what_is_recorded_is_what_passed_the_guard():
     stepped(part, 100)
     assert [row[1:] for row in part.recorded.command] == wheels.told
     assert [row[0] for row in part.recorded.command[:3]] == [0.0, 0.02, 0.04]
+
+
+class Slow(Wheels):
+    """Wheels whose line takes a while and tells of several at once."""
+
+    def obeyed(self):
+        return [Obeyed(T0 + ms * NS_PER_MS, 0.1, 0.2) for ms in (7, 31, 29)]
+
+
+def test_what_left_for_the_actuators_is_recorded_when_it_did_and_never_back_in_time():
+    part = CalibrationPart("n7", Slow(), LIMITS)
+    part.step(T0, [Incoming(track(T0), T0)])
+    assert part.recorded.command == [(0.007, 0.1, 0.2), (0.031, 0.1, 0.2)]
 
 
 def test_a_pose_that_is_stale_or_told_twice_is_not_recorded():

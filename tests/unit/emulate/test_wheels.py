@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from scm.clock import NS_PER_MS
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import MapError
 from scm.geometry import Pose2
 from scm.maps.load import load_map
@@ -83,10 +83,34 @@ def test_positive_steering_is_left_and_a_servo_without_pulses_stays():
     assert wheels.motion().steering == pytest.approx(math.radians(15.0), abs=0.01)
 
 
+def test_each_pin_counts_for_as_long_as_it_was_so_however_seldom_the_car_is_moved():
+    gone = {}
+    for every_ms in (1, 1000):
+        wheels, board = placed(), Board()
+        board.outputs, board.past = pins(0.0), []
+        for ms in range(every_ms, 2001, every_ms):
+            if ms == 1000:
+                board.past = [(700 * NS_PER_MS, pins(0.0)), (950 * NS_PER_MS, pins(1.0))]
+            if every_ms == 1:
+                board.past, board.outputs = [], pins(1.0 if 700 < ms <= 950 else 0.0)
+            wheels.follow(board, ms * NS_PER_MS)
+        gone[every_ms] = wheels.motion().pose.x
+    assert gone[1] > 0.03
+    assert gone[1000] == pytest.approx(gone[1], abs=1e-4)
+
+
+def test_a_car_rolls_on_while_its_computer_stalls():
+    wheels = placed()
+    wheels.advance(pins(1.0), NS_PER_S)
+    before = wheels.motion().pose.x
+    wheels.advance(pins(1.0), 3 * NS_PER_S)
+    assert wheels.motion().pose.x - before == pytest.approx(2.0 * wheels.motion().speed, rel=0.01)
+
+
 class Board:
     """A board whose pins a test sets."""
 
-    outputs = pins(1.0)
+    outputs, past = pins(1.0), ()
 
 
 class Desk:

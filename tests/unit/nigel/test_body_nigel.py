@@ -22,9 +22,9 @@ from scm.vehicles.lights import Switches
 from tests.unit.vehicle_agent.test_agent import EPOCH, Desk, command, lease, one, welcome
 from vehicle_agent.bodies import nigel
 from vehicle_agent.bodies.nigel import BODY, LIFTED_M, STALE_NS, NigelBody
-from vehicle_agent.body import Wiring
+from vehicle_agent.body import Obeyed, Wiring
 from vehicle_agent.nigel.host import REST, Wish
-from vehicle_agent.nigel.keeper import Told
+from vehicle_agent.nigel.keeper import Told, Written
 from vehicle_agent.nigel.telemetry import Telemetry
 
 BEGIN_NS = 10**9
@@ -42,6 +42,9 @@ class FakeHelm:
 
     def steer(self, wish, now_ns):
         self.wishes.append(wish)
+
+    def written(self):
+        return [Written(BEGIN_NS, 0.3, -0.2)]
 
     def close(self):
         self.is_closed = True
@@ -346,3 +349,9 @@ def test_its_fence_stops_it(desk, monkeypatch):
     assert fenced.see_for(2.0).throttle == 0.0
     assert fenced.state.mode == "stop"
     assert "fence" in fenced.status.detail
+
+
+def test_what_it_obeyed_is_what_the_keeper_of_its_cable_wrote():
+    body = NigelBody(load_car("nigel"), FakeHelm())
+    body.command(0.9, 0.9)
+    assert body.obeyed() == [Obeyed(BEGIN_NS, 0.3, -0.2)]

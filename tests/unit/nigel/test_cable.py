@@ -153,7 +153,12 @@ class LoopCable(Cable):
         back, self._back = self._back, b""
         return back
 
+    is_full = False
+
     def write(self, frames):
+        if self.is_full:
+            self.held_back += len(frames)
+            return
         self._back += self.device.hear(b"".join(frames), self.now_ns)
 
 
@@ -204,6 +209,24 @@ def test_the_keeper_answers_every_wish_and_tells_how_to_say_zero_once_it_knows()
     assert kept.device.values == {"steer_cmd": 0.0, "drive_cmd": 0.0}
 
 
+def test_the_keeper_tells_once_what_it_wrote_and_when_it_did_and_what_found_no_room_not():
+    kept = Kept()
+    kept.run(3 * NS_PER_S, Wish(0.5, -0.5))
+    kept.keeper.report()
+    begun, heard = kept.now_ns, len(kept.device.said)
+    kept.run(NS_PER_S, Wish(2.0, -0.25))
+    written = kept.keeper.report().written
+    payloads = [frame.payload for frame in kept.device.said[heard:] if frame.topic == 101]
+    assert [pack_float(one.throttle) for one in written] == payloads
+    assert {(one.throttle, one.steering) for one in written} == {(1.0, -0.25)}
+    assert [one.t_ns - begun for one in written] == [
+        (5 + 20 * i) * NS_PER_MS for i in range(50)]  # fmt: skip
+    assert kept.keeper.report() is None
+    kept.cable.is_full = True
+    kept.run(NS_PER_S, Wish(0.5, 0.5))
+    assert kept.keeper.report().written == ()
+
+
 def test_the_keeper_ends_with_zeros_said_five_times():
     kept = Kept()
     kept.run(3 * NS_PER_S, Wish(0.5, 0.5))
@@ -249,6 +272,19 @@ def test_a_silent_agent_is_zeroed_from_outside_and_close_leaves_zeros(driving):
     time.sleep(0.05)
     last = [(topic, payload) for _, topic, payload in device.log][-10:]
     assert last == [(101, ZERO), (100, ZERO)] * 5
+
+
+def test_the_helm_knows_once_what_was_written_and_when(driving):
+    helm, steer, device = driving
+    helm.written()
+    told = []
+    wait(lambda: told.extend(helm.written()) or len(told) > 20, 5.0, steer)
+    assert (0.5, 0.5) in {(one.throttle, one.steering) for one in told}
+    times = [one.t_ns for one in told]
+    assert times == sorted(set(times))
+    heard = [t_ns for t_ns, topic, _ in device.log if topic == 101]
+    assert all(any(abs(t_ns - at) < NS_PER_S for t_ns in heard) for at in times)
+    assert len(told) <= len(heard) + 1
 
 
 def test_a_pulled_cable_is_told_and_drives_again_when_it_is_back(driving):
