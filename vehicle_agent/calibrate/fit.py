@@ -9,8 +9,8 @@ Intervals are 90 %: the wider of what white residuals say and of what the window
 not make them too narrow; Student's t of as many windows as bear on a number. The numbers are those
 of the line that lies best through what a firmware that rounds makes of commands: added is what the
 published one's steps would do to this drive, of which legs that are all rounded alike show little;
-and to both gains that the Eye's metre is unsure. The Eye's own delay cannot be told from that of both actuators: the delays
-found are sums, and `eye_delay_s` of them is taken off as the Eye's.
+and to both gains that the Eye's metre is unsure. The Eye's own delay cannot be told from that of
+both actuators: the delays found are sums, and `eye_delay_s` of them is taken off as the Eye's.
 """
 
 from collections.abc import Mapping, Sequence
