@@ -183,19 +183,6 @@ class Roads:
             raise MapError(f"map {self.city_map.name}: no spawn {name!r}{known}")
         return self._pose_of(spawn)
 
-    def free_spawns(self, occupied: Sequence[Pose2], clearance_m: float = 0.45) -> list[str]:
-        """Return the spawn places whose pose is at least `clearance_m` from all given poses.
-
-        The distance counts between rear axles: a Nigel is 0.30 m long, so 0.45 m leaves a gap of
-        half a car. Best first: in the order of the file.
-        """
-        free = []
-        for name in self._spawns:
-            pose = self.spawn_pose(name)
-            if all(math.hypot(pose.x - o.x, pose.y - o.y) >= clearance_m for o in occupied):
-                free.append(name)
-        return free
-
     def route(self, start_lane: str, via: tuple[str, ...] = (), laps: int = 1) -> tuple[str, ...]:
         """Return the lanes of the shortest way from a lane through others, in driving order.
 

@@ -7,10 +7,10 @@ errors of long ago do not count; what is left over is the residual. Gauss-Newton
 Intervals are 90 %: the wider of what white residuals say and of what the windows' own scatter says
 (a jackknife that leaves out a window at a time), so that an Eye whose errors last for a while does
 not make them too narrow; Student's t of as many windows as bear on a number. The numbers are those
-of the line that lies best through what a firmware that rounds makes of commands: no interval is
-narrower than what the published one's steps would do to this drive, and both gains bear that the
-Eye's metre is unsure. The Eye's own delay cannot be told from that of both actuators: the delays
-found are sums, and `eye_delay_s` of them is taken off as the Eye's.
+of the line that lies best through what a firmware that rounds makes of commands: added is what the
+published one's steps would do to this drive, of which legs that are all rounded alike show little;
+and to both gains that the Eye's metre is unsure. The Eye's own delay cannot be told from that of
+both actuators: the delays found are sums, and `eye_delay_s` of them is taken off as the Eye's.
 """
 
 from collections.abc import Mapping, Sequence
@@ -286,7 +286,7 @@ def fit(car: Car, commands: Floats, poses: Floats, eye_delay_s: float = 0.0) -> 
             break
     left, slopes = _slopes(model, z, apart)
     _, halves = _solve(left, slopes, z)
-    halves = np.maximum(halves, WIDE * _rounding(model, z, left, slopes))
+    halves = np.hypot(halves, WIDE * _rounding(model, z, left, slopes))
     return _told(model, z, halves, left, eye_delay_s)
 
 

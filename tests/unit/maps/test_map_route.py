@@ -131,12 +131,6 @@ def test_a_path_over_a_crossing_is_followed_by_its_hint(roads):
     assert s == pytest.approx(14.99, abs=1e-3)
 
 
-def test_a_spawn_is_free_unless_a_car_is_near(roads):
-    every = [spawn.name for spawn in roads.city_map.spawns]
-    assert roads.free_spawns([], 0.45) == every
-    assert roads.free_spawns([roads.spawn_pose("c")], 0.45) == [n for n in every if n != "c"]
-
-
 def test_an_unknown_spawn_is_refused(roads):
     with pytest.raises(MapError, match="no spawn 'z'"):
         roads.spawn_pose("z")
