@@ -16,28 +16,35 @@ from scm.api import problem
 from scm.api.city import Ask, City
 from scm.api.gate import Gate, content_policy
 from scm.api.keys import KeyRing
+from scm.api.operations import Operations
 from scm.api.routes import (
     boxes,
     cameras,
-    cars,
     events,
     eye,
     health,
     live,
     map,  # noqa: A004  named for its noun
     misbehaviour,
+    operations,
     session,
     signals,
     stations,
     stop,
     traffic,
+    vehicles,
 )
 from scm.api.routes import keys as key_routes
+from scm.api.shelves import Shelves
 from scm.api.stream import Stream
 from scm.api.view import CityView
+from scm.clock import WallClock
 from scm.maps.model import CityMap
 
 STATIC_DIR = Path(__file__).parent / "static"
+PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
+"""First part of the address of each page of the dashboard; what follows is the page's own."""
+
 _REVALIDATE = {"Cache-Control": "no-cache"}
 
 
@@ -57,6 +64,7 @@ def create_app(
     *,
     keys: KeyRing | None = None,
     plans: Mapping[str, Sequence[str]] | None = None,
+    shelves: Shelves | None = None,
 ) -> FastAPI:
     """Build the application.
 
@@ -67,8 +75,10 @@ def create_app(
         keys: Who may call, and what each may do; without it only this machine may call, and may do
             everything.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
+        shelves: Folders of recordings, reports and the like; None: the city offers none.
     """
-    city = City(view, ask, city_map, plans or {})
+    city = City(view, ask, city_map, plans or {}, shelves or Shelves())
+    work = Operations(WallClock())
     stream = Stream(city, uuid.uuid4().hex[:8])
     app = FastAPI(
         title=f"scm {city_map.name}",
@@ -76,7 +86,7 @@ def create_app(
         docs_url=None,  # its page loads from a CDN: ours is static/docs.html
         redoc_url=None,
         openapi_url="/api/v1/openapi.json",
-        lifespan=_lifespan_of(stream),
+        lifespan=_lifespan_of(stream, work),
     )
     app.state.stream = stream
     app.state.keys = keys
@@ -84,9 +94,10 @@ def create_app(
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
     app.add_middleware(Gate, keys=keys, policy=policy)
     api = APIRouter(prefix="/api/v1")
-    for noun in (cars, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic):
+    for noun in (vehicles, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic):
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
+    api.include_router(operations.router(work), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)
     api.include_router(session.router(), responses=problem.RESPONSES)
     api.include_router(key_routes.router(keys), responses=problem.RESPONSES)
@@ -97,12 +108,13 @@ def create_app(
 
 
 def _lifespan_of(
-    stream: Stream,
+    stream: Stream, work: Operations
 ) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         task = asyncio.create_task(stream.run())
         yield
+        work.close()
         stream.close()
         await task
 
@@ -110,9 +122,15 @@ def _lifespan_of(
 
 
 def _add_pages(app: FastAPI) -> None:
-    @app.get("/", include_in_schema=False)
     def dashboard() -> FileResponse:
         return FileResponse(STATIC_DIR / "index.html", headers=_REVALIDATE)
+
+    for path in (
+        "/",
+        *(f"/{page}" for page in PAGES),
+        *(f"/{page}/{{rest:path}}" for page in PAGES),
+    ):
+        app.get(path, include_in_schema=False)(dashboard)
 
     @app.get("/docs", include_in_schema=False)
     def docs() -> FileResponse:

@@ -8,6 +8,7 @@ from fastapi import Header, Path, Response
 
 from scm.api.encoding import encode
 from scm.api.problem import RefusedError
+from scm.api.shelves import Shelves
 from scm.api.view import CityView
 from scm.maps.model import CityMap
 from scm.v2x.message import Message, Refused, Request
@@ -34,12 +35,14 @@ class City:
     Attributes:
         send: Asks a request on the bus and waits for the reply, at most so many seconds.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
+        shelves: Folders that the interface reads and writes.
     """
 
     view: CityView
     send: Ask
     city_map: CityMap
     plans: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    shelves: Shelves = field(default_factory=Shelves)
 
     def ask(self, request: Request, reply: type[R]) -> R:
         """Ask the city and return its answer; blocks, so only for routes in the thread pool.

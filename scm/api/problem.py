@@ -16,7 +16,10 @@ from scm.v2x.message import Refused
 STATUS_OF_CODE = {
     "not_found": 404,
     "owned": 409,
+    "precondition_failed": 412,
     "invalid": 422,
+    "precondition_required": 428,
+    "busy": 429,
     "offline": 503,
     "timeout": 504,
 }
@@ -33,7 +36,7 @@ _CODE_OF_STATUS = {
 }
 
 
-_STATUSES = (400, 401, 403, 404, 409, 422, 429, 500, 503, 504)
+_STATUSES = (400, 401, 403, 404, 409, 412, 422, 428, 429, 500, 503, 504)
 
 
 class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):

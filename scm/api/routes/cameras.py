@@ -21,7 +21,7 @@ BOUNDARY = "frame"
 
 def router(city: City, stream: Stream) -> APIRouter:
     """Return the routes."""
-    routes = APIRouter(prefix="/cars", tags=["cameras"], dependencies=[VIEWER])
+    routes = APIRouter(prefix="/vehicles", tags=["cameras"], dependencies=[VIEWER])
 
     @routes.get("/{name}/camera/{camera}.jpg", summary="One picture", response_class=Response)
     async def still(name: Name, camera: Name) -> Response:

@@ -15,7 +15,9 @@ def router(city: City) -> APIRouter:
     def cameras() -> Response:
         return json_response({"cameras": camera_rows(city.view.picture())})
 
-    @routes.get("/{name}/frame.jpg", summary="A camera's newest picture", response_class=Response)
+    @routes.get(
+        "/cameras/{name}/frame.jpg", summary="A camera's newest picture", response_class=Response
+    )
     def frame(name: Name, t_ns: int | None = None) -> Response:
         held = frame_of(city.view.picture(), name, t_ns)
         if held is None:
@@ -23,7 +25,7 @@ def router(city: City) -> APIRouter:
         headers = {"Cache-Control": "no-store", "X-Time-Ns": str(held.message.t_ns)}
         return Response(held.message.payload, headers=headers, media_type="image/jpeg")
 
-    @routes.get("/{name}/tags", summary="The tags found in a camera's newest picture")
+    @routes.get("/cameras/{name}/tags", summary="The tags found in a camera's newest picture")
     def tags(name: Name) -> Response:
         held = tags_of(city.view.picture(), name)
         if held is None:

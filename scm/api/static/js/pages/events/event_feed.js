@@ -1,7 +1,7 @@
 /** The log of the city, newest first. */
-import { html } from "./html.js";
-import { clock } from "./format.js";
-import { events } from "./store.js";
+import { html } from "scm/shared/html.js";
+import { clock } from "scm/shared/format.js";
+import { events } from "scm/shell/store.js";
 
 export function EventFeed() {
   return html`

@@ -1,7 +1,7 @@
 /** The stations on the bus: parts, vehicles and clients, with those lost in the last minute. */
-import { html } from "./html.js";
-import { span } from "./format.js";
-import { stations } from "./store.js";
+import { html } from "scm/shared/html.js";
+import { span } from "scm/shared/format.js";
+import { stations } from "scm/shell/store.js";
 
 const STALE_S = 3;
 const ROLES = { part: "part", v: "vehicle" };

@@ -1,11 +1,11 @@
 /** The cars as a table: who, whose, how fast, how fresh, how far, and what holds them. */
 import { signal } from "@preact/signals";
-import { html } from "./html.js";
-import { change } from "./api.js";
-import { Dialog } from "./dialog.js";
-import { age, byName, fixed, UNKNOWN } from "./format.js";
-import { selected } from "./selection.js";
-import { city, world } from "./store.js";
+import { html } from "scm/shared/html.js";
+import { change } from "scm/shell/api.js";
+import { Dialog } from "scm/shared/dialog.js";
+import { age, byName, fixed, UNKNOWN } from "scm/shared/format.js";
+import { selected } from "scm/shared/selection.js";
+import { city, world } from "scm/shell/store.js";
 
 const STALE_MS = 500;
 
@@ -13,7 +13,7 @@ const STALE_MS = 500;
 const removing = signal(null);
 
 export function CarsTable() {
-  const cars = world.value.cars.toSorted((a, b) => byName(a.vehicle, b.vehicle));
+  const cars = world.value.vehicles.toSorted((a, b) => byName(a.vehicle, b.vehicle));
   return html`
     <section class="panel cars" aria-label="Cars">
       <div class="panel-head">
@@ -40,8 +40,8 @@ export function CarsTable() {
 
 /** A car that stood where it was put would block its lane: where there are lanes, it drives. */
 async function add() {
-  const reply = await change("POST", "/cars", {}, ({ vehicle }) => `${vehicle} is on the map.`);
-  if (reply && city.value?.lanes.length) await change("POST", `/cars/${reply.vehicle}/route`, {});
+  const reply = await change("POST", "/vehicles", {}, ({ vehicle }) => `${vehicle} is on the map.`);
+  if (reply && city.value?.lanes.length) await change("POST", `/vehicles/${reply.vehicle}/route`, {});
 }
 
 function Car({ car }) {
@@ -71,7 +71,7 @@ function RemoveDialog({ name }) {
   const close = () => (removing.value = null);
   const remove = () => {
     close();
-    change("DELETE", `/cars/${name}?reason=dashboard`, undefined, () => `${name} is off the map.`);
+    change("DELETE", `/vehicles/${name}?reason=dashboard`, undefined, () => `${name} is off the map.`);
   };
   return html`
     <${Dialog} title="Take ${name} off the map?" onClose=${close}>

@@ -1,13 +1,13 @@
 /** The map: roads drawn once by the server, and over them everything that moves or changes. */
 import { effect } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { html } from "./html.js";
-import { drawBoxes } from "./box_shape.js";
-import { drawCar, footprint } from "./car_shape.js";
-import { drawLight } from "./light_shape.js";
-import { carsNow } from "./motion.js";
-import { selected } from "./selection.js";
-import { boxes, city, link, live, signals } from "./store.js";
+import { html } from "scm/shared/html.js";
+import { drawBoxes } from "scm/shared/box_shape.js";
+import { drawCar, footprint } from "scm/shared/car_shape.js";
+import { drawLight } from "scm/shared/light_shape.js";
+import { carsNow } from "scm/shared/motion.js";
+import { selected } from "scm/shared/selection.js";
+import { boxes, city, link, live, signals } from "scm/shell/store.js";
 
 const FRAME_MS = 30;
 const MOST_NAMES = 60; // more would hide the cars
@@ -70,7 +70,7 @@ function pick(event, box) {
   const y = event.clientY - top;
   let best = null;
   let nearest = 0.2 * view.scale;
-  for (const car of live.cars) {
+  for (const car of live.vehicles) {
     const { middle } = footprint(car.car);
     const far = Math.hypot(
       view.x(car.x_m + middle * Math.cos(car.yaw_rad)) - x,

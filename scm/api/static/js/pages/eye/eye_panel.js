@@ -1,10 +1,10 @@
 /** The Eye: its newest picture with the tags found drawn over it, and how far off each pose is. */
 import { useEffect, useRef, useState } from "preact/hooks";
-import { html } from "./html.js";
-import { EyePicture } from "./eye_picture.js";
-import { byName, fixed, span, UNKNOWN } from "./format.js";
-import { selected } from "./selection.js";
-import { cameras, live } from "./store.js";
+import { html } from "scm/shared/html.js";
+import { EyePicture } from "scm/pages/eye/eye_picture.js";
+import { byName, fixed, span, UNKNOWN } from "scm/shared/format.js";
+import { selected } from "scm/shared/selection.js";
+import { cameras, live } from "scm/shell/store.js";
 
 const GOOD_MM = 10;
 

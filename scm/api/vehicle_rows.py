@@ -1,4 +1,4 @@
-"""Cars as they are shown: the world's truth with trip, own report and the Eye's residual."""
+"""Vehicles as they are shown: the world's truth with trip, own report and the Eye's residual."""
 
 import msgspec
 
@@ -23,7 +23,7 @@ class TripRow(msgspec.Struct, kw_only=True, frozen=True):
     route: tuple[str, ...]
 
 
-class CarRow(msgspec.Struct, kw_only=True, frozen=True):
+class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
     """One car; pose of the rear axle's centre in the map frame.
 
     Attributes:
@@ -54,21 +54,21 @@ class CarRow(msgspec.Struct, kw_only=True, frozen=True):
     eye: Residual | None
 
 
-class CarsTopic(msgspec.Struct, kw_only=True, frozen=True):
-    """All cars and the pulse of the world; `t_ns` and `tick` are None until the world is heard."""
+class VehiclesTopic(msgspec.Struct, kw_only=True, frozen=True):
+    """All vehicles and the world's pulse; `t_ns` and `tick` are None until it is heard."""
 
     t_ns: int | None
     tick: int | None
     real_time_factor: float
     late_ticks: int
-    cars: tuple[CarRow, ...]
+    vehicles: tuple[VehicleRow, ...]
 
 
-def cars_topic(picture: Picture) -> CarsTopic:
+def vehicles_topic(picture: Picture) -> VehiclesTopic:
     """Return all cars, by name."""
     held = picture.snapshot
     if held is None:
-        return CarsTopic(t_ns=None, tick=None, real_time_factor=0.0, late_ticks=0, cars=())
+        return VehiclesTopic(t_ns=None, tick=None, real_time_factor=0.0, late_ticks=0, vehicles=())
     residuals = _residuals(picture)
     since_ms = 1000.0 * held.age_s(picture.now_ns)
     rows = [
@@ -80,12 +80,12 @@ def cars_topic(picture: Picture) -> CarsTopic:
         )
         for car in sorted(held.message.vehicles, key=lambda car: car.vehicle)
     ]
-    return CarsTopic(
+    return VehiclesTopic(
         t_ns=held.message.t_ns,
         tick=held.message.tick,
         real_time_factor=round(held.message.real_time_factor, 3),
         late_ticks=held.message.late_ticks,
-        cars=tuple(rows),
+        vehicles=tuple(rows),
     )
 
 
@@ -94,8 +94,8 @@ def _row(
     since_ms: float,
     trip: TripRow | None,
     eye: Residual | None,
-) -> CarRow:
-    return CarRow(
+) -> VehicleRow:
+    return VehicleRow(
         vehicle=car.vehicle,
         kind=car.kind,
         car=car.car,

@@ -1,13 +1,13 @@
-"""Cars: list, look at one, put one on the map, send it on a route, take it off."""
+"""Vehicles: list, look at one, put one on the map, send it on a route, take it off."""
 
 from typing import Literal
 
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from scm.api.car_rows import CarRow, cars_topic
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
 from scm.api.roles import OPERATOR, VIEWER
+from scm.api.vehicle_rows import VehicleRow, vehicles_topic
 from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
@@ -47,17 +47,17 @@ class LightsBody(BaseModel):
 
 def router(city: City) -> APIRouter:
     """Return the routes."""
-    routes = APIRouter(prefix="/cars", tags=["cars"], dependencies=[VIEWER])
+    routes = APIRouter(prefix="/vehicles", tags=["vehicles"], dependencies=[VIEWER])
 
     @routes.get("", summary="All cars on the map")
-    def all_cars() -> Response:
-        return json_response(cars_topic(city.view.picture()))
+    def all_vehicles() -> Response:
+        return json_response(vehicles_topic(city.view.picture()))
 
     @routes.post("", summary="Spawn a hosted car", status_code=201, dependencies=[OPERATOR])
     def spawn(body: SpawnBody, key: IdempotencyKey = "") -> Response:
         request = SpawnRequest(request_id=key, vehicle=body.vehicle, car=body.car, spawn=body.spawn)
         reply = city.ask(request, SpawnReply)
-        return json_response(reply, 201, {"Location": f"/api/v1/cars/{reply.vehicle}"})
+        return json_response(reply, 201, {"Location": f"/api/v1/vehicles/{reply.vehicle}"})
 
     @routes.get("/{name}", summary="One car")
     def one_car(name: Name) -> Response:
@@ -93,9 +93,9 @@ def router(city: City) -> APIRouter:
     return routes
 
 
-def _find(city: City, name: str) -> CarRow:
-    rows = cars_topic(city.view.picture()).cars
+def _find(city: City, name: str) -> VehicleRow:
+    rows = vehicles_topic(city.view.picture()).vehicles
     found = next((row for row in rows if row.vehicle == name), None)
     if found is None:
-        raise not_found("car", name)
+        raise not_found("vehicle", name)
     return found

@@ -1,5 +1,5 @@
 /** Cars between two snapshots: from where they were drawn to where they are, so that 20 Hz looks smooth. */
-import { live } from "./store.js";
+import { live } from "scm/shell/store.js";
 
 const GLIDE_MS = 60;
 const JUMP_M = 0.3;
@@ -16,7 +16,7 @@ export function carsNow() {
   }
   const share = Math.min(1, (performance.now() - live.at) / GLIDE_MS);
   shown.clear();
-  return live.cars.map((car) => {
+  return live.vehicles.map((car) => {
     const drawn = between(from.get(car.vehicle), car, share);
     shown.set(car.vehicle, drawn);
     return drawn;

@@ -61,7 +61,7 @@ export class EyePicture {
   }
 
   async #fetchNewest() {
-    const response = await fetch(`/api/v1/eye/${this.#camera}/frame.jpg`);
+    const response = await fetch(`/api/v1/eye/cameras/${this.#camera}/frame.jpg`);
     if (!response.ok) return;
     const t_ns = response.headers.get("X-Time-Ns");
     const image = await createImageBitmap(await response.blob());

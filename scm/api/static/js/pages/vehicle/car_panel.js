@@ -1,11 +1,11 @@
 /** The chosen car: what its cameras see, and its lights. A film runs only while it is shown. */
 import { signal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { html } from "./html.js";
-import { change } from "./api.js";
-import { fixed } from "./format.js";
-import { selected } from "./selection.js";
-import { indicatorsOf, world } from "./store.js";
+import { html } from "scm/shared/html.js";
+import { change } from "scm/shell/api.js";
+import { fixed } from "scm/shared/format.js";
+import { selected } from "scm/shared/selection.js";
+import { indicatorsOf, world } from "scm/shell/store.js";
 
 const HEADLIGHTS = [["off", "Off"], ["low", "Low"], ["high", "High"]];
 const INDICATORS = [["off", "Off"], ["left", "◀"], ["hazard", "◀ ▶"], ["right", "▶"]];
@@ -16,12 +16,12 @@ const camera = signal("front");
 
 /** The chosen car's row; null when none is chosen, or it left. */
 export function chosenCar() {
-  return world.value.cars.find((car) => car.vehicle === selected.value) ?? null;
+  return world.value.vehicles.find((car) => car.vehicle === selected.value) ?? null;
 }
 
 export function CarPanel({ car }) {
   const shown = car.cameras.includes(camera.value) ? camera.value : car.cameras[0];
-  const film = `/api/v1/cars/${car.vehicle}/camera/${shown}/film`;
+  const film = `/api/v1/vehicles/${car.vehicle}/camera/${shown}/film`;
   return html`
     <section class="panel car" aria-label="Car ${car.vehicle}">
       <div class="panel-head">
@@ -86,7 +86,7 @@ function Lights({ car }) {
     : car.lights.includes("head_low")
       ? "low"
       : "off";
-  const set = (body) => change("PUT", `/cars/${car.vehicle}/lights`, body);
+  const set = (body) => change("PUT", `/vehicles/${car.vehicle}/lights`, body);
   return html`
     <div class="switches">
       <${Switch}

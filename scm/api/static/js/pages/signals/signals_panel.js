@@ -1,10 +1,10 @@
 /** The signals: each light with colour, letter and time to change; plan and monitor of its junction. */
 import { signal } from "@preact/signals";
-import { html } from "./html.js";
-import { change } from "./api.js";
-import { Dialog } from "./dialog.js";
-import { UNKNOWN } from "./format.js";
-import { city, link, now, signals, signalsAt } from "./store.js";
+import { html } from "scm/shared/html.js";
+import { change } from "scm/shell/api.js";
+import { Dialog } from "scm/shared/dialog.js";
+import { UNKNOWN } from "scm/shared/format.js";
+import { city, link, now, signals, signalsAt } from "scm/shell/store.js";
 
 export const LETTERS = { red: "R", yellow: "Y", green: "G", flashing_red: "F", dark: "D" };
 const WORDS = {

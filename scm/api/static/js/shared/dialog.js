@@ -1,6 +1,6 @@
 /** A modal question over the page: Escape and a click beside it mean no. What has `data-first` gets the focus. */
 import { useLayoutEffect, useRef } from "preact/hooks";
-import { html } from "./html.js";
+import { html } from "scm/shared/html.js";
 
 export function Dialog({ title, onClose, children }) {
   const dialog = useRef(null);

@@ -1,7 +1,7 @@
 /** What the page has to say or ask: short notices, and the question for the API key. */
-import { html } from "./html.js";
-import { dismiss, keyWanted, notices } from "./api.js";
-import { Dialog } from "./dialog.js";
+import { html } from "scm/shared/html.js";
+import { dismiss, keyWanted, notices } from "scm/shell/api.js";
+import { Dialog } from "scm/shared/dialog.js";
 
 export function Notices() {
   return html`

@@ -1,42 +1,58 @@
-/** The bar on top: which city, how alive it is, and the red button. */
+/** The bar on top: which city, its pages, how alive it is, and the red button. */
 import { signal } from "@preact/signals";
-import { html } from "./html.js";
-import { change } from "./api.js";
-import { Dialog } from "./dialog.js";
-import { clock, fixed, span, UNKNOWN } from "./format.js";
-import { city, isConnected, link, quiet_s, stop, world } from "./store.js";
+import { html } from "scm/shared/html.js";
+import { change } from "scm/shell/api.js";
+import { Dialog } from "scm/shared/dialog.js";
+import { clock, fixed, span, UNKNOWN } from "scm/shared/format.js";
+import { city, isConnected, link, pulse, quiet_s, stop } from "scm/shell/store.js";
+import { nextTheme, theme } from "scm/shell/theme.js";
 
 const asking = signal(false);
 
 const LINK_WORDS = { connecting: "Connecting", live: "Live", stale: "Stale", lost: "No data" };
 
-export function TitleBar() {
-  const { t_ns, real_time_factor, late_ticks, cars } = world.value;
+const THEMES = { system: ["◐", "as the system"], light: ["☀", "light"], dark: ["☾", "dark"] };
+
+export function TitleBar({ pages, here }) {
+  const { t_ns, real_time_factor, late_ticks } = pulse.value;
   const heard = t_ns !== null;
+  const vitals = heard
+    ? `real-time factor ${fixed(real_time_factor, 2)}, ${late_ticks} late ticks`
+    : "the world was not heard yet";
   return html`
     <header class="title-bar">
-      <img class="mark" src="/static/icon.svg" alt="" />
-      <h1>${city.value ? city.value.title : "Smart City Manager"}</h1>
-      <span class="link-state" data-link=${link.value} role="status">
+      <a class="home" href="/map" title=${city.value?.title ?? "Smart City Manager"}>
+        <img class="mark" src="/static/icon.svg" alt="" />
+        <h1>${city.value ? city.value.title : "Smart City Manager"}</h1>
+      </a>
+      <nav aria-label="Pages">
+        ${pages.map(
+          (page) => html`
+            <a key=${page.name} href="/${page.name}" aria-current=${page.name === here ? "page" : null}>
+              ${page.title}
+            </a>
+          `,
+        )}
+      </nav>
+      <span class="link-state" data-link=${link.value} role="status" title=${vitals}>
         <i></i>${LINK_WORDS[link.value]}
       </span>
-      <dl class="vitals">
-        <${Vital} name="Time" value=${heard ? clock(t_ns) : UNKNOWN} />
-        <${Vital}
-          name="Real-time factor"
-          value=${heard ? `×${fixed(real_time_factor, 2)}` : UNKNOWN}
-          warn=${heard && real_time_factor < 0.95}
-        />
-        <${Vital} name="Late ticks" value=${heard ? late_ticks : UNKNOWN} />
-        <${Vital} name="Cars" value=${heard ? cars.length : UNKNOWN} />
-      </dl>
+      <span class="clock ${heard && real_time_factor < 0.95 ? "warn" : ""}" title=${vitals}>
+        ${heard ? clock(t_ns) : UNKNOWN}
+        <small>×${heard ? fixed(real_time_factor, 2) : UNKNOWN}</small>
+      </span>
+      <${ThemeButton} />
       <${StopButton} />
     </header>
   `;
 }
 
-function Vital({ name, value, warn }) {
-  return html`<div class=${warn ? "warn" : ""}><dt>${name}</dt><dd>${value}</dd></div>`;
+function ThemeButton() {
+  const [sign, words] = THEMES[theme.value];
+  const label = `Colours: ${words}`;
+  return html`
+    <button class="plain theme" title=${label} aria-label=${label} onClick=${nextTheme}>${sign}</button>
+  `;
 }
 
 function StopButton() {
@@ -98,7 +114,7 @@ export function Banners() {
     html`<div class="banner lost" role="alert">
       <b>${isConnected.value ? "The world is silent" : "No connection to the server"}</b>
       <span>
-        ${world.value.t_ns === null
+        ${pulse.value.t_ns === null
           ? "Nothing has been heard yet."
           : `What you see is ${span(quiet_s.value)} old.`}
       </span>
