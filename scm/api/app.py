@@ -13,13 +13,14 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 from scm.api import openapi, problem
-from scm.api.city import Ask, City
+from scm.api.city import Ask, City, Link
 from scm.api.gate import Gate, content_policy
 from scm.api.keys import KeyRing
 from scm.api.operations import Operations
 from scm.api.routes import (
     boxes,
     cameras,
+    cities,
     events,
     eye,
     health,
@@ -65,6 +66,7 @@ def create_app(
     keys: KeyRing | None = None,
     plans: Mapping[str, Sequence[str]] | None = None,
     shelves: Shelves | None = None,
+    link: Link | None = None,
 ) -> FastAPI:
     """Build the application.
 
@@ -76,8 +78,9 @@ def create_app(
             everything.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
         shelves: Folders of recordings, reports and the like; None: the city offers none.
+        link: What is known of the connection to the bus.
     """
-    city = City(view, ask, city_map, plans or {}, shelves or Shelves())
+    city = City(view, ask, city_map, plans or {}, shelves or Shelves(), link or Link())
     work = Operations(WallClock())
     stream = Stream(city, uuid.uuid4().hex[:8])
     app = FastAPI(
@@ -96,7 +99,9 @@ def create_app(
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
     app.add_middleware(Gate, keys=keys, policy=policy)
     api = APIRouter(prefix="/api/v1")
-    for noun in (vehicles, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic):
+    for noun in (
+        cities, vehicles, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic,
+    ):  # fmt: skip
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
     api.include_router(operations.router(work), responses=problem.RESPONSES)

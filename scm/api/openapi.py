@@ -6,6 +6,7 @@ docstring says goes to its fields, the rest comes from `scm.api.words`, and exam
 records are put together from those of their parts.
 """
 
+import inspect
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -18,7 +19,7 @@ from scm.api.words import UNITS, WORDS
 from scm.errors import RunError
 
 _DEFS, _COMPONENTS = "#/$defs/", "#/components/schemas/"
-_ENTRY = re.compile(r"^ {0,4}(\w+(?:, \w+)*): ")
+_ENTRY = re.compile(r"^ {4}(\w+(?:, \w+)*): ")
 _DEPTH = 6
 Schema = dict[str, Any]
 
@@ -57,9 +58,10 @@ def described(document: Schema) -> Schema:
     _point(document)
     for schema in schemas.values():
         _describe_fields(schema)
-    for schema in schemas.values():
-        for name, field in schema.get("properties", {}).items():
-            _add_example(name, field, schemas)
+    fields = [item for schema in schemas.values() for item in schema.get("properties", {}).items()]
+    for name, field in fields:
+        _describe_by_record(field, schemas)
+        _add_example(name, field, schemas)
     for operation in operations(document):
         for parameter in operation.get("parameters", ()):
             _add_example(parameter["name"], parameter["schema"], schemas)
@@ -108,9 +110,18 @@ def _describe_fields(schema: Schema) -> None:
         field.pop("title", None)
 
 
+def _describe_by_record(field: Schema, schemas: Schema) -> None:
+    """Give a field that holds records, and says nothing more, the words of these."""
+    inner = [field, field.get("items") or {}, *field.get("anyOf", ())]
+    for one in inner:
+        if "$ref" in one and "description" not in field:
+            record = schemas[one["$ref"].removeprefix(_COMPONENTS)]
+            field["description"] = record.get("description", "")
+
+
 def _attributes(docstring: str) -> tuple[str, dict[str, str]]:
     """Return a record's own description, and what its docstring says of its fields."""
-    about, _, entries = docstring.partition("Attributes:\n")
+    about, _, entries = inspect.cleandoc(docstring).partition("Attributes:\n")
     told: dict[str, str] = {}
     names: list[str] = []
     for line in entries.splitlines():
@@ -151,7 +162,7 @@ def _example(name: str, field: Schema, schemas: Schema, depth: int) -> Any:
 def _of_type(name: str, field: Schema, schemas: Schema, depth: int) -> Any:
     kind, known = field.get("type"), WORDS[name][1] if name in WORDS else None
     if kind == "array":
-        if _is_a("array", known):
+        if _is_a("array", known) and "$ref" not in (field.get("items") or {}):
             return known
         parts = field.get("prefixItems") or [field.get("items") or {}]
         return [_example(name, part, schemas, depth) for part in parts] if depth < _DEPTH else []
@@ -159,10 +170,17 @@ def _of_type(name: str, field: Schema, schemas: Schema, depth: int) -> Any:
         return known if _is_a("object", known) else _record(field, schemas, depth + 1)
     if kind == "boolean":
         return known if _is_a("boolean", known) else True
-    if _is_a(str(kind), known):
-        return known
-    unit = UNITS.get(name.rpartition("_")[2])
-    return unit if _is_a(str(kind), unit) else None
+    numbers = (UNITS.get(name.rpartition("_")[2]), field.get("minimum"), 1)
+    for value in (known, field.get("default"), *numbers):
+        if _is_a(str(kind), value) and value != "" and _is_within(field, value):
+            return value
+    return None
+
+
+def _is_within(field: Schema, value: Any) -> bool:
+    if isinstance(value, str):
+        return len(value) <= field.get("maxLength", len(value))
+    return bool(field.get("minimum", value) <= value <= field.get("maximum", value))
 
 
 def _record(schema: Schema, schemas: Schema, depth: int) -> Any:

@@ -32,10 +32,15 @@ T = TypeVar("T")
 
 
 class Page(msgspec.Struct, Generic[T], kw_only=True, frozen=True):
-    """Some rows of a list; `next` is the cursor of those after them, None at the end."""
+    """Some rows of a list.
+
+    Attributes:
+        items: The rows of this page.
+        next: Cursor of those after them; null at the end.
+    """
 
     items: tuple[T, ...]
-    next: str | None
+    next: Annotated[str | None, msgspec.Meta(examples=["azptaXNtYXRjaC03"])]
 
 
 def page_of(

@@ -27,6 +27,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.api.app import create_app
+    from scm.api.city import Link
     from scm.api.gate import check_bind
     from scm.api.keys import KeyRing
     from scm.api.server import serve
@@ -52,6 +53,12 @@ def _run(arguments: argparse.Namespace) -> int:
             city_map,
             keys=keys,
             shelves=shelves_in(arguments.data) if arguments.data else None,
+            link=Link(
+                city=arguments.city,
+                is_connected=lambda: bus.connected,
+                rejected=lambda: bus.rejected,
+                clock=WallClock(),
+            ),
             plans={junction.name: names("scm.traffic.plans") for junction in city_map.junctions},
         )
 

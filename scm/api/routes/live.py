@@ -7,6 +7,7 @@ from fastapi.responses import StreamingResponse
 
 from scm.api.problem import RefusedError
 from scm.api.roles import VIEWER
+from scm.api.schemas import answer_file
 from scm.api.stream import Stream
 from scm.errors import nearest
 from scm.v2x.message import Refused
@@ -16,7 +17,14 @@ def router(stream: Stream) -> APIRouter:
     """Return the route."""
     routes = APIRouter(tags=["stream"], dependencies=[VIEWER])
 
-    @routes.get("/stream", summary="What is live: a snapshot, then what changed, at 20 Hz")
+    @routes.get(
+        "/stream",
+        summary="What is live: a snapshot, then what changed, at 20 Hz",
+        response_class=StreamingResponse,
+        responses=answer_file(
+            "text/event-stream", "`snapshot`, then `delta` and `beat`, as events."
+        ),
+    )
     async def live(
         topics: Annotated[
             str,
