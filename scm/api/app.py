@@ -15,7 +15,10 @@ from starlette.types import Scope
 from scm.api import openapi, problem
 from scm.api.city import Ask, City, Link
 from scm.api.gate import Gate, content_policy
+from scm.api.idempotency import Idempotent
 from scm.api.keys import KeyRing
+from scm.api.limits import Limited
+from scm.api.metrics import Measured, Metrics
 from scm.api.operations import Operations
 from scm.api.routes import (
     boxes,
@@ -36,8 +39,10 @@ from scm.api.routes import (
     vehicles,
 )
 from scm.api.routes import keys as key_routes
+from scm.api.routes import metrics as metrics_routes
 from scm.api.shelves import Shelves
 from scm.api.stream import Stream
+from scm.api.trace import Traced
 from scm.api.view import CityView
 from scm.clock import WallClock
 from scm.maps.model import CityMap
@@ -97,7 +102,13 @@ def create_app(
     problem.install(app)
     openapi.install(app)
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
+    clock = WallClock()
+    app.add_middleware(Idempotent, clock=clock)  # what is added later sees a request earlier
+    app.add_middleware(Limited, clock=clock)
     app.add_middleware(Gate, keys=keys, policy=policy)
+    metrics = Metrics(city, stream)
+    app.add_middleware(Measured, metrics=metrics, clock=clock)
+    app.add_middleware(Traced)
     api = APIRouter(prefix="/api/v1")
     for noun in (
         cities, vehicles, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic,
@@ -110,6 +121,7 @@ def create_app(
     api.include_router(key_routes.router(keys), responses=problem.RESPONSES)
     app.include_router(api)
     app.include_router(health.router(city), responses=problem.RESPONSES)
+    app.include_router(metrics_routes.router(metrics), responses=problem.RESPONSES)
     _add_pages(app)
     return app
 

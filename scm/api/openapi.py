@@ -179,7 +179,7 @@ def _of_type(name: str, field: Schema, schemas: Schema, depth: int) -> Any:
 
 def _is_within(field: Schema, value: Any) -> bool:
     if isinstance(value, str):
-        return len(value) <= field.get("maxLength", len(value))
+        return len(value) <= int(field.get("maxLength", len(value)))
     return bool(field.get("minimum", value) <= value <= field.get("maximum", value))
 
 

@@ -12,6 +12,7 @@ from fastapi.exceptions import RequestValidationError
 from msgspec import Meta
 from starlette.exceptions import HTTPException
 
+from scm.api.trace import trace_id
 from scm.v2x.message import Refused
 
 STATUS_OF_CODE = {
@@ -101,6 +102,7 @@ def problem(
         code=code,
         detail=detail,
         instance=instance,
+        trace_id=trace_id(),
         errors=errors,
     )
     headers = {"Cache-Control": "no-store"}
