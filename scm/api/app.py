@@ -30,6 +30,7 @@ from scm.api.routes import (
     live,
     map,  # noqa: A004  named for its noun
     misbehaviour,
+    ngsi,
     operations,
     session,
     signals,
@@ -120,6 +121,7 @@ def create_app(
     api.include_router(session.router(), responses=problem.RESPONSES)
     api.include_router(key_routes.router(keys), responses=problem.RESPONSES)
     app.include_router(api)
+    app.include_router(ngsi.router(city), responses=problem.RESPONSES)
     app.include_router(health.router(city), responses=problem.RESPONSES)
     app.include_router(metrics_routes.router(metrics), responses=problem.RESPONSES)
     _add_pages(app)
