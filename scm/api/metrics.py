@@ -75,11 +75,24 @@ class Measured:
         try:
             await self._app(scope, receive, send_noted)
         finally:
-            route = str(getattr(scope.get("route"), "path", "") or "none")
+            route = _route_of(scope)
             self._metrics.requests.labels(scope["method"], route, str(status)).inc()
             if not media.startswith(_ENDLESS):
                 took_s = seconds(self._clock.now_ns() - began_ns)
                 self._metrics.seconds.labels(scope["method"], route).observe(took_s)
+
+
+def _route_of(scope: Scope) -> str:
+    """Return the address of a route with its names in braces; `none`: there was no such route.
+
+    The route itself knows its address below its noun's prefix only.
+    """
+    template = str(getattr(scope.get("route"), "path_format", ""))
+    if not template:
+        return "none"
+    given = template.format_map({name: str(value) for name, value in scope["path_params"].items()})
+    path = str(scope["path"])
+    return path[: len(path) - len(given)] + template if path.endswith(given) else template
 
 
 class _OfCity(Collector):

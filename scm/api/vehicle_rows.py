@@ -2,7 +2,7 @@
 
 import msgspec
 
-from scm.api.picture import Held, Picture, SeenPose
+from scm.api.picture import Held, Picture, SeenPose, once_a_picture
 from scm.api.residual import Residual
 from scm.camera.optics import fitted
 from scm.v2x.messages.trip import Trip
@@ -64,6 +64,7 @@ class VehiclesTopic(msgspec.Struct, kw_only=True, frozen=True):
     vehicles: tuple[VehicleRow, ...]
 
 
+@once_a_picture
 def vehicles_topic(picture: Picture) -> VehiclesTopic:
     """Return all cars, by name."""
     held = picture.snapshot

@@ -27,7 +27,7 @@ def router(city: City) -> APIRouter:
     routes = APIRouter(prefix="/boxes", tags=["boxes"], dependencies=[VIEWER])
 
     @routes.get("", summary="Where the boxes are that cars can push", responses=answer(Boxes))
-    def boxes() -> Response:
+    async def boxes() -> Response:
         return json_response(Boxes(boxes=boxes_of(city.view.picture())))
 
     @routes.post(

@@ -75,7 +75,7 @@ def router(city: City, stream: Stream) -> APIRouter:
         summary="A car's cameras, and which are watched here",
         responses=answer(Cameras),
     )
-    def cameras(name: Name) -> Response:
+    async def cameras(name: Name) -> Response:
         return json_response(Cameras(cameras=_cameras(city, name), watched=city.view.watched(name)))
 
     return routes

@@ -65,11 +65,11 @@ def router(city: City) -> APIRouter:
     routes = APIRouter(prefix="/cities", tags=["cities"], dependencies=[VIEWER])
 
     @routes.get("", summary="The cities that this server shows: its own", responses=answer(Cities))
-    def all_cities() -> Response:
+    async def all_cities() -> Response:
         return json_response(Cities(cities=(_row(city),)))
 
     @routes.get("/{name}", summary="One city", responses=answer(CityRow))
-    def one_city(name: Name) -> Response:
+    async def one_city(name: Name) -> Response:
         if name != city.name:
             raise not_found("city", name)
         return json_response(_row(city))

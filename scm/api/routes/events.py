@@ -29,7 +29,7 @@ def router(city: City) -> APIRouter:
     routes = APIRouter(prefix="/events", tags=["events"], dependencies=[VIEWER])
 
     @routes.get("", summary="Events in order of arrival", responses=answer(Events))
-    def events(
+    async def events(
         after: Annotated[
             int, Query(ge=0, description="number of the last event read", examples=[40])
         ] = 0,

@@ -23,7 +23,7 @@ def router(city: City) -> APIRouter:
     routes = APIRouter(prefix="/eye", tags=["eye"], dependencies=[VIEWER])
 
     @routes.get("", summary="All cameras, with tags and poses seen", responses=answer(Overhead))
-    def cameras() -> Response:
+    async def cameras() -> Response:
         return json_response(Overhead(cameras=camera_rows(city.view.picture())))
 
     @routes.get(
@@ -32,7 +32,7 @@ def router(city: City) -> APIRouter:
         response_class=Response,
         responses=answer_file("image/jpeg", "The picture; `X-Time-Ns`: of its exposure."),
     )
-    def frame(
+    async def frame(
         name: Name,
         t_ns: Annotated[
             int | None,
@@ -50,7 +50,7 @@ def router(city: City) -> APIRouter:
         summary="The tags found in a camera's newest picture",
         responses=answer(EyeTags),
     )
-    def tags(name: Name) -> Response:
+    async def tags(name: Name) -> Response:
         held = tags_of(city.view.picture(), name)
         if held is None:
             raise not_found("camera with tags", name)

@@ -25,7 +25,7 @@ def router(city: City) -> APIRouter:
     as_svg = draw_svg(city.city_map, movable=False).encode()  # the page draws those live
 
     @routes.get("/map", summary="The map as JSON", responses=answer(CityMap))
-    def map_json(request: Request) -> Response:
+    async def map_json(request: Request) -> Response:
         return _tagged(request, as_json, "application/json")
 
     @routes.get(
@@ -34,7 +34,7 @@ def router(city: City) -> APIRouter:
         response_class=SvgResponse,
         responses=answer_file("image/svg+xml", "The drawing, a metre a unit."),
     )
-    def map_svg(request: Request) -> Response:
+    async def map_svg(request: Request) -> Response:
         return _tagged(request, as_svg, "image/svg+xml")
 
     return routes

@@ -18,7 +18,7 @@ def router(metrics: Metrics) -> APIRouter:
         response_class=Response,
         responses=answer_file("text/plain", "One line a number; `# HELP` says what it is."),
     )
-    def all_metrics() -> Response:
+    async def all_metrics() -> Response:
         return Response(metrics.text(), headers={"Content-Type": CONTENT_TYPE_LATEST})
 
     return routes

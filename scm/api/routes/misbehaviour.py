@@ -35,7 +35,7 @@ def router(city: City) -> APIRouter:
     @routes.get(
         "", summary="Scores of all stations, and who is reported", responses=answer(Misbehaviour)
     )
-    def scores() -> Response:
+    async def scores() -> Response:
         held, reports = city.view.misbehaviour()
         told = None if held is None else held.message
         body = Misbehaviour(
@@ -52,7 +52,7 @@ def router(city: City) -> APIRouter:
         summary="The newest report on a station, with its evidence",
         responses=answer(MisbehaviourReport),
     )
-    def report(name: Name) -> Response:
+    async def report(name: Name) -> Response:
         found = city.view.misbehaviour()[1].get(name)
         if found is None:
             raise not_found("report on a station", name)

@@ -14,12 +14,12 @@ def router(operations: Operations) -> APIRouter:
     routes = APIRouter(prefix="/operations", tags=["operations"], dependencies=[VIEWER])
 
     @routes.get("", summary="Long work, newest first", responses=answer_page(Operation))
-    def all_operations(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
+    async def all_operations(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
         rows = operations.rows()
         return page_response(request, page_of(rows, lambda row: row.id, limit=limit, cursor=cursor))
 
     @routes.get("/{name}", summary="One piece of work", responses=answer(Operation))
-    def one_operation(name: Name) -> Response:
+    async def one_operation(name: Name) -> Response:
         row = operations.find(name)
         if row is None:
             raise not_found("operation", name)

@@ -29,13 +29,13 @@ def router() -> APIRouter:
     routes = APIRouter(prefix="/session", tags=["session"], dependencies=[VIEWER])
 
     @routes.get("", summary="Who this key says you are", responses=answer(Session))
-    def session(request: Request) -> Response:
+    async def session(request: Request) -> Response:
         return json_response(_session(request))
 
     @routes.put(
         "", summary="Keep this key as a cookie, good for reading", responses=answer(Session)
     )
-    def begin(request: Request) -> Response:
+    async def begin(request: Request) -> Response:
         response = json_response(_session(request))
         key = request.scope["scm_key"]
         if key:
@@ -46,7 +46,7 @@ def router() -> APIRouter:
         return response
 
     @routes.delete("", summary="Forget the cookie", responses=answer(Ended))
-    def end() -> Response:
+    async def end() -> Response:
         response = json_response(Ended())
         response.delete_cookie(COOKIE, path="/api")
         return response

@@ -54,12 +54,12 @@ def router(city: City) -> APIRouter:
     routes = APIRouter(prefix="/signals", tags=["signals"], dependencies=[VIEWER])
 
     @routes.get("", summary="All junctions", responses=answer(Junctions))
-    def all_signals() -> Response:
+    async def all_signals() -> Response:
         rows = junction_rows(city.view.picture(), city.city_map.junctions, city.plans)
         return json_response(Junctions(signals=rows))
 
     @routes.get("/{name}", summary="One junction", responses=answer(JunctionRow))
-    def one_signal(name: Name) -> Response:
+    async def one_signal(name: Name) -> Response:
         rows = junction_rows(city.view.picture(), city.city_map.junctions, city.plans)
         found = next((row for row in rows if row.junction == name), None)
         if found is None:

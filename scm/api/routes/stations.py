@@ -38,11 +38,11 @@ def router(city: City) -> APIRouter:
     routes = APIRouter(prefix="/stations", tags=["stations"], dependencies=[VIEWER])
 
     @routes.get("", summary="All stations", responses=answer(Stations))
-    def all_stations() -> Response:
+    async def all_stations() -> Response:
         return json_response(Stations(stations=city.view.picture().stations))
 
     @routes.get("/{name}", summary="One station", responses=answer(Stations))
-    def one_station(name: Name) -> Response:
+    async def one_station(name: Name) -> Response:
         return json_response(Stations(stations=_named(city, name)))
 
     @routes.get(
@@ -50,7 +50,7 @@ def router(city: City) -> APIRouter:
         summary="The last events that a station told, or that are about it",
         responses=answer(StationEvents),
     )
-    def station_events(name: Name) -> Response:
+    async def station_events(name: Name) -> Response:
         _named(city, name)
         told = city.view.events_after(0, _LOOKED_THROUGH)
         own = [one for one in reversed(told) if name in (one.source, one.vehicle)]

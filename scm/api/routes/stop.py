@@ -33,7 +33,7 @@ def router(city: City) -> APIRouter:
     routes = APIRouter(prefix="/stop", tags=["stop"], dependencies=[VIEWER])
 
     @routes.get("", summary="Whether the city-wide stop is engaged", responses=answer(CityStop))
-    def stop() -> Response:
+    async def stop() -> Response:
         return json_response(stop_of(city.view.picture()))
 
     @routes.put(

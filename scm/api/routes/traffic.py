@@ -29,7 +29,7 @@ def router(city: City) -> APIRouter:
     @routes.get(
         "", summary="Counts, delays, queues and level of service", responses=answer(TrafficCounts)
     )
-    def counts() -> Response:
+    async def counts() -> Response:
         held = city.view.picture().traffic
         if held is None:
             raise not_found("station", "observer")
@@ -40,7 +40,7 @@ def router(city: City) -> APIRouter:
         summary="Violations, newest first, with their evidence",
         responses=answer(Violations),
     )
-    def violations(
+    async def violations(
         vehicle: Annotated[
             str, Query(max_length=32, description="of this car alone", examples=["n1"])
         ] = "",

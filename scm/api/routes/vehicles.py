@@ -71,7 +71,7 @@ def router(city: City) -> APIRouter:
     routes = APIRouter(prefix="/vehicles", tags=["vehicles"], dependencies=[VIEWER])
 
     @routes.get("", summary="All cars on the map", responses=answer(VehiclesTopic))
-    def all_vehicles() -> Response:
+    async def all_vehicles() -> Response:
         return json_response(vehicles_topic(city.view.picture()))
 
     @routes.post(
@@ -87,7 +87,7 @@ def router(city: City) -> APIRouter:
         return json_response(reply, 201, {"Location": f"/api/v1/vehicles/{reply.vehicle}"})
 
     @routes.get("/{name}", summary="One car", responses=answer(VehicleRow))
-    def one_car(name: Name) -> Response:
+    async def one_car(name: Name) -> Response:
         return json_response(_find(city, name))
 
     @routes.delete(
