@@ -200,7 +200,8 @@ def _parts(plan: _Plan) -> list[Job]:
     cars = f"cars, walls, sensors, radio; {plan.wanted.hosted} hosted"
     kept = ("--state", plan.state)
     keys = () if plan.wanted.keys is None else ("--keys", plan.wanted.keys)
-    web = ("--host", plan.wanted.host, "--port", str(plan.port), *keys)
+    data = ("--data", str(plan.wanted.record_dir))
+    web = ("--host", plan.wanted.host, "--port", str(plan.port), *keys, *data)
 
     air = [word for setting in plan.wanted.radio for word in ("--radio", setting)]
 

@@ -8,23 +8,45 @@ from fastapi import Header, Path, Response
 
 from scm.api.encoding import encode
 from scm.api.problem import RefusedError
+from scm.api.shelves import Shelves
 from scm.api.view import CityView
+from scm.clock import Clock
 from scm.maps.model import CityMap
 from scm.v2x.message import Message, Refused, Request
 
 ASK_TIMEOUT_S = 2.0
 
 Ask = Callable[[Request, float], Message]
-Name = Annotated[str, Path(pattern=r"^[a-z0-9_-]{1,32}$", description="a name on the bus")]
+Name = Annotated[
+    str, Path(pattern=r"^[a-z0-9_-]{1,32}$", description="a name on the bus", examples=["n1"])
+]
 IdempotencyKey = Annotated[
     str,
     Header(
         alias="Idempotency-Key",
         max_length=128,
         description="same key, same effect, once: a retry gets the stored answer",
+        examples=["6f1c2f0e-0b5e-4d0e-9d55-7d1f6f6c2b1a"],
     ),
 ]
 R = TypeVar("R", bound=Message)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Link:
+    """What the server knows of its own connection to the bus.
+
+    Attributes:
+        city: Chunk of all keys of the city on the bus; empty: as its map is called.
+        is_connected: Whether the router can be reached now.
+        rejected: How many arrivals were dropped because they could not be read.
+        clock: That of the view's runner; None: time stands still between its steps.
+    """
+
+    city: str = ""
+    is_connected: Callable[[], bool] = lambda: True
+    rejected: Callable[[], int] = lambda: 0
+    clock: Clock | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +56,26 @@ class City:
     Attributes:
         send: Asks a request on the bus and waits for the reply, at most so many seconds.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
+        shelves: Folders that the interface reads and writes.
+        link: Its connection to the bus.
     """
 
     view: CityView
     send: Ask
     city_map: CityMap
     plans: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    shelves: Shelves = field(default_factory=Shelves)
+    link: Link = field(default_factory=Link)
+
+    @property
+    def name(self) -> str:
+        """What the city is called."""
+        return self.link.city or self.city_map.name
+
+    def now_ns(self) -> int:
+        """Return the present time, by the clock of the view's runner [ns]."""
+        stepped_ns = self.view.picture().now_ns
+        return stepped_ns if self.link.clock is None else max(stepped_ns, self.link.clock.now_ns())
 
     def ask(self, request: Request, reply: type[R]) -> R:
         """Ask the city and return its answer; blocks, so only for routes in the thread pool.

@@ -2,9 +2,10 @@
 
 Without keys the interface is for this machine only, and whoever calls is its admin: the bind
 address must be loopback, and the Host header must name it, so that a web page elsewhere cannot
-reach it by renaming itself (DNS rebinding). With keys, everything below `/api` needs one. Changes
-must come from our own pages or from programs: a browser tells its origin; and they must carry
-their key in the header: the cookie, which pages have for streams and pictures, is for reading.
+reach it by renaming itself (DNS rebinding). With keys, everything below `/api` and `/ngsi-ld`, and
+`/metrics`, needs one. Changes must come from our own pages or from programs: a browser tells its
+origin; and they must carry their key in the header: the cookie, which pages have for streams and
+pictures, is for reading.
 """
 
 import base64
@@ -27,7 +28,7 @@ from scm.v2x.access import is_loopback
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 COOKIE = "scm_key"
-GUARDED = "/api/"
+GUARDED = ("/api/", "/ngsi-ld/", "/metrics")
 OPEN = frozenset({"/api/v1/openapi.json"})
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _INLINE_SCRIPT = re.compile(r"<script(?![^>]*\bsrc=)[^>]*>(.*?)</script>", re.DOTALL)
@@ -139,6 +140,12 @@ class Gate:
             return HTTPStatus.UNAUTHORIZED, "unauthorised", detail
         scope.update(scm_role=record.role, scm_owner=record.owner, scm_key=key)
         return None
+
+
+def caller_of(scope: Scope) -> str:
+    """Return what tells a caller from others: the public part of its key, or its address."""
+    key = str(scope.get("scm_key", ""))
+    return key.split("_")[1] if key.count("_") > 1 else _address(scope)
 
 
 def _key_of(headers: Headers, *, with_cookie: bool) -> str:

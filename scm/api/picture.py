@@ -1,6 +1,8 @@
 """What the city looked like at one moment: a copy that the web may read without a lock."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import wraps
 from typing import Generic, TypeVar
 
 from scm.api.residual import Residual
@@ -21,6 +23,7 @@ from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 M = TypeVar("M", bound=Message)
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,3 +75,20 @@ class Picture:
     poses: dict[tuple[str, str], SeenPose] = field(default_factory=dict)
     stations: tuple[StationRow, ...] = ()
     event_seq: int = 0
+
+
+def once_a_picture(make: Callable[[Picture], T]) -> Callable[[Picture], T]:
+    """Make what is shown of a picture once, however many ask for it before the next one."""
+    held: tuple[Picture, T] | None = None
+
+    @wraps(make)
+    def made(picture: Picture) -> T:
+        nonlocal held
+        known = held
+        if known is not None and known[0] is picture:
+            return known[1]
+        shown = make(picture)
+        held = (picture, shown)
+        return shown
+
+    return made

@@ -4,19 +4,24 @@ On top of the RFC's members every problem has a `code`, a short machine word.
 """
 
 from http import HTTPStatus
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
+from msgspec import Meta
 from starlette.exceptions import HTTPException
 
+from scm.api.trace import trace_id
 from scm.v2x.message import Refused
 
 STATUS_OF_CODE = {
     "not_found": 404,
     "owned": 409,
+    "precondition_failed": 412,
     "invalid": 422,
+    "precondition_required": 428,
+    "busy": 429,
     "offline": 503,
     "timeout": 504,
 }
@@ -33,26 +38,40 @@ _CODE_OF_STATUS = {
 }
 
 
-_STATUSES = (400, 401, 403, 404, 409, 422, 429, 500, 503, 504)
+_STATUSES = (400, 401, 403, 404, 409, 412, 422, 428, 429, 500, 503, 504)
 
 
 class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """The body of an error; `errors` lists each wrong field with where it stands."""
+    """The body of an error, RFC 9457.
 
-    type: str
-    title: str
-    status: int
-    code: str
-    detail: str = ""
-    instance: str = ""
-    errors: tuple[dict[str, str], ...] = ()
+    Attributes:
+        type: `about:blank`: the status says it all.
+        title: The status in words.
+        status: Of the answer.
+        code: A short word for programs.
+        detail: What is wrong, where, what was expected, in a sentence.
+        instance: What was asked.
+        trace_id: Names this request in the log of the server (W3C trace context).
+        errors: Each wrong field: `where` it stands, and what was `expected` there.
+    """
+
+    type: Annotated[str, Meta(examples=["about:blank"])]
+    title: Annotated[str, Meta(examples=["Not Found"])]
+    status: Annotated[int, Meta(examples=[404])]
+    code: Annotated[str, Meta(examples=["not_found"])]
+    detail: Annotated[str, Meta(examples=["there is no vehicle named 'n9'"])] = ""
+    instance: Annotated[str, Meta(examples=["/api/v1/vehicles/n9"])] = ""
+    trace_id: Annotated[str, Meta(examples=["4bf92f3577b34da6a3ce929d0e0e4736"])] = ""
+    errors: Annotated[
+        tuple[dict[str, str], ...],
+        Meta(examples=[[{"where": "body.laps", "expected": "a number above 0"}]]),
+    ] = ()
 
 
-_SCHEMA = msgspec.json.schema(Problem)["$defs"]["Problem"]
 RESPONSES: dict[int | str, dict[str, Any]] = {
     status: {
         "description": HTTPStatus(status).phrase,
-        "content": {"application/problem+json": {"schema": _SCHEMA}},
+        "content": {"application/problem+json": {"schema": msgspec.json.schema(Problem)}},
     }
     for status in _STATUSES
 }
@@ -83,6 +102,7 @@ def problem(
         code=code,
         detail=detail,
         instance=instance,
+        trace_id=trace_id(),
         errors=errors,
     )
     headers = {"Cache-Control": "no-store"}

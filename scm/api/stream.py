@@ -1,8 +1,8 @@
 """The live stream: one loop encodes what changed, once, for all pages that listen.
 
-A page first gets a `snapshot` with every topic, then `delta`s with the topics that changed, each
-whole; events come one by one and never twice. A page too slow to take them gets a new snapshot
-instead of a backlog. Silence is broken by a `beat` once a second.
+A page first gets a `snapshot` of its topics, then `delta`s with those that changed, each whole;
+events come one by one and never twice. What nobody hears is not made. A page too slow to take them
+gets a new snapshot instead of a backlog. Silence is broken by a `beat` once a second.
 
 An id is `<run>-<frame>-<event>`: a page that comes back with the last one it saw gets the events
 after that one; after a restart of the server the run differs, and it gets the last ones anew.
@@ -11,19 +11,14 @@ after that one; after a restart of the server the run differs, and it gets the l
 import asyncio
 import logging
 from collections import deque
-from collections.abc import AsyncIterator, Callable
-from typing import NamedTuple
+from collections.abc import AsyncIterator, Iterable
 
 import msgspec
 
-from scm.api.car_rows import cars_topic
 from scm.api.city import City
 from scm.api.encoding import encode
-from scm.api.eye_rows import camera_rows
 from scm.api.picture import Picture
-from scm.api.routes.boxes import boxes_of
-from scm.api.routes.stop import stop_of
-from scm.api.signal_rows import junction_rows
+from scm.api.topics import EVENTS, topics_of
 
 _LOGGER = logging.getLogger(__name__)
 
@@ -34,17 +29,11 @@ CARS_A_FRAME = 250  # so many more cars, one frame longer to wait: pages draw on
 QUEUE_DEPTH = 20  # frames: one second
 
 
-class Topic(NamedTuple):
-    """A part of the page: how to make it, and every how many frames that is due."""
-
-    make: Callable[[Picture], object]
-    every: int
-
-
 class Listener:
     """One page: frames on their way to it; when it cannot keep up they are all dropped."""
 
-    def __init__(self) -> None:
+    def __init__(self, topics: frozenset[str]) -> None:
+        self.topics = topics
         self._frames: deque[bytes] = deque()
         self._wake = asyncio.Event()
         self.behind = False
@@ -83,20 +72,15 @@ class Stream:
         self._listeners: set[Listener] = set()
         self._sent: dict[str, bytes] = {}
         self._frame = 0
-        self._silent_frames = 0
         self._failed_frame = -BEAT_FRAMES
         self._event_seq = 0
         self._closed = False
-        self._topics = {
-            "cars": Topic(cars_topic, 1),
-            "signals": Topic(
-                lambda picture: junction_rows(picture, city.city_map.junctions, city.plans), 2
-            ),
-            "boxes": Topic(boxes_of, 2),
-            "stop": Topic(stop_of, 2),
-            "eye": Topic(camera_rows, 2),
-            "stations": Topic(lambda picture: picture.stations, 10),
-        }
+        self._topics = topics_of(city)
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Names of all topics."""
+        return (*self._topics, EVENTS)
 
     @property
     def pages(self) -> int:
@@ -131,28 +115,36 @@ class Stream:
             self._event_seq = picture.event_seq
             return
         changed = self._changed(picture)
-        if not changed:
-            self._silent_frames += 1
-            if self._silent_frames < BEAT_FRAMES:
-                return
-        self._silent_frames = 0
-        frame = self._event("delta" if changed else "beat", changed, self._event_seq)
+        frames: dict[frozenset[str], bytes | None] = {}
         for listener in self._listeners:
-            listener.offer(frame)
+            if listener.topics not in frames:
+                frames[listener.topics] = self._frame_of(changed, listener.topics)
+            frame = frames[listener.topics]
+            if frame is not None:
+                listener.offer(frame)
 
-    async def listen(self, last_event_id: str = "") -> AsyncIterator[bytes]:
-        """Yield a page's frames: a snapshot first, and again whenever it fell behind."""
-        listener = Listener()
+    async def listen(
+        self, last_event_id: str = "", topics: Iterable[str] | None = None
+    ) -> AsyncIterator[bytes]:
+        """Yield a page's frames: a snapshot first, and again whenever it fell behind.
+
+        Args:
+            last_event_id: Of the last frame that the page saw; empty: none.
+            topics: Those that it hears, of `self.topics`; None: all.
+        """
+        listener = Listener(frozenset(self.topics if topics is None else topics))
         self._listeners.add(listener)
         try:
-            yield b"retry: 1000\n\n" + self._snapshot(self._resume_seq(last_event_id))
+            yield b"retry: 1000\n\n" + self._snapshot(
+                listener.topics, self._resume_seq(last_event_id)
+            )
             while not (self._closed or listener.closed):
                 frame = await listener.take()
                 if frame is not None:
                     yield frame
                 elif listener.behind:
                     listener.behind = False
-                    yield self._snapshot(None)
+                    yield self._snapshot(listener.topics, None)
         finally:
             self._listeners.discard(listener)
 
@@ -161,10 +153,19 @@ class Stream:
             self._failed_frame = self._frame
             _LOGGER.error("stream_frame_failed frame=%d", self._frame, exc_info=failure)
 
+    def _frame_of(self, changed: dict[str, msgspec.Raw], topics: frozenset[str]) -> bytes | None:
+        """Return a page's part of what changed; None: nothing, and no beat is due."""
+        own = {name: body for name, body in changed.items() if name in topics}
+        if own:
+            return self._event("delta", own, self._event_seq)
+        beat_is_due = self._frame % BEAT_FRAMES == 0
+        return self._event("beat", own, self._event_seq) if beat_is_due else None
+
     def _changed(self, picture: Picture) -> dict[str, msgspec.Raw]:
         changed: dict[str, msgspec.Raw] = {}
+        heard = frozenset[str]().union(*(listener.topics for listener in self._listeners))
         for name, topic in self._topics.items():
-            if self._frame % (topic.every + _crowding(name, picture)) == 0:
+            if name in heard and self._frame % (topic.every + _crowding(name, picture)) == 0:
                 body = encode(topic.make(picture))
                 if self._sent.get(name) != body:
                     self._sent[name] = body
@@ -172,17 +173,20 @@ class Stream:
         events = self._city.view.events_after(self._event_seq, EVENTS_SHOWN)
         if events:
             self._event_seq = events[-1].seq
-            changed["events"] = msgspec.Raw(encode(events))
+            changed[EVENTS] = msgspec.Raw(encode(events))
         return changed
 
-    def _snapshot(self, after_seq: int | None) -> bytes:
+    def _snapshot(self, topics: frozenset[str], after_seq: int | None) -> bytes:
         picture = self._city.view.picture()
         after_seq = max(after_seq or 0, picture.event_seq - EVENTS_SHOWN)
         events = self._city.view.events_after(after_seq, EVENTS_SHOWN)
         body = {
-            name: msgspec.Raw(encode(topic.make(picture))) for name, topic in self._topics.items()
+            name: msgspec.Raw(encode(topic.make(picture)))
+            for name, topic in self._topics.items()
+            if name in topics
         }
-        body["events"] = msgspec.Raw(encode(events))
+        if EVENTS in topics:
+            body[EVENTS] = msgspec.Raw(encode(events))
         body["run"] = msgspec.Raw(encode(self._run_id))
         return self._event("snapshot", body, events[-1].seq if events else after_seq)
 
@@ -197,6 +201,6 @@ class Stream:
 
 def _crowding(topic: str, picture: Picture) -> int:
     """Return how many frames longer a topic waits in a large city."""
-    if topic != "cars" or picture.snapshot is None:
+    if topic != "vehicles" or picture.snapshot is None:
         return 0
     return len(picture.snapshot.message.vehicles) // CARS_A_FRAME

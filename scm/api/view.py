@@ -56,6 +56,7 @@ class CityView:
         self.serves: Sequence[Serves] = ()
         self._lock = threading.Lock()
         self._now_ns = 0
+        self._picture: Picture | None = None
         self._next_forget_ns = 0
         self._snapshot: Held[WorldSnapshot] | None = None
         self._definition: WorldDefinition | None = None
@@ -103,6 +104,7 @@ class CityView:
         """Keep what came in; never answers."""
         with self._lock:
             self._now_ns = now_ns
+            self._picture = None
             for incoming in inbox:
                 taker = self._takers.get(type(incoming.message))
                 if taker is not None:
@@ -115,28 +117,34 @@ class CityView:
     def finish(self, now_ns: int) -> list[Outgoing]:
         """Leave without a word."""
         self._now_ns = now_ns
+        self._picture = None
         return []
 
     def picture(self) -> Picture:
-        """Return a copy of the present state; safe from any thread."""
+        """Return a copy of the present state, one for all until the next step; any thread may."""
         with self._lock:
-            return Picture(
-                now_ns=self._now_ns,
-                snapshot=self._snapshot,
-                definition=self._definition,
-                stop=self._stop,
-                spats=dict(self._spats),
-                monitors=dict(self._monitors),
-                trips=dict(self._trips),
-                traffic=self._traffic,
-                violations=tuple(self._violations),
-                frames={camera: tuple(frames) for camera, frames in self._frames.items()},
-                tags={camera: tuple(tags) for camera, tags in self._tags.items()},
-                eye_statuses=dict(self._eye_statuses),
-                poses=dict(self._poses),
-                stations=self._stations.rows(self._now_ns),
-                event_seq=self._log.newest_seq,
-            )
+            if self._picture is None:
+                self._picture = self._drawn()
+            return self._picture
+
+    def _drawn(self) -> Picture:
+        return Picture(
+            now_ns=self._now_ns,
+            snapshot=self._snapshot,
+            definition=self._definition,
+            stop=self._stop,
+            spats=dict(self._spats),
+            monitors=dict(self._monitors),
+            trips=dict(self._trips),
+            traffic=self._traffic,
+            violations=tuple(self._violations),
+            frames={camera: tuple(frames) for camera, frames in self._frames.items()},
+            tags={camera: tuple(tags) for camera, tags in self._tags.items()},
+            eye_statuses=dict(self._eye_statuses),
+            poses=dict(self._poses),
+            stations=self._stations.rows(self._now_ns),
+            event_seq=self._log.newest_seq,
+        )
 
     def events_after(self, seq: int, limit: int) -> tuple[LoggedEvent, ...]:
         """Return up to `limit` events numbered above `seq`, oldest first; safe from any thread."""

@@ -2,6 +2,7 @@
 
 import argparse
 import threading
+from pathlib import Path
 
 from scm.command import Command, credentials_of, part_arguments
 
@@ -16,13 +17,21 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="API keys of `scm key add`, sqlite:PATH or postgresql://...: needed to bind any "
         "address but this machine's own",
     )
+    parser.add_argument(
+        "--data",
+        metavar="FOLDER",
+        type=Path,
+        help="folder of recordings; reports, scenarios, calibrations and plans lie below it",
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.api.app import create_app
+    from scm.api.city import Link
     from scm.api.gate import check_bind
     from scm.api.keys import KeyRing
     from scm.api.server import serve
+    from scm.api.shelves import shelves_in
     from scm.api.view import CityView
     from scm.clock import WallClock
     from scm.live import run, stop_on_signal
@@ -43,6 +52,13 @@ def _run(arguments: argparse.Namespace) -> int:
             lambda request, timeout_s: ask(bus, request, timeout_s),
             city_map,
             keys=keys,
+            shelves=shelves_in(arguments.data) if arguments.data else None,
+            link=Link(
+                city=arguments.city,
+                is_connected=lambda: bus.connected,
+                rejected=lambda: bus.rejected,
+                clock=WallClock(),
+            ),
             plans={junction.name: names("scm.traffic.plans") for junction in city_map.junctions},
         )
 

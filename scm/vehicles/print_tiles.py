@@ -32,7 +32,7 @@ import numpy as np
 from scm.vehicles.jit import fetch, put, put_lane, rollout_kernel, stage
 
 # rows of `car`: those of the fleet's block, then the car's numbers, then what is worked out
-{car_rows}
+{vehicle_rows}
 # rows of each wheel in `wheel`
 {wheel_rows}
 CAR_ROWS = {car_count}
@@ -154,7 +154,7 @@ def print_tiles(title: str, program: Program, slots: Slots, columns: Sequence[st
         title=title,
         lanes=LANES,
         width=WIDTH,
-        car_rows=_named_rows(rows.car),
+        vehicle_rows=_named_rows(rows.car),
         wheel_rows=_named_rows(rows.wheel),
         car_count=len(rows.car),
         wheel_count=len(rows.wheel),

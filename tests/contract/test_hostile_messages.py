@@ -7,10 +7,10 @@ import msgspec
 import pytest
 from msgspec import inspect
 
-from scm.api.car_rows import cars_topic
 from scm.api.encoding import encode as to_json
 from scm.api.eye_rows import camera_rows
 from scm.api.signal_rows import junction_rows
+from scm.api.vehicle_rows import vehicles_topic
 from scm.api.view import CityView
 from scm.errors import MessageError
 from scm.lockstep import Lockstep
@@ -135,7 +135,7 @@ def test_no_part_stops_at_extreme_numbers(city, kind):
         running.run_for(0.02)
         picture = view.picture()
         rows = (
-            cars_topic(picture),
+            vehicles_topic(picture),
             junction_rows(picture, MAP.junctions, {}),
             camera_rows(picture),
         )

@@ -26,7 +26,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
 
 
 def cars_of(running: CityProcess) -> dict[str, Any]:
-    return {row["vehicle"]: row for row in running.get("/cars")["cars"]}
+    return {row["vehicle"]: row for row in running.get("/vehicles")["vehicles"]}
 
 
 def events_of(running: CityProcess, vehicle: str) -> list[str]:

@@ -27,7 +27,9 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
     scm("fleet", "add", "n9", "--fleet", fleet, "--role", "vehicle", "--password")
     runs = tmp_path_factory.mktemp("runs")
     with city(runs, "--fleet", str(fleet), "--hosted", "1", "--agents", "1") as process:
-        wait_for(lambda: len(process.get("/cars")["cars"]) == 2, 60.0, "two cars are on the map")
+        wait_for(
+            lambda: len(process.get("/vehicles")["vehicles"]) == 2, 60.0, "two cars are on the map"
+        )
         yield process
 
 

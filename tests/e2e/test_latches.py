@@ -17,11 +17,11 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
 
 
 def cars_of(running: CityProcess) -> dict[str, Any]:
-    return {row["vehicle"]: row for row in running.get("/cars")["cars"]}
+    return {row["vehicle"]: row for row in running.get("/vehicles")["vehicles"]}
 
 
 def tick(running: CityProcess) -> int:
-    return int(running.get("/cars")["tick"])
+    return int(running.get("/vehicles")["tick"])
 
 
 def fault(running: CityProcess) -> str | None:

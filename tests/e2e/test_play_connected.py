@@ -13,13 +13,13 @@ def test_a_car_of_a_running_city_plays_a_drive_and_goes_back_to_its_driver(tmp_p
     )
     (tmp_path / "drive.yaml").write_text("drive: 1\ncommands: a.csv\n", encoding="utf-8")
     with city(tmp_path) as running:
-        wait_for(lambda: running.get("/cars")["cars"], 20.0, "cars are on the map")
+        wait_for(lambda: running.get("/vehicles")["vehicles"], 20.0, "cars are on the map")
         arguments = ["play", str(tmp_path / "drive.yaml"), "--connect", running.endpoint]
         assert main([*arguments, "--vehicle", "n1", "--out", str(tmp_path / "out")]) == 0
         assert main([*arguments, "--vehicle", "n99", "--out", str(tmp_path / "no")]) == 2
 
         def given_back() -> bool:
-            rows = {row["vehicle"]: row for row in running.get("/cars")["cars"]}
+            rows = {row["vehicle"]: row for row in running.get("/vehicles")["vehicles"]}
             return bool(rows["n1"]["owner"] == "world")
 
         wait_for(given_back, 5.0, "the city has its car again")

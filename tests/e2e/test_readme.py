@@ -94,7 +94,7 @@ def joins(command: str, running: CityProcess, workplace: Path) -> None:
         name = command.partition("--name ")[2].split()[0]
 
         def there() -> bool:
-            return name in {row["vehicle"] for row in running.get("/cars")["cars"]}
+            return name in {row["vehicle"] for row in running.get("/vehicles")["vehicles"]}
 
         wait_for(there, 40.0, f"{name} is on the map")
     finally:

@@ -1,12 +1,20 @@
 """Construction boxes that cars can push: where they are, and back to their places."""
 
+import msgspec
 from fastapi import APIRouter, Response
 
 from scm.api.city import City, IdempotencyKey, json_response
 from scm.api.picture import Picture
 from scm.api.roles import OPERATOR, VIEWER
+from scm.api.schemas import answer
 from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
 from scm.v2x.messages.world_snapshot import SnapshotBox
+
+
+class Boxes(msgspec.Struct, kw_only=True, frozen=True):
+    """Where the boxes are that cars can push."""
+
+    boxes: tuple[SnapshotBox, ...]
 
 
 def boxes_of(picture: Picture) -> tuple[SnapshotBox, ...]:
@@ -18,12 +26,15 @@ def router(city: City) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/boxes", tags=["boxes"], dependencies=[VIEWER])
 
-    @routes.get("", summary="Where the boxes are that cars can push")
-    def boxes() -> Response:
-        return json_response({"boxes": boxes_of(city.view.picture())})
+    @routes.get("", summary="Where the boxes are that cars can push", responses=answer(Boxes))
+    async def boxes() -> Response:
+        return json_response(Boxes(boxes=boxes_of(city.view.picture())))
 
     @routes.post(
-        "/reset", summary="Put all boxes back where the map has them", dependencies=[OPERATOR]
+        "/reset",
+        summary="Put all boxes back where the map has them",
+        dependencies=[OPERATOR],
+        responses=answer(BoxesReply),
     )
     def reset(key: IdempotencyKey = "") -> Response:
         return json_response(city.ask(BoxesRequest(request_id=key, by="api"), BoxesReply))

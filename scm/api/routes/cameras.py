@@ -3,12 +3,14 @@
 import asyncio
 from collections.abc import AsyncIterator
 
+import msgspec
 from fastapi import APIRouter, Response
 from fastapi.responses import StreamingResponse
 
 from scm.api.city import City, Name, json_response, not_found
 from scm.api.problem import RefusedError
 from scm.api.roles import VIEWER
+from scm.api.schemas import answer, answer_file
 from scm.api.stream import Stream
 from scm.camera.optics import fitted
 from scm.v2x.message import Refused
@@ -19,11 +21,28 @@ PATIENCE_S = 15.0  # the first picture also paints the floor: seconds on a busy 
 BOUNDARY = "frame"
 
 
+class Cameras(msgspec.Struct, kw_only=True, frozen=True):
+    """A car's cameras.
+
+    Attributes:
+        cameras: Those that its file gives it; may be empty.
+        watched: Those whose pictures somebody looks at now.
+    """
+
+    cameras: tuple[str, ...]
+    watched: tuple[str, ...]
+
+
 def router(city: City, stream: Stream) -> APIRouter:
     """Return the routes."""
-    routes = APIRouter(prefix="/cars", tags=["cameras"], dependencies=[VIEWER])
+    routes = APIRouter(prefix="/vehicles", tags=["cameras"], dependencies=[VIEWER])
 
-    @routes.get("/{name}/camera/{camera}.jpg", summary="One picture", response_class=Response)
+    @routes.get(
+        "/{name}/camera/{camera}.jpg",
+        summary="One picture",
+        response_class=Response,
+        responses=answer_file("image/jpeg", "The newest picture; `X-Time-Ns`: of its exposure."),
+    )
     async def still(name: Name, camera: Name) -> Response:
         _check(city, name, camera)
         with city.view.watching(name, camera):
@@ -35,7 +54,14 @@ def router(city: City, stream: Stream) -> APIRouter:
                 await asyncio.sleep(LOOK_S)
         raise not_found("camera with a picture", f"{name}/{camera}")
 
-    @routes.get("/{name}/camera/{camera}/film", summary="A film", response_class=Response)
+    @routes.get(
+        "/{name}/camera/{camera}/film",
+        summary="A film",
+        response_class=Response,
+        responses=answer_file(
+            "multipart/x-mixed-replace", "JPEG pictures for as long as you read."
+        ),
+    )
     async def film(name: Name, camera: Name) -> Response:
         _check(city, name, camera)
         return StreamingResponse(
@@ -44,9 +70,13 @@ def router(city: City, stream: Stream) -> APIRouter:
             headers={"Cache-Control": "no-store"},
         )
 
-    @routes.get("/{name}/camera", summary="A car's cameras, and which are watched here")
-    def cameras(name: Name) -> Response:
-        return json_response({"cameras": _cameras(city, name), "watched": city.view.watched(name)})
+    @routes.get(
+        "/{name}/camera",
+        summary="A car's cameras, and which are watched here",
+        responses=answer(Cameras),
+    )
+    async def cameras(name: Name) -> Response:
+        return json_response(Cameras(cameras=_cameras(city, name), watched=city.view.watched(name)))
 
     return routes
 

@@ -1,34 +1,67 @@
 """API keys: who has one, and the end of one; new ones are made where the store is (`scm key`)."""
 
-from fastapi import APIRouter, Response
+from typing import Annotated
+
+import msgspec
+from fastapi import APIRouter, Path, Response
 
 from scm.api.city import json_response, not_found
-from scm.api.keys import KeyRing
-from scm.api.roles import ADMIN
+from scm.api.keys import KeyRecord, KeyRing
+from scm.api.roles import ADMIN, Role
+from scm.api.schemas import answer
 from scm.errors import AccessError
+
+
+class KeyRow(msgspec.Struct, kw_only=True, frozen=True):
+    """An API key without its secret.
+
+    Attributes:
+        id: Public part of the key.
+        owner: Whose it is.
+        made_s: When it was made, seconds since 1970.
+    """
+
+    id: str
+    owner: str
+    role: Role
+    made_s: int
+
+
+class AllKeys(msgspec.Struct, kw_only=True, frozen=True):
+    """All API keys.
+
+    Attributes:
+        keys: By their id.
+    """
+
+    keys: tuple[KeyRow, ...]
 
 
 def router(keys: KeyRing | None) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/keys", tags=["keys"], dependencies=[ADMIN])
 
-    @routes.get("", summary="All API keys, without their secrets")
+    @routes.get("", summary="All API keys, without their secrets", responses=answer(AllKeys))
     def all_keys() -> Response:
         found = () if keys is None else keys.records()
-        rows = [
-            {"id": one.key_id, "owner": one.owner, "role": one.role, "made_s": one.made_s}
-            for one in found
-        ]
-        return json_response({"keys": rows})
+        return json_response(AllKeys(keys=tuple(_row(one) for one in found)))
 
-    @routes.delete("/{key_id}", summary="End an API key at once")
-    def revoke(key_id: str) -> Response:
+    @routes.delete("/{key_id}", summary="End an API key at once", responses=answer(KeyRow))
+    def revoke(
+        key_id: Annotated[
+            str, Path(max_length=64, description="public part of the key", examples=["1f0c9a2e"])
+        ],
+    ) -> Response:
         if keys is None:
             raise not_found("key", key_id)
         try:
             ended = keys.revoke(key_id)
         except AccessError as cause:
             raise not_found("key", key_id) from cause
-        return json_response({"id": ended.key_id, "owner": ended.owner, "role": ended.role})
+        return json_response(_row(ended))
 
     return routes
+
+
+def _row(one: KeyRecord) -> KeyRow:
+    return KeyRow(id=one.key_id, owner=one.owner, role=one.role, made_s=one.made_s)

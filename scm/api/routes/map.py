@@ -7,7 +7,9 @@ from fastapi import APIRouter, Request, Response
 
 from scm.api.city import City
 from scm.api.roles import VIEWER
+from scm.api.schemas import answer, answer_file
 from scm.maps.draw import draw_svg
+from scm.maps.model import CityMap
 
 
 class SvgResponse(Response):
@@ -22,12 +24,17 @@ def router(city: City) -> APIRouter:
     as_json = msgspec.json.encode(city.city_map)
     as_svg = draw_svg(city.city_map, movable=False).encode()  # the page draws those live
 
-    @routes.get("/map", summary="The map as JSON")
-    def map_json(request: Request) -> Response:
+    @routes.get("/map", summary="The map as JSON", responses=answer(CityMap))
+    async def map_json(request: Request) -> Response:
         return _tagged(request, as_json, "application/json")
 
-    @routes.get("/map.svg", summary="The map drawn", response_class=SvgResponse)
-    def map_svg(request: Request) -> Response:
+    @routes.get(
+        "/map.svg",
+        summary="The map drawn",
+        response_class=SvgResponse,
+        responses=answer_file("image/svg+xml", "The drawing, a metre a unit."),
+    )
+    async def map_svg(request: Request) -> Response:
         return _tagged(request, as_svg, "image/svg+xml")
 
     return routes

@@ -1,30 +1,58 @@
 """Misbehaviour: what is held against each station that speaks, and reports with evidence."""
 
+import msgspec
 from fastapi import APIRouter, Response
 
 from scm.api.city import City, Name, json_response, not_found
 from scm.api.roles import VIEWER
+from scm.api.schemas import answer
+from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
+from scm.v2x.messages.misbehaviour_scores import StationScore
+
+
+class Misbehaviour(msgspec.Struct, kw_only=True, frozen=True):
+    """What is held against those who speak on the air.
+
+    Attributes:
+        watched: Whether a misbehaviour part is there at all.
+        witness: Whether an Eye is there to hold claims against.
+        t_ns: Of these scores; None: there are none.
+        stations: With the score of each.
+        reported: Names of those with a report against them.
+    """
+
+    watched: bool
+    witness: bool
+    t_ns: int | None
+    stations: tuple[StationScore, ...]
+    reported: tuple[str, ...]
 
 
 def router(city: City) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/misbehaviour", tags=["misbehaviour"], dependencies=[VIEWER])
 
-    @routes.get("", summary="Scores of all stations, and who is reported")
-    def scores() -> Response:
+    @routes.get(
+        "", summary="Scores of all stations, and who is reported", responses=answer(Misbehaviour)
+    )
+    async def scores() -> Response:
         held, reports = city.view.misbehaviour()
         told = None if held is None else held.message
-        body = {
-            "watched": told is not None,
-            "witness": told is not None and told.witness,
-            "t_ns": None if told is None else told.t_ns,
-            "stations": () if told is None else told.stations,
-            "reported": sorted(reports),
-        }
+        body = Misbehaviour(
+            watched=told is not None,
+            witness=told is not None and told.witness,
+            t_ns=None if told is None else told.t_ns,
+            stations=() if told is None else told.stations,
+            reported=tuple(sorted(reports)),
+        )
         return json_response(body)
 
-    @routes.get("/{name}", summary="The newest report on a station, with its evidence")
-    def report(name: Name) -> Response:
+    @routes.get(
+        "/{name}",
+        summary="The newest report on a station, with its evidence",
+        responses=answer(MisbehaviourReport),
+    )
+    async def report(name: Name) -> Response:
         found = city.view.misbehaviour()[1].get(name)
         if found is None:
             raise not_found("report on a station", name)

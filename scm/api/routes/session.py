@@ -1,23 +1,42 @@
 """Who is calling; and a cookie for pages, whose event stream and pictures cannot send a header."""
 
+import msgspec
 from fastapi import APIRouter, Request, Response
 
 from scm.api.city import json_response
 from scm.api.gate import COOKIE
-from scm.api.roles import VIEWER
+from scm.api.roles import VIEWER, Role
+from scm.api.schemas import answer
+
+
+class Session(msgspec.Struct, kw_only=True, frozen=True):
+    """Who is calling.
+
+    Attributes:
+        owner: Whose key it is; without keys: `this machine`.
+    """
+
+    owner: str
+    role: Role
+
+
+class Ended(msgspec.Struct, kw_only=True, frozen=True):
+    """The cookie is forgotten: nothing more to say."""
 
 
 def router() -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/session", tags=["session"], dependencies=[VIEWER])
 
-    @routes.get("", summary="Who this key says you are")
-    def session(request: Request) -> Response:
-        return json_response({"owner": request.scope["scm_owner"], "role": _role(request)})
+    @routes.get("", summary="Who this key says you are", responses=answer(Session))
+    async def session(request: Request) -> Response:
+        return json_response(_session(request))
 
-    @routes.put("", summary="Keep this key as a cookie, good for reading")
-    def begin(request: Request) -> Response:
-        response = json_response({"owner": request.scope["scm_owner"], "role": _role(request)})
+    @routes.put(
+        "", summary="Keep this key as a cookie, good for reading", responses=answer(Session)
+    )
+    async def begin(request: Request) -> Response:
+        response = json_response(_session(request))
         key = request.scope["scm_key"]
         if key:
             secure = request.url.scheme == "https"
@@ -26,14 +45,14 @@ def router() -> APIRouter:
             )
         return response
 
-    @routes.delete("", summary="Forget the cookie")
-    def end() -> Response:
-        response = json_response({})
+    @routes.delete("", summary="Forget the cookie", responses=answer(Ended))
+    async def end() -> Response:
+        response = json_response(Ended())
         response.delete_cookie(COOKIE, path="/api")
         return response
 
     return routes
 
 
-def _role(request: Request) -> str:
-    return str(request.scope["scm_role"])
+def _session(request: Request) -> Session:
+    return Session(owner=request.scope["scm_owner"], role=request.scope["scm_role"])

@@ -2,30 +2,54 @@
 
 from typing import Annotated
 
+import msgspec
 from fastapi import APIRouter, Query, Response
 
 from scm.api.city import City, json_response, not_found
 from scm.api.roles import VIEWER
+from scm.api.schemas import answer
+from scm.v2x.messages.traffic_counts import TrafficCounts
+from scm.v2x.messages.violation import Violation
+
+
+class Violations(msgspec.Struct, kw_only=True, frozen=True):
+    """Broken rules.
+
+    Attributes:
+        violations: Newest first.
+    """
+
+    violations: tuple[Violation, ...]
 
 
 def router(city: City) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/traffic", tags=["traffic"], dependencies=[VIEWER])
 
-    @routes.get("", summary="Counts, delays, queues and level of service")
-    def counts() -> Response:
+    @routes.get(
+        "", summary="Counts, delays, queues and level of service", responses=answer(TrafficCounts)
+    )
+    async def counts() -> Response:
         held = city.view.picture().traffic
         if held is None:
             raise not_found("station", "observer")
         return json_response(held.message)
 
-    @routes.get("/violations", summary="Violations, newest first, with their evidence")
-    def violations(
-        vehicle: Annotated[str, Query(max_length=32, description="of this car alone")] = "",
-        limit: Annotated[int, Query(ge=1, le=500)] = 100,
+    @routes.get(
+        "/violations",
+        summary="Violations, newest first, with their evidence",
+        responses=answer(Violations),
+    )
+    async def violations(
+        vehicle: Annotated[
+            str, Query(max_length=32, description="of this car alone", examples=["n1"])
+        ] = "",
+        limit: Annotated[
+            int, Query(ge=1, le=500, description="how many at most", examples=[100])
+        ] = 100,
     ) -> Response:
         told = reversed(city.view.picture().violations)
         found = [one for one in told if vehicle in ("", one.vehicle)]
-        return json_response({"violations": found[:limit]})
+        return json_response(Violations(violations=tuple(found[:limit])))
 
     return routes

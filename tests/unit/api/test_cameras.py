@@ -42,7 +42,7 @@ def test_a_still_picture_is_the_next_one_that_comes(app, client, view, hear, sna
     hear(1.0, snapshot(n1=(0.0, 0.0, 0.0)))
     with view.watching("n1", "front"):
         hear(1.1, frame(5))
-        answer = client("GET", f"{API}/cars/n1/camera/front.jpg")
+        answer = client("GET", f"{API}/vehicles/n1/camera/front.jpg")
     assert answer.content == b"jpeg"
     assert answer.headers["content-type"] == "image/jpeg"
     assert answer.headers["x-time-ns"] == "5"
@@ -55,7 +55,7 @@ def test_a_still_picture_is_the_next_one_that_comes(app, client, view, hear, sna
 )
 def test_a_camera_that_is_not_there_is_refused(client, hear, snapshot, path, status):
     hear(1.0, snapshot(n1=(0.0, 0.0, 0.0)))
-    answer = client("GET", f"{API}/cars/{path}")
+    answer = client("GET", f"{API}/vehicles/{path}")
     assert answer.status_code == status
     assert answer.headers["content-type"] == "application/problem+json"
 
@@ -65,9 +65,9 @@ def test_a_camera_that_the_car_lacks_is_refused_with_those_it_has(client, hear, 
     nigel, other = both.vehicles
     dart = msgspec.structs.replace(other, car="dart")
     hear(1.0, msgspec.structs.replace(both, vehicles=(nigel, dart)))
-    top = client("GET", f"{API}/cars/n1/camera/top/film").json()
+    top = client("GET", f"{API}/vehicles/n1/camera/top/film").json()
     assert top["detail"] == "there is no camera named 'top': n1 has cameras front and rear"
-    front = client("GET", f"{API}/cars/n2/camera/front.jpg")
+    front = client("GET", f"{API}/vehicles/n2/camera/front.jpg")
     assert front.status_code == 404
     assert front.json()["detail"] == "there is no camera named 'front': n2 has no cameras"
 
@@ -75,10 +75,10 @@ def test_a_camera_that_the_car_lacks_is_refused_with_those_it_has(client, hear, 
 def test_a_car_tells_its_cameras_and_which_are_watched(client, view, hear, snapshot):
     hear(1.0, snapshot(n1=(0.0, 0.0, 0.0)))
     with view.watching("n1", "rear"):
-        answer = client("GET", f"{API}/cars/n1/camera").json()
+        answer = client("GET", f"{API}/vehicles/n1/camera").json()
     assert answer == {"cameras": ["front", "rear"], "watched": ["rear"]}
-    assert client("GET", f"{API}/cars/n1").json()["cameras"] == ["front", "rear"]
-    assert client("GET", f"{API}/cars/n9/camera").status_code == 404
+    assert client("GET", f"{API}/vehicles/n1").json()["cameras"] == ["front", "rear"]
+    assert client("GET", f"{API}/vehicles/n9/camera").status_code == 404
 
 
 class _City:

@@ -70,7 +70,7 @@ class TestWithoutKey:
         "url", ["http://evil.example:8000", "http://127.0.0.1.evil.example", "http://10.0.0.1"]
     )
     def test_a_page_that_renamed_itself_to_us_may_not_even_read(self, app, client_of, url):
-        response = client_of(app, url)("GET", "/api/v1/cars")
+        response = client_of(app, url)("GET", "/api/v1/vehicles")
         assert (response.status_code, response.json()["code"]) == (403, "host")
 
     @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ class TestWithoutKey:
 
     def test_a_form_of_another_site_cannot_pass_as_json(self, client, fake_city):
         headers = {"Content-Type": "text/plain"}
-        response = client("POST", "/api/v1/cars", content=b"{}", headers=headers)
+        response = client("POST", "/api/v1/vehicles", content=b"{}", headers=headers)
         assert response.status_code == 422
         assert fake_city.asked == []
 
@@ -103,7 +103,7 @@ class TestWithKeys:
     def test_what_tells_nothing_of_the_city_is_open(self, keyed_app, client_of, path):
         assert client_of(keyed_app, "http://city.example")("GET", path).status_code == 200
 
-    @pytest.mark.parametrize("path", ["/api/v1/cars", "/api/v1/stream", "/api/v1/keys"])
+    @pytest.mark.parametrize("path", ["/api/v1/vehicles", "/api/v1/stream", "/api/v1/keys"])
     def test_nobody_reads_without_a_key(self, keyed_app, client_of, path):
         response = client_of(keyed_app)("GET", path)
         assert (response.status_code, response.json()["code"]) == (401, "unauthorised")
@@ -122,7 +122,7 @@ class TestWithKeys:
     @pytest.mark.parametrize(
         ("method", "path", "body", "least"),
         [
-            ("GET", "/api/v1/cars", None, "viewer"),
+            ("GET", "/api/v1/vehicles", None, "viewer"),
             ("PUT", STOP, {"engaged": True}, "operator"),
             ("POST", "/api/v1/signals/crossing/monitor/reset", {"reason": "seen"}, "engineer"),
             ("GET", "/api/v1/keys", None, "admin"),
@@ -155,7 +155,7 @@ class TestWithKeys:
         path = f"/api/v1/keys/{other.split('_')[1]}"
         assert client("DELETE", path, headers=bearer(admin)).status_code == 200
         assert client("DELETE", path, headers=bearer(admin)).status_code == 404
-        assert client("GET", "/api/v1/cars", headers=bearer(other)).status_code == 401
+        assert client("GET", "/api/v1/vehicles", headers=bearer(other)).status_code == 401
 
     def test_a_page_reads_with_a_cookie_and_changes_with_its_key_alone(
         self, keyed_app, client_of, key_of, fake_city
@@ -165,7 +165,7 @@ class TestWithKeys:
         cookie = begun.headers["set-cookie"]
         assert {"HttpOnly", "SameSite=strict", "Path=/api"} <= set(cookie.split("; "))
         with_cookie = {"Cookie": cookie.split(";")[0]}
-        assert client("GET", "/api/v1/cars", headers=with_cookie).status_code == 200
+        assert client("GET", "/api/v1/vehicles", headers=with_cookie).status_code == 200
         who = client("GET", "/api/v1/session", headers=with_cookie).json()
         assert who == {"owner": "anna", "role": "operator"}
         assert put_stop(client, **with_cookie).status_code == 401
@@ -192,7 +192,7 @@ def call_from(app, address, headers):
     async def call():
         transport = httpx.ASGITransport(app, client=(address, 1))
         async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1") as client:
-            return await client.get("/api/v1/cars", headers=headers)
+            return await client.get("/api/v1/vehicles", headers=headers)
 
     return asyncio.run(call())
 
@@ -219,7 +219,9 @@ def test_every_route_names_its_least_role_and_no_change_is_for_viewers(app):
         assert max(roles) >= least, route.path
 
 
-@pytest.mark.parametrize("path", ["/", "/docs", "/api/v1/cars", "/nothing", "/static/js/app.js"])
+@pytest.mark.parametrize(
+    "path", ["/", "/docs", "/api/v1/vehicles", "/nothing", "/static/js/app.js"]
+)
 def test_every_answer_carries_the_security_headers(client, path):
     headers = client("GET", path).headers
     policy = headers["content-security-policy"]

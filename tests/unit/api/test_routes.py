@@ -31,36 +31,36 @@ def is_problem(response, status, code):
 class TestCars:
     def test_all_cars_are_listed(self, client, hear, snapshot):
         hear(1.0, snapshot(n1=(0.1, 0.2, 0.3), n2=(0.0, 0.0, 0.0)))
-        body = client("GET", f"{API}/cars").json()
-        assert [car["vehicle"] for car in body["cars"]] == ["n1", "n2"]
-        assert body["cars"][0]["yaw_rad"] == 0.3
+        body = client("GET", f"{API}/vehicles").json()
+        assert [car["vehicle"] for car in body["vehicles"]] == ["n1", "n2"]
+        assert body["vehicles"][0]["yaw_rad"] == 0.3
 
     def test_one_car_is_found_by_name(self, client, hear, snapshot):
         hear(1.0, snapshot(n1=(0.1, 0.2, 0.3)))
-        assert client("GET", f"{API}/cars/n1").json()["x_m"] == 0.1
+        assert client("GET", f"{API}/vehicles/n1").json()["x_m"] == 0.1
 
     def test_a_car_that_is_not_there_is_not_found(self, client):
-        body = is_problem(client("GET", f"{API}/cars/n1"), 404, "not_found")
+        body = is_problem(client("GET", f"{API}/vehicles/n1"), 404, "not_found")
         assert "n1" in body["detail"]
-        assert body["instance"] == f"{API}/cars/n1"
+        assert body["instance"] == f"{API}/vehicles/n1"
 
     def test_a_name_that_no_key_could_carry_is_invalid(self, client):
-        is_problem(client("GET", f"{API}/cars/N 1"), 422, "invalid")
+        is_problem(client("GET", f"{API}/vehicles/N 1"), 422, "invalid")
 
     def test_spawning_asks_the_world_and_says_where_to_look(self, client, fake_city):
         reply = SpawnReply(vehicle="n5", x_m=1.0, y_m=2.0, yaw_rad=0.0, tag_id=5)
         fake_city.answers[SpawnRequest] = reply
         response = client(
-            "POST", f"{API}/cars", json={"car": "dart"}, headers={"Idempotency-Key": "k1"}
+            "POST", f"{API}/vehicles", json={"car": "dart"}, headers={"Idempotency-Key": "k1"}
         )
         assert response.status_code == 201
-        assert response.headers["location"] == f"{API}/cars/n5"
+        assert response.headers["location"] == f"{API}/vehicles/n5"
         assert response.json()["tag_id"] == 5
         assert fake_city.asked == [SpawnRequest(request_id="k1", car="dart")]
 
     def test_removing_passes_the_reason_on(self, client, fake_city):
         fake_city.answers[RemoveRequest] = RemoveReply(vehicle="n5")
-        response = client("DELETE", f"{API}/cars/n5?reason=tidy")
+        response = client("DELETE", f"{API}/vehicles/n5?reason=tidy")
         assert response.json() == {"vehicle": "n5"}
         assert fake_city.asked == [RemoveRequest(vehicle="n5", reason="tidy")]
 
@@ -69,7 +69,7 @@ class TestCars:
             vehicle="n5", trip_id="t1", route=("a", "b"), length_m=3.0
         )
         body = {"via": ["a", "b"], "laps": 2, "speed_mps": 0.2}
-        response = client("POST", f"{API}/cars/n5/route", json=body)
+        response = client("POST", f"{API}/vehicles/n5/route", json=body)
         assert response.json()["route"] == ["a", "b"]
         assert fake_city.asked == [
             RouteRequest(vehicle="n5", via=("a", "b"), laps=2, speed_mps=0.2)
@@ -79,7 +79,7 @@ class TestCars:
         "body", [{"laps": 0}, {"speed_mps": -1}, {"via": "a"}, {"vias": ["a"]}, {"laps": "two"}]
     )
     def test_a_wrong_route_is_refused_before_anybody_is_asked(self, client, fake_city, body):
-        problem = is_problem(client("POST", f"{API}/cars/n5/route", json=body), 422, "invalid")
+        problem = is_problem(client("POST", f"{API}/vehicles/n5/route", json=body), 422, "invalid")
         (field,) = body
         assert problem["errors"][0]["where"] == f"body.{field}"
         assert problem["errors"][0]["expected"]
@@ -89,18 +89,18 @@ class TestCars:
         fake_city.answers[LightRequest] = LightReply(
             vehicle="n5", headlights="low", indicators="off"
         )
-        response = client("PUT", f"{API}/cars/n5/lights", json={"headlights": "low"})
+        response = client("PUT", f"{API}/vehicles/n5/lights", json={"headlights": "low"})
         assert response.json()["headlights"] == "low"
         assert fake_city.asked == [LightRequest(vehicle="n5", headlights="low")]
 
     def test_a_light_that_does_not_exist_is_refused(self, client, fake_city):
-        response = client("PUT", f"{API}/cars/n5/lights", json={"indicators": "up"})
+        response = client("PUT", f"{API}/vehicles/n5/lights", json={"indicators": "up"})
         is_problem(response, 422, "invalid")
         assert fake_city.asked == []
 
     def test_what_is_not_json_is_a_problem_too(self, client):
         headers = {"Content-Type": "application/json"}
-        response = client("POST", f"{API}/cars", content=b"{", headers=headers)
+        response = client("POST", f"{API}/vehicles", content=b"{", headers=headers)
         is_problem(response, 422, "invalid")
 
 
@@ -118,22 +118,22 @@ class TestRefusals:
     )
     def test_the_city_s_no_becomes_a_problem(self, client, fake_city, code, status):
         fake_city.answers[RemoveRequest] = Refused(code=code, detail="because")
-        body = is_problem(client("DELETE", f"{API}/cars/n5"), status, code)
+        body = is_problem(client("DELETE", f"{API}/vehicles/n5"), status, code)
         assert body["detail"] == "because"
 
     def test_a_reply_of_the_wrong_kind_is_a_problem(self, client, fake_city):
         fake_city.answers[RemoveRequest] = CityStop(t_ns=0, engaged=False)
-        is_problem(client("DELETE", f"{API}/cars/n5"), 409, "invalid_reply")
+        is_problem(client("DELETE", f"{API}/vehicles/n5"), 409, "invalid_reply")
 
     def test_a_path_that_does_not_exist_is_a_problem(self, client):
         is_problem(client("GET", f"{API}/nothing"), 404, "not_found")
 
     def test_a_method_that_is_not_offered_is_a_problem(self, client):
-        is_problem(client("PATCH", f"{API}/cars"), 405, "method_not_allowed")
+        is_problem(client("PATCH", f"{API}/vehicles"), 405, "method_not_allowed")
 
     def test_our_own_failure_is_a_problem_that_tells_no_secrets(self, client, fake_city):
         fake_city.answers = None  # asking it is a bug of ours now
-        body = is_problem(client("DELETE", f"{API}/cars/n5"), 500, "internal")
+        body = is_problem(client("DELETE", f"{API}/vehicles/n5"), 500, "internal")
         assert "NoneType" not in body["detail"]
 
 
@@ -239,7 +239,7 @@ class TestMap:
 class TestEye:
     def test_a_frame_is_the_jpeg_that_came(self, client, hear):
         hear(1.0, EyeFrame(camera="overhead", t_ns=7, width_px=4, height_px=3, payload=b"jpeg"))
-        response = client("GET", f"{API}/eye/overhead/frame.jpg")
+        response = client("GET", f"{API}/eye/cameras/overhead/frame.jpg")
         assert response.content == b"jpeg"
         assert response.headers["content-type"] == "image/jpeg"
         assert response.headers["x-time-ns"] == "7"
@@ -248,11 +248,11 @@ class TestEye:
 
     def test_tags_are_those_that_came(self, client, hear):
         hear(1.0, EyeTags(camera="overhead", t_ns=7, tags=(), latency_ms=20.0))
-        assert client("GET", f"{API}/eye/overhead/tags").json()["latency_ms"] == 20.0
+        assert client("GET", f"{API}/eye/cameras/overhead/tags").json()["latency_ms"] == 20.0
 
     @pytest.mark.parametrize("what", ["frame.jpg", "tags"])
     def test_a_camera_never_heard_is_not_found(self, client, what):
-        is_problem(client("GET", f"{API}/eye/overhead/{what}"), 404, "not_found")
+        is_problem(client("GET", f"{API}/eye/cameras/overhead/{what}"), 404, "not_found")
 
 
 class TestRest:
@@ -282,6 +282,6 @@ class TestRest:
 
     def test_every_route_is_described(self, client):
         paths = client("GET", f"{API}/openapi.json").json()["paths"]
-        assert {"/api/v1/cars", "/api/v1/stop", "/api/v1/stream", "/readyz"} <= set(paths)
+        assert {"/api/v1/vehicles", "/api/v1/stop", "/api/v1/stream", "/readyz"} <= set(paths)
         for methods in paths.values():
             assert all(route["summary"] for route in methods.values())

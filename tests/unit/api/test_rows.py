@@ -1,8 +1,8 @@
 import pytest
 
-from scm.api.car_rows import cars_topic
 from scm.api.eye_rows import camera_rows, frame_of, tags_of
 from scm.api.signal_rows import junction_rows
+from scm.api.vehicle_rows import vehicles_topic
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import Complaint, EyeStatus
@@ -28,13 +28,13 @@ def junction(view, city_map, plans=None):
 
 class TestCars:
     def test_before_the_world_speaks_nothing_is_known(self, view):
-        topic = cars_topic(view.picture())
-        assert (topic.t_ns, topic.tick, topic.cars) == (None, None, ())
+        topic = vehicles_topic(view.picture())
+        assert (topic.t_ns, topic.tick, topic.vehicles) == (None, None, ())
 
     def test_cars_come_by_name_with_an_age_that_grows_with_the_snapshot(self, view, hear, snapshot):
         hear(1.0, snapshot(n2=(1.0, 0.0, 0.0), n1=(0.0, 0.0, 0.0)))
         hear(1.25)
-        cars = cars_topic(view.picture()).cars
+        cars = vehicles_topic(view.picture()).vehicles
         assert [(car.vehicle, car.age_ms) for car in cars] == [("n1", 250.0), ("n2", 250.0)]
 
     def test_a_trip_is_shown_until_it_has_not_been_told_for_ten_seconds(self, view, hear, snapshot):
@@ -49,10 +49,10 @@ class TestCars:
             waiting_for="signal",
         )
         hear(1.0, trip, snapshot(n1=(0.0, 0.0, 0.0)))
-        (car,) = cars_topic(view.picture()).cars
+        (car,) = vehicles_topic(view.picture()).vehicles
         assert (car.trip.done_m, car.trip.length_m, car.trip.waiting_for) == (1.23, 7.0, "signal")
         hear(12.0, snapshot(n1=(0.0, 0.0, 0.0)))
-        assert cars_topic(view.picture()).cars[0].trip is None
+        assert vehicles_topic(view.picture()).vehicles[0].trip is None
 
     def test_the_residual_of_the_eye_stands_beside_its_car(self, view, hear, snapshot):
         hear(1.0, snapshot(1.0, n1=(0.0, 0.0, 0.0), n2=(1.0, 0.0, 0.0)))
@@ -67,11 +67,11 @@ class TestCars:
             covariance=(0.0,) * 9,
         )
         hear(1.1, pose)
-        first, second = cars_topic(view.picture()).cars
+        first, second = vehicles_topic(view.picture()).vehicles
         assert first.eye.position_mm == 2.0
         assert second.eye is None
         hear(3.5)
-        assert cars_topic(view.picture()).cars[0].eye is None
+        assert vehicles_topic(view.picture()).vehicles[0].eye is None
 
 
 class TestSignals:

@@ -58,9 +58,9 @@ def test_a_page_over_a_real_socket_gets_a_snapshot_and_then_deltas(app, hear, sn
         hear(1.0, snapshot(n1=(0.5, 0.0, 0.0)))
         for name, body in events:
             assert name == "delta"
-            if "cars" in body and body["cars"]["cars"]:
+            if "vehicles" in body and body["vehicles"]["vehicles"]:
                 break
-        assert body["cars"]["cars"][0]["x_m"] == 0.5
+        assert body["vehicles"]["vehicles"][0]["x_m"] == 0.5
 
 
 def test_it_stops_within_a_second_even_while_a_page_listens(app):

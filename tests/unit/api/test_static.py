@@ -4,10 +4,11 @@ import re
 
 import pytest
 
-from scm.api.app import STATIC_DIR
+from scm.api.app import PAGES, STATIC_DIR
 
-OURS = sorted((STATIC_DIR / "js").glob("*.js"))
-PAGES = sorted(STATIC_DIR.glob("*.html"))
+OURS = sorted((STATIC_DIR / "js").rglob("*.js"))
+STYLES = sorted((STATIC_DIR / "css").rglob("*.css"))
+DOCUMENTS = sorted(STATIC_DIR.glob("*.html"))
 
 
 def test_vendored_modules_are_what_the_table_says():
@@ -28,30 +29,43 @@ def test_no_script_writes_markup_from_data(path):
         assert danger not in text
 
 
-@pytest.mark.parametrize("path", [*OURS, *PAGES, *STATIC_DIR.glob("css/*.css")], ids=str)
+@pytest.mark.parametrize("path", [*OURS, *DOCUMENTS, *STYLES], ids=str)
 def test_nothing_of_ours_points_to_another_host(path):
     assert not re.search(r"(?:https?:)?//[a-z0-9-]+\.[a-z]", path.read_text("utf-8"))
 
 
 @pytest.mark.parametrize("path", OURS, ids=lambda path: path.name)
 def test_every_import_leads_to_a_file(path):
-    (page,) = [page for page in PAGES if page.name == "index.html"]
+    (page,) = [page for page in DOCUMENTS if page.name == "index.html"]
     mapping = json.loads(
         re.search(r"<script type=\"importmap\">(.*?)</script>", page.read_text("utf-8"), re.DOTALL)[
             1
         ]
     )["imports"]
-    for target in re.findall(r'from "([^"]+)"', path.read_text("utf-8")):
-        if target.startswith("./"):
-            assert (path.parent / target).is_file(), target
+    for target in re.findall(r'(?:from|import\() ?"([^"]+)"', path.read_text("utf-8")):
+        if target.startswith("scm/"):
+            assert (STATIC_DIR / "js" / target.removeprefix("scm/")).is_file(), target
         else:
             assert (STATIC_DIR / mapping[target].removeprefix("/static/")).is_file(), target
+
+
+def test_every_page_of_the_bar_has_an_address_and_a_style_sheet():
+    index = (STATIC_DIR / "js" / "pages" / "index.js").read_text("utf-8")
+    assert tuple(re.findall(r'name: "([a-z]+)"', index)) == PAGES
+    for name in PAGES:
+        assert (STATIC_DIR / "css" / "pages" / f"{name}.css").is_file(), name
+
+
+@pytest.mark.parametrize("page", ["", *PAGES, "vehicles/n1"])
+def test_every_page_is_served_at_its_own_address(client, page):
+    answer = client("GET", f"/{page}")
+    assert (answer.status_code, answer.headers["content-type"][:9]) == (200, "text/html")
 
 
 def test_both_pages_have_the_same_inline_script_so_one_policy_fits():
     scripts = {
         re.search(r"<script type=\"importmap\">.*?</script>", page.read_text("utf-8"), re.DOTALL)[0]
-        for page in PAGES
+        for page in DOCUMENTS
     }
     assert len(scripts) == 1
 

@@ -28,9 +28,9 @@ def test_a_page_first_gets_everything(stream, hear, snapshot, event):
         _, (name, _, body) = await begin(stream)
         assert name == "snapshot"
         assert set(body) == {
-            "cars", "signals", "boxes", "stop", "eye", "stations", "events", "run",
+            "vehicles", "pulse", "signals", "boxes", "stop", "eye", "stations", "events", "run",
         }  # fmt: skip
-        assert body["cars"]["cars"][0]["vehicle"] == "n1"
+        assert body["vehicles"]["vehicles"][0]["vehicle"] == "n1"
         assert [item["text"] for item in body["events"]] == ["hello"]
 
     asyncio.run(scenario())
@@ -46,9 +46,9 @@ def test_then_it_gets_only_what_changed(stream, hear, snapshot):
         tick = None
         while tick != 2:
             name, _, body = parsed(await anext(page))
-            tick = body["cars"]["tick"] if "cars" in body else None
+            tick = body["vehicles"]["tick"] if "vehicles" in body else None
         assert name == "delta"
-        assert set(body) == {"cars"}
+        assert set(body) == {"vehicles"}
 
     asyncio.run(scenario())
 
@@ -120,11 +120,11 @@ def test_a_page_too_slow_gets_a_new_snapshot_instead_of_a_backlog(stream, hear, 
             stream.send_frame()
         name, _, body = parsed(await anext(page))
         assert name == "snapshot"
-        assert body["cars"]["tick"] == QUEUE_DEPTH + 4
+        assert body["vehicles"]["tick"] == QUEUE_DEPTH + 4
         hear(1.0, snapshot(tick=99))
         stream.send_frame()
         name, _, body = parsed(await anext(page))
-        assert (name, body["cars"]["tick"]) == ("delta", 99)
+        assert (name, body["vehicles"]["tick"]) == ("delta", 99)
 
     asyncio.run(scenario())
 
@@ -186,7 +186,7 @@ def test_a_frame_that_fails_does_not_end_the_stream(stream, view, caplog, monkey
 
 def test_a_listener_behind_takes_no_more_until_it_was_told():
     async def scenario():
-        listener = Listener()
+        listener = Listener(frozenset())
         for _ in range(QUEUE_DEPTH + 1):
             listener.offer(b"x")
         listener.offer(b"y")
@@ -207,7 +207,7 @@ def test_a_large_citys_cars_come_in_every_fifth_frame_only(stream, hear, snapsho
             if tick % 10 == 9:  # as a page that keeps up
                 while page_frames(stream):
                     _, _, body = parsed(await anext(page))
-                    told += "cars" in body
+                    told += "vehicles" in body
         assert told == 10
 
     def page_frames(stream):

@@ -1,44 +1,14 @@
-/** The dashboard: lays out the panels and starts the store. */
+/** The dashboard: the shell with its pages, and the store behind them. */
 import { render } from "preact";
-import { html } from "./html.js";
-import { CarPanel, chosenCar } from "./car_panel.js";
-import { CarsTable } from "./cars_table.js";
-import { EventFeed } from "./event_feed.js";
-import { EyePanel } from "./eye_panel.js";
-import { MapPanel } from "./map_panel.js";
-import { KeyDialog, Notices } from "./notices.js";
-import { SignalsPanel } from "./signals_panel.js";
-import { StationsPanel } from "./stations_panel.js";
-import { Banners, TitleBar } from "./title_bar.js";
-import { link, start } from "./store.js";
+import { html } from "scm/shared/html.js";
+import { PAGES } from "scm/pages/index.js";
+import { pagesAre } from "scm/shell/router.js";
+import { Shell } from "scm/shell/shell.js";
+import { start } from "scm/shell/store.js";
+import "scm/shell/theme.js";
 
-function Dashboard() {
-  const car = chosenCar();
-  return html`
-    <div class="page" data-link=${link.value}>
-      <${TitleBar} />
-      <${Banners} />
-      <main>
-        <div class="wide">
-          <${MapPanel} />
-          <div class="below">
-            <${CarsTable} />
-            <${EventFeed} />
-          </div>
-        </div>
-        <div class="side">
-          <${SignalsPanel} />
-          ${car ? html`<${CarPanel} car=${car} />` : html`<${EyePanel} />`}
-          <${StationsPanel} />
-        </div>
-      </main>
-      <${Notices} />
-      <${KeyDialog} />
-    </div>
-  `;
-}
-
+pagesAre(PAGES.map((page) => page.name));
 const root = document.getElementById("app");
 root.replaceChildren();
-render(html`<${Dashboard} />`, root);
+render(html`<${Shell} />`, root);
 start();

@@ -1,6 +1,6 @@
 /** Lists the routes of openapi.json, without anything from elsewhere. */
 import { render } from "preact";
-import { html } from "./html.js";
+import { html } from "scm/shared/html.js";
 
 function Route({ path, method, route, schemas }) {
   const body = route.requestBody?.content?.["application/json"]?.schema;

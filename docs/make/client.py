@@ -1,0 +1,408 @@
+"""Write `scm/client` from the interface's own description: `python docs/make/client.py`.
+
+A noun of the interface (the tag of its routes) becomes a class, an operation a method, a record of
+its answers a struct. Records of one noun lie in its file, those of several in `shared.py`.
+`tests/contract/test_client.py` says when this has to be run again.
+"""
+
+import builtins
+import keyword
+import re
+import subprocess
+import sys
+import textwrap
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from scm.api.app import create_app
+from scm.api.view import CityView
+from scm.maps.load import load_map
+from scm.v2x.message import Refused
+
+FOLDER = Path(__file__).parents[2] / "scm" / "client"
+REFERENCE = "#/components/schemas/"
+KEY = "Idempotency-Key"
+SHARED = "shared"
+WIDTH = 99
+MOST_RECORDS = 20
+BY = "Written by docs/make/client.py: do not change it here."
+Schema = dict[str, Any]
+
+
+def description() -> Schema:
+    """Return what the interface says of itself."""
+    refused = Refused(code="offline", detail="nobody is there")
+    app = create_app(CityView(), lambda _request, _timeout_s: refused, load_map("driving_school"))
+    return app.openapi()
+
+
+def files(document: Schema) -> dict[str, str]:
+    """Return all files to write, by their path below `scm/client`, not yet formatted."""
+    nouns: dict[str, list[tuple[str, str, Schema]]] = defaultdict(list)
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            nouns[operation["tags"][0]].append((method.upper(), path, operation))
+    schemas = document["components"]["schemas"]
+    homes = _homes(nouns, schemas)
+    made = {"client.py": _client(sorted(nouns))}
+    made["nouns/__init__.py"] = f'"""One file a noun of the interface.\n\n{BY}\n"""\n'
+    made["records/__init__.py"] = f'"""What the interface answers.\n\n{BY}\n"""\n'
+    for home in sorted(set(homes.values())):
+        made[f"records/{_file(home)}.py"] = _records(home, homes, schemas)
+    for noun, operations in nouns.items():
+        made[f"nouns/{_file(noun)}.py"] = _noun(noun, operations, homes, schemas)
+    return made
+
+
+def _homes(nouns: dict[str, list[tuple[str, str, Schema]]], schemas: Schema) -> dict[str, str]:
+    """Return which file each record lies in."""
+    users: dict[str, set[str]] = defaultdict(set)
+    for noun, operations in nouns.items():
+        for _, _, operation in operations:
+            todo = list(_references(_success(operation)[1]))
+            while todo:
+                name = todo.pop()
+                if noun not in users[name]:
+                    users[name].add(noun)
+                    todo.extend(_references(schemas[name]))
+    homes = {
+        name: next(iter(used)) if len(used) == 1 else SHARED
+        for name, used in users.items()
+        if "enum" not in schemas[name]
+    }
+    for home, count in Counter(homes.values()).items():
+        if count > MOST_RECORDS:
+            for name in _ordered(home, homes, schemas)[: count // 2]:
+                homes[name] = f"{home}_parts"
+    return homes
+
+
+def _ordered(home: str, homes: dict[str, str], schemas: Schema) -> list[str]:
+    """Return the records of a file, each behind those it holds."""
+    done: dict[str, None] = {}
+
+    def add(name: str) -> None:
+        for other in _references(schemas[name]):
+            if homes.get(other) == home and other not in done:
+                add(other)
+        done[name] = None
+
+    for name in schemas:
+        if homes.get(name) == home and name not in done:
+            add(name)
+    return list(done)
+
+
+def _references(node: Any) -> Iterator[str]:
+    if isinstance(node, dict):
+        if "$ref" in node:
+            yield node["$ref"].removeprefix(REFERENCE)
+        for child in node.values():
+            yield from _references(child)
+    elif isinstance(node, list):
+        for child in node:
+            yield from _references(child)
+
+
+def _success(operation: Schema) -> tuple[str, Schema]:
+    """Return the media type and the schema of an operation's answer."""
+    for status, told in sorted(operation["responses"].items()):
+        if status.startswith("2"):
+            for media, content in told.get("content", {}).items():
+                return media, content.get("schema", {})
+    return "", {}
+
+
+def _records(home: str, homes: dict[str, str], schemas: Schema) -> str:
+    own = _ordered(home, homes, schemas)
+    body = "\n\n".join(_record(name, schemas) for name in own)
+    used = {name for one in own for name in _references(schemas[one])} - set(own)
+    lines = [f'"""Records of {home}.', "", f'{BY}\n"""', ""]
+    lines += [*_typing(body), "import msgspec", *_imports(used, homes)]
+    return "\n".join([*lines, "", "", body])
+
+
+def _typing(body: str) -> list[str]:
+    """Return the imports of the standard library that a file needs."""
+    lines = ["from collections.abc import Iterator"] if "Iterator[" in body else []
+    names = [name for name in ("Any", "Literal") if re.search(rf"\b{name}\b", body)]
+    return [*lines, f"from typing import {', '.join(names)}"] if names else lines
+
+
+def _imports(used: set[str], homes: dict[str, str]) -> list[str]:
+    """Return the imports of records."""
+    by_home = defaultdict(set)
+    for name in used & set(homes):
+        by_home[homes[name]].add(_class(name))
+    return [
+        f"from scm.client.records.{_file(home)} import {', '.join(sorted(names))}"
+        for home, names in sorted(by_home.items())
+    ]
+
+
+def _record(name: str, schemas: Schema) -> str:
+    schema = schemas[name]
+    required = set(schema.get("required", ()))
+    words = [(_name(key), one) for key, one in schema.get("properties", {}).items()]
+    about = [f"{key}: {one['description']}" for key, one in words if one.get("description")]
+    lines = [f"class {_class(name)}(msgspec.Struct, kw_only=True, frozen=True):"]
+    lines += _docstring(schema.get("description") or f"{name}.", "Attributes", about, 4)
+    for key, one in schema.get("properties", {}).items():
+        lines.append("    " + _field(key, one, key in required, schemas))
+    return "\n".join(lines) + "\n"
+
+
+def _field(key: str, schema: Schema, required: bool, schemas: Schema) -> str:
+    own, kind = _name(key), _type(schema, schemas)
+    default = "" if required else _default(schema)
+    if default == "None" and "None" not in kind and kind != "Any":
+        kind += " | None"
+    if own != key:
+        facts = f"name={key!r}" + (f", default={default}" if default else "")
+        return f"{own}: {kind} = msgspec.field({facts})"
+    return f"{own}: {kind}" + (f" = {default}" if default else "")
+
+
+def _default(schema: Schema) -> str:
+    value = schema.get("default")
+    if isinstance(value, dict):
+        return "None"
+    return repr(_frozen(value))
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(_frozen(one) for one in value) if isinstance(value, list) else value
+
+
+def _type(schema: Schema, schemas: Schema) -> str:
+    """Return a schema as a type of Python."""
+    if "$ref" in schema:
+        name = schema["$ref"].removeprefix(REFERENCE)
+        target = schemas[name]
+        return _type(target, schemas) if "enum" in target else _class(name)
+    choices = schema.get("anyOf") or schema.get("oneOf")
+    if choices:
+        kinds = list(dict.fromkeys(_type(one, schemas) for one in choices))
+        return " | ".join(sorted(kinds, key=lambda kind: kind == "None"))
+    if "enum" in schema or "const" in schema:
+        values = schema.get("enum", [schema.get("const")])
+        shown = ", ".join(repr(value) for value in values if value is not None)
+        return f"Literal[{shown}]" + (" | None" if None in values else "")
+    return _plain(schema, schemas)
+
+
+def _plain(schema: Schema, schemas: Schema) -> str:
+    kind = schema.get("type")
+    if kind == "array":
+        if "prefixItems" in schema:
+            return f"tuple[{', '.join(_type(one, schemas) for one in schema['prefixItems'])}]"
+        inner = _type(schema.get("items") or {}, schemas)
+        return f"tuple[{inner}, ...]"
+    if kind == "object":
+        more = schema.get("additionalProperties")
+        inner = _type(more, schemas) if isinstance(more, dict) else "Any"
+        return f"dict[str, {inner}]"
+    if kind == "string" and schema.get("contentEncoding") == "base64":
+        return "bytes"
+    kinds = {"string": "str", "integer": "int", "number": "float", "boolean": "bool"}
+    return {**kinds, "null": "None"}.get(str(kind), "Any")
+
+
+class _Method:
+    """One operation as a method."""
+
+    def __init__(self, method: str, path: str, operation: Schema, schemas: Schema) -> None:
+        self._method, self._path, self._operation = method, path, operation
+        self._schemas = schemas
+        noun, own = operation["tags"][0], operation["operationId"]
+        self.name = _name(own.removeprefix(re.sub(r"\W", "_", noun) + "_"))
+        self._places: dict[str, dict[str, str]] = defaultdict(dict)
+        self._given: list[str] = []
+        self._about: list[str] = []
+        self._has_key = False
+        for parameter in operation.get("parameters", ()):
+            self._add_parameter(parameter)
+        self._body, self._sends_bytes = self._add_body()
+        if self._has_key:
+            self._given.append('idempotency_key: str = ""')
+            self._about.append("idempotency_key: Same key, same effect, once; empty: a new one.")
+
+    def _add(self, place: str, key: str, schema: Schema, required: bool) -> None:
+        own = _name(key)
+        while own in {_name_of(one) for one in self._given}:
+            own += "_"
+        self._places[place][key] = own
+        kind = _type(schema, self._schemas)
+        default = "" if required else _default(schema)
+        if default == "None" and "None" not in kind:
+            kind += " | None"
+        self._given.append(f"{own}: {kind}" + (f" = {default}" if default else ""))
+        self._about.append(f"{own}: {schema.get('description') or key}")
+
+    def _add_parameter(self, parameter: Schema) -> None:
+        if parameter["name"] == KEY:
+            self._has_key = True
+            return
+        if parameter["name"] == "Last-Event-ID":
+            return
+        schema = {"description": parameter.get("description"), **parameter["schema"]}
+        self._add(parameter["in"], parameter["name"], schema, parameter.get("required", False))
+        if parameter["in"] == "path" and "*" not in self._given:
+            return
+        if "*" not in self._given:
+            self._given.insert(len(self._given) - 1, "*")
+
+    def _add_body(self) -> tuple[bool, bool]:
+        content = self._operation.get("requestBody", {}).get("content", {})
+        if not content:
+            return False, False
+        if "*" not in self._given:
+            self._given.append("*")
+        schema = content.get("application/json", {}).get("schema")
+        if schema is None:
+            self._given.append("content: bytes")
+            self._about.append("content: What to send.")
+            return False, True
+        target = self._schemas[schema["$ref"].removeprefix(REFERENCE)] if "$ref" in schema else {}
+        required = set(target.get("required", ()))
+        for key, one in target.get("properties", {}).items():
+            self._add("body", key, one, key in required)
+        return True, False
+
+    def source(self) -> str:
+        """Return the method."""
+        if self._given[-1:] == ["*"]:
+            self._given.pop()
+        if self._has_key and "*" not in self._given:
+            self._given.insert(len(self._given) - 1, "*")
+        media, schema = _success(self._operation)
+        kind, call = self._call(media, schema)
+        given = ", ".join(["self", *self._given])
+        summary = self._operation["summary"]
+        lines = [f"    def {self.name}({given}) -> {kind}:"]
+        lines += _docstring(summary, "Args", self._about, 8)[:-1]
+        return "\n".join([*lines, f"        return {call}", ""])
+
+    def _call(self, media: str, schema: Schema) -> tuple[str, str]:
+        """Return what the method answers, and the call that gets it."""
+        path = re.sub(r"\{(\w+)(:\w+)?\}", self._part, self._path)
+        facts = [f'f"{path}"' if path != self._path else f'"{path}"']
+        for place, word in (("query", "query"), ("header", "headers")):
+            if self._places[place]:
+                facts.append(f"{word}={_dict(self._places[place])}")
+        if media == "application/json" or media.endswith("+json"):
+            kind = _type(schema, self._schemas)
+            verb = "send" if self._sends_bytes else "ask"
+            content = ["content"] if self._sends_bytes else []
+            facts = [f'"{self._method}"', facts[0], kind, *content, *facts[1:]]
+            facts += [f"body={_dict(self._places['body'])}"] if self._body else []
+            facts += ["key=idempotency_key"] if self._has_key else []
+            return kind, f"self._connection.{verb}({', '.join(facts)})"
+        if media == "text/event-stream":
+            return "Iterator[LiveEvent]", f"self._connection.events({', '.join(facts)})"
+        if media.startswith(("image/", "text/")):
+            return "bytes", f"self._connection.fetch({', '.join(facts)})"
+        return "Iterator[bytes]", f"self._connection.pieces({', '.join(facts)})"
+
+    def _part(self, found: re.Match[str]) -> str:
+        own = self._places["path"][found[1]]
+        return "{part(" + own + ")}" if found[2] != ":path" else "{" + own + "}"
+
+
+def _dict(places: dict[str, str]) -> str:
+    return "{" + ", ".join(f'"{key}": {own}' for key, own in places.items()) + "}"
+
+
+def _name_of(given: str) -> str:
+    return given.partition(":")[0]
+
+
+def _noun(
+    noun: str, operations: list[tuple[str, str, Schema]], homes: dict[str, str], schemas: Schema
+) -> str:
+    methods = [_Method(*one, schemas) for one in operations]
+    head = [f"class {_class(noun)}Noun:", f'    """Operations on {noun}."""', ""]
+    head += ["    def __init__(self, connection: Connection) -> None:"]
+    head += ["        self._connection = connection"]
+    body = "\n".join([*head, "", *(method.source() for method in methods)])
+    used = {name for one in operations for name in _references(_success(one[2])[1])}
+    lines = [f'"""Operations on {noun} of a city.', "", f'{BY}\n"""', ""]
+    lines += [*_typing(body), *_imports(used, homes)]
+    more = ", part" if "{part(" in body else ""
+    lines.append(f"from scm.client.connection import Connection{more}")
+    lines += ["from scm.client.stream import LiveEvent"] if "[LiveEvent]" in body else []
+    return "\n".join([*lines, "", "", body])
+
+
+def _client(nouns: list[str]) -> str:
+    lines = [f'"""The client of a city, noun by noun.\n\n{BY}\n"""', "", "from typing import Self"]
+    lines += [f"from scm.client.nouns.{_file(noun)} import {_class(noun)}Noun" for noun in nouns]
+    lines += ["from scm.client.connection import Connection", "", "", "class Client:"]
+    lines += ['    """A city over its web interface; close it, or use it in a `with`.', ""]
+    lines += ["    Args:", "        url: Where its dashboard is: `http://127.0.0.1:8000`."]
+    lines += ["        key: API key, where the city asks for one.", '    """', ""]
+    lines += ['    def __init__(self, url: str = "http://127.0.0.1:8000", key: str = "") -> None:']
+    lines += ["        self.connection = Connection(url, key)"]
+    lines += [f"        self.{_file(noun)} = {_class(noun)}Noun(self.connection)" for noun in nouns]
+    lines += ["", "    def close(self) -> None:", '        """End the connection."""']
+    lines += ["        self.connection.close()", "", "    def __enter__(self) -> Self:"]
+    lines += ["        return self", "", "    def __exit__(self, *_: object) -> None:"]
+    return "\n".join([*lines, "        self.close()", ""])
+
+
+def _docstring(about: str, title: str, entries: list[str], indent: int) -> list[str]:
+    room, pad = WIDTH - indent, " " * indent
+    first, _, rest = " ".join(about.split()).partition(". ")
+    first = textwrap.shorten(first.rstrip("."), room - 8, placeholder=" ...") + "."
+    if not rest and not entries:
+        return [f'{pad}"""{first}"""', ""]
+    lines = [f'{pad}"""{first}', ""]
+    if rest:
+        lines += [*textwrap.wrap(rest, WIDTH, initial_indent=pad, subsequent_indent=pad), ""]
+    if entries:
+        lines.append(f"{pad}{title}:")
+        inner, more = pad + " " * 4, pad + " " * 8
+        for entry in entries:
+            text = " ".join(entry.split())
+            lines += textwrap.wrap(text, WIDTH, initial_indent=inner, subsequent_indent=more)
+        lines.append("")
+    return [*lines[:-1], f'{pad}"""', ""]
+
+
+def _name(text: str) -> str:
+    """Return a name of Python, with a line behind it where it means something else already."""
+    name = re.sub(r"\W", "_", text).strip("_").lower()
+    taken = keyword.iskeyword(name) or (hasattr(builtins, name) and name not in ("id", "type"))
+    return f"{name}_" if taken else name
+
+
+def _file(noun: str) -> str:
+    """Return a noun as the name of a module and of the client's attribute."""
+    return re.sub(r"\W", "_", noun).lower()
+
+
+def _class(text: str) -> str:
+    words = [word for word in re.split(r"[\W_]+", text) if word]
+    return "".join(word[0].upper() + word[1:] for word in words)
+
+
+def formatted(sources: dict[str, str], folder: Path) -> dict[str, str]:
+    """Write the files below a folder, and return them in the form of this project."""
+    for path, text in sources.items():
+        target = folder / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(text, "utf-8")
+    paths = [str(folder / path) for path in sources]
+    settings = ["--config", str(FOLDER.parents[1] / "pyproject.toml"), "--quiet"]
+    ruff = [sys.executable, "-m", "ruff"]
+    subprocess.run([*ruff, "check", *settings, "--fix-only", "--select", "I", *paths], check=True)
+    subprocess.run([*ruff, "format", *settings, *paths], check=True)
+    return {path: (folder / path).read_text("utf-8") for path in sources}
+
+
+if __name__ == "__main__":
+    for old in (*FOLDER.glob("nouns/*.py"), *FOLDER.glob("records/*.py")):
+        old.unlink()
+    formatted(files(description()), FOLDER)

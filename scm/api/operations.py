@@ -1,0 +1,194 @@
+"""Long work: an answer at once, 202 with an operation to look at, and the work on a thread.
+
+An operation is `waiting`, `running`, then `done`, `failed` or `cancelled` for good. Work of one
+kind runs one at a time, in the order of asking.
+"""
+
+import itertools
+import logging
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import Literal
+
+import msgspec
+from fastapi import Response
+
+from scm.api.city import json_response
+from scm.api.problem import RefusedError
+from scm.clock import Clock
+from scm.errors import ScmError
+from scm.v2x.message import Refused
+
+_LOGGER = logging.getLogger(__name__)
+
+KEPT = 200
+MOST_WAITING = 20
+
+State = Literal["waiting", "running", "done", "failed", "cancelled"]
+
+
+class Operation(msgspec.Struct, kw_only=True, frozen=True):
+    """One piece of long work.
+
+    Attributes:
+        id: Of this operation, below `/operations`.
+        kind: What work it is: `mismatch`, `export`, ...
+        what: Of which thing, in words.
+        progress: 0 to 1; None: nobody can tell.
+        doing: The step it is at, in words.
+        result: Address of what it made; empty until it is done.
+        error: Why it failed; empty unless it did.
+        owner: Who asked for it.
+    """
+
+    id: str
+    kind: str
+    what: str
+    state: State
+    progress: float | None
+    doing: str
+    result: str
+    error: str
+    owner: str
+    asked_ns: int
+    began_ns: int | None
+    ended_ns: int | None
+
+
+class Cancelled(Exception):  # noqa: N818  it is no error
+    """Raised inside work that was called off, at its next word about itself."""
+
+
+class Teller:
+    """How work tells where it is; raises `Cancelled` when it was called off."""
+
+    def __init__(self, operations: "Operations", name: str, cancel: threading.Event) -> None:
+        self._operations = operations
+        self._name = name
+        self.cancelled = cancel
+
+    def __call__(self, doing: str = "", progress: float | None = None) -> None:
+        """Tell the step and the share of work done."""
+        if self.cancelled.is_set():
+            raise Cancelled
+        changes = {"doing": doing, "progress": progress}
+        self._operations.change(self._name, **changes)
+
+
+Work = Callable[[Teller], str]
+"""Does the work; returns the address of what it made."""
+
+
+class Operations:
+    """All long work of one server; safe from any thread. What is long over is forgotten."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._numbers = itertools.count(1)
+        self._rows: OrderedDict[str, Operation] = OrderedDict()
+        self._cancels: dict[str, threading.Event] = {}
+        self._turns: dict[str, threading.Lock] = {}
+
+    def start(self, kind: str, what: str, work: Work, *, owner: str = "") -> Operation:
+        """Begin work on a thread of its own, or let it wait for the one of its kind that runs.
+
+        Raises:
+            RefusedError: when too many of its kind wait already.
+        """
+        with self._lock:
+            waiting = sum(
+                row.kind == kind and row.state in ("waiting", "running")
+                for row in self._rows.values()
+            )
+            if waiting >= MOST_WAITING:
+                detail = f"operations of kind {kind!r}: {waiting} wait, expected fewer; try later"
+                raise RefusedError(Refused(code="busy", detail=detail))
+            row = Operation(
+                id=f"{kind}-{next(self._numbers)}",
+                kind=kind,
+                what=what,
+                state="waiting",
+                progress=None,
+                doing="waits for its turn",
+                result="",
+                error="",
+                owner=owner,
+                asked_ns=self._clock.now_ns(),
+                began_ns=None,
+                ended_ns=None,
+            )
+            self._rows[row.id] = row
+            self._cancels[row.id] = threading.Event()
+            turn = self._turns.setdefault(kind, threading.Lock())
+            self._forget()
+        thread = threading.Thread(
+            target=self._run, args=(row.id, work, turn), name=row.id, daemon=True
+        )
+        thread.start()
+        return row
+
+    def rows(self) -> tuple[Operation, ...]:
+        """Return all that is known, newest first."""
+        with self._lock:
+            return tuple(reversed(self._rows.values()))
+
+    def find(self, name: str) -> Operation | None:
+        """Return an operation by its id; None: not known, or forgotten."""
+        with self._lock:
+            return self._rows.get(name)
+
+    def cancel(self, name: str) -> Operation | None:
+        """Call work off: it ends at its next word about itself; over, it stays as it is."""
+        with self._lock:
+            cancel = self._cancels.get(name)
+        if cancel is not None:
+            cancel.set()
+        return self.find(name)
+
+    def change(self, name: str, **changes: object) -> None:
+        """Change what is told of an operation."""
+        with self._lock:
+            row = self._rows.get(name)
+            if row is not None:
+                self._rows[name] = msgspec.structs.replace(row, **changes)
+
+    def close(self) -> None:
+        """Call all work off, without waiting for it."""
+        with self._lock:
+            for cancel in self._cancels.values():
+                cancel.set()
+
+    def _run(self, name: str, work: Work, turn: threading.Lock) -> None:
+        tell = Teller(self, name, self._cancels[name])
+        with turn:
+            try:
+                self.change(name, state="running", began_ns=self._clock.now_ns())
+                tell("begins")
+                result = work(tell)
+            except Cancelled:
+                self._end(name, "cancelled")
+            except ScmError as error:
+                self._end(name, "failed", error=str(error))
+            except Exception:
+                _LOGGER.exception("operation_failed id=%s", name)
+                self._end(name, "failed", error="the server failed on this; its log says why")
+            else:
+                self._end(name, "done", result=result, progress=1.0)
+
+    def _end(self, name: str, state: State, **changes: object) -> None:
+        over = {"state": state, "doing": "", "ended_ns": self._clock.now_ns()}
+        self.change(name, **over, **changes)
+
+    def _forget(self) -> None:
+        for name in [name for name, row in self._rows.items() if row.ended_ns is not None]:
+            if len(self._rows) <= KEPT:
+                return
+            del self._rows[name]
+            del self._cancels[name]
+
+
+def accepted(row: Operation) -> Response:
+    """Return 202 with the operation and its address."""
+    return json_response(row, 202, {"Location": f"/api/v1/operations/{row.id}"})

@@ -1,0 +1,102 @@
+"""Pages of a long list: a cursor instead of a number, so that what is added does not move them.
+
+A page is asked for by `limit` and `cursor`; the answer names the next one in its body and, as
+RFC 8288 asks, in `Link`. A cursor is opaque to its reader: the key of the last row already told.
+"""
+
+import base64
+import binascii
+from collections.abc import Callable, Iterable
+from typing import Annotated, Generic, TypeVar
+from urllib.parse import urlencode
+
+import msgspec
+from fastapi import Query, Request, Response
+
+from scm.api.city import json_response
+from scm.api.problem import RefusedError
+from scm.v2x.message import Refused
+
+MOST = 500
+
+Limit = Annotated[int, Query(ge=1, le=MOST, description="rows a page", examples=[100])]
+Cursor = Annotated[
+    str,
+    Query(
+        max_length=200,
+        description="`next` of the page before; empty: the first page",
+        examples=["czo0MQ"],
+    ),
+]
+T = TypeVar("T")
+
+
+class Page(msgspec.Struct, Generic[T], kw_only=True, frozen=True):
+    """Some rows of a list.
+
+    Attributes:
+        items: The rows of this page.
+        next: Cursor of those after them; null at the end.
+    """
+
+    items: tuple[T, ...]
+    next: Annotated[str | None, msgspec.Meta(examples=["azptaXNtYXRjaC03"])]
+
+
+def page_of(
+    rows: Iterable[T], key: Callable[[T], str], *, limit: int = 100, cursor: str = ""
+) -> Page[T]:
+    """Cut a page from rows in their order.
+
+    Args:
+        rows: All of them; those up to the cursor's are skipped.
+        key: What tells a row from all others and never changes; rows need not be sorted by it.
+        limit: Rows a page.
+        cursor: Of the page before.
+
+    Raises:
+        RefusedError: when the cursor is none of ours, or its row is gone.
+    """
+    wanted = _read(cursor) if cursor else None
+    found: list[T] = []
+    for row in rows:
+        if wanted is not None:
+            if key(row) == wanted:
+                wanted = None
+            continue
+        if len(found) == limit:
+            return Page(items=tuple(found), next=cursor_at(key(found[-1])))
+        found.append(row)
+    if wanted is not None:
+        raise _bad(cursor, "its row is gone: begin anew")
+    return Page(items=tuple(found), next=None)
+
+
+def cursor_at(key: str) -> str:
+    """Return the cursor behind the row of that key."""
+    return base64.urlsafe_b64encode(f"k:{key}".encode()).decode().rstrip("=")
+
+
+def page_response(request: Request, page: Page[T]) -> Response:
+    """Return a page as JSON, with the next one's address in `Link`."""
+    if page.next is None:
+        return json_response(page)
+    query = {**request.query_params, "cursor": page.next}
+    link = f'<{request.url.path}?{urlencode(query)}>; rel="next"'
+    return json_response(page, headers={"Link": link})
+
+
+def _read(cursor: str) -> str:
+    padded = cursor + "=" * (-len(cursor) % 4)
+    try:
+        text = base64.b64decode(padded, altchars=b"-_", validate=True).decode()
+    except (binascii.Error, UnicodeDecodeError, ValueError):
+        text = ""
+    if not text.startswith("k:"):
+        raise _bad(cursor, "it is none of ours")
+    return text.removeprefix("k:")
+
+
+def _bad(cursor: str, why: str) -> RefusedError:
+    detail = f"cursor: got {cursor!r}, expected `next` of the page before: {why}"
+    return RefusedError(Refused(code="invalid", detail=detail))

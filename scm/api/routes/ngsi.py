@@ -1,0 +1,124 @@
+"""NGSI-LD, for reading: the city's entities as a context broker would give them."""
+
+from typing import Annotated, Any
+
+import msgspec
+from fastapi import APIRouter, Path, Query, Request, Response
+from msgspec import Meta
+
+from scm.api.city import City, not_found
+from scm.api.encoding import encode
+from scm.api.ngsi import CONTEXT, CORE, TYPES, Entity, entities, key_values
+from scm.api.problem import RefusedError
+from scm.api.roles import VIEWER
+from scm.api.schemas import Responses
+from scm.errors import nearest
+from scm.v2x.message import Refused
+
+JSON_LD, JSON = "application/ld+json", "application/json"
+_TYPE = "http://www.w3.org/ns/json-ld#context"
+_EXAMPLE: dict[str, object] = {
+    "id": "urn:ngsi-ld:Vehicle:city:n1",
+    "type": "Vehicle",
+    "speed": {"type": "Property", "value": 10.58, "unitCode": "KMH"},
+}
+
+Attributes = Annotated[
+    dict[str, Any],
+    Meta(description="`id`, `type` and attributes of the entity's model", examples=[_EXAMPLE]),
+]
+Short = Annotated[
+    str,
+    Query(max_length=32, description="`keyValues`: attributes are their values", examples=[""]),
+]
+
+
+def router(city: City) -> APIRouter:
+    """Return the routes."""
+    routes = APIRouter(prefix="/ngsi-ld/v1", tags=["ngsi"], dependencies=[VIEWER])
+
+    @routes.get(
+        "/entities",
+        summary="NGSI-LD entities of the city",
+        responses=_answer(list[Attributes], "Entities, in the order of their types and names."),
+    )
+    def all_entities(
+        request: Request,
+        kind: Annotated[
+            str,
+            Query(
+                alias="type",
+                max_length=100,
+                description=f"comma between: {', '.join(TYPES)}; none: all",
+                examples=["Vehicle"],
+            ),
+        ] = "",
+        limit: Annotated[int, Query(ge=0, le=1000, description="at most", examples=[20])] = 20,
+        offset: Annotated[int, Query(ge=0, le=10**6, description="to skip", examples=[0])] = 0,
+        count: Annotated[
+            bool, Query(description="tell how many there are in all", examples=[True])
+        ] = False,
+        options: Short = "",
+    ) -> Response:
+        wanted = _types(kind)
+        found = [one for name in wanted for one in entities(city, name)]
+        page = found[offset : offset + limit]
+        headers = {"NGSILD-Results-Count": str(len(found))} if count else {}
+        return _response(request, [_shaped(one, options) for one in page], headers)
+
+    @routes.get(
+        "/entities/{entity}",
+        summary="One NGSI-LD entity",
+        responses=_answer(Attributes, "The entity."),
+    )
+    def one_entity(
+        request: Request,
+        entity: Annotated[
+            str,
+            Path(
+                max_length=200,
+                description="its urn",
+                examples=["urn:ngsi-ld:Vehicle:city:n1"],
+            ),
+        ],
+        options: Short = "",
+    ) -> Response:
+        kind = [*entity.split(":"), "", "", ""][2]
+        for one in entities(city, kind) if kind in TYPES else ():
+            if one["id"] == entity:
+                return _response(request, _shaped(one, options), {})
+        raise not_found("entity", entity)
+
+    return routes
+
+
+def _answer(kind: Any, about: str) -> Responses:
+    schema = msgspec.json.schema(kind)
+    return {200: {"description": about, "content": {JSON: {"schema": schema}}}}
+
+
+def _types(kind: str) -> list[str]:
+    wanted = [name.strip() for name in kind.split(",") if name.strip()] or list(TYPES)
+    for name in wanted:
+        if name not in TYPES:
+            detail = f"type: got {name!r}, expected some of {TYPES}{nearest(name, TYPES)}"
+            raise RefusedError(Refused(code="invalid", detail=detail))
+    return wanted
+
+
+def _shaped(entity: Entity, options: str) -> Entity:
+    return key_values(entity) if options == "keyValues" else entity
+
+
+def _response(request: Request, body: Entity | list[Entity], headers: dict[str, str]) -> Response:
+    """Return entities with their context inside as JSON-LD, or named in `Link` as JSON."""
+    own = {"Cache-Control": "no-store", **headers}
+    if JSON_LD in request.headers.get("accept", ""):
+        inside = (
+            [{"@context": CONTEXT, **one} for one in body]
+            if isinstance(body, list)
+            else {"@context": CONTEXT, **body}
+        )
+        return Response(encode(inside), headers=own, media_type=JSON_LD)
+    own["Link"] = f'<{CORE}>; rel="{_TYPE}"; type="{JSON_LD}"'
+    return Response(encode(body), headers=own, media_type=JSON)

@@ -1,0 +1,34 @@
+"""Shelves: folders that the interface reads and writes, each for one kind of file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shelves:
+    """Where files lie; None: this city offers none of them.
+
+    Attributes:
+        recordings: MCAP files of the city's runs, the one being written among them.
+        reports: A folder for each mismatch report, and for the job that makes it.
+        scenarios: Fleet scenario scripts, `*.py`.
+        calibrations: What the Eye's calibration found, a file a camera.
+        plans: Signal plans that people edited, a file a junction and plan.
+    """
+
+    recordings: Path | None = None
+    reports: Path | None = None
+    scenarios: Path | None = None
+    calibrations: Path | None = None
+    plans: Path | None = None
+
+
+def shelves_in(folder: Path) -> Shelves:
+    """Return all shelves in one folder, recordings at its top; who writes makes its folder."""
+    return Shelves(
+        recordings=folder,
+        reports=folder / "reports",
+        scenarios=folder / "scenarios",
+        calibrations=folder / "calibrations",
+        plans=folder / "plans",
+    )

@@ -1,0 +1,43 @@
+/** The stations on the bus: parts, vehicles and clients, with those lost in the last minute. */
+import { html } from "scm/shared/html.js";
+import { span } from "scm/shared/format.js";
+import { stations } from "scm/shell/store.js";
+
+const STALE_S = 3;
+const ROLES = { part: "part", v: "vehicle" };
+
+export function StationsPanel() {
+  const alive = stations.value.filter((station) => station.alive).length;
+  const lost = stations.value.length - alive;
+  return html`
+    <section class="panel stations" aria-label="Stations">
+      <div class="panel-head">
+        <h2>Stations <small>${alive} here${lost ? `, ${lost} lost` : ""}</small></h2>
+      </div>
+      <div class="scroll" tabindex="0" role="region" aria-label="List of stations">
+        <ul>
+          ${stations.value.map((row) => html`<${Station} key=${row.role + row.name + row.session} row=${row} />`)}
+        </ul>
+        ${!stations.value.length && html`<p class="empty">Nobody is on the bus yet.</p>`}
+      </div>
+    </section>
+  `;
+}
+
+function Station({ row }) {
+  const silent = row.age_s !== null && row.age_s > STALE_S;
+  const state = !row.alive ? "lost" : silent ? "stale" : "alive";
+  const notes = [
+    row.late_steps && `${row.late_steps} late`,
+    row.dropped && `${row.dropped} dropped`,
+  ].filter(Boolean);
+  return html`
+    <li data-station=${row.name} data-state=${state} title="session ${row.session}">
+      <i aria-hidden="true"></i>
+      <b>${row.name}</b>
+      <span class="detail" title=${row.detail}>${row.alive ? row.detail || ROLES[row.role] || row.role : "lost"}</span>
+      <span class="late">${notes.join(", ")}</span>
+      <span class="age">${row.age_s === null ? "" : span(row.age_s)}</span>
+    </li>
+  `;
+}

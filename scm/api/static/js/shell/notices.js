@@ -1,0 +1,40 @@
+/** What the page has to say or ask: short notices, and the question for the API key. */
+import { html } from "scm/shared/html.js";
+import { dismiss, keyWanted, notices } from "scm/shell/api.js";
+import { Dialog } from "scm/shared/dialog.js";
+
+export function Notices() {
+  return html`
+    <div class="notices" role="status" aria-live="polite">
+      ${notices.value.map(
+        ({ id, kind, text }) => html`
+          <div key=${id} class="notice ${kind}">
+            <span>${text}</span>
+            <button class="plain" aria-label="Dismiss" onClick=${() => dismiss(id)}>✕</button>
+          </div>
+        `,
+      )}
+    </div>
+  `;
+}
+
+export function KeyDialog() {
+  const answer = keyWanted.value;
+  if (!answer) return null;
+  const submit = (event) => {
+    event.preventDefault();
+    answer(event.target.elements.key.value.trim());
+  };
+  return html`
+    <${Dialog} title="API key" onClose=${() => answer("")}>
+      <p>This city asks for an API key. It is kept for this tab.</p>
+      <form onSubmit=${submit}>
+        <input name="key" type="password" autocomplete="off" required aria-label="API key" />
+        <div class="actions">
+          <button type="button" onClick=${() => answer("")}>Cancel</button>
+          <button class="primary">Use key</button>
+        </div>
+      </form>
+    <//>
+  `;
+}

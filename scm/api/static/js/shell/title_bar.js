@@ -1,0 +1,127 @@
+/** The bar on top: which city, its pages, how alive it is, and the red button. */
+import { signal } from "@preact/signals";
+import { html } from "scm/shared/html.js";
+import { change } from "scm/shell/api.js";
+import { Dialog } from "scm/shared/dialog.js";
+import { clock, fixed, span, UNKNOWN } from "scm/shared/format.js";
+import { city, isConnected, link, pulse, quiet_s, stop } from "scm/shell/store.js";
+import { nextTheme, theme } from "scm/shell/theme.js";
+
+const asking = signal(false);
+
+const LINK_WORDS = { connecting: "Connecting", live: "Live", stale: "Stale", lost: "No data" };
+
+const THEMES = { system: ["◐", "as the system"], light: ["☀", "light"], dark: ["☾", "dark"] };
+
+export function TitleBar({ pages, here }) {
+  const { t_ns, real_time_factor, late_ticks } = pulse.value;
+  const heard = t_ns !== null;
+  const vitals = heard
+    ? `real-time factor ${fixed(real_time_factor, 2)}, ${late_ticks} late ticks`
+    : "the world was not heard yet";
+  return html`
+    <header class="title-bar">
+      <a class="home" href="/map" title=${city.value?.title ?? "Smart City Manager"}>
+        <img class="mark" src="/static/icon.svg" alt="" />
+        <h1>${city.value ? city.value.title : "Smart City Manager"}</h1>
+      </a>
+      <nav aria-label="Pages">
+        ${pages.map(
+          (page) => html`
+            <a key=${page.name} href="/${page.name}" aria-current=${page.name === here ? "page" : null}>
+              ${page.title}
+            </a>
+          `,
+        )}
+      </nav>
+      <span class="link-state" data-link=${link.value} role="status" title=${vitals}>
+        <i></i>${LINK_WORDS[link.value]}
+      </span>
+      <span class="clock ${heard && real_time_factor < 0.95 ? "warn" : ""}" title=${vitals}>
+        ${heard ? clock(t_ns) : UNKNOWN}
+        <small>×${heard ? fixed(real_time_factor, 2) : UNKNOWN}</small>
+      </span>
+      <${ThemeButton} />
+      <${StopButton} />
+    </header>
+  `;
+}
+
+function ThemeButton() {
+  const [sign, words] = THEMES[theme.value];
+  const label = `Colours: ${words}`;
+  return html`
+    <button class="plain theme" title=${label} aria-label=${label} onClick=${nextTheme}>${sign}</button>
+  `;
+}
+
+function StopButton() {
+  const engaged = stop.value.engaged;
+  const label = engaged ? "Release stop" : "City stop";
+  return html`
+    <button
+      id="city-stop"
+      class="city-stop"
+      aria-pressed=${engaged}
+      onClick=${() => (asking.value = true)}
+    >
+      ${label}
+    </button>
+    ${asking.value && html`<${StopDialog} engaged=${engaged} />`}
+  `;
+}
+
+function StopDialog({ engaged }) {
+  const close = () => (asking.value = false);
+  const submit = async (event) => {
+    event.preventDefault();
+    const reason = event.target.elements.reason.value;
+    close();
+    await change("PUT", "/stop", { engaged: !engaged, by: "dashboard", reason }, (reply) =>
+      reply.engaged ? "All cars are told to stop." : "The stop is released.",
+    );
+  };
+  // Enter must stop the city: the button has the focus, not the reason.
+  const verb = engaged ? "Let all cars drive again" : "Stop all cars";
+  return html`
+    <${Dialog} title=${engaged ? "Release the city stop?" : "Stop the whole city?"} onClose=${close}>
+      <p>
+        ${engaged
+          ? "Every car goes on with what it was doing. Look at the map first."
+          : "Every car brakes and stands, whoever drives it, until the stop is released."}
+      </p>
+      <form onSubmit=${submit}>
+        <input name="reason" maxlength="200" placeholder="Reason (optional)" aria-label="Reason" />
+        <div class="actions">
+          <button type="button" onClick=${close}>Cancel</button>
+          <button class=${engaged ? "primary" : "danger"} data-first>${verb}</button>
+        </div>
+      </form>
+    <//>
+  `;
+}
+
+export function Banners() {
+  const { engaged, by, reason } = stop.value;
+  const lost = link.value === "lost" || (link.value === "connecting" && quietSinceStart());
+  return html`
+    ${engaged &&
+    html`<div class="banner stopped" role="alert">
+      <b>City stopped</b>
+      <span>${[by && `by ${by}`, reason].filter(Boolean).join(" · ")}</span>
+    </div>`}
+    ${lost &&
+    html`<div class="banner lost" role="alert">
+      <b>${isConnected.value ? "The world is silent" : "No connection to the server"}</b>
+      <span>
+        ${pulse.value.t_ns === null
+          ? "Nothing has been heard yet."
+          : `What you see is ${span(quiet_s.value)} old.`}
+      </span>
+    </div>`}
+  `;
+}
+
+function quietSinceStart() {
+  return performance.now() > 3000 && quiet_s.value > 2;
+}

@@ -1,0 +1,67 @@
+"""Topics of the live stream: what each tells, and how often it is looked at.
+
+A page hears those it names. One topic is one part of the city as a whole, made anew from the
+picture; it is sent when its bytes changed. A new one is a line here.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import msgspec
+
+from scm.api.city import City
+from scm.api.eye_rows import camera_rows
+from scm.api.picture import Picture
+from scm.api.routes.boxes import boxes_of
+from scm.api.routes.stop import stop_of
+from scm.api.signal_rows import junction_rows
+from scm.api.vehicle_rows import vehicles_topic
+
+EVENTS = "events"
+"""The one topic that is no state: its entries come one by one, and never twice."""
+
+
+class Topic(NamedTuple):
+    """A part of the page: how to make it, and every how many frames of 50 ms that is due."""
+
+    make: Callable[[Picture], object]
+    every: int
+
+
+class Pulse(msgspec.Struct, kw_only=True, frozen=True):
+    """How alive the world is; `t_ns` and `tick` are None until it is heard."""
+
+    t_ns: int | None
+    tick: int | None
+    real_time_factor: float
+    late_ticks: int
+    vehicles: int
+
+
+def pulse_of(picture: Picture) -> Pulse:
+    """Return the world's time, tick and count of vehicles."""
+    if picture.snapshot is None:
+        return Pulse(t_ns=None, tick=None, real_time_factor=0.0, late_ticks=0, vehicles=0)
+    told = picture.snapshot.message
+    return Pulse(
+        t_ns=told.t_ns,
+        tick=told.tick,
+        real_time_factor=round(told.real_time_factor, 3),
+        late_ticks=told.late_ticks,
+        vehicles=len(told.vehicles),
+    )
+
+
+def topics_of(city: City) -> dict[str, Topic]:
+    """Return every topic but `events`, by name."""
+    return {
+        "pulse": Topic(pulse_of, 4),
+        "stop": Topic(stop_of, 2),
+        "vehicles": Topic(vehicles_topic, 1),
+        "signals": Topic(
+            lambda picture: junction_rows(picture, city.city_map.junctions, city.plans), 2
+        ),
+        "boxes": Topic(boxes_of, 2),
+        "eye": Topic(camera_rows, 2),
+        "stations": Topic(lambda picture: picture.stations, 10),
+    }

@@ -1,0 +1,64 @@
+"""W3C trace context: the id that a caller gives a piece of work, or a new one, in answer and log.
+
+A caller sends `traceparent: 00-<trace id>-<span id>-<flags>`; the trace id comes back in the header
+`Trace-Id`, in problems, and with every failed request in the server's log. It ends here: messages
+on the bus have the request's `Idempotency-Key` as their id instead.
+"""
+
+import logging
+import re
+import secrets
+from contextvars import ContextVar
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from scm.log import event
+
+HEADER = "Trace-Id"
+_PARENT = re.compile(r"(?!ff)[0-9a-f]{2}-(?!0{32})([0-9a-f]{32})-(?!0{16})[0-9a-f]{16}-[0-9a-f]{2}")
+_LOGGER = logging.getLogger(__name__)
+_current: ContextVar[str] = ContextVar("trace_id", default="")
+
+
+def trace_id() -> str:
+    """Return the id of the request that is being answered; empty outside of one."""
+    return _current.get()
+
+
+def trace_id_of(traceparent: str) -> str:
+    """Return the trace id of a `traceparent`, or a new one where that cannot be read."""
+    match = _PARENT.match(traceparent)
+    return match[1] if match is not None else secrets.token_hex(16)
+
+
+class Traced:
+    """ASGI middleware, outermost of all: every answer carries its trace id."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request under its trace id."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        own = trace_id_of(Headers(scope=scope).get("traceparent", ""))
+        token = _current.set(own)
+
+        async def send_traced(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message)[HEADER] = own
+                if message["status"] >= 500:
+                    _tell(scope, message["status"], own)
+            await send(message)
+
+        try:
+            await self._app(scope, receive, send_traced)
+        finally:
+            _current.reset(token)
+
+
+def _tell(scope: Scope, status: int, own: str) -> None:
+    facts = {"method": scope["method"], "path": scope["path"], "status": status, "trace_id": own}
+    event(_LOGGER, "request_failed", level=logging.WARNING, **facts)

@@ -1,0 +1,66 @@
+"""The client of a city, noun by noun.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from typing import Self
+
+from scm.client.connection import Connection
+from scm.client.nouns.boxes import BoxesNoun
+from scm.client.nouns.cameras import CamerasNoun
+from scm.client.nouns.cities import CitiesNoun
+from scm.client.nouns.events import EventsNoun
+from scm.client.nouns.eye import EyeNoun
+from scm.client.nouns.health import HealthNoun
+from scm.client.nouns.keys import KeysNoun
+from scm.client.nouns.map import MapNoun
+from scm.client.nouns.misbehaviour import MisbehaviourNoun
+from scm.client.nouns.ngsi import NgsiNoun
+from scm.client.nouns.operations import OperationsNoun
+from scm.client.nouns.session import SessionNoun
+from scm.client.nouns.signals import SignalsNoun
+from scm.client.nouns.stations import StationsNoun
+from scm.client.nouns.stop import StopNoun
+from scm.client.nouns.stream import StreamNoun
+from scm.client.nouns.traffic import TrafficNoun
+from scm.client.nouns.vehicles import VehiclesNoun
+
+
+class Client:
+    """A city over its web interface; close it, or use it in a `with`.
+
+    Args:
+        url: Where its dashboard is: `http://127.0.0.1:8000`.
+        key: API key, where the city asks for one.
+    """
+
+    def __init__(self, url: str = "http://127.0.0.1:8000", key: str = "") -> None:
+        self.connection = Connection(url, key)
+        self.boxes = BoxesNoun(self.connection)
+        self.cameras = CamerasNoun(self.connection)
+        self.cities = CitiesNoun(self.connection)
+        self.events = EventsNoun(self.connection)
+        self.eye = EyeNoun(self.connection)
+        self.health = HealthNoun(self.connection)
+        self.keys = KeysNoun(self.connection)
+        self.map = MapNoun(self.connection)
+        self.misbehaviour = MisbehaviourNoun(self.connection)
+        self.ngsi = NgsiNoun(self.connection)
+        self.operations = OperationsNoun(self.connection)
+        self.session = SessionNoun(self.connection)
+        self.signals = SignalsNoun(self.connection)
+        self.stations = StationsNoun(self.connection)
+        self.stop = StopNoun(self.connection)
+        self.stream = StreamNoun(self.connection)
+        self.traffic = TrafficNoun(self.connection)
+        self.vehicles = VehiclesNoun(self.connection)
+
+    def close(self) -> None:
+        """End the connection."""
+        self.connection.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,241 @@
+"""Ask a city over HTTP: typed answers, problems as exceptions, and the same question again.
+
+What only looks, and changes that carry an `Idempotency-Key`, are asked again when the answer is
+lost or the server is busy: under one key an effect happens once.
+"""
+
+import threading
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeVar
+from urllib.parse import quote
+
+import httpx
+import msgspec
+
+from scm.client.stream import Lines, LiveEvent, events_of
+from scm.errors import LinkError, MessageError, ScmError
+
+TRIES = 4
+PAUSE_S = 0.25
+LONGEST_PAUSE_S = 5.0
+SILENT_S = 5.0
+AGAIN = frozenset({429, 502, 503, 504})
+
+T = TypeVar("T")
+Values = Mapping[str, Any]
+
+
+class Problem(msgspec.Struct, kw_only=True, frozen=True):
+    """The body of an error, RFC 9457."""
+
+    status: int
+    title: str = ""
+    code: str = ""
+    detail: str = ""
+    trace_id: str = ""
+    errors: tuple[dict[str, str], ...] = ()
+
+
+class ProblemError(ScmError):
+    """The city said no.
+
+    Attributes:
+        problem: What it said: `code` is for programs, `detail` for people.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(f"{problem.status} {problem.code}: {problem.detail}")
+        self.problem = problem
+
+
+class Connection:
+    """A connection to the interface of one city.
+
+    Args:
+        url: Where its dashboard is: `http://127.0.0.1:8000`.
+        key: API key, where the city asks for one.
+        timeout_s: For one answer.
+        transport: Another way to the server than the network, for tests.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        key: str = "",
+        *,
+        timeout_s: float = 10.0,
+        transport: httpx.BaseTransport | None = None,
+    ) -> None:
+        headers = {"Authorization": f"Bearer {key}"} if key else {}
+        self._http = httpx.Client(
+            base_url=url, headers=headers, timeout=timeout_s, transport=transport
+        )
+        self._closed = threading.Event()
+
+    def close(self) -> None:
+        """End the connection, and streams at their next turn."""
+        self._closed.set()
+        self._http.close()
+
+    def ask(
+        self,
+        method: str,
+        path: str,
+        kind: type[T],
+        *,
+        query: Values | None = None,
+        headers: Values | None = None,
+        body: Values | None = None,
+        key: str | None = None,
+    ) -> T:
+        """Return the answer.
+
+        Args:
+            method: Of HTTP.
+            path: Of the resource.
+            kind: Of the answer.
+            query: What is None is left out; likewise in `headers`.
+            headers: Beside the usual ones.
+            body: Sent as JSON; what is None is left to the server.
+            key: Of a change that may be asked again; empty: a new one. None: not a change, or one
+                that must not be.
+
+        Raises:
+            ProblemError: when the city says no.
+            LinkError: when there is no answer.
+            MessageError: when the answer is not of that kind.
+        """
+        content = None if body is None else msgspec.json.encode(_given(body))
+        response = self._ask(method, path, query, headers, content, key)
+        try:
+            return msgspec.json.decode(response.content, type=kind)
+        except msgspec.MsgspecError as cause:
+            msg = f"{method} {path}: {cause}; expected {kind}: is the server another version?"
+            raise MessageError(msg) from cause
+
+    def fetch(
+        self,
+        path: str,
+        *,
+        query: Values | None = None,
+        headers: Values | None = None,
+    ) -> bytes:
+        """Return what is no JSON, whole; raises as `ask`."""
+        return self._ask("GET", path, query, headers, None, None).content
+
+    def send(
+        self,
+        method: str,
+        path: str,
+        kind: type[T],
+        content: bytes,
+        *,
+        query: Values | None = None,
+        headers: Values | None = None,
+        key: str | None = None,
+    ) -> T:
+        """Send bytes that are no JSON, and return the answer; raises as `ask`."""
+        response = self._ask(method, path, query, headers, content, key, "application/octet-stream")
+        return msgspec.json.decode(response.content, type=kind)
+
+    def pieces(
+        self, path: str, *, query: Values | None = None, headers: Values | None = None
+    ) -> Iterator[bytes]:
+        """Yield what is long or endless as it comes; raises as `ask`."""
+        with self._http.stream(
+            "GET", path, params=_given(query), headers=_given(headers)
+        ) as response:
+            _check(response)
+            yield from response.iter_bytes()
+
+    def events(self, path: str, *, query: Values | None = None) -> Iterator[LiveEvent]:
+        """Yield events for as long as they are asked for, through losses of the connection.
+
+        Raises:
+            ProblemError: when the city says no.
+            LinkError: when the city cannot be reached several times in a row.
+        """
+        yield from events_of(lambda last_id: self._lines(path, query, last_id), self._pause)
+
+    def _lines(self, path: str, query: Values | None, last_id: str) -> Lines:
+        headers = {"Last-Event-ID": last_id} if last_id else {}
+        timeout = httpx.Timeout(self._http.timeout, read=SILENT_S)
+        with self._http.stream(
+            "GET", path, params=_given(query), headers=headers, timeout=timeout
+        ) as response:
+            _check(response)
+            yield from response.iter_lines()
+
+    def _ask(
+        self,
+        method: str,
+        path: str,
+        query: Values | None,
+        headers: Values | None,
+        content: bytes | None,
+        key: str | None,
+        media: str = "application/json",
+    ) -> httpx.Response:
+        carried = _given(headers)
+        if content is not None:
+            carried["Content-Type"] = media
+        if key is not None:
+            carried["Idempotency-Key"] = key or uuid.uuid4().hex
+
+        def once() -> httpx.Response:
+            return self._http.request(
+                method, path, params=_given(query), headers=carried, content=content
+            )
+
+        response = self._again(once) if method == "GET" or key is not None else _reach(once)
+        _check(response)
+        return response
+
+    def _again(self, once: Callable[[], httpx.Response]) -> httpx.Response:
+        """Return an answer, asking again while that may help."""
+        for number in range(TRIES - 1):
+            try:
+                response = _reach(once)
+            except LinkError:
+                self._pause(number)
+                continue
+            if response.status_code not in AGAIN:
+                return response
+            self._pause(number, response.headers.get("Retry-After", ""))
+        return _reach(once)
+
+    def _pause(self, number: int, at_least: str = "") -> bool:
+        """Wait before trying again; return whether the connection was closed meanwhile."""
+        asked_s = float(at_least) if at_least.isascii() and at_least.isdigit() else 0.0
+        pause_s = max(asked_s, PAUSE_S * 2.0**number)
+        return self._closed.wait(min(pause_s, LONGEST_PAUSE_S))
+
+
+def part(value: str) -> str:
+    """Return a value as a part of a path."""
+    return quote(value, safe="")
+
+
+def _given(values: Values | None) -> dict[str, Any]:
+    return {name: value for name, value in (values or {}).items() if value is not None}
+
+
+def _reach(once: Callable[[], httpx.Response]) -> httpx.Response:
+    try:
+        return once()
+    except httpx.TransportError as cause:
+        msg = f"no answer from the city: {type(cause).__name__}: {cause}; is `scm up` running?"
+        raise LinkError(msg) from cause
+
+
+def _check(response: httpx.Response) -> None:
+    """Raise what the city refused."""
+    if response.is_success:
+        return
+    response.read()
+    try:
+        problem = msgspec.json.decode(response.content, type=Problem)
+    except msgspec.MsgspecError:
+        problem = Problem(status=response.status_code, detail=response.text[:200])
+    raise ProblemError(problem)

@@ -1,0 +1,27 @@
+"""Operations on misbehaviour of a city.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from scm.client.connection import Connection, part
+from scm.client.records.misbehaviour import MisbehaviourReport
+from scm.client.records.misbehaviour_parts import Misbehaviour
+
+
+class MisbehaviourNoun:
+    """Operations on misbehaviour."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def scores(self) -> Misbehaviour:
+        """Scores of all stations, and who is reported."""
+        return self._connection.ask("GET", "/api/v1/misbehaviour", Misbehaviour)
+
+    def report(self, name: str) -> MisbehaviourReport:
+        """The newest report on a station, with its evidence.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/misbehaviour/{part(name)}", MisbehaviourReport)

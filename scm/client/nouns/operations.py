@@ -1,0 +1,41 @@
+"""Operations on operations of a city.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from scm.client.connection import Connection, part
+from scm.client.records.operations import Operation, PageOperation
+
+
+class OperationsNoun:
+    """Operations on operations."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def all_operations(self, *, limit: int = 100, cursor: str = "") -> PageOperation:
+        """Long work, newest first.
+
+        Args:
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.ask(
+            "GET", "/api/v1/operations", PageOperation, query={"limit": limit, "cursor": cursor}
+        )
+
+    def one_operation(self, name: str) -> Operation:
+        """One piece of work.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/operations/{part(name)}", Operation)
+
+    def cancel(self, name: str) -> Operation:
+        """Call work off.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("DELETE", f"/api/v1/operations/{part(name)}", Operation)

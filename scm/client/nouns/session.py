@@ -1,0 +1,26 @@
+"""Operations on session of a city.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from scm.client.connection import Connection
+from scm.client.records.session import Ended, Session
+
+
+class SessionNoun:
+    """Operations on session."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def session(self) -> Session:
+        """Who this key says you are."""
+        return self._connection.ask("GET", "/api/v1/session", Session)
+
+    def begin(self) -> Session:
+        """Keep this key as a cookie, good for reading."""
+        return self._connection.ask("PUT", "/api/v1/session", Session)
+
+    def end(self) -> Ended:
+        """Forget the cookie."""
+        return self._connection.ask("DELETE", "/api/v1/session", Ended)

@@ -1,0 +1,25 @@
+"""Operations on stream of a city.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from collections.abc import Iterator
+
+from scm.client.connection import Connection
+from scm.client.stream import LiveEvent
+
+
+class StreamNoun:
+    """Operations on stream."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def live(self, *, topics: str = "") -> Iterator[LiveEvent]:
+        """What is live: a snapshot, then what changed, at 20 Hz.
+
+        Args:
+            topics: those to hear, comma between: pulse, stop, vehicles, signals, boxes, eye,
+                stations, events; none: all
+        """
+        return self._connection.events("/api/v1/stream", query={"topics": topics})

@@ -1,0 +1,32 @@
+"""Operations on traffic of a city.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from scm.client.connection import Connection
+from scm.client.records.traffic import TrafficCounts, Violations
+
+
+class TrafficNoun:
+    """Operations on traffic."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def counts(self) -> TrafficCounts:
+        """Counts, delays, queues and level of service."""
+        return self._connection.ask("GET", "/api/v1/traffic", TrafficCounts)
+
+    def violations(self, *, vehicle: str = "", limit: int = 100) -> Violations:
+        """Violations, newest first, with their evidence.
+
+        Args:
+            vehicle: of this car alone
+            limit: how many at most
+        """
+        return self._connection.ask(
+            "GET",
+            "/api/v1/traffic/violations",
+            Violations,
+            query={"vehicle": vehicle, "limit": limit},
+        )

@@ -1,0 +1,120 @@
+"""Operations on vehicles of a city.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from typing import Literal
+
+from scm.client.connection import Connection, part
+from scm.client.records.vehicles import (
+    LightReply,
+    RemoveReply,
+    RouteReply,
+    SpawnReply,
+    VehicleRow,
+    VehiclesTopic,
+)
+
+
+class VehiclesNoun:
+    """Operations on vehicles."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def all_vehicles(self) -> VehiclesTopic:
+        """All cars on the map."""
+        return self._connection.ask("GET", "/api/v1/vehicles", VehiclesTopic)
+
+    def spawn(
+        self, *, vehicle: str = "", car: str = "nigel", spawn: str = "", idempotency_key: str = ""
+    ) -> SpawnReply:
+        """Spawn a hosted car.
+
+        Args:
+            vehicle: its name; empty: the world names it
+            car: name of its car file
+            spawn: a spawn place; empty: any free one
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            "/api/v1/vehicles",
+            SpawnReply,
+            body={"vehicle": vehicle, "car": car, "spawn": spawn},
+            key=idempotency_key,
+        )
+
+    def one_car(self, name: str) -> VehicleRow:
+        """One car.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}", VehicleRow)
+
+    def remove(self, name: str, *, reason: str = "", idempotency_key: str = "") -> RemoveReply:
+        """Take a car off the map.
+
+        Args:
+            name: a name on the bus
+            reason: why, for the log
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "DELETE",
+            f"/api/v1/vehicles/{part(name)}",
+            RemoveReply,
+            query={"reason": reason},
+            key=idempotency_key,
+        )
+
+    def route(
+        self,
+        name: str,
+        *,
+        via: tuple[str, ...] | None = None,
+        laps: int = 1,
+        speed_mps: float | None = None,
+        idempotency_key: str = "",
+    ) -> RouteReply:
+        """Send a car on a route.
+
+        Args:
+            name: a name on the bus
+            via: lanes to pass, in this order
+            laps: how often to pass them
+            speed_mps: wished on free road; null: the limits
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/vehicles/{part(name)}/route",
+            RouteReply,
+            body={"via": via, "laps": laps, "speed_mps": speed_mps},
+            key=idempotency_key,
+        )
+
+    def lights(
+        self,
+        name: str,
+        *,
+        headlights: Literal["off", "low", "high"] | None = None,
+        indicators: Literal["off", "left", "right", "hazard"] | None = None,
+        idempotency_key: str = "",
+    ) -> LightReply:
+        """Switch a car's headlights and indicators.
+
+        Args:
+            name: a name on the bus
+            headlights: null: as they are
+            indicators: null: as they are
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "PUT",
+            f"/api/v1/vehicles/{part(name)}/lights",
+            LightReply,
+            body={"headlights": headlights, "indicators": indicators},
+            key=idempotency_key,
+        )

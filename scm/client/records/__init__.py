@@ -1,0 +1,4 @@
+"""What the interface answers.
+
+Written by docs/make/client.py: do not change it here.
+"""

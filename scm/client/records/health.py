@@ -1,0 +1,45 @@
+"""Records of health.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+import msgspec
+
+
+class Alive(msgspec.Struct, kw_only=True, frozen=True):
+    """The server answers.
+
+    Attributes:
+        status: `ok`.
+    """
+
+    status: str
+
+
+class Check(msgspec.Struct, kw_only=True, frozen=True):
+    """One thing that the server needs.
+
+    Attributes:
+        name: `router`: its connection to the bus; `world`: snapshots come; `disk`: there is room
+            on the shelves for recordings, reports and the like.
+        good: Whether it is there.
+        detail: What was found, in words.
+    """
+
+    name: str
+    good: bool
+    detail: str
+
+
+class Ready(msgspec.Struct, kw_only=True, frozen=True):
+    """The server can do its work.
+
+    Attributes:
+        status: `ready`.
+        snapshot_age_s: How long ago the world was heard.
+        checks: What was looked at.
+    """
+
+    status: str
+    snapshot_age_s: float | None
+    checks: tuple[Check, ...]

@@ -1,0 +1,70 @@
+"""Records of shared.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+import msgspec
+
+
+class StationRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One run of one station.
+
+    Attributes:
+        role: What it is in the city, or what its holder may do.
+        name: What it is called.
+        session: Of this run of it: another after each start.
+        alive: Whether it is there; false: it left or died.
+        since_ns: When it was first seen here.
+        lost_ns: When it left or died; None while it is there.
+        age_s: Since its last status; None: it never sent one.
+        detail: What it says of itself, or what was seen, in words.
+        step_ms: Its slowest step of the last second [ms].
+        late_steps: Steps that began later than a period after they were due.
+        dropped: Messages that its mailboxes had to drop, since its start.
+    """
+
+    role: str
+    name: str
+    session: str
+    alive: bool
+    since_ns: int
+    lost_ns: int | None = None
+    age_s: float | None = None
+    detail: str = ""
+    step_ms: float = 0.0
+    late_steps: int = 0
+    dropped: int = 0
+
+
+class Residual(msgspec.Struct, kw_only=True, frozen=True):
+    """Measured minus true: distance on the floor, and yaw (+ = measured further left).
+
+    Attributes:
+        position_mm: Distance from the truth, on the floor [mm].
+        yaw_deg: Measured further left than the truth [degree].
+    """
+
+    position_mm: float
+    yaw_deg: float
+
+
+class LoggedEvent(msgspec.Struct, kw_only=True, frozen=True):
+    """An event and its number; numbers start at 1 and have no gaps.
+
+    Attributes:
+        seq: Its number in the log, from 1, without gaps.
+        severity: `info`, `warning` or `error`.
+        source: Who told it.
+        t_ns: When it was true, by the clock of who tells it [ns].
+        name: What it is called.
+        text: One sentence for a person.
+        vehicle: Name of a car.
+    """
+
+    seq: int
+    severity: str
+    source: str
+    t_ns: int
+    name: str
+    text: str
+    vehicle: str | None = None

@@ -1,0 +1,84 @@
+"""Server-sent events: what is live, through losses of the connection, and as one picture.
+
+The stream tells a `snapshot` of its topics, then `delta`s with those that changed, each whole, and
+a `beat` in silence. After a loss the last id goes back to the server: no event comes twice.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import httpx
+import msgspec
+
+from scm.errors import LinkError
+
+TRIES = 8
+
+Lines = Iterator[str]
+
+
+class LiveEvent(msgspec.Struct, kw_only=True, frozen=True):
+    """One event.
+
+    Attributes:
+        id: Where the stream goes on after it.
+        name: `snapshot`, `delta` or `beat`.
+        data: Topics by name.
+    """
+
+    id: str
+    name: str
+    data: dict[str, Any]
+
+
+def events_of(connect: Callable[[str], Lines], pause: Callable[[int], bool]) -> Iterator[LiveEvent]:
+    """Yield events, and connect again when they stop.
+
+    Args:
+        connect: Returns the lines of a stream that goes on after an event, by its id.
+        pause: Waits before the next try, by its number; returns whether to give up.
+
+    Raises:
+        LinkError: when no event came in several tries.
+    """
+    last_id, failed = "", 0
+    while True:
+        reason = "the server ended the stream"
+        try:
+            for found in parse(connect(last_id)):
+                last_id, failed = found.id or last_id, 0
+                yield found
+        except httpx.TransportError as cause:
+            reason = f"{type(cause).__name__}: {cause}"
+        failed += 1
+        if failed >= TRIES:
+            msg = f"live stream: nothing came in {failed} tries: {reason}; is `scm up` running?"
+            raise LinkError(msg)
+        if pause(failed):
+            return
+
+
+def parse(lines: Lines) -> Iterator[LiveEvent]:
+    """Yield the events that lines tell; one that is cut off is dropped."""
+    fields: dict[str, str] = {}
+    for line in lines:
+        if line:
+            name, _, value = line.partition(":")
+            fields[name] = value.removeprefix(" ")
+        elif "data" in fields:
+            data = msgspec.json.decode(fields["data"], type=dict[str, Any])
+            yield LiveEvent(id=fields.get("id", ""), name=fields.get("event", ""), data=data)
+            fields = {}
+        else:
+            fields = {}
+
+
+def states(events: Iterator[LiveEvent]) -> Iterator[dict[str, Any]]:
+    """Yield all topics as they are after each event; `events` of the log are those just told."""
+    state: dict[str, Any] = {}
+    for found in events:
+        if found.name == "snapshot":
+            state = {}
+        state.pop("events", None)
+        state |= found.data
+        yield dict(state)

@@ -1,0 +1,115 @@
+"""The interface describes itself wholly: whoever reads openapi.json needs nothing else."""
+
+import pytest
+
+from scm.api.app import create_app
+from scm.api.openapi import described
+from scm.api.view import CityView
+from scm.errors import RunError
+from scm.maps.load import load_map
+
+SUCCESS = ("200", "201", "202", "204", "206")
+REFERENCE = "#/components/schemas/"
+
+
+@pytest.fixture(scope="module")
+def document():
+    app = create_app(CityView(), lambda _request, _timeout_s: None, load_map("driving_school"))
+    return app.openapi()
+
+
+def operations_of(document):
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            yield f"{method.upper()} {path}", operation
+
+
+def fields_of(document):
+    for record, schema in document["components"]["schemas"].items():
+        for name, field in schema.get("properties", {}).items():
+            yield f"{record}.{name}", field
+
+
+def said(problems):
+    return "\n".join(["", *sorted(problems)])
+
+
+def test_every_operation_says_what_it_does_and_whose_noun_it_is(document):
+    wrong = [
+        where
+        for where, operation in operations_of(document)
+        if not (operation.get("summary") and len(operation.get("tags", ())) == 1)
+    ]
+    assert not wrong, said(wrong)
+
+
+def test_every_operation_has_an_answer_with_a_schema(document):
+    """`responses=answer(Record)`, `answer_page` or `answer_file` of scm.api.schemas."""
+    wrong = []
+    for where, operation in operations_of(document):
+        told = [operation["responses"][code] for code in SUCCESS if code in operation["responses"]]
+        schemas = [media.get("schema") for one in told for media in one.get("content", {}).values()]
+        if not schemas or not all(schemas):
+            wrong.append(where)
+    assert not wrong, said(wrong)
+
+
+def test_every_operation_may_answer_a_problem(document):
+    for where, operation in operations_of(document):
+        told = operation["responses"]["404"]["content"]["application/problem+json"]["schema"]
+        assert told == {"$ref": REFERENCE + "Problem"}, where
+
+
+def test_every_parameter_has_words_and_an_example(document):
+    wrong = [
+        f"{where} {parameter['name']}: {lacks}"
+        for where, operation in operations_of(document)
+        for parameter in operation.get("parameters", ())
+        for lacks in ("description", "examples")
+        if not (parameter.get(lacks) or parameter["schema"].get(lacks))
+    ]
+    assert not wrong, said(wrong)
+
+
+def test_every_field_has_words(document):
+    """Under `Attributes:` of the record's docstring, or in scm.api.words for its name."""
+    wrong = [where for where, field in fields_of(document) if not field.get("description")]
+    assert not wrong, said(wrong)
+
+
+def test_every_field_has_an_example_of_its_type(document):
+    wrong = [where for where, field in fields_of(document) if "examples" not in field]
+    assert not wrong, said(wrong)
+
+
+def test_every_reference_finds_its_record(document):
+    def references(node):
+        if isinstance(node, dict):
+            if "$ref" in node:
+                yield node["$ref"]
+            for child in node.values():
+                yield from references(child)
+        elif isinstance(node, list):
+            for child in node:
+                yield from references(child)
+
+    known = {REFERENCE + name for name in document["components"]["schemas"]}
+    assert set(references(document)) <= known
+    assert "$defs" not in str(document)
+
+
+def test_examples_hold_by_their_own_schema(document):
+    jsonschema = pytest.importorskip("jsonschema_rs")
+    wrong = []
+    for where, field in fields_of(document):
+        schema = {**field, "components": document["components"]}
+        validator = jsonschema.validator_for(schema)
+        for example in field.get("examples", ()):
+            wrong += [f"{where}: {fault.message}" for fault in validator.iter_errors(example)]
+    assert not wrong, said(wrong)
+
+
+def test_two_records_of_one_name_are_refused():
+    document = {"paths": {}, "a": {"$defs": {"X": {"type": "string"}}}, "b": {"$defs": {"X": {}}}}
+    with pytest.raises(RunError, match="two records are named 'X'"):
+        described(document)

@@ -1,0 +1,93 @@
+"""A whole city as a user starts it, and a real browser that looks at its pages.
+
+One city serves all tests of this folder: each leaves it as it found it (no stop engaged, cars of
+its own taken off). Set SCM_PICTURES to a folder to keep what `look` photographs.
+"""
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.e2e.city_process import CityProcess, city, wait_for
+from tests.e2e.pages.visiting import Visit, judge, photograph
+
+CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
+SIZES = {"wide": (1440, 900), "narrow": (390, 844)}
+THEMES = ("light", "dark")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip the pages where no browser is; CI has to have one."""
+    if Path(CHROMIUM).exists() or "CI" in os.environ:
+        return
+    reason = f"no browser: {CHROMIUM} is missing (apt-get install chromium)"
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker(pytest.mark.skip(reason=reason))
+
+
+@pytest.fixture(scope="package")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
+    """`scm up driving_school`: four hosted cars, two agents, signals, Eye and recorder."""
+    with city(tmp_path_factory.mktemp("pages")) as process:
+        wait_for(lambda: len(process.get("/vehicles")["vehicles"]) == 6, 90.0, "six cars are there")
+        yield process
+
+
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Any]:
+    """Debian's Chromium."""
+    sync_api = pytest.importorskip("playwright.sync_api")
+    with sync_api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def visit(browser: Any, running: CityProcess) -> Iterator[Callable[..., Visit]]:
+    """Open an address of the dashboard in a window of its own, and wait until it is live."""
+    contexts = []
+
+    def open_at(path: str, size: str = "wide", theme: str = "light", script: str = "") -> Visit:
+        width, height = SIZES[size]
+        context = browser.new_context(
+            viewport={"width": width, "height": height}, color_scheme=theme
+        )
+        contexts.append(context)
+        context.add_init_script(script)
+        visited = Visit(context.new_page())
+        visited.page.goto(running.url + path)
+        visited.page.wait_for_selector('.link-state[data-link="live"]')
+        return visited
+
+    yield open_at
+    for context in contexts:
+        context.close()
+
+
+@pytest.fixture
+def look(visit: Callable[..., Visit]) -> Callable[..., Visit]:
+    """Look at a page: it is quiet, accessible, asks nobody else, fits; photograph it."""
+
+    def at(path: str, name: str, size: str, theme: str, ready: str = "main > *") -> Visit:
+        """Visit `path`, wait for the selector `ready`, judge it, and keep `name_size_theme.png`."""
+        visited = visit(path, size, theme)
+        visited.page.wait_for_selector(ready)
+        judge(visited)
+        photograph(visited, f"{name}_{size}_{theme}")
+        return visited
+
+    return at

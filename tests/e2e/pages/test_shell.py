@@ -1,0 +1,100 @@
+"""What every page has: the bar, the red stop, stale data, colours, keyboard, small windows."""
+
+import pytest
+
+from tests.e2e.pages.visiting import judge
+
+PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
+
+
+def test_every_page_opens_from_the_bar_without_a_reload(visit):
+    visited = visit("/")
+    page = visited.page
+    page.evaluate("() => { window.sameDocument = true }")
+    for name in PAGES:
+        page.click(f'nav a[href="/{name}"]')
+        page.wait_for_selector(f"main.at-{name} > *")
+        assert page.get_attribute(f'nav a[href="/{name}"]', "aria-current") == "page"
+    page.go_back()
+    page.wait_for_selector("main.at-mismatch > *")
+    assert page.evaluate("() => window.sameDocument")
+    assert visited.complaints == []
+
+
+def test_an_address_that_is_no_page_says_so(visit):
+    page = visit("/map").page
+    page.evaluate("() => history.pushState(null, '', '/nowhere')")
+    page.evaluate("() => dispatchEvent(new PopStateEvent('popstate'))")
+    page.wait_for_selector("main.at-nowhere a[href='/map']")
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_the_red_stop_is_on_every_page(visit, name):
+    page = visit(f"/{name}", "narrow").page
+    assert page.locator("#city-stop").is_visible()
+
+
+def test_the_red_stop_stops_the_city_by_keyboard_and_lets_it_go(visit, running):
+    visited = visit("/events")
+    page = visited.page
+    page.focus("#city-stop")
+    page.keyboard.press("Enter")
+    page.fill("dialog input[name=reason]", "a hand on the floor")
+    page.keyboard.press("Enter")
+    page.wait_for_selector(".banner.stopped >> text=a hand on the floor")
+    try:
+        assert running.get("/stop")["engaged"]
+        judge(visited)
+    finally:
+        page.click("#city-stop")
+        page.wait_for_selector("dialog .primary")
+        page.keyboard.press("Enter")
+        visited.until(lambda: not running.get("/stop")["engaged"], "the stop is released")
+    page.wait_for_selector(".banner.stopped", state="detached")
+
+
+def test_escape_leaves_the_question_and_the_city_alone(visit, running):
+    page = visit("/map").page
+    page.click("#city-stop")
+    page.wait_for_selector("dialog[open]")
+    page.keyboard.press("Escape")
+    page.wait_for_selector("dialog", state="detached")
+    assert not running.get("/stop")["engaged"]
+
+
+def test_a_silent_world_greys_the_page_then_says_so_and_comes_back_by_itself(visit, running):
+    visited = visit("/map")
+    page = visited.page
+    with running.frozen("world"):
+        page.wait_for_selector('.page[data-link="stale"]')
+        page.wait_for_selector('.page[data-link="lost"] .banner.lost')
+    page.wait_for_selector('.page[data-link="live"]')
+    page.wait_for_selector(".banner.lost", state="detached")
+    assert visited.complaints == []
+
+
+def test_a_server_that_comes_back_is_heard_again(visit, running):
+    page = visit("/map").page
+    running.kill("api")
+    page.wait_for_selector('.page[data-link="live"]')
+    page.wait_for_function("() => !document.querySelector('.banner.lost')")
+
+
+def test_the_colours_follow_the_choice_of_the_person(visit):
+    page = visit("/map", theme="light").page
+    ground = "() => getComputedStyle(document.body).backgroundColor"
+    light = page.evaluate(ground)
+    page.click("button.theme")  # light
+    assert page.evaluate(ground) == light
+    page.click("button.theme")  # dark
+    assert page.evaluate(ground) != light
+    page.reload()
+    page.wait_for_selector("button.theme[aria-label$=dark]")
+    assert page.evaluate(ground) != light
+
+
+def test_the_keyboard_skips_the_bar(visit):
+    page = visit("/map").page
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    assert page.evaluate("() => document.activeElement.id") == "main"

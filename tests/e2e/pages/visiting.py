@@ -1,0 +1,73 @@
+"""A page that is looked at: what it waits for, what it complains of, and what must hold of all."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+PATIENCE_MS = 30_000
+SERIOUS = {"serious", "critical"}
+
+
+class Visit:
+    """A page that remembers everything it complained about and every host it asked."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+        self.complaints: list[str] = []
+        self.hosts: set[str] = set()
+        page.set_default_timeout(PATIENCE_MS)
+        page.on("console", self._on_console)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("request", lambda request: self.hosts.add(urlsplit(request.url).netloc))
+
+    def wait(self, expression: str, argument: Any = None) -> None:
+        """Wait until JavaScript on the page is true."""
+        self.page.wait_for_function(expression, arg=argument)
+
+    def until(self, condition: Callable[[], Any], what: str) -> Any:
+        """Wait for something on our side; the page lives on meanwhile."""
+        for _ in range(PATIENCE_MS // 50):
+            value = condition()
+            if value:
+                return value
+            self.page.wait_for_timeout(50)
+        msg = f"not within {PATIENCE_MS / 1000:g} s: {what}"
+        raise AssertionError(msg)
+
+    def _on_console(self, message: Any) -> None:
+        if message.type in ("error", "warning"):
+            self.complaints.append(message.text)
+
+
+def judge(visited: Visit) -> None:
+    """Fail where the page complains, asks another host, scrolls sideways, or axe finds fault."""
+    page = visited.page
+    assert visited.complaints == []
+    assert visited.hosts == {urlsplit(page.url).netloc}
+    wide = "() => [document.documentElement.scrollWidth, window.innerWidth]"
+    content, window = page.evaluate(wide)
+    assert content <= window, f"the page is {content} px wide in a window of {window} px"
+    assert faults_of(page) == []
+
+
+def faults_of(page: Any) -> list[str]:
+    """Return what axe-core calls serious or critical, each with what it is about."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    found = Axe().run(page).response["violations"]
+    return [
+        f"{fault['id']}: {node['html'][:160]} ({node['failureSummary'][:300]})"
+        for fault in found
+        if fault["impact"] in SERIOUS
+        for node in fault["nodes"]
+    ]
+
+
+def photograph(visited: Visit, name: str) -> None:
+    """Keep a picture of the page where SCM_PICTURES says; nothing without it."""
+    folder = os.environ.get("SCM_PICTURES")
+    if folder:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        visited.page.screenshot(path=Path(folder) / f"{name}.png")

@@ -1,0 +1,57 @@
+"""Topics tell parts of the city; shelves lie in one folder; the stream takes only known names."""
+
+from pathlib import Path
+
+import pytest
+
+from scm.api.city import City
+from scm.api.encoding import encode
+from scm.api.shelves import Shelves, shelves_in
+from scm.api.topics import EVENTS, pulse_of, topics_of
+
+
+@pytest.fixture
+def city(view, fake_city, city_map):
+    return City(view, fake_city.ask, city_map)
+
+
+def test_every_topic_can_be_told_before_anything_is_heard(city):
+    for name, topic in topics_of(city).items():
+        assert encode(topic.make(city.view.picture())), name
+        assert topic.every >= 1
+
+
+def test_events_are_no_state_and_so_no_topic_made_from_a_picture(city):
+    assert EVENTS not in topics_of(city)
+
+
+def test_the_pulse_is_unknown_until_the_world_is_heard(view, hear, snapshot):
+    still = pulse_of(view.picture())
+    assert (still.t_ns, still.tick, still.vehicles) == (None, None, 0)
+    hear(2.0, snapshot(at_s=1.0, tick=7, n1=(0, 0, 0), n2=(1, 0, 0)))
+    beats = pulse_of(view.picture())
+    assert (beats.t_ns, beats.tick, beats.vehicles) == (1_000_000_000, 7, 2)
+
+
+def test_a_topic_follows_the_picture(city, hear, snapshot):
+    vehicles = topics_of(city)["vehicles"].make
+    hear(2.0, snapshot(n1=(0, 0, 0)))
+    before = encode(vehicles(city.view.picture()))
+    hear(2.05, snapshot(at_s=1.05, n1=(0.1, 0, 0)))
+    assert encode(vehicles(city.view.picture())) != before
+
+
+def test_an_unknown_topic_is_refused_with_the_nearest_one(client):
+    answer = client("GET", "/api/v1/stream?topics=vehicles,signal")
+    assert (answer.status_code, answer.json()["code"]) == (422, "invalid")
+    assert "got 'signal'" in answer.json()["detail"]
+    assert "did you mean 'signals'" in answer.json()["detail"]
+
+
+def test_all_shelves_lie_in_one_folder():
+    shelves = shelves_in(Path("runs"))
+    assert shelves.recordings == Path("runs")
+    folders = [shelves.reports, shelves.scenarios, shelves.calibrations, shelves.plans]
+    assert len(set(folders)) == 4
+    assert all(folder.parent == Path("runs") for folder in folders)
+    assert Shelves().recordings is None
