@@ -110,7 +110,7 @@ def test_a_killed_car_is_noticed_within_one_and_a_half_seconds(running: CityProc
         os.kill(agent.pid, signal.SIGKILL)
         noticed = "the city shows n8 as lost"
         wait_for(lambda: not cars_of(running).get("n8", {"alive": False})["alive"], 1.5, noticed)
-        events = running.get("/events")["events"]
+        events = running.get("/events")["items"]
         assert any(e["name"] == "vehicle_lost" and e.get("vehicle") == "n8" for e in events)
     finally:
         end(agent)
