@@ -201,7 +201,7 @@ def _parts(plan: _Plan) -> list[Job]:
     kept = ("--state", plan.state)
     keys = () if plan.wanted.keys is None else ("--keys", plan.wanted.keys)
     data = ("--data", str(plan.wanted.record_dir))
-    web = ("--host", plan.wanted.host, "--port", str(plan.port), *keys, *data)
+    web = ("--host", plan.wanted.host, "--port", str(plan.port), *keys, *data, *kept)
 
     air = [word for setting in plan.wanted.radio for word in ("--radio", setting)]
 

@@ -13,6 +13,8 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 from scm.api import openapi, problem
+from scm.api.acknowledgements import Acknowledgements
+from scm.api.audit_trail import Audited
 from scm.api.city import Ask, City, Link
 from scm.api.gate import Gate, content_policy
 from scm.api.idempotency import Idempotent
@@ -21,6 +23,7 @@ from scm.api.limits import Limited
 from scm.api.metrics import Measured, Metrics
 from scm.api.operations import Operations
 from scm.api.routes import (
+    audit,
     boxes,
     cameras,
     cities,
@@ -47,6 +50,8 @@ from scm.api.trace import Traced
 from scm.api.view import CityView
 from scm.clock import WallClock
 from scm.maps.model import CityMap
+from scm.store.memory import MemoryStore
+from scm.store.repository import Repository
 
 STATIC_DIR = Path(__file__).parent / "static"
 PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
@@ -73,6 +78,7 @@ def create_app(
     plans: Mapping[str, Sequence[str]] | None = None,
     shelves: Shelves | None = None,
     link: Link | None = None,
+    state: Repository | None = None,
 ) -> FastAPI:
     """Build the application.
 
@@ -85,10 +91,13 @@ def create_app(
         plans: Names of the signal plans each junction offers, beyond those that were seen.
         shelves: Folders of recordings, reports and the like; None: the city offers none.
         link: What is known of the connection to the bus.
+        state: The city's store, with its audit log; None: a new one in memory.
     """
+    clock, store = WallClock(), state or MemoryStore()
+    seen = Acknowledgements(store, clock)
     city = City(view, ask, city_map, plans or {}, shelves or Shelves(), link or Link())
-    work = Operations(WallClock())
-    stream = Stream(city, uuid.uuid4().hex[:8])
+    work = Operations(clock)
+    stream = Stream(city, uuid.uuid4().hex[:8], seen)
     app = FastAPI(
         title=f"scm {city_map.name}",
         version="1",
@@ -103,19 +112,21 @@ def create_app(
     problem.install(app)
     openapi.install(app)
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
-    clock = WallClock()
     app.add_middleware(Idempotent, clock=clock)  # what is added later sees a request earlier
     app.add_middleware(Limited, clock=clock)
+    app.add_middleware(Audited, store=store, clock=clock)
     app.add_middleware(Gate, keys=keys, policy=policy)
     metrics = Metrics(city, stream)
     app.add_middleware(Measured, metrics=metrics, clock=clock)
     app.add_middleware(Traced)
     api = APIRouter(prefix="/api/v1")
     for noun in (
-        cities, vehicles, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic,
+        cities, vehicles, signals, stations, map, boxes, eye, stop, misbehaviour, traffic,
     ):  # fmt: skip
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
+    api.include_router(events.router(city, seen), responses=problem.RESPONSES)
+    api.include_router(audit.router(store), responses=problem.RESPONSES)
     api.include_router(operations.router(work), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)
     api.include_router(session.router(), responses=problem.RESPONSES)

@@ -1,16 +1,31 @@
-"""The last events of the city, numbered in order of arrival, so that a reader can page on."""
+"""The last events of the city, numbered in order of arrival, so that a reader can page on.
 
+A number counts from the start of the server. What an event is called for good, whoever heard it
+and however often, is its `id`: a server that starts again hears the last ones again.
+"""
+
+import hashlib
 from collections import deque
+from collections.abc import Iterator
 
 import msgspec
 
 from scm.v2x.messages.city_event import CityEvent
 
+DEPTH = 5000
+
 
 class LoggedEvent(msgspec.Struct, kw_only=True, frozen=True):
-    """An event and its number; numbers start at 1 and have no gaps."""
+    """An event and its number; numbers start at 1 and have no gaps.
+
+    Attributes:
+        seq: Number of the event since the server started.
+        id: The same for this event for ever: of its time, source, name and text.
+        vehicle: The car it is about; null: none.
+    """
 
     seq: int
+    id: str
     severity: str
     source: str
     t_ns: int
@@ -19,10 +34,41 @@ class LoggedEvent(msgspec.Struct, kw_only=True, frozen=True):
     vehicle: str | None = None
 
 
+class EventFilter(msgspec.Struct, kw_only=True, frozen=True):
+    """Which events are wanted; what is left empty lets everything pass.
+
+    Attributes:
+        severity, source, name: One or more of each, comma between.
+        vehicle: The car it is about.
+        text: To be found in the sentence, the name or the source; case does not matter.
+        since_ns, until_ns: When it happened, both ends included [ns since 1970].
+    """
+
+    severity: str = ""
+    source: str = ""
+    name: str = ""
+    vehicle: str = ""
+    text: str = ""
+    since_ns: int | None = None
+    until_ns: int | None = None
+
+    def passes(self, event: LoggedEvent) -> bool:
+        """Return whether an event is wanted."""
+        return (
+            _names(self.severity, event.severity)
+            and _names(self.source, event.source)
+            and _names(self.name, event.name)
+            and self.vehicle in ("", event.vehicle)
+            and self.text.casefold() in f"{event.text} {event.name} {event.source}".casefold()
+            and (self.since_ns is None or event.t_ns >= self.since_ns)
+            and (self.until_ns is None or event.t_ns <= self.until_ns)
+        )
+
+
 class EventLog:
     """A bounded log: the oldest event is forgotten when it is full."""
 
-    def __init__(self, depth: int = 2000) -> None:
+    def __init__(self, depth: int = DEPTH) -> None:
         self._events: deque[LoggedEvent] = deque(maxlen=depth)
         self.newest_seq = 0
 
@@ -30,10 +76,24 @@ class EventLog:
         """Append an event under the next number."""
         self.newest_seq += 1
         facts = {name: getattr(event, name) for name in event.__struct_fields__}
-        self._events.append(LoggedEvent(seq=self.newest_seq, **facts))
+        self._events.append(LoggedEvent(seq=self.newest_seq, id=id_of(event), **facts))
 
     def after(self, seq: int, limit: int) -> tuple[LoggedEvent, ...]:
         """Return up to `limit` events numbered above `seq`, oldest first."""
         first = self._events[0].seq if self._events else 1
         start = max(0, seq + 1 - first)
         return tuple(self._events[i] for i in range(start, min(start + limit, len(self._events))))
+
+    def newest_first(self) -> Iterator[LoggedEvent]:
+        """Return a copy of all events that are kept."""
+        return iter(tuple(reversed(self._events)))
+
+
+def id_of(event: CityEvent) -> str:
+    """Return what an event is called for good: 16 hexadecimal digits."""
+    said = f"{event.t_ns}\n{event.source}\n{event.name}\n{event.vehicle}\n{event.text}"
+    return hashlib.blake2b(said.encode(), digest_size=8).hexdigest()
+
+
+def _names(wanted: str, own: str) -> bool:
+    return not wanted or own in (part.strip() for part in wanted.split(","))

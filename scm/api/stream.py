@@ -15,6 +15,7 @@ from collections.abc import AsyncIterator, Iterable
 
 import msgspec
 
+from scm.api.acknowledgements import Acknowledgements
 from scm.api.city import City
 from scm.api.encoding import encode
 from scm.api.picture import Picture
@@ -66,7 +67,7 @@ class Listener:
 class Stream:
     """The live stream of one city; `run` it in the event loop that serves the pages."""
 
-    def __init__(self, city: City, run_id: str) -> None:
+    def __init__(self, city: City, run_id: str, seen: Acknowledgements) -> None:
         self._city = city
         self._run_id = run_id
         self._listeners: set[Listener] = set()
@@ -75,7 +76,7 @@ class Stream:
         self._failed_frame = -BEAT_FRAMES
         self._event_seq = 0
         self._closed = False
-        self._topics = topics_of(city)
+        self._topics = topics_of(city, seen)
 
     @property
     def topics(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from scm.api.acknowledgements import Acknowledgements
 from scm.api.city import City
 from scm.api.eye_rows import camera_rows
 from scm.api.picture import Picture
@@ -19,6 +20,8 @@ from scm.api.vehicle_rows import vehicles_topic
 
 EVENTS = "events"
 """The one topic that is no state: its entries come one by one, and never twice."""
+
+ACKNOWLEDGED_SHOWN = 500
 
 
 class Topic(NamedTuple):
@@ -52,7 +55,7 @@ def pulse_of(picture: Picture) -> Pulse:
     )
 
 
-def topics_of(city: City) -> dict[str, Topic]:
+def topics_of(city: City, seen: Acknowledgements) -> dict[str, Topic]:
     """Return every topic but `events`, by name."""
     return {
         "pulse": Topic(pulse_of, 4),
@@ -63,5 +66,6 @@ def topics_of(city: City) -> dict[str, Topic]:
         ),
         "boxes": Topic(boxes_of, 2),
         "eye": Topic(camera_rows, 2),
+        "acknowledgements": Topic(lambda _: seen.newest(ACKNOWLEDGED_SHOWN), 4),
         "stations": Topic(lambda picture: picture.stations, 10),
     }

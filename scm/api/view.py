@@ -151,6 +151,11 @@ class CityView:
         with self._lock:
             return self._log.after(seq, limit)
 
+    def events(self) -> Iterator[LoggedEvent]:
+        """Return all events that are kept, newest first; safe from any thread."""
+        with self._lock:
+            return self._log.newest_first()
+
     def misbehaviour(
         self,
     ) -> tuple[Held[MisbehaviourScores] | None, dict[str, MisbehaviourReport]]:

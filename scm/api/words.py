@@ -6,6 +6,8 @@ the driving school. A name with a unit at its end needs no example here.
 """
 
 WORDS: dict[str, tuple[str, object]] = {
+    "acknowledged_by": ("Who took note of it; null: nobody yet.", "ada"),
+    "acknowledgements": ("Who took note of which event.", None),
     "age_s": ("How long ago it was heard last [s].", 0.2),
     "against": ("What it happened with.", ["n2"]),
     "alive": ("Whether it is there; false: it left or died.", True),
@@ -34,6 +36,7 @@ WORDS: dict[str, tuple[str, object]] = {
     "delta_latitude": ("Against the reference position [1e-7 degree].", -12),
     "delta_longitude": ("Against the reference position [1e-7 degree].", 30),
     "detail": ("What it says of itself, or what was seen, in words.", "4 cars"),
+    "digest": ("Hash of the newest entry, hexadecimal.", "0" * 64),
     "doing": ("The step it is at, in words.", "reads the recording"),
     "done_m": ("How far the car is on its way [m].", 2.31),
     "dropped": ("Messages that its mailboxes had to drop, since its start.", 0),
@@ -41,6 +44,7 @@ WORDS: dict[str, tuple[str, object]] = {
     "engaged": ("Whether the city-wide stop is engaged: no car may drive.", False),
     "epoch": ("Counts the leases of this car: a command of an older one is refused.", 3),
     "error": ("What failed, in words.", "runs/today.mcap: it holds no car named n9"),
+    "event": ("Id of an event.", "9f3a51c07be2d418"),
     "events": ("Entries of the log.", None),
     "fault": ("What the monitor latched; null: all is well.", "conflict"),
     "first_vehicle_tag_id": ("AprilTag of the first car; the others follow.", 1),
@@ -89,6 +93,7 @@ WORDS: dict[str, tuple[str, object]] = {
     "next": ("What follows.", ["east_loop"]),
     "next_colour": ("What comes then; null: not known.", "yellow"),
     "noise_sigma": ("Standard deviation of a grey value.", 2.0),
+    "note": ("What was said to it.", "tyre put back on"),
     "number": ("Its number.", 1),
     "owner": ("Who holds it.", "world"),
     "packed": ("The values, row by row from the top, deflated, base64.", "eJxjYAAAAAEAAQ=="),
@@ -110,6 +115,7 @@ WORDS: dict[str, tuple[str, object]] = {
     "real_time_factor": ("Simulated over elapsed time, over the last second.", 1.0),
     "reason": ("Why.", "a hand on the floor"),
     "reported": ("Names of those reported.", ["n5"]),
+    "request_id": ("Id that its asker gave it; empty: none.", "k1"),
     "residual": ("What it differs from the truth by; null: no truth of that time.", None),
     "result": ("Address of what was made.", "/mismatch/today-n1"),
     "reverse_light_on": ("Whether it is on.", False),

@@ -18,6 +18,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "address but this machine's own",
     )
     parser.add_argument(
+        "--state",
+        metavar="STORE",
+        help="the city's state, sqlite:PATH or postgresql://...: its audit log, and which events "
+        "were acknowledged",
+    )
+    parser.add_argument(
         "--data",
         metavar="FOLDER",
         type=Path,
@@ -52,6 +58,7 @@ def _run(arguments: argparse.Namespace) -> int:
             lambda request, timeout_s: ask(bus, request, timeout_s),
             city_map,
             keys=keys,
+            state=open_store(arguments.state) if arguments.state else None,
             shelves=shelves_in(arguments.data) if arguments.data else None,
             link=Link(
                 city=arguments.city,

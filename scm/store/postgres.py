@@ -41,6 +41,7 @@ MIGRATIONS: tuple[tuple[LiteralString, ...], ...] = (
         'CREATE TABLE latches (key TEXT COLLATE "C" PRIMARY KEY, value BYTEA NOT NULL)',
         'CREATE TABLE marks (key TEXT COLLATE "C" PRIMARY KEY, value BYTEA NOT NULL)',
     ),
+    ('CREATE TABLE seen (key TEXT COLLATE "C" PRIMARY KEY, value BYTEA NOT NULL)',),
 )
 """What each schema version adds to the one before; the table `scm_schema` counts them."""
 

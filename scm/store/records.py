@@ -7,6 +7,7 @@ latches  monitor/<junction>   FaultRecord      a fault that only a person resets
 plans    traffic/<junction>   PlanRecord       the plan in force, and the wish for flash
 answers  <station>/<digest>   StoredAnswer     see scm.v2x.answers
 marks    <station>                             which batch of which run was written last
+seen     event/<id>           Acknowledgement  who took note of an event (scm.api.acknowledgements)
 """
 
 from typing import TypeVar

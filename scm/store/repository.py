@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from typing import Literal, NamedTuple, Protocol, get_args
 
-Table = Literal["leases", "plans", "answers", "credentials", "latches", "marks"]
+Table = Literal["leases", "plans", "answers", "credentials", "latches", "marks", "seen"]
 Log = Literal["audit"]
 
 TABLES: tuple[Table, ...] = get_args(Table)

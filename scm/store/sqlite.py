@@ -30,6 +30,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         _NEVER.format("DELETE", "audit is append-only"),
     ),
     tuple(_TABLE.format(name) for name in ("latches", "marks")),
+    (_TABLE.format("seen"),),
 )
 """What each schema version adds to the one before; `PRAGMA user_version` counts them."""
 

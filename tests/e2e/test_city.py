@@ -30,7 +30,7 @@ def cars_of(running: CityProcess) -> dict[str, Any]:
 
 
 def events_of(running: CityProcess, vehicle: str) -> list[str]:
-    told = running.get("/events")["events"]
+    told = running.get("/events")["items"]
     return [event["name"] for event in told if event.get("vehicle") == vehicle]
 
 

@@ -1,47 +1,184 @@
-"""Events: the log of the city, paged by the number of the last event already read."""
+"""Events: the log of the city, filtered, acknowledged, as a file."""
 
+from collections.abc import Iterator
 from typing import Annotated
 
 import msgspec
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
 
-from scm.api.city import City, json_response
-from scm.api.event_log import LoggedEvent
-from scm.api.roles import VIEWER
-from scm.api.schemas import answer
+from scm.api.acknowledgements import Acknowledgement, Acknowledgements
+from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
+from scm.api.event_log import EventFilter, LoggedEvent
+from scm.api.paging import Cursor, Limit, page_of, page_response
+from scm.api.roles import OPERATOR, VIEWER
+from scm.api.schemas import answer, answer_file, answer_page
+from scm.api.tables import Form, table_response
 
 
-class Events(msgspec.Struct, kw_only=True, frozen=True):
-    """Some events of the log.
+class EventRow(msgspec.Struct, kw_only=True, frozen=True):
+    """An event, and who took note of it.
 
     Attributes:
-        next_after: Number of the last of these: ask on with it as `after`.
-        more: Whether there are others after them already.
+        seq: Number of the event since the server started.
+        id: The same for this event for ever.
+        vehicle: The car it is about; null: none.
+        acknowledged_by: Who took note of it; null: nobody yet.
+        acknowledged_ns: When [ns since 1970]; null: not yet.
+        note: What was said to it.
     """
 
-    events: tuple[LoggedEvent, ...]
-    next_after: int
-    more: bool
+    seq: int
+    id: str
+    severity: str
+    source: str
+    t_ns: int
+    name: str
+    text: str
+    vehicle: str | None
+    acknowledged_by: str | None
+    acknowledged_ns: int | None
+    note: str
 
 
-def router(city: City) -> APIRouter:
+class AcknowledgeBody(BaseModel):
+    """Events that somebody took note of."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    events: list[Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]] = Field(
+        min_length=1,
+        max_length=1000,
+        description="ids of the events",
+        examples=[["9f3a51c07be2d418"]],
+    )
+    by: str = Field("", max_length=64, description="who; empty: the key's owner", examples=["ada"])
+    note: str = Field(
+        "", max_length=500, description="what there is to say", examples=["tyre put back on"]
+    )
+
+
+class Acknowledged(msgspec.Struct, kw_only=True, frozen=True):
+    """What is acknowledged now.
+
+    Attributes:
+        acknowledgements: Of the events that were named, as they stand.
+    """
+
+    acknowledgements: tuple[Acknowledgement, ...]
+
+
+def _wanted(
+    severity: Annotated[
+        str, Query(max_length=64, description="one or more, comma between", examples=["error"])
+    ] = "",
+    source: Annotated[
+        str, Query(max_length=200, description="stations, comma between", examples=["world"])
+    ] = "",
+    name: Annotated[
+        str, Query(max_length=200, description="names, comma between", examples=["city_stop"])
+    ] = "",
+    vehicle: Annotated[str, Query(max_length=32, description="of a car", examples=["n1"])] = "",
+    text: Annotated[
+        str, Query(max_length=100, description="to be found in it", examples=["wall"])
+    ] = "",
+    since_ns: Annotated[
+        int | None, Query(description="not before [ns since 1970]", examples=[0])
+    ] = None,
+    until_ns: Annotated[
+        int | None, Query(description="not after [ns since 1970]", examples=[2**62])
+    ] = None,
+) -> EventFilter:
+    return EventFilter(
+        severity=severity,
+        source=source,
+        name=name,
+        vehicle=vehicle,
+        text=text,
+        since_ns=since_ns,
+        until_ns=until_ns,
+    )
+
+
+Wanted = Annotated[EventFilter, Depends(_wanted)]
+Open = Annotated[
+    bool, Query(alias="open", description="only those nobody took note of", examples=[True])
+]
+
+
+def router(city: City, seen: Acknowledgements) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/events", tags=["events"], dependencies=[VIEWER])
 
+<<<<<<< HEAD
     @routes.get("", summary="Events in order of arrival", responses=answer(Events))
     async def events(
+=======
+    @routes.get("", summary="Events, newest first", responses=answer_page(EventRow))
+    def events(
+        request: Request,
+        wanted: Wanted,
+        *,
+        only_open: Open = False,
+>>>>>>> h-ev
         after: Annotated[
-            int, Query(ge=0, description="number of the last event read", examples=[40])
+            int, Query(ge=0, description="only those numbered above", examples=[40])
         ] = 0,
-        limit: Annotated[
-            int, Query(ge=1, le=500, description="events a page", examples=[100])
-        ] = 100,
+        limit: Limit = 100,
+        cursor: Cursor = "",
     ) -> Response:
-        found = city.view.events_after(after, limit + 1)
-        page, more = found[:limit], len(found) > limit
-        cursor = page[-1].seq if page else after
-        link = {"Link": f'</api/v1/events?after={cursor}&limit={limit}>; rel="next"'}
-        body = Events(events=page, next_after=cursor, more=more)
-        return json_response(body, headers=link if more else None)
+        rows = (row for row in _rows(city, seen, wanted, only_open=only_open) if row.seq > after)
+        return page_response(request, page_of(rows, lambda row: row.id, limit=limit, cursor=cursor))
+
+    @routes.get(
+        ".{form}",
+        summary="Events as a file",
+        responses=answer_file("text/csv"),
+        response_class=Response,
+    )
+    def export(form: Form, wanted: Wanted, *, only_open: Open = False) -> Response:
+        rows = _rows(city, seen, wanted, only_open=only_open)
+        return table_response(rows, EventRow, form, f"{city.city_map.name}-events")
+
+    @routes.post(
+        "/acknowledgements",
+        summary="Take note of events",
+        responses=answer(Acknowledged),
+        dependencies=[OPERATOR],
+    )
+    def acknowledge(body: AcknowledgeBody, request: Request, key: IdempotencyKey = "") -> Response:
+        by = body.by or str(request.scope["scm_owner"])
+        return json_response(Acknowledged(acknowledgements=seen.add(body.events, by, body.note)))
+
+    @routes.delete(
+        "/acknowledgements/{name}",
+        summary="Take an acknowledgement back",
+        responses=answer(Acknowledgement),
+        dependencies=[OPERATOR],
+    )
+    def take_back(name: Name, key: IdempotencyKey = "") -> Response:
+        row = seen.take_back(name)
+        if row is None:
+            raise not_found("acknowledgement", name)
+        return json_response(row)
 
     return routes
+
+
+def _rows(
+    city: City, seen: Acknowledgements, wanted: EventFilter, *, only_open: bool
+) -> Iterator[EventRow]:
+    known = seen.rows()
+    for event in city.view.events():
+        own = known.get(event.id)
+        if wanted.passes(event) and not (only_open and own):
+            yield _row(event, own)
+
+
+def _row(event: LoggedEvent, own: Acknowledgement | None) -> EventRow:
+    return EventRow(
+        **msgspec.structs.asdict(event),
+        acknowledged_by=own.by if own else None,
+        acknowledged_ns=own.at_ns if own else None,
+        note=own.note if own else "",
+    )

@@ -205,14 +205,15 @@ class TestEvents:
         seen, path = [], f"{API}/events?limit=3"
         while path:
             response = client("GET", path)
-            seen += [item["seq"] for item in response.json()["events"]]
+            seen += [item["seq"] for item in response.json()["items"]]
             path = response.links.get("next", {}).get("url")
-        assert seen == [1, 2, 3, 4, 5, 6, 7]
+        assert seen == [7, 6, 5, 4, 3, 2, 1]
 
-    def test_a_page_at_the_end_says_where_to_go_on_later(self, client, hear, event):
-        hear(1.0, event("one"))
+    def test_only_what_came_after_a_number_is_told(self, client, hear, event):
+        hear(1.0, event("one"), event("two"))
         body = client("GET", f"{API}/events?after=1").json()
-        assert body == {"events": [], "next_after": 1, "more": False}
+        assert [row["text"] for row in body["items"]] == ["two"]
+        assert client("GET", f"{API}/events?after=2").json() == {"items": [], "next": None}
 
     @pytest.mark.parametrize("query", ["limit=0", "limit=501", "after=-1", "after=x"])
     def test_a_wrong_page_is_refused(self, client, query):

@@ -3,13 +3,17 @@ import json
 
 import pytest
 
+from scm.api.acknowledgements import Acknowledgements
 from scm.api.city import City
 from scm.api.stream import BEAT_FRAMES, EVENTS_SHOWN, QUEUE_DEPTH, Listener, Stream
+from scm.clock import StepClock
+from scm.store.memory import MemoryStore
 
 
 @pytest.fixture
 def stream(view, fake_city, city_map):
-    return Stream(City(view, fake_city.ask, city_map), "run1")
+    seen = Acknowledgements(MemoryStore(), StepClock())
+    return Stream(City(view, fake_city.ask, city_map), "run1", seen)
 
 
 def parsed(frame):
@@ -28,7 +32,8 @@ def test_a_page_first_gets_everything(stream, hear, snapshot, event):
         _, (name, _, body) = await begin(stream)
         assert name == "snapshot"
         assert set(body) == {
-            "vehicles", "pulse", "signals", "boxes", "stop", "eye", "stations", "events", "run",
+            "acknowledgements", "vehicles", "pulse", "signals", "boxes", "stop", "eye", "stations",
+            "events", "run",
         }  # fmt: skip
         assert body["vehicles"]["vehicles"][0]["vehicle"] == "n1"
         assert [item["text"] for item in body["events"]] == ["hello"]

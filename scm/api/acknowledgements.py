@@ -1,0 +1,89 @@
+"""Acknowledgements: a person has seen an event, and says so once for everybody.
+
+They are kept in the city's state, so that they outlive the server; the oldest are forgotten.
+"""
+
+import threading
+from collections.abc import Sequence
+
+import msgspec
+
+from scm.clock import Clock
+from scm.errors import StoreError
+from scm.store.repository import Repository
+
+KEPT = 5000
+_PREFIX = "event/"
+
+
+class Acknowledgement(msgspec.Struct, kw_only=True, frozen=True):
+    """Who took note of an event.
+
+    Attributes:
+        event: Id of the event.
+        by: Who took note of it.
+        note: What was said to it; may be empty.
+        at_ns: When [ns since 1970].
+    """
+
+    event: str
+    by: str
+    note: str
+    at_ns: int
+
+
+class Acknowledgements:
+    """All acknowledgements of a city; safe from any thread."""
+
+    def __init__(self, store: Repository, clock: Clock) -> None:
+        self._store = store
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._rows: dict[str, Acknowledgement] = {}
+        kept = [_read(key, body) for key, body in store.items("seen") if key.startswith(_PREFIX)]
+        for row in sorted(kept, key=lambda row: row.at_ns):
+            self._rows[row.event] = row
+
+    def rows(self) -> dict[str, Acknowledgement]:
+        """Return all of them by the event's id."""
+        with self._lock:
+            return dict(self._rows)
+
+    def newest(self, most: int) -> tuple[Acknowledgement, ...]:
+        """Return those that came last, oldest first."""
+        with self._lock:
+            return tuple(self._rows.values())[-most:]
+
+    def add(self, events: Sequence[str], by: str, note: str = "") -> tuple[Acknowledgement, ...]:
+        """Acknowledge events by their ids; one already acknowledged stays as it was."""
+        with self._lock, self._store.transaction():
+            for event in events:
+                if event not in self._rows:
+                    row = Acknowledgement(event=event, by=by, note=note, at_ns=self._clock.now_ns())
+                    self._store.put("seen", _PREFIX + event, msgspec.json.encode(row))
+                    self._rows[event] = row
+            self._forget()
+            return tuple(self._rows[event] for event in events if event in self._rows)
+
+    def take_back(self, event: str) -> Acknowledgement | None:
+        """Take one back; return what it was, or None."""
+        with self._lock:
+            row = self._rows.pop(event, None)
+            if row is not None:
+                self._store.delete("seen", _PREFIX + event)
+            return row
+
+    def _forget(self) -> None:
+        over = len(self._rows) - KEPT
+        if over > 0:
+            for event in tuple(self._rows)[:over]:
+                del self._rows[event]
+                self._store.delete("seen", _PREFIX + event)
+
+
+def _read(key: str, body: bytes) -> Acknowledgement:
+    try:
+        return msgspec.json.decode(body, type=Acknowledgement)
+    except msgspec.MsgspecError as cause:
+        msg = f"state: seen {key}: {cause}; expected an acknowledgement"
+        raise StoreError(msg) from cause

@@ -1,0 +1,184 @@
+"""The audit trail as the web sees it: what was changed through it, added; what all did, read.
+
+World and signals note each request that they obey themselves (`scm.store.audit`). What the web
+changes beyond that, its own files, jobs, keys and acknowledgements, it notes here, and every
+refusal of a change too: who, from where, what, how it ended, how long it took.
+"""
+
+import asyncio
+import logging
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from scm.api.idempotency import CHANGES
+from scm.api.trace import trace_id
+from scm.clock import Clock
+from scm.errors import StoreError
+from scm.store.audit import AuditLog, Deed
+from scm.store.repository import Repository
+
+_LOGGER = logging.getLogger(__name__)
+
+STATION = "api"
+BLOCK = 500
+MOST_LOOKED_AT = 20_000
+
+
+class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One deed of the audit log.
+
+    Attributes:
+        number: Of the entry; numbers have no gaps.
+        t_ns: When it was asked for [ns since 1970].
+        station: Who did it: `world`, `traffic`, `api`.
+        kind: The request's class, or method and path of a call of the web.
+        by: Who asked.
+        request_id: Id of the request; empty: it had none.
+        request, reply: What was asked and answered, as the station noted it.
+    """
+
+    number: int
+    t_ns: int
+    station: str
+    kind: str
+    by: str
+    request_id: str
+    request: dict[str, Any]
+    reply: dict[str, Any]
+
+
+class AuditFilter(msgspec.Struct, kw_only=True, frozen=True):
+    """Which deeds are wanted; what is left empty lets everything pass.
+
+    Attributes:
+        station: Who did it.
+        by: Who asked: a part of the name.
+        kind: A part of the request's class or path.
+        text: To be found anywhere in the entry; case does not matter.
+    """
+
+    station: str = ""
+    by: str = ""
+    kind: str = ""
+    text: str = ""
+
+    def passes(self, row: AuditRow) -> bool:
+        """Return whether a deed is wanted."""
+        return (
+            self.station in ("", row.station)
+            and self.by.casefold() in row.by.casefold()
+            and self.kind.casefold() in row.kind.casefold()
+            and (not self.text or self.text.casefold() in _said(row))
+        )
+
+
+def newest_first(store: Repository) -> Iterator[AuditRow]:
+    """Yield deeds newest first, at most `MOST_LOOKED_AT`.
+
+    Raises:
+        StoreError: naming an entry that cannot be read.
+    """
+    log = AuditLog(store)
+    last = log.head().number
+    first = max(0, last - MOST_LOOKED_AT)
+    while last > first:
+        start = max(first, last - BLOCK)
+        block = []
+        for at, deed in log.deeds(start):
+            if at > last:
+                break
+            block.append(_row(at, deed))
+        yield from reversed(block)
+        last = start
+
+
+class Audited:
+    """ASGI middleware behind the gate: notes every change, whether it was done or refused."""
+
+    def __init__(self, app: ASGIApp, *, store: Repository, clock: Clock) -> None:
+        self._app = app
+        self._log = AuditLog(store)
+        self._clock = clock
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, and note it when it was to change something."""
+        if scope["type"] != "http" or scope["method"] not in CHANGES:
+            await self._app(scope, receive, send)
+            return
+        began_ns = self._clock.now_ns()
+        status = 500
+        sizes = {"received": 0}
+
+        async def counted() -> Message:
+            message = await receive()
+            sizes["received"] += len(message.get("body", b""))
+            return message
+
+        async def send_noted(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+            await send(message)
+
+        try:
+            await self._app(scope, counted, send_noted)
+        finally:
+            deed = _deed(scope, status, sizes["received"], began_ns, self._clock.now_ns())
+            await asyncio.to_thread(self._note, deed)
+
+    def _note(self, deed: Deed) -> None:
+        try:
+            self._log.note(deed)
+        except StoreError as failure:  # the change is done: to fail its answer would tell a lie
+            _LOGGER.error("audit_failed kind=%r: %s", deed.kind, failure)  # noqa: TRY400
+
+
+def _deed(scope: Scope, status: int, received: int, began_ns: int, ended_ns: int) -> Deed:
+    client = scope.get("client")
+    headers = dict(scope["headers"])
+    asked = {
+        "role": scope.get("scm_role", ""),
+        "address": str(client[0]) if client else "",
+        "query": scope["query_string"].decode("latin-1")[:500],
+        "bytes": received,
+        "trace_id": trace_id(),
+    }
+    done = {"status": status, "ms": round((ended_ns - began_ns) / 1e6, 1)}
+    return Deed(
+        t_ns=began_ns,
+        station=STATION,
+        kind=f"{scope['method']} {scope['path']}"[:300],
+        by=str(scope.get("scm_owner", "")),
+        request_id=headers.get(b"idempotency-key", b"").decode("latin-1")[:128],
+        request=_raw(asked),
+        reply=_raw(done),
+    )
+
+
+def _raw(body: object) -> msgspec.Raw:
+    return msgspec.Raw(msgspec.json.encode(body))
+
+
+def _row(number: int, deed: Deed) -> AuditRow:
+    return AuditRow(
+        number=number,
+        t_ns=deed.t_ns,
+        station=deed.station,
+        kind=deed.kind,
+        by=deed.by,
+        request_id=deed.request_id,
+        request=_object(deed.request),
+        reply=_object(deed.reply),
+    )
+
+
+def _object(raw: msgspec.Raw) -> dict[str, Any]:
+    body = msgspec.json.decode(raw)
+    return body if isinstance(body, dict) else {"value": body}
+
+
+def _said(row: AuditRow) -> str:
+    return msgspec.json.encode(row).decode().casefold()

@@ -1,0 +1,86 @@
+"""The events page over a real city: what happened is found, acknowledged, exported; and audited."""
+
+import json
+
+import pytest
+
+from tests.e2e.pages.visiting import judge, photograph
+
+ROWS = ".at-events .entries > li"
+
+
+def stop_and_go(running, reason):
+    """Make two events and four deeds that everybody sees."""
+    for engaged in (True, False):
+        body = {"engaged": engaged, "by": "ada", "reason": reason}
+        running.web.put("/stop", json=body).raise_for_status()
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("size", ["wide", "narrow"])
+def test_the_log_is_readable_at_every_size_and_in_both_colours(look, running, size, theme):
+    stop_and_go(running, "a hand on the floor")
+    visited = look("/events", "events", size, theme, ready=f"{ROWS} >> text=a hand on the floor")
+    visited.page.click('.at-events .tabs a[href="/events/audit"]')
+    visited.page.wait_for_selector(".at-events [data-deed]")
+    judge(visited)
+    photograph(visited, f"audit_{size}_{theme}")
+
+
+def test_a_person_finds_follows_acknowledges_and_takes_back(visit, running):
+    visited = visit("/events")
+    page = visited.page
+    stop_and_go(running, "a marble on lane two")
+    mine = f"{ROWS}:has-text('a marble on lane two')"
+    page.wait_for_selector(mine)
+    page.fill("input[aria-label='Find in events']", "marble")
+    page.click(".chips [data-severity=warning]")
+    page.wait_for_selector(f"{ROWS}:not(:has-text('marble'))", state="detached")
+    page.locator(f"{mine} >> text=Acknowledge").first.focus()
+    page.keyboard.press("Enter")
+    page.fill("dialog input[name=note]", "rolled away")
+    page.keyboard.press("Enter")
+    page.wait_for_selector(f"{mine} >> text=rolled away")
+    (row, *_) = running.get("/events?text=marble")["items"]
+    assert (row["acknowledged_by"], row["note"]) == ("this machine", "rolled away")
+    href = page.get_attribute(".export a[href*='jsonl']", "href")
+    lines = running.web.get(href.removeprefix("/api/v1")).text.splitlines()
+    assert {json.loads(line)["severity"] for line in lines} == {"warning"}
+    assert all("marble" in line for line in lines)
+    page.check("label.tick input")
+    page.wait_for_selector(f"{mine} >> text=rolled away", state="detached")
+    page.uncheck("label.tick input")
+    page.locator(f"{mine} >> button[aria-label^='Take back']").first.click()
+    visited.until(
+        lambda: running.get("/events?text=marble")["items"][0]["acknowledged_by"] is None,
+        "the acknowledgement is taken back",
+    )
+    assert visited.complaints == []
+
+
+def test_a_paused_log_stands_still_until_it_is_followed_again(visit, running):
+    visited = visit("/events")
+    page = visited.page
+    page.wait_for_selector(ROWS)
+    page.click("text=Pause")
+    page.wait_for_selector(".paused")
+    stop_and_go(running, "while nobody looks")
+    visited.until(lambda: running.get("/events?text=nobody")["items"], "it is in the log")
+    visited.until(lambda: not running.get("/stop")["engaged"], "the stop is released")
+    page.wait_for_timeout(500)  # ten frames of the stream
+    assert "while nobody looks" not in page.inner_text(".at-events .entries")
+    page.click("text=Follow")
+    page.wait_for_selector(f"{ROWS} >> text=while nobody looks")
+
+
+def test_the_audit_names_who_did_what_and_its_chain_is_whole(visit, running):
+    stop_and_go(running, "for the audit")
+    page = visit("/events/audit").page
+    page.fill("input[aria-label='Find in deeds']", "for the audit")
+    deed = ".at-events [data-deed]:has-text('StopRequest')"
+    page.wait_for_selector(deed)
+    assert "world" in page.locator(deed).first.inner_text()
+    page.locator(f"{deed} .name").first.click()
+    assert "for the audit" in page.inner_text(".at-events .whole pre")
+    page.click("text=Check the chain")
+    page.wait_for_selector(".chain >> text=whole:")

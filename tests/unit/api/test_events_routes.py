@@ -1,0 +1,207 @@
+"""Events filtered, acknowledged and exported; deeds noted, filtered and checked."""
+
+import csv
+import io
+import json
+
+import msgspec
+import pytest
+
+from scm.api.acknowledgements import KEPT, Acknowledgements
+from scm.api.app import create_app
+from scm.api.event_log import EventLog, id_of
+from scm.clock import StepClock
+from scm.errors import StoreError
+from scm.store.audit import AuditLog, Deed
+from scm.store.memory import MemoryStore
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.stop_request import StopRequest
+
+API = "/api/v1"
+
+
+def told(text, severity="info", source="world", t_ns=1, name="told", vehicle=None):
+    return CityEvent(
+        severity=severity, source=source, t_ns=t_ns, name=name, text=text, vehicle=vehicle
+    )
+
+
+LOG = (
+    told("n1 touched a wall", "warning", t_ns=10, name="contact", vehicle="n1"),
+    told("plan calm is in force", source="traffic", t_ns=20, name="plan_changed"),
+    told("n2 touched a Wall", "warning", t_ns=30, name="contact", vehicle="n2"),
+    told("the monitor latched a fault", "error", source="monitor", t_ns=40, name="fault"),
+)
+
+
+@pytest.fixture
+def store():
+    return MemoryStore()
+
+
+@pytest.fixture
+def own_client(view, fake_city, city_map, store, client_of):
+    return client_of(create_app(view, fake_city.ask, city_map, state=store))
+
+
+def texts(answer):
+    return [row["text"] for row in answer.json()["items"]]
+
+
+class TestFilter:
+    @pytest.mark.parametrize(
+        ("query", "found"),
+        [
+            ("severity=warning", [2, 0]),
+            ("severity=warning,error", [3, 2, 0]),
+            ("source=traffic", [1]),
+            ("name=contact&vehicle=n1", [0]),
+            ("vehicle=n", []),
+            ("text=WALL", [2, 0]),
+            ("text=monitor", [3]),
+            ("since_ns=20&until_ns=30", [2, 1]),
+            ("", [3, 2, 1, 0]),
+        ],
+    )
+    def test_only_what_is_wanted_is_told_newest_first(self, client, hear, query, found):
+        hear(1.0, *LOG)
+        assert texts(client("GET", f"{API}/events?{query}")) == [LOG[i].text for i in found]
+
+    def test_a_file_holds_what_the_filter_lets_through(self, client, hear):
+        hear(1.0, *LOG)
+        answer = client("GET", f"{API}/events.csv?severity=warning")
+        rows = list(csv.DictReader(io.StringIO(answer.text)))
+        assert [row["text"] for row in rows] == ["n2 touched a Wall", "n1 touched a wall"]
+        assert answer.headers["content-disposition"].endswith('-events.csv"')
+        lines = client("GET", f"{API}/events.jsonl?vehicle=n1").text.splitlines()
+        assert [json.loads(line)["name"] for line in lines] == ["contact"]
+
+    def test_a_spreadsheet_runs_nothing_that_a_car_said(self, client, hear):
+        hear(1.0, told('=HYPERLINK("x")'))
+        assert "'=HYPERLINK" in client("GET", f"{API}/events.csv").text
+
+    def test_there_is_no_file_of_another_form(self, client):
+        assert client("GET", f"{API}/events.xlsx").status_code == 422
+
+
+class TestIds:
+    def test_an_event_heard_again_after_a_restart_has_the_same_id(self):
+        first, second = EventLog(), EventLog()
+        for event in LOG:
+            first.add(event)
+        second.add(LOG[2])
+        assert second.after(0, 9)[0].id == first.after(2, 1)[0].id
+        assert len({id_of(event) for event in LOG}) == len(LOG)
+
+
+class TestAcknowledging:
+    def test_what_was_seen_says_by_whom_and_is_no_longer_open(self, client, hear):
+        hear(1.0, *LOG)
+        wall = client("GET", f"{API}/events?vehicle=n1").json()["items"][0]
+        body = {"events": [wall["id"]], "by": "ada", "note": "put back"}
+        answer = client("POST", f"{API}/events/acknowledgements", json=body)
+        assert answer.json()["acknowledgements"][0]["by"] == "ada"
+        again = client("GET", f"{API}/events?vehicle=n1").json()["items"][0]
+        assert (again["acknowledged_by"], again["note"]) == ("ada", "put back")
+        assert LOG[0].text not in texts(client("GET", f"{API}/events?open=true"))
+        assert client("DELETE", f"{API}/events/acknowledgements/{wall['id']}").status_code == 200
+        assert LOG[0].text in texts(client("GET", f"{API}/events?open=true"))
+        assert client("DELETE", f"{API}/events/acknowledgements/{wall['id']}").status_code == 404
+
+    def test_without_a_name_it_was_the_keys_owner(self, client, hear):
+        hear(1.0, *LOG)
+        body = {"events": [id_of(LOG[0])]}
+        answer = client("POST", f"{API}/events/acknowledgements", json=body).json()
+        assert answer["acknowledgements"][0]["by"] == "this machine"
+
+    @pytest.mark.parametrize("body", [{"events": []}, {"events": ["x"]}, {"events": ["0" * 15]}])
+    def test_what_is_no_id_is_refused(self, client, body):
+        assert client("POST", f"{API}/events/acknowledgements", json=body).status_code == 422
+
+    def test_it_outlives_the_server(self, store):
+        clock = StepClock(7)
+        Acknowledgements(store, clock).add(["a" * 16], "ada", "seen")
+        (row,) = Acknowledgements(store, clock).rows().values()
+        assert (row.by, row.note, row.at_ns) == ("ada", "seen", 7)
+
+    def test_the_first_who_saw_it_stays(self, store):
+        seen = Acknowledgements(store, StepClock(7))
+        seen.add(["a" * 16], "ada")
+        (row,) = seen.add(["a" * 16], "bob")
+        assert row.by == "ada"
+
+    def test_the_oldest_are_forgotten(self, store):
+        seen = Acknowledgements(store, StepClock(7))
+        ids = [f"{number:016x}" for number in range(KEPT + 3)]
+        seen.add(ids, "ada")
+        assert list(seen.rows()) == ids[3:]
+        assert len(list(store.items("seen"))) == KEPT
+
+    def test_a_broken_record_is_named(self, store):
+        store.put("seen", "event/x", b"{}")
+        with pytest.raises(StoreError, match="event/x"):
+            Acknowledgements(store, StepClock(7))
+
+
+class TestAudit:
+    def test_every_change_and_every_refusal_is_noted_and_looking_is_not(
+        self, own_client, fake_city
+    ):
+        fake_city.answers[StopRequest] = CityStop(t_ns=1, engaged=True)
+        own_client("GET", f"{API}/stop")
+        headers = {"Idempotency-Key": "k1"}
+        own_client("PUT", f"{API}/stop", json={"engaged": True}, headers=headers)
+        own_client("PUT", f"{API}/stop", json={"engaged": "never"})
+        rows = own_client("GET", f"{API}/audit").json()["items"]
+        assert [(row["kind"], row["reply"]["status"]) for row in rows] == [
+            ("PUT /api/v1/stop", 422),
+            ("PUT /api/v1/stop", 200),
+        ]
+        assert rows[1]["request_id"] == "k1"
+        assert (rows[1]["by"], rows[1]["request"]["role"]) == ("this machine", "admin")
+
+    def test_deeds_of_all_stations_are_told_newest_first_page_by_page(self, own_client, store):
+        log = AuditLog(store)
+        for number in range(1, 1203):
+            log.note(Deed(t_ns=number, station="world", kind="StopRequest", by="ada"))
+        first = own_client("GET", f"{API}/audit?limit=500").json()
+        assert [first["items"][i]["number"] for i in (0, 499)] == [1202, 703]
+        second = own_client("GET", f"{API}/audit?limit=500&cursor={first['next']}").json()
+        assert [second["items"][i]["number"] for i in (0, 499)] == [702, 203]
+
+    @pytest.mark.parametrize(
+        ("query", "found"),
+        [("station=world", [1]), ("by=BOB", [2]), ("kind=plan", [2]), ("text=crossing", [2])],
+    )
+    def test_deeds_are_filtered(self, own_client, store, query, found):
+        log = AuditLog(store)
+        log.note(Deed(t_ns=1, station="world", kind="StopRequest", by="ada"))
+        request = json.dumps({"junction": "crossing"}).encode()
+        log.note(
+            Deed(t_ns=2, station="traffic", kind="PlanRequest", by="bob",
+                 request=msgspec.Raw(request))
+        )  # fmt: skip
+        rows = own_client("GET", f"{API}/audit?{query}").json()["items"]
+        assert [row["number"] for row in rows] == found
+
+    def test_a_chain_that_was_tampered_with_is_called_so(self, own_client, store):
+        log = AuditLog(store)
+        for number in range(3):
+            log.note(Deed(t_ns=number, station="world", kind="StopRequest"))
+        whole = own_client("GET", f"{API}/audit/verdict").json()
+        assert (whole["whole"], whole["entries"]) == (True, 3)
+        store._logs["audit"][1] = (
+            store._logs["audit"][1][:64] + b'{"t_ns":9,"station":"x","kind":"y"}'
+        )
+        broken = own_client("GET", f"{API}/audit/verdict").json()
+        assert not broken["whole"]
+        assert "entry 3" in broken["error"]
+
+    def test_a_store_that_fails_does_not_undo_the_change(
+        self, own_client, fake_city, store, caplog
+    ):
+        fake_city.answers[StopRequest] = CityStop(t_ns=1, engaged=True)
+        store.close()
+        assert own_client("PUT", f"{API}/stop", json={"engaged": True}).status_code == 200
+        assert "audit_failed" in caplog.text
