@@ -231,7 +231,7 @@ class _Method:
 
     def _add(self, place: str, key: str, schema: Schema, required: bool) -> None:
         own = _name(key)
-        while own in {_name_of(one) for one in self._given}:
+        while hasattr(builtins, own) or own in {_name_of(one) for one in self._given}:
             own += "_"
         self._places[place][key] = own
         kind = _type(schema, self._schemas)

@@ -17,7 +17,7 @@ class NgsiNoun:
     def all_entities(
         self,
         *,
-        type: str = "",
+        type_: str = "",
         limit: int = 20,
         offset: int = 0,
         count: bool = False,
@@ -26,7 +26,7 @@ class NgsiNoun:
         """NGSI-LD entities of the city.
 
         Args:
-            type: comma between: Vehicle, RoadSegment, TrafficFlowObserved; none: all
+            type_: comma between: Vehicle, RoadSegment, TrafficFlowObserved; none: all
             limit: at most
             offset: to skip
             count: tell how many there are in all
@@ -37,7 +37,7 @@ class NgsiNoun:
             "/ngsi-ld/v1/entities",
             tuple[dict[str, Any], ...],
             query={
-                "type": type,
+                "type": type_,
                 "limit": limit,
                 "offset": offset,
                 "count": count,
