@@ -6,6 +6,7 @@ Written by docs/make/client.py: do not change it here.
 from typing import Self
 
 from scm.client.connection import Connection
+from scm.client.nouns.audit import AuditNoun
 from scm.client.nouns.boxes import BoxesNoun
 from scm.client.nouns.cameras import CamerasNoun
 from scm.client.nouns.cities import CitiesNoun
@@ -36,6 +37,7 @@ class Client:
 
     def __init__(self, url: str = "http://127.0.0.1:8000", key: str = "") -> None:
         self.connection = Connection(url, key)
+        self.audit = AuditNoun(self.connection)
         self.boxes = BoxesNoun(self.connection)
         self.cameras = CamerasNoun(self.connection)
         self.cities = CitiesNoun(self.connection)

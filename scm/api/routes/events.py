@@ -110,17 +110,12 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/events", tags=["events"], dependencies=[VIEWER])
 
-<<<<<<< HEAD
-    @routes.get("", summary="Events in order of arrival", responses=answer(Events))
-    async def events(
-=======
     @routes.get("", summary="Events, newest first", responses=answer_page(EventRow))
     def events(
         request: Request,
         wanted: Wanted,
         *,
         only_open: Open = False,
->>>>>>> h-ev
         after: Annotated[
             int, Query(ge=0, description="only those numbered above", examples=[40])
         ] = 0,

@@ -20,6 +20,6 @@ class StreamNoun:
 
         Args:
             topics: those to hear, comma between: pulse, stop, vehicles, signals, boxes, eye,
-                stations, events; none: all
+                acknowledgements, stations, events; none: all
         """
         return self._connection.events("/api/v1/stream", query={"topics": topics})

@@ -46,25 +46,3 @@ class Residual(msgspec.Struct, kw_only=True, frozen=True):
 
     position_mm: float
     yaw_deg: float
-
-
-class LoggedEvent(msgspec.Struct, kw_only=True, frozen=True):
-    """An event and its number; numbers start at 1 and have no gaps.
-
-    Attributes:
-        seq: Its number in the log, from 1, without gaps.
-        severity: `info`, `warning` or `error`.
-        source: Who told it.
-        t_ns: When it was true, by the clock of who tells it [ns].
-        name: What it is called.
-        text: One sentence for a person.
-        vehicle: Name of a car.
-    """
-
-    seq: int
-    severity: str
-    source: str
-    t_ns: int
-    name: str
-    text: str
-    vehicle: str | None = None

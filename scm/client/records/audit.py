@@ -1,0 +1,60 @@
+"""Records of audit.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from typing import Any
+
+import msgspec
+
+
+class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One deed of the audit log.
+
+    Attributes:
+        number: Of the entry; numbers have no gaps.
+        t_ns: When it was asked for [ns since 1970].
+        station: Who did it: `world`, `traffic`, `api`.
+        kind: The request's class, or method and path of a call of the web.
+        by: Who asked.
+        request_id: Id of the request; empty: it had none.
+        request: What was asked and answered, as the station noted it.
+        reply: What was asked and answered, as the station noted it.
+    """
+
+    number: int
+    t_ns: int
+    station: str
+    kind: str
+    by: str
+    request_id: str
+    request: dict[str, Any]
+    reply: dict[str, Any]
+
+
+class PageAuditRow(msgspec.Struct, kw_only=True, frozen=True):
+    """Some rows of a list.
+
+    Attributes:
+        items: The rows of this page.
+        next_: Cursor of those after them; null at the end.
+    """
+
+    items: tuple[AuditRow, ...]
+    next_: str | None = msgspec.field(name="next")
+
+
+class Verdict(msgspec.Struct, kw_only=True, frozen=True):
+    """Whether the chain of entries is whole.
+
+    Attributes:
+        whole: Whether every entry follows the one before as it is now.
+        entries: How many there are, up to the first broken one.
+        digest: Hash of the newest, in hexadecimal: note it elsewhere, and give it again.
+        error: What is broken; empty: nothing.
+    """
+
+    whole: bool
+    entries: int
+    digest: str
+    error: str
