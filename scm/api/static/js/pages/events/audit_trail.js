@@ -55,8 +55,9 @@ function Deed({ row }) {
       <td><time>${clock(row.t_ns)}</time></td>
       <td>
         <button class="name" aria-expanded=${whole} onClick=${() => setWhole(!whole)}>${row.kind}</button>
+        <small>${gist(row)}</small>
       </td>
-      <td>${row.by || row.request.by || ""}</td>
+      <td>${row.by || row.request.by || row.request.vehicle || ""}</td>
       <td>${row.station}</td>
       <td class=${bad ? "warn" : ""}>${ended}</td>
     </tr>
@@ -69,6 +70,14 @@ function Deed({ row }) {
       </tr>
     `}
   `;
+}
+
+/** What a request was about, in its own words: to which car or junction, what, and why. */
+function gist({ station, request }) {
+  if (station === "api") return request.query;
+  const { vehicle, junction, plan, engaged, reason } = request;
+  const stop = engaged === undefined ? null : engaged ? "engaged" : "released";
+  return [vehicle, junction, plan, stop, reason].filter(Boolean).join(" · ");
 }
 
 /** How a deed ended, in a word or two. */
