@@ -1,4 +1,8 @@
-/** A car seen from above, drawn in metres with the rear axle's centre as origin, x forward, y left. */
+/**
+ * A car seen from above, drawn in metres with the rear axle's centre as origin, x forward, y left.
+ *
+ * Its kind is told by colour and by the sign on its roof: circle hosted, diamond remote, triangle real.
+ */
 
 /** Outlines by car file [m]: rear and front end, half width, wheelbase; unknown ones look like a Nigel. */
 const OUTLINES = {
@@ -13,6 +17,15 @@ const PAINT = {
   lost: ["#8a929c", "#5c636c"],
 };
 
+/** Corners of the signs that are no circle. */
+const SIGNS = {
+  remote: [[1.1, 0], [0, 1], [-1.1, 0], [0, -1]],
+  real: [[1.1, 0], [-0.75, 1], [-0.75, -1]],
+};
+
+/** The two colours of a car of this kind, light and dark; a lost one is grey. */
+export const paintOf = (kind, alive) => (alive ? (PAINT[kind] ?? PAINT.hosted) : PAINT.lost);
+
 export function footprint(car) {
   const { rear, front, half, wheelbase } = OUTLINES[car] ?? OUTLINES.nigel;
   return { rear, front, half, wheelbase, middle: (rear + front) / 2 };
@@ -21,23 +34,24 @@ export function footprint(car) {
 /** Draw a car; a chosen or lost one always with its name, others when there is room: `named`. */
 export function drawCar(paper, view, car, chosen, named = true) {
   const shape = footprint(car.car);
-  const paint = car.alive ? (PAINT[car.kind] ?? PAINT.hosted) : PAINT.lost;
+  const paint = paintOf(car.kind, car.alive);
   paper.save();
   paper.translate(view.x(car.x_m), view.y(car.y_m));
   paper.rotate(-car.yaw_rad);
   paper.scale(view.scale, -view.scale);
   const on = new Set(car.alive ? car.lights : []);
   beams(paper, shape, on);
-  if (chosen) halo(paper, shape);
+  if (chosen) drawHalo(paper, shape);
   wheels(paper, shape, car.steering_rad);
-  body(paper, shape, paint);
+  drawBody(paper, shape, paint, car.alive ? car.kind : "lost");
   lamps(paper, shape, on);
   if (!car.alive) cross(paper, shape);
   paper.restore();
-  if (named || chosen || !car.alive) label(paper, view, car, shape, paint, chosen);
+  if (named || chosen || !car.alive) drawLabel(paper, view, car, chosen);
 }
 
-function halo(paper, { rear, front, half }) {
+/** The ring about a chosen car. */
+export function drawHalo(paper, { rear, front, half }) {
   paper.beginPath();
   paper.roundRect(rear - 0.03, -half - 0.03, front - rear + 0.06, 2 * half + 0.06, 0.06);
   paper.lineWidth = 0.009;
@@ -60,7 +74,8 @@ function wheels(paper, { half, wheelbase }, steering) {
   }
 }
 
-function body(paper, { rear, front, half }, [light, dark]) {
+/** The body with its windows and the sign of its kind, in metres. */
+export function drawBody(paper, { rear, front, half }, [light, dark], kind) {
   const wide = half - 0.019;
   paper.beginPath();
   paper.roundRect(rear, -wide, front - rear, 2 * wide, [0.03, 0.03, 0.05, 0.05].reverse());
@@ -76,6 +91,20 @@ function body(paper, { rear, front, half }, [light, dark]) {
   paper.fillStyle = "rgba(10, 16, 24, 0.72)";
   pane(paper, rear + 0.62 * length, rear + 0.76 * length, 0.62 * wide, 0.82 * wide);
   pane(paper, rear + 0.24 * length, rear + 0.15 * length, 0.62 * wide, 0.76 * wide);
+  paper.fillStyle = "#ffffff";
+  paper.beginPath();
+  signOf(paper, kind, rear + 0.44 * length, 0, 0.42 * wide);
+  paper.fill();
+}
+
+/** The outline of a kind's sign about (x, y); points forward. */
+export function signOf(paper, kind, x, y, size) {
+  const corners = SIGNS[kind];
+  if (!corners) paper.arc(x, y, 0.85 * size, 0, 2 * Math.PI);
+  else {
+    corners.forEach(([along, across], i) => paper[i ? "lineTo" : "moveTo"](x + along * size, y + across * size));
+    paper.closePath();
+  }
 }
 
 /** A windscreen: a trapezium from x0 (narrow) to x1 (wide). */
@@ -142,7 +171,9 @@ function cross(paper, { rear, front, half }) {
 }
 
 /** The name beside the car, outside its outline whatever its heading. */
-function label(paper, view, car, { middle, front, rear, half }, [colour], chosen) {
+export function drawLabel(paper, view, car, chosen) {
+  const { middle, front, rear, half } = footprint(car.car);
+  const [colour] = paintOf(car.kind, car.alive);
   const [c, s] = [Math.cos(car.yaw_rad), Math.sin(car.yaw_rad)];
   const x = view.x(car.x_m + middle * c);
   const reach = (Math.abs(s) * (front - rear)) / 2 + Math.abs(c) * half;
