@@ -10,6 +10,7 @@ const OUTLINES = {
   f1tenth: { rear: -0.09, front: 0.44, half: 0.15, wheelbase: 0.33 },
   dart: { rear: -0.04, front: 0.24, half: 0.08, wheelbase: 0.175 },
 };
+const SMALL_PX_PER_M = 130; // below, names are written smaller
 const PAINT = {
   hosted: ["#4c8df0", "#2c65bd"],
   remote: ["#a97bf2", "#7647c2"],
@@ -178,16 +179,19 @@ export function drawLabel(paper, view, car, chosen) {
   const x = view.x(car.x_m + middle * c);
   const reach = (Math.abs(s) * (front - rear)) / 2 + Math.abs(c) * half;
   const y = view.y(car.y_m + middle * s) - reach * view.scale - 12;
-  paper.font = "600 12px system-ui, sans-serif";
+  const small = view.scale < SMALL_PX_PER_M;
+  paper.font = `600 ${small ? 10 : 12}px system-ui, sans-serif`;
   paper.textAlign = "left";
   paper.textBaseline = "middle";
   const text = car.alive ? car.vehicle : `${car.vehicle} lost`;
-  const width = paper.measureText(text).width + 24;
+  const lead = small ? 5 : 17; // the dot stands before the name where there is room
+  const width = paper.measureText(text).width + lead + (small ? 5 : 7);
+  const half_px = small ? 7 : 9;
   paper.beginPath();
-  paper.roundRect(x - width / 2, y - 9, width, 18, 9);
+  paper.roundRect(x - width / 2, y - half_px, width, 2 * half_px, half_px);
   paper.fillStyle = chosen ? "#ffffff" : "rgba(13, 18, 24, 0.88)";
   paper.fill();
-  dot(paper, x - width / 2 + 10, y, 3.5, colour);
+  if (!small) dot(paper, x - width / 2 + 10, y, 3.5, colour);
   paper.fillStyle = chosen ? "#10151b" : "#f1f4f8";
-  paper.fillText(text, x - width / 2 + 17, y + 0.5);
+  paper.fillText(text, x - width / 2 + lead, y + 0.5);
 }

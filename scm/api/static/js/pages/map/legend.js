@@ -5,7 +5,8 @@ import { layers } from "scm/pages/map/layers.js";
 import { viewChanged } from "scm/pages/map/viewport.js";
 
 const KINDS = ["hosted", "remote", "real", "lost"];
-const MOST_PX = 120;
+const MOST_PX = 110;
+const NARROW_PARTS = 4; // on a narrow map the bar is at most a quarter of it
 const STEPS = [1, 2, 5];
 
 export function Kinds() {
@@ -28,7 +29,7 @@ export function HeatKey() {
 /** The longest round length that fits. */
 export function ScaleBar({ view }) {
   viewChanged.value;
-  const most = MOST_PX / view.scale;
+  const most = Math.min(MOST_PX, view.width / NARROW_PARTS) / view.scale;
   const power = 10 ** Math.floor(Math.log10(most));
   const length = power * STEPS.findLast((step) => step * power <= most);
   const words = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;

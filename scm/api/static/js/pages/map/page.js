@@ -1,4 +1,4 @@
-/** The map page: the map, and beside it the chosen car, all cars, the signals and the stations. */
+/** The map page: the map, and beside it all cars, the chosen one, the signals and the stations. */
 import { useEffect } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { selected } from "scm/shared/selection.js";
@@ -19,8 +19,8 @@ export function Page() {
   return html`
     <${MapPanel} />
     <aside aria-label="Vehicles, signals and stations">
-      <${ChosenCard} />
       <${VehicleTable} />
+      <${ChosenCard} />
       <${SignalsShort} />
       <${StationsPanel} />
     </aside>

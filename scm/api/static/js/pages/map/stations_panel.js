@@ -4,13 +4,15 @@ import { span } from "scm/shared/format.js";
 import { stations } from "scm/shell/store.js";
 
 const STALE_S = 3;
+/** Open from the start where there is room. */
+const first = matchMedia("(min-width: 861px)").matches;
 const ROLES = { part: "part", v: "vehicle" };
 
 export function StationsPanel() {
   const alive = stations.value.filter((station) => station.alive).length;
   const lost = stations.value.length - alive;
   return html`
-    <details class="panel stations">
+    <details class="panel stations" open=${first}>
       <summary>
         <h2>Stations <small>${alive} here${lost ? html`, <span class="warn">${lost} lost</span>` : ""}</small></h2>
       </summary>

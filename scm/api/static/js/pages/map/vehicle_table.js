@@ -109,7 +109,7 @@ function Head({ column }) {
   const sort = here ? (turned ? "descending" : "ascending") : null;
   const turn = () => (order.value = { column: column.name, turned: here && !turned });
   return html`
-    <th class="${column.number ? "number" : ""} ${column.name}" aria-sort=${sort}>
+    <th class="${column.number ? "number" : ""} of-${column.name}" aria-sort=${sort}>
       <button class="plain" onClick=${turn}>
         ${column.title}<span class="arrow" aria-hidden="true">${here ? (turned ? "▾" : "▴") : ""}</span>
       </button>
