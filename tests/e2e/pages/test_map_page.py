@@ -18,8 +18,9 @@ def pixels_of(page, colour, reach=40):
     """Count the canvas' pixels of about a colour."""
     return page.evaluate(
         """([[r, g, b], reach]) => {
-            const canvas = document.querySelector('.map canvas');
-            const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+            const { width, height } = document.querySelector('.map canvas');
+            const paper = document.querySelector('.map canvas').getContext('2d');
+            const { data } = paper.getImageData(0, 0, width, height);
             let count = 0;
             for (let i = 0; i < data.length; i += 4)
                 count += Math.abs(data[i] - r) + Math.abs(data[i + 1] - g)
@@ -96,14 +97,11 @@ def test_a_car_is_chosen_on_the_map_followed_and_let_go(visit):
     visited = visit("/map")
     page = visited.page
     page.wait_for_selector('tr[data-car="n6"]')
-    place = (
-        """async () => {
-        const { fleet } = await import('%s');
+    place = f"""async () => {{
+        const {{ fleet }} = await import('{FLEET}');
         const row = fleet.rows.get('n5');
         return [fleet.x[row], fleet.y[row]];
-    }"""
-        % FLEET
-    )
+    }}"""
     page.focus(".sheet")
 
     def click_on_it():
