@@ -31,13 +31,14 @@ def pixels_of(page, colour, reach=40):
     )
 
 
-def is_drawn(page, colour, least):
-    """Wait until the canvas shows enough of a colour."""
+def is_drawn(page, colour, least, most=10**9):
+    """Wait until the canvas shows enough of a colour, and not too much."""
     for _ in range(300):
-        if pixels_of(page, colour) >= least:
+        if least <= pixels_of(page, colour) <= most:
             return
         page.wait_for_timeout(50)
-    raise AssertionError(f"{pixels_of(page, colour)} pixels of {colour}, expected {least}")
+    count = pixels_of(page, colour)
+    raise AssertionError(f"{count} pixels of {colour}, expected {least} to {most}")
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -139,7 +140,7 @@ def test_the_lidar_is_heard_only_while_it_is_shown(visit):
             break
         page.wait_for_timeout(50)
     assert any("scan/stream" in url for url in ended)
-    assert pixels_of(page, (255, 210, 60)) < 150
+    is_drawn(page, (255, 210, 60), 0, most=149)
 
 
 def test_layers_are_chosen_and_kept_for_the_next_visit(visit):
