@@ -2,7 +2,7 @@
 import { signal } from "@preact/signals";
 
 const LEAST_CELL_M = 0.08;
-const CELLS_ACROSS = 110;
+const CELLS_ACROSS = 200;
 const FADE_S = 60;
 const PAINT_MS = 400;
 const LEAST_WEIGHT = 0.02;

@@ -21,6 +21,7 @@ const DETAIL_PX = 30;
 const MOST_NAMES = 60; // more would hide the cars
 const EDGE_PX = 40;
 const PICK_PX = 22;
+const RING_PX = 14;
 
 /** How many frames were drawn, and how long the last took: for measurements. */
 export const drawn = { frames: 0, cars: 0, took_ms: 0 };
@@ -66,7 +67,7 @@ export class Scene {
     }
     if (on.trails) {
       this.trails.note(fleet);
-      this.trails.draw(paper, view, fleet, glide);
+      this.trails.draw(paper, view, this.ratio, now, fleet);
     }
     drawBoxes(paper, view, boxes.peek(), city.peek()?.boxes ?? []);
     this.#drawChosenBelow(on);
@@ -146,8 +147,10 @@ export class Scene {
   #drawRing(car) {
     const { paper, view } = this;
     if (0.3 * view.scale < DETAIL_PX) {
+      const { middle } = footprint(car.car);
+      const [x, y] = [car.x_m + middle * Math.cos(car.yaw_rad), car.y_m + middle * Math.sin(car.yaw_rad)];
       paper.beginPath();
-      paper.arc(view.x(car.x_m), view.y(car.y_m), 14, 0, 2 * Math.PI);
+      paper.arc(view.x(x), view.y(y), RING_PX, 0, 2 * Math.PI);
       paper.lineWidth = 2.5;
       paper.strokeStyle = "#ffffff";
       paper.stroke();
