@@ -1,7 +1,8 @@
 /** The map with its controls: pan, zoom and choose by mouse, touch and keyboard. */
+import { computed } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
-import { carNamed, fleetBeat } from "scm/pages/map/fleet.js";
+import { carNamed, fleet, fleetBeat } from "scm/pages/map/fleet.js";
 import { readGround } from "scm/pages/map/ground.js";
 import { gestures } from "scm/pages/map/gestures.js";
 import { followed, layers } from "scm/pages/map/layers.js";
@@ -11,11 +12,18 @@ import { HeatKey, Kinds, ScaleBar } from "scm/pages/map/legend.js";
 import { Scene } from "scm/pages/map/scene.js";
 import { Viewport, viewChanged } from "scm/pages/map/viewport.js";
 import { selected } from "scm/shared/selection.js";
-import { link } from "scm/shell/store.js";
+import { link, now } from "scm/shell/store.js";
 
 const ROADS = "/api/v1/map.svg";
 const ZOOM = 1.4;
 const PAN_PX = 80;
+const STALE_MS = 500;
+
+/** How fresh the map is: as the page, but stale also when only the cars' own stream is silent. */
+const sight = computed(() => {
+  const quiet = now.value - fleet.at > STALE_MS;
+  return link.value === "live" && quiet ? "stale" : link.value;
+});
 
 export function MapPanel() {
   const canvas = useRef(null);
@@ -39,7 +47,7 @@ export function MapPanel() {
       <div
         class="sheet"
         ref=${sheet}
-        data-link=${link.value}
+        data-link=${sight.value}
         tabindex="0"
         role="group"
         aria-label="Map: arrows move it, plus and minus zoom, 0 shows all, F follows the chosen car"
