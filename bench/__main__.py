@@ -23,6 +23,7 @@ BENCHMARKS = (
 
 
 LONG = (
+    "dashboard",
     "devkit",
     "flow",
     "glosa",

@@ -23,6 +23,8 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
         colour: None while nothing fresh is known.
         min_s: It will not change before; None: not known.
         max_s: It will have changed by then; None: not known.
+        likely_s: A forecast between the two, no promise; None: nobody knows.
+        likely_confidence: Share of such forecasts that come true within a second, 0 to 1.
     """
 
     group: str
@@ -30,6 +32,8 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
     next_colour: str | None = None
     min_s: float | None = None
     max_s: float | None = None
+    likely_s: float | None = None
+    likely_confidence: float | None = None
 
 
 class MonitorRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -109,6 +113,8 @@ def _group(name: str, group: SignalGroup | None, spat: Held[Spat] | None, now_ns
         next_colour=group.next_colour,
         min_s=left_s(group.min_end_ns),
         max_s=left_s(group.max_end_ns),
+        likely_s=left_s(group.likely_end_ns),
+        likely_confidence=None if flashing else group.likely_confidence,
     )
 
 

@@ -14,7 +14,7 @@ from scm.selftest.city import City
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 PARTS = ("traffic", "monitor", "world", "api")
-ENDLESS = ("/stream", "/live", ".mjpeg", "/events/stream")
+ENDLESS = ("/stream", "/live", ".mjpeg", ".bin", "/events/stream")
 SPAN_S = 20.0
 EXAMPLES = 12
 CHECKS = [not_a_server_error, response_schema_conformance]

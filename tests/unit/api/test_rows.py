@@ -1,8 +1,10 @@
+import msgspec
 import pytest
 
 from scm.api.eye_rows import camera_rows, frame_of, tags_of
 from scm.api.signal_rows import junction_rows
 from scm.api.vehicle_rows import vehicles_topic
+from scm.clock import NS_PER_S
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import Complaint, EyeStatus
@@ -83,6 +85,18 @@ class TestSignals:
         group = junction(view, city_map).groups[0]
         assert (group.colour, group.min_s, group.max_s) == ("green", 3.5, 5.5)
         assert group.next_colour == "yellow"
+
+    def test_a_forecast_counts_from_now_and_says_how_far_to_trust_it(
+        self, view, hear, spat, city_map
+    ):
+        told = spat(at_s=5000.0)
+        likely_ns = told.t_ns + 5 * NS_PER_S
+        forecast = {"likely_end_ns": likely_ns, "likely_confidence": 0.8}
+        group = msgspec.structs.replace(told.groups[0], **forecast)
+        hear(7.0, msgspec.structs.replace(told, groups=(group,)))
+        hear(7.5)
+        row = junction(view, city_map).groups[0]
+        assert (row.likely_s, row.likely_confidence) == (4.5, 0.8)
 
     def test_every_group_of_the_map_has_a_row_even_unheard(self, view, city_map):
         row = junction(view, city_map)

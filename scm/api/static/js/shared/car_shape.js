@@ -1,4 +1,8 @@
-/** A car seen from above, drawn in metres with the rear axle's centre as origin, x forward, y left. */
+/**
+ * A car seen from above, drawn in metres with the rear axle's centre as origin, x forward, y left.
+ *
+ * Its kind is told by colour and by the sign on its roof: circle hosted, diamond remote, triangle real.
+ */
 
 /** Outlines by car file [m]: rear and front end, half width, wheelbase; unknown ones look like a Nigel. */
 const OUTLINES = {
@@ -6,12 +10,22 @@ const OUTLINES = {
   f1tenth: { rear: -0.09, front: 0.44, half: 0.15, wheelbase: 0.33 },
   dart: { rear: -0.04, front: 0.24, half: 0.08, wheelbase: 0.175 },
 };
+const SMALL_PX_PER_M = 130; // below, names are written smaller
 const PAINT = {
   hosted: ["#4c8df0", "#2c65bd"],
   remote: ["#a97bf2", "#7647c2"],
   real: ["#f0a13c", "#b9711a"],
   lost: ["#8a929c", "#5c636c"],
 };
+
+/** Corners of the signs that are no circle. */
+const SIGNS = {
+  remote: [[1.1, 0], [0, 1], [-1.1, 0], [0, -1]],
+  real: [[1.1, 0], [-0.75, 1], [-0.75, -1]],
+};
+
+/** The two colours of a car of this kind, light and dark; a lost one is grey. */
+export const paintOf = (kind, alive) => (alive ? (PAINT[kind] ?? PAINT.hosted) : PAINT.lost);
 
 export function footprint(car) {
   const { rear, front, half, wheelbase } = OUTLINES[car] ?? OUTLINES.nigel;
@@ -21,23 +35,24 @@ export function footprint(car) {
 /** Draw a car; a chosen or lost one always with its name, others when there is room: `named`. */
 export function drawCar(paper, view, car, chosen, named = true) {
   const shape = footprint(car.car);
-  const paint = car.alive ? (PAINT[car.kind] ?? PAINT.hosted) : PAINT.lost;
+  const paint = paintOf(car.kind, car.alive);
   paper.save();
   paper.translate(view.x(car.x_m), view.y(car.y_m));
   paper.rotate(-car.yaw_rad);
   paper.scale(view.scale, -view.scale);
   const on = new Set(car.alive ? car.lights : []);
   beams(paper, shape, on);
-  if (chosen) halo(paper, shape);
+  if (chosen) drawHalo(paper, shape);
   wheels(paper, shape, car.steering_rad);
-  body(paper, shape, paint);
+  drawBody(paper, shape, paint, car.alive ? car.kind : "lost");
   lamps(paper, shape, on);
   if (!car.alive) cross(paper, shape);
   paper.restore();
-  if (named || chosen || !car.alive) label(paper, view, car, shape, paint, chosen);
+  if (named || chosen || !car.alive) drawLabel(paper, view, car, chosen);
 }
 
-function halo(paper, { rear, front, half }) {
+/** The ring about a chosen car. */
+export function drawHalo(paper, { rear, front, half }) {
   paper.beginPath();
   paper.roundRect(rear - 0.03, -half - 0.03, front - rear + 0.06, 2 * half + 0.06, 0.06);
   paper.lineWidth = 0.009;
@@ -60,7 +75,8 @@ function wheels(paper, { half, wheelbase }, steering) {
   }
 }
 
-function body(paper, { rear, front, half }, [light, dark]) {
+/** The body with its windows and the sign of its kind, in metres. */
+export function drawBody(paper, { rear, front, half }, [light, dark], kind) {
   const wide = half - 0.019;
   paper.beginPath();
   paper.roundRect(rear, -wide, front - rear, 2 * wide, [0.03, 0.03, 0.05, 0.05].reverse());
@@ -76,6 +92,20 @@ function body(paper, { rear, front, half }, [light, dark]) {
   paper.fillStyle = "rgba(10, 16, 24, 0.72)";
   pane(paper, rear + 0.62 * length, rear + 0.76 * length, 0.62 * wide, 0.82 * wide);
   pane(paper, rear + 0.24 * length, rear + 0.15 * length, 0.62 * wide, 0.76 * wide);
+  paper.fillStyle = "#ffffff";
+  paper.beginPath();
+  signOf(paper, kind, rear + 0.44 * length, 0, 0.42 * wide);
+  paper.fill();
+}
+
+/** The outline of a kind's sign about (x, y); points forward. */
+export function signOf(paper, kind, x, y, size) {
+  const corners = SIGNS[kind];
+  if (!corners) paper.arc(x, y, 0.85 * size, 0, 2 * Math.PI);
+  else {
+    corners.forEach(([along, across], i) => paper[i ? "lineTo" : "moveTo"](x + along * size, y + across * size));
+    paper.closePath();
+  }
 }
 
 /** A windscreen: a trapezium from x0 (narrow) to x1 (wide). */
@@ -142,21 +172,26 @@ function cross(paper, { rear, front, half }) {
 }
 
 /** The name beside the car, outside its outline whatever its heading. */
-function label(paper, view, car, { middle, front, rear, half }, [colour], chosen) {
+export function drawLabel(paper, view, car, chosen) {
+  const { middle, front, rear, half } = footprint(car.car);
+  const [colour] = paintOf(car.kind, car.alive);
   const [c, s] = [Math.cos(car.yaw_rad), Math.sin(car.yaw_rad)];
   const x = view.x(car.x_m + middle * c);
   const reach = (Math.abs(s) * (front - rear)) / 2 + Math.abs(c) * half;
   const y = view.y(car.y_m + middle * s) - reach * view.scale - 12;
-  paper.font = "600 12px system-ui, sans-serif";
+  const small = view.scale < SMALL_PX_PER_M;
+  paper.font = `600 ${small ? 10 : 12}px system-ui, sans-serif`;
   paper.textAlign = "left";
   paper.textBaseline = "middle";
   const text = car.alive ? car.vehicle : `${car.vehicle} lost`;
-  const width = paper.measureText(text).width + 24;
+  const lead = small ? 5 : 17; // the dot stands before the name where there is room
+  const width = paper.measureText(text).width + lead + (small ? 5 : 7);
+  const half_px = small ? 7 : 9;
   paper.beginPath();
-  paper.roundRect(x - width / 2, y - 9, width, 18, 9);
+  paper.roundRect(x - width / 2, y - half_px, width, 2 * half_px, half_px);
   paper.fillStyle = chosen ? "#ffffff" : "rgba(13, 18, 24, 0.88)";
   paper.fill();
-  dot(paper, x - width / 2 + 10, y, 3.5, colour);
+  if (!small) dot(paper, x - width / 2 + 10, y, 3.5, colour);
   paper.fillStyle = chosen ? "#10151b" : "#f1f4f8";
-  paper.fillText(text, x - width / 2 + 17, y + 0.5);
+  paper.fillText(text, x - width / 2 + lead, y + 0.5);
 }

@@ -1,128 +1,143 @@
-/** The map: roads drawn once by the server, and over them everything that moves or changes. */
-import { effect } from "@preact/signals";
+/** The map with its controls: pan, zoom and choose by mouse, touch and keyboard. */
+import { computed } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
-import { drawBoxes } from "scm/shared/box_shape.js";
-import { drawCar, footprint } from "scm/shared/car_shape.js";
-import { drawLight } from "scm/shared/light_shape.js";
-import { carsNow } from "scm/shared/motion.js";
+import { carNamed, fleet, fleetBeat } from "scm/pages/map/fleet.js";
+import { readGround } from "scm/pages/map/ground.js";
+import { gestures } from "scm/pages/map/gestures.js";
+import { followed, layers } from "scm/pages/map/layers.js";
+import { LayersMenu } from "scm/pages/map/layers_menu.js";
+import { hearCloseUp } from "scm/pages/map/close_up.js";
+import { HeatKey, Kinds, ScaleBar } from "scm/pages/map/legend.js";
+import { Scene } from "scm/pages/map/scene.js";
+import { Viewport, viewChanged } from "scm/pages/map/viewport.js";
 import { selected } from "scm/shared/selection.js";
-import { boxes, city, link, live, signals } from "scm/shell/store.js";
+import { link, now } from "scm/shell/store.js";
 
-const FRAME_MS = 30;
-const MOST_NAMES = 60; // more would hide the cars
 const ROADS = "/api/v1/map.svg";
+const ZOOM = 1.4;
+const PAN_PX = 80;
+const STALE_MS = 500;
+
+/** How fresh the map is: as the page, but stale also when only the cars' own stream is silent. */
+const sight = computed(() => {
+  const quiet = now.value - fleet.at > STALE_MS;
+  return link.value === "live" && quiet ? "stale" : link.value;
+});
 
 export function MapPanel() {
   const canvas = useRef(null);
-  const [box, setBox] = useState(null);
-  useEffect(() => void readBox().then(setBox), []);
-  useEffect(() => (box ? animate(canvas.current, box) : undefined), [box]);
-  const shape = box ? { "--shape": `${box.width} / ${box.height}` } : {};
+  const sheet = useRef(null);
+  const [ground, setGround] = useState(null);
+  const [view, setView] = useState(null);
+  useEffect(() => void readGround(ROADS).then(setGround, setGround), []);
+  useEffect(() => {
+    if (!ground?.box) return undefined;
+    const seen = new Viewport(ground.box);
+    const scene = new Scene(canvas.current, ground, seen);
+    setView(seen);
+    const ends = [scene.run(), gestures(sheet.current, seen, (x, y) => choose(scene.pick(x, y))), hearCloseUp()];
+    return () => ends.forEach((end) => end());
+  }, [ground]);
+  if (ground instanceof Error) {
+    return html`<section class="panel map" role="alert"><p class="empty">The map could not be read: ${ground.message}</p></section>`;
+  }
   return html`
     <section class="panel map" aria-label="Map">
-      <div class="sheet" style=${shape} data-link=${link.value}>
-        ${box && html`<img class="roads" src=${ROADS} alt="" draggable="false" />`}
+      <div
+        class="sheet"
+        ref=${sheet}
+        data-link=${sight.value}
+        tabindex="0"
+        role="group"
+        aria-label="Map: arrows move it, plus and minus zoom, 0 shows all, F follows the chosen car"
+        onKeyDown=${(event) => view && onKey(event, view)}
+      >
         <canvas
           ref=${canvas}
           role="img"
           aria-label="Map of the city with its cars and signals; the tables tell the same in words"
-          onClick=${(event) => box && pick(event, box)}
         ></canvas>
       </div>
-      <ul class="legend" aria-label="Legend">
-        <li><i data-kind="hosted"></i>hosted</li>
-        <li><i data-kind="remote"></i>remote</li>
-        <li><i data-kind="real"></i>real</li>
-        <li><i data-kind="lost"></i>lost</li>
-      </ul>
+      ${view && html`<${Controls} view=${view} />`}
+      <div class="corner"><${FollowChip} /><${HeatKey} /><${Kinds} />${view && html`<${ScaleBar} view=${view} />`}</div>
     </section>
   `;
 }
 
-/** The picture's frame: map metres, x right; its y counts down, so the map's y is -y. */
-async function readBox() {
-  const response = await fetch(ROADS);
-  const drawing = new DOMParser().parseFromString(await response.text(), "image/svg+xml");
-  const [left, top, width, height] = drawing.documentElement
-    .getAttribute("viewBox")
-    .split(/[\s,]+/)
-    .map(Number);
-  return { left, top, width, height };
+function choose(vehicle) {
+  selected.value = vehicle;
+  if (followed.value) followed.value = vehicle;
 }
 
-/** Metres to pixels of an element, the way the picture below is fitted into it. */
-function viewOf(box, width, height) {
-  const scale = Math.min(width / box.width, height / box.height);
-  const left = (width - scale * box.width) / 2 - scale * box.left;
-  const top = (height - scale * box.height) / 2 - scale * box.top;
-  return {
-    scale,
-    x: (x_m) => left + scale * x_m,
-    y: (y_m) => top - scale * y_m,
-  };
+function Controls({ view }) {
+  viewChanged.value; // the scale that cannot be passed
+  const zoom = (factor) => view.zoom(factor);
+  const car = selected.value;
+  const follow = () => (followed.value = followed.value ? null : car);
+  return html`
+    <div class="controls" role="group" aria-label="Map controls">
+      <button aria-label="Zoom in" title="Zoom in (+)" onClick=${() => zoom(ZOOM)}>+</button>
+      <button aria-label="Zoom out" title="Zoom out (−)" onClick=${() => zoom(1 / ZOOM)}>−</button>
+      <button
+        aria-label="Show all"
+        title="Show all (0)"
+        disabled=${view.isWhole}
+        onClick=${() => showAll(view)}
+      >⤢</button>
+      <button
+        class="follow"
+        aria-label="Follow the chosen car"
+        title=${car ? `Follow ${car} (F)` : "Choose a car to follow it"}
+        aria-pressed=${followed.value !== null}
+        disabled=${!car && !followed.value}
+        onClick=${follow}
+      >◎</button>
+    </div>
+    <${LayersMenu} />
+  `;
 }
 
-function pick(event, box) {
-  const { width, height, left, top } = event.currentTarget.getBoundingClientRect();
-  const view = viewOf(box, width, height);
-  const x = event.clientX - left;
-  const y = event.clientY - top;
-  let best = null;
-  let nearest = 0.2 * view.scale;
-  for (const car of live.vehicles) {
-    const { middle } = footprint(car.car);
-    const far = Math.hypot(
-      view.x(car.x_m + middle * Math.cos(car.yaw_rad)) - x,
-      view.y(car.y_m + middle * Math.sin(car.yaw_rad)) - y,
-    );
-    if (far < nearest) [best, nearest] = [car.vehicle, far];
-  }
-  selected.value = best;
+function showAll(view) {
+  followed.value = null;
+  view.showAll();
 }
 
-/** Draw at most 30 times a second, which is smooth for a table city; returns what ends it. */
-function animate(canvas, box) {
-  const paper = canvas.getContext("2d");
-  const groups = new Map();
-  const forget = effect(() => {
-    groups.clear();
-    for (const junction of signals.value) {
-      for (const group of junction.groups) {
-        groups.set(`${junction.junction}/${group.group}`, group.colour);
-      }
-    }
-  });
-  let request = 0;
-  let drawn = -Infinity;
-  const frame = (time) => {
-    request = requestAnimationFrame(frame);
-    if (time - drawn < FRAME_MS) return;
-    drawn = time;
-    const view = prepare(canvas, paper, box);
-    const colours = link.value === "live" ? groups : new Map();
-    drawBoxes(paper, view, boxes.value, city.value?.boxes ?? []);
-    const cars = carsNow();
-    const named = cars.length <= MOST_NAMES;
-    for (const car of cars) drawCar(paper, view, car, car.vehicle === selected.value, named);
-    // Lights last: no car's name may hide a colour.
-    for (const light of city.value?.lights ?? []) {
-      drawLight(paper, view, light, colours.get(`${light.junction}/${light.group}`));
-    }
-  };
-  request = requestAnimationFrame(frame);
-  return () => {
-    cancelAnimationFrame(request);
-    forget();
-  };
+/** Says what the map follows, and that a car left. */
+function FollowChip() {
+  if (!followed.value) return null;
+  fleetBeat.value; // looks again whether it is still there
+  const gone = !carNamed(followed.value);
+  return html`
+    <button class="chip" onClick=${() => (followed.value = null)}>
+      ${gone ? `${followed.value} left the map` : `Following ${followed.value}`} <span aria-hidden="true">✕</span>
+      <span class="hidden">Stop following</span>
+    </button>
+  `;
 }
 
-function prepare(canvas, paper, box) {
-  const { clientWidth: width, clientHeight: height } = canvas;
-  const ratio = window.devicePixelRatio || 1;
-  const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
-  if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
-  paper.setTransform(ratio, 0, 0, ratio, 0, 0);
-  paper.clearRect(0, 0, width, height);
-  return viewOf(box, width, height);
+const KEYS = {
+  "+": (view) => view.zoom(ZOOM),
+  "=": (view) => view.zoom(ZOOM),
+  "-": (view) => view.zoom(1 / ZOOM),
+  0: showAll,
+  ArrowLeft: (view) => move(view, PAN_PX, 0),
+  ArrowRight: (view) => move(view, -PAN_PX, 0),
+  ArrowUp: (view) => move(view, 0, PAN_PX),
+  ArrowDown: (view) => move(view, 0, -PAN_PX),
+  f: () => (followed.value = followed.value ? null : selected.value),
+  l: () => (layers.value = { ...layers.value, lidar: !layers.value.lidar }),
+  Escape: () => (followed.value = selected.value = null),
+};
+
+function move(view, dx, dy) {
+  followed.value = null;
+  view.pan(dx, dy);
+}
+
+function onKey(event, view) {
+  const act = KEYS[event.key];
+  if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
+  event.preventDefault();
+  act(view);
 }

@@ -1,15 +1,28 @@
-/** The map page: the map, and beside it the cars and the stations. */
+/** The map page: the map, and beside it all cars, the chosen one, the signals and the stations. */
+import { useEffect } from "preact/hooks";
 import { html } from "scm/shared/html.js";
+import { selected } from "scm/shared/selection.js";
+import { route } from "scm/shell/router.js";
 import { useTopics } from "scm/shell/store.js";
-import { CarsTable } from "scm/pages/map/cars_table.js";
+import { ChosenCard } from "scm/pages/map/chosen_card.js";
+import { useFleet } from "scm/pages/map/fleet.js";
 import { MapPanel } from "scm/pages/map/map_panel.js";
+import { SignalsShort } from "scm/pages/map/signals_short.js";
 import { StationsPanel } from "scm/pages/map/stations_panel.js";
+import { VehicleTable } from "scm/pages/map/vehicle_table.js";
 
 export function Page() {
-  useTopics("vehicles", "signals", "boxes", "stations");
+  useTopics("signals", "boxes", "stations");
+  useFleet();
+  const asked = route.value.query.vehicle; // `/map?vehicle=n1` shows that car
+  useEffect(() => void (asked && (selected.value = asked)), [asked]);
   return html`
     <${MapPanel} />
-    <${CarsTable} />
-    <${StationsPanel} />
+    <aside aria-label="Vehicles, signals and stations">
+      <${VehicleTable} />
+      <${ChosenCard} />
+      <${SignalsShort} />
+      <${StationsPanel} />
+    </aside>
   `;
 }

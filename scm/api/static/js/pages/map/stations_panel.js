@@ -1,26 +1,28 @@
-/** The stations on the bus: parts, vehicles and clients, with those lost in the last minute. */
+/** The stations on the bus, behind a line that says how many: parts, vehicles and clients, and those lost. */
 import { html } from "scm/shared/html.js";
 import { span } from "scm/shared/format.js";
 import { stations } from "scm/shell/store.js";
 
 const STALE_S = 3;
+/** Open from the start where there is room. */
+const first = matchMedia("(min-width: 861px)").matches;
 const ROLES = { part: "part", v: "vehicle" };
 
 export function StationsPanel() {
   const alive = stations.value.filter((station) => station.alive).length;
   const lost = stations.value.length - alive;
   return html`
-    <section class="panel stations" aria-label="Stations">
-      <div class="panel-head">
-        <h2>Stations <small>${alive} here${lost ? `, ${lost} lost` : ""}</small></h2>
-      </div>
+    <details class="panel stations" open=${first}>
+      <summary>
+        <h2>Stations <small>${alive} here${lost ? html`, <span class="warn">${lost} lost</span>` : ""}</small></h2>
+      </summary>
       <div class="scroll" tabindex="0" role="region" aria-label="List of stations">
         <ul>
           ${stations.value.map((row) => html`<${Station} key=${row.role + row.name + row.session} row=${row} />`)}
         </ul>
         ${!stations.value.length && html`<p class="empty">Nobody is on the bus yet.</p>`}
       </div>
-    </section>
+    </details>
   `;
 }
 

@@ -1,0 +1,55 @@
+/** Put a car on the map: of which file, under which name. It drives at once where there are lanes. */
+import { signal } from "@preact/signals";
+import { html } from "scm/shared/html.js";
+import { Dialog } from "scm/shared/dialog.js";
+import { selected } from "scm/shared/selection.js";
+import { change } from "scm/shell/api.js";
+import { city } from "scm/shell/store.js";
+import { fleet } from "scm/pages/map/fleet.js";
+
+const asking = signal(false);
+
+export function AddCar() {
+  return html`
+    <button class="small" onClick=${() => (asking.value = true)}>Add a car</button>
+    ${asking.value && html`<${Question} />`}
+  `;
+}
+
+function Question() {
+  const close = () => (asking.value = false);
+  const submit = (event) => {
+    event.preventDefault();
+    const { car, vehicle } = event.target.elements;
+    close();
+    add({ car: car.value, vehicle: vehicle.value.trim() });
+  };
+  const files = [...new Set(["nigel", ...fleet.vehicles.map((one) => one.car)])];
+  return html`
+    <${Dialog} title="Add a car" onClose=${close}>
+      <p>The world puts it on a free place${city.value?.lanes.length ? " and lets it drive" : ""}.</p>
+      <form class="add-car" onSubmit=${submit}>
+        <label>
+          Kind of car
+          <input name="car" list="car-files" value="nigel" pattern="[a-z0-9_\\-]+" required />
+          <datalist id="car-files">${files.map((file) => html`<option key=${file} value=${file}></option>`)}</datalist>
+        </label>
+        <label>
+          Name
+          <input name="vehicle" pattern="[a-z0-9_\\-]{1,32}" placeholder="the next free one" />
+        </label>
+        <div class="actions">
+          <button type="button" onClick=${close}>Cancel</button>
+          <button class="primary" data-first>Add it</button>
+        </div>
+      </form>
+    <//>
+  `;
+}
+
+async function add(body) {
+  const reply = await change("POST", "/vehicles", body, ({ vehicle }) => `${vehicle} is on the map.`);
+  if (!reply) return;
+  selected.value = reply.vehicle;
+  if (city.value?.lanes.length) await change("POST", `/vehicles/${reply.vehicle}/route`, {});
+}

@@ -1,0 +1,37 @@
+/** What the map shows beside roads, cars and signals; kept for this browser. */
+import { effect, signal } from "@preact/signals";
+
+const KEPT = "scm-map-layers";
+
+/** Name to title, in the order of the menu; the last two are of the chosen car. */
+export const LAYERS = {
+  names: "Names of cars",
+  times: "Time to change of signals",
+  trails: "Trails",
+  heat: "Heat map of speed",
+  path: "Planned path of the chosen car",
+  lidar: "LIDAR of the chosen car",
+};
+
+const FIRST = { names: true, times: true, trails: false, heat: false, path: true, lidar: false };
+
+/** Name to whether it is shown. */
+export const layers = signal({ ...FIRST, ...read() });
+
+/** Name of the car that the map keeps in its middle; null: none. */
+export const followed = signal(null);
+
+function read() {
+  try {
+    const kept = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
+    return Object.fromEntries(Object.entries(kept).filter(([name]) => name in LAYERS));
+  } catch {
+    return {};
+  }
+}
+
+effect(() => localStorage.setItem(KEPT, JSON.stringify(layers.value)));
+
+export function show(name, on) {
+  layers.value = { ...layers.value, [name]: on };
+}

@@ -1,0 +1,47 @@
+/** Every junction in a line: its plan, each group's colour, letter and time to change, and what is wrong. */
+import { html } from "scm/shared/html.js";
+import { LETTERS } from "scm/shared/light_shape.js";
+import { now, signals, signalsAt } from "scm/shell/store.js";
+import { timeToChange } from "scm/pages/map/signal_times.js";
+
+const WORDS = { red: "red", yellow: "yellow", green: "green", flashing_red: "flashing red", dark: "dark" };
+
+export function SignalsShort() {
+  const passed_s = Math.max(0, (now.value - signalsAt.value) / 1000);
+  return html`
+    <section class="panel signals-short" aria-label="Signals">
+      <div class="panel-head"><h2>Signals <small>${signals.value.length || ""}</small></h2></div>
+      <div class="scroll" tabindex="0" role="region" aria-label="Signals by junction">
+        ${signals.value.map((junction) => html`<${Junction} key=${junction.junction} junction=${junction} passed_s=${passed_s} />`)}
+        ${!signals.value.length && html`<p class="empty">This city has no signals.</p>`}
+      </div>
+    </section>
+  `;
+}
+
+function Junction({ junction, passed_s }) {
+  const { junction: name, fresh, mode, plan, monitor } = junction;
+  const state = !fresh ? "silent" : mode === "flash" ? "flashing" : `plan ${plan}`;
+  return html`
+    <div class="junction" data-fault=${Boolean(monitor?.fault)}>
+      <a href="/signals/${name}">${name}</a>
+      <small class=${fresh && mode !== "flash" ? "" : "warn"}>${monitor?.fault ? `monitor: ${monitor.fault}` : state}</small>
+      <ul>
+        ${junction.groups.map((group) => html`<${Group} key=${group.group} group=${group} passed_s=${passed_s} />`)}
+      </ul>
+    </div>
+  `;
+}
+
+function Group({ group, passed_s }) {
+  const colour = group.colour ?? "unknown";
+  const time = timeToChange(group, passed_s);
+  return html`
+    <li title="${group.group}: ${WORDS[colour] ?? "not known"}">
+      <span class="head" data-colour=${colour} role="img" aria-label="${group.group} ${WORDS[colour] ?? "not known"}">
+        <i></i><b>${LETTERS[colour] ?? "?"}</b>
+      </span>
+      <span class="time">${time || "—"}</span>
+    </li>
+  `;
+}

@@ -1,0 +1,219 @@
+"""The map page as people use it: mouse, keyboard and table, and what it does to the real city."""
+
+import pytest
+
+SCENE = "/static/js/pages/map/scene.js"
+FLEET = "/static/js/pages/map/fleet.js"
+SCALE = ".scale"
+
+
+def fleet(visited, expression):
+    """Evaluate JavaScript over the page's own fleet."""
+    return visited.page.evaluate(
+        f"async () => {{ const {{ fleet }} = await import('{FLEET}'); return {expression}; }}"
+    )
+
+
+def pixels_of(page, colour, reach=40):
+    """Count the canvas' pixels of about a colour."""
+    return page.evaluate(
+        """([[r, g, b], reach]) => {
+            const { width, height } = document.querySelector('.map canvas');
+            const paper = document.querySelector('.map canvas').getContext('2d');
+            const { data } = paper.getImageData(0, 0, width, height);
+            let count = 0;
+            for (let i = 0; i < data.length; i += 4)
+                count += Math.abs(data[i] - r) + Math.abs(data[i + 1] - g)
+                    + Math.abs(data[i + 2] - b) < reach;
+            return count;
+        }""",
+        [colour, reach],
+    )
+
+
+def is_drawn(page, colour, least, most=10**9):
+    """Wait until the canvas shows enough of a colour, and not too much."""
+    for _ in range(300):
+        if least <= pixels_of(page, colour) <= most:
+            return
+        page.wait_for_timeout(50)
+    count = pixels_of(page, colour)
+    raise AssertionError(f"{count} pixels of {colour}, expected {least} to {most}")
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("size", ["wide", "narrow"])
+def test_the_map_looks_right(look, size, theme):
+    visited = look(
+        "/map?vehicle=n1", "map", size, theme, ready='.chosen-car dd:text-matches("m/s")'
+    )
+    is_drawn(visited.page, (76, 141, 240), 100)  # hosted cars' blue
+    is_drawn(visited.page, (90, 209, 255), 100)  # the way ahead of the chosen car
+
+
+def test_the_binary_stream_tells_what_rest_tells(visit, running):
+    visited = visit("/map")
+    visited.page.wait_for_selector('tr[data-car="n6"]')
+    told = {car["vehicle"]: car for car in running.get("/vehicles")["vehicles"]}
+    shown = fleet(visited, "fleet.vehicles.map((car, row) => [car, fleet.x[row], fleet.y[row]])")
+    assert [car["vehicle"] for car, _, _ in shown] == sorted(told)
+    for car, x_m, y_m in shown:
+        assert car["kind"] == told[car["vehicle"]]["kind"]
+        assert abs(x_m - told[car["vehicle"]]["x_m"]) < 1.0
+        assert abs(y_m - told[car["vehicle"]]["y_m"]) < 1.0
+    before = fleet(visited, "fleet.sequence")
+    visited.wait(
+        f"""async (before) => (await import('{FLEET}')).fleet.sequence > before + 5""", before
+    )
+
+
+def test_the_map_is_zoomed_and_panned_by_mouse_and_keyboard(visit):
+    visited = visit("/map")
+    page = visited.page
+    page.wait_for_selector(SCALE)
+    whole = page.inner_text(SCALE)
+    assert page.is_disabled('[aria-label="Show all"]')
+    page.focus(".sheet")
+    for _ in range(6):
+        page.keyboard.press("+")
+    visited.wait("(old) => document.querySelector('.scale').innerText !== old", whole)
+    page.keyboard.press("0")
+    visited.wait("(old) => document.querySelector('.scale').innerText === old", whole)
+    box = page.locator(".sheet").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    for _ in range(5):
+        page.mouse.wheel(0, -300)
+    visited.wait("(old) => document.querySelector('.scale').innerText !== old", whole)
+    page.mouse.down()
+    page.mouse.move(x - 200, y, steps=4)
+    page.mouse.up()
+    assert page.locator(".chosen-car").count() == 0  # a drag chooses nobody
+    page.click('[aria-label="Show all"]')
+    assert page.inner_text(SCALE) == whole
+    assert visited.complaints == []
+
+
+def test_a_car_is_chosen_on_the_map_followed_and_let_go(visit):
+    visited = visit("/map")
+    page = visited.page
+    page.wait_for_selector('tr[data-car="n6"]')
+    place = f"""async () => {{
+        const {{ fleet }} = await import('{FLEET}');
+        const row = fleet.rows.get('n5');
+        return [fleet.x[row], fleet.y[row]];
+    }}"""
+    page.focus(".sheet")
+
+    def click_on_it():
+        box = page.locator(".sheet").bounding_box()
+        x_m, y_m = page.evaluate(place)
+        left, top, width, height = (-0.376, -1.665, 3.52, 2.19)
+        scale = min(box["width"] / width, box["height"] / height)
+        x = box["width"] / 2 + scale * (x_m - left - width / 2)
+        y = box["height"] / 2 - scale * (y_m + top + height / 2)
+        page.mouse.click(box["x"] + x, box["y"] + y)
+        page.wait_for_timeout(100)
+        return page.locator('tr[data-car="n5"].chosen').count()
+
+    visited.until(click_on_it, "n5 is chosen by a click on it")
+    page.focus(".sheet")
+    page.keyboard.press("f")
+    page.wait_for_selector('.chip:has-text("Following n5")')
+    page.keyboard.press("ArrowLeft")  # who moves the map follows no more
+    page.wait_for_selector(".chip", state="detached")
+    page.keyboard.press("Escape")
+    page.wait_for_selector(".chosen-car", state="detached")
+
+
+def test_the_lidar_is_heard_only_while_it_is_shown(visit):
+    page = visit("/map?vehicle=n2").page
+    asked, ended = [], []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("requestfailed", lambda request: ended.append(request.url))
+    page.click('.acts button:text("LIDAR")')
+    is_drawn(page, (255, 210, 60), 150)
+    assert [url for url in asked if "/vehicles/n2/scan/stream" in url]
+    page.click('.acts button:text("LIDAR")')
+    for _ in range(100):
+        if any("scan/stream" in url for url in ended):
+            break
+        page.wait_for_timeout(50)
+    assert any("scan/stream" in url for url in ended)
+    is_drawn(page, (255, 210, 60), 0, most=149)
+
+
+def test_layers_are_chosen_and_kept_for_the_next_visit(visit):
+    visited = visit("/map")
+    page = visited.page
+    page.click('button:text("Layers")')
+    page.check("input[name=heat]")
+    page.check("input[name=trails]")
+    page.wait_for_selector('.heat-key:has-text("m/s")')
+    page.keyboard.press("Escape")
+    page.wait_for_selector("#layers-list", state="hidden")
+    page.reload()
+    page.wait_for_selector(".heat-key")
+    assert visited.complaints == []
+
+
+def test_the_table_is_searched_filtered_sorted_and_walked_by_keyboard(visit):
+    visited = visit("/map")
+    page = visited.page
+    names = ".cars tbody tr[data-car] .name"
+    page.wait_for_selector('tr[data-car="n6"]')
+    page.select_option(".filters select", "remote")
+    visited.until(lambda: page.locator(names).all_inner_texts() == ["n5", "n6"], "only agents")
+    page.select_option(".filters select", "")
+    page.fill(".filters input", "n3")
+    visited.until(lambda: page.locator(names).all_inner_texts() == ["n3"], "only n3")
+    page.fill(".filters input", "nobody")
+    page.wait_for_selector('.cars .empty:text("No vehicle is like that.")')
+    page.fill(".filters input", "")
+    page.click('th button:has-text("Name")')
+    page.wait_for_selector('th[aria-sort="descending"]')
+    visited.until(lambda: page.locator(names).first.inner_text() == "n6", "n6 is first")
+    page.focus(".cars .scroll")
+    page.keyboard.press("ArrowDown")
+    page.wait_for_selector('tr[data-car="n6"].chosen')
+    page.keyboard.press("ArrowDown")
+    page.wait_for_selector('tr[data-car="n5"].chosen')
+    page.wait_for_selector('.chosen-car:has-text("remote")')
+
+
+def test_a_car_is_added_and_taken_off_again(visit, running):
+    visited = visit("/map")
+    page = visited.page
+    page.wait_for_selector('tr[data-car="n6"]')
+    page.click('button:text("Add a car")')
+    page.fill("dialog input[name=vehicle]", "guest")
+    page.keyboard.press("Enter")
+    page.wait_for_selector('.chosen-car:has-text("guest")')
+    page.wait_for_selector('tr[data-car="guest"].chosen')
+    names = [car["vehicle"] for car in running.get("/vehicles")["vehicles"]]
+    assert "guest" in names
+    page.click('.acts button:text("Take off")')
+    page.wait_for_selector("dialog[open] .danger")
+    page.keyboard.press("Enter")
+    page.wait_for_selector('tr[data-car="guest"]', state="detached")
+    names = [car["vehicle"] for car in running.get("/vehicles")["vehicles"]]
+    assert "guest" not in names
+    assert visited.complaints == []
+
+
+def test_signals_have_letter_and_time_and_lead_to_their_junction(visit):
+    visited = visit("/map")
+    page = visited.page
+    visited.wait(
+        """() => {
+            const heads = [...document.querySelectorAll('.signals-short .head')];
+            return heads.length && heads.every(head => /^[RYGF]$/.test(head.innerText.trim()));
+        }"""
+    )
+    assert page.get_attribute(".signals-short a", "href") == "/signals/crossing"
+
+
+def test_frames_go_on_while_nothing_is_touched(visit):
+    visited = visit("/map")
+    before = visited.page.evaluate(f"async () => (await import('{SCENE}')).drawn.frames")
+    visited.wait(f"async (before) => (await import('{SCENE}')).drawn.frames > before + 5", before)
