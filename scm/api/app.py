@@ -28,6 +28,7 @@ from scm.api.routes import (
     misbehaviour,
     operations,
     session,
+    signal_plans,
     signals,
     stations,
     stop,
@@ -36,6 +37,7 @@ from scm.api.routes import (
 )
 from scm.api.routes import keys as key_routes
 from scm.api.shelves import Shelves
+from scm.api.signal_plans import PlanShelf
 from scm.api.stream import Stream
 from scm.api.view import CityView
 from scm.clock import WallClock
@@ -94,8 +96,11 @@ def create_app(
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
     app.add_middleware(Gate, keys=keys, policy=policy)
     api = APIRouter(prefix="/api/v1")
-    for noun in (vehicles, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic):
+    for noun in (vehicles, stations, events, map, boxes, eye, stop, misbehaviour, traffic):
         api.include_router(noun.router(city), responses=problem.RESPONSES)
+    plan_shelf = PlanShelf(city.shelves.plans)
+    api.include_router(signals.router(city, plan_shelf), responses=problem.RESPONSES)
+    api.include_router(signal_plans.router(city, plan_shelf, work), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
     api.include_router(operations.router(work), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)
