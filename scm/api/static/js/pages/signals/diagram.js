@@ -8,12 +8,12 @@ import { barAt, heightOf, paint } from "scm/pages/signals/diagram_paint.js";
 import { bars, barsRead, clockNow, row, site, status } from "scm/pages/signals/store.js";
 import { plain, WORDS } from "scm/pages/signals/words.js";
 
-const SPANS_S = [30, 60, 120, 300, 600];
+const SPANS_S = [30, 60, 90, 120, 300, 600];
 const FUTURE = 0.3;
 const PAN = 0.25;
 
 /** How many seconds are shown, and how far the view is moved back from now [s]. */
-const span = signal(window.innerWidth < 860 ? 60 : 120);
+const span = signal(window.innerWidth < 860 ? 60 : 90);
 const back = signal(0);
 
 /** What lies under the pointer, in words. */

@@ -9,8 +9,8 @@
 import { LETTERS, plain } from "scm/pages/signals/words.js";
 
 const AXIS = 22;
-const ROW = 28;
-const BAR = 18;
+const ROW = 36;
+const BAR = 24;
 const SPLIT = 12;
 const TICKS_S = [5, 10, 15, 30, 60, 120];
 const LEAST_LETTER_PX = 13;
@@ -166,7 +166,7 @@ function hatch(paper, fromX, top, width, height, colour) {
 }
 
 /** One colour from `from` to `to`, in the shape that says which. */
-function drawBar({ paper, x, ink, view }, colour, from, to, top, label = "") {
+function drawBar({ paper, x, ink, view }, colour, from, to, top, ...labels) {
   const [a, b] = [Math.max(x(from), x(view.from)), Math.min(x(to), x(view.until))];
   if (b <= a) return;
   const y = top + (ROW - BAR) / 2;
@@ -184,13 +184,17 @@ function drawBar({ paper, x, ink, view }, colour, from, to, top, label = "") {
     paper.fillStyle = colour === "dark" ? ink.muted : ink.red;
     paper.fillRect(a, y + BAR / 2 - 1, b - a, 2);
   }
-  if (label && b - a > LEAST_LETTER_PX) {
-    paper.font = `650 11px ${ink.font}`;
-    paper.textAlign = "center";
-    paper.textBaseline = "middle";
-    paper.fillStyle = colour === "green" ? ink.onGreen : ink.text;
-    if (paper.measureText(label).width < b - a - 4) paper.fillText(label, (a + b) / 2, y + BAR / 2 + 0.5);
-  }
+  if (b - a > LEAST_LETTER_PX) write(paper, ink, colour === "green" ? ink.onGreen : ink.text, labels, a, b, y + BAR / 2);
+}
+
+/** The first of some texts that fits between `a` and `b`; none: nothing. */
+function write(paper, ink, colour, texts, a, b, y) {
+  paper.font = `650 11px ${ink.font}`;
+  paper.textAlign = "center";
+  paper.textBaseline = "middle";
+  paper.fillStyle = colour;
+  const text = texts.find((one) => paper.measureText(one).width < b - a - 4);
+  if (text) paper.fillText(text, (a + b) / 2, y + 0.5);
 }
 
 function drawComing(sheet, turn, top, times, label) {
@@ -212,14 +216,7 @@ function drawComing(sheet, turn, top, times, label) {
   paper.strokeRect(x(from) + 0.5, top + (ROW - BAR) / 2 + 0.5, x(to) - x(from) - 1, BAR - 1);
   paper.restore();
   if (label && turn.start > view.now) {
-    paper.font = `600 11px ${ink.font}`;
-    paper.textAlign = "center";
-    paper.textBaseline = "middle";
-    paper.fillStyle = ink.text;
-    const room = x(Math.min(to, view.until)) - x(from);
-    if (paper.measureText(label).width < room - 4) {
-      paper.fillText(label, (x(from) + x(Math.min(to, view.until))) / 2, top + ROW / 2 + 0.5);
-    }
+    write(paper, ink, ink.text, [label], x(from), x(Math.min(to, view.until)), top + ROW / 2);
   }
 }
 
@@ -231,7 +228,8 @@ function drawRing(sheet, ring, top, { bars, times, coming }) {
       const end = bar.end ?? view.now;
       if (end < view.from - 20 || bar.start > view.until) return;
       if (bar.colour === "green") {
-        drawBar(sheet, "green", bar.start, end, top, `${plain(group)} ${Math.round(end - bar.start)} s`);
+        const [name, lasted] = [plain(group), `${Math.round(end - bar.start)} s`];
+        drawBar(sheet, "green", bar.start, end, top, `${name} ${lasted}`, name, lasted);
       } else if (bar.colour === "yellow") {
         drawBar(sheet, "yellow", bar.start, end, top);
       } else if (bar.colour === "red" && list[at - 1]?.colour === "yellow") {

@@ -14,7 +14,7 @@ const LAMPS = [
 export function Heads({ told }) {
   const detectors = new Map((status()?.detectors ?? []).map((one) => [one.group, one]));
   return html`
-    <section class="heads" aria-label="Signal groups">
+    <section class="heads" data-many=${told.groups.length > 4} aria-label="Signal groups">
       ${told.groups.map(
         (group) => html`
           <${Head}

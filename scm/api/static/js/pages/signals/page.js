@@ -14,7 +14,7 @@ import { plain } from "scm/pages/signals/words.js";
 import { Wishes } from "scm/pages/signals/wishes.js";
 
 export function Page() {
-  useTopics("signals", "signal_status");
+  useTopics("signals", "signal_status", "events");
   const names = signals.value.map((one) => one.junction);
   const wanted = route.value.rest || names[0] || null;
   const known = names.includes(wanted);

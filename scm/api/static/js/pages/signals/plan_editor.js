@@ -2,7 +2,7 @@
 import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { change, notify } from "scm/shell/api.js";
-import { changeOf, cycleOf, PlanStrip } from "scm/pages/signals/plan_strip.js";
+import { changeOf, cycleOf, PlanStrip, splitOf } from "scm/pages/signals/plan_strip.js";
 import { junction, plans, read, readPlans, site } from "scm/pages/signals/store.js";
 import { plain, secs } from "scm/pages/signals/words.js";
 
@@ -177,7 +177,7 @@ export function PlanEditor() {
         </button>
         <${Verdict} faults=${faults} found=${found} />
         <div class="acts">
-          <button disabled=${faults.length > 0 || found?.state === "running"} onClick=${() => prove(draft)}>
+          <button disabled=${faults.length > 0 || isProven || found?.state === "running"} onClick=${() => prove(draft)}>
             ${isProven ? "Proven" : "Prove"}
           </button>
           <button class="primary" disabled=${!isProven || Boolean(unnamed)} title=${unnamed} onClick=${() => save(draft)}>Save</button>
@@ -192,7 +192,6 @@ function Stage({ at, stage, count, onPut, onMove, onRemove }) {
   const phases = site.value?.phases ?? [];
   const least = Math.max(0, ...phases.filter((p) => stage.groups.includes(p.group)).map((p) => p.min_green_s));
   const { yellow_s, red_clear_s } = changeOf(stage.groups);
-  const split = (stage.green_s || 0) + (stage.extra_red_s || 0) + yellow_s + red_clear_s;
   const flip = (group) =>
     onPut({
       groups: phases
@@ -241,7 +240,7 @@ function Stage({ at, stage, count, onPut, onMove, onRemove }) {
           onInput=${(event) => onPut({ extra_red_s: number(event) })}
         />
       </td>
-      <td class="number"><b>${secs(split)}</b></td>
+      <td class="number"><b>${secs(splitOf(stage))}</b></td>
       <td class="order">
         <button class="small" aria-label="Stage ${at + 1} earlier" disabled=${at === 0} onClick=${() => onMove(-1)}>▲</button>
         <button class="small" aria-label="Stage ${at + 1} later" disabled=${at === count - 1} onClick=${() => onMove(1)}>▼</button>

@@ -14,7 +14,9 @@ const deleting = signal(null);
 
 export function Plans({ told }) {
   const now = status();
-  const policies = (site.value?.policies ?? []).filter((one) => one.policy !== "fixed");
+  const policies = (site.value?.policies ?? []).filter(
+    (one) => !["fixed", "flashing"].includes(one.policy), // the plans, and the button for flash
+  );
   return html`
     <section class="panel plans" aria-label="Plans">
       <div class="panel-head">
@@ -73,7 +75,7 @@ function Policy({ of: one, now }) {
         <b>${plain(one.policy)}</b>
         ${runs && html`<span class="badge on">runs</span>`}
         ${now?.pending === one.policy && html`<span class="badge">next</span>`}
-        <small>${one.about}</small>
+        <small>${one.about.replace(`${plain(one.policy)}: `, "")}</small>
       </div>
       <span class="cycle">policy</span>
       <div class="acts">

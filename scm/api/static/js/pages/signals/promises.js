@@ -10,7 +10,14 @@ const lead = signal(5);
 
 export function Promises() {
   const told = score.value;
-  if (!told) return html`<section class="panel promises" aria-label="Promises"><h2>Promises</h2><p class="empty">Reading…</p></section>`;
+  if (!told) {
+    return html`
+      <section class="panel promises" aria-label="Promises">
+        <h2>SPaT promises</h2>
+        <p class="empty">Reading what was told…</p>
+      </section>
+    `;
+  }
   const broken = told.early + told.late;
   const leads = [...new Set(told.leads.map((one) => one.lead_s))];
   return html`
@@ -25,7 +32,7 @@ export function Promises() {
         </div>
         <div><dt>too early</dt><dd>${told.early}</dd></div>
         <div><dt>too late</dt><dd>${told.late}</dd></div>
-        <div><dt>latest end never told</dt><dd>${told.open}</dd></div>
+        <div><dt>no latest end</dt><dd>${told.open}</dd></div>
         <div><dt>cut by flash</dt><dd>${told.cut}</dd></div>
       </dl>
       ${told.judged
@@ -37,7 +44,7 @@ export function Promises() {
 
 function Leads({ told }) {
   return html`
-    <table>
+    <div class="scroll"><table>
       <caption class="hidden">Likely ends as told before the end, against the end</caption>
       <thead>
         <tr>
@@ -65,7 +72,7 @@ function Leads({ told }) {
             `,
           )}
       </tbody>
-    </table>
+    </table></div>
   `;
 }
 
@@ -87,7 +94,7 @@ function Histogram({ told, leads }) {
   return html`
     <figure class="histogram">
       <figcaption>
-        Error of the likely end
+        Likely end, told too early or too late
         <select
           aria-label="How long before the end"
           value=${String(lead.value)}

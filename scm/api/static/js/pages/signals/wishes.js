@@ -3,7 +3,8 @@ import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { change, notify } from "scm/shell/api.js";
 import { Dialog } from "scm/shared/dialog.js";
-import { span } from "scm/shared/format.js";
+import { clock, span } from "scm/shared/format.js";
+import { events } from "scm/shell/store.js";
 import { clockNow, site, status } from "scm/pages/signals/store.js";
 import { plain, VERBS } from "scm/pages/signals/words.js";
 
@@ -50,13 +51,14 @@ export function Wishes({ told }) {
   return html`
     <section class="panel wishes" aria-label="Wishes">
       <div class="panel-head">
-        <h2>Wishes <small>nobody sets a colour: the kernel says when</small></h2>
+        <h2>Wishes <small>the kernel decides when</small></h2>
         <button class="small ${told.mode === "flash" ? "" : "danger"}" onClick=${() => (flashing.value = true)}>
           ${told.mode === "flash" ? "End flash…" : "Flash red…"}
         </button>
       </div>
       <${Form} junction=${told.junction} names=${told.groups.map((one) => one.group)} />
       <${Held} junction=${told.junction} held=${held} />
+      <${Lately} junction=${told.junction} />
       ${flashing.value && html`<${Flash} junction=${told.junction} on=${told.mode !== "flash"} />`}
     </section>
   `;
@@ -172,6 +174,28 @@ function Held({ junction, held }) {
           </li>
         `,
       )}
+    </ul>
+  `;
+}
+
+const SHOWN = 8;
+
+/** What was asked for and what came of it, from the log. */
+function Lately({ junction }) {
+  const about = `junction ${junction} `;
+  const told = events.value.filter((event) => event.text.includes(about)).slice(0, SHOWN);
+  return html`
+    <h3>Lately <a href="/events">all events</a></h3>
+    <ul class="lately">
+      ${told.map(
+        (event) => html`
+          <li key=${event.seq} data-severity=${event.severity}>
+            <time>${clock(event.t_ns)}</time>
+            <span>${event.text.replace(about, "")}</span>
+          </li>
+        `,
+      )}
+      ${!told.length && html`<li class="empty">Nothing was asked for and nothing changed.</li>`}
     </ul>
   `;
 }
