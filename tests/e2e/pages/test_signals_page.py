@@ -1,4 +1,4 @@
-"""The signals page as a traffic engineer uses it, with the real controller and monitor behind it."""
+"""The signals page as an engineer uses it, with the real controller and monitor behind it."""
 
 import pytest
 

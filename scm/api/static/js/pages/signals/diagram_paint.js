@@ -78,7 +78,7 @@ function inkOf(canvas) {
     text: light ? "#17202b" : "#e8ecf1",
     muted: light ? "#5a6675" : "#93a0b0",
     line: light ? "#dbe1e8" : "#28323f",
-    green: light ? "#1f9a63" : "#2fbf80",
+    green: light ? "#15803d" : "#2fbf80",
     onGreen: light ? "#ffffff" : "#03200f",
     yellow: light ? "#d99a00" : "#f0b94a",
     red: light ? "#c9302a" : "#ff6a64",
@@ -194,7 +194,14 @@ function write(paper, ink, colour, texts, a, b, y) {
   paper.textBaseline = "middle";
   paper.fillStyle = colour;
   const text = texts.find((one) => paper.measureText(one).width < b - a - 4);
-  if (text) paper.fillText(text, (a + b) / 2, y + 0.5);
+  if (!text) return;
+  if (colour === ink.text) {
+    paper.strokeStyle = ink.ground; // so that a line behind it does not strike it through
+    paper.lineWidth = 4;
+    paper.strokeText(text, (a + b) / 2, y + 0.5);
+    paper.lineWidth = 1;
+  }
+  paper.fillText(text, (a + b) / 2, y + 0.5);
 }
 
 function drawComing(sheet, turn, top, times, label) {
