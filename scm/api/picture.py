@@ -15,6 +15,8 @@ from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.signal_site import SignalSite
+from scm.v2x.messages.signal_status import SignalStatus
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.trip import Trip
@@ -51,7 +53,7 @@ class Picture:
     """The newest of everything heard, as of `now_ns`, the time of the view's last step.
 
     Attributes:
-        spats, monitors: By junction.
+        spats, monitors, sites, signal_statuses: By junction.
         trips: By vehicle.
         traffic: The observer's newest counts; `violations` the last it told, oldest first.
         frames, tags: By camera, the last few, oldest first; `eye_statuses` the newest.
@@ -66,6 +68,8 @@ class Picture:
     stop: CityStop | None = None
     spats: dict[str, Held[Spat]] = field(default_factory=dict)
     monitors: dict[str, Held[MonitorStatus]] = field(default_factory=dict)
+    sites: dict[str, SignalSite] = field(default_factory=dict)
+    signal_statuses: dict[str, Held[SignalStatus]] = field(default_factory=dict)
     trips: dict[str, Held[Trip]] = field(default_factory=dict)
     traffic: Held[TrafficCounts] | None = None
     violations: tuple[Violation, ...] = ()

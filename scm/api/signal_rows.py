@@ -11,6 +11,8 @@ from scm.api.picture import Held, Picture
 from scm.clock import seconds
 from scm.maps.model import Junction
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.signal_request import SignalWish
+from scm.v2x.messages.signal_status import SignalDetector, SignalStatus, SignalTurn
 from scm.v2x.messages.spat import SignalGroup, Spat
 
 FRESH_S = 1.0
@@ -23,8 +25,9 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
         colour: None while nothing fresh is known.
         min_s: It will not change before; None: not known.
         max_s: It will have changed by then; None: not known.
-        likely_s: A forecast between the two, no promise; None: nobody knows.
-        likely_confidence: Share of such forecasts that come true within a second, 0 to 1.
+        likely_s: It will likely change then: a forecast, no promise; None: nobody knows.
+        confidence: Share of such forecasts that come true within a second, 0 to 1.
+        since_ns: When this colour began, on the controller's clock.
     """
 
     group: str
@@ -33,7 +36,8 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
     min_s: float | None = None
     max_s: float | None = None
     likely_s: float | None = None
-    likely_confidence: float | None = None
+    confidence: float | None = None
+    since_ns: int | None = None
 
 
 class MonitorRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -45,9 +49,14 @@ class MonitorRow(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class JunctionRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One junction; `fresh` tells whether its controller was heard within the last second."""
+    """One junction; `fresh` tells whether its controller was heard within the last second.
+
+    Attributes:
+        t_ns: The controller's clock now; None: it was never heard.
+    """
 
     junction: str
+    t_ns: int | None
     fresh: bool
     mode: str | None
     plan: str | None
@@ -72,6 +81,45 @@ def junction_rows(
     )
 
 
+class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
+    """What runs at a junction and who wants what, on its controller's clock.
+
+    Attributes:
+        pending: Plan or policy to come at the next safe moment; empty: none.
+        detectors: Of its groups; none: nobody listens for cars now.
+        turns: Greens on and to come; none: nobody knows.
+        failure: Why a policy was given up for fixed time; empty: none was.
+    """
+
+    junction: str
+    policy: str
+    plan: str
+    pending: str
+    wishes: tuple[SignalWish, ...]
+    detectors: tuple[SignalDetector, ...]
+    turns: tuple[SignalTurn, ...]
+    failure: str
+
+
+def status_rows(picture: Picture) -> tuple[StatusRow, ...]:
+    """Return what runs at every junction that was heard."""
+    return tuple(status_row(held.message) for held in picture.signal_statuses.values())
+
+
+def status_row(status: SignalStatus) -> StatusRow:
+    """Return what runs at one junction."""
+    return StatusRow(
+        junction=status.junction,
+        policy=status.policy,
+        plan=status.plan,
+        pending=status.pending,
+        wishes=status.wishes,
+        detectors=status.detectors,
+        turns=status.turns,
+        failure=status.failure,
+    )
+
+
 def _row(
     junction: Junction,
     spat: Held[Spat] | None,
@@ -84,6 +132,7 @@ def _row(
     names = {junction.plan, *plans, *([spat.message.plan] if spat is not None else [])} - {"flash"}
     return JunctionRow(
         junction=junction.name,
+        t_ns=spat.message.t_ns + now_ns - spat.arrived_ns if spat is not None else None,
         fresh=fresh,
         mode=spat.message.mode if spat is not None else None,
         plan=spat.message.plan if spat is not None else None,
@@ -114,7 +163,8 @@ def _group(name: str, group: SignalGroup | None, spat: Held[Spat] | None, now_ns
         min_s=left_s(group.min_end_ns),
         max_s=left_s(group.max_end_ns),
         likely_s=left_s(group.likely_end_ns),
-        likely_confidence=None if flashing else group.likely_confidence,
+        confidence=group.likely_confidence,
+        since_ns=group.since_ns,
     )
 
 

@@ -15,7 +15,7 @@ from scm.api.eye_rows import camera_rows
 from scm.api.picture import Picture
 from scm.api.routes.boxes import boxes_of
 from scm.api.routes.stop import stop_of
-from scm.api.signal_rows import junction_rows
+from scm.api.signal_rows import junction_rows, status_rows
 from scm.api.vehicle_rows import vehicles_topic
 
 EVENTS = "events"
@@ -64,6 +64,7 @@ def topics_of(city: City, seen: Acknowledgements) -> dict[str, Topic]:
         "signals": Topic(
             lambda picture: junction_rows(picture, city.city_map.junctions, city.plans), 2
         ),
+        "signal_status": Topic(status_rows, 4),
         "boxes": Topic(boxes_of, 2),
         "eye": Topic(camera_rows, 2),
         "acknowledgements": Topic(lambda _: seen.newest(ACKNOWLEDGED_SHOWN), 4),

@@ -15,6 +15,7 @@ from scm.api.event_log import EventLog, LoggedEvent
 from scm.api.picture import Held, Picture, SeenPose
 from scm.api.residual import residual_of, truth_at
 from scm.api.scan_watch import ScanWatch
+from scm.api.signal_history import History, PromiseScore, SignalHistory, Verdict
 from scm.api.stations import StationTable
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import Pose2
@@ -34,6 +35,8 @@ from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
+from scm.v2x.messages.signal_site import SignalSite
+from scm.v2x.messages.signal_status import SignalStatus
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.trip import Trip
@@ -67,6 +70,9 @@ class CityView:
         self._truth: deque[WorldSnapshot] = deque(maxlen=TRUTH_DEPTH)
         self._spats: dict[str, Held[Spat]] = {}
         self._monitors: dict[str, Held[MonitorStatus]] = {}
+        self._sites: dict[str, SignalSite] = {}
+        self._signal_statuses: dict[str, Held[SignalStatus]] = {}
+        self._signal_history = SignalHistory()
         self._trips: dict[str, Held[Trip]] = {}
         self._traffic: Held[TrafficCounts] | None = None
         self._violations: deque[Violation] = deque(maxlen=VIOLATIONS_DEPTH)
@@ -84,8 +90,10 @@ class CityView:
         self._takers: dict[type[Message], Callable[[Any, int], None]] = {
             WorldSnapshot: self._take_snapshot,
             WorldDefinition: self._take_definition,
-            Spat: lambda m, t: self._spats.update({m.junction: Held(m, t)}),
-            MonitorStatus: lambda m, t: self._monitors.update({m.junction: Held(m, t)}),
+            Spat: self._take_spat,
+            SignalSite: lambda m, _: self._sites.update({m.junction: m}),
+            SignalStatus: lambda m, t: self._signal_statuses.update({m.junction: Held(m, t)}),
+            MonitorStatus: self._take_monitor,
             EyeFrame: self._take_frame,
             EyeTags: self._take_tags,
             EyePose: self._take_pose,
@@ -140,6 +148,8 @@ class CityView:
             stop=self._stop,
             spats=dict(self._spats),
             monitors=dict(self._monitors),
+            sites=dict(self._sites),
+            signal_statuses=dict(self._signal_statuses),
             trips=dict(self._trips),
             traffic=self._traffic,
             violations=tuple(self._violations),
@@ -167,6 +177,21 @@ class CityView:
         """Return all stations' scores, and the newest report by station; safe from any thread."""
         with self._lock:
             return self._scores, dict(self._reports)
+
+    def signal_history(self, junction: str, groups: Sequence[str]) -> History:
+        """Return what a junction's groups showed in the last minutes; safe from any thread."""
+        with self._lock:
+            return self._signal_history.history(junction, groups)
+
+    def signal_score(self, junction: str) -> PromiseScore:
+        """Return what became of what a junction told; safe from any thread."""
+        with self._lock:
+            return self._signal_history.score(junction)
+
+    def signal_verdicts(self, junction: str) -> tuple[Verdict, ...]:
+        """Return what a junction's monitor said, newest first; safe from any thread."""
+        with self._lock:
+            return self._signal_history.verdicts(junction)
 
     @contextmanager
     def watching(self, vehicle: str, camera: str) -> Iterator[None]:
@@ -255,6 +280,14 @@ class CityView:
 
     def _take_definition(self, definition: WorldDefinition, _t_ns: int) -> None:
         self._definition = definition
+
+    def _take_spat(self, spat: Spat, t_ns: int) -> None:
+        self._spats[spat.junction] = Held(spat, t_ns)
+        self._signal_history.take(spat)
+
+    def _take_monitor(self, status: MonitorStatus, t_ns: int) -> None:
+        self._monitors[status.junction] = Held(status, t_ns)
+        self._signal_history.take_monitor(status)
 
     def _take_stop(self, stop: CityStop, _t_ns: int) -> None:
         self._stop = stop

@@ -59,6 +59,14 @@ class EpochRecord(msgspec.Struct, kw_only=True, frozen=True):
     highest: int
 
 
+class StageRecord(msgspec.Struct, kw_only=True, frozen=True):
+    """A stage of a plan that somebody made."""
+
+    groups: tuple[str, ...]
+    green_s: float
+    extra_red_s: float = 0.0
+
+
 class PlanRecord(msgspec.Struct, kw_only=True, frozen=True):
     """What a junction was last asked for.
 
@@ -66,11 +74,13 @@ class PlanRecord(msgspec.Struct, kw_only=True, frozen=True):
         plan: By name, to come into force at the next safe moment.
         flash: Whether a person asked for flashing red.
         by: Who asked, and why, in one sentence.
+        stages: Of a plan that is none of the junction's own.
     """
 
     plan: str
     flash: bool = False
     by: str = ""
+    stages: tuple[StageRecord, ...] = ()
 
 
 class FaultRecord(msgspec.Struct, kw_only=True, frozen=True):

@@ -41,8 +41,7 @@ def take(
     """
     _check(request, program, policies)
     if request.verb == "clear":
-        wanted = set(request.groups)
-        return tuple(one for one in held if wanted and not wanted & set(one.groups))
+        return tuple(one for one in held if not _is_cleared(one, request))
     new = Asked(
         request.verb,
         tuple(dict.fromkeys(request.groups)),
@@ -73,6 +72,11 @@ def lapse(
         if now_ns < one.until_ns and (groups or not one.groups):
             left.append(one._replace(groups=groups))
     return tuple(left)
+
+
+def _is_cleared(one: Asked, request: SignalRequest) -> bool:
+    wanted = set(request.groups)
+    return request.clears in ("", one.verb) and (not wanted or bool(wanted & set(one.groups)))
 
 
 def groups_of(held: Sequence[Asked], verb: Verb) -> frozenset[str]:

@@ -7,7 +7,7 @@ ends a colour against what Spat has promised. As long as anybody has a reason fo
 red; then it starts again through all red.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,8 +16,8 @@ from scm.traffic import asked, kernel
 from scm.traffic.asked import NEED_RINGS, Asked
 from scm.traffic.detectors import Detector
 from scm.traffic.kernel import Phase, Program
-from scm.traffic.likely import forecasts, within
-from scm.traffic.plan import FLASH, load_timetable, plan_names
+from scm.traffic.likely import Coming, forecasts, laid_out, within
+from scm.traffic.plan import FLASH, Timetable, load_timetable, plan_names
 from scm.traffic.policy import (
     FIXED,
     Answer,
@@ -127,8 +127,7 @@ class Controller:
         self._program = program
         self._revision = revision
         tables = tables or {name: (load_timetable(name, program), None) for name in plan_names()}
-        self._plans = list(tables)
-        self._timetables = Timetables(tables, self._known(plan))
+        self._timetables = Timetables(tables, _known(junction, plan, tables))
         self._site = site_of(junction, program, learned, car)
         self._policies = {name: load_policy(name) for name in policy_names()}
         self._usual = self._known_policy(policy)
@@ -151,6 +150,7 @@ class Controller:
         self._seq = 0
         self._foreseen_ns = 0
         self._forecasts: dict[str, int] = {}
+        self._coming: tuple[Coming, ...] = ()
         self._restart_ns = max(times.clearance for times in program.times) + STEP_NS
 
     @property
@@ -188,12 +188,25 @@ class Controller:
         Raises:
             PlanError: when there is no such plan or policy.
         """
-        if plan not in self._plans and plan in self._policies:
+        plans = self._timetables.names
+        if plan not in plans and plan in self._policies:
             self._usual = plan
         else:
-            self._timetables.pending = "" if self._known(plan) == self.plan else plan
+            self._timetables.ask(_known(self.junction, plan, plans))
             self._usual = FIXED
         self.failure = self._failed = ""
+
+    def ask_for_guest(self, table: Timetable) -> None:
+        """Wish for a plan that somebody made; it comes once every promise reckons with it."""
+        self._timetables.offer(table)
+        self._usual = FIXED
+        self.failure = self._failed = ""
+
+    def outlook(self, now_ns: int) -> tuple[Coming, ...]:
+        """Return the greens to come, as the timetable says or the policy foresees."""
+        if self.mode == FLASH:
+            return ()
+        return self._timetables.outlook(now_ns) if self.policy == FIXED else self._coming
 
     def take(self, request: SignalRequest, now_ns: int) -> None:
         """Take a wish of an operator or a script.
@@ -242,13 +255,6 @@ class Controller:
             groups=tuple(self._tell(name, shown, now_ns) for name, shown in self._shown.items()),
             revision=self._revision,
         )
-
-    def _known(self, plan: str) -> str:
-        if plan not in self._plans:
-            names = [*self._plans, *policy_names(), FLASH]
-            msg = f"junction {self.junction}: no plan {plan!r}{nearest(plan, names)}, only {names}"
-            raise PlanError(msg)
-        return plan
 
     def _known_policy(self, policy: str) -> str:
         if policy not in self._policies:
@@ -357,7 +363,7 @@ class Controller:
     def _foresee(self, now_ns: int, heard: Heard) -> None:
         """Ask timetable or policy when the present colours will likely end."""
         self._foreseen_ns = now_ns
-        self._forecasts = {}
+        self._forecasts, self._coming = {}, ()
         if self.mode == FLASH:
             return
         if self.policy == FIXED:
@@ -369,7 +375,8 @@ class Controller:
         view, promises = self._view(now_ns, 0, heard), self._promises()
         try:
             turns = self._policies[self.policy].foresee(self._site, self._memory, view)
-            self._forecasts = forecasts(self._program, self._state, promises, turns, now_ns)
+            self._coming = tuple(laid_out(self._program, self._state, promises, turns, now_ns))
+            self._forecasts = forecasts(self._program, self._state, self._coming)
         except Exception as cause:  # noqa: BLE001 as above; the next step gives it up
             self._fail(cause)
 
@@ -460,3 +467,11 @@ class Controller:
             likely_end_ns=likely and likely.end_ns,
             likely_confidence=likely and likely.confidence,
         )
+
+
+def _known(junction: str, plan: str, plans: Collection[str]) -> str:
+    if plan not in plans:
+        names = [*plans, *policy_names(), FLASH]
+        msg = f"junction {junction}: no plan {plan!r}{nearest(plan, names)}, only {names}"
+        raise PlanError(msg)
+    return plan

@@ -1,5 +1,6 @@
 """One junction of the traffic part: its controller, its detectors, and what is still to be told."""
 
+from collections.abc import Mapping
 from typing import Literal
 
 from msgspec.structs import replace
@@ -8,8 +9,11 @@ from scm.clock import NS_PER_MS
 from scm.maps.model import Junction
 from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller, Heard
-from scm.traffic.detectors import Watcher
+from scm.traffic.detectors import Detector, Watcher
+from scm.traffic.junction_facts import JunctionFacts, wishes_of
 from scm.traffic.plan import FLASH
+from scm.traffic.plan_asked import check_name, recalled, records_of, table_of
+from scm.traffic.policy import policy_names
 from scm.traffic.priority_air import PriorityDesk
 from scm.traffic.program import STEP_NS
 from scm.v2x.etsi_convert import roadside_station, spatem_of
@@ -20,7 +24,7 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.mapem_tx import MapemTx
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
-from scm.v2x.messages.signal_request import SignalReply, SignalRequest, SignalWish
+from scm.v2x.messages.signal_request import SignalReply, SignalRequest
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx
 
@@ -42,8 +46,11 @@ class JunctionSignals:
         watcher: Watcher,
         desk: PriorityDesk,
         mapem: MapemBody,
+        facts: JunctionFacts,
     ) -> None:
         self.junction = junction
+        self._facts = facts
+        self._names = {*(plan.plan for plan in facts.site.plans), *policy_names()}
         self._mapem = mapem
         self._mapem_ns: int | None = None
         self.record = PlanRecord(plan="")
@@ -52,11 +59,13 @@ class JunctionSignals:
         self.watcher = watcher
         self._told = (controller.mode, controller.running, "")
         self._asked = "as the map says"
+        self._taken = ""
         self._why_flash = ""
         self._monitor_ns: int | None = None
         self._sent_ns: int | None = None
         self._wishes = controller.asked
         self._news: list[Outgoing] = []
+        self._detectors: Mapping[str, Detector] = {}
 
     def hear_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
         """Flash while the monitor reports a fault."""
@@ -73,15 +82,19 @@ class JunctionSignals:
         Raises:
             PlanError: when there is no such plan any more.
         """
+        stages = recalled(record.stages)
         for plan in (record.plan, FLASH if record.flash else ""):
             if plan:
-                self.serve_plan(PlanRequest(junction=self.junction.name, plan=plan, by=record.by))
+                more = stages if plan == record.plan else ()
+                self.serve_plan(
+                    PlanRequest(junction=self.junction.name, plan=plan, by=record.by, stages=more)
+                )
 
     def serve_plan(self, request: PlanRequest) -> PlanReply:
         """Take a wish for a plan, or for flash; `record` is what should outlive the process.
 
         Raises:
-            PlanError: when there is no such plan.
+            PlanError: when there is no such plan, or one that came with it is not as it must be.
         """
         controller = self.controller
         who = f"{request.by} asked" + (f": {request.reason}" if request.reason else "")
@@ -89,8 +102,14 @@ class JunctionSignals:
             self._flash("person", who, on=True)
             self.record = replace(self.record, flash=True, by=request.by)
             return PlanReply(junction=request.junction, plan=FLASH)
-        controller.ask(request.plan)
-        self.record = PlanRecord(plan=request.plan, by=request.by)
+        if request.stages:
+            check_name(request.plan, self._names)
+            controller.ask_for_guest(table_of(request.plan, request.stages, self._facts.program))
+            self._taken = f"takes plan {request.plan} ({who})"
+        else:
+            controller.ask(request.plan)
+        stages = records_of(request.stages)
+        self.record = PlanRecord(plan=request.plan, by=request.by, stages=stages)
         self._asked = who
         self._flash("person", who, on=False)
         plan = FLASH if controller.is_flashing else controller.running
@@ -117,17 +136,7 @@ class JunctionSignals:
             junction=request.junction,
             policy=controller.policy,
             pending=controller.pending,
-            wishes=tuple(
-                SignalWish(
-                    verb=one.verb,
-                    groups=one.groups,
-                    by=one.by,
-                    reason=one.reason,
-                    ends_ns=one.until_ns,
-                    policy=one.policy,
-                )
-                for one in controller.asked
-            ),
+            wishes=wishes_of(controller.asked),
         )
 
     def step(self, now_ns: int) -> list[Outgoing]:
@@ -141,15 +150,18 @@ class JunctionSignals:
         self._lapses(now_ns)
         self._changes(now_ns)
         news, self._news = self._news, []
-        return [spat, *self._on_air(spat), *self.desk.tell(controller.priority, now_ns), *news]
+        told = self._facts.tell(controller, self._detectors, now_ns)
+        answers = self.desk.tell(controller.priority, now_ns)
+        return [spat, *self._on_air(spat), *answers, *told, *news]
 
     def _heard(self, now_ns: int) -> Heard:
         calls = self.desk.calls(now_ns)
         if not self.controller.needs_detectors:
+            self._detectors = {}
             return Heard({}, priority=calls)
         watcher = self.watcher
-        detectors = watcher.by_group(watcher.read(now_ns))
-        return Heard(detectors, watcher.sees(now_ns), calls)
+        self._detectors = watcher.by_group(watcher.read(now_ns))
+        return Heard(self._detectors, watcher.sees(now_ns), calls)
 
     def _flash(self, reason: str, why: str, *, on: bool) -> None:
         if on and not self.controller.is_flashing:
@@ -189,6 +201,9 @@ class JunctionSignals:
             controller.failure,
         )  # fmt: skip
         self._told = now
+        if self._taken:
+            self._tell("info", "plan_taken", self._taken, now_ns)
+            self._taken = ""
         if running != now[1]:
             text = f"runs plan {now[1]}, before {running} ({self._asked})"
             self._tell("info", "plan_changed", text, now_ns)

@@ -69,14 +69,22 @@ def _share(beyond_ns: int, *, red: bool) -> float:
     return next((share for most_s, share in SURE if beyond_s <= most_s), FAR)
 
 
-def forecasts(
+class Coming(NamedTuple):
+    """A green that is on or to come [ns]; without an end: nobody knows until when."""
+
+    groups: frozenset[str]
+    start_ns: int
+    end_ns: int | None
+
+
+def laid_out(
     program: Program,
     state: State,
     promises: Sequence[Promise | None],
     turns: Sequence[Turn],
     now_ns: int,
-) -> dict[str, int]:
-    """Return the likely ends of the present colours [ns], of the groups whose end the turns tell.
+) -> list[Coming]:
+    """Return turns with the kernel's times between them.
 
     Args:
         program: Of the junction.
@@ -85,28 +93,46 @@ def forecasts(
         turns: That the policy foresees, what is green now first.
         now_ns: The present time.
     """
-    ends: dict[str, int] = {}
-    green = {
-        name
-        for name, group in zip(program.groups, state, strict=True)
-        if group.phase is Phase.GREEN
-    }
+    green = _green(program, state)
     at_ns, before = now_ns, frozenset[str]()
-    for number, turn in enumerate(turns):
+    laid: list[Coming] = []
+    for turn in turns:
         entering = turn.groups - before - green
         at_ns += _change_ns(program, before - turn.groups, entering)
-        if number == 0:
+        if not laid:
             at_ns += _cleared_ns(program, state, promises, entering, now_ns)
-        for name in entering:
-            ends.setdefault(name, at_ns)
         if turn.green_s is None:
+            return [*laid, Coming(turn.groups, at_ns, None)]
+        laid.append(Coming(turn.groups, at_ns, at_ns + round(turn.green_s * NS_PER_S)))
+        at_ns, before = at_ns + round(turn.green_s * NS_PER_S), turn.groups
+    return laid
+
+
+def forecasts(program: Program, state: State, coming: Sequence[Coming]) -> dict[str, int]:
+    """Return the likely ends of the present colours [ns], of the groups whose end is told.
+
+    Args:
+        program: Of the junction.
+        state: Of its kernel.
+        coming: From `laid_out`.
+    """
+    ends: dict[str, int] = {}
+    green, before = _green(program, state), frozenset[str]()
+    for number, turn in enumerate(coming):
+        for name in turn.groups - before - green:
+            ends.setdefault(name, turn.start_ns)
+        if turn.end_ns is None:
             break
-        at_ns += round(turn.green_s * NS_PER_S)
-        following = turns[number + 1].groups if number + 1 < len(turns) else frozenset[str]()
+        following = coming[number + 1].groups if number + 1 < len(coming) else frozenset[str]()
         for name in (turn.groups & green) - following:
-            ends.setdefault(name, at_ns)
+            ends.setdefault(name, turn.end_ns)
         before = turn.groups
     return ends
+
+
+def _green(program: Program, state: State) -> set[str]:
+    pairs = zip(program.groups, state, strict=True)
+    return {name for name, group in pairs if group.phase is Phase.GREEN}
 
 
 def _change_ns(program: Program, leaving: frozenset[str], entering: frozenset[str]) -> int:

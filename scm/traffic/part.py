@@ -20,6 +20,7 @@ from scm.part import Hears, Serves
 from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller
 from scm.traffic.detectors import Seen, Watcher, reach_of
+from scm.traffic.junction_facts import JunctionFacts
 from scm.traffic.junction_signals import JunctionSignals
 from scm.traffic.kernel import Program
 from scm.traffic.own_plan import OWN, own_table
@@ -98,6 +99,7 @@ class TrafficPart:
                 Watcher(junction, roads, reach_of(programs[junction.name], roads)),
                 PriorityDesk(junction, roads),
                 mapem_of(roads, junction),
+                JunctionFacts(junction.name, programs[junction.name], tables[junction.name]),
             )
             for junction in city_map.junctions
         }
@@ -172,7 +174,8 @@ class TrafficPart:
             reply = signals.serve_plan(request)
             return [Keep("plans", request.junction, signals.record), Answer(item, reply)]
         except PlanError as refusal:
-            code = "invalid" if isinstance(request, SignalRequest) else "not_found"
+            is_wish = isinstance(request, SignalRequest) or request.stages
+            code = "invalid" if is_wish else "not_found"
             return [Answer(item, Refused(code=code, detail=str(refusal)))]
 
 

@@ -21,10 +21,11 @@ FLASH = "flash"
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """Groups that are green together, and for how long [ns]."""
+    """Groups that are green together, for how long, and how much longer all are red then [ns]."""
 
     groups: tuple[str, ...]
     green_ns: int
+    extra_red_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,12 +132,13 @@ def timetable(name: str, cycle: tuple[Stage, ...], program: Program) -> Timetabl
     for stage in cycle:
         end_ns = position_ns + stage.green_ns
         slots.append(Slot(frozenset(stage.groups), position_ns, end_ns))
-        position_ns = end_ns + _between_ns(stage, program)
+        position_ns = end_ns + least_between_ns(stage.groups, program) + stage.extra_red_ns
     return Timetable(name, tuple(slots), position_ns)
 
 
-def _between_ns(stage: Stage, program: Program) -> int:
-    times = [times_of(program, group) for group in stage.groups]
+def least_between_ns(groups: tuple[str, ...], program: Program) -> int:
+    """Return the least time from the end of a stage's green to the next green [ns]."""
+    times = [times_of(program, group) for group in groups]
     return max(t.yellow + t.clearance for t in times) + 3 * STEP_NS
 
 

@@ -51,7 +51,7 @@ class _Seen(NamedTuple):
     quiet: int
 
 
-_Memory = tuple[_Seen, ...]
+Memory = tuple[_Seen, ...]
 
 _COLOUR = {
     Phase.RED.name: "red",
@@ -90,7 +90,7 @@ def prove(kernel: Kernel, program: Program, dts: Sequence[int] = (1,)) -> Walked
 
 def _walk(kernel: Kernel, program: Program, dts: Sequence[int]) -> Walked:
     first = kernel.start(program)
-    todo: list[tuple[State, _Memory]] = [(first, tuple(_Seen(_of(g), 0, 0) for g in first))]
+    todo: list[tuple[State, Memory]] = [(first, first_memory(first))]
     seen, transitions = set(todo), 0
     sizes = range(len(program.groups) + 1)
     wishes = [frozenset(w) for w in chain(*(combinations(program.groups, n) for n in sizes))]
@@ -100,7 +100,7 @@ def _walk(kernel: Kernel, program: Program, dts: Sequence[int]) -> Walked:
         state, memory = todo.pop()
         for wish, dt, flash in moves:
             after = kernel.step(program, state, wish, dt, flash=flash)
-            node = after, _watch(program, memory, after, wish, dt)
+            node = after, watch(program, memory, after, wish, dt)
             if flash and any(seen.colour != "flash" for seen in node[1]):
                 raise PlanError("unsafe: flash is asked for and not shown")
             transitions += 1
@@ -110,13 +110,18 @@ def _walk(kernel: Kernel, program: Program, dts: Sequence[int]) -> Walked:
     return Walked(frozenset(state for state, _ in seen), transitions)
 
 
+def first_memory(state: State) -> Memory:
+    """Return what an observer knows who sees a junction for the first time."""
+    return tuple(_Seen(_of(group), 0, 0) for group in state)
+
+
 def _of(group: tuple[Phase, int]) -> str:
     return _COLOUR[group[0].name]
 
 
-def _watch(
-    program: Program, memory: _Memory, state: State, wishes: Collection[str], dt: int
-) -> _Memory:
+def watch(
+    program: Program, memory: Memory, state: State, wishes: Collection[str], dt: int
+) -> Memory:
     """Return the observer's memory after a step that it finds no fault with."""
     after = [
         _Seen(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from scm.traffic.likely import Coming
 from scm.traffic.plan import Timetable
 from scm.traffic.promise import Cycle
 from scm.traffic.wave import Wave, dwell_ns, dwelling
@@ -12,6 +13,9 @@ Tables = Mapping[str, tuple[Timetable, Wave | None]]
 class Timetables:
     """What runs now and what may run next; it knows no clock.
 
+    A guest, a plan that somebody made, may run from the cycle after the next on: what was promised
+    before it came does not reckon with it. It leaves when it neither runs nor is wanted.
+
     Attributes:
         plan: In force.
         pending: To come with the next cycle; empty: none.
@@ -19,13 +23,32 @@ class Timetables:
     """
 
     def __init__(self, tables: Tables, plan: str) -> None:
-        self._tables = tables
+        self._own = dict(tables)
+        self._tables = dict(tables)
+        self._entering: dict[str, Timetable] = {}
         self.plan = plan
         self.pending = ""
         self.clear(0, 0)
 
+    @property
+    def names(self) -> list[str]:
+        """The names of all plans that may be asked for, guests included."""
+        return list({**self._tables, **self._entering})
+
+    def ask(self, plan: str) -> None:
+        """Let a plan come with the next cycle, or stay."""
+        self.pending = "" if plan == self.plan else plan
+        if plan == self.plan:
+            self._entering.pop(plan, None)
+
+    def offer(self, guest: Timetable) -> None:
+        """Take a plan that somebody made, and let it come; one of its name makes room for it."""
+        self._entering = {guest.plan: guest}
+        self.pending = guest.plan
+
     def clear(self, now_ns: int, until_ns: int) -> None:
         """Wish nothing until a time, then begin the first cycle."""
+        self._change_guests()
         self._set(Cycle(None, now_ns, until_ns))
 
     def put_off(self, by_ns: int) -> None:
@@ -35,9 +58,11 @@ class Timetables:
 
     def next_cycle(self) -> None:
         """Begin the cycle after this one, of the plan that was asked for."""
-        self.plan, self.pending = self.pending or self.plan, ""
+        if self.pending and self.pending not in self._entering:
+            self.plan, self.pending = self.pending, ""
         began_ns = self.cycle.ends_ns
         table = self._beginning(self.plan, began_ns)
+        self._change_guests()
         self._set(Cycle(table, began_ns, began_ns + table.length_ns))
 
     def wishes(self, now_ns: int) -> frozenset[str]:
@@ -47,8 +72,36 @@ class Timetables:
 
     def next_start_ns(self, group: str) -> int:
         """Return when a group's green begins in the next cycle, of the plan that is to come."""
-        coming = dict(zip(self._tables, self.coming, strict=True))[self.pending or self.plan]
-        return self.cycle.ends_ns + coming.first_start_ns(group)
+        return self.cycle.ends_ns + self._next().first_start_ns(group)
+
+    def outlook(self, now_ns: int) -> tuple[Coming, ...]:
+        """Return the greens that are on or still to come in this cycle, and those of the next."""
+        cycle, following = self.cycle, self._next()
+        this = cycle.timetable.slots if cycle.timetable is not None else ()
+        greens = [
+            *((slot, cycle.began_ns) for slot in this if cycle.began_ns + slot.end_ns > now_ns),
+            *((slot, cycle.ends_ns) for slot in following.slots),
+        ]
+        return tuple(
+            Coming(slot.groups, began_ns + slot.start_ns, began_ns + slot.end_ns)
+            for slot, began_ns in greens
+        )
+
+    def _next(self) -> Timetable:
+        """Return the next cycle: of the plan to come, or, while that may not yet, of this one."""
+        is_ready = self.pending and self.pending not in self._entering
+        name = self.pending if is_ready else self.plan
+        return dict(zip(self._tables, self.coming, strict=True))[name]
+
+    def _change_guests(self) -> None:
+        """Let guests in, and those go that nobody wants; call it where nothing is promised."""
+        entering, self._entering = self._entering, {}
+        stay = {
+            name: pair
+            for name, pair in self._tables.items()
+            if name in self._own or name in (self.plan, self.pending)
+        }
+        self._tables = {**stay, **{name: (table, None) for name, table in entering.items()}}
 
     def _beginning(self, plan: str, began_ns: int) -> Timetable:
         """Return a plan's timetable for a cycle that begins at a time."""

@@ -133,7 +133,7 @@ _OF_PART: dict[str, Rights] = {
         serves=("world/*", "v/*/lease", "v/*/join", "v/*/remove", "v/*/cmd/*"),
     ),
     "traffic": Rights(
-        says=("tl/*/spat", "v2x/tx/*/*"),
+        says=("tl/*/spat", "tl/*/site", "tl/*/status", "v2x/tx/*/*"),
         hears=("tl/*/mon", "v2x/rx/*/*/*", "eye/pose/*", "world/def"),
         serves=("tl/*/req", "tl/*/wish"),
     ),

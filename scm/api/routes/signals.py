@@ -1,38 +1,101 @@
-"""Signals: what each junction shows, wishes for another plan, and the monitor's reset."""
+"""Signals: what each junction shows, what runs, who wants what of it, and the monitor's reset.
+
+Nobody sets a colour. A wish is taken or refused in words, has who, why and an end, and the signal
+kernel decides when it is safe.
+"""
+
+from typing import Annotated, Literal
 
 import msgspec
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
+from scm.api.etag import tagged
+from scm.api.paging import Cursor, Limit, page_of, page_response
+from scm.api.problem import RefusedError
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
-from scm.api.schemas import answer
-from scm.api.signal_rows import JunctionRow, junction_rows
+from scm.api.signal_plans import PlanShelf
+from scm.api.signal_rows import junction_rows, status_row
+from scm.maps.model import Junction
+from scm.v2x.message import Refused
 from scm.v2x.messages.monitor_reset import MonitorReset
 from scm.v2x.messages.monitor_status import MonitorStatus
-from scm.v2x.messages.plan_request import PlanReply, PlanRequest
+from scm.v2x.messages.plan_request import PlanReply, PlanRequest, SignalStage
+from scm.v2x.messages.signal_request import LONGEST_S, SignalReply, SignalRequest, Verb
+from scm.v2x.messages.signal_site import SignalSite
+from scm.v2x.plan_file import fits
+
+_VERBS: dict[str, tuple[Verb, str]] = {
+    "calls": ("call", "Call groups: each is served once"),
+    "holds": ("hold", "Hold groups: once green, they stay green"),
+    "force-offs": ("force_off", "Force groups off: their green ends once others are called"),
+    "omits": ("omit", "Omit groups: they are not begun"),
+    "preempts": ("preempt", "Pre-empt for one group: it comes next and stays"),
+}
+By = Annotated[str, Field(max_length=64, description="who asks; told in the log", examples=["ada"])]
+Reason = Annotated[str, Field(max_length=500, description="why", examples=["school is out"])]
+ExpiresS = Annotated[
+    float,
+    Field(gt=0.0, le=LONGEST_S, description="seconds until it lapses by itself", examples=[60.0]),
+]
 
 
-class Junctions(msgspec.Struct, kw_only=True, frozen=True):
-    """All junctions of the map, in its order.
-
-    Attributes:
-        signals: One row a junction.
-    """
-
-    signals: tuple[JunctionRow, ...]
-
-
-class PlanBody(BaseModel):
-    """A plan by name, or `flash`; the signal kernel decides when it is safe to begin."""
-
+class _Body(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
+    by: By = "api"
+    reason: Reason = ""
+
+
+class PlanBody(_Body):
+    """What to run until further notice; the signal kernel decides when it is safe to begin."""
+
     plan: str = Field(
-        min_length=1, max_length=64, description="its name, or `flash`", examples=["calm"]
+        min_length=1,
+        max_length=64,
+        description="a plan by name (shipped, the map's own, or saved), a policy, or `flash`",
+        examples=["calm"],
     )
-    by: str = Field("api", max_length=64, description="who wishes it", examples=["ada"])
-    reason: str = Field("", max_length=500, description="why, for the log", examples=["rush hour"])
+
+
+class WishBody(_Body):
+    """A wish for signal groups; it lapses, and the junction goes back to what runs."""
+
+    groups: list[Annotated[str, Field(max_length=64)]] = Field(
+        min_length=1, max_length=64, description="signal groups", examples=[["south_east"]]
+    )
+    expires_s: ExpiresS = 60.0
+
+
+class PolicyBody(_Body):
+    """A policy for a while."""
+
+    policy: str = Field(min_length=1, max_length=64, description="its name", examples=["actuated"])
+    expires_s: ExpiresS = 300.0
+
+
+class FlashBody(_Body):
+    """Flashing red, at once."""
+
+    engaged: bool = Field(description="true: flash; false: go on, all red first", examples=[True])
+    expires_s: ExpiresS | None = Field(
+        None, description="seconds until it ends by itself; null: not by itself", examples=[120.0]
+    )
+
+
+class ClearBody(_Body):
+    """Which wishes to take back; both empty: all."""
+
+    groups: list[Annotated[str, Field(max_length=64)]] = Field(
+        default_factory=list,
+        max_length=64,
+        description="wishes for any of these groups; empty: whatever they are for",
+        examples=[["south_east"]],
+    )
+    verb: Literal["", "call", "hold", "force_off", "omit", "preempt", "policy"] = Field(
+        "", description="wishes of this kind; empty: of any", examples=["hold"]
+    )
 
 
 class ResetBody(BaseModel):
@@ -40,59 +103,221 @@ class ResetBody(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    by: str = Field("api", max_length=64, description="who wishes it", examples=["ada"])
+    by: By = "api"
     reason: str = Field(
-        min_length=1,
-        max_length=500,
-        description="why it is safe to go on, for the log",
-        examples=["lamp replaced"],
+        min_length=1, max_length=500, description="why it is over", examples=["lamp replaced"]
     )
 
 
-def router(city: City) -> APIRouter:
+def router(city: City, shelf: PlanShelf) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/signals", tags=["signals"], dependencies=[VIEWER])
+    _add_reading(routes, city)
+    _add_wishes(routes, city)
+    _add_running(routes, city, shelf)
+    _add_monitor(routes, city)
+    return routes
 
-    @routes.get("", summary="All junctions", responses=answer(Junctions))
-    async def all_signals() -> Response:
+
+def junction_of(city: City, name: str) -> Junction:
+    """Return a junction of the map.
+
+    Raises:
+        RefusedError: when there is none of that name.
+    """
+    found = next((one for one in city.city_map.junctions if one.name == name), None)
+    if found is None:
+        raise not_found("junction", name)
+    return found
+
+
+def site_of(city: City, name: str) -> SignalSite:
+    """Return what a junction told of itself.
+
+    Raises:
+        RefusedError: when there is none of that name, or its controller was not heard yet.
+    """
+    junction_of(city, name)
+    site = city.view.picture().sites.get(name)
+    if site is None:
+        detail = f"the controller of junction {name!r} was not heard yet"
+        raise RefusedError(Refused(code="offline", detail=detail))
+    return site
+
+
+def _add_reading(routes: APIRouter, city: City) -> None:
+    @routes.get("", summary="All junctions")
+    def all_signals() -> Response:
         rows = junction_rows(city.view.picture(), city.city_map.junctions, city.plans)
-        return json_response(Junctions(signals=rows))
+        return json_response({"signals": rows})
 
-    @routes.get("/{name}", summary="One junction", responses=answer(JunctionRow))
-    async def one_signal(name: Name) -> Response:
-        rows = junction_rows(city.view.picture(), city.city_map.junctions, city.plans)
-        found = next((row for row in rows if row.junction == name), None)
-        if found is None:
-            raise not_found("junction", name)
-        return json_response(found)
+    @routes.get("/{name}", summary="One junction")
+    def one_signal(name: Name) -> Response:
+        junction = junction_of(city, name)
+        (row,) = junction_rows(city.view.picture(), [junction], city.plans)
+        return json_response(row)
 
-    @routes.put(
-        "/{name}/plan",
-        summary="Wish for another plan",
-        dependencies=[OPERATOR],
-        responses=answer(PlanReply),
-    )
+    @routes.get("/{name}/site", summary="Phases, least times, conflicts, rings, policies")
+    def site(request: Request, name: Name) -> Response:
+        told = site_of(city, name)
+        return tagged(request, msgspec.structs.replace(told, t_ns=0))
+
+    @routes.get("/{name}/status", summary="What runs, detectors, greens to come")
+    def status(name: Name) -> Response:
+        junction_of(city, name)
+        held = city.view.picture().signal_statuses.get(name)
+        if held is None:
+            raise not_found("status of a junction", name)
+        return json_response(status_row(held.message))
+
+    @routes.get("/{name}/history", summary="What each group showed in the last ten minutes")
+    def history(name: Name) -> Response:
+        groups = [group.name for group in junction_of(city, name).groups]
+        return json_response(city.view.signal_history(name, groups))
+
+    @routes.get("/{name}/promises", summary="What SPaT told against what happened")
+    def promises(name: Name) -> Response:
+        junction_of(city, name)
+        return json_response(city.view.signal_score(name))
+
+
+def _add_wishes(routes: APIRouter, city: City) -> None:
+    @routes.get("/{name}/wishes", summary="Wishes in force, each with who, why and its end")
+    def wishes(request: Request, name: Name, limit: Limit = 100, cursor: Cursor = "") -> Response:
+        junction_of(city, name)
+        held = city.view.picture().signal_statuses.get(name)
+        rows = held.message.wishes if held is not None else ()
+        page = page_of(rows, lambda w: f"{w.verb} {w.groups}", limit=limit, cursor=cursor)
+        return page_response(request, page)
+
+    for noun, (verb, summary) in _VERBS.items():
+        _add_verb(routes, city, noun, verb, summary)
+
+    @routes.post("/{name}/clear", summary="Take wishes back", dependencies=[OPERATOR])
+    def clear(name: Name, body: ClearBody, key: IdempotencyKey = "") -> Response:
+        junction_of(city, name)
+        request = SignalRequest(
+            request_id=key,
+            junction=name,
+            verb="clear",
+            groups=tuple(body.groups),
+            clears=body.verb,
+            by=body.by,
+            reason=body.reason,
+        )
+        return json_response(city.ask(request, SignalReply))
+
+
+def _add_verb(routes: APIRouter, city: City, noun: str, verb: Verb, summary: str) -> None:
+    def wish(name: Name, body: WishBody, key: IdempotencyKey = "") -> Response:
+        junction_of(city, name)
+        request = SignalRequest(
+            request_id=key,
+            junction=name,
+            verb=verb,
+            groups=tuple(body.groups),
+            by=body.by,
+            reason=body.reason,
+            expires_s=body.expires_s,
+        )
+        return json_response(city.ask(request, SignalReply))
+
+    path, unique = f"/{{name}}/{noun}", f"signals_{verb}"
+    routes.post(path, summary=summary, dependencies=[OPERATOR], operation_id=unique)(wish)
+
+
+def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
+    @routes.put("/{name}/plan", summary="Wish for another plan", dependencies=[OPERATOR])
     def plan(name: Name, body: PlanBody, key: IdempotencyKey = "") -> Response:
-        _check(city, name)
+        junction_of(city, name)
         request = PlanRequest(
-            request_id=key, junction=name, plan=body.plan, by=body.by, reason=body.reason
+            request_id=key,
+            junction=name,
+            plan=body.plan,
+            by=body.by,
+            reason=body.reason,
+            stages=_saved_stages(city, shelf, name, body.plan),
         )
         return json_response(city.ask(request, PlanReply))
+
+    @routes.put("/{name}/policy", summary="Run a policy for a while", dependencies=[OPERATOR])
+    def policy(name: Name, body: PolicyBody, key: IdempotencyKey = "") -> Response:
+        junction_of(city, name)
+        return json_response(city.ask(_policy(name, body.policy, body, key), SignalReply))
+
+    @routes.put("/{name}/flash", summary="Flash red, or go on", dependencies=[OPERATOR])
+    def flash(name: Name, body: FlashBody, key: IdempotencyKey = "") -> Response:
+        junction_of(city, name)
+        if body.engaged and body.expires_s is not None:
+            return json_response(city.ask(_policy(name, "flashing", body, key), SignalReply))
+        held = city.view.picture().signal_statuses.get(name)
+        if held is None:
+            raise not_found("status of a junction", name)
+        if not body.engaged and any(wish.policy == "flashing" for wish in held.message.wishes):
+            request = SignalRequest(
+                request_id=f"{key}-wish" if key else "",
+                junction=name,
+                verb="clear",
+                clears="policy",
+                by=body.by,
+                reason=body.reason,
+            )
+            city.ask(request, SignalReply)
+        runs = held.message.plan if held.message.policy == "fixed" else held.message.policy
+        wanted = "flash" if body.engaged else runs
+        stages = () if body.engaged else _saved_stages(city, shelf, name, wanted)
+        asked = PlanRequest(
+            request_id=key,
+            junction=name,
+            plan=wanted,
+            by=body.by,
+            reason=body.reason,
+            stages=stages,
+        )
+        return json_response(city.ask(asked, PlanReply))
+
+
+def _policy(name: str, policy: str, body: PolicyBody | FlashBody, key: str) -> SignalRequest:
+    return SignalRequest(
+        request_id=key,
+        junction=name,
+        verb="policy",
+        policy=policy,
+        by=body.by,
+        reason=body.reason,
+        expires_s=body.expires_s or LONGEST_S,
+    )
+
+
+def _add_monitor(routes: APIRouter, city: City) -> None:
+    @routes.get("/{name}/monitor", summary="What the monitor said, newest first")
+    def verdicts(request: Request, name: Name, limit: Limit = 100, cursor: Cursor = "") -> Response:
+        junction_of(city, name)
+        rows = city.view.signal_verdicts(name)
+        page = page_of(rows, lambda row: str(row.t_ns), limit=limit, cursor=cursor)
+        return page_response(request, page)
 
     @routes.post(
         "/{name}/monitor/reset",
         summary="Clear a latched fault of the monitor",
         dependencies=[ENGINEER],
-        responses=answer(MonitorStatus),
     )
     def reset(name: Name, body: ResetBody, key: IdempotencyKey = "") -> Response:
-        _check(city, name)
+        junction_of(city, name)
         request = MonitorReset(request_id=key, junction=name, by=body.by, reason=body.reason)
         return json_response(city.ask(request, MonitorStatus))
 
-    return routes
 
+def _saved_stages(city: City, shelf: PlanShelf, name: str, plan: str) -> tuple[SignalStage, ...]:
+    """Return the stages of a saved plan; none: it is one that the junction has itself.
 
-def _check(city: City, name: str) -> None:
-    if all(junction.name != name for junction in city.city_map.junctions):
-        raise not_found("junction", name)
+    Raises:
+        RefusedError: when it was proven for a junction that has changed since.
+    """
+    file = shelf.read(name, plan)
+    if file is None:
+        return ()
+    if not file.is_proven or not fits(file, site_of(city, name)):
+        detail = f"plan {plan!r} is not proven for junction {name!r} as it is now: prove it again"
+        raise RefusedError(Refused(code="unproven", detail=detail))
+    return file.stages

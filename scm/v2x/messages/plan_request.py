@@ -2,7 +2,22 @@
 
 from typing import ClassVar
 
+import msgspec
+
 from scm.v2x.message import Message, Request
+
+
+class SignalStage(msgspec.Struct, kw_only=True, frozen=True):
+    """Groups that are green together, for how long, and how much longer all are red afterwards.
+
+    Attributes:
+        green_s: The stage's split without yellow and red clear, which the kernel adds.
+        extra_red_s: On top of red clear.
+    """
+
+    groups: tuple[str, ...]
+    green_s: float
+    extra_red_s: float = 0.0
 
 
 class PlanReply(Message, kw_only=True, frozen=True):
@@ -21,7 +36,12 @@ class PlanReply(Message, kw_only=True, frozen=True):
 
 
 class PlanRequest(Request, kw_only=True, frozen=True):
-    """Use a plan by name, or `flash`; with who asks and why."""
+    """Use a plan by name, or `flash`; with who asks and why.
+
+    Attributes:
+        stages: Of a plan that the junction does not have: it is checked, taken and run under that
+            name for as long as it is wanted. Empty: one of its own.
+    """
 
     KEY: ClassVar[str] = "tl/{junction}/req"
     REPLY: ClassVar[type[Message]] = PlanReply
@@ -30,6 +50,7 @@ class PlanRequest(Request, kw_only=True, frozen=True):
     plan: str
     by: str
     reason: str = ""
+    stages: tuple[SignalStage, ...] = ()
 
 
 MESSAGE = PlanRequest

@@ -50,6 +50,7 @@ class SignalRequest(Request, kw_only=True, frozen=True):
             when its least time is over and others are called. `omit`: do not begin. `preempt`: go
             to this one group and stay. `policy`: run the one named. `clear`: take back all
             wishes, or those for these groups.
+        clears: With `clear`: takes back wishes with this verb alone; empty: with any.
         by: Who wishes; `reason`: why. Both are told.
         expires_s: When the wish lapses, from now; `LONGEST_S` at most.
     """
@@ -64,6 +65,7 @@ class SignalRequest(Request, kw_only=True, frozen=True):
     reason: str = ""
     expires_s: float = 60.0
     policy: str = ""
+    clears: Verb | Literal[""] = ""
 
 
 MESSAGE = SignalRequest

@@ -10,7 +10,7 @@ from scm.traffic import rings
 from scm.traffic.controller import Controller, Heard
 from scm.traffic.detectors import Detector
 from scm.traffic.kernel import GroupTimes, Program
-from scm.traffic.likely import FREED, forecasts, within
+from scm.traffic.likely import FREED, forecasts, laid_out, within
 from scm.traffic.plan import plan_names
 from scm.traffic.policies import actuated
 from scm.traffic.policy import Policy, Turn, site_of
@@ -211,7 +211,7 @@ def test_turns_are_put_one_after_the_other_with_the_kernels_times_between():
     )
     turns = [Turn(frozenset("a"), 4.0), Turn(frozenset("b"), 3.0), Turn(frozenset("c"), None)]
     promises = [Promise(10 * S, None), Promise(0, None), Promise(0, None)]
-    ends = forecasts(CROSSING, state, promises, turns, 0)
+    ends = forecasts(CROSSING, state, laid_out(CROSSING, state, promises, turns, 0))
     assert ends == {"a": 40 * S, "b": (40 + 52) * S, "c": (40 + 52 + 30 + 52) * S}
 
 

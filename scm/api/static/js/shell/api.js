@@ -24,11 +24,13 @@ export function dismiss(id) {
 
 /**
  * Ask the city for a change and tell the person how it went.
+ * @param headers more of them, such as `If-Match`.
  * @returns the reply, or null when it was refused.
  */
-export async function change(method, path, body, done) {
+export async function change(method, path, body, done, headers = {}) {
   try {
-    const reply = await send(method, path, body, crypto.randomUUID?.() ?? String(Math.random()));
+    const id = crypto.randomUUID?.() ?? String(Math.random());
+    const reply = await send(method, path, body, { ...headers, "Idempotency-Key": id });
     if (done) notify("info", done(reply));
     return reply;
   } catch (error) {
@@ -37,8 +39,8 @@ export async function change(method, path, body, done) {
   }
 }
 
-async function send(method, path, body, requestId) {
-  const headers = { "Idempotency-Key": requestId };
+async function send(method, path, body, own) {
+  const headers = { ...own };
   const key = sessionStorage.getItem(KEY);
   if (key) headers.Authorization = `Bearer ${key}`;
   if (body !== undefined) headers["Content-Type"] = "application/json";
@@ -49,7 +51,7 @@ async function send(method, path, body, requestId) {
   });
   const reply = await response.json().catch(() => ({}));
   if (response.ok) return reply;
-  if (response.status === 401 && (await askForKey())) return send(method, path, body, requestId);
+  if (response.status === 401 && (await askForKey())) return send(method, path, body, own);
   throw new Error(reply.detail || reply.title || `${method} ${path}: ${response.status}`);
 }
 

@@ -1,0 +1,249 @@
+"""Signal plans: list, read, prove, save, delete; a plan is saved when the search has proven it."""
+
+from typing import Annotated, Literal
+
+import msgspec
+from fastapi import APIRouter, Path, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from scm.api.city import City, Name, json_response, not_found
+from scm.api.etag import check_match, tagged
+from scm.api.operations import Operations, accepted
+from scm.api.paging import Cursor, Limit, page_of, page_response
+from scm.api.problem import RefusedError
+from scm.api.roles import ENGINEER, OPERATOR, VIEWER
+from scm.api.routes.signals import By, Reason, junction_of, site_of
+from scm.api.signal_plans import PlanShelf
+from scm.clock import WallClock
+from scm.errors import PlanError
+from scm.v2x.message import Refused
+from scm.v2x.messages.plan_request import SignalStage
+from scm.v2x.messages.signal_site import SignalPlan, SignalSite
+from scm.v2x.plan_file import PlanFile, PlanProof, fits
+
+PlanName = Annotated[
+    str,
+    Path(pattern=r"^[a-z][a-z0-9_-]{0,31}$", description="a plan's name", examples=["rush"]),
+]
+
+
+class StageBody(BaseModel):
+    """One stage of the cycle; yellow and red clear after it are the kernel's."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    groups: list[Annotated[str, Field(max_length=64)]] = Field(
+        min_length=1, max_length=64, description="that are green together", examples=[["north"]]
+    )
+    green_s: float = Field(ge=0.0, le=300.0, description="how long they are green", examples=[12.0])
+    extra_red_s: float = Field(
+        0.0, ge=0.0, le=300.0, description="all red on top of red clear", examples=[1.0]
+    )
+
+
+class StagesBody(BaseModel):
+    """What to prove."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    plan: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")] = Field(
+        description="what the plan will be called", examples=["rush"]
+    )
+    stages: list[StageBody] = Field(
+        min_length=1,
+        max_length=24,
+        description="in the order of the cycle",
+        examples=[[{"groups": ["north"], "green_s": 12.0, "extra_red_s": 0.0}]],
+    )
+
+
+class PlanBody(BaseModel):
+    """A plan to save; these very stages must have been proven for this junction."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    about: str = Field(
+        "", max_length=200, description="what it is for", examples=["more green for the north"]
+    )
+    by: By = "api"
+    reason: Reason = ""
+    stages: list[StageBody] = Field(
+        min_length=1,
+        max_length=24,
+        description="in the order of the cycle",
+        examples=[[{"groups": ["north"], "green_s": 12.0, "extra_red_s": 0.0}]],
+    )
+
+
+class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
+    """A plan as it may be asked for.
+
+    Attributes:
+        source: `shipped` with the city or its map, or `saved` by somebody.
+        usable: Whether it is proven for the junction as it is now.
+        saved_ns: When it was saved; 0: it was not.
+    """
+
+    junction: str
+    plan: str
+    about: str
+    source: Literal["shipped", "saved"]
+    usable: bool
+    cycle_s: float
+    stages: tuple[SignalStage, ...]
+    by: str = ""
+    reason: str = ""
+    saved_ns: int = 0
+    proof: PlanProof | None = None
+
+
+def router(city: City, shelf: PlanShelf, work: Operations) -> APIRouter:
+    """Return the routes."""
+    routes = APIRouter(prefix="/signals/{name}", tags=["signals"], dependencies=[VIEWER])
+    _add_reading(routes, city, shelf)
+    _add_proving(routes, city, shelf, work)
+    _add_writing(routes, city, shelf)
+    return routes
+
+
+def _add_reading(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
+    @routes.get("/plans", summary="All plans of a junction")
+    def plans(request: Request, name: Name, limit: Limit = 100, cursor: Cursor = "") -> Response:
+        site = site_of(city, name)
+        saved = (_find(site, shelf, plan) for plan in shelf.names(name))
+        rows = [*(_shipped(site, plan) for plan in site.plans), *filter(None, saved)]
+        page = page_of(rows, lambda row: row.plan, limit=limit, cursor=cursor)
+        return page_response(request, page)
+
+    @routes.get("/plans/{plan}", summary="One plan")
+    def one_plan(request: Request, name: Name, plan: PlanName) -> Response:
+        row = _find(site_of(city, name), shelf, plan)
+        if row is None:
+            raise not_found("plan", plan)
+        return tagged(request, row)
+
+
+def _add_proving(routes: APIRouter, city: City, shelf: PlanShelf, work: Operations) -> None:
+    @routes.post(
+        "/proofs",
+        summary="Search every state of kernel and plan for fault",
+        status_code=202,
+        dependencies=[OPERATOR],
+    )
+    def prove(request: Request, name: Name, body: StagesBody) -> Response:
+        file = _file(site_of(city, name), body.plan, body.stages)
+        owner = str(request.scope.get("scm_owner", ""))
+        what = f"plan {body.plan} of junction {name}"
+        return accepted(
+            work.start("plan-proof", what, lambda tell: shelf.prove(file, tell), owner=owner)
+        )
+
+    @routes.get("/proofs/{digest}", summary="One proof")
+    def proof(name: Name, digest: Annotated[str, Path(pattern=r"^[0-9a-f]{16}$")]) -> Response:
+        junction_of(city, name)
+        found = shelf.proof_of(digest)
+        if found is None:
+            raise not_found("proof", digest)
+        return json_response(found)
+
+
+def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
+    @routes.put("/plans/{plan}", summary="Save a proven plan", dependencies=[ENGINEER])
+    def save(request: Request, name: Name, plan: PlanName, body: PlanBody) -> Response:
+        site = site_of(city, name)
+        _check_own(site, plan)
+        before = _find(site, shelf, plan)
+        check_match(request, before)
+        file = _file(site, plan, body.stages)
+        proof = shelf.proof_of(file.digest) or (before.proof if before is not None else None)
+        if proof is None or proof.digest != file.digest:
+            detail = f"plan {plan!r}: these stages are not proven; POST them to .../proofs first"
+            raise RefusedError(Refused(code="unproven", detail=detail))
+        named = {"about": body.about, "by": body.by, "reason": body.reason}
+        now_ns = WallClock().now_ns()
+        file = msgspec.structs.replace(file, **named, saved_ns=now_ns, proof=proof)
+        try:
+            shelf.write(file)
+        except PlanError as refusal:
+            raise RefusedError(Refused(code="full", detail=str(refusal))) from refusal
+        return tagged(request, _saved(site, file), 200 if before is not None else 201)
+
+    @routes.delete("/plans/{plan}", summary="Delete a saved plan", dependencies=[ENGINEER])
+    def delete(request: Request, name: Name, plan: PlanName) -> Response:
+        site = site_of(city, name)
+        _check_own(site, plan)
+        before = _find(site, shelf, plan)
+        if before is None:
+            raise not_found("plan", plan)
+        check_match(request, before)
+        shelf.delete(name, plan)
+        return json_response(before)
+
+
+def _check_own(site: SignalSite, plan: str) -> None:
+    """Refuse to change a plan that was not saved by anybody, or a name that means something else.
+
+    Raises:
+        RefusedError: saying so.
+    """
+    taken = {"flash", *(one.plan for one in site.plans), *(one.policy for one in site.policies)}
+    if plan in taken:
+        detail = f"plan {plan!r}: the junction has one of that name; save it under another"
+        raise RefusedError(Refused(code="name_taken", detail=detail))
+
+
+def _file(site: SignalSite, plan: str, stages: list[StageBody]) -> PlanFile:
+    return PlanFile(
+        junction=site.junction,
+        plan=plan,
+        stages=tuple(
+            SignalStage(groups=tuple(one.groups), green_s=one.green_s, extra_red_s=one.extra_red_s)
+            for one in stages
+        ),
+        phases=site.phases,
+        conflicts=site.conflicts,
+    )
+
+
+def _find(site: SignalSite, shelf: PlanShelf, plan: str) -> PlanRow | None:
+    """Return a plan by name; None: there is none.
+
+    Raises:
+        RefusedError: when its file cannot be read.
+    """
+    shipped = next((one for one in site.plans if one.plan == plan), None)
+    if shipped is not None:
+        return _shipped(site, shipped)
+    try:
+        file = shelf.read(site.junction, plan)
+    except PlanError as wrong:
+        raise RefusedError(Refused(code="unreadable", detail=str(wrong))) from wrong
+    return None if file is None else _saved(site, file)
+
+
+def _shipped(site: SignalSite, plan: SignalPlan) -> PlanRow:
+    return PlanRow(
+        junction=site.junction,
+        plan=plan.plan,
+        about=plan.about,
+        source="shipped",
+        usable=True,
+        cycle_s=plan.cycle_s,
+        stages=plan.stages,
+    )
+
+
+def _saved(site: SignalSite, file: PlanFile) -> PlanRow:
+    return PlanRow(
+        junction=site.junction,
+        plan=file.plan,
+        about=file.about,
+        source="saved",
+        usable=file.is_proven and fits(file, site),
+        cycle_s=file.proof.cycle_s if file.proof is not None else 0.0,
+        stages=file.stages,
+        by=file.by,
+        reason=file.reason,
+        saved_ns=file.saved_ns,
+        proof=file.proof,
+    )

@@ -1,0 +1,321 @@
+"""What signals showed in the last minutes, and what became of what was told of it beforehand.
+
+One bar is one colour of one group, from its first step to the first step of the next colour, on
+the controller's clock. While it is shown, what SPaT tells of its end is noted; when it has ended,
+it is judged once: an end before the earliest or after the latest that was told is a broken promise,
+and the likely end is compared as it was told 2, 5, 10 and 20 s before. Flash is at once and
+promises nothing: what it cuts is not judged.
+"""
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import msgspec
+
+from scm.clock import NS_PER_MS, NS_PER_S, seconds
+from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.spat import SignalGroup, Spat
+
+KEPT_S = 600
+GAP_NS = 1_000 * NS_PER_MS
+LEADS_S = (2, 5, 10, 20)
+CLOSE_S = 1.0
+VERDICTS_KEPT = 50
+_UNPROMISED = ("flashing_red", "dark")
+
+
+class Bar(msgspec.Struct, kw_only=True, frozen=True):
+    """One colour of one group; `end_ns` None: it is shown still."""
+
+    colour: str
+    start_ns: int
+    end_ns: int | None
+
+
+class GroupBars(msgspec.Struct, kw_only=True, frozen=True):
+    """What one group showed, oldest first."""
+
+    group: str
+    bars: tuple[Bar, ...]
+
+
+class Running(msgspec.Struct, kw_only=True, frozen=True):
+    """What ran from a time on."""
+
+    t_ns: int
+    mode: str
+    plan: str
+
+
+class History(msgspec.Struct, kw_only=True, frozen=True):
+    """The last minutes of one junction, on its controller's clock.
+
+    Attributes:
+        t_ns: Of the last step that was heard; None: none was yet.
+        kept_s: How far back anything is kept.
+    """
+
+    junction: str
+    t_ns: int | None
+    kept_s: int
+    groups: tuple[GroupBars, ...]
+    ran: tuple[Running, ...]
+
+
+class LeadScore(msgspec.Struct, kw_only=True, frozen=True):
+    """Likely ends as told some time before the end, against the end.
+
+    Attributes:
+        colour: That ended.
+        lead_s: How long before.
+        errors_s: Told less true, one for each colour that ended; + = it ended earlier than told.
+        unknown: How often no likely end was told.
+        mean_s, worst_s: Of the errors; None: there are none. `worst_s` by its amount.
+        within: Share of errors of a second at most.
+        told: Mean of the confidence that was told.
+    """
+
+    colour: str
+    lead_s: int
+    errors_s: tuple[float, ...]
+    unknown: int
+    mean_s: float | None
+    worst_s: float | None
+    within: float | None
+    told: float | None
+
+
+class PromiseScore(msgspec.Struct, kw_only=True, frozen=True):
+    """What became of what SPaT told in the last minutes.
+
+    Attributes:
+        judged: Colours that ended.
+        early: Of them, before the earliest end that was told.
+        late: After the latest end that was told.
+        open: Whose latest end was never told.
+        cut: Ended by flash; not judged.
+    """
+
+    junction: str
+    kept_s: int
+    judged: int
+    early: int
+    late: int
+    open: int
+    cut: int
+    leads: tuple[LeadScore, ...]
+
+
+class Verdict(msgspec.Struct, kw_only=True, frozen=True):
+    """What the monitor said from a time on, on its clock."""
+
+    t_ns: int
+    fault: str | None
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Judged:
+    """One colour that ended; `leads` holds error and told confidence, None: nothing was told."""
+
+    end_ns: int
+    colour: str
+    early: bool
+    late: bool
+    open: bool
+    cut: bool
+    leads: tuple[tuple[int, tuple[float, float] | None], ...]
+
+
+@dataclass(slots=True)
+class _Shown:
+    """A colour while it is shown, and all that was told of its end."""
+
+    colour: str
+    start_ns: int
+    earliest_ns: int
+    latest_ns: int | None
+    told: list[tuple[int, int | None, float]] = field(default_factory=list)
+
+    def note(self, group: SignalGroup, now_ns: int) -> None:
+        self.earliest_ns = max(self.earliest_ns, group.min_end_ns)
+        if group.max_end_ns is not None:
+            latest_ns = self.latest_ns
+            self.latest_ns = min(group.max_end_ns, latest_ns or group.max_end_ns)
+        if not self.told or self.told[-1][1] != group.likely_end_ns:
+            self.told.append((now_ns, group.likely_end_ns, group.likely_confidence or 0.0))
+
+    def judged(self, end_ns: int, *, cut: bool) -> _Judged:
+        leads = [] if cut else [(lead_s, self._error(end_ns, lead_s)) for lead_s in LEADS_S]
+        lasted_s = seconds(end_ns - self.start_ns)
+        return _Judged(
+            end_ns,
+            self.colour,
+            early=not cut and end_ns < self.earliest_ns,
+            late=not cut and self.latest_ns is not None and end_ns > self.latest_ns,
+            open=not cut and self.latest_ns is None,
+            cut=cut,
+            leads=tuple((lead_s, error) for lead_s, error in leads if lead_s <= lasted_s),
+        )
+
+    def _error(self, end_ns: int, lead_s: int) -> tuple[float, float] | None:
+        """Return how far the likely end was off that was told some time before the end."""
+        at_ns = end_ns - lead_s * NS_PER_S
+        told = next((one for one in reversed(self.told) if one[0] <= at_ns), None)
+        if told is None or told[1] is None:
+            return None
+        return round(seconds(told[1] - end_ns), 3), told[2]
+
+
+@dataclass(slots=True)
+class _Group:
+    shown: _Shown | None = None
+    bars: deque[Bar] = field(default_factory=deque)
+    judged: deque[_Judged] = field(default_factory=deque)
+
+
+class JunctionHistory:
+    """The last minutes of one junction; hears every `Spat`."""
+
+    def __init__(self, junction: str) -> None:
+        self._junction = junction
+        self._groups: dict[str, _Group] = {}
+        self._ran: deque[Running] = deque()
+        self._t_ns: int | None = None
+
+    def take(self, spat: Spat) -> None:
+        """Note what is shown and told."""
+        now_ns, last_ns = spat.t_ns, self._t_ns
+        if last_ns is not None and now_ns < last_ns:
+            self._groups.clear()  # another controller, with a clock of its own
+            self._ran.clear()
+        elif last_ns is not None and now_ns - last_ns > GAP_NS:
+            self._interrupt(last_ns)
+        self._t_ns = now_ns
+        running = (spat.mode, spat.plan)
+        if not self._ran or (self._ran[-1].mode, self._ran[-1].plan) != running:
+            self._ran.append(Running(t_ns=now_ns, mode=spat.mode, plan=spat.plan))
+        for told in spat.groups:
+            self._take_group(self._groups.setdefault(told.group, _Group()), told, now_ns)
+        self._forget(now_ns - KEPT_S * NS_PER_S)
+
+    def history(self, names: Iterable[str]) -> History:
+        """Return what was shown, of the groups named, in their order."""
+        groups = ((name, self._groups.get(name, _Group())) for name in names)
+        return History(
+            junction=self._junction,
+            t_ns=self._t_ns,
+            kept_s=KEPT_S,
+            groups=tuple(GroupBars(group=name, bars=_bars(group)) for name, group in groups),
+            ran=tuple(self._ran),
+        )
+
+    def score(self) -> PromiseScore:
+        """Return what became of what was told."""
+        ended = [one for group in self._groups.values() for one in group.judged]
+        return PromiseScore(
+            junction=self._junction,
+            kept_s=KEPT_S,
+            judged=sum(not one.cut for one in ended),
+            early=sum(one.early for one in ended),
+            late=sum(one.late for one in ended),
+            open=sum(one.open for one in ended),
+            cut=sum(one.cut for one in ended),
+            leads=tuple(
+                _lead_score(ended, colour, lead_s)
+                for colour in ("green", "red")
+                for lead_s in LEADS_S
+            ),
+        )
+
+    def _take_group(self, group: _Group, told: SignalGroup, now_ns: int) -> None:
+        shown = group.shown
+        if shown is None or shown.colour != told.colour:
+            if shown is not None:
+                group.bars.append(_bar(shown, told.since_ns))
+                if shown.colour not in _UNPROMISED:
+                    cut = told.colour in _UNPROMISED
+                    group.judged.append(shown.judged(told.since_ns, cut=cut))
+            start_ns = told.since_ns if shown is not None else now_ns
+            shown = group.shown = _Shown(told.colour, start_ns, told.min_end_ns, told.max_end_ns)
+        shown.note(told, now_ns)
+
+    def _interrupt(self, last_ns: int) -> None:
+        """Nothing was heard for a while: what was shown then is not known, nor when it ended."""
+        for group in self._groups.values():
+            if group.shown is not None:
+                group.bars.append(_bar(group.shown, last_ns))
+                group.shown = None
+
+    def _forget(self, oldest_ns: int) -> None:
+        for group in self._groups.values():
+            while group.bars and (group.bars[0].end_ns or 0) < oldest_ns:
+                group.bars.popleft()
+            while group.judged and group.judged[0].end_ns < oldest_ns:
+                group.judged.popleft()
+        while len(self._ran) > 1 and self._ran[1].t_ns < oldest_ns:
+            self._ran.popleft()
+
+
+class SignalHistory:
+    """All junctions, and what their monitors said."""
+
+    def __init__(self) -> None:
+        self._junctions: dict[str, JunctionHistory] = {}
+        self._verdicts: dict[str, deque[Verdict]] = {}
+
+    def take(self, spat: Spat) -> None:
+        """Note what a junction shows and tells."""
+        if spat.junction not in self._junctions:
+            self._junctions[spat.junction] = JunctionHistory(spat.junction)
+        self._junctions[spat.junction].take(spat)
+
+    def take_monitor(self, status: MonitorStatus) -> None:
+        """Note what a monitor says, when it says something else."""
+        said = self._verdicts.setdefault(status.junction, deque(maxlen=VERDICTS_KEPT))
+        if not said or (said[-1].fault, said[-1].detail) != (status.fault, status.detail):
+            verdict = Verdict(t_ns=status.t_ns, fault=status.fault, detail=status.detail)
+            said.append(verdict)
+
+    def history(self, junction: str, groups: Iterable[str]) -> History:
+        """Return what a junction's groups showed."""
+        return self._of(junction).history(groups)
+
+    def score(self, junction: str) -> PromiseScore:
+        """Return what became of what a junction told."""
+        return self._of(junction).score()
+
+    def verdicts(self, junction: str) -> tuple[Verdict, ...]:
+        """Return what a junction's monitor said, newest first."""
+        return tuple(reversed(self._verdicts.get(junction, ())))
+
+    def _of(self, junction: str) -> JunctionHistory:
+        return self._junctions.get(junction, JunctionHistory(junction))
+
+
+def _bars(group: _Group) -> tuple[Bar, ...]:
+    return (*group.bars, *([_bar(group.shown, None)] if group.shown is not None else []))
+
+
+def _bar(shown: _Shown, end_ns: int | None) -> Bar:
+    return Bar(colour=shown.colour, start_ns=shown.start_ns, end_ns=end_ns)
+
+
+def _lead_score(ended: Iterable[_Judged], colour: str, lead_s: int) -> LeadScore:
+    found = [
+        error for one in ended if one.colour == colour for at, error in one.leads if at == lead_s
+    ]
+    known = [error for error in found if error is not None]
+    errors_s = tuple(error_s for error_s, _ in known)
+    count = len(known)
+    return LeadScore(
+        colour=colour,
+        lead_s=lead_s,
+        errors_s=errors_s,
+        unknown=len(found) - count,
+        mean_s=round(sum(errors_s) / count, 3) if count else None,
+        worst_s=max(errors_s, key=abs) if count else None,
+        within=sum(abs(error_s) <= CLOSE_S for error_s in errors_s) / count if count else None,
+        told=round(sum(share for _, share in known) / count, 3) if count else None,
+    )

@@ -1,0 +1,54 @@
+"""What runs at a junction and who wants what of it: for people; cars need `Spat` alone."""
+
+from typing import ClassVar
+
+import msgspec
+
+from scm.v2x.message import Message
+from scm.v2x.messages.signal_request import SignalWish
+
+
+class SignalTurn(msgspec.Struct, kw_only=True, frozen=True):
+    """Groups that will likely be green together; `end_ns` None: nobody knows until when."""
+
+    groups: tuple[str, ...]
+    start_ns: int
+    end_ns: int | None
+
+
+class SignalDetector(msgspec.Struct, kw_only=True, frozen=True):
+    """What the detectors of a group's lanes see; `queue` and `near` count cars."""
+
+    group: str
+    call: bool
+    queue: int
+    near: int
+
+
+class SignalStatus(Message, kw_only=True, frozen=True):
+    """Told once a second, and at once when what runs or a wish changes.
+
+    Attributes:
+        plan: Of the timetable, also while another policy runs.
+        pending: Plan or policy to come at the next safe moment; empty: none.
+        wishes: Of people and scripts, in force.
+        detectors: Of the groups; none: nobody listens for cars now.
+        turns: Greens to come, by the timetable or as the policy foresees; none: nobody knows.
+        failure: Why a policy was given up for fixed time; empty: none was.
+    """
+
+    KEY: ClassVar[str] = "tl/{junction}/status"
+    RATE_HZ: ClassVar[float | None] = 1.0
+
+    junction: str
+    t_ns: int
+    policy: str
+    plan: str
+    pending: str = ""
+    wishes: tuple[SignalWish, ...] = ()
+    detectors: tuple[SignalDetector, ...] = ()
+    turns: tuple[SignalTurn, ...] = ()
+    failure: str = ""
+
+
+MESSAGE = SignalStatus

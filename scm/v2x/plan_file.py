@@ -1,0 +1,73 @@
+"""A signal plan that a person made, as it is stored, proven and shown: for one junction as it is.
+
+What is proven is the stages together with the junction's times and conflicts: its `digest`. When
+the junction changes, or one stage does, the proof is one of something else.
+"""
+
+import hashlib
+
+import msgspec
+
+from scm.v2x.messages.plan_request import SignalStage
+from scm.v2x.messages.signal_site import SignalPhase, SignalSite
+
+
+class PlanProof(msgspec.Struct, kw_only=True, frozen=True):
+    """What the search walked through without finding fault.
+
+    Attributes:
+        digest: Of what was proven.
+        states, transitions: Of the kernel, under any wishes.
+        plan_states, plan_transitions: Of the kernel under this plan, however late its steps.
+        cycle_s: What the stages make, with yellow and red clear.
+        took_s: How long the search took.
+    """
+
+    digest: str
+    states: int
+    transitions: int
+    plan_states: int
+    plan_transitions: int
+    cycle_s: float
+    took_s: float
+
+
+class PlanFile(msgspec.Struct, kw_only=True, frozen=True):
+    """A plan with the junction that it is for.
+
+    Attributes:
+        phases, conflicts: Of the junction when the plan was made.
+        by: Who saved it; `reason` why, `saved_ns` when.
+    """
+
+    junction: str
+    plan: str
+    stages: tuple[SignalStage, ...]
+    phases: tuple[SignalPhase, ...]
+    conflicts: tuple[tuple[str, str], ...]
+    about: str = ""
+    by: str = ""
+    reason: str = ""
+    saved_ns: int = 0
+    proof: PlanProof | None = None
+
+    @property
+    def digest(self) -> str:
+        """Name of what a proof of it proves."""
+        kept = [(p.group, p.min_green_s, p.yellow_s, p.red_clear_s) for p in self.phases]
+        proven = msgspec.json.encode([self.junction, self.stages, kept, self.conflicts])
+        return hashlib.sha256(proven).hexdigest()[:16]
+
+    @property
+    def is_proven(self) -> bool:
+        """Whether its proof is of what it says."""
+        return self.proof is not None and self.proof.digest == self.digest
+
+
+def fits(file: PlanFile, site: SignalSite) -> bool:
+    """Return whether a plan was made for a junction as it is now."""
+    return (
+        file.junction == site.junction
+        and file.phases == site.phases
+        and file.conflicts == site.conflicts
+    )

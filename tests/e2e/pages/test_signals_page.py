@@ -1,0 +1,195 @@
+"""The signals page as an engineer uses it, with the real controller and monitor behind it."""
+
+import pytest
+
+from tests.e2e.city_process import wait_for
+from tests.e2e.pages.conftest import SIZES, THEMES
+from tests.e2e.pages.visiting import judge, photograph
+
+pytestmark = pytest.mark.e2e
+
+AT = "/signals/crossing"
+READY = '.choices [data-plan="calm"]'
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("theme", THEMES)
+def test_it_looks_as_it_should(look, size, theme):
+    visited = look("/signals", "signals", size, theme, READY)
+    assert visited.page.locator(".head").count() == 2
+
+
+def ink(page):
+    """Return how many different colours the timing diagram shows."""
+    return page.evaluate(
+        """() => {
+          const canvas = document.querySelector(".diagram canvas");
+          const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+          const seen = new Set();
+          for (let i = 0; i < data.length; i += 16) seen.add(data.slice(i, i + 3).join());
+          return seen.size;
+        }"""
+    )
+
+
+def test_lamps_and_diagram_show_what_the_controller_shows_and_time_runs(visit, running):
+    visited = visit(AT)
+    page = visited.page
+    page.wait_for_selector(READY)
+
+    def agrees():
+        shown = page.evaluate(
+            "() => [...document.querySelectorAll('.head')]"
+            ".map((head) => [head.dataset.group, head.dataset.colour])"
+        )
+        told = running.get("/signals/crossing")["groups"]
+        return dict(shown) == {group["group"]: group["colour"] for group in told}
+
+    visited.until(agrees, "the lamps agree with the controller")
+    lit = page.locator('.lamps i[data-lit="true"]').all_inner_texts()
+    assert len(lit) == 2
+    assert set(lit) <= {"R", "Y", "G"}
+    visited.until(lambda: ink(page) > 8, "the diagram is drawn")
+    left = page.locator(".head .left b").all_inner_texts()
+    visited.until(lambda: page.locator(".head .left b").all_inner_texts() != left, "it counts down")
+    page.focus(".diagram canvas")
+    before = page.inner_text(".tools output")
+    page.keyboard.press("+")
+    assert page.inner_text(".tools output") != before
+    page.keyboard.press("ArrowLeft")
+    page.wait_for_selector('.tools button[aria-label="Later"]:enabled')
+    page.keyboard.press("Home")
+    page.wait_for_selector('.tools button[aria-label="Later"]:disabled')
+    box = page.locator(".diagram canvas").bounding_box()
+    page.mouse.move(box["x"] + 0.65 * box["width"], box["y"] + box["height"] - 20)
+    page.wait_for_function(
+        "() => document.querySelector('.readout').textContent.includes('south west:')"
+    )
+    assert visited.complaints == []
+
+
+def test_a_hold_is_asked_for_by_keyboard_shown_and_taken_back(visit, running):
+    visited = visit(AT)
+    page = visited.page
+    page.wait_for_selector(READY)
+    page.focus('[aria-label="hold south east"]')
+    page.keyboard.press("Enter")
+    page.keyboard.type("a parade")
+    page.keyboard.press("Enter")
+    page.wait_for_selector('.held li[data-verb="hold"] >> text=dashboard: a parade')
+    try:
+        (wish,) = running.get("/signals/crossing/wishes")["items"]
+        assert (wish["verb"], wish["groups"], wish["reason"]) == (
+            "hold",
+            ["south_east"],
+            "a parade",
+        )
+        page.wait_for_selector(".pending >> text=actuated begins")
+        page.wait_for_selector(".lately >> text=a parade")
+    finally:
+        page.click(".held li button")
+        wait_for(lambda: not running.get("/signals/crossing/wishes")["items"], 20.0, "taken back")
+    page.wait_for_selector(".wishes .empty >> text=No wish is in force")
+
+
+def test_a_plan_is_made_proven_saved_asked_for_and_deleted(visit, running):
+    visited = visit(AT)
+    page = visited.page
+    page.click('[aria-label="Copy plan calm"]')
+    page.fill("#plan-name", "rush")
+    green = '[aria-label="Green of stage 1 in seconds"]'
+    page.fill(green, "1")
+    page.wait_for_selector(".verdict[data-state=bad] >> text=below the min green")
+    prove, save = page.locator(".editor .acts button").all()
+    assert prove.is_disabled()
+    page.check(".editor tbody tr:first-child .chip:nth-child(2) input")
+    page.wait_for_selector(".verdict[data-state=bad] >> text=conflict and cannot share it")
+    page.uncheck(".editor tbody tr:first-child .chip:nth-child(2) input")
+    page.fill(green, "14")
+    assert save.is_disabled()
+    prove.click()
+    page.wait_for_selector(".verdict[data-state=good] >> text=Proven: 212 states")
+    photograph(visited, "signals_editor")
+    judge(visited)
+    page.fill(green, "14.5")  # what is proven is not this any more
+    page.wait_for_selector(".verdict >> text=The search has to prove it")
+    assert save.is_disabled()
+    page.fill(green, "14")
+    save.click()
+    page.wait_for_selector('.choices [data-plan="rush"] .badge >> text=proven')
+    saved = running.get("/signals/crossing/plans/rush")
+    assert (saved["source"], saved["stages"][0]["green_s"], saved["usable"]) == ("saved", 14, True)
+    page.click('[aria-label="Run plan rush"]')
+    page.fill("dialog input[name=reason]", "morning")
+    page.keyboard.press("Enter")
+    page.wait_for_selector('[data-plan="rush"] .badge >> text=next')
+    assert running.get("/signals/crossing/status")["pending"] == "rush"
+    page.evaluate("() => document.querySelectorAll('.notice button').forEach((b) => b.click())")
+    again = running.web.put("/signals/crossing/plan", json={"plan": "calm", "by": "test"})
+    assert again.json()["pending"] == ""
+    page.click('[aria-label="Delete plan rush"]')
+    page.click("dialog .danger")
+    page.wait_for_selector('.choices [data-plan="rush"]', state="detached")
+    assert running.web.get("/signals/crossing/plans/rush").status_code == 404
+    assert visited.complaints == []
+
+
+def test_flash_is_shown_at_once_with_its_letter_and_ended_with_a_reason(visit, running):
+    visited = visit(AT)
+    page = visited.page
+    page.wait_for_selector(READY)
+
+    def answer(button, reason):
+        page.click(f".wishes >> text={button}")
+        page.fill("dialog input[name=reason]", reason)
+        page.keyboard.press("Enter")
+
+    answer("Flash red…", "works on the road")
+    page.wait_for_selector('.runs[data-mode="flash"]')
+    try:
+        assert running.get("/signals/crossing")["mode"] == "flash"
+        assert set(page.locator('.lamps i[data-lit="true"]').all_inner_texts()) == {"F"}
+    finally:
+        answer("End flash…", "done")
+        wait_for(lambda: running.get("/signals/crossing")["mode"] != "flash", 20.0, "it goes on")
+    page.wait_for_selector('.runs:not([data-mode="flash"])')
+
+
+def test_a_fault_of_the_monitor_is_shown_kept_and_cleared_with_a_reason(visit, running):
+    visited = visit(AT)
+    page = visited.page
+
+    def fault():
+        return running.get("/signals/crossing")["monitor"]["fault"]
+
+    with running.frozen("traffic"):
+        page.wait_for_selector('.monitor[data-state="fault"]')
+        page.wait_for_selector(".runs[data-mode=unheard]")
+    visited.until(lambda: fault() == "stale", "the fault is latched")
+    wait_for(lambda: running.get("/signals/crossing")["fresh"], 20.0, "the controller is back")
+    page.click(".monitor .danger")
+    page.fill("dialog input[name=reason]", "it was frozen by a test")
+    page.keyboard.press("Enter")
+    visited.until(lambda: fault() is None, "the fault is cleared")
+    page.click(".monitor >> text=History")
+    page.wait_for_selector("dialog .said >> text=stale")
+    page.keyboard.press("Escape")
+    page.wait_for_selector('.monitor[data-state="ok"]')
+    wait_for(
+        lambda: running.get("/signals/crossing")["mode"] == "plan", 30.0, "the plan runs again"
+    )
+
+
+def test_what_was_told_is_judged_and_no_promise_was_broken(visit, running):
+    wait_for(lambda: running.get("/signals/crossing/promises")["judged"] >= 2, 60.0, "some ended")
+    told = running.get("/signals/crossing/promises")
+    assert (told["early"], told["late"]) == (0, 0)
+    page = visit(AT).page
+    page.wait_for_selector('.facts [data-state="good"] dd >> text=0 of')
+
+
+def test_a_junction_that_is_not_there_is_said_and_the_way_back_shown(visit):
+    page = visit("/signals/moon").page
+    page.click("main >> text=Go to crossing")
+    page.wait_for_selector(READY)
+    assert page.url.endswith(AT)

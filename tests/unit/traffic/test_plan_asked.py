@@ -1,0 +1,204 @@
+"""Plans that people made: refused with every reason, or run without a broken promise."""
+
+import random
+
+import pytest
+
+from scm.errors import PlanError
+from scm.lockstep import Lockstep
+from scm.maps.load import load_map
+from scm.part import Hears
+from scm.store.records import PlanRecord
+from scm.traffic.controller import Controller
+from scm.traffic.kernel import GroupTimes, Program
+from scm.traffic.part import TrafficPart
+from scm.traffic.plan import load_timetable
+from scm.traffic.plan_asked import prove_file, recalled, records_of, stages_of, table_of
+from scm.traffic.program import STEP_NS
+from scm.v2x.message import Refused
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.plan_request import PlanReply, PlanRequest, SignalStage
+from scm.v2x.messages.signal_request import SignalRequest
+from scm.v2x.messages.signal_site import SignalSite
+from scm.v2x.messages.signal_status import SignalStatus
+from scm.v2x.messages.spat import Spat
+from scm.v2x.plan_file import PlanFile, fits
+
+S = STEP_NS
+MAP = load_map("driving_school")
+PROGRAM = Program(
+    ("a", "b", "c"),
+    (GroupTimes(29 * S, 6 * S, 46 * S), GroupTimes(20 * S, 6 * S, 30 * S), GroupTimes(3 * S, S, S)),
+    frozenset({frozenset("ab"), frozenset("bc"), frozenset("ac")}),
+)
+RUSH = (
+    SignalStage(groups=("south_east",), green_s=6.0, extra_red_s=0.5),
+    SignalStage(groups=("south_west",), green_s=3.0),
+)
+
+
+def stage(*groups, green_s=5.0, extra_red_s=0.0):
+    return SignalStage(groups=groups, green_s=green_s, extra_red_s=extra_red_s)
+
+
+@pytest.mark.parametrize(
+    ("stages", "said"),
+    [
+        ((stage("a", "b"), stage("c")), "'a' and 'b' conflict but share a stage"),
+        ((stage("a"), stage("b")), "group 'c' is never green"),
+        ((stage("a", green_s=1.0), stage("b"), stage("c")), "expected at least 2.9 s"),
+        ((stage("a", green_s=float("nan")),), "green_s: got nan, expected 0 to 300 s"),
+        ((stage("a", extra_red_s=-1.0),), "stage 1: extra_red_s: got -1"),
+        ((stage("a"), stage("b", green_s=299.0), stage("c")), "expected 300 s at most"),
+        (tuple(stage("a") for _ in range(25)), "stages: got 25, expected 24 at most"),
+    ],
+)
+def test_a_plan_that_cannot_be_is_refused_with_the_reason(stages, said):
+    with pytest.raises(PlanError) as refusal:
+        table_of("rush", stages, PROGRAM)
+    assert said in str(refusal.value)
+
+
+@pytest.mark.parametrize("name", ["brisk", "calm"])
+def test_the_stages_of_a_timetable_make_it_again(name):
+    table = load_timetable(name, PROGRAM)
+    assert table_of(name, stages_of(table, PROGRAM), PROGRAM) == table
+
+
+def test_stored_stages_are_recalled_as_they_were():
+    assert recalled(records_of(RUSH)) == RUSH
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_no_promise_is_broken_while_plans_of_people_come_and_go(seed):
+    dice = random.Random(seed)
+    controller = Controller("x", PROGRAM, "calm")
+    last, kept, ran = {}, 0, set()
+    for now_ns in range(0, 12_000 * S, S):
+        controller.step(now_ns)
+        spat = controller.spat(now_ns)
+        ran.add(spat.plan)
+        for group in spat.groups:
+            before = last.get(group.group)
+            if before is not None and before.colour == group.colour:
+                assert group.min_end_ns >= before.min_end_ns
+                assert group.max_end_ns <= before.max_end_ns
+            elif before is not None:
+                assert before.min_end_ns <= now_ns <= before.max_end_ns
+                kept += 1
+            last[group.group] = group
+        if dice.random() < 0.004:
+            greens = [dice.randrange(30, 200) / 10 for _ in range(3)]
+            groups = dice.sample("abc", 3)
+            made = tuple(stage(g, green_s=s) for g, s in zip(groups, greens, strict=True))
+            controller.ask_for_guest(table_of(dice.choice(["rush", "night"]), made, PROGRAM))
+        elif dice.random() < 0.002:
+            controller.ask(dice.choice(["calm", "brisk"]))
+    assert kept > 100
+    assert ran == {"calm", "brisk", "rush", "night"}
+
+
+def test_a_plan_that_nobody_wants_any_more_is_forgotten():
+    controller = Controller("x", PROGRAM, "brisk")
+    made = (stage("a"), stage("b"), stage("c"))
+    controller.step(0)
+    controller.ask_for_guest(table_of("rush", made, PROGRAM))
+    steps = iter(range(S, 10_000 * S, S))
+    for now_ns in steps:
+        controller.step(now_ns)
+        if controller.plan == "rush":
+            break
+    assert controller.pending == ""
+    controller.ask("brisk")
+    for _ in range(1000):
+        controller.step(next(steps))
+    with pytest.raises(PlanError, match="no plan 'rush'"):
+        controller.ask("rush")
+
+
+@pytest.fixture
+def city():
+    with Lockstep([TrafficPart(MAP, "brisk")]) as running:
+        yield running
+
+
+def ask(city, plan, stages=()):
+    return city.call(
+        PlanRequest(junction="crossing", plan=plan, by="ada", reason="school", stages=stages)
+    )
+
+
+def messages(box):
+    return [item.message for item in box.drain()]
+
+
+def test_a_plan_of_the_bus_is_run_told_and_comes_back_after_a_restart(city):
+    spats, events = city.hear(Hears(Spat)), city.hear(Hears(CityEvent))
+    city.run_for(6.0)
+    assert ask(city, "rush", RUSH) == PlanReply(junction="crossing", plan="brisk", pending="rush")
+    city.run_for(40.0)
+    assert messages(spats)[-1].plan == "rush"
+    said = [event.text for event in messages(events)]
+    assert any("takes plan rush (ada asked: school)" in text for text in said)
+    assert any("runs plan rush, before brisk" in text for text in said)
+    kept = PlanRecord(plan="rush", by="ada", stages=records_of(RUSH))
+    with Lockstep([TrafficPart(MAP, "brisk", kept={"crossing": kept})]) as again:
+        spats = again.hear(Hears(Spat))
+        again.run_for(8.0)
+        assert messages(spats)[-1].plan == "rush"
+
+
+@pytest.mark.parametrize(("plan", "stages"), [("calm", RUSH), ("flash", RUSH), ("priority", RUSH)])
+def test_a_name_that_means_something_else_is_not_taken(city, plan, stages):
+    city.run_for(1.0)
+    if plan == "flash":
+        assert (
+            ask(city, plan, stages).plan == "flash"
+        )  # flash has no stages: they are not looked at
+        return
+    refusal = ask(city, plan, stages)
+    assert isinstance(refusal, Refused)
+    assert (refusal.code, "has one of that name" in refusal.detail) == ("invalid", True)
+
+
+def test_what_a_junction_is_and_what_is_wished_of_it_is_told(city):
+    sites, told = city.hear(Hears(SignalSite)), city.hear(Hears(SignalStatus))
+    city.run_for(21.0)
+    site = messages(sites)[-1]
+    assert [phase.group for phase in site.phases] == ["south_east", "south_west"]
+    assert site.rings == ((("south_east", "south_west"),),)
+    assert {plan.plan for plan in site.plans} == {"brisk", "calm"}
+    assert len(messages(told)) == pytest.approx(22, abs=2)
+    city.call(SignalRequest(junction="crossing", verb="hold", groups=("south_east",), by="ada"))
+    city.run_for(0.2)
+    wishes = messages(told)[-1].wishes
+    assert [(wish.verb, wish.by) for wish in wishes] == [("hold", "ada")]
+    clear = {"verb": "clear", "groups": ("south_east",), "by": "ada"}
+    city.call(SignalRequest(junction="crossing", clears="call", **clear))
+    city.run_for(0.2)
+    assert len(messages(told)) in (0, 1)
+    reply = city.call(SignalRequest(junction="crossing", clears="hold", **clear))
+    assert reply.wishes == ()
+
+
+def test_greens_to_come_are_told_as_they_come(city):
+    told, spats = city.hear(Hears(SignalStatus)), city.hear(Hears(Spat))
+    city.run_for(12.0)
+    turn = next(t for t in messages(told)[-1].turns if t.start_ns > city.now_ns)
+    city.run_for((turn.start_ns - city.now_ns) / 1e9 + 0.25)
+    green = {group.group for group in messages(spats)[-1].groups if group.colour == "green"}
+    assert green == set(turn.groups)
+
+
+def test_a_file_is_proven_for_the_junction_that_it_describes(city):
+    sites = city.hear(Hears(SignalSite))
+    city.run_for(1.0)
+    site = messages(sites)[0]
+    facts = {"junction": "crossing", "phases": site.phases, "conflicts": site.conflicts}
+    file = PlanFile(plan="rush", stages=RUSH, **facts)
+    proof = prove_file(file)
+    assert proof.digest == file.digest
+    assert proof.cycle_s == pytest.approx(6.0 + 3.0 + 0.5 + 2 * (0.6 + 4.6 + 0.3))
+    assert fits(file, site)
+    other = PlanFile(plan="rush", stages=(RUSH[1], RUSH[0]), **facts)
+    assert other.digest != file.digest

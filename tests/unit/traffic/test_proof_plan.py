@@ -1,0 +1,64 @@
+"""The search for plans finds what a plan says and a junction does not do, however steps come."""
+
+import pytest
+
+from scm.errors import PlanError
+from scm.traffic import kernel
+from scm.traffic.kernel import GroupTimes, Program
+from scm.traffic.plan import Slot, Stage, Timetable, timetable
+from scm.traffic.program import STEP_NS
+from scm.traffic.proof_plan import prove_plan
+
+S = STEP_NS
+PROGRAM = Program(
+    ("a", "b"),
+    (GroupTimes(5 * S, 2 * S, 4 * S), GroupTimes(4 * S, 2 * S, 3 * S)),
+    frozenset({frozenset("ab")}),
+)
+CYCLE = (Stage(("a",), 6 * S), Stage(("b",), 5 * S, 2 * S))
+
+
+def test_a_plan_with_room_between_its_stages_is_proven_and_counted():
+    found = prove_plan(kernel, PROGRAM, timetable("rush", CYCLE, PROGRAM))
+    assert found.plan_states > found.states > 10
+    assert found.plan_transitions == 2 * found.plan_states
+    assert found.transitions > found.states
+
+
+def test_extra_red_makes_the_cycle_longer_by_just_that():
+    plain = timetable("rush", (CYCLE[0], Stage(("b",), 5 * S)), PROGRAM)
+    assert timetable("rush", CYCLE, PROGRAM).length_ns - plain.length_ns == 2 * S
+
+
+@pytest.mark.parametrize("missing", [2, 3])
+def test_a_gap_too_short_for_late_steps_is_found(missing):
+    good = timetable("rush", CYCLE, PROGRAM)
+    first, second = good.slots
+    start_ns = second.start_ns - missing * S
+    early = Slot(second.groups, start_ns, second.end_ns)
+    tight = Timetable("rush", (first, early), good.length_ns)
+    with pytest.raises(PlanError, match=r"group 'b' is red at .* where its green should be"):
+        prove_plan(kernel, PROGRAM, tight)
+
+
+def test_a_green_that_a_late_step_could_miss_is_refused():
+    good = timetable("rush", CYCLE, PROGRAM)
+    short = Slot(good.slots[0].groups, 0, S)
+    with pytest.raises(PlanError, match="too short for late steps"):
+        prove_plan(kernel, PROGRAM, Timetable("rush", (short, good.slots[1]), good.length_ns))
+
+
+class Careless:
+    """The kernel without its guard: whoever is wished for begins."""
+
+    start = staticmethod(kernel.start)
+
+    @staticmethod
+    def step(program, state, wishes, dt, *, flash=False):
+        alone = program._replace(conflicts=frozenset())
+        return kernel.step(alone, state, wishes, dt, flash=flash)
+
+
+def test_no_plan_is_proven_over_a_kernel_that_is_not_safe():
+    with pytest.raises(PlanError, match="unsafe: group"):
+        prove_plan(Careless(), PROGRAM, timetable("rush", CYCLE, PROGRAM))
