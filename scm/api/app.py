@@ -27,6 +27,8 @@ from scm.api.routes import (
     map,  # noqa: A004  named for its noun
     misbehaviour,
     operations,
+    planned_path,
+    scan,
     session,
     signals,
     stations,
@@ -35,8 +37,10 @@ from scm.api.routes import (
     vehicles,
 )
 from scm.api.routes import keys as key_routes
+from scm.api.routes import vehicle_frames as frame_routes
 from scm.api.shelves import Shelves
 from scm.api.stream import Stream
+from scm.api.vehicle_frames import VehicleFrames
 from scm.api.view import CityView
 from scm.clock import WallClock
 from scm.maps.model import CityMap
@@ -80,15 +84,17 @@ def create_app(
     city = City(view, ask, city_map, plans or {}, shelves or Shelves())
     work = Operations(WallClock())
     stream = Stream(city, uuid.uuid4().hex[:8])
+    frames = VehicleFrames(view)
     app = FastAPI(
         title=f"scm {city_map.name}",
         version="1",
         docs_url=None,  # its page loads from a CDN: ours is static/docs.html
         redoc_url=None,
         openapi_url="/api/v1/openapi.json",
-        lifespan=_lifespan_of(stream, work),
+        lifespan=_lifespan_of(stream, frames, work),
     )
     app.state.stream = stream
+    app.state.frames = frames
     app.state.keys = keys
     problem.install(app)
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
@@ -97,6 +103,9 @@ def create_app(
     for noun in (vehicles, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic):
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
+    api.include_router(scan.router(city, stream), responses=problem.RESPONSES)
+    api.include_router(planned_path.router(city), responses=problem.RESPONSES)
+    api.include_router(frame_routes.router(frames), responses=problem.RESPONSES)
     api.include_router(operations.router(work), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)
     api.include_router(session.router(), responses=problem.RESPONSES)
@@ -108,15 +117,16 @@ def create_app(
 
 
 def _lifespan_of(
-    stream: Stream, work: Operations
+    stream: Stream, frames: VehicleFrames, work: Operations
 ) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
-        task = asyncio.create_task(stream.run())
+        tasks = [asyncio.create_task(stream.run()), asyncio.create_task(frames.run())]
         yield
         work.close()
         stream.close()
-        await task
+        frames.close()
+        await asyncio.gather(*tasks)
 
     return lifespan
 

@@ -73,6 +73,7 @@ async def _serve(
                 on_ready(_address(listener))
         await asyncio.sleep(_POLL_S)
     app.state.stream.close()
+    app.state.frames.close()
     server.should_exit = True
     await serving
 

@@ -1,18 +1,20 @@
 """The view: a part that only hears, and keeps the newest of everything a person wants to see.
 
 `step` runs on the runner's thread, everything else is called by the web's. Pictures of cars'
-cameras are heard only while somebody watches them: they are rendered for whoever hears them.
+cameras and their LIDARs' scans are heard only while somebody watches them: they are made for
+whoever hears them.
 """
 
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from scm.api.event_log import EventLog, LoggedEvent
 from scm.api.picture import Held, Picture, SeenPose
 from scm.api.residual import residual_of, truth_at
+from scm.api.scan_watch import ScanWatch
 from scm.api.stations import StationTable
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import Pose2
@@ -26,6 +28,7 @@ from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags
+from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
 from scm.v2x.messages.monitor_status import MonitorStatus
@@ -71,6 +74,7 @@ class CityView:
         self._eye_statuses: dict[str, Held[EyeStatus]] = {}
         self._watched: Counter[tuple[str, str]] = Counter()
         self._camera_frames: dict[tuple[str, str], Held[CameraFrame]] = {}
+        self._scans = ScanWatch()
         self._poses: dict[tuple[str, str], SeenPose] = {}
         self._scores: Held[MisbehaviourScores] | None = None
         self._reports: dict[str, MisbehaviourReport] = {}
@@ -97,6 +101,7 @@ class CityView:
         }
         self._always = tuple(Hears(kind) for kind in self._takers)
         self._takers[CameraFrame] = self._take_camera_frame
+        self._takers[LidarScan] = self._scans.take
         self.hears: Sequence[Hears] = self._always
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -170,17 +175,59 @@ class CityView:
         with self._lock:
             return tuple(sorted(camera for name, camera in self._watched if name == vehicle))
 
+    @contextmanager
+    def watching_scan(self, vehicle: str) -> Iterator[None]:
+        """Hear a car's LIDAR for as long as this lasts; safe from any thread."""
+        self._watch_scan(vehicle, 1)
+        try:
+            yield
+        finally:
+            self._watch_scan(vehicle, -1)
+
+    def scan(self, vehicle: str) -> tuple[Held[LidarScan], Pose2 | None] | None:
+        """Return a watched car's newest scan, and where the car was; safe from any thread."""
+        with self._lock:
+            held = self._scans.newest(vehicle)
+            if held is None:
+                return None
+            return held, truth_at(self._truth, vehicle, held.message.t_ns)
+
+    @property
+    def snapshot(self) -> Held[WorldSnapshot] | None:
+        """What the world told last, and when; safe from any thread."""
+        return self._snapshot
+
+    @property
+    def trips(self) -> Mapping[str, Held[Trip]]:
+        """Each vehicle's newest trip; a copy, safe from any thread."""
+        with self._lock:
+            return dict(self._trips)
+
+    @property
+    def now_ns(self) -> int:
+        """Time of the last step."""
+        return self._now_ns
+
+    def _watch_scan(self, vehicle: str, more: int) -> None:
+        with self._lock:
+            self._scans.watch(vehicle, more)
+            self._wish()
+
     def _watch(self, which: tuple[str, str], more: int) -> None:
         with self._lock:
             self._watched[which] += more
             if self._watched[which] <= 0:
                 del self._watched[which]
                 self._camera_frames.pop(which, None)
-            cameras = (
-                Hears(CameraFrame, {"vehicle": vehicle, "camera": camera})
-                for vehicle, camera in self._watched
-            )
-            self.hears = (*self._always, *cameras)
+            self._wish()
+
+    def _wish(self) -> None:
+        """Say what is to be heard now."""
+        cameras = (
+            Hears(CameraFrame, {"vehicle": vehicle, "camera": camera})
+            for vehicle, camera in self._watched
+        )
+        self.hears = (*self._always, *cameras, *self._scans.hears())
 
     def _take_camera_frame(self, frame: CameraFrame, t_ns: int) -> None:
         which = (frame.vehicle, frame.camera)

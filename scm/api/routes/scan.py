@@ -1,0 +1,83 @@
+"""LIDAR scans of cars: the next one, or all of them for as long as somebody watches."""
+
+import asyncio
+from collections.abc import AsyncIterator
+
+from fastapi import APIRouter, Response
+from fastapi.responses import StreamingResponse
+
+from scm.api.city import City, Name, json_response, not_found
+from scm.api.encoding import encode
+from scm.api.problem import RefusedError
+from scm.api.roles import VIEWER
+from scm.api.scan_watch import ScanRow, scan_row, scanner_of
+from scm.api.stream import Stream
+from scm.v2x.message import Refused
+
+LOOK_S = 0.02
+PATIENCE_S = 3.0
+BEAT_LOOKS = 50  # silent for a second: a comment, so that a lost page is noticed
+
+
+def router(city: City, stream: Stream) -> APIRouter:
+    """Return the routes."""
+    routes = APIRouter(prefix="/vehicles", tags=["scans"], dependencies=[VIEWER])
+
+    @routes.get("/{name}/scan", summary="The next turn of a car's LIDAR")
+    async def one(name: Name) -> Response:
+        scanner = _check(city, name)
+        with city.view.watching_scan(name):
+            for _ in range(round(PATIENCE_S / LOOK_S)):
+                row = _newest(city, name, scanner)
+                if row is not None:
+                    return json_response(row)
+                await asyncio.sleep(LOOK_S)
+        raise not_found("car with a scan", name)
+
+    @routes.get("/{name}/scan/stream", summary="Every turn, as server-sent events")
+    async def every(name: Name) -> Response:
+        scanner = _check(city, name)
+        return StreamingResponse(
+            _turns(city, stream, name, scanner),
+            media_type="text/event-stream",
+            headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
+        )
+
+    return routes
+
+
+async def _turns(
+    city: City, stream: Stream, name: str, scanner: tuple[float, float]
+) -> AsyncIterator[bytes]:
+    """Yield every new scan until the page goes away or the server ends."""
+    shown_ns, silent = None, 0
+    with city.view.watching_scan(name):
+        yield b"retry: 1000\n\n"
+        while not stream.is_closed:
+            row = _newest(city, name, scanner)
+            silent += 1
+            if row is not None and row.t_ns != shown_ns:
+                shown_ns, silent = row.t_ns, 0
+                yield b"event: scan\ndata: " + encode(row) + b"\n\n"
+            elif silent % BEAT_LOOKS == 0:
+                yield b": silent\n\n"
+            await asyncio.sleep(LOOK_S)
+
+
+def _newest(city: City, name: str, scanner: tuple[float, float]) -> ScanRow | None:
+    found = city.view.scan(name)
+    return None if found is None else scan_row(*found, scanner, city.view.now_ns)
+
+
+def _check(city: City, name: str) -> tuple[float, float]:
+    """Return where the car's scanner sits; refuse a car that is not there or has none."""
+    held = city.view.snapshot
+    cars = () if held is None else held.message.vehicles
+    car = next((car for car in cars if car.vehicle == name), None)
+    if car is None:
+        raise not_found("car", name)
+    scanner = scanner_of(car.car)
+    if scanner is None:
+        detail = f"there is no LIDAR on {name}: a car of the kind {car.car} has none"
+        raise RefusedError(Refused(code="not_found", detail=detail))
+    return scanner

@@ -1,0 +1,113 @@
+"""LIDAR scans of the cars that somebody looks at: cars scan only while somebody hears them."""
+
+from collections import Counter
+from collections.abc import Iterator
+from functools import lru_cache
+
+import msgspec
+import numpy as np
+
+from scm.api.picture import Held
+from scm.geometry import Pose2
+from scm.part import Hears
+from scm.v2x.messages.lidar_scan import LidarScan
+from scm.vehicles.car import car_names, load_car
+
+FULL_CIRCLE_RAD = 2.0 * np.pi
+DEFAULT_CAR = "nigel"
+
+
+class ScanRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One turn of a car's LIDAR, and where the car stood when it ended.
+
+    Attributes:
+        t_ns: When the last beam looked, world's clock.
+        age_s: How long ago it reached us.
+        scanner_x_m: Where the scanner sits on the car, forward of its pose; likewise `y`, left.
+        bearing_first_rad: Where beam 0 looks, 0 is ahead, + = left.
+        bearing_step_rad: From each beam to the next, counter-clockwise.
+        ranges_m: One a beam; None: nothing within `range_max_m`.
+        x_m: The car's pose at `t_ns` in the map frame; None with `y_m`, `yaw_rad`: not known.
+    """
+
+    vehicle: str
+    t_ns: int
+    age_s: float
+    range_min_m: float
+    range_max_m: float
+    scanner_x_m: float
+    scanner_y_m: float
+    bearing_first_rad: float
+    bearing_step_rad: float
+    ranges_m: tuple[float | None, ...]
+    x_m: float | None
+    y_m: float | None
+    yaw_rad: float | None
+
+
+class ScanWatch:
+    """Who watches whose scans, and the newest of each; not safe between threads by itself."""
+
+    def __init__(self) -> None:
+        self._watched: Counter[str] = Counter()
+        self._newest: dict[str, Held[LidarScan]] = {}
+
+    def watch(self, vehicle: str, more: int) -> None:
+        """Count `more` watchers of a car; without any its scans are forgotten."""
+        self._watched[vehicle] += more
+        if self._watched[vehicle] <= 0:
+            del self._watched[vehicle]
+            self._newest.pop(vehicle, None)
+
+    def take(self, scan: LidarScan, t_ns: int) -> None:
+        """Keep a scan of a watched car."""
+        if scan.vehicle in self._watched:
+            self._newest[scan.vehicle] = Held(scan, t_ns)
+
+    def newest(self, vehicle: str) -> Held[LidarScan] | None:
+        """Return the newest scan of a watched car; None: none yet."""
+        return self._newest.get(vehicle)
+
+    def hears(self) -> Iterator[Hears]:
+        """Yield what has to be heard for those who watch now."""
+        return (Hears(LidarScan, {"vehicle": vehicle}) for vehicle in self._watched)
+
+
+@lru_cache(maxsize=64)
+def scanner_of(car: str) -> tuple[float, float] | None:
+    """Return where the LIDAR of a car of that file sits [m], x forward, y left; None: it has none.
+
+    A file that is not ours is a Nigel's.
+    """
+    model = load_car(car if car in car_names() else DEFAULT_CAR)
+    if not model.has("lidar.position_m"):
+        return None
+    x_m, y_m, _ = model.vector("lidar.position_m")
+    return x_m, y_m
+
+
+def scan_row(
+    held: Held[LidarScan], pose: Pose2 | None, scanner: tuple[float, float], now_ns: int
+) -> ScanRow:
+    """Return a scan as it is shown; `pose` is the car's at the scan's time, if it is known."""
+    scan = held.message
+    ranges = np.frombuffer(scan.payload, "<f4")
+    misses = ~np.isfinite(ranges)
+    shown = np.round(ranges.astype(np.float64), 3).astype(object)
+    shown[misses] = None
+    step = scan.bearing_step_rad
+    return ScanRow(
+        vehicle=scan.vehicle,
+        t_ns=scan.t_ns,
+        age_s=round(held.age_s(now_ns), 3),
+        range_min_m=scan.range_min_m,
+        range_max_m=scan.range_max_m,
+        scanner_x_m=scanner[0],
+        scanner_y_m=scanner[1],
+        bearing_first_rad=scan.bearing_first_rad,
+        bearing_step_rad=FULL_CIRCLE_RAD / max(1, scan.beams) if step is None else step,
+        ranges_m=tuple(shown.tolist()),
+        x_m=None if pose is None else round(pose.x, 4),
+        y_m=None if pose is None else round(pose.y, 4),
+        yaw_rad=None if pose is None else round(pose.yaw, 4),
+    )
