@@ -20,9 +20,12 @@ from scm.api.operations import Operations
 from scm.api.routes import (
     boxes,
     cameras,
+    close_up,
+    drive,
     events,
     eye,
     health,
+    leases,
     live,
     map,  # noqa: A004  named for its noun
     misbehaviour,
@@ -42,6 +45,7 @@ from scm.api.shelves import Shelves
 from scm.api.stream import Stream
 from scm.api.vehicle_frames import VehicleFrames
 from scm.api.view import CityView
+from scm.api.wire import Wire
 from scm.clock import WallClock
 from scm.maps.model import CityMap
 
@@ -69,6 +73,7 @@ def create_app(
     keys: KeyRing | None = None,
     plans: Mapping[str, Sequence[str]] | None = None,
     shelves: Shelves | None = None,
+    wire: Wire | None = None,
 ) -> FastAPI:
     """Build the application.
 
@@ -80,8 +85,9 @@ def create_app(
             everything.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
         shelves: Folders of recordings, reports and the like; None: the city offers none.
+        wire: Says commands on the bus; None: no car can be driven from a page.
     """
-    city = City(view, ask, city_map, plans or {}, shelves or Shelves())
+    city = City(view, ask, city_map, plans or {}, shelves or Shelves(), wire)
     work = Operations(WallClock())
     stream = Stream(city, uuid.uuid4().hex[:8])
     frames = VehicleFrames(view)
@@ -100,12 +106,16 @@ def create_app(
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
     app.add_middleware(Gate, keys=keys, policy=policy)
     api = APIRouter(prefix="/api/v1")
-    for noun in (vehicles, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic):
+    for noun in (
+        vehicles, leases, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic
+    ):  # fmt: skip
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
     api.include_router(scan.router(city, stream), responses=problem.RESPONSES)
     api.include_router(planned_path.router(city), responses=problem.RESPONSES)
     api.include_router(frame_routes.router(frames), responses=problem.RESPONSES)
+    api.include_router(close_up.router(city, stream), responses=problem.RESPONSES)
+    api.include_router(drive.router(city, stream))
     api.include_router(operations.router(work), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)
     api.include_router(session.router(), responses=problem.RESPONSES)

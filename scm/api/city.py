@@ -10,6 +10,7 @@ from scm.api.encoding import encode
 from scm.api.problem import RefusedError
 from scm.api.shelves import Shelves
 from scm.api.view import CityView
+from scm.api.wire import Wire
 from scm.maps.model import CityMap
 from scm.v2x.message import Message, Refused, Request
 
@@ -36,6 +37,7 @@ class City:
         send: Asks a request on the bus and waits for the reply, at most so many seconds.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
         shelves: Folders that the interface reads and writes.
+        wire: Says commands on the bus; None: nobody can be driven from here.
     """
 
     view: CityView
@@ -43,6 +45,7 @@ class City:
     city_map: CityMap
     plans: Mapping[str, Sequence[str]] = field(default_factory=dict)
     shelves: Shelves = field(default_factory=Shelves)
+    wire: Wire | None = None
 
     def ask(self, request: Request, reply: type[R]) -> R:
         """Ask the city and return its answer; blocks, so only for routes in the thread pool.

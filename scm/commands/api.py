@@ -32,6 +32,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.api.server import serve
     from scm.api.shelves import shelves_in
     from scm.api.view import CityView
+    from scm.api.wire import BusWire
     from scm.clock import WallClock
     from scm.live import run, stop_on_signal
     from scm.maps.load import load_map
@@ -52,6 +53,7 @@ def _run(arguments: argparse.Namespace) -> int:
             city_map,
             keys=keys,
             shelves=shelves_in(arguments.data) if arguments.data else None,
+            wire=BusWire(bus),
             plans={junction.name: names("scm.traffic.plans") for junction in city_map.junctions},
         )
 
