@@ -64,7 +64,7 @@ def test_a_car_is_found_by_typing_and_opened_by_the_keyboard(visit):
     page.wait_for_function("() => document.querySelectorAll('tr[data-car]').length === 1")
     page.focus(f"tr[data-car={AGENT}] a")
     page.keyboard.press("Enter")
-    page.wait_for_selector(f".who select >> text={AGENT}")
+    page.wait_for_function(f"() => document.querySelector('.who select')?.value === '{AGENT}'")
     assert page.url.endswith(f"/vehicles/{AGENT}")
 
 
@@ -80,7 +80,9 @@ def test_a_held_key_drives_and_a_released_one_stops_within_half_a_second(visit, 
     page.keyboard.down("w")
     visited.until(lambda: speed(running) > 0.05, "it drives while the key is held")
     page.wait_for_selector('.now[data-why="driving"]')
-    plotted = "() => !document.querySelector('[data-plot=throttle] .key b').textContent.match(/0.00|—/)"
+    plotted = (
+        "() => !document.querySelector('[data-plot=throttle] .key b').textContent.match(/0.00|—/)"
+    )
     page.wait_for_function(plotted)
     page.keyboard.up("w")
     stands_within(running, 0.5)

@@ -25,15 +25,17 @@ export function CloseUp({ car }) {
         </select>
       </label>
       <span class="kind" data-kind=${car.kind}>${car.kind}</span>
-      <span>${car.car}</span>
+      <span>${car.car}, tag ${car.tag_id}</span>
       <span class="mode" data-mode=${mode}>${mode}</span>
       <span class="speed"><b>${fixed(car.speed_mps, 2)}</b> m/s</span>
     </header>
     <${CameraPanel} car=${car} />
     <${LidarPanel} car=${car} />
-    <${WheelPanel} car=${car} />
     <${PlotsPanel} car=${car} />
-    <${FactsPanel} car=${car} />
-    <${LightsPanel} car=${car} />
+    <div class="side">
+      <${WheelPanel} car=${car} />
+      <${FactsPanel} car=${car} />
+      <${LightsPanel} car=${car} />
+    </div>
   `;
 }

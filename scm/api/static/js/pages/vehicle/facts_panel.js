@@ -23,12 +23,12 @@ export function FactsPanel({ car }) {
         <dt>Battery</dt><dd>${car.battery_v === null ? "not measured" : fixed(car.battery_v, 2, " V")}</dd>
         <dt>Trip</dt><dd>${tripOf(car.trip)}</dd>
         <dt>Driven by</dt><dd class=${isAtHome(car) ? "" : "warn"}>${ownerOf(car)}</dd>
-        <dt>Lease</dt><dd>epoch ${car.epoch} <small>${isAtHome(car) ? "at home" : `ends in ${span(car.lease_left_ms / 1000)}`}</small></dd>
+        <dt>Lease</dt><dd>${isAtHome(car) ? "at home" : `ends in ${span(car.lease_left_ms / 1000)}`}</dd>
+        <dt>Epoch</dt><dd>${car.epoch}</dd>
         <dt>Last report</dt><dd class=${car.age_ms > STALE_MS ? "warn" : ""}>${age(car.age_ms)} <small>ago</small></dd>
         <dt>Round trip</dt><dd data-fact="link" title=${link?.title ?? ""}>${link?.text ?? UNKNOWN}</dd>
         <dt>Eye sees it off by</dt><dd>${eyeOf(car.eye)}</dd>
         <dt>Misbehaviour</dt><dd class=${doubtOf(car.vehicle).reported ? "bad" : ""}>${doubtText(car.vehicle)}</dd>
-        <dt>Tag</dt><dd>${car.tag_id}</dd>
       </dl>
     </section>
   `;

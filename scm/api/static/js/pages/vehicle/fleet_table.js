@@ -46,7 +46,7 @@ export function FleetTable() {
           <thead>
             <tr>
               <th>Name</th><th>State</th><th>Kind</th><th class="wide">Car</th><th>Driven by</th>
-              <th class="number">Speed</th><th class="wide">Trip</th><th class="number">Battery</th>
+              <th class="number">Speed</th><th class="wide">Trip</th><th class="number wide">Battery</th>
               <th class="number wide">Doubts</th><th class="number" title="Age of its newest report">Link</th>
             </tr>
           </thead>
@@ -70,7 +70,7 @@ function Row({ car }) {
       <td class=${isAtHome(car) ? "" : "warn"}>${ownerOf(car)}</td>
       <td class="number">${fixed(car.speed_mps, 2)} <small>m/s</small></td>
       <td class="wide">${tripOf(car)}</td>
-      <td class="number">${fixed(car.battery_v, 1)} <small>${car.battery_v === null ? "" : "V"}</small></td>
+      <td class="number wide">${fixed(car.battery_v, 1)} <small>${car.battery_v === null ? "" : "V"}</small></td>
       <td class="number wide ${doubt.reported ? "bad" : ""}">${doubt.reported ? "reported" : doubt.score === null ? UNKNOWN : fixed(doubt.score, 1)}</td>
       <td class="number ${car.age_ms > STALE_MS ? "warn" : ""}">${age(car.age_ms)}</td>
     </tr>

@@ -7,7 +7,7 @@ import { colours } from "scm/shell/theme.js";
 import { fresh, reportsNow, SHOWN_S, useReports } from "scm/pages/vehicle/reports.js";
 
 const DRAW_MS = 66;
-const HEIGHT = 168;
+const HEIGHT = 152;
 const FONT = "11px system-ui, sans-serif";
 
 const PLOTS = [

@@ -37,7 +37,7 @@ function Free({ car }) {
   const taken = !isAtHome(car);
   return html`
     <p>
-      ${taken ? html`<b>${ownerOf(car)}</b> drives ${car.vehicle} now.` : `${ownerOf(car)} drives ${car.vehicle} now; it goes on when you give it back.`}
+      ${taken ? html`${car.vehicle} is driven by <b>${ownerOf(car)}</b>.` : `${car.vehicle} is driven by ${ownerOf(car)}, which goes on when you give it back.`}
     </p>
     ${over && html`<p class="over" role="status" data-code=${over.code}>${said(over)}</p>`}
     ${taken
