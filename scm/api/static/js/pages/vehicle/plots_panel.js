@@ -6,7 +6,7 @@ import { UNKNOWN } from "scm/shared/format.js";
 import { colours } from "scm/shell/theme.js";
 import { fresh, reportsNow, SHOWN_S, useReports } from "scm/pages/vehicle/reports.js";
 
-const DRAW_MS = 66;
+const DRAW_MS = 100;
 const HEIGHT = 152;
 const FONT = "11px system-ui, sans-serif";
 
