@@ -24,8 +24,12 @@ def take(visited, running, name=CAR):
     page = visited.page
     page.click("text=Take over")
     page.wait_for_selector('.wheel[data-state="held"]')
-    assert row(running, name)["lease_left_ms"] is not None
-    visited.until(lambda: abs(speed(running, name)) < 0.01, "it stands under the wheel")
+
+    def stands():
+        car = row(running, name)
+        return car["lease_left_ms"] is not None and abs(car["speed_mps"]) < 0.01
+
+    visited.until(stands, "it stands under the wheel")
 
 
 def give_back(visited, running, name=CAR):
