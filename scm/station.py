@@ -196,5 +196,6 @@ def _is_request(item: Incoming) -> bool:
 
 
 def _has_effect(item: Incoming) -> bool:
-    """Return whether a request does more than to say that its owner is still there."""
-    return getattr(item.message, "verb", "") != "renew"
+    """Return whether a request does more than to say, or to ask, that somebody is still there."""
+    request = cast("Request", item.message)
+    return request.HAS_EFFECT and getattr(request, "verb", "") != "renew"

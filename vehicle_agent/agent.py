@@ -22,6 +22,7 @@ from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.denm_rx import DenmRx
 from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.echo_request import EchoReply, EchoRequest
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.monitor_status import MonitorStatus
@@ -104,11 +105,14 @@ class AgentPart:
             DriveCommand: self._on_command,
             RouteRequest: self._on_route,
             LightRequest: self._on_lights,
+            EchoRequest: self._on_echo,
             EyeTrack: self._on_eye,
         }
         self.hears: Sequence[Hears] = self._hears()
         own = {"vehicle": name}
-        self.serves: Sequence[Serves] = (Serves(RouteRequest, own), Serves(LightRequest, own))
+        self.serves: Sequence[Serves] = tuple(
+            Serves(kind, own) for kind in (RouteRequest, LightRequest, EchoRequest)
+        )
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Hear, drive, report; a failure lets go of the body before anybody is told of it."""
@@ -309,6 +313,9 @@ class AgentPart:
             return Refused(code="owned", detail=f"{self.name} is driven by somebody else")
         told = self._stay.told(request.headlights, request.indicators)
         return LightReply(vehicle=self.name, headlights=told.headlights, indicators=told.indicators)
+
+    def _on_echo(self, item: Incoming) -> list[Outgoing]:
+        return [Answer(item, EchoReply(vehicle=self.name, t_ns=item.t_ns))]
 
     def _status(self, now_ns: int) -> list[Outgoing]:
         if self._status_ns is not None and now_ns - self._status_ns < NS_PER_S:

@@ -24,6 +24,7 @@ class Motion:
         accel: Along the body [m/s^2].
         steering: Mean road-wheel angle [rad], + = left.
         source: Where the pose comes from: `simulated`, `eye`, `odometry`.
+        battery_v: Of the drive battery; a simulated one is without load. None: not measured.
     """
 
     pose: Pose2
@@ -33,6 +34,7 @@ class Motion:
     accel: float
     steering: float
     source: str
+    battery_v: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -216,5 +216,6 @@ class Stay:
                 turn=self._turn,
             ),
             car=self._car,
+            battery_v=motion.battery_v,
             contacts=self._felt,
         )

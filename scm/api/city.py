@@ -10,6 +10,7 @@ from scm.api.encoding import encode
 from scm.api.problem import RefusedError
 from scm.api.shelves import Shelves
 from scm.api.view import CityView
+from scm.api.wire import Wire
 from scm.clock import Clock
 from scm.maps.model import CityMap
 from scm.v2x.message import Message, Refused, Request
@@ -34,19 +35,28 @@ R = TypeVar("R", bound=Message)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
-    """What the server knows of its own connection to the bus.
+    """What the server knows of its own connection to the bus, and of its city's start.
 
     Attributes:
         city: Chunk of all keys of the city on the bus; empty: as its map is called.
         is_connected: Whether the router can be reached now.
         rejected: How many arrivals were dropped because they could not be read.
         clock: That of the view's runner; None: time stands still between its steps.
+        wire: Says commands on the bus; None: nobody can be driven from here.
+        connect: Endpoint of the city's router, for scripts that are run beside it; empty: not known.
+        words: What tells a program of ours where the bus is and who it is there; empty: such a
+            program cannot reach the city.
+        map_file: Name or path of the map, as other programs are told it; empty: its own name.
     """
 
     city: str = ""
     is_connected: Callable[[], bool] = lambda: True
     rejected: Callable[[], int] = lambda: 0
     clock: Clock | None = None
+    wire: Wire | None = None
+    connect: str = ""
+    words: Sequence[str] = ()
+    map_file: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +81,11 @@ class City:
     def name(self) -> str:
         """What the city is called."""
         return self.link.city or self.city_map.name
+
+    @property
+    def wire(self) -> Wire | None:
+        """What says commands on the bus; None: nobody can be driven from here."""
+        return self.link.wire
 
     def now_ns(self) -> int:
         """Return the present time, by the clock of the view's runner [ns]."""

@@ -6,6 +6,8 @@ reach it by renaming itself (DNS rebinding). With keys, everything below `/api` 
 `/metrics`, needs one. Changes must come from our own pages or from programs: a browser tells its
 origin; and they must carry their key in the header: the cookie, which pages have for streams and
 pictures, is for reading.
+A WebSocket is a change from its first byte. Pages cannot give it a header, nor may a key stand in
+an address, which is logged: they offer it as the subprotocol `scm.key.<key>`, which is not chosen.
 """
 
 import base64
@@ -28,6 +30,7 @@ from scm.v2x.access import is_loopback
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 COOKIE = "scm_key"
+KEY_PROTOCOL = "scm.key."
 GUARDED = ("/api/", "/ngsi-ld/", "/metrics")
 OPEN = frozenset({"/api/v1/openapi.json"})
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -85,17 +88,20 @@ class Gate:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request pass, or answer it with a problem."""
-        if scope["type"] != "http":
+        if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
 
         async def send_guarded(message: Message) -> None:
-            if message["type"] == "http.response.start":
+            if message["type"] in ("http.response.start", "websocket.http.response.start"):
                 MutableHeaders(scope=message).update(self._headers)
             await send(message)
 
         headers = Headers(scope=scope)
-        refusal = self._refusal(scope["method"], headers) or self._admit(scope, headers)
+        is_safe = scope["type"] == "http" and scope["method"] in _SAFE_METHODS
+        refusal = self._refusal(headers, is_safe=is_safe) or self._admit(
+            scope, headers, is_safe=is_safe
+        )
         if refusal is None:
             await self._app(scope, receive, send_guarded)
             return
@@ -105,12 +111,12 @@ class Gate:
             response.headers["Retry-After"] = str(math.ceil(self._brake.wait_s(_address(scope))))
         await response(scope, receive, send_guarded)
 
-    def _refusal(self, method: str, headers: Headers) -> _Refusal | None:
+    def _refusal(self, headers: Headers, *, is_safe: bool) -> _Refusal | None:
         host = headers.get("host", "")
         if self._keys is None and _name_of(host) not in LOOPBACK_NAMES:
             detail = f"Host: got {host!r}, expected one of {sorted(LOOPBACK_NAMES)}"
             return HTTPStatus.FORBIDDEN, "host", detail
-        if method in _SAFE_METHODS:
+        if is_safe:
             return None
         origin = headers.get("origin")
         foreign = origin is not None and urlsplit(origin).netloc != host
@@ -119,7 +125,7 @@ class Gate:
             return HTTPStatus.FORBIDDEN, "origin", detail
         return None
 
-    def _admit(self, scope: Scope, headers: Headers) -> _Refusal | None:
+    def _admit(self, scope: Scope, headers: Headers, *, is_safe: bool) -> _Refusal | None:
         """Note whose request it is, or refuse it."""
         if self._keys is None:
             scope.update(scm_role="admin", scm_owner="this machine", scm_key="")
@@ -127,7 +133,7 @@ class Gate:
         path = str(scope["path"])
         if not path.startswith(GUARDED) or path in OPEN:
             return None
-        key = _key_of(headers, with_cookie=scope["method"] in _SAFE_METHODS)
+        key = _key_of(headers, with_cookie=is_safe) or _key_offered(scope)
         address = _address(scope)
         if key and self._brake.wait_s(address) > 0.0:
             detail = f"too many wrong keys from {address}; wait a little"
@@ -160,6 +166,13 @@ def _key_of(headers: Headers, *, with_cookie: bool) -> str:
     except CookieError:
         return ""
     return cookie.value if cookie is not None else ""
+
+
+def _key_offered(scope: Scope) -> str:
+    """Return the key among the subprotocols that a WebSocket offers; empty: none."""
+    offered = scope.get("subprotocols", ())
+    keys = (name for name in offered if name.startswith(KEY_PROTOCOL))
+    return str(next(keys, "")).removeprefix(KEY_PROTOCOL)
 
 
 def _address(scope: Scope) -> str:

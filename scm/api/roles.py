@@ -6,9 +6,10 @@ faults that the monitor latched. An admin also sees and ends keys. Every route n
 
 from typing import Literal, get_args
 
-from fastapi import Depends, Request
+from fastapi import Depends
 from fastapi.params import Depends as Dependency
 from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection
 
 from scm.errors import AccessError, nearest
 
@@ -35,9 +36,9 @@ class AtLeast:
     def __init__(self, role: Role) -> None:
         self.role = role
 
-    def __call__(self, request: Request) -> None:
+    def __call__(self, connection: HTTPConnection) -> None:
         """Pass, or refuse."""
-        own: Role | None = request.scope.get("scm_role")
+        own: Role | None = connection.scope.get("scm_role")
         if own is None or ROLES.index(own) < ROLES.index(self.role):
             detail = f"your key is one of a {own}; this needs {self.role} or above"
             raise HTTPException(403, detail)

@@ -13,6 +13,7 @@ from scm.api.gate import check_bind
 from scm.errors import RunError
 
 _POLL_S = 0.05
+LONGEST_PACKET = 4096  # bytes; a drive packet has about a hundred
 
 
 class _Server(uvicorn.Server):
@@ -47,7 +48,9 @@ def serve(
     listener = _bind(host, port)
     config = uvicorn.Config(
         app,
-        ws="none",
+        ws="websockets-sansio",
+        ws_max_size=LONGEST_PACKET,
+        ws_per_message_deflate=False,
         log_config=None,
         access_log=False,
         lifespan="on",

@@ -29,6 +29,8 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         cameras: Those that its file gives it; may be empty.
         age_ms: How old its newest state is now, the snapshot's own age included.
+        lease_left_ms: Until the lease ends if it is not renewed; None: it is at home.
+        battery_v: Of the drive battery; None: not measured.
         throttle: As the car reports it; None: it reports nothing.
         eye: What the Eye's newest pose differs from the truth; None: not seen lately.
     """
@@ -45,6 +47,8 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
     steering_rad: float
     owner: str
     epoch: int
+    lease_left_ms: float | None
+    battery_v: float | None
     mode: str
     age_ms: float
     alive: bool
@@ -109,6 +113,8 @@ def _row(
         steering_rad=round(car.steering_rad, 4),
         owner=car.owner,
         epoch=car.epoch,
+        lease_left_ms=None if car.lease_left_ms is None else round(car.lease_left_ms),
+        battery_v=None if car.battery_v is None else round(car.battery_v, 2),
         mode=car.mode,
         age_ms=round(car.age_ms + since_ms, 1),
         alive=car.alive,

@@ -1,8 +1,8 @@
 """The view: a part that only hears, and keeps the newest of everything a person wants to see.
 
 `step` runs on the runner's thread, everything else is called by the web's. Pictures of cars'
-cameras and their LIDARs' scans are heard only while somebody watches them: they are made for
-whoever hears them.
+cameras, their LIDARs' scans and their own reports are heard only while somebody watches them: they
+are made for whoever hears them.
 """
 
 import threading
@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from scm.api.close_up import CloseUps
 from scm.api.event_log import EventLog, LoggedEvent
 from scm.api.picture import Held, Picture, SeenPose
 from scm.api.residual import residual_of, truth_at
@@ -40,6 +41,7 @@ from scm.v2x.messages.signal_status import SignalStatus
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.violation import Violation
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
@@ -82,6 +84,7 @@ class CityView:
         self._watched: Counter[tuple[str, str]] = Counter()
         self._camera_frames: dict[tuple[str, str], Held[CameraFrame]] = {}
         self._scans = ScanWatch()
+        self._close_ups = CloseUps()
         self._poses: dict[tuple[str, str], SeenPose] = {}
         self._scores: Held[MisbehaviourScores] | None = None
         self._reports: dict[str, MisbehaviourReport] = {}
@@ -111,6 +114,7 @@ class CityView:
         self._always = tuple(Hears(kind) for kind in self._takers)
         self._takers[CameraFrame] = self._take_camera_frame
         self._takers[LidarScan] = self._scans.take
+        self._takers[VehicleState] = self._close_ups.take
         self.hears: Sequence[Hears] = self._always
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -246,6 +250,25 @@ class CityView:
         """Time of the last step."""
         return self._now_ns
 
+    @contextmanager
+    def watching_closely(self, vehicle: str) -> Iterator[None]:
+        """Hear all that a car reports for as long as this lasts; safe from any thread."""
+        self._watch_closely(vehicle, 1)
+        try:
+            yield
+        finally:
+            self._watch_closely(vehicle, -1)
+
+    def reports_after(self, vehicle: str, number: int) -> tuple[int, tuple[VehicleState, ...]]:
+        """Return a watched car's reports after `number`, and the newest number; thread-safe."""
+        with self._lock:
+            return self._close_ups.after(vehicle, number)
+
+    def _watch_closely(self, vehicle: str, more: int) -> None:
+        with self._lock:
+            self._close_ups.watch(vehicle, more)
+            self._wish()
+
     def _watch_scan(self, vehicle: str, more: int) -> None:
         with self._lock:
             self._scans.watch(vehicle, more)
@@ -265,7 +288,7 @@ class CityView:
             Hears(CameraFrame, {"vehicle": vehicle, "camera": camera})
             for vehicle, camera in self._watched
         )
-        self.hears = (*self._always, *cameras, *self._scans.hears())
+        self.hears = (*self._always, *cameras, *self._scans.hears(), *self._close_ups.hears())
 
     def _take_camera_frame(self, frame: CameraFrame, t_ns: int) -> None:
         which = (frame.vehicle, frame.camera)

@@ -31,6 +31,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _at_bus(arguments: argparse.Namespace) -> list[str]:
+    """Return how a program of ours finds the bus, and as whom."""
+    words = ["--connect", arguments.connect, "--city", arguments.city]
+    return words + (["--credentials", str(arguments.credentials)] if arguments.credentials else [])
+
+
 def _run(arguments: argparse.Namespace) -> int:
     from scm.api.app import create_app
     from scm.api.city import Link
@@ -39,6 +45,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.api.server import serve
     from scm.api.shelves import shelves_in
     from scm.api.view import CityView
+    from scm.api.wire import BusWire
     from scm.clock import WallClock
     from scm.live import run, stop_on_signal
     from scm.maps.load import load_map
@@ -65,6 +72,10 @@ def _run(arguments: argparse.Namespace) -> int:
                 is_connected=lambda: bus.connected,
                 rejected=lambda: bus.rejected,
                 clock=WallClock(),
+                wire=BusWire(bus),
+                connect=arguments.connect,
+                words=_at_bus(arguments),
+                map_file=arguments.map,
             ),
             plans={junction.name: names("scm.traffic.plans") for junction in city_map.junctions},
         )

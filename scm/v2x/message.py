@@ -50,10 +50,12 @@ class Request(Message, kw_only=True, frozen=True):
 
     Attributes:
         request_id: Same id, same effect, once: a retry gets the stored answer. Empty: not retried.
+        HAS_EFFECT: Whether it changes anything: what does not is in no audit log.
     """
 
     DELIVERY: ClassVar[Delivery] = Delivery.RPC
     REPLY: ClassVar[type[Message]] = Message
+    HAS_EFFECT: ClassVar[bool] = True
 
     request_id: str = ""
 

@@ -144,7 +144,7 @@ _OF_PART: dict[str, Rights] = {
     ),
     "camera": Rights(says=("v/*/@camera/*",), hears=("world/snapshot", "world/def", "tl/*/spat")),
     "record": _WATCHES,
-    "api": _WATCHES + Rights(asks=EVERY_REQUEST),
+    "api": _WATCHES + Rights(says=("v/*/cmd/drive",), asks=EVERY_REQUEST),
     "up": _WATCHES,
     "selftest": _WATCHES + Rights(says=("**",), asks=("**",)),
     "observer": Rights(

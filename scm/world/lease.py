@@ -96,6 +96,11 @@ def is_expired(lease: Lease, now_ns: int) -> bool:
     return lease.expires_ns is not None and now_ns >= lease.expires_ns
 
 
+def left_ms(lease: Lease, now_ns: int) -> float | None:
+    """Return how long it lives on unless it is renewed; None: for ever, it is at home."""
+    return None if lease.expires_ns is None else max(0.0, (lease.expires_ns - now_ns) / NS_PER_MS)
+
+
 def sent_home(lease: Lease) -> Lease:
     """Return the home owner's lease that follows this one."""
     return grant(lease.home, lease.epoch + 1)

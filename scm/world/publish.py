@@ -16,6 +16,7 @@ from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 from scm.vehicles.lights import Indicators, lamps
+from scm.world import lease as rules
 from scm.world.hosted import HostedCar
 from scm.world.remote import RemoteCar
 from scm.world.slots import MODES
@@ -66,13 +67,13 @@ def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
     columns = (
         slots.seq, slots.x, slots.y, slots.yaw, slots.speed, signal("lateral_speed"),
         slots.yaw_rate, signal("accel_x") + signal("impact_x"), signal("steer_angle"),
-        slots.throttle, slots.steering, slots.mode,
+        slots.throttle, slots.steering, slots.mode, signal("battery"),
     )  # fmt: skip
     rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)
     for (
-        car,
-        lit,
-    ), seq, x, y, yaw, speed, lateral, yaw_rate, accel, wheels, throttle, steering, mode in rows:
+        (car, lit), seq, x, y, yaw, speed, lateral, yaw_rate, accel, wheels,
+        throttle, steering, mode, volts,
+    ) in rows:  # fmt: skip
         yield VehicleState(
             vehicle=car.name,
             t_ns=now_ns,
@@ -92,6 +93,7 @@ def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
             mode=MODES[mode],
             lights=lamps(car.switches, throttle, speed, now_ns, **lit),
             car=car.car_file,
+            battery_v=volts or None,
         )
 
 
@@ -124,10 +126,10 @@ def _hosted_in_snapshot(world: World, now_ns: int) -> Iterator[SnapshotVehicle]:
     of = np.flatnonzero(slots.hosted)
     columns = (
         slots.x, slots.y, slots.yaw, slots.speed, slots.throttle, signal("steer_angle"),
-        signal("roll"), signal("pitch"), slots.mode,
+        signal("roll"), signal("pitch"), slots.mode, signal("battery"),
     )  # fmt: skip
     rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)
-    for (car, lit), x, y, yaw, speed, throttle, steering, roll, pitch, mode in rows:
+    for (car, lit), x, y, yaw, speed, throttle, steering, roll, pitch, mode, volts in rows:
         yield SnapshotVehicle(
             vehicle=car.name,
             kind=car.kind,
@@ -143,6 +145,8 @@ def _hosted_in_snapshot(world: World, now_ns: int) -> Iterator[SnapshotVehicle]:
             pitch_rad=pitch,
             owner=car.lease.owner,
             epoch=car.lease.epoch,
+            lease_left_ms=rules.left_ms(car.lease, now_ns),
+            battery_v=volts or None,
             mode=MODES[mode],
             lights=lamps(car.switches, throttle, speed, now_ns, **lit),
         )
@@ -164,6 +168,8 @@ def _remote_in_snapshot(car: RemoteCar, now_ns: int) -> SnapshotVehicle:
         throttle=None if state is None else state.throttle,
         owner=car.lease.owner,
         epoch=car.lease.epoch,
+        lease_left_ms=rules.left_ms(car.lease, now_ns),
+        battery_v=None if state is None else state.battery_v,
         mode="idle" if state is None else state.mode,
         age_ms=car.age_ns(now_ns) / NS_PER_MS,
         alive=car.alive,

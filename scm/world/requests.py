@@ -16,6 +16,7 @@ from scm.v2x.key import check_name
 from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
 from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.echo_request import EchoReply, EchoRequest
 from scm.v2x.messages.join_request import LAST_TAG_ID, JoinReply, JoinRequest
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.light_request import LightReply, LightRequest
@@ -148,6 +149,13 @@ def _lights(world: World, request: LightRequest, now_ns: int) -> LightReply:
     return LightReply(vehicle=car.name, headlights=told.headlights, indicators=told.indicators)
 
 
+def _echo(world: World, request: EchoRequest, now_ns: int) -> EchoReply:
+    car = _known(world, request.vehicle)
+    if isinstance(car, RemoteCar):
+        raise _RefusedError("not_found", f"{car.name} is not hosted: its own agent answers for it")
+    return EchoReply(vehicle=car.name, t_ns=now_ns)
+
+
 def _stop(world: World, request: StopRequest, now_ns: int) -> CityStop:
     world.stop = CityStop(
         t_ns=now_ns, engaged=request.engaged, by=request.by, reason=request.reason
@@ -241,10 +249,11 @@ _ANSWERS: dict[type[Message], Callable[[World, Any, int], Message]] = {
     LeaseRequest: _lease,
     LightRequest: _lights,
     BoxesRequest: _boxes,
+    EchoRequest: _echo,
     StopRequest: _stop,
 }
 
 SERVES = tuple(Serves(kind) for kind in (
     SpawnRequest, JoinRequest, RemoveRequest, RouteRequest, LeaseRequest, LightRequest,
-    BoxesRequest, StopRequest,
+    BoxesRequest, EchoRequest, StopRequest,
 ))  # fmt: skip

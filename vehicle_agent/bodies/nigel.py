@@ -145,6 +145,7 @@ class NigelBody:
             accel=self._accel,
             steering=self._wheels,
             source="eye",
+            battery_v=None if self._helm.told is None else self._helm.told.battery_v,
         )
 
     def sensors(self, vehicle: str, now_ns: int) -> Sequence[VehicleSensors | LidarScan]:

@@ -126,6 +126,7 @@ class SimulatedBody:
             accel=float(fleet.accel_x[row] + fleet.impact_x[row]),
             steering=float(fleet.steer_angle[row]),
             source="simulated",
+            battery_v=float(fleet.battery[row]) or None,
         )
 
     def sensors(self, vehicle: str, now_ns: int) -> list[VehicleSensors]:

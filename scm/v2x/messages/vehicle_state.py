@@ -18,6 +18,7 @@ class VehicleState(Message, kw_only=True, frozen=True):
         mode: `drive`, `hold` (commands late), `stop` (commands lost or city stopped), `idle`.
         lights: Names of those that are on: `head_low head_high left right tail brake reverse`.
         car: Its car file's name.
+        battery_v: Of the drive battery; a simulated one is without load. None: not measured.
         contacts: Number of the newest `Contact` that this motion has felt; 0: it tells nothing.
     """
 
@@ -42,6 +43,7 @@ class VehicleState(Message, kw_only=True, frozen=True):
     mode: str = "drive"
     lights: tuple[str, ...] = ()
     car: str = "nigel"
+    battery_v: float | None = None
     contacts: int = 0
 
 

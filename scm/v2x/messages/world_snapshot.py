@@ -17,6 +17,8 @@ class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True):
         kind: `hosted`, `remote` or `real`.
         throttle: As commanded, or as its agent reports it; None: it has not reported yet.
         owner: Who holds its lease.
+        lease_left_ms: Until that ends if it is not renewed; None: it is at home, and never ends.
+        battery_v: Of its drive battery; a simulated one is without load. None: not measured.
         age_ms: How old its newest state is: 0 for hosted cars.
         alive: False from the moment its agent is known to be gone until it is taken off the map.
     """
@@ -35,6 +37,8 @@ class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True):
     pitch_rad: float = 0.0
     owner: str = "world"
     epoch: int = 0
+    lease_left_ms: float | None = None
+    battery_v: float | None = None
     mode: str = "drive"
     age_ms: float = 0.0
     alive: bool = True

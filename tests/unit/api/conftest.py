@@ -1,6 +1,7 @@
 """A view that has heard a little, a city that answers from a list, and a client without sockets."""
 
 import asyncio
+import threading
 
 import httpx
 import pytest
@@ -24,10 +25,18 @@ class FakeCity:
     def __init__(self):
         self.asked = []
         self.answers = {}
+        self._news = threading.Condition()
+
+    def wait_for(self, count):
+        """Wait until so much was asked: a server may ask after its client has gone."""
+        with self._news:
+            assert self._news.wait_for(lambda: len(self.asked) >= count, 5.0)
 
     def ask(self, request, timeout_s):
         assert timeout_s > 0.0
-        self.asked.append(request)
+        with self._news:
+            self.asked.append(request)
+            self._news.notify_all()
         return self.answers.get(type(request), Refused(code="offline", detail="nobody answers"))
 
 

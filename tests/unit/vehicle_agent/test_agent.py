@@ -18,6 +18,7 @@ from scm.v2x.message import Refused
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.echo_request import EchoReply, EchoRequest
 from scm.v2x.messages.join_request import JoinReply, JoinRequest
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.light_request import LightReply, LightRequest
@@ -200,6 +201,13 @@ def test_an_agent_switches_the_lights_of_its_car(inside):
     reply = one(inside.step(LightRequest(vehicle="n7", headlights="low")), Answer).reply
     assert reply == LightReply(vehicle="n7", headlights="low", indicators="off")
     assert {"head_low", "tail"} <= set(one(inside.step(), VehicleState).lights)
+
+
+def test_an_agent_echoes_whoever_drives_its_car(inside):
+    inside.step(command(EPOCH + 1))
+    reply = one(inside.step(EchoRequest(vehicle="n7")), Answer).reply
+    assert isinstance(reply, EchoReply)
+    assert reply.vehicle == "n7"
 
 
 def test_hazard_lights_flash_when_commands_stay_away(inside):

@@ -13,6 +13,7 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.echo_request import EchoReply, EchoRequest
 from scm.v2x.messages.join_request import JoinRequest
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.presence import Presence
@@ -22,6 +23,7 @@ from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.world_definition import WorldDefinition
+from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.vehicles.car import load_car
 from scm.world.requests import is_free
 
@@ -399,3 +401,22 @@ def test_an_absurd_report_is_dropped_and_counted(city, absurd):
     city.run(3, city.report(seq=2, **{"x": 2.0, **absurd}))
     assert city.shown("n7").x_m == 1.0
     assert city.world.ignored == 1
+
+
+def test_the_world_echoes_for_hosted_cars_and_leaves_the_others_to_their_agents(city):
+    city.ask(SpawnRequest(vehicle="n1"))
+    city.ask(JoinRequest(vehicle="n7", session="s"))
+    assert isinstance(city.ask(EchoRequest(vehicle="n1")), EchoReply)
+    assert city.ask(EchoRequest(vehicle="n7")).code == "not_found"
+
+
+def test_the_snapshot_tells_how_long_a_lease_lives_on_and_the_voltage_of_the_battery(city):
+    city.ask(SpawnRequest(vehicle="n1"))
+    city.run_for(0.2)
+    (at_home,) = city.heard(WorldSnapshot)[-1].vehicles
+    assert at_home.lease_left_ms is None
+    assert at_home.battery_v == load_car("nigel").value("drive.battery_nominal_v")
+    city.ask(LeaseRequest(vehicle="n1", owner="desk", verb="acquire", ttl_ms=900))
+    city.run_for(0.2)
+    (leased,) = city.heard(WorldSnapshot)[-1].vehicles
+    assert 500.0 < leased.lease_left_ms < 900.0

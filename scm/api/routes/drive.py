@@ -1,0 +1,37 @@
+"""Drive a car by hand: a WebSocket, the only one of the interface.
+
+The first packet takes the wheel, the others drive; see `scm.api.teleop` and docs/dashboard/vehicle.
+"""
+
+import secrets
+
+from fastapi import APIRouter, WebSocket
+
+from scm.api.city import City, Name
+from scm.api.problem import RefusedError
+from scm.api.roles import OPERATOR
+from scm.api.stream import Stream
+from scm.api.teleop import PROTOCOL, Seat
+from scm.clock import WallClock
+from scm.v2x.message import Refused
+
+
+def router(city: City, stream: Stream) -> APIRouter:
+    """Return the route."""
+    routes = APIRouter(prefix="/vehicles", tags=["vehicles"], dependencies=[OPERATOR])
+
+    @routes.websocket("/{name}/drive")
+    async def drive(socket: WebSocket, name: Name) -> None:
+        if city.wire is None:
+            detail = "this interface has no wire to say commands on"
+            raise RefusedError(Refused(code="offline", detail=detail))
+        if PROTOCOL not in socket.scope["subprotocols"]:
+            detail = f"Sec-WebSocket-Protocol: expected {PROTOCOL} among those offered"
+            raise RefusedError(Refused(code="invalid", detail=detail))
+        await socket.accept(subprotocol=PROTOCOL)
+        owner = f"{socket.scope['scm_owner']} #{secrets.token_hex(2)}"
+        await Seat(
+            city, city.wire, WallClock(), socket, name, owner, lambda: stream.is_closed
+        ).run()
+
+    return routes

@@ -1,0 +1,41 @@
+/** One vehicle: what it sees, what it is told and how it answers, who drives it, and a wheel to take. */
+import { html } from "scm/shared/html.js";
+import { go } from "scm/shell/router.js";
+import { world } from "scm/shell/store.js";
+import { byName, fixed } from "scm/shared/format.js";
+import { CameraPanel } from "scm/pages/vehicle/camera_panel.js";
+import { FactsPanel } from "scm/pages/vehicle/facts_panel.js";
+import { LidarPanel } from "scm/pages/vehicle/lidar_panel.js";
+import { LightsPanel } from "scm/pages/vehicle/lights_panel.js";
+import { PlotsPanel } from "scm/pages/vehicle/plots_panel.js";
+import { WheelPanel } from "scm/pages/vehicle/wheel_panel.js";
+
+export function CloseUp({ car }) {
+  const mode = car.alive ? car.mode : "lost";
+  return html`
+    <header class="who">
+      <a href="/vehicles">All vehicles</a>
+      <label>
+        <span class="hidden">Vehicle</span>
+        <select aria-label="Vehicle" value=${car.vehicle} onChange=${(event) => go(`/vehicles/${event.target.value}`)}>
+          ${world.value.vehicles
+            .map((one) => one.vehicle)
+            .toSorted(byName)
+            .map((name) => html`<option value=${name} selected=${name === car.vehicle}>${name}</option>`)}
+        </select>
+      </label>
+      <span class="kind" data-kind=${car.kind}>${car.kind}</span>
+      <span>${car.car}, tag ${car.tag_id}</span>
+      <span class="mode" data-mode=${mode}>${mode}</span>
+      <span class="speed"><b>${fixed(car.speed_mps, 2)}</b> m/s</span>
+    </header>
+    <${CameraPanel} car=${car} />
+    <${LidarPanel} car=${car} />
+    <${PlotsPanel} car=${car} />
+    <div class="side">
+      <${WheelPanel} car=${car} />
+      <${FactsPanel} car=${car} />
+      <${LightsPanel} car=${car} />
+    </div>
+  `;
+}

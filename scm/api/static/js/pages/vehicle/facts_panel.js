@@ -1,0 +1,84 @@
+/** What is known of a car: where it is, who drives it, how far away it is, and whether to believe it. */
+import { useEffect, useState } from "preact/hooks";
+import { html } from "scm/shared/html.js";
+import { age, fixed, span, UNKNOWN } from "scm/shared/format.js";
+import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
+import { doubtOf, misbehaviour, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
+
+const LINK_MS = 1000;
+const STALE_MS = 500;
+const DEGREES = 180 / Math.PI;
+
+export function FactsPanel({ car }) {
+  useMisbehaviour();
+  const link = useLink(car.vehicle);
+  const { x_m: x, y_m: y, yaw_rad: yaw } = car;
+  return html`
+    <section class="panel facts" aria-label="State">
+      <div class="panel-head"><h2>State</h2></div>
+      <dl>
+        <dt>Pose</dt><dd>${fixed(x, 2)}, ${fixed(y, 2)} m, ${fixed(yaw * DEGREES, 0, "°")}</dd>
+        <dt>Throttle</dt><dd>${fixed(car.throttle, 2)}</dd>
+        <dt>Steering</dt><dd>${fixed(car.steering_rad * DEGREES, 1, "°")} <small>${side(car.steering_rad)}</small></dd>
+        <dt>Battery</dt><dd>${car.battery_v === null ? "not measured" : fixed(car.battery_v, 2, " V")}</dd>
+        <dt>Trip</dt><dd>${tripOf(car.trip)}</dd>
+        <dt>Driven by</dt><dd class=${isAtHome(car) ? "" : "warn"}>${ownerOf(car)}</dd>
+        <dt>Lease</dt><dd>${isAtHome(car) ? "at home" : `ends in ${span(car.lease_left_ms / 1000)}`}</dd>
+        <dt>Epoch</dt><dd>${car.epoch}</dd>
+        <dt>Last report</dt><dd class=${car.age_ms > STALE_MS ? "warn" : ""}>${age(car.age_ms)} <small>ago</small></dd>
+        <dt>Round trip</dt><dd data-fact="link" title=${link?.title ?? ""}>${link?.text ?? UNKNOWN}</dd>
+        <dt>Eye sees it off by</dt><dd>${eyeOf(car.eye)}</dd>
+        <dt>Misbehaviour</dt><dd class=${doubtOf(car.vehicle).reported ? "bad" : ""}>${doubtText(car.vehicle)}</dd>
+      </dl>
+    </section>
+  `;
+}
+
+/** The way to the car's owner and back, measured once a second while the page is looked at. */
+function useLink(vehicle) {
+  const [link, setLink] = useState(null);
+  useEffect(() => {
+    let ended = false;
+    const ask = async () => {
+      if (document.hidden) return;
+      const reply = await fetch(`/api/v1/vehicles/${vehicle}/link`).catch(() => null);
+      const body = await reply?.json().catch(() => null);
+      if (ended || !reply) return;
+      setLink(
+        reply.ok
+          ? { text: `${fixed(body.round_trip_ms, 1)} ms`, title: `answered by its ${body.answered_by}` }
+          : { text: "no answer", title: body?.detail ?? "" },
+      );
+    };
+    ask();
+    const timer = setInterval(ask, LINK_MS);
+    return () => {
+      ended = true;
+      clearInterval(timer);
+    };
+  }, [vehicle]);
+  return link;
+}
+
+function side(angle) {
+  if (Math.abs(angle) * DEGREES < 0.5) return "";
+  return angle > 0 ? "left" : "right";
+}
+
+function tripOf(trip) {
+  if (!trip) return "none";
+  if (trip.arrived) return "arrived";
+  const way = trip.length_m === null ? `circulates, ${fixed(trip.done_m, 1)} m so far` : `${fixed(trip.done_m, 1)} of ${fixed(trip.length_m, 1)} m`;
+  return trip.waiting_for ? `${way}; waits for ${trip.waiting_for}` : way;
+}
+
+function eyeOf(eye) {
+  return eye ? `${fixed(eye.position_mm, 1)} mm, ${fixed(eye.yaw_deg, 1, "°")}` : "not seen";
+}
+
+function doubtText(vehicle) {
+  if (!misbehaviour.value?.watched) return "nobody watches";
+  const { score, reported } = doubtOf(vehicle);
+  if (score === null) return "not on the air";
+  return `score ${fixed(score, 1)}${reported ? ", reported" : ""}`;
+}

@@ -1,0 +1,86 @@
+/** All vehicles in one table: who drives them, how they are, and whether to believe them. */
+import { signal } from "@preact/signals";
+import { html } from "scm/shared/html.js";
+import { age, byName, fixed, UNKNOWN } from "scm/shared/format.js";
+import { world } from "scm/shell/store.js";
+import { doubtOf, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
+import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
+
+const STALE_MS = 500;
+const KINDS = ["all", "hosted", "remote", "real"];
+
+const wanted = signal({ text: "", kind: "all" });
+
+export function FleetTable() {
+  useMisbehaviour();
+  const all = world.value.vehicles;
+  const text = wanted.value.text.toLowerCase();
+  const shown = all
+    .filter((car) => wanted.value.kind === "all" || car.kind === wanted.value.kind)
+    .filter((car) => [car.vehicle, car.owner, car.car, car.mode].some((word) => word.toLowerCase().includes(text)))
+    .toSorted((a, b) => byName(a.vehicle, b.vehicle));
+  const set = (change) => (wanted.value = { ...wanted.value, ...change });
+  return html`
+    <section class="panel fleet" aria-label="Vehicles">
+      <div class="panel-head">
+        <h2>Vehicles <small>${shown.length === all.length ? all.length : `${shown.length} of ${all.length}`}</small></h2>
+        <div class="filters">
+          <input
+            type="search"
+            placeholder="Name, owner, mode"
+            aria-label="Filter vehicles"
+            value=${wanted.value.text}
+            onInput=${(event) => set({ text: event.target.value })}
+          />
+          <div class="choices" role="group" aria-label="Kind">
+            ${KINDS.map(
+              (kind) => html`
+                <button class="small" aria-pressed=${wanted.value.kind === kind} onClick=${() => set({ kind })}>${kind}</button>
+              `,
+            )}
+          </div>
+        </div>
+      </div>
+      <div class="scroll" tabindex="0" role="region" aria-label="Table of vehicles">
+        <table>
+          <thead>
+            <tr>
+              <th>Name</th><th>State</th><th>Kind</th><th class="wide">Car</th><th>Driven by</th>
+              <th class="number">Speed</th><th class="wide">Trip</th><th class="number wide">Battery</th>
+              <th class="number wide">Doubts</th><th class="number" title="Age of its newest report">Link</th>
+            </tr>
+          </thead>
+          <tbody>${shown.map((car) => html`<${Row} key=${car.vehicle} car=${car} />`)}</tbody>
+        </table>
+        ${!shown.length && html`<p class="empty">${all.length ? "No vehicle is like that." : "No vehicle is in the city. Add one on the map."}</p>`}
+      </div>
+    </section>
+  `;
+}
+
+function Row({ car }) {
+  const mode = car.alive ? car.mode : "lost";
+  const doubt = doubtOf(car.vehicle);
+  return html`
+    <tr data-car=${car.vehicle} data-alive=${car.alive}>
+      <td><a class="to" href="/vehicles/${car.vehicle}">${car.vehicle}</a></td>
+      <td><span class="mode" data-mode=${mode}>${mode}</span></td>
+      <td><span class="kind" data-kind=${car.kind}>${car.kind}</span></td>
+      <td class="wide">${car.car}</td>
+      <td class=${isAtHome(car) ? "" : "warn"}>${ownerOf(car)}</td>
+      <td class="number">${fixed(car.speed_mps, 2)} <small>m/s</small></td>
+      <td class="wide">${tripOf(car)}</td>
+      <td class="number wide">${fixed(car.battery_v, 1)} <small>${car.battery_v === null ? "" : "V"}</small></td>
+      <td class="number wide ${doubt.reported ? "bad" : ""}">${doubt.reported ? "reported" : doubt.score === null ? UNKNOWN : fixed(doubt.score, 1)}</td>
+      <td class="number ${car.age_ms > STALE_MS ? "warn" : ""}">${age(car.age_ms)}</td>
+    </tr>
+  `;
+}
+
+function tripOf(car) {
+  if (!car.trip) return UNKNOWN;
+  if (car.trip.waiting_for) return `waits for ${car.trip.waiting_for}`;
+  if (car.trip.arrived) return "arrived";
+  if (car.trip.length_m === null) return "circulates";
+  return `${fixed(car.trip.done_m, 1)} of ${fixed(car.trip.length_m, 1)} m`;
+}

@@ -1,0 +1,91 @@
+/** Hands on the wheel: keys, a gamepad, pads on the screen. Whoever lets go drives no more. */
+
+const KEYS = {
+  KeyW: "ahead", ArrowUp: "ahead", KeyS: "back", ArrowDown: "back",
+  KeyA: "left", ArrowLeft: "left", KeyD: "right", ArrowRight: "right",
+};
+const TURN_PER_S = 4;
+const RISE_PER_S = 3;
+const REST = 0.08; // of a stick: it never comes back to quite nothing
+const PULLED = 0.2; // of a trigger
+const TRIGGERS = [6, 7];
+const TYPED_INTO = "input:not([type=range]), select, textarea, dialog *";
+
+/** Begin to feel; `wish()` tells what is wished for now, `end()` lets go for good. */
+export function hands(onLetGo) {
+  const held = new Set();
+  const wish = { held: false, throttle: 0, steering: 0, by: "keys" };
+  let last = performance.now();
+  const letGo = () => {
+    held.clear();
+    onLetGo();
+  };
+  const onKey = (event) => {
+    const what = KEYS[event.code];
+    if (!what || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.type === "keydown" && event.target.closest?.(TYPED_INTO)) return;
+    event.preventDefault();
+    if (event.type === "keydown") held.add(what);
+    else held.delete(what);
+    if (!held.size) onLetGo();
+  };
+  const onHidden = () => document.hidden && letGo();
+  window.addEventListener("keydown", onKey);
+  window.addEventListener("keyup", onKey);
+  window.addEventListener("blur", letGo);
+  document.addEventListener("visibilitychange", onHidden);
+  return {
+    /** A pad on the screen is pressed, or let go. */
+    pad(what, down) {
+      if (down) held.add(what);
+      else held.delete(what);
+      if (!held.size) onLetGo();
+    },
+    wish(most) {
+      const now = performance.now();
+      const passed = Math.min(0.1, (now - last) / 1000);
+      last = now;
+      const stick = pull();
+      if (stick) Object.assign(wish, stick, { throttle: most * stick.throttle });
+      else byKeys(wish, held, most, passed);
+      return wish;
+    },
+    end() {
+      held.clear();
+      window.removeEventListener("keydown", onKey);
+      window.removeEventListener("keyup", onKey);
+      window.removeEventListener("blur", letGo);
+      document.removeEventListener("visibilitychange", onHidden);
+    },
+  };
+}
+
+/** Keys: the wheel turns and the pedal goes down in a moment, and comes up at once. */
+function byKeys(wish, held, most, passed) {
+  const way = (held.has("ahead") ? 1 : 0) - (held.has("back") ? 1 : 0);
+  const side = (held.has("left") ? 1 : 0) - (held.has("right") ? 1 : 0);
+  wish.by = "keys";
+  wish.held = held.size > 0;
+  wish.steering = towards(wish.steering, side, TURN_PER_S * passed);
+  const begun = Math.sign(wish.throttle) === way ? wish.throttle : 0;
+  wish.throttle = way ? towards(begun, way * most, RISE_PER_S * passed) : 0;
+}
+
+/** What a gamepad says whose trigger is pulled; null: none is. */
+function pull() {
+  if (document.hidden || !document.hasFocus()) return null;
+  for (const pad of navigator.getGamepads?.() ?? []) {
+    if (!pad?.connected || !TRIGGERS.some((i) => (pad.buttons[i]?.value ?? 0) > PULLED)) continue;
+    const [x, y] = [rested(pad.axes[0]), rested(pad.axes[1])];
+    return { by: "gamepad", held: true, throttle: -y, steering: -x };
+  }
+  return null;
+}
+
+function rested(value = 0) {
+  return Math.abs(value) < REST ? 0 : Math.max(-1, Math.min(1, value));
+}
+
+function towards(from, to, most) {
+  return from + Math.max(-most, Math.min(most, to - from));
+}

@@ -1,0 +1,31 @@
+/** What is held against each station on the air: asked every two seconds while a page shows it. */
+import { signal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+
+const EVERY_MS = 2000;
+
+/** `{watched, witness, stations, reported}`; null until it was heard. */
+export const misbehaviour = signal(null);
+
+export function useMisbehaviour() {
+  useEffect(() => {
+    let ended = false;
+    const ask = async () => {
+      const reply = await fetch("/api/v1/misbehaviour").catch(() => null);
+      if (!ended && reply?.ok) misbehaviour.value = await reply.json();
+    };
+    ask();
+    const timer = setInterval(ask, EVERY_MS);
+    return () => {
+      ended = true;
+      clearInterval(timer);
+    };
+  }, []);
+}
+
+/** `{score, reported}` of a car; the score is null where nobody watches it. */
+export function doubtOf(vehicle) {
+  const told = misbehaviour.value;
+  const row = told?.stations.find((one) => one.station === vehicle);
+  return { score: row?.score ?? null, reported: told?.reported.includes(vehicle) ?? false };
+}

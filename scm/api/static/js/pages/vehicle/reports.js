@@ -1,0 +1,53 @@
+/** The last half minute of all that a car reports, in columns; heard while somebody shows it. */
+import { signal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+
+export const SHOWN_S = 30;
+const DEGREES = 180 / Math.PI;
+
+/** Columns of `Sample` in their order, angles in degrees; `t` counts from the newest report backwards. */
+const NAMES = ["t", "throttle", "steering", "speed", "angle", "yawRate", "accel"];
+
+/** Counts up with every frame that came. */
+export const fresh = signal(0);
+
+let columns = empty();
+
+function empty() {
+  return Object.fromEntries(NAMES.map((name) => [name, []]));
+}
+
+/** The columns as they are now; nobody else writes them. */
+export function reportsNow() {
+  return columns;
+}
+
+/** Hear a car's reports for as long as the component is on the page. */
+export function useReports(vehicle) {
+  useEffect(() => {
+    columns = empty();
+    fresh.value += 1;
+    const source = new EventSource(`/api/v1/vehicles/${vehicle}/reports`);
+    source.addEventListener("reports", (message) => {
+      for (const row of JSON.parse(message.data).samples) take(row);
+      forget();
+      fresh.value += 1;
+    });
+    return () => source.close();
+  }, [vehicle]);
+}
+
+function take([t, throttle, steering, speed, angle, yawRate, accel]) {
+  const last = columns.t.at(-1);
+  if (last !== undefined && t <= last) {
+    if (last - t < 1) return; // late
+    columns = empty(); // the car's clock began anew
+  }
+  const row = [t, throttle, steering, speed, angle * DEGREES, yawRate * DEGREES, accel];
+  NAMES.forEach((name, i) => columns[name].push(row[i]));
+}
+
+function forget() {
+  const first = columns.t.findIndex((t) => t >= columns.t.at(-1) - SHOWN_S);
+  if (first > 100) for (const name of NAMES) columns[name].splice(0, first);
+}

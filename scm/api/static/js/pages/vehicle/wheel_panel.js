@@ -1,0 +1,144 @@
+/** Take a car's wheel: keys, gamepad or pads; a dead-man in all of them; and give it back. */
+import { useEffect, useState } from "preact/hooks";
+import { html } from "scm/shared/html.js";
+import { fixed, UNKNOWN } from "scm/shared/format.js";
+import { stop } from "scm/shell/store.js";
+import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
+import { drop, giveBack, most, pad, take, wheel } from "scm/pages/vehicle/wheel.js";
+
+const PADS = [
+  ["ahead", "▲", "Ahead", "W"],
+  ["left", "◀", "Left", "A"],
+  ["back", "▼", "Back", "S"],
+  ["right", "▶", "Right", "D"],
+];
+const WHY = {
+  driving: "You drive",
+  released: "No hand on the wheel: it stands",
+  silent: "This page is silent: it stands",
+};
+
+export function WheelPanel({ car }) {
+  useEffect(() => drop, []);
+  const { state } = wheel.value;
+  return html`
+    <section class="panel wheel" data-state=${state} aria-label="Drive by hand">
+      <div class="panel-head">
+        <h2>Drive by hand</h2>
+        ${state === "held" && html`<span class="yours">You hold the wheel</span>`}
+      </div>
+      ${state === "held" ? html`<${Held} car=${car} />` : html`<${Free} car=${car} />`}
+    </section>
+  `;
+}
+
+function Free({ car }) {
+  const { state, over } = wheel.value;
+  const taken = !isAtHome(car);
+  return html`
+    <p>
+      ${taken ? html`${car.vehicle} is driven by <b>${ownerOf(car)}</b>.` : `${car.vehicle} is driven by ${ownerOf(car)}, which goes on when you give it back.`}
+    </p>
+    ${over && html`<p class="over" role="status" data-code=${over.code}>${said(over)}</p>`}
+    ${taken
+      ? html`<${Steal} car=${car} />`
+      : html`
+          <div class="actions">
+            <button class="primary big" disabled=${state === "asking" || !car.alive} onClick=${() => take(car.vehicle)}>
+              ${state === "asking" ? "Asking …" : "Take over"}
+            </button>
+          </div>
+        `}
+    <${Help} />
+  `;
+}
+
+/** Who takes a car from somebody says why: it stands in the events. */
+function Steal({ car }) {
+  const [reason, setReason] = useState("");
+  const submit = (event) => {
+    event.preventDefault();
+    take(car.vehicle, reason.trim());
+  };
+  return html`
+    <form class="steal" onSubmit=${submit}>
+      <input aria-label="Reason" required maxlength="200" placeholder="Why you take it" value=${reason} onInput=${(event) => setReason(event.target.value)} />
+      <button class="danger" disabled=${!reason.trim()}>Take it anyway</button>
+    </form>
+  `;
+}
+
+function Held({ car }) {
+  const { told, round_ms } = wheel.value;
+  const stopped = stop.value.engaged;
+  const why = stopped ? "The city is stopped: nothing drives" : (WHY[told?.why] ?? "Waiting for the car");
+  return html`
+    <p class="now" role="status" data-why=${stopped ? "stopped" : told?.why}>${why}</p>
+    <div class="instruments">
+      <${Bar} name="Throttle" value=${told?.throttle ?? 0} />
+      <${Bar} name="Steering" value=${-(told?.steering ?? 0)} shown=${told?.steering ?? 0} />
+    </div>
+    <dl>
+      <dt>Speed</dt><dd>${fixed(told?.speed_mps, 2, " m/s")}</dd>
+      <dt>The car says</dt><dd>${told?.mode ?? UNKNOWN}</dd>
+      <dt>Round trip</dt><dd data-fact="latency">${round_ms === null ? UNKNOWN : `${Math.round(round_ms)} ms`}</dd>
+    </dl>
+    <div class="pads" role="group" aria-label="Pads: hold to drive">
+      ${PADS.map(([what, sign, word, letter]) => html`<${Pad} key=${what} what=${what} sign=${sign} word=${word} letter=${letter} />`)}
+    </div>
+    <label class="most">
+      Most throttle <b>${Math.round(100 * most.value)} %</b>
+      <input type="range" min="0.1" max="1" step="0.05" value=${most.value} onInput=${(event) => (most.value = Number(event.target.value))} />
+    </label>
+    <button class="give-back big" onClick=${giveBack}>Give ${car.vehicle} back</button>
+  `;
+}
+
+function Pad({ what, sign, word, letter }) {
+  const down = (event) => {
+    event.currentTarget.setPointerCapture?.(event.pointerId);
+    pad(what, true);
+  };
+  const up = () => pad(what, false);
+  return html`
+    <button
+      class="pad"
+      data-pad=${what}
+      aria-label="${word}: hold"
+      onPointerDown=${down}
+      onPointerUp=${up}
+      onPointerCancel=${up}
+      onLostPointerCapture=${up}
+      onContextMenu=${(event) => event.preventDefault()}
+    ><span>${sign}</span><small>${letter}</small></button>
+  `;
+}
+
+function Bar({ name, value, shown = value }) {
+  return html`
+    <label class="bar">
+      <span>${name}</span>
+      <meter class="hidden" min="-1" max="1" value=${shown}>${shown}</meter>
+      <svg viewBox="-1 0 2 0.16" preserveAspectRatio="none" aria-hidden="true">
+        <rect x=${Math.min(0, value)} y="0" width=${Math.abs(value)} height="0.16" />
+        <line x1="0" x2="0" y1="0" y2="0.16" />
+      </svg>
+      <b>${fixed(shown, 2)}</b>
+    </label>
+  `;
+}
+
+function Help() {
+  return html`
+    <ul class="help">
+      <li><kbd>W</kbd> <kbd>A</kbd> <kbd>S</kbd> <kbd>D</kbd> or arrows: hold to drive, let go to stop.</li>
+      <li>Gamepad: hold a trigger; the left stick drives and steers.</li>
+      <li>Hidden page, lost focus or 250 ms of silence: the car stops.</li>
+    </ul>
+  `;
+}
+
+function said({ code, detail }) {
+  const begins = { given_back: "Given back", lost: "You lost the wheel", owned: "Not taken", ended: "It ended", abandoned: "Given back" }[code];
+  return begins ? `${begins}: ${detail}.` : detail;
+}

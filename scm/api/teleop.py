@@ -1,0 +1,309 @@
+"""Teleoperation: one person at one car's wheel, over a WebSocket.
+
+    take          the lease is asked for; stolen only with a reason
+    drive         each packet goes to the car at once; without packets zeros go out every 50 ms
+    give back     or the connection ends: the lease goes back, and the car goes on with its trip
+
+The car's guard stops it 300 ms after the last command, whatever becomes of this process; the
+city-wide stop holds in the guard as well, so no packet passes it.
+"""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable
+
+import msgspec
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+
+from scm.api.city import City
+from scm.api.problem import RefusedError
+from scm.api.wheel import (
+    LEASE_MS,
+    DrivePacket,
+    GiveBackPacket,
+    Packet,
+    TakePacket,
+    Wheel,
+)
+from scm.api.wire import Wire
+from scm.clock import NS_PER_S, Clock, seconds
+from scm.errors import LinkError
+from scm.log import event
+from scm.v2x.message import Message, Refused
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
+from scm.v2x.messages.route_request import RouteReply, RouteRequest
+from scm.v2x.messages.trip import Trip
+
+PROTOCOL = "scm.drive.v1"
+BEAT_S = 0.05
+GAP_S = 0.01
+FIRST_WORD_S = 5.0
+RENEW_TIMEOUT_S = 0.7
+RESUME_NS = 2 * NS_PER_S
+RESUME_PAUSE_S = 0.1
+TRIP_KNOWN_S = 10.0
+NORMAL, GOING_AWAY, BAD_PACKET, NOT_YOURS = 1000, 1001, 1007, 4409
+
+_log = logging.getLogger(__name__)
+
+
+class Taken(msgspec.Struct, kw_only=True, frozen=True, tag="taken"):
+    """The wheel is yours."""
+
+    vehicle: str
+    owner: str
+    epoch: int
+
+
+class Told(msgspec.Struct, kw_only=True, frozen=True, tag="told"):
+    """What became of your newest packet.
+
+    Attributes:
+        seq, t_ms: Of that packet, to measure the way; None: none came yet.
+        why: `driving`, `released` (no hand on the dead-man) or `silent` (no packet for 250 ms).
+        throttle, steering: What the car was told.
+        mode: The car's, as the world last told it: `stop` also while the city is stopped.
+    """
+
+    seq: int | None
+    t_ms: float | None
+    why: str
+    throttle: float
+    steering: float
+    mode: str
+    speed_mps: float | None
+
+
+class Over(msgspec.Struct, kw_only=True, frozen=True, tag="over"):
+    """You do not hold the wheel: refused, lost, or given back; the connection ends.
+
+    Attributes:
+        code: `given_back`, `abandoned`, `lost`, `ended`, or the city's word for its refusal.
+    """
+
+    code: str
+    detail: str
+
+
+_packets: msgspec.json.Decoder[Packet] = msgspec.json.Decoder(Packet)
+
+
+class Seat:
+    """One connection of one person to one car.
+
+    Args:
+        city: Where the car is.
+        wire: Says its commands.
+        clock: Of this process.
+        socket: Accepted already.
+        vehicle: The car.
+        owner: The name of the lease: of nobody else's connection.
+        is_closed: Tells when the server ends.
+    """
+
+    def __init__(
+        self,
+        city: City,
+        wire: Wire,
+        clock: Clock,
+        socket: WebSocket,
+        vehicle: str,
+        owner: str,
+        is_closed: Callable[[], bool],
+    ) -> None:
+        self._city, self._wire, self._clock, self._socket = city, wire, clock, socket
+        self._vehicle, self._owner, self._is_closed = vehicle, owner, is_closed
+        self._news = asyncio.Event()
+        self._over: Over | None = None
+        self._renewing: asyncio.Task[None] | None = None
+
+    async def run(self) -> None:
+        """Take the wheel, drive, give it back; returns when all of it is over."""
+        first = await self._first_word()
+        if first is None:
+            return
+        trip = self._trip()
+        try:
+            lease = await asyncio.to_thread(self._take, first.reason)
+        except RefusedError as refusal:
+            await self._end(Over(code=refusal.refused.code, detail=str(refusal)), NOT_YOURS)
+            return
+        wheel = Wheel(self._vehicle, self._owner, lease.epoch, self._clock.now_ns())
+        reading: asyncio.Task[None] | None = None
+        try:
+            await self._send(Taken(vehicle=self._vehicle, owner=self._owner, epoch=lease.epoch))
+            reading = asyncio.create_task(self._read(wheel))
+            await self._drive(wheel)
+        except (WebSocketDisconnect, RuntimeError):
+            pass  # the page has gone: what follows is all that there is to do
+        finally:
+            if reading is not None:
+                reading.cancel()
+            await asyncio.shield(self._leave(wheel, trip))
+
+    async def _first_word(self) -> TakePacket | None:
+        try:
+            word = await asyncio.wait_for(self._socket.receive_text(), FIRST_WORD_S)
+            packet = _packets.decode(word)
+            if isinstance(packet, TakePacket):
+                return packet
+            detail = f"the first packet: got a {type(packet).__name__}, expected a take"
+            await self._end(Over(code="invalid", detail=detail), BAD_PACKET)
+        except (TimeoutError, msgspec.MsgspecError, KeyError) as cause:
+            detail = f"the first packet: {cause or 'none'}; expected a take"
+            await self._end(Over(code="invalid", detail=detail), BAD_PACKET)
+        except WebSocketDisconnect:
+            pass
+        return None
+
+    def _take(self, reason: str) -> LeaseReply:
+        request = LeaseRequest(
+            vehicle=self._vehicle,
+            owner=self._owner,
+            verb="steal" if reason.strip() else "acquire",
+            ttl_ms=LEASE_MS,
+            reason=reason,
+        )
+        lease = self._city.ask(request, LeaseReply)
+        self._tell("wheel_taken", f"{self._owner} drives {self._vehicle} by hand")
+        return lease
+
+    async def _read(self, wheel: Wheel) -> None:
+        """Hear the person, until one of the two ends it."""
+        try:
+            while self._over is None:
+                packet = _packets.decode(await self._socket.receive_text())
+                if isinstance(packet, GiveBackPacket):
+                    self._over = Over(code="given_back", detail="")
+                elif isinstance(packet, DrivePacket):
+                    wheel.hear(packet, self._clock.now_ns())
+                self._news.set()
+        except (msgspec.MsgspecError, KeyError) as cause:
+            self._over = Over(code="invalid", detail=f"packet: {cause}")
+        except (WebSocketDisconnect, RuntimeError):
+            self._over = Over(code="ended", detail="the connection ended")
+        self._news.set()
+
+    async def _drive(self, wheel: Wheel) -> None:
+        while self._over is None:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._news.wait(), BEAT_S)
+            self._news.clear()
+            now_ns = self._clock.now_ns()
+            if self._over is None:
+                await self._pass_on(wheel, now_ns)
+            if self._is_closed():
+                self._over = Over(code="ended", detail="the server ends")
+            elif wheel.is_abandoned(now_ns):
+                self._over = Over(code="abandoned", detail="no packet came for 5 s")
+            else:
+                await asyncio.sleep(GAP_S)  # however fast a page speaks
+
+    async def _pass_on(self, wheel: Wheel, now_ns: int) -> None:
+        command = wheel.command(now_ns)
+        try:
+            self._wire.say(command)
+        except LinkError as closed:
+            self._over = Over(code="offline", detail=str(closed))
+            return
+        if self._renewing is None or self._renewing.done():
+            request = wheel.renewal(now_ns)
+            if request is not None:
+                self._renewing = asyncio.create_task(self._renew(request))
+        snapshot = self._city.view.snapshot
+        cars = () if snapshot is None else snapshot.message.vehicles
+        car = next((car for car in cars if car.vehicle == self._vehicle), None)
+        newest = wheel.newest
+        told = Told(
+            seq=None if newest is None else newest.seq,
+            t_ms=None if newest is None else newest.t_ms,
+            why=wheel.why(now_ns),
+            throttle=command.throttle,
+            steering=command.steering,
+            mode="lost" if car is None else car.mode,
+            speed_mps=None if car is None else round(car.speed_mps, 4),
+        )
+        await self._send(told)
+
+    async def _renew(self, request: LeaseRequest) -> None:
+        try:
+            reply = await asyncio.to_thread(self._wire.ask_once, request, RENEW_TIMEOUT_S)
+        except LinkError as closed:
+            reply = Refused(code="offline", detail=str(closed))
+        if isinstance(reply, Refused) and reply.code not in ("timeout", "offline"):
+            self._over = self._over or Over(code="lost", detail=reply.detail)
+            self._news.set()
+
+    async def _leave(self, wheel: Wheel, trip: Trip | None) -> None:
+        over = self._over or Over(code="ended", detail="the connection ended")
+        if over.code != "lost":
+            told = await self._give_back(wheel, trip)
+            over = Over(code=over.code, detail=f"{over.detail}; {told}".removeprefix("; "))
+        self._tell("wheel_left", f"{self._owner} let go of {self._vehicle}: {over.detail}")
+        status = {"given_back": NORMAL, "invalid": BAD_PACKET, "lost": NOT_YOURS}
+        await self._end(over, status.get(over.code, GOING_AWAY))
+
+    async def _give_back(self, wheel: Wheel, trip: Trip | None) -> str:
+        """Return the lease, send the car on where it was going, and say how that went."""
+        request = LeaseRequest(
+            vehicle=self._vehicle, owner=self._owner, verb="release", epoch=wheel.epoch
+        )
+        try:
+            await asyncio.to_thread(self._city.ask, request, LeaseReply)
+        except RefusedError as refusal:
+            return f"the lease was not given back: {refusal}"
+        return f"{self._vehicle} stands" if trip is None else await self._resume(trip)
+
+    async def _resume(self, trip: Trip) -> str:
+        """Send the car on; an agent first waits to be sure that nobody drives it any more."""
+        until_ns = self._clock.now_ns() + RESUME_NS
+        via = () if trip.length_m is None else trip.route[-1:]
+        while True:
+            request = RouteRequest(vehicle=self._vehicle, via=via)
+            answer = await asyncio.to_thread(self._ask_route, request)
+            if not isinstance(answer, Refused):
+                return f"{self._vehicle} goes on by itself"
+            if answer.code != "owned" or self._clock.now_ns() >= until_ns:
+                return f"{self._vehicle} stands: {answer.detail}"
+            await asyncio.sleep(RESUME_PAUSE_S)
+
+    def _ask_route(self, request: RouteRequest) -> Message:
+        try:
+            return self._city.ask(request, RouteReply)
+        except RefusedError as refusal:
+            return refusal.refused
+
+    def _trip(self) -> Trip | None:
+        """Return the trip that the car is on, which ends when it is taken."""
+        held = self._city.view.trips.get(self._vehicle)
+        now_ns = self._city.view.now_ns
+        if held is None or held.message.arrived_ns is not None:
+            return None
+        return held.message if held.age_s(now_ns) <= TRIP_KNOWN_S else None
+
+    def _tell(self, name: str, text: str) -> None:
+        now_ns = self._clock.now_ns()
+        event(_log, name, vehicle=self._vehicle, owner=repr(self._owner), t_s=seconds(now_ns))
+        with contextlib.suppress(LinkError):
+            self._wire.say(
+                CityEvent(
+                    severity="info",
+                    source=self._city.view.name,
+                    t_ns=now_ns,
+                    name=name,
+                    text=text,
+                    vehicle=self._vehicle,
+                )
+            )
+
+    async def _send(self, word: Taken | Told | Over) -> None:
+        await self._socket.send_text(msgspec.json.encode(word).decode())
+
+    async def _end(self, over: Over, status: int) -> None:
+        if self._socket.client_state is not WebSocketState.CONNECTED:
+            return
+        with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+            await self._send(over)
+            await self._socket.close(status)

@@ -1,0 +1,129 @@
+"""A car's wheel in the hands of a person far away: the rules, without socket, bus or clock.
+
+    the person holds a key, a stick or a pad     the car obeys the newest packet
+    lets go                                      zero throttle at once, steering as it was
+    no packet for 250 ms                         zero throttle, steering held
+    no packet for 5 s                            the wheel is given back
+
+Whatever passes here passes the car's own guard as well, which stops it when this process dies.
+"""
+
+import math
+from typing import Literal
+
+import msgspec
+
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.lease_request import LeaseRequest
+
+SILENT_NS = 250 * NS_PER_MS
+GONE_NS = 5 * NS_PER_S
+LEASE_MS = 3000  # the guard stops the car long before: this bridges a slow moment of ours
+RENEW_NS = 700 * NS_PER_MS
+
+Why = Literal["driving", "released", "silent"]
+
+
+class TakePacket(msgspec.Struct, kw_only=True, frozen=True, tag="take", forbid_unknown_fields=True):
+    """The first word of a person; with a `reason` the car is taken from whoever has it."""
+
+    reason: str = ""
+
+
+class DrivePacket(
+    msgspec.Struct, kw_only=True, frozen=True, tag="drive", forbid_unknown_fields=True
+):
+    """What is wished for now.
+
+    Attributes:
+        seq: Counts up.
+        t_ms: On the person's clock; comes back in the answer to this packet.
+        held: Whether a hand is on the dead-man: a key, a trigger, a pad.
+        throttle: -1 to 1, + = forward.
+        steering: -1 to 1, + = left.
+    """
+
+    seq: int
+    t_ms: float
+    held: bool
+    throttle: float
+    steering: float
+
+
+class GiveBackPacket(
+    msgspec.Struct, kw_only=True, frozen=True, tag="give_back", forbid_unknown_fields=True
+):
+    """The last word of a person."""
+
+
+Packet = TakePacket | DrivePacket | GiveBackPacket
+
+
+class Wheel:
+    """One person's commands to one car under one lease.
+
+    Args:
+        vehicle: The car.
+        owner: Whose lease it is.
+        epoch: Of the lease.
+        now_ns: When it was granted.
+    """
+
+    def __init__(self, vehicle: str, owner: str, epoch: int, now_ns: int) -> None:
+        self.vehicle = vehicle
+        self.owner = owner
+        self.epoch = epoch
+        self.newest: DrivePacket | None = None
+        self._heard_ns = now_ns
+        self._renew_ns = now_ns + RENEW_NS
+        self._seq = 0
+        self._steering = 0.0
+
+    def hear(self, packet: DrivePacket, now_ns: int) -> bool:
+        """Take a packet; refuse one that is old or holds no numbers; return which."""
+        numbers = (packet.throttle, packet.steering, packet.t_ms)
+        is_old = self.newest is not None and packet.seq <= self.newest.seq
+        if is_old or not all(map(math.isfinite, numbers)):
+            return False
+        self.newest, self._heard_ns = packet, now_ns
+        self._steering = max(-1.0, min(1.0, packet.steering))
+        return True
+
+    def why(self, now_ns: int) -> Why:
+        """Return whether the person drives, and why not."""
+        if now_ns - self._heard_ns >= SILENT_NS:
+            return "silent"
+        return "driving" if self.newest is not None and self.newest.held else "released"
+
+    def is_abandoned(self, now_ns: int) -> bool:
+        """Return whether nobody has been there for so long that the car goes back."""
+        return now_ns - self._heard_ns >= GONE_NS
+
+    def command(self, now_ns: int) -> DriveCommand:
+        """Return what the car is to do now."""
+        self._seq += 1
+        throttle = 0.0
+        if self.newest is not None and self.why(now_ns) == "driving":
+            throttle = max(-1.0, min(1.0, self.newest.throttle))
+        return DriveCommand(
+            vehicle=self.vehicle,
+            t_ns=now_ns,
+            epoch=self.epoch,
+            seq=self._seq,
+            throttle=throttle,
+            steering=self._steering,
+        )
+
+    def renewal(self, now_ns: int) -> LeaseRequest | None:
+        """Return the request that keeps the lease, three times in its life; None: not yet."""
+        if now_ns < self._renew_ns:
+            return None
+        self._renew_ns = now_ns + RENEW_NS
+        return LeaseRequest(
+            vehicle=self.vehicle,
+            owner=self.owner,
+            verb="renew",
+            epoch=self.epoch,
+            ttl_ms=LEASE_MS,
+        )

@@ -1,0 +1,56 @@
+"""How the interface speaks on the bus beside requests with an id: commands, and questions."""
+
+import threading
+from typing import Protocol
+
+from scm.v2x.bus import Bus
+from scm.v2x.exchange import Call, Incoming
+from scm.v2x.message import Message, Refused, Request
+
+SLACK_S = 0.5
+
+
+class Wire(Protocol):
+    """What teleoperation needs of the bus; safe from any thread."""
+
+    def say(self, message: Message) -> None:
+        """Publish; never waits for a slow receiver.
+
+        Raises:
+            LinkError: when the bus is closed.
+        """
+        ...
+
+    def ask_once(self, request: Request, timeout_s: float) -> Message:
+        """Return the reply, or a `Refused`: asked once, under no id, so that none is stored.
+
+        Raises:
+            LinkError: when the bus is closed.
+        """
+        ...
+
+
+class BusWire:
+    """The wire of a real bus."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+
+    def say(self, message: Message) -> None:
+        """Publish."""
+        self._bus.publish(message)
+
+    def ask_once(self, request: Request, timeout_s: float) -> Message:
+        """Ask, and wait for the reply."""
+        replied = threading.Event()
+        replies: list[Incoming] = []
+
+        def take(reply: Incoming) -> None:
+            replies.append(reply)
+            replied.set()
+
+        self._bus.call(Call(request, timeout_s), take)
+        if replied.wait(timeout_s + SLACK_S):
+            return replies[0].message
+        what = type(request).__name__
+        return Refused(code="timeout", detail=f"{what}: no answer within {timeout_s:g} s")

@@ -1,0 +1,58 @@
+"""What a car reports of itself, heard while somebody looks, and told as rows."""
+
+import pytest
+
+from scm.api.close_up import DEPTH, sample_of
+from scm.part import Hears
+from scm.v2x.messages.vehicle_state import VehicleState
+
+
+@pytest.fixture
+def report():
+    def build(seq=1, vehicle="n1", steering=0.2):
+        return VehicleState(
+            vehicle=vehicle, t_ns=seq * 20_000_000, seq=seq, x_m=0.0, y_m=0.0, yaw_rad=0.0,
+            speed_mps=0.25, yaw_rate_radps=0.1, accel_mps2=0.5, steering_rad=0.05, throttle=0.9,
+            steering=steering, source="simulated",
+        )  # fmt: skip
+
+    return build
+
+
+def test_reports_are_heard_only_while_somebody_looks(view):
+    wish = Hears(VehicleState, {"vehicle": "n1"})
+    assert wish not in view.hears
+    with view.watching_closely("n1"), view.watching_closely("n1"):
+        assert list(view.hears).count(wish) == 1
+    assert wish not in view.hears
+
+
+def test_each_report_is_told_once_and_in_order(view, hear, report):
+    with view.watching_closely("n1"):
+        hear(1.0, report(1), report(2), report(1, vehicle="n2"))
+        number, states = view.reports_after("n1", 0)
+        assert [state.seq for state in states] == [1, 2]
+        hear(1.1, report(3))
+        number, states = view.reports_after("n1", number)
+        assert [state.seq for state in states] == [3]
+        assert view.reports_after("n1", number) == (number, ())
+
+
+def test_what_nobody_fetches_is_forgotten(view, hear, report):
+    with view.watching_closely("n1"):
+        hear(1.0, *(report(seq) for seq in range(1, DEPTH + 3)))
+        assert len(view.reports_after("n1", 0)[1]) == DEPTH
+    with view.watching_closely("n1"):
+        assert view.reports_after("n1", 0)[1] == ()
+
+
+def test_a_row_holds_command_and_response_in_the_documented_order(report):
+    row = sample_of(report(5))
+    assert row.__struct_fields__[:4] == ("t_s", "throttle", "steering", "speed_mps")
+    assert (row.t_s, row.throttle, row.steering, row.speed_mps) == (0.1, 0.9, 0.2, 0.25)
+    assert (row.steering_rad, row.yaw_rate_radps, row.accel_mps2) == (0.05, 0.1, 0.5)
+    assert sample_of(report(steering=None)).steering is None
+
+
+def test_a_car_that_is_not_there_has_no_reports(client):
+    assert client("GET", "/api/v1/vehicles/n9/reports").status_code == 404
