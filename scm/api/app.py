@@ -27,6 +27,8 @@ from scm.api.routes import (
     map,  # noqa: A004  named for its noun
     misbehaviour,
     operations,
+    recordings,
+    scenarios,
     session,
     signals,
     stations,
@@ -65,6 +67,7 @@ def create_app(
     keys: KeyRing | None = None,
     plans: Mapping[str, Sequence[str]] | None = None,
     shelves: Shelves | None = None,
+    connect: str = "",
 ) -> FastAPI:
     """Build the application.
 
@@ -76,8 +79,9 @@ def create_app(
             everything.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
         shelves: Folders of recordings, reports and the like; None: the city offers none.
+        connect: Endpoint of the city's router, for scripts that are run beside it.
     """
-    city = City(view, ask, city_map, plans or {}, shelves or Shelves())
+    city = City(view, ask, city_map, plans or {}, shelves or Shelves(), connect)
     work = Operations(WallClock())
     stream = Stream(city, uuid.uuid4().hex[:8])
     app = FastAPI(
@@ -96,6 +100,8 @@ def create_app(
     api = APIRouter(prefix="/api/v1")
     for noun in (vehicles, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic):
         api.include_router(noun.router(city), responses=problem.RESPONSES)
+    api.include_router(recordings.router(city), responses=problem.RESPONSES)
+    api.include_router(scenarios.router(city, work), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
     api.include_router(operations.router(work), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)

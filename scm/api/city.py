@@ -36,6 +36,7 @@ class City:
         send: Asks a request on the bus and waits for the reply, at most so many seconds.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
         shelves: Folders that the interface reads and writes.
+        connect: Endpoint of the city's router; empty: not known.
     """
 
     view: CityView
@@ -43,6 +44,7 @@ class City:
     city_map: CityMap
     plans: Mapping[str, Sequence[str]] = field(default_factory=dict)
     shelves: Shelves = field(default_factory=Shelves)
+    connect: str = ""
 
     def ask(self, request: Request, reply: type[R]) -> R:
         """Ask the city and return its answer; blocks, so only for routes in the thread pool.

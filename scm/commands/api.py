@@ -51,6 +51,7 @@ def _run(arguments: argparse.Namespace) -> int:
             lambda request, timeout_s: ask(bus, request, timeout_s),
             city_map,
             keys=keys,
+            connect=arguments.connect,
             shelves=shelves_in(arguments.data) if arguments.data else None,
             plans={junction.name: names("scm.traffic.plans") for junction in city_map.junctions},
         )
