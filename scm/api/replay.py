@@ -191,7 +191,7 @@ class _Frames:
         return True
 
     def _car(self, car: SnapshotVehicle) -> CarAt:
-        facts = CarFacts(vehicle=car.vehicle, kind=car.kind, car=car.car, owner=car.owner)
+        facts = _facts(car)
         number = self._numbers.setdefault(facts, len(self.cars))
         if number == len(self.cars):
             self.cars.append(facts)
@@ -255,12 +255,23 @@ def map_of(index: RunIndex) -> CityMap | None:
     return told.map if told is not None else None
 
 
-def cars_in(index: RunIndex) -> tuple[str, ...]:
+def cars_in(index: RunIndex) -> tuple[CarFacts, ...]:
     """Return all cars of the first and the last snapshot: those that a sparse recording tells."""
     first = next(index.read(0, index.end_ns, SNAPSHOT), None)
     last = index.newest(index.end_ns, SNAPSHOT)
     told = [read(one, WorldSnapshot) for one in (first, last) if one is not None]
-    return tuple({car.vehicle: None for one in told if one is not None for car in one.vehicles})
+    cars = {car.vehicle: _facts(car) for one in told if one is not None for car in one.vehicles}
+    return tuple(cars.values())
+
+
+def first_frame_s(index: RunIndex) -> float:
+    """Return when the world first told where cars are; 0 where it never did."""
+    first = next(index.read(0, index.end_ns, SNAPSHOT), None)
+    return (first.t_ns - index.begin_ns) / NS_PER_S if first is not None else 0.0
+
+
+def _facts(car: SnapshotVehicle) -> CarFacts:
+    return CarFacts(vehicle=car.vehicle, kind=car.kind, car=car.car, owner=car.owner)
 
 
 def csv_of(index: RunIndex, vehicle: str = "") -> Iterator[bytes]:

@@ -17,10 +17,11 @@ from scm.api.etag import check_match, tagged
 from scm.api.paging import Cursor, Limit, Page, page_of, page_response
 from scm.api.problem import RefusedError
 from scm.api.ranged import send_file
-from scm.api.recordings_shelf import NAME, Notes, RecordingRow, RecordingsShelf, natural, unreadable
+from scm.api.recordings_shelf import NAME, Notes, RecordingRow, RecordingsShelf, cars_of, natural, unreadable
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
 from scm.errors import RecordingError
 from scm.maps.draw import draw_svg
+from scm.maps.model import Box, Light
 from scm.recorder.run_index import RunIndex
 from scm.v2x.message import Refused
 
@@ -67,15 +68,15 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         cars: All cars that it tells of.
         map_title: Of the map that was driven on; empty: it does not tell.
-        map_svg: Address of the drawn map.
-        events: How many it holds.
+        first_frame_s: When the world first told where cars are: it may have begun later.
     """
 
     recording: RecordingRow
-    cars: tuple[str, ...]
+    cars: tuple[replay.CarFacts, ...]
     map_title: str
-    map_svg: str
-    events: int
+    lights: tuple[Light, ...]
+    boxes: tuple[Box, ...]
+    first_frame_s: float
 
 
 def router(city: City) -> APIRouter:
@@ -126,7 +127,7 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
     @routes.get("/{name}/csv", summary="Its cars as CSV", response_class=Response)
     def as_csv(name: Name, vehicle: Vehicle = "") -> Response:
         index = shelf.index(name)
-        if vehicle and vehicle not in _cars(index):
+        if vehicle and vehicle not in cars_of(index):
             raise not_found(f"car of {name}", vehicle)
         file = f"{name}{f'-{vehicle}' if vehicle else ''}.csv"
         return StreamingResponse(replay.csv_of(index, vehicle), 200, _named(file), "text/csv")
@@ -144,8 +145,9 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:
                 recording=shelf.row(name),
                 cars=_cars(index),
                 map_title=city_map.title if city_map else "",
-                map_svg=f"/api/v1/recordings/{name}/map.svg",
-                events=len(replay.events_of(index)),
+                lights=city_map.lights if city_map else (),
+                boxes=city_map.boxes if city_map else (),
+                first_frame_s=replay.first_frame_s(index),
             )
         )
 
@@ -209,8 +211,8 @@ def _readable(shelf: RecordingsShelf, name: str) -> RunIndex:
     return index
 
 
-def _cars(index: RunIndex) -> tuple[str, ...]:
-    return tuple(sorted(replay.cars_in(index), key=natural))
+def _cars(index: RunIndex) -> tuple[replay.CarFacts, ...]:
+    return tuple(sorted(replay.cars_in(index), key=lambda car: natural(car.vehicle)))
 
 
 def _named(file: str) -> dict[str, str]:
