@@ -17,7 +17,15 @@ from scm.api.etag import check_match, tagged
 from scm.api.paging import Cursor, Limit, Page, page_of, page_response
 from scm.api.problem import RefusedError
 from scm.api.ranged import send_file
-from scm.api.recordings_shelf import NAME, Notes, RecordingRow, RecordingsShelf, cars_of, natural, unreadable
+from scm.api.recordings_shelf import (
+    NAME,
+    Notes,
+    RecordingRow,
+    RecordingsShelf,
+    cars_of,
+    natural,
+    unreadable,
+)
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
 from scm.errors import RecordingError
 from scm.maps.draw import draw_svg

@@ -88,8 +88,9 @@ def _add_scripts(routes: APIRouter, shelf: ScenarioShelf) -> None:
         request: Request, name: Name, body: ScenarioBody, key: IdempotencyKey = ""
     ) -> Response:
         del key  # the same script twice is the same script
-        check_match(request, shelf.find(name))
-        return tagged(request, shelf.write(name, body.text))
+        before = shelf.find(name)
+        check_match(request, before)
+        return tagged(request, shelf.write(name, body.text), 200 if before else 201)
 
     @routes.delete("/{name}", summary="Delete a script", dependencies=[ADMIN])
     def remove(name: Name, key: IdempotencyKey = "") -> Response:

@@ -34,7 +34,7 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
       go("/mismatch");
     }
   };
-  const time = (end, title) => html`
+  const time = (end, title, empty) => html`
     <label>
       ${title}
       <span class="with-button">
@@ -44,7 +44,7 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
           min="0"
           max=${Math.ceil(recording.length_s)}
           step="0.1"
-          placeholder=${end === "from" ? "begin" : "end"}
+          placeholder=${empty}
           value=${span[end]}
           onInput=${(event) => setSpan({ ...span, [end]: event.target.value })}
         />
@@ -67,7 +67,7 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
           Car file
           <input name="car" required pattern="[a-z0-9_\\-]+" maxlength="64" value=${car} onInput=${(event) => setCar(event.target.value)} />
         </label>
-        ${time("from", "From [s]")} ${time("to", "To [s]")}
+        ${time("from", "From [s]", "begin")} ${time("to", "To [s]", "end")}
         <label>
           Search for at most
           <select name="budget">
