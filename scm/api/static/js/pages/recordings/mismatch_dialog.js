@@ -12,7 +12,7 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
   const first = cars.find((car) => car.vehicle === chosen) ?? cars[0];
   const [vehicle, setVehicle] = useState(first?.vehicle ?? "");
   const [car, setCar] = useState(first?.car ?? "nigel");
-  const [span, setSpan] = useState({ from: "", to: "" });
+  const [span, setSpan] = useState({ start: "", stop: "" });
   const choose = (name) => {
     setVehicle(name);
     setCar(cars.find((one) => one.vehicle === name)?.car ?? car);
@@ -25,8 +25,8 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
       vehicle,
       car,
       budget_s: Number(event.target.elements.budget.value),
-      from_s: span.from === "" ? null : Number(span.from),
-      to_s: span.to === "" ? null : Number(span.to),
+      from_s: span.start === "" ? null : Number(span.start),
+      to_s: span.stop === "" ? null : Number(span.stop),
     };
     const done = () => `The search for ${vehicle} has begun.`;
     if (await change("POST", "/mismatch/jobs", body, done)) {
@@ -67,7 +67,7 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
           Car file
           <input name="car" required pattern="[a-z0-9_\\-]+" maxlength="64" value=${car} onInput=${(event) => setCar(event.target.value)} />
         </label>
-        ${time("from", "From [s]", "begin")} ${time("to", "To [s]", "end")}
+        ${time("start", "From [s]", "begin")} ${time("stop", "To [s]", "end")}
         <label>
           Search for at most
           <select name="budget">

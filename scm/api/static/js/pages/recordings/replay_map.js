@@ -21,7 +21,8 @@ export function ReplayMap({ player, summary, chosen, onChoose }) {
     let request = 0;
     const frame = () => {
       request = requestAnimationFrame(frame);
-      draw(canvas.current, box, player, summary, pick.current);
+      // The page may have gone, and its end not yet be told.
+      if (canvas.current) draw(canvas.current, box, player, summary, pick.current);
     };
     request = requestAnimationFrame(frame);
     return () => cancelAnimationFrame(request);
