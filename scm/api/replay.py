@@ -1,0 +1,331 @@
+"""Moments of a recording, small enough to be drawn: where cars were, what signals showed, events.
+
+Times are seconds since the recording's first message, on the recorder's clock.
+"""
+
+import csv
+import io
+import re
+from collections.abc import Callable, Iterator
+from typing import TypeVar
+
+import msgspec
+
+from scm.clock import NS_PER_S
+from scm.maps.model import CityMap
+from scm.recorder.mcap_file import Recorded
+from scm.recorder.run_index import RunIndex
+from scm.v2x.message import Message
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.v2x.messages.world_definition import WorldDefinition
+from scm.v2x.messages.world_snapshot import SnapshotBox, SnapshotVehicle, WorldSnapshot
+
+MOST_ROWS = 60_000  # of one answer: a hundred cars for a minute at 10 Hz
+MOST_EVENTS = 20_000
+BLOCK = 64 * 1024
+_PREFIX = r"scm/@v\d+/[^/]+/"
+M = TypeVar("M", bound=Message)
+Wanted = Callable[[str], bool]
+
+
+def _key(form: str) -> Wanted:
+    expression = re.compile(_PREFIX + form)
+    return lambda key: expression.fullmatch(key) is not None
+
+
+SNAPSHOT, SPAT, EVENT = _key("world/snapshot"), _key("tl/[^/]+/spat"), _key("event/[^/]+/[^/]+")
+DEFINITION = _key("world/def")
+_DRAWN = _key("(?:world/snapshot|tl/[^/]+/spat)")
+
+
+class CarAt(msgspec.Struct, kw_only=True, frozen=True, array_like=True):
+    """One car in one frame, without names: `[car, x_m, y_m, yaw_rad, ...]`.
+
+    Attributes:
+        car: Number of its entry in `cars`.
+        lights: Names of those that are on.
+    """
+
+    car: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    speed_mps: float
+    steering_rad: float
+    mode: str
+    alive: bool
+    lights: tuple[str, ...]
+
+
+class CarFacts(msgspec.Struct, kw_only=True, frozen=True):
+    """What of a car is the same in all frames."""
+
+    vehicle: str
+    kind: str
+    car: str
+    owner: str
+
+
+class Frame(msgspec.Struct, kw_only=True, frozen=True):
+    """The city at one moment; `boxes` None: as in the frame before."""
+
+    t_s: float
+    cars: tuple[CarAt, ...]
+    boxes: tuple[SnapshotBox, ...] | None
+
+
+class SignalChange(msgspec.Struct, kw_only=True, frozen=True):
+    """From when on a signal group shows a colour."""
+
+    t_s: float
+    group: str
+    colour: str
+
+
+class Frames(msgspec.Struct, kw_only=True, frozen=True):
+    """A stretch of a recording.
+
+    Attributes:
+        to_s: How far it goes: less than was asked where that would be too much for one answer.
+        cars: Whom the frames' numbers mean.
+        signals: Changes, the colours at `from_s` first; a group is `junction/group`.
+        damaged: What of the stretch cannot be read, in words.
+    """
+
+    from_s: float
+    to_s: float
+    hz: float
+    cars: tuple[CarFacts, ...]
+    frames: tuple[Frame, ...]
+    signals: tuple[SignalChange, ...]
+    damaged: tuple[str, ...]
+
+
+class RecordedEvent(msgspec.Struct, kw_only=True, frozen=True):
+    """An event of a recording; `number` counts from its begin."""
+
+    number: int
+    t_s: float
+    severity: str
+    source: str
+    name: str
+    text: str
+    vehicle: str | None
+
+
+def frames_of(index: RunIndex, from_s: float, to_s: float, hz: float) -> Frames:
+    """Return where everything was from a time to another, at most so often a second.
+
+    Raises:
+        RecordingError: when the file cannot be opened any more.
+    """
+    gathering = _Frames(index, hz)
+    begin_ns, end_ns = (index.begin_ns + round(at * NS_PER_S) for at in (from_s, to_s))
+    gathering.lights_before(begin_ns)
+    damage: list[str] = []
+    for one in index.read(begin_ns, end_ns, _DRAWN, damage):
+        if not gathering.take(one):
+            end_ns = one.t_ns
+            break
+    return Frames(
+        from_s=from_s,
+        to_s=min(to_s, gathering.seconds(end_ns)),
+        hz=hz,
+        cars=tuple(gathering.cars),
+        frames=tuple(gathering.frames),
+        signals=tuple(gathering.signals),
+        damaged=tuple(damage),
+    )
+
+
+class _Frames:
+    """Frames on their way to an answer."""
+
+    def __init__(self, index: RunIndex, hz: float) -> None:
+        self._index, self._period_ns = index, NS_PER_S / hz
+        self._due_ns = 0.0
+        self._rows = 0
+        self._numbers: dict[CarFacts, int] = {}
+        self._colours: dict[str, str] = {}
+        self._boxes: tuple[SnapshotBox, ...] = ()
+        self.cars: list[CarFacts] = []
+        self.frames: list[Frame] = []
+        self.signals: list[SignalChange] = []
+
+    def seconds(self, t_ns: float) -> float:
+        """Return a time since the recording's begin [s]."""
+        return round((t_ns - self._index.begin_ns) / NS_PER_S, 3)
+
+    def lights_before(self, begin_ns: int) -> None:
+        """Note what each junction showed when the stretch begins."""
+        for key in [key for key in self._index.topics.values() if SPAT(key)]:
+            found = self._index.newest(begin_ns, key.__eq__)
+            spat = read(found, Spat) if found is not None else None
+            if spat is not None:
+                self._lights(begin_ns, spat)
+
+    def take(self, one: Recorded) -> bool:
+        """Take a message; return False when the answer is full."""
+        if SPAT(one.key):
+            spat = read(one, Spat)
+            if spat is not None:
+                self._lights(one.t_ns, spat)
+            return True
+        if one.t_ns < self._due_ns:
+            return True
+        snapshot = read(one, WorldSnapshot)
+        if snapshot is None:
+            return True
+        self._rows += len(snapshot.vehicles)
+        if self._rows > MOST_ROWS and self.frames:
+            return False
+        # Counted from when it was due, so that 20 Hz that jitter make 10 Hz and not 7.
+        late = one.t_ns - self._due_ns >= self._period_ns
+        self._due_ns = (one.t_ns if late else self._due_ns) + 0.999 * self._period_ns
+        boxes = snapshot.boxes if snapshot.boxes != self._boxes or not self.frames else None
+        self._boxes = snapshot.boxes
+        cars = tuple(self._car(car) for car in snapshot.vehicles)
+        self.frames.append(Frame(t_s=self.seconds(one.t_ns), cars=cars, boxes=boxes))
+        return True
+
+    def _car(self, car: SnapshotVehicle) -> CarAt:
+        facts = _facts(car)
+        number = self._numbers.setdefault(facts, len(self.cars))
+        if number == len(self.cars):
+            self.cars.append(facts)
+        return CarAt(
+            car=number,
+            x_m=round(car.x_m, 4),
+            y_m=round(car.y_m, 4),
+            yaw_rad=round(car.yaw_rad, 4),
+            speed_mps=round(car.speed_mps, 3),
+            steering_rad=round(car.steering_rad, 3),
+            mode=car.mode,
+            alive=car.alive,
+            lights=car.lights,
+        )
+
+    def _lights(self, t_ns: int, spat: Spat) -> None:
+        for group in spat.groups:
+            name = f"{spat.junction}/{group.group}"
+            if self._colours.get(name) != group.colour:
+                self._colours[name] = group.colour
+                change = SignalChange(t_s=self.seconds(t_ns), group=name, colour=group.colour)
+                self.signals.append(change)
+
+
+def events_of(index: RunIndex) -> tuple[RecordedEvent, ...]:
+    """Return the events of a recording in their order, the first 20 000 of them.
+
+    Raises:
+        RecordingError: when the file cannot be opened any more.
+    """
+    found: list[RecordedEvent] = []
+    for one in index.read(0, index.end_ns, EVENT):
+        event = read(one, CityEvent)
+        if event is None:
+            continue
+        t_s = round((one.t_ns - index.begin_ns) / NS_PER_S, 3)
+        found.append(
+            RecordedEvent(
+                number=len(found) + 1,
+                t_s=t_s,
+                severity=event.severity,
+                source=event.source,
+                name=event.name,
+                text=event.text,
+                vehicle=event.vehicle,
+            )
+        )
+        if len(found) == MOST_EVENTS:
+            break
+    return tuple(found)
+
+
+def map_of(index: RunIndex) -> CityMap | None:
+    """Return the map that was driven on; None where the recording does not tell it.
+
+    Raises:
+        RecordingError: when the file cannot be opened any more.
+    """
+    found = index.newest(index.end_ns, DEFINITION)
+    told = read(found, WorldDefinition) if found is not None else None
+    return told.map if told is not None else None
+
+
+def cars_in(index: RunIndex) -> tuple[CarFacts, ...]:
+    """Return all cars of the first and the last snapshot: those that a sparse recording tells."""
+    first = next(index.read(0, index.end_ns, SNAPSHOT), None)
+    last = index.newest(index.end_ns, SNAPSHOT)
+    told = [read(one, WorldSnapshot) for one in (first, last) if one is not None]
+    cars = {car.vehicle: _facts(car) for one in told if one is not None for car in one.vehicles}
+    return tuple(cars.values())
+
+
+def first_frame_s(index: RunIndex) -> float:
+    """Return when the world first told where cars are; 0 where it never did."""
+    first = next(index.read(0, index.end_ns, SNAPSHOT), None)
+    return (first.t_ns - index.begin_ns) / NS_PER_S if first is not None else 0.0
+
+
+def _facts(car: SnapshotVehicle) -> CarFacts:
+    return CarFacts(vehicle=car.vehicle, kind=car.kind, car=car.car, owner=car.owner)
+
+
+def csv_of(index: RunIndex, vehicle: str = "") -> Iterator[bytes]:
+    """Yield a recording as CSV, in blocks: a car's own reports, or all cars as the world saw them.
+
+    Args:
+        index: Of the recording.
+        vehicle: The car; empty: all of them, a row a car and snapshot.
+    """
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(("t_s", "vehicle", *(_OF_CAR if vehicle else _OF_ALL)))
+    damage: list[str] = []
+    for row in _car_rows(index, vehicle, damage) if vehicle else _all_rows(index, damage):
+        rows.writerow(row)
+        if text.tell() > BLOCK:
+            yield text.getvalue().encode()
+            text.seek(0)
+            text.truncate()
+    for told in damage:
+        text.write(f"# left out: {told}\n")
+    yield text.getvalue().encode()
+
+
+_OF_ALL = (
+    *("kind", "owner", "mode", "alive", "x_m", "y_m", "yaw_rad"),
+    *("speed_mps", "steering_rad", "throttle"),
+)
+_OF_CAR = (
+    *("source", "mode", "epoch", "x_m", "y_m", "yaw_rad", "speed_mps", "lateral_speed_mps"),
+    *("yaw_rate_radps", "accel_mps2", "steering_rad", "throttle", "steering"),
+)
+
+
+def _car_rows(index: RunIndex, vehicle: str, damage: list[str]) -> Iterator[tuple[object, ...]]:
+    key = _key(f"v/{re.escape(vehicle)}/state")
+    for one in index.read(0, index.end_ns, key, damage):
+        state = read(one, VehicleState)
+        if state is not None:
+            t_s = round((one.t_ns - index.begin_ns) / NS_PER_S, 6)
+            yield (t_s, vehicle, *(getattr(state, name) for name in _OF_CAR))
+
+
+def _all_rows(index: RunIndex, damage: list[str]) -> Iterator[tuple[object, ...]]:
+    for one in index.read(0, index.end_ns, SNAPSHOT, damage):
+        snapshot = read(one, WorldSnapshot)
+        for car in snapshot.vehicles if snapshot is not None else ():
+            t_s = round((one.t_ns - index.begin_ns) / NS_PER_S, 6)
+            yield (t_s, car.vehicle, *(getattr(car, name) for name in _OF_ALL))
+
+
+def read(one: Recorded, kind: type[M]) -> M | None:
+    """Return a recorded message; None where it is not of today's form."""
+    try:
+        return msgspec.json.decode(one.body, type=kind)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        return None

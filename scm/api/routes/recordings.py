@@ -1,0 +1,247 @@
+"""Recordings: what there is, any moment of one, its events, and files to take home."""
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path as FilePath
+from typing import Annotated
+
+import msgspec
+from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi.responses import StreamingResponse
+from pydantic import BaseModel, ConfigDict, Field
+
+from scm.api import replay
+from scm.api.city import City, IdempotencyKey, json_response, not_found
+from scm.api.etag import check_match, tagged
+from scm.api.paging import Cursor, Limit, Page, page_of, page_response
+from scm.api.problem import RefusedError
+from scm.api.ranged import send_file
+from scm.api.recordings_shelf import (
+    NAME,
+    Notes,
+    RecordingRow,
+    RecordingsShelf,
+    cars_of,
+    natural,
+    unreadable,
+)
+from scm.api.roles import ENGINEER, OPERATOR, VIEWER
+from scm.errors import RecordingError
+from scm.maps.draw import draw_svg
+from scm.maps.model import Box, Light
+from scm.recorder.run_index import RunIndex
+from scm.v2x.message import Refused
+
+MCAP = "application/octet-stream"
+MOST_S = 120.0
+BLOCK = 256 * 1024
+
+Name = Annotated[
+    str,
+    Path(
+        pattern=NAME,
+        description="a recording: its file without .mcap",
+        examples=["city-20261123-031838-925408"],
+    ),
+]
+Seconds = Annotated[
+    float,
+    Query(ge=0.0, le=1e7, description="seconds since the recording began", examples=[12.5]),
+]
+Vehicle = Annotated[
+    str,
+    Query(
+        pattern=r"^[A-Za-z0-9_-]{0,32}$",
+        description="a car's own reports; empty: all cars as the world saw them",
+        examples=["n1"],
+    ),
+]
+
+
+class NotesBody(BaseModel):
+    """What to call a recording, and what to know of it; its file keeps its name."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    title: str = Field("", max_length=120, description="shown first", examples=["Brisk plan"])
+    notes: str = Field(
+        "", max_length=4000, description="in words, as long as need be", examples=["n3 slipped"]
+    )
+
+
+class Summary(msgspec.Struct, kw_only=True, frozen=True):
+    """What is known of a recording before any of it is shown.
+
+    Attributes:
+        cars: All cars that it tells of.
+        map_title: Of the map that was driven on; empty: it does not tell.
+        first_frame_s: When the world first told where cars are: it may have begun later.
+    """
+
+    recording: RecordingRow
+    cars: tuple[replay.CarFacts, ...]
+    map_title: str
+    lights: tuple[Light, ...]
+    boxes: tuple[Box, ...]
+    first_frame_s: float
+
+
+def router(city: City) -> APIRouter:
+    """Return the routes."""
+    routes = APIRouter(prefix="/recordings", tags=["recordings"], dependencies=[VIEWER])
+    shelf = RecordingsShelf(city.shelves.recordings)
+    _add_downloads(routes, shelf)
+    _add_moments(routes, shelf, city)
+    _add_notes(routes, shelf)
+
+    @routes.get("", summary="All recordings, the one written last first")
+    def all_recordings(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
+        names = page_of(shelf.names(), str, limit=limit, cursor=cursor)
+        rows = Page(items=_rows(shelf, names.items), next=names.next)
+        return page_response(request, rows)
+
+    @routes.get("/{name}", summary="One recording")
+    def one_recording(name: Name) -> Response:
+        return json_response(shelf.row(name))
+
+    @routes.delete("/{name}", summary="Delete a recording", dependencies=[ENGINEER])
+    def remove(name: Name, key: IdempotencyKey = "") -> Response:
+        del key  # what is gone stays gone
+        shelf.remove(name)
+        return Response(status_code=204)
+
+    return routes
+
+
+def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
+    """Add files to take home; before the routes whose names would match them too."""
+
+    @routes.api_route(
+        "/{name}.mcap",
+        methods=["GET", "HEAD"],
+        summary="The file as the recorder wrote it, or a range of it",
+        response_class=Response,
+        operation_id="recording_file",
+    )
+    def file(request: Request, name: Name) -> Response:
+        return send_file(request, shelf.path(name), MCAP)
+
+    @routes.get("/{name}/foxglove.mcap", summary="The file for Foxglove", response_class=Response)
+    async def foxglove(name: Name) -> Response:
+        index = await asyncio.to_thread(shelf.index, name)
+        return StreamingResponse(_converted(index.path), 200, _named(f"{name}.foxglove.mcap"), MCAP)
+
+    @routes.get("/{name}/csv", summary="Its cars as CSV", response_class=Response)
+    def as_csv(name: Name, vehicle: Vehicle = "") -> Response:
+        index = shelf.index(name)
+        if vehicle and vehicle not in cars_of(index):
+            raise not_found(f"car of {name}", vehicle)
+        file = f"{name}{f'-{vehicle}' if vehicle else ''}.csv"
+        return StreamingResponse(replay.csv_of(index, vehicle), 200, _named(file), "text/csv")
+
+
+def _add_moments(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:
+    """Add what a replay shows."""
+
+    @routes.get("/{name}/summary", summary="What a replay has to know first")
+    def summary(name: Name) -> Response:
+        index = _readable(shelf, name)
+        city_map = replay.map_of(index)
+        return json_response(
+            Summary(
+                recording=shelf.row(name),
+                cars=_cars(index),
+                map_title=city_map.title if city_map else "",
+                lights=city_map.lights if city_map else (),
+                boxes=city_map.boxes if city_map else (),
+                first_frame_s=replay.first_frame_s(index),
+            )
+        )
+
+    @routes.get("/{name}/frames", summary="Where everything was, from a time to another")
+    def frames(
+        name: Name,
+        from_s: Seconds = 0.0,
+        to_s: Seconds = 10.0,
+        hz: Annotated[
+            float, Query(gt=0.0, le=50.0, description="frames a second, at most", examples=[10.0])
+        ] = 10.0,
+    ) -> Response:
+        if not from_s <= to_s <= from_s + MOST_S:
+            detail = f"to_s: got {to_s:g}, expected from_s ({from_s:g}) to {MOST_S:g} s after it"
+            raise RefusedError(Refused(code="invalid", detail=detail))
+        return json_response(replay.frames_of(_readable(shelf, name), from_s, to_s, hz))
+
+    @routes.get("/{name}/events", summary="Its events, in their order")
+    def events(request: Request, name: Name, limit: Limit = 500, cursor: Cursor = "") -> Response:
+        rows = replay.events_of(_readable(shelf, name))
+        page = page_of(rows, lambda row: str(row.number), limit=limit, cursor=cursor)
+        return page_response(request, page)
+
+    @routes.get("/{name}/map.svg", summary="The map it was driven on", response_class=Response)
+    def map_svg(name: Name) -> Response:
+        city_map = replay.map_of(_readable(shelf, name)) or city.city_map
+        headers = {"Cache-Control": "no-cache"}
+        return Response(draw_svg(city_map, movable=False), 200, headers, "image/svg+xml")
+
+
+def _add_notes(routes: APIRouter, shelf: RecordingsShelf) -> None:
+    @routes.get("/{name}/notes", summary="What people wrote about it")
+    def notes(request: Request, name: Name) -> Response:
+        return tagged(request, shelf.notes(name))
+
+    @routes.put("/{name}/notes", summary="Name it and note something", dependencies=[OPERATOR])
+    def write(request: Request, name: Name, body: NotesBody, key: IdempotencyKey = "") -> Response:
+        del key  # the same notes twice are the same notes
+        check_match(request, shelf.notes(name))
+        fresh = Notes(title=body.title.strip(), notes=body.notes.strip())
+        shelf.write_notes(name, fresh)
+        return tagged(request, fresh)
+
+
+def _rows(shelf: RecordingsShelf, names: tuple[str, ...]) -> tuple[RecordingRow, ...]:
+    """Return rows of recordings, without those that were deleted meanwhile."""
+    rows = []
+    for name in names:
+        try:
+            rows.append(shelf.row(name))
+        except RefusedError:
+            continue
+    return tuple(rows)
+
+
+def _readable(shelf: RecordingsShelf, name: str) -> RunIndex:
+    """Return a recording's index; refuse one that holds nothing yet."""
+    index = shelf.index(name)
+    if not index.chunks:
+        raise unreadable(RecordingError(f"{index.path}: nothing was recorded yet"))
+    return index
+
+
+def _cars(index: RunIndex) -> tuple[replay.CarFacts, ...]:
+    return tuple(sorted(replay.cars_in(index), key=lambda car: natural(car.vehicle)))
+
+
+def _named(file: str) -> dict[str, str]:
+    return {"Content-Disposition": f'attachment; filename="{file}"', "Cache-Control": "no-store"}
+
+
+async def _converted(path: FilePath) -> AsyncIterator[bytes]:
+    """Yield what `scm export foxglove` writes; it works beside the server, so that it stays quick.
+
+    A reader who goes away ends it.
+    """
+    command = (sys.executable, "-m", "scm", "export", "foxglove", str(path))
+    process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE)
+    assert process.stdout is not None  # noqa: S101  it was asked for
+    try:
+        while block := await process.stdout.read(BLOCK):
+            yield block
+        if await process.wait():
+            msg = f"{path}: the export for Foxglove failed; the server's log says why"
+            raise RecordingError(msg)  # the answer breaks off: a cut file must not look whole
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()

@@ -1,0 +1,99 @@
+"""Scenarios: scripts that drive the fleet, kept, edited and run."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from scm.api.city import City, IdempotencyKey, json_response, not_found
+from scm.api.etag import check_match, tagged
+from scm.api.operations import Operations, accepted
+from scm.api.paging import Cursor, Limit, page_of, page_response
+from scm.api.roles import ADMIN, OPERATOR, VIEWER
+from scm.api.scenarios import MOST_BYTES, NAME, ScenarioRuns, ScenarioShelf
+
+Name = Annotated[
+    str, Path(pattern=NAME, description="a script without .py", examples=["travel_times"])
+]
+Run = Annotated[
+    str,
+    Path(pattern=r"^scenario-[0-9]{1,9}$", description="its operation", examples=["scenario-3"]),
+]
+
+
+class ScenarioBody(BaseModel):
+    """A script, whole."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    text: str = Field(
+        max_length=MOST_BYTES,
+        description="Python that drives the fleet, as `scm.fleet` says",
+        examples=['"""Say hello."""\nprint("hello")\n'],
+    )
+
+
+class RunBody(BaseModel):
+    """How to run a script."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    arguments: list[Annotated[str, Field(max_length=200)]] = Field(
+        default_factory=list,
+        max_length=50,
+        description="of its command line; {connect} becomes the address of this city's router",
+        examples=[["--live", "--connect", "{connect}"]],
+    )
+
+
+def router(city: City, work: Operations) -> APIRouter:
+    """Return the routes."""
+    routes = APIRouter(prefix="/scenarios", tags=["scenarios"], dependencies=[VIEWER])
+    shelf = ScenarioShelf(city.shelves.scenarios)
+    runs = ScenarioRuns(shelf, work, city.connect)
+    _add_scripts(routes, shelf)
+
+    @routes.post("/{name}/runs", summary="Run a script", status_code=202, dependencies=[OPERATOR])
+    def run(request: Request, name: Name, body: RunBody, key: IdempotencyKey = "") -> Response:
+        owner = str(request.scope["scm_owner"])
+        return accepted(runs.start(name, body.arguments, owner=owner, key=key))
+
+    @routes.get("/runs/{run}/lines", summary="What a run printed")
+    def lines(
+        run: Run,
+        after: Annotated[
+            int, Query(ge=0, le=10**9, description="number of the first line", examples=[0])
+        ] = 0,
+    ) -> Response:
+        return json_response(runs.lines(run, after))
+
+    return routes
+
+
+def _add_scripts(routes: APIRouter, shelf: ScenarioShelf) -> None:
+    @routes.get("", summary="All scripts, one's own first")
+    def all_scenarios(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
+        page = page_of(shelf.rows(), lambda row: row.name, limit=limit, cursor=cursor)
+        return page_response(request, page)
+
+    @routes.get("/{name}", summary="One script with its text")
+    def one(request: Request, name: Name) -> Response:
+        found = shelf.find(name)
+        if found is None:
+            raise not_found("scenario", name)
+        return tagged(request, found)
+
+    @routes.put("/{name}", summary="Write a script", dependencies=[ADMIN])
+    def write(
+        request: Request, name: Name, body: ScenarioBody, key: IdempotencyKey = ""
+    ) -> Response:
+        del key  # the same script twice is the same script
+        before = shelf.find(name)
+        check_match(request, before)
+        return tagged(request, shelf.write(name, body.text), 200 if before else 201)
+
+    @routes.delete("/{name}", summary="Delete a script", dependencies=[ADMIN])
+    def remove(name: Name, key: IdempotencyKey = "") -> Response:
+        del key  # what is gone stays gone
+        shelf.remove(name)
+        return Response(status_code=204)

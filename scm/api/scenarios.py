@@ -1,0 +1,282 @@
+"""Fleet scenarios: Python scripts of a folder, and running one beside the live city.
+
+A script is a program with all rights of the server: who may write one may do anything there. It
+hears where the city is in `SCM_CONNECT` and by `{connect}` among its arguments.
+"""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+from collections import OrderedDict
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO
+
+import msgspec
+
+import scm
+from scm.api.city import not_found
+from scm.api.operations import Cancelled, Operation, Operations, Teller
+from scm.api.problem import RefusedError
+from scm.errors import ScmError
+from scm.v2x.message import Refused
+
+NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,59}$"
+MOST_BYTES = 200_000
+KEPT_LINES, KEPT_RUNS, LINE_CHARACTERS = 2000, 50, 2000
+LOOK_S, GRACE_S = 0.1, 8.0
+SHIPPED = Path(scm.__file__).parents[1] / "examples"
+KIND = "scenario"
+_CONNECT = "{connect}"
+
+
+class Scenario(msgspec.Struct, kw_only=True, frozen=True):
+    """One script; `shipped`: it came with the program, and cannot be changed here."""
+
+    name: str
+    about: str
+    shipped: bool
+    text: str = ""
+
+
+class Lines(msgspec.Struct, kw_only=True, frozen=True):
+    """What a run printed; `first` is the number of the first line that is still known."""
+
+    run: str
+    first: int
+    lines: tuple[str, ...]
+
+
+class ScenarioShelf:
+    """The scripts of a folder, and those that came with the program."""
+
+    def __init__(self, folder: Path | None, shipped: Path = SHIPPED) -> None:
+        self._folder, self._shipped = folder, shipped
+
+    def rows(self) -> tuple[Scenario, ...]:
+        """Return all scripts without their texts; people's own first."""
+        found: dict[str, Scenario] = {}
+        for folder in (self._folder, self._shipped):
+            if folder is None or not folder.is_dir():
+                continue
+            for file in sorted(folder.glob("*.py")):
+                if re.fullmatch(NAME, file.stem) and file.stem not in found:
+                    row = self._read(file)
+                    found[file.stem] = msgspec.structs.replace(row, text="")
+        return tuple(found.values())
+
+    def find(self, name: str) -> Scenario | None:
+        """Return a script, None where there is none of that name."""
+        file = self._file(name)
+        return self._read(file) if file is not None else None
+
+    def path(self, name: str) -> Path:
+        """Return a script's file.
+
+        Raises:
+            RefusedError: when there is none of that name.
+        """
+        file = self._file(name)
+        if file is None:
+            raise not_found("scenario", name)
+        return file
+
+    def write(self, name: str, text: str) -> Scenario:
+        """Keep a script.
+
+        Raises:
+            RefusedError: when it is no Python, it came with the program, or nothing can be kept.
+        """
+        self._check_own(name)
+        try:
+            compile(text, f"{name}.py", "exec", dont_inherit=True)
+        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+            line = f", line {error.lineno}" if isinstance(error, SyntaxError) else ""
+            said = error.msg if isinstance(error, SyntaxError) else str(error)
+            detail = f"{name}.py{line}: expected a Python script: {said}"
+            raise RefusedError(Refused(code="invalid", detail=detail)) from None
+        assert self._folder is not None  # noqa: S101  or it would not be one's own
+        file = self._folder / f"{name}.py"
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            fresh = file.with_suffix(".part")
+            fresh.write_text(text, "utf-8")
+            fresh.replace(file)
+        except OSError as cause:
+            raise _not_kept(name, cause) from None
+        return self._read(file)
+
+    def remove(self, name: str) -> None:
+        """Delete a script.
+
+        Raises:
+            RefusedError: when there is none of that name, or it came with the program.
+        """
+        path = self.path(name)
+        self._check_own(name)
+        try:
+            path.unlink()
+        except OSError as cause:
+            raise _not_kept(name, cause) from None
+
+    def _check_own(self, name: str) -> None:
+        if self._folder is None:
+            detail = "this city keeps no scenarios: start it with a folder (scm api --data FOLDER)"
+            raise RefusedError(Refused(code="offline", detail=detail))
+        found = self.find(name)
+        if found is not None and found.shipped:
+            detail = f"{name} came with the program: save it under another name"
+            raise RefusedError(Refused(code="shipped", detail=detail))
+
+    def _file(self, name: str) -> Path | None:
+        if not re.fullmatch(NAME, name):
+            return None
+        folders = (folder for folder in (self._folder, self._shipped) if folder is not None)
+        files = (folder / f"{name}.py" for folder in folders)
+        return next((file for file in files if file.is_file()), None)
+
+    def _read(self, file: Path) -> Scenario:
+        text = file.read_text("utf-8", "replace")
+        about = re.match(r'\s*(?:#.*\n|\s)*r?"""(.+?)(?:\n|""")', text)
+        return Scenario(
+            name=file.stem,
+            about=about[1].strip() if about else "",
+            shipped=file.parent == self._shipped,
+            text=text,
+        )
+
+
+class ScenarioRuns:
+    """Scripts that run or ran: each an operation, with what it printed."""
+
+    def __init__(self, shelf: ScenarioShelf, work: Operations, connect: str) -> None:
+        self._shelf, self._work, self._connect = shelf, work, connect
+        self._lock = threading.Lock()
+        self._printed: OrderedDict[str, _Printed] = OrderedDict()
+        self._of_key: dict[str, str] = {}
+
+    def start(self, name: str, arguments: Sequence[str], *, owner: str, key: str) -> Operation:
+        """Run a script, once for each idempotency key.
+
+        Raises:
+            RefusedError: when there is none of that name, or too many wait.
+        """
+        path = self._shelf.path(name)
+        with self._lock:
+            known = self._work.find(self._of_key.get(key, "")) if key else None
+            if known is not None:
+                return known
+            printed = _Printed()
+            filled = [one.replace(_CONNECT, self._connect) for one in arguments]
+
+            def work(tell: Teller) -> str:
+                return self._run(path, filled, printed, tell)
+
+            row = self._work.start(KIND, name, work, owner=owner)
+            printed.run = row.id
+            self._printed[row.id] = printed
+            if key:
+                self._of_key[key] = row.id
+            while len(self._printed) > KEPT_RUNS:
+                gone, _ = self._printed.popitem(last=False)
+                self._of_key = {key: run for key, run in self._of_key.items() if run != gone}
+        return row
+
+    def lines(self, run: str, after: int) -> Lines:
+        """Return what a run printed, from line `after` on.
+
+        Raises:
+            RefusedError: when there was no such run, or it is forgotten.
+        """
+        with self._lock:
+            printed = self._printed.get(run)
+        if printed is None:
+            raise not_found("run of a scenario", run)
+        return printed.after(after)
+
+    def _run(self, path: Path, arguments: list[str], printed: "_Printed", tell: Teller) -> str:
+        environment = {**os.environ, "SCM_CONNECT": self._connect, "PYTHONUNBUFFERED": "1"}
+        try:
+            process = subprocess.Popen(
+                [sys.executable, str(path), *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                errors="replace",
+                env=environment,
+                start_new_session=True,
+            )
+        except OSError as cause:
+            msg = f"{path.name}: cannot be started: {cause.strerror or cause}"
+            raise ScmError(msg) from cause
+        assert process.stdout is not None  # noqa: S101  it was asked for
+        reader = threading.Thread(target=printed.read, args=(process.stdout,), daemon=True)
+        reader.start()
+        try:
+            while process.poll() is None:
+                tell(printed.last() or "runs")
+                tell.cancelled.wait(LOOK_S)
+        except Cancelled:
+            _end(process)
+            raise
+        finally:
+            reader.join(GRACE_S)
+        if process.returncode:
+            why = printed.last() or "it said nothing"
+            msg = f"{path.name} ended with exit code {process.returncode}: {why}"
+            raise ScmError(msg)
+        return f"/recordings/scenarios?run={printed.run}"
+
+
+class _Printed:
+    """The last lines that a run printed."""
+
+    def __init__(self) -> None:
+        self.run = ""
+        self._lock = threading.Lock()
+        self._first = 0
+        self._lines: list[str] = []
+
+    def read(self, stream: IO[str]) -> None:
+        """Take lines until the program ends."""
+        with stream:
+            while line := stream.readline(LINE_CHARACTERS):
+                with self._lock:
+                    self._lines.append(line.rstrip("\n"))
+                    if len(self._lines) > KEPT_LINES:
+                        del self._lines[0]
+                        self._first += 1
+
+    def last(self) -> str:
+        """Return the last line that says something."""
+        with self._lock:
+            return next((line for line in reversed(self._lines) if line.strip()), "")[:200]
+
+    def after(self, number: int) -> Lines:
+        """Return the lines from a number on."""
+        with self._lock:
+            first = max(number, self._first)
+            return Lines(run=self.run, first=first, lines=tuple(self._lines[first - self._first :]))
+
+
+def _end(process: "subprocess.Popen[str]") -> None:
+    """Press Ctrl-C, so that the script takes its cars away; kill what does not listen."""
+    for number, patience_s in ((signal.SIGINT, GRACE_S), (signal.SIGKILL, GRACE_S)):
+        try:
+            os.killpg(process.pid, number)
+            process.wait(patience_s)
+        except ProcessLookupError:
+            return
+        except subprocess.TimeoutExpired:
+            continue
+        else:
+            return
+
+
+def _not_kept(name: str, cause: OSError) -> RefusedError:
+    detail = f"{name}.py: cannot be changed: {cause.strerror or cause}"
+    return RefusedError(Refused(code="not_written", detail=detail))

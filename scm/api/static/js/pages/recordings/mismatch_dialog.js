@@ -1,0 +1,84 @@
+/** Begin a mismatch job: does this car drive as its file says? */
+import { useState } from "preact/hooks";
+import { html } from "scm/shared/html.js";
+import { Dialog } from "scm/shared/dialog.js";
+import { change } from "scm/shell/api.js";
+import { go } from "scm/shell/router.js";
+import { minutes } from "scm/pages/recordings/words.js";
+
+const BUDGETS_S = [60, 120, 300, 600];
+
+export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
+  const first = cars.find((car) => car.vehicle === chosen) ?? cars[0];
+  const [vehicle, setVehicle] = useState(first?.vehicle ?? "");
+  const [car, setCar] = useState(first?.car ?? "nigel");
+  const [span, setSpan] = useState({ start: "", stop: "" });
+  const choose = (name) => {
+    setVehicle(name);
+    setCar(cars.find((one) => one.vehicle === name)?.car ?? car);
+  };
+  const here = (end) => () => setSpan({ ...span, [end]: player.t_s.toFixed(1) });
+  const submit = async (event) => {
+    event.preventDefault();
+    const body = {
+      recording: recording.name,
+      vehicle,
+      car,
+      budget_s: Number(event.target.elements.budget.value),
+      from_s: span.start === "" ? null : Number(span.start),
+      to_s: span.stop === "" ? null : Number(span.stop),
+    };
+    const done = () => `The search for ${vehicle} has begun.`;
+    if (await change("POST", "/mismatch/jobs", body, done)) {
+      onClose();
+      go("/mismatch");
+    }
+  };
+  const time = (end, title, empty) => html`
+    <label>
+      ${title}
+      <span class="with-button">
+        <input
+          name=${end}
+          type="number"
+          min="0"
+          max=${Math.ceil(recording.length_s)}
+          step="0.1"
+          placeholder=${empty}
+          value=${span[end]}
+          onInput=${(event) => setSpan({ ...span, [end]: event.target.value })}
+        />
+        <button type="button" onClick=${here(end)} title="The moment that is shown">${minutes(player.t_s, true)}</button>
+      </span>
+    </label>
+  `;
+  return html`
+    <${Dialog} title="Start a mismatch job" onClose=${onClose}>
+      <p class="hint">Drives the car's file with the recorded commands, and searches for what the two differ in.</p>
+      ${!cars.length && html`<p class="trouble">This recording tells of no car.</p>`}
+      <form class="fields two-by-two" onSubmit=${submit}>
+        <label>
+          Car
+          <select name="vehicle" data-first value=${vehicle} onChange=${(event) => choose(event.target.value)}>
+            ${cars.map((one) => html`<option value=${one.vehicle}>${one.vehicle} (${one.kind})</option>`)}
+          </select>
+        </label>
+        <label>
+          Car file
+          <input name="car" required pattern="[a-z0-9_\\-]+" maxlength="64" value=${car} onInput=${(event) => setCar(event.target.value)} />
+        </label>
+        ${time("start", "From [s]", "begin")} ${time("stop", "To [s]", "end")}
+        <label>
+          Search for at most
+          <select name="budget">
+            ${BUDGETS_S.map((s) => html`<option value=${s} selected=${s === 120}>${minutes(s)} min</option>`)}
+          </select>
+        </label>
+        <div class="actions">
+          <button type="button" onClick=${onClose}>Cancel</button>
+          <button class="primary" disabled=${!cars.length}>Start</button>
+        </div>
+      </form>
+    <//>
+  `;
+}

@@ -1,0 +1,354 @@
+"""A run as Foxglove draws it: frames, cars, roads, lights, pictures, scans, numbers and the log.
+
+The recorder's own file is for our tools: Foxglove lists its channels and cannot read their schemas.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from typing import Any, TypeVar
+
+import msgspec
+import numpy as np
+from mcap.writer import Writer
+
+from scm.clock import NS_PER_S
+from scm.errors import CarError
+from scm.maps.model import CityMap, Light
+from scm.maps.route import Roads
+from scm.recorder import foxglove_messages as fox
+from scm.recorder.mcap_file import Recorded, SchemaTable
+from scm.recorder.run_index import RunIndex
+from scm.v2x.message import Message
+from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.eye_frame import EyeFrame
+from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.v2x.messages.world_definition import WorldDefinition
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
+from scm.vehicles.car import load_car
+
+MAP = "map"
+BLOCK = 256 * 1024
+CARS_EVERY_NS = NS_PER_S
+NIGEL_M = -0.07, 0.23, 0.175
+LEVELS = {"info": 2, "warning": 3, "error": 4}
+ROAD, LANE = fox.Colour(r=0.45, g=0.48, b=0.53), fox.Colour(r=0.93, g=0.93, b=0.88)
+WHITE = fox.Colour(r=1.0, g=1.0, b=1.0)
+KINDS = {
+    "hosted": fox.Colour(r=0.3, g=0.55, b=0.94),
+    "remote": fox.Colour(r=0.66, g=0.48, b=0.95),
+    "real": fox.Colour(r=0.94, g=0.63, b=0.24),
+}
+GREY = fox.Colour(r=0.35, g=0.35, b=0.35)
+LIGHTS = {
+    "red": fox.Colour(r=1.0, g=0.2, b=0.2),
+    "flashing_red": fox.Colour(r=1.0, g=0.2, b=0.2, a=0.6),
+    "yellow": fox.Colour(r=1.0, g=0.76, b=0.2),
+    "green": fox.Colour(r=0.2, g=0.82, b=0.55),
+}
+_WANTED = (
+    WorldDefinition, WorldSnapshot, VehicleState, Spat, CityEvent, EyeFrame, CameraFrame, LidarScan,
+)  # fmt: skip
+M = TypeVar("M", bound=Message)
+
+
+def write_foxglove(index: RunIndex) -> Iterator[bytes]:
+    """Yield an MCAP file for Foxglove, in blocks; damaged pieces of the run are left out.
+
+    Raises:
+        RecordingError: when the run cannot be opened.
+    """
+    out = _Blocks()
+    kinds: dict[str, type[Message]] = {}
+    city = next(iter(index.topics.values()), "//city").split("/")
+    table = SchemaTable(city[2] if len(city) > 2 else "city")  # scm/@v1/<city>/...
+    for key in index.topics.values():
+        kind = table.kind_of(key)
+        if kind in _WANTED:
+            kinds[key] = kind
+    writing = _Writing(out)
+    for one in index.read(0, index.end_ns, kinds.__contains__):
+        told = _told(one, kinds[one.key])
+        if told is not None:
+            writing.take(one.t_ns, told)
+        if out.held > BLOCK:
+            yield out.taken()
+    writing.close()
+    yield out.taken()
+
+
+def _told(one: Recorded, kind: type[M]) -> M | None:
+    try:
+        return msgspec.json.decode(one.body, type=kind)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        return None
+
+
+class _Blocks:
+    """A stream for the writer, whose bytes are taken away as they come."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+        self._taken = 0
+        self.held = 0
+
+    def write(self, data: bytes) -> int:
+        """Hold bytes until they are taken."""
+        self._parts.append(bytes(data))
+        self.held += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        """Return how much was written since the begin."""
+        return self._taken + self.held
+
+    def flush(self) -> None:
+        """Do nothing: who takes the bytes sends them."""
+
+    def taken(self) -> bytes:
+        """Return what is held, and hold it no longer."""
+        block = b"".join(self._parts)
+        self._taken += self.held
+        self._parts, self.held = [], 0
+        return block
+
+
+class _Writing:
+    """The file on its way: what each message of the run becomes."""
+
+    def __init__(self, stream: Any) -> None:
+        self._writer = Writer(stream)
+        self._writer.start(profile="", library="scm")
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._cars: dict[str, tuple[str, str, bool]] = {}
+        self._cars_due_ns = 0
+        self._colours: dict[tuple[str, str], str] = {}
+        self._lights: tuple[Light, ...] = ()
+        self._has_map = False
+        self._takers: dict[type[Message], Callable[[int, Any], None]] = {
+            WorldDefinition: self._definition,
+            WorldSnapshot: self._snapshot,
+            VehicleState: self._state,
+            Spat: self._spat,
+            CityEvent: self._event,
+            EyeFrame: self._eye,
+            CameraFrame: self._camera,
+            LidarScan: self._scan,
+        }
+
+    def take(self, t_ns: int, told: Message) -> None:
+        """Write what a message means."""
+        self._takers[type(told)](t_ns, told)
+
+    def close(self) -> None:
+        """End the file with its index."""
+        self._writer.finish()
+
+    def _add(self, topic: str, t_ns: int, body: msgspec.Struct) -> None:
+        if topic not in self._channels:
+            name = f"foxglove.{type(body).__name__}"
+            name = "scm.CarState" if isinstance(body, fox.CarState) else name
+            if name not in self._schemas:
+                schema = msgspec.json.encode(fox.schema_of(type(body)))
+                self._schemas[name] = self._writer.register_schema(name, "jsonschema", schema)
+            self._channels[topic] = self._writer.register_channel(
+                topic=topic, message_encoding="json", schema_id=self._schemas[name]
+            )
+        self._writer.add_message(
+            channel_id=self._channels[topic],
+            log_time=t_ns,
+            publish_time=t_ns,
+            data=msgspec.json.encode(body),
+        )
+
+    def _definition(self, t_ns: int, told: WorldDefinition) -> None:
+        if self._has_map:  # the same is sent every 10 s
+            return
+        self._has_map, self._lights = True, told.map.lights
+        entity = fox.Entity(
+            timestamp=_time(t_ns), frame_id=MAP, id="roads", lines=_road_lines(told.map)
+        )
+        self._add("/map", t_ns, fox.SceneUpdate(entities=(entity,)))
+
+    def _snapshot(self, t_ns: int, told: WorldSnapshot) -> None:
+        at = _time(t_ns)
+        frames = tuple(_frame(at, car) for car in told.vehicles)
+        self._add("/tf", t_ns, fox.FrameTransforms(transforms=frames))
+        cars = {car.vehicle: (car.car, car.kind, car.alive) for car in told.vehicles}
+        if cars == self._cars and t_ns < self._cars_due_ns:
+            return
+        # All of them again each second: after a seek Foxglove knows one message a topic.
+        self._cars_due_ns = t_ns + CARS_EVERY_NS
+        gone = tuple(
+            fox.Deletion(timestamp=at, type=0, id=name) for name in self._cars if name not in cars
+        )
+        self._cars = cars
+        entities = tuple(_car(at, car) for car in told.vehicles)
+        self._add("/cars", t_ns, fox.SceneUpdate(deletions=gone, entities=entities))
+
+    def _state(self, t_ns: int, told: VehicleState) -> None:
+        state = fox.CarState(
+            timestamp=_time(told.t_ns),
+            x_m=told.x_m,
+            y_m=told.y_m,
+            yaw_rad=told.yaw_rad,
+            speed_mps=told.speed_mps,
+            lateral_speed_mps=told.lateral_speed_mps,
+            yaw_rate_radps=told.yaw_rate_radps,
+            accel_mps2=told.accel_mps2,
+            throttle=told.throttle,
+            steering=told.steering or 0.0,
+            steering_rad=told.steering_rad,
+            mode=told.mode,
+            owner_epoch=told.epoch,
+        )
+        self._add(f"/{told.vehicle}/state", t_ns, state)
+
+    def _spat(self, t_ns: int, told: Spat) -> None:
+        colours = {(told.junction, group.group): group.colour for group in told.groups}
+        if all(self._colours.get(group) == colour for group, colour in colours.items()):
+            return
+        self._colours |= colours
+        entities = tuple(
+            _light(_time(t_ns), light, self._colours.get((light.junction, light.group), "dark"))
+            for light in self._lights
+        )
+        self._add("/signals", t_ns, fox.SceneUpdate(entities=entities))
+
+    def _event(self, t_ns: int, told: CityEvent) -> None:
+        log = fox.Log(
+            timestamp=_time(t_ns),
+            level=LEVELS[told.severity],
+            message=told.text,
+            name=f"{told.source}: {told.name}",
+        )
+        self._add("/events", t_ns, log)
+
+    def _eye(self, t_ns: int, told: EyeFrame) -> None:
+        self._picture(f"/eye/{told.camera}", t_ns, told.camera, told.payload)
+
+    def _camera(self, t_ns: int, told: CameraFrame) -> None:
+        topic = f"/{told.vehicle}/camera/{told.camera}"
+        self._picture(topic, t_ns, told.vehicle, told.payload)
+
+    def _picture(self, topic: str, t_ns: int, frame: str, payload: bytes) -> None:
+        picture = fox.CompressedImage(timestamp=_time(t_ns), frame_id=frame, data=payload)
+        self._add(topic, t_ns, picture)
+
+    def _scan(self, t_ns: int, told: LidarScan) -> None:
+        cloud = fox.PointCloud(
+            timestamp=_time(told.t_ns),
+            frame_id=told.vehicle,
+            pose=fox.Pose(position=_scanner(self._cars.get(told.vehicle, ("nigel",))[0])),
+            point_stride=12,
+            fields=tuple(fox.PackedField(name=axis, offset=4 * i) for i, axis in enumerate("xyz")),
+            data=_points(told),
+        )
+        self._add(f"/{told.vehicle}/scan", t_ns, cloud)
+
+
+def _time(t_ns: int) -> fox.Time:
+    return fox.Time(sec=t_ns // NS_PER_S, nsec=t_ns % NS_PER_S)
+
+
+def _frame(at: fox.Time, car: SnapshotVehicle) -> fox.Transform:
+    half = 0.5 * car.yaw_rad
+    return fox.Transform(
+        timestamp=at,
+        parent_frame_id=MAP,
+        child_frame_id=car.vehicle,
+        translation=fox.Vector(x=car.x_m, y=car.y_m),
+        rotation=fox.Quaternion(z=math.sin(half), w=math.cos(half)),
+    )
+
+
+def _car(at: fox.Time, car: SnapshotVehicle) -> fox.Entity:
+    rear, front, width = _outline(car.car)
+    length, height, middle = front - rear, 0.4 * width, 0.5 * (front + rear)
+    colour = KINDS.get(car.kind, GREY) if car.alive else GREY
+    body = fox.Pose(position=fox.Vector(x=middle, y=0.0, z=0.5 * height + 0.02))
+    cabin = fox.Pose(position=fox.Vector(x=middle - 0.06 * length, y=0.0, z=1.3 * height + 0.02))
+    return fox.Entity(
+        timestamp=at,
+        frame_id=car.vehicle,
+        id=car.vehicle,
+        cubes=(
+            fox.Cube(pose=body, size=fox.Vector(x=length, y=width, z=height), color=colour),
+            fox.Cube(
+                pose=cabin,
+                size=fox.Vector(x=0.5 * length, y=0.8 * width, z=0.6 * height),
+                color=GREY,
+            ),
+        ),
+        texts=(
+            fox.Label(
+                pose=fox.Pose(position=fox.Vector(x=middle, y=0.0, z=3.0 * height)),
+                color=WHITE,
+                text=car.vehicle,
+            ),
+        ),
+    )
+
+
+def _light(at: fox.Time, light: Light, colour: str) -> fox.Entity:
+    pose = fox.Pose(position=fox.Vector(x=light.x_m, y=light.y_m, z=0.2))
+    size = fox.Vector(x=0.08, y=0.08, z=0.08)
+    lamp = fox.Cube(pose=pose, size=size, color=LIGHTS.get(colour, GREY))
+    return fox.Entity(timestamp=at, frame_id=MAP, id=f"light {light.light_id}", spheres=(lamp,))
+
+
+def _road_lines(city_map: CityMap) -> tuple[fox.Line, ...]:
+    """Return the edge of the floor, and a line along the middle of each lane."""
+    roads = Roads(city_map)
+    (x0, x1), (y0, y1) = city_map.floor.x_m, city_map.floor.y_m
+    corners = ((x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0))
+    edge = fox.Line(thickness=0.02, points=_places(corners), color=ROAD)
+    lanes = (roads.lane(lane.name) for lane in city_map.lanes)
+    middles = (fox.Line(thickness=0.012, points=_places(lane.points), color=LANE) for lane in lanes)
+    return (edge, *middles)
+
+
+def _places(points: Any) -> tuple[fox.Vector, ...]:
+    return tuple(fox.Vector(x=float(x), y=float(y)) for x, y in points)
+
+
+def _points(scan: LidarScan) -> bytes:
+    """Return where a scan's beams hit, in the scanner's frame: three float32 a point."""
+    payload = scan.payload[: len(scan.payload) // 4 * 4]
+    ranges = np.frombuffer(payload, "<f4")[: scan.beams]
+    step = scan.bearing_step_rad or math.tau / max(1, scan.beams)
+    bearing = scan.bearing_first_rad + step * np.arange(len(ranges))
+    hit = np.isfinite(ranges) & (ranges > 0.0)
+    x, y = ranges[hit] * np.cos(bearing[hit]), ranges[hit] * np.sin(bearing[hit])
+    return np.column_stack((x, y, np.zeros(len(x)))).astype("<f4").tobytes()
+
+
+@lru_cache(maxsize=64)
+def _outline(car: str) -> tuple[float, float, float]:
+    """Return rear end, front end and width of a car's body [m]; a Nigel's where it is unknown."""
+    try:
+        known = load_car(car, trusted=False)
+    except CarError:
+        return NIGEL_M
+    if not known.has("body.footprint_x_m"):
+        return NIGEL_M
+    rear, front = known.vector("body.footprint_x_m")
+    right, left = known.vector("body.footprint_y_m")
+    return rear, front, left - right
+
+
+@lru_cache(maxsize=64)
+def _scanner(car: str) -> fox.Vector:
+    """Return where a car's scanner is on its body; the car's origin where its file has none."""
+    try:
+        known = load_car(car, trusted=False)
+    except CarError:
+        return fox.Vector(x=0.0, y=0.0)
+    if not known.has("lidar.position_m"):
+        return fox.Vector(x=0.0, y=0.0)
+    x, y, z = known.vector("lidar.position_m")
+    return fox.Vector(x=x, y=y, z=z)

@@ -1,0 +1,281 @@
+"""Where in a run's file each quarter of a second lies, so that a seek reads no more than it shows.
+
+A complete file brings its index along. One that is still being written, or whose writer was killed,
+is walked from record to record without unpacking them, and only what is new since the last look.
+"""
+
+import struct
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+import zstandard
+from mcap.reader import make_reader
+from mcap.records import ChunkIndex
+
+from scm.errors import RecordingError
+from scm.recorder.mcap_file import UNREADABLE, Recorded
+
+MAGIC = b"\x89MCAP0\r\n"
+CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, DATA_END = 0x04, 0x05, 0x06, 0x07, 0x0F
+MOST_UNPACKED = 256 * 2**20  # of one chunk: a file that claims more is damaged or hostile
+_RECORD = struct.Struct("<BQ")
+_CHUNK = struct.Struct("<QQQII")
+_MESSAGE = struct.Struct("<HIQQ")
+_U16, _U32 = struct.Struct("<H"), struct.Struct("<I")
+
+
+class Chunk(NamedTuple):
+    """A piece of a run: from when to when [ns], where its record lies, and which channels it has.
+
+    Attributes:
+        start: Of its content in the file, behind the record's head.
+        length: Of that content [bytes].
+    """
+
+    begin_ns: int
+    end_ns: int
+    start: int
+    length: int
+    channels: frozenset[int]
+
+
+@dataclass(slots=True)
+class RunIndex:
+    """What a run's file holds, and where.
+
+    Attributes:
+        size: Of the file when it was looked at.
+        whole: Whether the file has its end; else its writer is at work, or was killed.
+        topics: The bus key of each channel.
+        read_to: How far a file without its end makes sense [bytes].
+    """
+
+    path: Path
+    size: int
+    whole: bool
+    chunks: list[Chunk] = field(default_factory=list)
+    topics: dict[int, str] = field(default_factory=dict)
+    read_to: int = 0
+
+    @property
+    def begin_ns(self) -> int:
+        """When the first message was heard; 0 in an empty run."""
+        return min((chunk.begin_ns for chunk in self.chunks), default=0)
+
+    @property
+    def end_ns(self) -> int:
+        """When the last message was heard; 0 in an empty run."""
+        return max((chunk.end_ns for chunk in self.chunks), default=0)
+
+    def read(
+        self,
+        begin_ns: int,
+        end_ns: int,
+        wanted: Callable[[str], bool],
+        damage: list[str] | None = None,
+    ) -> Iterator[Recorded]:
+        """Yield messages of some keys from a time to another, chunk after chunk.
+
+        A damaged chunk is left out, and told in `damage`.
+
+        Raises:
+            RecordingError: when the file cannot be opened (any more).
+        """
+        for chunk, keys, stream in self._holding(begin_ns, end_ns, wanted, self.chunks):
+            try:
+                content = _unpacked(stream, self.path, chunk)
+            except RecordingError as error:
+                if damage is not None:
+                    damage.append(str(error))
+                continue
+            yield from _messages(content, keys, begin_ns, end_ns)
+
+    def newest(self, before_ns: int, wanted: Callable[[str], bool]) -> Recorded | None:
+        """Return the last message of some keys up to a time, None where there is none.
+
+        Raises:
+            RecordingError: when the file cannot be opened (any more).
+        """
+        backwards = self._holding(0, before_ns, wanted, reversed(self.chunks))
+        for chunk, keys, stream in backwards:
+            try:
+                content = _unpacked(stream, self.path, chunk)
+            except RecordingError:
+                continue
+            found = max(_messages(content, keys, 0, before_ns), key=_heard_ns, default=None)
+            if found is not None:
+                return found
+        return None
+
+    def _holding(
+        self, begin_ns: int, end_ns: int, wanted: Callable[[str], bool], chunks: Iterable[Chunk]
+    ) -> Iterator[tuple[Chunk, dict[int, str], BinaryIO]]:
+        """Yield the chunks that have messages of some keys within a time."""
+        keys = {number: key for number, key in self.topics.items() if wanted(key)}
+        with _opened(self.path) as stream:
+            for chunk in chunks:
+                is_then = chunk.end_ns >= begin_ns and chunk.begin_ns <= end_ns
+                if is_then and not chunk.channels.isdisjoint(keys):
+                    yield chunk, keys, stream
+
+
+def read_index(path: Path, known: RunIndex | None = None) -> RunIndex:
+    """Find what a run's file holds, as far as it goes.
+
+    Args:
+        path: The `.mcap`.
+        known: What was found before: a file that only grew is read on from there.
+
+    Raises:
+        RecordingError: when it is no MCAP file, or cannot be read.
+    """
+    with _opened(path) as stream:
+        size = path.stat().st_size
+        if known is not None and known.size == size:
+            return known
+        if stream.read(len(MAGIC)) != MAGIC:
+            msg = f"{path}: no recording: an MCAP file begins otherwise"
+            raise RecordingError(msg)
+        complete = _summary(stream, path, size)
+        if complete is not None:
+            return complete
+        grows = known is not None and not known.whole and known.size < size
+        index = known if grows and known is not None else RunIndex(path, size, whole=False)
+        return _walk(stream, index, size)
+
+
+def _opened(path: Path) -> BinaryIO:
+    try:
+        return path.open("rb")
+    except OSError as cause:
+        msg = f"{path}: cannot be read: {cause.strerror or cause}"
+        raise RecordingError(msg) from cause
+
+
+def _summary(stream: BinaryIO, path: Path, size: int) -> RunIndex | None:
+    """Return the index that a complete file brings along; None where it has no end."""
+    try:
+        stream.seek(-len(MAGIC), 2)
+        if size < 2 * len(MAGIC) or stream.read(len(MAGIC)) != MAGIC:
+            return None
+        stream.seek(0)
+        summary = make_reader(stream).get_summary()
+    except UNREADABLE:
+        return None
+    if summary is None:
+        return None
+    chunks = [
+        _chunk_of(one)
+        for one in sorted(summary.chunk_indexes, key=lambda one: one.chunk_start_offset)
+        if 0 <= one.chunk_start_offset < size
+    ]
+    topics = {number: channel.topic for number, channel in summary.channels.items()}
+    return RunIndex(path, size, whole=True, chunks=chunks, topics=topics, read_to=size)
+
+
+def _chunk_of(index: ChunkIndex) -> Chunk:
+    return Chunk(
+        index.message_start_time,
+        index.message_end_time,
+        index.chunk_start_offset + _RECORD.size,
+        index.chunk_length - _RECORD.size,
+        frozenset(index.message_index_offsets),
+    )
+
+
+def _walk(stream: BinaryIO, index: RunIndex, size: int) -> RunIndex:
+    """Go on through a file without an end: chunks count when the file has them entirely."""
+    found = RunIndex(
+        index.path, size, whole=False, chunks=list(index.chunks), topics=dict(index.topics)
+    )
+    at = index.read_to or len(MAGIC)
+    while at + _RECORD.size <= size:
+        stream.seek(at)
+        kind, length = _RECORD.unpack(stream.read(_RECORD.size))
+        inside, after = at + _RECORD.size, at + _RECORD.size + length
+        if after > size or kind in (0, DATA_END):
+            break
+        if kind == CHUNK and length >= _CHUNK.size:
+            begin_ns, end_ns, *_ = _CHUNK.unpack(stream.read(_CHUNK.size))
+            found.chunks.append(Chunk(begin_ns, end_ns, inside, length, frozenset()))
+        elif kind == MESSAGE_INDEX and found.chunks and length >= _U16.size:
+            (number,) = _U16.unpack(stream.read(_U16.size))
+            last = found.chunks[-1]
+            found.chunks[-1] = last._replace(channels=last.channels | {number})
+            if number not in found.topics:
+                found.topics |= _channels_in(stream, index.path, last)
+        at = after
+    found.read_to = at
+    return found
+
+
+def _channels_in(stream: BinaryIO, path: Path, chunk: Chunk) -> dict[int, str]:
+    """Return the channels that a chunk brings in; none where it is damaged."""
+    try:
+        content = _unpacked(stream, path, chunk)
+    except RecordingError:
+        return {}
+    return {
+        number: key
+        for kind, start, end in _records(content)
+        if kind == CHANNEL
+        for number, key in (_channel(content[start:end]),)
+    }
+
+
+def _channel(record: bytes) -> tuple[int, str]:
+    """Return a channel's number and key."""
+    (number,) = _U16.unpack_from(record)
+    (length,) = _U32.unpack_from(record, 4)
+    return number, record[8 : 8 + length].decode("utf-8", "replace")
+
+
+def _messages(
+    content: bytes, keys: dict[int, str], begin_ns: int, end_ns: int
+) -> Iterator[Recorded]:
+    for kind, start, end in _records(content):
+        if kind != MESSAGE or end - start < _MESSAGE.size:
+            continue
+        number, _, t_ns, _ = _MESSAGE.unpack_from(content, start)
+        if number in keys and begin_ns <= t_ns <= end_ns:
+            yield Recorded(t_ns, keys[number], content[start + _MESSAGE.size : end])
+
+
+def _heard_ns(one: Recorded) -> int:
+    return one.t_ns
+
+
+def _records(content: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield the kind, begin and end of each whole record in a chunk's content."""
+    at = 0
+    while at + _RECORD.size <= len(content):
+        kind, length = _RECORD.unpack_from(content, at)
+        start = at + _RECORD.size
+        at = start + length
+        if at <= len(content):
+            yield kind, start, at
+
+
+def _unpacked(stream: BinaryIO, path: Path, chunk: Chunk) -> bytes:
+    """Return a chunk's records.
+
+    Raises:
+        RecordingError: when it is damaged, or packed in a way that the recorder does not use.
+    """
+    stream.seek(chunk.start)
+    record = stream.read(chunk.length)
+    try:
+        _, _, size, _, name_length = _CHUNK.unpack_from(record)
+        at = _CHUNK.size + name_length
+        packing, packed = record[_CHUNK.size : at], record[at + 8 :]
+        if packing == b"":
+            return packed
+        if packing != b"zstd" or max(size, zstandard.frame_content_size(packed)) > MOST_UNPACKED:
+            msg = f"{path}: a chunk of {size} bytes packed as {packing[:20]!r} is none of ours"
+            raise RecordingError(msg)
+        return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+    except UNREADABLE as cause:
+        msg = f"{path}: the piece at byte {chunk.start} is damaged ({cause})"
+        raise RecordingError(msg) from cause

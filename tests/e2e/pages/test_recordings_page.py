@@ -1,0 +1,211 @@
+"""The recordings page: a drive of the real city seen again, taken home, noted, deleted; scripts."""
+
+import pytest
+from mcap.reader import make_reader
+
+from scm.recorder.recover import recover
+from scm.recorder.run_index import read_index
+from tests.e2e.city_process import wait_for
+from tests.e2e.pages.visiting import judge
+
+NAME = "morning_drive"
+AT = f"/recordings/{NAME}"
+DRIVEN_S = 12.0
+READY = '.sheet[data-shown="cars"]'
+ALL_SHOWN = "() => document.querySelectorAll('.cars tbody tr').length === 6"
+SCRIPT = '"""Say a word."""\nimport time\nprint("a word", flush=True)\ntime.sleep(60)\n'
+
+
+@pytest.fixture(scope="module")
+def drive(running):
+    """Keep what was recorded so far, with six cars in it, as a recording of its own."""
+    (live,) = (row["name"] for row in running.get("/recordings")["items"])
+
+    def is_long():
+        summary = running.get(f"/recordings/{live}/summary")
+        length_s = summary["recording"]["length_s"] - summary["first_frame_s"]
+        return len(summary["cars"]) == 6 and length_s > DRIVEN_S
+
+    wait_for(is_long, 90.0, "six cars have driven for a while")
+    path = running.folder / f"{NAME}.mcap"
+    recover(running.folder / f"{live}.mcap", path)
+    yield running.get(f"/recordings/{NAME}/summary")
+    path.unlink(missing_ok=True)
+
+
+@pytest.fixture
+def last_s(drive):
+    """A moment near the end, when all cars drive."""
+    return round(drive["recording"]["length_s"] - 3.0, 1)
+
+
+@pytest.mark.parametrize("size", ["wide", "narrow"])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_replay_is_calm_accessible_and_fits(look, last_s, size, theme):
+    visited = look(f"{AT}?t={last_s}", "recordings", size, theme, ready=READY)
+    visited.wait(ALL_SHOWN)
+    assert visited.page.locator(".not-live").inner_text().upper().startswith("NOT LIVE")
+    assert visited.page.title().startswith("NOT LIVE")
+
+
+def test_the_list_tells_what_is_written_and_opens_a_replay_that_leaves_no_trace(look, drive):
+    visited = look("/recordings", "recordings_list", "wide", "light", ready="tbody tr")
+    page = visited.page
+    assert page.locator('tr[data-state="being written"]').count() == 1
+    page.click(f'tr[data-recording="{NAME}"] a')
+    page.wait_for_selector(".not-live")
+    page.go_back()
+    page.wait_for_selector("tbody tr")
+    assert not page.title().startswith("NOT LIVE")
+    assert visited.complaints == []
+
+
+def test_cars_stand_where_the_recording_has_them(visit, running, drive, last_s):
+    page = visit(f"{AT}?t={last_s}").page
+    page.wait_for_function(ALL_SHOWN)
+    shown = {
+        row.get_attribute("data-car"): float(row.locator(".number").inner_text().split()[0])
+        for row in page.locator(".cars tbody tr").all()
+    }
+    path = f"/recordings/{NAME}/frames?from_s={last_s - 0.15:.2f}&to_s={last_s}"
+    told = running.get(path)
+    cars = {told["cars"][car[0]]["vehicle"]: car[4] for car in told["frames"][-1]["cars"]}
+    assert set(shown) == set(cars)
+    for name, speed_mps in cars.items():
+        assert shown[name] == pytest.approx(speed_mps, abs=0.15)
+
+
+def test_it_plays_pauses_steps_and_jumps_by_mouse_and_keyboard(visit, drive, last_s):
+    visited = visit(f"{AT}?t={last_s}")
+    page = visited.page
+    page.wait_for_selector(READY)
+    slider = page.locator("input[type=range]")
+
+    def at_s():
+        return float(slider.input_value())
+
+    page.click(".play")
+    visited.until(lambda: at_s() > last_s + 0.5, "it plays")
+    page.keyboard.press("l")
+    page.wait_for_selector('.loop[aria-pressed="true"]')
+    visited.until(lambda: at_s() < last_s - 1.0, "it begins again")
+    page.click(".play")
+    page.wait_for_selector('.play[aria-pressed="false"]')
+    page.keyboard.press("End")
+    visited.until(lambda: at_s() > last_s + 2.0, "the end is shown")
+    page.keyboard.press("ArrowLeft")
+    visited.until(lambda: at_s() < last_s + 2.4, "a second back")
+    page.keyboard.press("+")
+    assert page.locator(".buttons select").input_value() == "2"
+    page.click(".events li button >> nth=0")
+    first = drive["first_frame_s"]
+    visited.until(lambda: at_s() < first + 3.0, "the first event is shown")
+    slider.fill(str(last_s))
+    visited.until(lambda: page.evaluate(ALL_SHOWN), "the slider leads where it is put")
+    assert visited.complaints == []
+
+
+def test_a_recording_that_is_being_written_grows_while_it_is_looked_at(visit, running):
+    rows = running.get("/recordings")["items"]
+    live = next(row["name"] for row in rows if row["state"] == "being written")
+    visited = visit(f"/recordings/{live}")
+    slider = visited.page.locator("input[type=range]")
+    before = float(slider.get_attribute("max"))
+    visited.until(lambda: float(slider.get_attribute("max")) > before, "it grows")
+
+
+def test_files_to_take_home_hold_what_was_recorded(visit, drive, tmp_path):
+    visited = visit(AT)
+    page = visited.page
+    page.click("text=Download")
+    page.wait_for_selector("dialog .files")
+    judge(visited)
+    with page.expect_download() as waiting:
+        page.click(f"text={NAME}.mcap")
+    waiting.value.save_as(tmp_path / "run.mcap")
+    assert read_index(tmp_path / "run.mcap").whole
+    page.select_option("dialog select", "n2")
+    with page.expect_download() as waiting:
+        page.click("text=n2.csv")
+    waiting.value.save_as(tmp_path / "n2.csv")
+    assert len((tmp_path / "n2.csv").read_text().splitlines()) > 20 * DRIVEN_S
+    with page.expect_download() as waiting:
+        page.click(f"text={NAME}.foxglove.mcap")
+    waiting.value.save_as(tmp_path / "fox.mcap")
+    with (tmp_path / "fox.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    topics = {channel.topic for channel in summary.channels.values()}
+    assert {"/tf", "/cars", "/map", "/signals", "/n1/state"} <= topics
+
+
+def test_a_mismatch_job_is_asked_for_the_car_and_the_span_that_are_shown(visit, drive, last_s):
+    visited = visit(f"{AT}?t={last_s}")
+    page = visited.page
+    page.wait_for_function(ALL_SHOWN)
+    page.click('tr[data-car="n2"] button')
+    page.click("text=Mismatch job")
+    page.click("dialog .with-button button >> nth=1")
+    judge(visited)
+    with page.expect_request("**/mismatch/jobs") as asked:
+        page.click("dialog .primary")
+    assert asked.value.post_data_json == {
+        "recording": NAME,
+        "vehicle": "n2",
+        "car": "nigel",
+        "budget_s": 120,
+        "from_s": None,
+        "to_s": last_s,
+    }
+    identity = asked.value.response().json().get("id")
+    if identity:
+        page.request.delete(page.url.split("/recordings")[0] + f"/api/v1/operations/{identity}")
+
+
+def test_a_name_and_notes_stay_and_a_deleted_recording_goes(visit, running, drive):
+    other = "to_be_deleted"
+    source = running.folder / f"{NAME}.mcap"
+    (running.folder / f"{other}.mcap").write_bytes(source.read_bytes())
+    visited = visit(f"/recordings/{other}")
+    page = visited.page
+    page.click("text=Name and notes")
+    page.fill("dialog input", "Rush hour")
+    page.fill("dialog textarea", "n3 was pushed")
+    page.click("dialog .primary")
+    page.wait_for_selector(".about h2 >> text=Rush hour")
+    assert running.get(f"/recordings/{other}")["notes"] == "n3 was pushed"
+    page.click(".tools >> text=Delete")
+    page.click("dialog .danger")
+    page.wait_for_selector(f'tr[data-recording="{NAME}"]')
+    assert not (running.folder / f"{other}.mcap").exists()
+    assert visited.complaints == []
+
+
+def test_a_recording_that_cannot_be_read_says_so(visit, running):
+    bad = running.folder / "bad.mcap"
+    bad.write_bytes(b"no recording")
+    try:
+        page = visit("/recordings/bad").page
+        page.wait_for_selector("[role=alert] >> text=an MCAP file begins otherwise")
+    finally:
+        bad.unlink()
+
+
+def test_a_script_is_written_run_watched_and_stopped(look, running):
+    visited = look("/recordings/scenarios", "scenarios", "wide", "dark", ready=".code")
+    page = visited.page
+    page.click(".scripts >> text=New")
+    page.fill("dialog input", "say_a_word")
+    page.click("dialog .primary")
+    page.wait_for_selector("h2 >> text=say_a_word.py")
+    page.fill(".code", SCRIPT)
+    page.click(".script .tools >> text=Save >> nth=-1")
+    page.wait_for_selector(".run button:not([disabled])")
+    page.click(".run button")
+    page.wait_for_selector("pre >> text=a word")
+    page.click(".runs >> text=Stop")
+    page.wait_for_selector('.runs [data-state="cancelled"]')
+    page.click(".script .tools >> text=Delete")
+    visited.until(
+        lambda: all(row["shipped"] for row in running.get("/scenarios")["items"]), "it is deleted"
+    )
+    assert visited.complaints == []

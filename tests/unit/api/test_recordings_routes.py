@@ -1,0 +1,197 @@
+"""Recordings over REST: the list, any moment, files, notes, and an end."""
+
+import csv
+import io
+import os
+import time
+
+import pytest
+
+from scm.api.app import create_app
+from scm.api.ranged import BLOCK
+from scm.api.shelves import shelves_in
+from tests.unit.recorder.short_run import BEGIN_NS, write_run
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "runs"
+
+
+@pytest.fixture
+def client(view, fake_city, city_map, folder, client_of):
+    folder.mkdir()
+    app = create_app(view, fake_city.ask, city_map, shelves=shelves_in(folder))
+    return client_of(app)
+
+
+@pytest.fixture
+def ask(client):
+    def call(path, status=200, method="GET", **options):
+        answer = client(method, f"/api/v1/recordings{path}", **options)
+        assert answer.status_code == status, answer.text
+        return answer.json() if answer.content else None
+
+    return call
+
+
+def quiet(path):
+    """Date a file back: nobody writes to it any more."""
+    long_ago = time.time() - 60.0
+    os.utime(path, (long_ago, long_ago))
+
+
+def test_a_city_without_a_shelf_has_no_recordings(view, fake_city, city_map, client_of):
+    client = client_of(create_app(view, fake_city.ask, city_map))
+    assert client("GET", "/api/v1/recordings").json() == {"items": [], "next": None}
+
+
+def test_the_list_tells_begin_length_cars_and_state(ask, folder):
+    write_run(folder / "run.mcap")
+    (row,) = ask("")["items"]
+    assert (row["name"], row["state"], row["begin_ns"]) == ("run", "complete", BEGIN_NS)
+    assert (row["length_s"], row["cars"]) == (5.0, ["n1", "n10"])
+    assert row["size_bytes"] == (folder / "run.mcap").stat().st_size
+
+
+def test_a_file_without_its_end_is_being_written_or_cut_off(ask, folder):
+    path = write_run(folder / "run.mcap", finish=False)
+    assert ask("/run")["state"] == "being written"
+    quiet(path)
+    row = ask("/run")
+    assert row["state"] == "cut off"
+    assert "scm recover run.mcap" in row["trouble"]
+    assert ask("/run/frames?from_s=4&to_s=5")["frames"][-1]["t_s"] > 4.8
+
+
+def test_a_bad_file_stands_in_the_list_with_its_reason_and_harms_no_other(ask, folder):
+    write_run(folder / "good.mcap")
+    (folder / "bad.mcap").write_bytes(b"no such thing")
+    rows = {row["name"]: row for row in ask("")["items"]}
+    assert rows["bad"]["state"] == "unreadable"
+    assert rows["bad"]["trouble"] == "bad.mcap: no recording: an MCAP file begins otherwise"
+    assert rows["good"]["state"] == "complete"
+    assert ask("/bad/frames", status=409)["code"] == "unreadable"
+
+
+def test_names_that_leave_the_folder_find_nothing(client, folder):
+    write_run(folder.parent / "outside.mcap")
+    for name in ("..%2Foutside", "%2e%2e%2foutside", "....", "outside"):
+        assert client("GET", f"/api/v1/recordings/{name}").status_code in (404, 422)
+
+
+def test_long_lists_come_in_pages(ask, folder):
+    for number in range(3):
+        os.utime(write_run(folder / f"r{number}.mcap", 0.5), (number, number))
+    first = ask("?limit=2")
+    assert [row["name"] for row in first["items"]] == ["r2", "r1"]
+    assert [row["name"] for row in ask(f"?limit=2&cursor={first['next']}")["items"]] == ["r0"]
+
+
+def test_frames_tell_where_cars_were_and_what_signals_showed(ask, folder):
+    write_run(folder / "run.mcap")
+    found = ask("/run/frames?from_s=1&to_s=3&hz=10")
+    assert [car["vehicle"] for car in found["cars"]] == ["n1", "n10"]
+    times = [frame["t_s"] for frame in found["frames"]]
+    assert len(times) == 21
+    assert (times[0], times[-1]) == (1.0, 3.0)
+    car, x_m, *_ = found["frames"][5]["cars"][0]
+    assert (car, x_m) == (0, times[5])
+    shown = [(one["t_s"], one["colour"]) for one in found["signals"]]
+    assert shown == [(1.0, "red"), (2.0, "green")]
+
+
+def test_boxes_are_told_at_the_begin_and_when_they_move(ask, folder):
+    write_run(folder / "run.mcap")
+    frames = ask("/run/frames?from_s=0&to_s=2")["frames"]
+    moved = [(frame["t_s"], frame["boxes"][0]["x_m"]) for frame in frames if frame["boxes"]]
+    assert moved == [(0.0, 0.0), (1.0, 0.1)]
+
+
+def test_too_much_at_once_is_cut_and_says_so(ask, folder, monkeypatch):
+    from scm.api import replay
+
+    monkeypatch.setattr(replay, "MOST_ROWS", 10)
+    write_run(folder / "run.mcap")
+    found = ask("/run/frames?from_s=0&to_s=5")
+    assert len(found["frames"]) == 5
+    assert found["to_s"] == 0.5
+    assert ask("/run/frames?from_s=0&to_s=500", status=422)["code"] == "invalid"
+
+
+def test_events_come_in_their_order_with_their_time(ask, folder):
+    write_run(folder / "run.mcap")
+    rows = ask("/run/events")["items"]
+    assert [(row["t_s"], row["severity"]) for row in rows] == [(0.0, "info"), (3.0, "warning")]
+
+
+def test_the_summary_knows_the_map_that_was_driven_on(ask, client, folder, city_map):
+    write_run(folder / "run.mcap")
+    summary = ask("/run/summary")
+    assert summary["map_title"] == city_map.title
+    assert len(summary["lights"]) == len(city_map.lights)
+    drawn = client("GET", "/api/v1/recordings/run/map.svg")
+    assert drawn.headers["content-type"] == "image/svg+xml"
+    assert "<svg" in drawn.text
+
+
+def test_csv_has_a_row_for_each_report(client, ask, folder):
+    write_run(folder / "run.mcap")
+    own = client("GET", "/api/v1/recordings/run/csv?vehicle=n10").text
+    rows = list(csv.DictReader(io.StringIO(own)))
+    assert len(rows) == 101
+    assert (rows[20]["t_s"], rows[20]["x_m"], rows[20]["throttle"]) == ("1.0", "-1.0", "0.4")
+    everybody = client("GET", "/api/v1/recordings/run/csv").text
+    assert len(everybody.splitlines()) == 1 + 2 * 101
+    ask("/run/csv?vehicle=n2", status=404)
+
+
+def test_the_file_comes_whole_or_in_ranges(client, folder):
+    content = write_run(folder / "run.mcap").read_bytes()
+    at = "/api/v1/recordings/run.mcap"
+    whole = client("GET", at)
+    assert whole.content == content
+    assert whole.headers["accept-ranges"] == "bytes"
+    part = client("GET", at, headers={"Range": "bytes=100-199"})
+    assert (part.status_code, part.content) == (206, content[100:200])
+    assert part.headers["content-range"] == f"bytes 100-199/{len(content)}"
+    assert client("GET", at, headers={"Range": "bytes=-50"}).content == content[-50:]
+    assert client("GET", at, headers={"Range": "bytes=50-"}).content == content[50:]
+    assert client("GET", at, headers={"Range": f"bytes={len(content)}-"}).status_code == 416
+    old = client("GET", at, headers={"Range": "bytes=0-9", "If-Range": '"older"'})
+    assert (old.status_code, len(old.content)) == (200, len(content))
+    head = client("HEAD", at)
+    assert (head.content, head.headers["content-length"]) == (b"", str(len(content)))
+
+
+def test_a_file_that_grows_meanwhile_is_sent_as_long_as_it_was(tmp_path):
+    from scm.api.ranged import _blocks
+
+    path = tmp_path / "run.mcap"
+    path.write_bytes(b"a" * (BLOCK + 5))
+    blocks = _blocks(path, 0, BLOCK + 5)
+    first = next(blocks)
+    with path.open("ab") as stream:
+        stream.write(b"b" * 1000)
+    assert first + b"".join(blocks) == b"a" * (BLOCK + 5)
+
+
+def test_notes_are_kept_for_who_saw_the_present_ones(client, ask, folder):
+    write_run(folder / "run.mcap")
+    at = "/api/v1/recordings/run/notes"
+    tag = client("GET", at).headers["etag"]
+    body = {"title": "Brisk", "notes": "n1 slipped"}
+    assert client("PUT", at, json=body).status_code == 428
+    assert client("PUT", at, json=body, headers={"If-Match": tag}).json() == body
+    assert client("PUT", at, json={}, headers={"If-Match": tag}).status_code == 412
+    row = ask("/run")
+    assert (row["title"], row["notes"]) == ("Brisk", "n1 slipped")
+
+
+def test_a_recording_can_be_deleted_but_not_while_it_is_written(ask, folder):
+    path = write_run(folder / "run.mcap", finish=False)
+    assert ask("/run", status=409, method="DELETE")["code"] == "being_written"
+    quiet(path)
+    ask("/run", status=204, method="DELETE")
+    assert not path.exists()
+    ask("/run", status=404)

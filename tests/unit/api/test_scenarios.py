@@ -1,0 +1,128 @@
+"""Scripts of a folder: kept, edited, run beside the city, stopped."""
+
+import time
+
+import pytest
+
+from scm.api.app import create_app
+from scm.api.shelves import shelves_in
+
+OVER = ("done", "failed", "cancelled")
+
+
+@pytest.fixture
+def client(view, fake_city, city_map, tmp_path, client_of):
+    shelves = shelves_in(tmp_path)
+    return client_of(create_app(view, fake_city.ask, city_map, shelves=shelves, connect="tcp/x:1"))
+
+
+@pytest.fixture
+def keep(client):
+    def put(name, text, status=None, **headers):
+        status = status or (200 if headers else 201)
+        headers = headers or {"If-None-Match": "*"}
+        at = f"/api/v1/scenarios/{name}"
+        answer = client("PUT", at, json={"text": text}, headers=headers)
+        assert answer.status_code == status, answer.text
+        return answer
+
+    return put
+
+
+@pytest.fixture
+def run(client):
+    def start(name, *arguments, key=""):
+        at = f"/api/v1/scenarios/{name}/runs"
+        headers = {"Idempotency-Key": key} if key else {}
+        answer = client("POST", at, json={"arguments": list(arguments)}, headers=headers)
+        assert answer.status_code == 202, answer.text
+        return answer.json()["id"]
+
+    return start
+
+
+@pytest.fixture
+def operation(client):
+    def wait(run, done=lambda row: row["state"] in OVER):
+        for _ in range(600):
+            row = client("GET", f"/api/v1/operations/{run}").json()
+            if done(row):
+                return row
+            time.sleep(0.05)
+        raise AssertionError(row)
+
+    return wait
+
+
+def lines_of(client, run, after=0):
+    return client("GET", f"/api/v1/scenarios/runs/{run}/lines?after={after}").json()["lines"]
+
+
+def test_ones_own_scripts_stand_before_the_shipped_ones(client, keep):
+    keep("zebra", '"""Count zebras."""\n')
+    rows = client("GET", "/api/v1/scenarios").json()["items"]
+    assert (rows[0]["name"], rows[0]["about"], rows[0]["shipped"]) == (
+        "zebra",
+        "Count zebras.",
+        False,
+    )
+    shipped = {row["name"]: row["about"] for row in rows if row["shipped"]}
+    assert shipped["travel_times"].startswith("Two cars lap")
+
+
+def test_a_script_is_changed_only_by_who_saw_it_last(client, keep):
+    tag = keep("mine", "a = 1\n").headers["etag"]
+    keep("mine", "a = 2\n", **{"If-Match": tag})
+    keep("mine", "a = 3\n", status=412, **{"If-Match": tag})
+    keep("mine", "a = 3\n", status=412)
+    assert client("GET", "/api/v1/scenarios/mine").json()["text"] == "a = 2\n"
+
+
+def test_what_is_no_python_is_refused_with_its_line(keep):
+    answer = keep("mine", "a = 1\nb = (\n", status=422)
+    assert answer.json()["detail"].startswith("mine.py, line 2: expected a Python script")
+
+
+def test_what_came_with_the_program_cannot_be_changed_or_deleted(client, keep):
+    tag = client("GET", "/api/v1/scenarios/travel_times").headers["etag"]
+    keep("travel_times", "a = 1\n", status=409, **{"If-Match": tag})
+    assert client("DELETE", "/api/v1/scenarios/travel_times").json()["code"] == "shipped"
+
+
+def test_a_run_hears_where_the_city_is_and_its_lines_are_told(client, keep, run, operation):
+    keep("hello", 'import os, sys\nprint(os.environ["SCM_CONNECT"], sys.argv[1:])\nprint("b")\n')
+    number = run("hello", "--connect", "{connect}")
+    row = operation(number)
+    assert (row["state"], row["result"]) == ("done", f"/recordings/scenarios?run={number}")
+    assert lines_of(client, number) == ["tcp/x:1 ['--connect', 'tcp/x:1']", "b"]
+    assert lines_of(client, number, after=1) == ["b"]
+
+
+def test_the_same_key_runs_a_script_once(keep, run):
+    keep("hello", "print(1)\n")
+    assert run("hello", key="one") == run("hello", key="one") != run("hello", key="two")
+
+
+def test_a_script_that_fails_says_why(keep, run, operation):
+    keep("bad", 'raise SystemExit("no cars here")\n')
+    row = operation(run("bad"))
+    assert row["state"] == "failed"
+    assert row["error"] == "bad.py ended with exit code 1: no cars here"
+
+
+def test_a_stopped_script_may_clean_up(client, keep, run, operation):
+    keep(
+        "long",
+        "import time\ntry:\n    print('drives')\n    time.sleep(60)\n"
+        "except KeyboardInterrupt:\n    print('cars are gone')\n",
+    )
+    number = run("long")
+    operation(number, lambda row: row["doing"] == "drives")
+    client("DELETE", f"/api/v1/operations/{number}")
+    assert operation(number)["state"] == "cancelled"
+    assert lines_of(client, number) == ["drives", "cars are gone"]
+
+
+def test_a_run_that_never_was_is_not_found(client, keep):
+    assert client("GET", "/api/v1/scenarios/runs/scenario-7/lines").status_code == 404
+    assert client("POST", "/api/v1/scenarios/none/runs", json={}).status_code == 404

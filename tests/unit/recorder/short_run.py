@@ -1,0 +1,107 @@
+"""A short run in a file: two cars, a junction that turns green, two events, the map, a picture."""
+
+import msgspec
+
+from scm.clock import NS_PER_S
+from scm.maps.load import load_map
+from scm.recorder.mcap_file import RunFile
+from scm.v2x.exchange import RawSample
+from scm.v2x.key import prefix
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.v2x.messages.world_definition import WorldDefinition
+from scm.v2x.messages.world_snapshot import SnapshotBox, SnapshotVehicle, WorldSnapshot
+
+BEGIN_NS = 1_700_000_000 * NS_PER_S
+HZ = 20
+GREEN_S = 2.0
+PICTURE = b"\xff\xd8 a picture \xff\xd9"
+
+
+def write_run(path, seconds=5.0, *, finish=True):
+    """Write the run, a chunk each quarter of a second; without `finish` as a kill leaves it."""
+    file = RunFile(path, "city")
+    file.write(_sample(0.0, "world/def", _definition()))
+    file.write(_sample(0.0, "event/info/world", _event("info", "n1 stands on the map")))
+    for tick in range(round(seconds * HZ) + 1):
+        at_s = tick / HZ
+        for name, x_m in (("n1", at_s), ("n10", -at_s)):
+            file.write(_sample(at_s, f"v/{name}/state", _state(name, at_s, x_m, tick)))
+        file.write(_sample(at_s, "world/snapshot", _snapshot(at_s, tick)))
+        if tick % 2 == 0:
+            file.write(_sample(at_s, "tl/crossing/spat", _spat(at_s)))
+        if tick == 3 * HZ:
+            file.write(_sample(at_s, "event/warning/world", _event("warning", "n1 hit a wall")))
+            file.write(_picture(at_s))
+        if tick % 5 == 0:
+            file.flush()
+    file.flush()
+    content = path.read_bytes()
+    file.close()
+    if not finish:
+        path.write_bytes(content)
+    return path
+
+
+def _sample(at_s, key, message):
+    t_ns = BEGIN_NS + round(at_s * NS_PER_S)
+    return RawSample(prefix("city") + key, msgspec.json.encode(message), None, t_ns)
+
+
+def _picture(at_s):
+    head = {"camera": "overhead", "t_ns": BEGIN_NS, "width_px": 4, "height_px": 3}
+    key = prefix("city") + "eye/overhead/frame"
+    return RawSample(key, PICTURE, msgspec.json.encode(head), BEGIN_NS + round(at_s * NS_PER_S))
+
+
+def _definition():
+    return WorldDefinition(t_ns=BEGIN_NS, seed=0, map=load_map("driving_school"))
+
+
+def _event(severity, text):
+    return CityEvent(
+        severity=severity, source="world", t_ns=BEGIN_NS, name="told", text=text, vehicle="n1"
+    )
+
+
+def _state(name, at_s, x_m, tick):
+    return VehicleState(
+        vehicle=name,
+        t_ns=BEGIN_NS + round(at_s * NS_PER_S),
+        seq=tick,
+        x_m=x_m,
+        y_m=0.5,
+        yaw_rad=0.0,
+        speed_mps=1.0,
+        yaw_rate_radps=0.0,
+        steering_rad=0.1,
+        throttle=0.4,
+        steering=0.2,
+        source="simulated",
+    )
+
+
+def _snapshot(at_s, tick):
+    cars = tuple(
+        SnapshotVehicle(
+            vehicle=name,
+            kind="hosted",
+            car="nigel",
+            tag_id=number,
+            x_m=x_m,
+            y_m=0.5,
+            yaw_rad=0.0,
+            speed_mps=1.0,
+            steering_rad=0.1,
+        )
+        for number, (name, x_m) in enumerate((("n1", at_s), ("n10", -at_s)))
+    )
+    boxes = (SnapshotBox(name="box1", x_m=0.0 if at_s < 1.0 else 0.1, y_m=0.0, yaw_rad=0.0),)
+    return WorldSnapshot(t_ns=BEGIN_NS, tick=tick, vehicles=cars, boxes=boxes)
+
+
+def _spat(at_s):
+    colour = "red" if at_s < GREEN_S else "green"
+    group = SignalGroup(group="south_east", colour=colour, since_ns=0, min_end_ns=0)
+    return Spat(junction="crossing", t_ns=0, seq=1, mode="plan", plan="calm", groups=(group,))
