@@ -16,6 +16,7 @@ from scm.api import openapi, problem
 from scm.api.city import Ask, City
 from scm.api.gate import Gate, content_policy
 from scm.api.keys import KeyRing
+from scm.api.mismatch_jobs import MismatchJobs
 from scm.api.operations import Operations
 from scm.api.routes import (
     boxes,
@@ -26,6 +27,7 @@ from scm.api.routes import (
     live,
     map,  # noqa: A004  named for its noun
     misbehaviour,
+    mismatch,
     operations,
     session,
     signals,
@@ -65,6 +67,7 @@ def create_app(
     keys: KeyRing | None = None,
     plans: Mapping[str, Sequence[str]] | None = None,
     shelves: Shelves | None = None,
+    bus: Sequence[str] = (),
 ) -> FastAPI:
     """Build the application.
 
@@ -76,6 +79,8 @@ def create_app(
             everything.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
         shelves: Folders of recordings, reports and the like; None: the city offers none.
+        bus: Words that tell a program of ours where the bus is and who it is there; empty: such a
+            program cannot reach the city.
     """
     city = City(view, ask, city_map, plans or {}, shelves or Shelves())
     work = Operations(WallClock())
@@ -100,6 +105,8 @@ def create_app(
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
     api.include_router(operations.router(work), responses=problem.RESPONSES)
+    jobs = MismatchJobs(city, work, WallClock(), bus)
+    api.include_router(mismatch.router(city, jobs), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)
     api.include_router(session.router(), responses=problem.RESPONSES)
     api.include_router(key_routes.router(keys), responses=problem.RESPONSES)

@@ -52,6 +52,7 @@ def _run(arguments: argparse.Namespace) -> int:
             city_map,
             keys=keys,
             shelves=shelves_in(arguments.data) if arguments.data else None,
+            bus=_at_bus(arguments),
             plans={junction.name: names("scm.traffic.plans") for junction in city_map.junctions},
         )
 
@@ -72,6 +73,12 @@ def _run(arguments: argparse.Namespace) -> int:
             stop.set()
             hearing.join()
     return 1 if failures else 0
+
+
+def _at_bus(arguments: argparse.Namespace) -> list[str]:
+    """Return how a program of ours finds the bus, and as whom."""
+    words = ["--connect", arguments.connect, "--city", arguments.city]
+    return words + (["--credentials", str(arguments.credentials)] if arguments.credentials else [])
 
 
 COMMAND = Command(
