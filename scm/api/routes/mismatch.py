@@ -5,7 +5,7 @@ from pathlib import Path as FilePath
 from typing import Annotated, Any
 
 import msgspec
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from starlette.concurrency import run_in_threadpool
@@ -24,6 +24,7 @@ from scm.vehicles.car_files import car_files
 
 _CAR = r"^[a-z0-9_-]{0,32}$"
 _ZIP = {"application/zip": {"schema": {"type": "string", "contentMediaType": "application/zip"}}}
+Title = Annotated[str, Query(max_length=128, description="what to call it", examples=["my drive"])]
 ReportName = Annotated[
     str, Path(pattern=NAME, description="a report's name", examples=["again-n1"])
 ]
@@ -217,7 +218,7 @@ def _add_jobs(routes: APIRouter, city: City, jobs: MismatchJobs) -> None:
         responses=answer(uploads.Upload, 201),
         openapi_extra={"requestBody": {"required": True, "content": _ZIP}},
     )
-    async def upload(request: Request, key: IdempotencyKey = "") -> Response:
+    async def upload(request: Request, name: Title = "", key: IdempotencyKey = "") -> Response:
         del key  # a second copy is a second upload; the oldest are forgotten
         body = bytearray()
         async for chunk in request.stream():
@@ -226,9 +227,8 @@ def _add_jobs(routes: APIRouter, city: City, jobs: MismatchJobs) -> None:
                 most = uploads.MOST_BYTES // 2**20
                 detail = f"upload: more than {most} MiB; send a part of the recording"
                 raise RefusedError(Refused(code="invalid", detail=detail))
-        title = request.headers.get("x-name", "upload")
         cars = tuple(sorted(car_files()))
-        taken = await run_in_threadpool(uploads.take, jobs.shelf(), bytes(body), title, cars)
+        taken = await run_in_threadpool(uploads.take, jobs.shelf(), bytes(body), name, cars)
         return json_response(taken, 201)
 
 
