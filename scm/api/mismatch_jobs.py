@@ -120,11 +120,11 @@ class MismatchJobs:
 
         return self._work.start(KIND, job.source, work, owner=job.owner)
 
-    def drive(self, report: str, drive: str, vehicle: str, owner: str) -> Operation:
-        """Start a suggested drive with a car of the city; its recording is put into the report.
+    def drive(self, report: str, drive: str, vehicle: str, part: int, owner: str) -> Operation:
+        """Start a part of a suggested drive with a car; its recording is put into the report.
 
         Raises:
-            RefusedError: when there is no such drive, or no bus to send it over.
+            RefusedError: when there is no such drive or part, or no bus to send it over.
         """
         folder = self.reports.find(report)
         if folder is None or drive not in self.reports.drives(folder):
@@ -132,35 +132,35 @@ class MismatchJobs:
         if not self._bus:
             detail = "this server reaches no city to drive in"
             raise RefusedError(Refused(code="offline", detail=detail))
-        floor = self._city.city_map.floor
         plans = sorted((folder / drive).glob("*.yaml"))
+        if part > len(plans):
+            detail = f"part: got {part}, expected 1 to {len(plans)}"
+            raise RefusedError(Refused(code="invalid", detail=detail))
 
         def work(tell: Teller) -> str:
-            for i, plan in enumerate(plans):
-                leg = f", part {i + 1} of {len(plans)}" if len(plans) > 1 else ""
-                tell(f"{vehicle} comes to rest and drives{leg}", i / len(plans))
-                said = self._play(plan, vehicle, folder, floor.x_m + floor.y_m, tell)
-                if said:
-                    raise RunError(said)
+            tell(f"{vehicle} comes to rest and drives")
+            self._play(plans[part - 1], vehicle, folder, tell)
             return f"/mismatch/{report}"
 
         return self._work.start(DRIVE_KIND, f"{drive} of {report} by {vehicle}", work, owner=owner)
 
-    def _play(
-        self, plan: Path, vehicle: str, folder: Path, floor: tuple[float, ...], tell: Teller
-    ) -> str:
-        """Play one drive; return why it ended early, empty if it did not."""
+    def _play(self, plan: Path, vehicle: str, folder: Path, tell: Teller) -> None:
+        """Play a drive and keep its recording; one that ended early, or was called off, is none."""
         known = self.reports.told(folder)
         number = 1 + max((int(one.name.removeprefix("told_")) for one in known), default=0)
-        out = folder / f"told_{number}"
+        out, floor = folder / f"told_{number}", self._city.city_map.floor
         words = ["play", str(plan), *self._bus, "--vehicle", vehicle, "--out", str(out)]
-        words += ["--floor", *(f"{edge:g}" for edge in floor)]
+        words += ["--floor", *(f"{edge:g}" for edge in (*floor.x_m, *floor.y_m))]
+        whole = False
         try:
             lines = run_scm(words, tell, lambda _: None, kinder=False)
-        except BaseException:
-            shutil.rmtree(out, ignore_errors=True)
-            raise
-        return next((line for line in lines if line.startswith("stopped")), "")
+            early = next((line for line in lines if line.startswith("stopped")), "")
+            whole = not early
+        finally:
+            if not whole:
+                shutil.rmtree(out, ignore_errors=True)
+        if early:
+            raise RunError(early)
 
 
 def _words(recordings: Sequence[Path], job: Job, out: Path) -> list[str]:

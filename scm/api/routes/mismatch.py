@@ -96,6 +96,10 @@ class PlayBody(BaseModel):
     vehicle: str = Field(
         pattern=r"^[a-z0-9_-]{1,32}$", description="a car of the city", examples=["n1"]
     )
+    part: int = Field(
+        1, ge=1, le=99, description="of a drive in parts, between which the car is changed",
+        examples=[1],
+    )  # fmt: skip
 
 
 class Offers(msgspec.Struct, kw_only=True, frozen=True):
@@ -312,7 +316,7 @@ def _add_drives(routes: APIRouter, jobs: MismatchJobs) -> None:
     ) -> Response:  # fmt: skip
         del key  # drives of one city run one at a time, and a car's lease has one owner
         owner = str(request.scope.get("scm_owner", ""))
-        return accepted(jobs.drive(name, drive, body.vehicle, owner))
+        return accepted(jobs.drive(name, drive, body.vehicle, body.part, owner))
 
 
 def _folder(jobs: MismatchJobs, name: str) -> FilePath:

@@ -23,13 +23,15 @@ export function leavesFloor(way, car, floor) {
   return laidFrom(way, car).some(([x, y]) => !inside(x, floor.x_m) || !inside(y, floor.y_m));
 }
 
-export function DriveFloor({ way, car, cars, floor }) {
+export function DriveFloor(known) {
+  return known.way.length && known.floor && known.car ? html`<${Laid} ...${known} />` : null;
+}
+
+function Laid({ way, car, cars, floor }) {
   const [ref, width] = useWidth();
-  if (!way.length || !floor || !car) return null;
   const laid = laidFrom(way, car);
-  const xs = [...floor.x_m, ...laid.map(([x]) => x)];
-  const ys = [...floor.y_m, ...laid.map(([, y]) => y)];
-  const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+  const [x0, x1] = shown(floor.x_m, laid.map(([x]) => x));
+  const [y0, y1] = shown(floor.y_m, laid.map(([, y]) => y));
   const per_m = Math.min((width - 16) / (x1 - x0), 240 / (y1 - y0));
   const height = per_m * (y1 - y0) + 16;
   const left = (width - per_m * (x1 - x0)) / 2;
@@ -38,7 +40,7 @@ export function DriveFloor({ way, car, cars, floor }) {
   const data = laid.map(([px, py], i) => `${i ? "L" : "M"}${x(px).toFixed(1)} ${y(py).toFixed(1)}`).join("");
   return html`
     <figure ref=${ref}>
-      <svg width=${width} height=${height} role="img" aria-label="Where the drive leads from where ${car.vehicle} is">
+      <svg class="drive-floor" width=${width} height=${height} role="img" aria-label="Where the drive leads from where ${car.vehicle} is">
         <rect
           class="ground"
           x=${x(floor.x_m[0])}
@@ -53,6 +55,15 @@ export function DriveFloor({ way, car, cars, floor }) {
       <figcaption class="hint">Dashed: where the drive would lead ${car.vehicle} from where it is now.</figcaption>
     </figure>
   `;
+}
+
+/** What is shown of an axis: the floor, and of what leads off it as much as tells in which direction. */
+function shown([low, high], values) {
+  const beyond = 0.3 * (high - low);
+  return [
+    Math.max(low - beyond, Math.min(low, ...values) - 0.1),
+    Math.min(high + beyond, Math.max(high, ...values) + 0.1),
+  ];
 }
 
 function Body({ car, is, x, y, per_m }) {

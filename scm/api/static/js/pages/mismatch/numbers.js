@@ -6,6 +6,7 @@ import { alike, errorName, short, unitText } from "scm/pages/mismatch/words.js";
 const PARTS = ["fit", "choose", "confirm"];
 const TITLES = { fit: "Fit", choose: "Choose", confirm: "Confirm" };
 const MOST_TRIED = 14;
+const MOST_OWN = 12;
 
 export function FitTable({ fit }) {
   const names = [...new Set(PARTS.flatMap((part) => Object.keys(fit[part].before)))];
@@ -18,7 +19,6 @@ export function FitTable({ fit }) {
         <table>
           <thead>
             <tr>
-              <th>What</th>
               <th>Part</th>
               <th class="number">Before</th>
               <th class="number">After</th>
@@ -40,12 +40,12 @@ function Rows({ name, fit }) {
   const { words, unit } = errorName(name);
   return html`
     <tbody>
-      ${PARTS.map((part, i) => {
+      <tr><th colspan="4" scope="rowgroup">${words}</th></tr>
+      ${PARTS.map((part) => {
         const { before, after, noise_floor: noise } = fit[part];
         const [was, now, floor] = alike([before[name], after[name], noise[name]], unit);
         return html`
           <tr key=${part} class=${part}>
-            ${i === 0 && html`<th scope="rowgroup" rowspan="3">${words}</th>`}
             <td>${TITLES[part]}</td>
             <td class="number">${was}</td>
             <td class="number"><b>${now}</b></td>
@@ -62,6 +62,8 @@ export function OwnNumbers({ numbers }) {
   const shown = numbers.filter((one) => one.given_std > 0 && one.found.value !== null);
   if (!shown.length) return null;
   const moved = (one, value) => (value - one.given) / one.given_std;
+  const size = (one) => Math.abs(moved(one, one.found.value));
+  const sorted = shown.toSorted((a, b) => size(b) - size(a));
   const far = shown.flatMap((one) => [moved(one, one.found.low), moved(one, one.found.high)].map(Math.abs));
   const wide = Math.min(6, Math.max(2.5, ...far));
   return html`
@@ -69,21 +71,28 @@ export function OwnNumbers({ numbers }) {
       <div class="panel-head">
         <h2>The car's own numbers <small>with 90 % intervals</small></h2>
       </div>
-      <ul>
-        ${shown.map((one) => {
-          const unit = unitText(one.found.unit);
-          const at = { low: moved(one, one.found.low), value: moved(one, one.found.value), high: moved(one, one.found.high) };
-          return html`
-            <li key=${one.key}>
-              <span class="what">${one.key}</span>
-              <${Dot} at=${at} wide=${wide} />
-              <span class="number">${short(one.given)} → <b>${short(one.found.value)}</b> ${unit}</span>
-            </li>
-          `;
-        })}
-      </ul>
+      <ul>${sorted.slice(0, MOST_OWN).map((one) => html`<${Own} key=${one.key} one=${one} moved=${moved} wide=${wide} />`)}</ul>
+      ${sorted.length > MOST_OWN &&
+      html`
+        <details>
+          <summary>${sorted.length - MOST_OWN} that moved less</summary>
+          <ul>${sorted.slice(MOST_OWN).map((one) => html`<${Own} key=${one.key} one=${one} moved=${moved} wide=${wide} />`)}</ul>
+        </details>
+      `}
       <p class="hint">Inner area: one standard deviation as the car file states it; outer: two. Inside, the file was right.</p>
     </section>
+  `;
+}
+
+function Own({ one, moved, wide }) {
+  const { low, value, high, unit } = one.found;
+  const at = { low: moved(one, low), value: moved(one, value), high: moved(one, high) };
+  return html`
+    <li>
+      <span class="what">${one.key}</span>
+      <${Dot} at=${at} wide=${wide} />
+      <span class="number">${short(one.given)} → <b>${short(value)}</b> ${unitText(unit)}</span>
+    </li>
   `;
 }
 

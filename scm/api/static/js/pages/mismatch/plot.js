@@ -5,7 +5,7 @@ import { html } from "scm/shared/html.js";
 /** @returns `[ref, width]`: the width [px] of the element that gets the ref, followed as it changes. */
 export function useWidth(least = 260) {
   const ref = useRef(null);
-  const [width, setWidth] = useState(0);
+  const [width, setWidth] = useState(least); // until it is measured, before anybody sees it
   useLayoutEffect(() => {
     const measure = () => setWidth(Math.max(least, Math.floor(ref.current?.clientWidth ?? least)));
     measure();

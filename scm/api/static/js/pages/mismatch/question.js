@@ -37,6 +37,7 @@ function Drive({ report, drive, onDriven }) {
   const parts = useFetched(address).body?.parts ?? null;
   const { jobs, again } = useJobs();
   const [chosen, choose] = useState(null);
+  const [number, setNumber] = useState(0);
   const [asking, setAsking] = useState(false);
   const cars = world.value.vehicles.toSorted((a, b) => byName(a.vehicle, b.vehicle));
   const alike = cars.filter((car) => car.car === report.drawn.vehicle);
@@ -48,16 +49,17 @@ function Drive({ report, drive, onDriven }) {
     if (driven) onDriven();
   }, [driven]);
   if (!parts) return html`<p class="empty">Reading the drive …</p>`;
+  const part = parts[number];
   const play = async () => {
     setAsking(false);
     const said = () => `${car.vehicle} begins the drive.`;
-    if (await change("POST", `${address}/play`, { vehicle: car.vehicle }, said)) again();
+    if (await change("POST", `${address}/play`, { vehicle: car.vehicle, part: number + 1 }, said)) again();
   };
   return html`
     <div class="drive">
-      <${Commands} rows=${parts[0].commands} />
-      ${parts.length > 1 && html`<p class="hint">It has ${parts.length} parts, one after the other; this is the first.</p>`}
-      <${DriveFloor} way=${parts[0].way} car=${car} cars=${cars} floor=${city.value?.floor} />
+      ${parts.length > 1 && html`<${Parts} count=${parts.length} number=${number} onPick=${setNumber} />`}
+      <${Commands} rows=${part.commands} />
+      <${DriveFloor} way=${part.way} car=${car} cars=${cars} floor=${city.value?.floor} />
       <div class="send">
         <label>
           Car
@@ -69,21 +71,36 @@ function Drive({ report, drive, onDriven }) {
           Drive this with ${car?.vehicle ?? "a car"}
         </button>
       </div>
-      <${Warnings} car=${car} report=${report} parts=${parts} />
+      <${Warnings} car=${car} report=${report} part=${part} />
       ${now && html`<${Driving} job=${now} again=${again} />`}
       ${report.told > 0 && html`<${SearchAgain} report=${report} />`}
-      ${asking && html`<${Ask} car=${car} parts=${parts} onNo=${() => setAsking(false)} onYes=${play} />`}
+      ${asking && html`<${Ask} car=${car} part=${part} onNo=${() => setAsking(false)} onYes=${play} />`}
     </div>
   `;
 }
 
-function Warnings({ car, report, parts }) {
+/** A drive before and after something was done to the car: each part is sent by itself. */
+function Parts({ count, number, onPick }) {
+  return html`
+    <div class="tabs" role="group" aria-label="Part of the drive">
+      ${[...Array(count).keys()].map(
+        (i) => html`
+          <button key=${i} class="small" aria-pressed=${i === number} onClick=${() => onPick(i)}>
+            Part ${i + 1} of ${count}
+          </button>
+        `,
+      )}
+    </div>
+  `;
+}
+
+function Warnings({ car, report, part }) {
   if (!car) return html`<p class="warn">No car is in the city.</p>`;
   const said = [];
   if (car.car !== report.drawn.vehicle) {
     said.push(`${car.vehicle} is a ${car.car}; the question is about a ${report.drawn.vehicle}.`);
   }
-  if (leavesFloor(parts[0].way, car, city.value?.floor)) {
+  if (leavesFloor(part.way, car, city.value?.floor)) {
     said.push(`From where ${car.vehicle} is now the drive would lead off the floor: it would be refused.`);
   }
   return said.map((text) => html`<p class="warn" key=${text}>${text}</p>`);
@@ -114,12 +131,11 @@ function Commands({ rows }) {
   `;
 }
 
-function Ask({ car, parts, onNo, onYes }) {
-  const seconds = Math.round(parts.reduce((sum, part) => sum + part.lasts_s, 0));
+function Ask({ car, part, onNo, onYes }) {
   return html`
     <${Dialog} title="Let ${car.vehicle} drive this?" onClose=${onNo}>
       <p>
-        ${car.vehicle} comes to rest, then drives ${seconds} s by these commands, without looking. Keep its way free.
+        ${car.vehicle} comes to rest, then drives ${Math.round(part.lasts_s)} s by these commands, without looking. Keep its way free.
         It ends at the floor's edge, at a hit, by the city stop, or when you stop it; then it goes back to who drove it.
       </p>
       <div class="actions">
