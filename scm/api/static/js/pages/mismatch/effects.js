@@ -70,7 +70,7 @@ function Rivals({ effect, titles }) {
   if (!effect.rivals.length) return null;
   return html`
     <details>
-      <summary>${effect.rivals.length} rivals ruled out</summary>
+      <summary>${effect.rivals.length === 1 ? "One rival" : `${effect.rivals.length} rivals`} ruled out</summary>
       <ul class="rivals">
         ${effect.rivals.map(
           (rival, i) => html`

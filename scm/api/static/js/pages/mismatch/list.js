@@ -89,8 +89,8 @@ function Gain({ row }) {
   `;
   return html`
     <span class="gain" aria-label="Error on unseen parts ${length(row.before_m)}, then ${length(row.after_m)}">
-      <span>${bar("before", row.before_m)}<em>${length(row.before_m)}</em></span>
-      <span>${bar("after", row.after_m)}<em>${length(row.after_m)}</em></span>
+      <span>${bar("before", row.before_m)}<em>${length(row.before_m)} off before</em></span>
+      <span>${bar("after", row.after_m)}<em>${length(row.after_m)} after</em></span>
     </span>
   `;
 }

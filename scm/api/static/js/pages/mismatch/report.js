@@ -33,6 +33,7 @@ function Whole({ report, again }) {
   return html`
     <div class="report">
       <${Head} report=${report} />
+      ${drawn.residuals.length > 0 && html`<${WhereWhen} drawn=${drawn} />`}
       <div class="cards">
         ${effects.map(
           (card, i) => html`<${EffectCard} key=${i} card=${card} index=${i} report=${fields} drawn=${drawn} />`,
@@ -50,7 +51,6 @@ function Whole({ report, again }) {
           />
         `,
       )}
-      <${WhereWhen} drawn=${drawn} />
       ${drawn.free_runs && html`<${FreeRuns} runs=${drawn.free_runs} />`}
       <div class="columns">
         <div>

@@ -13,7 +13,6 @@ export function WhereWhen({ drawn }) {
   const [side, setSide] = useState("before");
   const [at, setAt] = useState(null); // index of the moment looked at
   const residual = drawn.residuals[chosen];
-  if (!residual) return null;
   const moment = at === null ? null : Math.min(at, residual.t_s.length - 1);
   const bound = useMemo(() => colourBound(residual), [residual]);
   const shared = { drawn, residual, side, bound, at: moment, setAt };
