@@ -38,14 +38,22 @@ def shelf(running):
     shutil.rmtree(folder)
 
 
+def arcs():
+    """Return rows to and fro on the spot, left and right: no wall is met."""
+    sides = [(1 if k % 12 < 6 else -1, 1 if k % 24 < 12 else -1) for k in range(32)]
+    return [
+        (0.5 * k, 0.4 * ahead * (0.6 + 0.2 * (k % 3)), 0.9 * left)
+        for k, (ahead, left) in enumerate(sides)
+    ]
+
+
 @pytest.fixture(scope="module")
 def searching(running, shelf, tmp_path_factory):
     """Send a drive of a simulated car and start a real search of it; it runs meanwhile."""
     folder = tmp_path_factory.mktemp("sent")
     with Lockstep([WorldPart(load_map("parking_school"), hosted=(("n1", "nigel"),))]) as city:
         city.run_for(0.1)
-        turns = [(0.5 * k, 0.2 + 0.1 * (k % 4), 0.9) for k in range(24)]
-        write_recording(play(LockstepLink(city), "n1", turns), "nigel", folder / "drive")
+        write_recording(play(LockstepLink(city), "n1", arcs()), "nigel", folder / "drive")
     packed = shutil.make_archive(str(folder / "drive"), "zip", folder / "drive")
     sent = running.web.post("/mismatch/uploads?name=turns", content=Path(packed).read_bytes())
     body = {"upload": sent.json()["upload"], "budget_s": 5}
