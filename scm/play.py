@@ -18,9 +18,12 @@ from typing import Any
 import msgspec
 import yaml
 
+from scm.clock import NS_PER_S
 from scm.errors import RunError, ScmError
 from scm.fleet import Link
+from scm.geometry import Pose2
 from scm.part import Hears
+from scm.play_watch import Watch
 from scm.recorder.driven import RUN_IN_NS, Heard, recording_of
 from scm.recording.read import Recording
 from scm.recording.table import read_table
@@ -36,6 +39,7 @@ OWNER = "script"
 LEASE_MS = 5000
 RENEW_S = 1.0
 REPEATED_S = 0.05
+LONGEST_REST_NS = 5 * NS_PER_S
 Row = tuple[float, float, float]
 _FILES = {
     "commands.csv": {"throttle": "command.throttle", "steering": "command.steering"},
@@ -77,11 +81,13 @@ class Played:
         vehicle: Who drove it.
         heard: What was sent to it and what the city told of it.
         lost: How many of the car's messages did not arrive, or had to make room for newer ones.
+        ended: Why it ended before its time; empty: it did not.
     """
 
     vehicle: str
     heard: Heard
     lost: int
+    ended: str = ""
 
 
 class _Ear:
@@ -107,9 +113,13 @@ class _Ear:
 
         self._link.run_until(is_due, 60.0)
 
-    def played(self) -> Played:
+    @property
+    def heard(self) -> Heard:
+        return self._heard
+
+    def played(self, ended: str) -> Played:
         lost = self._heard.lost + sum(box.dropped for box in self._others)
-        return Played(self._vehicle, self._heard, lost)
+        return Played(self._vehicle, self._heard, lost, ended)
 
 
 def read_drive(path: Path) -> tuple[Drive, list[Row]]:
@@ -136,30 +146,91 @@ def read_drive(path: Path) -> tuple[Drive, list[Row]]:
     return drive, rows
 
 
-def play(link: Link, vehicle: str, rows: list[Row]) -> Played:
+def play(link: Link, vehicle: str, rows: list[Row], watch: Watch | None = None) -> Played:
     """Command a car row by row and return what it reported; the lease is given back at the end.
 
     It is listened to for a second before: the first commands meet a servo that stands somewhere.
 
+    Args:
+        link: To the city.
+        vehicle: Who is to drive.
+        rows: Time, throttle and steering.
+        watch: Brings the car to rest first, and may end the drive before its time; None: nobody
+            looks.
+
     Raises:
-        RunError: when the car is not to be had.
+        RunError: when the car is not to be had, or the watch does not let it begin.
     """
     ear = _Ear(link, vehicle)
     ear.listen_until(link.now_ns + RUN_IN_NS)
-    epoch = _lease(link, vehicle, "acquire", 0)
-    began_ns, renewed = link.now_ns, 0.0
-    for seq, (t, throttle, steering) in enumerate(_repeated(rows), 1):
-        ear.listen_until(began_ns + round(t * 1e9))
-        if t - renewed > RENEW_S:
-            _lease(link, vehicle, "renew", epoch)
-            renewed = t
-        command = DriveCommand(vehicle=vehicle, t_ns=link.now_ns, epoch=epoch, seq=seq,
-                               throttle=throttle, steering=steering)  # fmt: skip
-        link.publish(command)
-        ear.sent(command)
-    _lease(link, vehicle, "release", epoch)
+    at_wheel = _Wheel(link, vehicle, ear)
+    try:
+        if watch is not None:
+            at_wheel.rest(watch)
+        ended = at_wheel.drive(rows, watch)
+    finally:
+        at_wheel.release()
     ear.listen_until(link.now_ns)
-    return ear.played()
+    return ear.played(ended)
+
+
+class _Wheel:
+    """Holds a car's lease and commands it."""
+
+    def __init__(self, link: Link, vehicle: str, ear: _Ear) -> None:
+        self._link, self._vehicle, self._ear = link, vehicle, ear
+        self._epoch = _lease(link, vehicle, "acquire", 0)
+        self._renewed_ns, self._seq = link.now_ns, 0
+
+    def command(self, throttle: float, steering: float) -> None:
+        if self._link.now_ns - self._renewed_ns > RENEW_S * 1e9:
+            _lease(self._link, self._vehicle, "renew", self._epoch)
+            self._renewed_ns = self._link.now_ns
+        self._seq += 1
+        command = DriveCommand(vehicle=self._vehicle, t_ns=self._link.now_ns, epoch=self._epoch,
+                               seq=self._seq, throttle=throttle, steering=steering)  # fmt: skip
+        self._link.publish(command)
+        self._ear.sent(command)
+
+    def rest(self, watch: Watch) -> None:
+        """Stop the car and wait until it stands."""
+        until_ns = self._link.now_ns + LONGEST_REST_NS
+        while not watch.is_at_rest(self._ear.heard.reports) and self._link.now_ns < until_ns:
+            self.command(0.0, 0.0)
+            self._ear.listen_until(self._link.now_ns + round(REPEATED_S * 1e9))
+        why = watch.refuses(self._ear.heard.reports)
+        if why:
+            msg = f"{self._vehicle}: {why}"
+            raise RunError(msg)
+
+    def drive(self, rows: list[Row], watch: Watch | None) -> str:
+        """Command row by row; return why it ended before its time."""
+        began_ns = self._link.now_ns
+        for t, throttle, steering in _repeated(rows):
+            self._ear.listen_until(began_ns + round(t * 1e9))
+            ended = watch.ends(self._ear.heard, began_ns) if watch is not None else ""
+            if ended:
+                self.command(0.0, 0.0)
+                return ended
+            self.command(throttle, steering)
+        return ""
+
+    def release(self) -> None:
+        _lease(self._link, self._vehicle, "release", self._epoch)
+
+
+def read_way(drive: Path) -> list[Pose2]:
+    """Return where a drive is thought to lead, from the table beside it; empty: nobody said.
+
+    Raises:
+        ScmError: when the table cannot be read.
+    """
+    path = drive.with_name(f"{drive.stem}_way.csv")
+    if not path.is_file():
+        return []
+    table = read_table(path)
+    columns = [table[name].tolist() for name in ("x_m", "y_m", "yaw_rad")]
+    return [Pose2(*row) for row in zip(*columns, strict=True)]
 
 
 def _repeated(rows: list[Row]) -> Iterator[Row]:
@@ -210,7 +281,7 @@ def _described(file: str, of: dict[str, str], recording: Recording) -> dict[str,
 
 def left_out(played: Played, recording: Recording) -> list[str]:
     """Return in sentences what of a played drive is not in its recording, or not as it was sent."""
-    heard, said = played.heard, []
+    heard, said = played.heard, [played.ended] if played.ended else []
     first_ns, last_ns = heard.commands[0].t_ns, heard.commands[-1].t_ns
     reports = [report for report in heard.reports if first_ns <= report.t_ns <= last_ns]
     hits = sum(first_ns <= t_ns <= last_ns for t_ns in heard.hit_ns)

@@ -70,10 +70,14 @@ class Teller:
 
     def __call__(self, doing: str = "", progress: float | None = None) -> None:
         """Tell the step and the share of work done."""
-        if self.cancelled.is_set():
-            raise Cancelled
+        self.check()
         changes = {"doing": doing, "progress": progress}
         self._operations.change(self._name, **changes)
+
+    def check(self) -> None:
+        """Raise `Cancelled` when the work was called off; tell nothing."""
+        if self.cancelled.is_set():
+            raise Cancelled
 
 
 Work = Callable[[Teller], str]

@@ -31,6 +31,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--out", type=Path, metavar="DIR", help=f"the report's folder; default: runs/{FOLDER}-NAME"
     )
     parser.add_argument(
+        "--from-s", type=float, metavar="S", help="leave out what is before, since the first row"
+    )
+    parser.add_argument(
+        "--to-s", type=float, metavar="S", help="leave out what is after, since the first row"
+    )
+    parser.add_argument(
         "--budget-s", type=float, default=120.0, help="time for the search [s] (%(default)g)"
     )
 
@@ -39,6 +45,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
     from scm.mismatch.progress import Progress
     from scm.mismatch.several import cars_of
+    from scm.recording.span import part_of
 
     name = arguments.recording[0].resolve()
     title = name.parent.name if name.name == "recording.yaml" else name.stem
@@ -46,7 +53,10 @@ def _run(arguments: argparse.Namespace) -> int:
     progress = Progress(sys.stderr, WallClock())
     try:
         if arguments.car is None and arguments.vehicle is None:
-            cars = cars_of(arguments.recording, arguments.data)
+            cars = {
+                name: [part_of(one, arguments.from_s, arguments.to_s) for one in recordings]
+                for name, recordings in cars_of(arguments.recording, arguments.data).items()
+            }
             said = _of_cars(cars, arguments.budget_s, out, progress)
         else:
             said = _of_one(arguments, out, progress)
@@ -63,7 +73,8 @@ def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> s
 
     found = diagnose(
         arguments.recording, arguments.car, arguments.data, vehicle=arguments.vehicle,
-        budget_s=arguments.budget_s, tell=progress.tell,
+        span_s=(arguments.from_s, arguments.to_s), budget_s=arguments.budget_s,
+        tell=progress.tell,
     )  # fmt: skip
     progress.tell("writing the report")
     write(found, out)

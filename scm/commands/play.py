@@ -3,9 +3,13 @@
 import argparse
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scm.command import Command, credentials_argument, credentials_of
 from scm.errors import RunError
+
+if TYPE_CHECKING:
+    from scm.play_watch import Watch
 
 NAME = "played"
 
@@ -25,6 +29,14 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--city", default="city", help="name of the running city (%(default)s)")
     parser.add_argument(
         "--vehicle", metavar="NAME", help="a car of the running city that stands at the start"
+    )
+    parser.add_argument(
+        "--floor",
+        type=float,
+        nargs=4,
+        metavar=("X0", "X1", "Y0", "Y1"),
+        help="of the running city [m]: bring the car to rest, refuse a drive that does not fit "
+        "from there, end it at the floor's edge, at a hit, or on Ctrl-C",
     )
 
 
@@ -47,7 +59,8 @@ def _run(arguments: argparse.Namespace) -> int:
         with ZenohBus(
             arguments.city, "script", arguments.connect, credentials=credentials_of(arguments)
         ) as bus:
-            played = play(LiveLink(bus), arguments.vehicle or "n1", rows)
+            watch = _watch(arguments, car) if arguments.floor else None
+            played = play(LiveLink(bus), arguments.vehicle or "n1", rows, watch)
     else:
         floor = arguments.drive.parent / drive.map
         city_map = load_map(floor if floor.is_file() else drive.map)
@@ -64,6 +77,25 @@ def _run(arguments: argparse.Namespace) -> int:
     for sentence in left_out(played, recording):
         print(sentence)
     return 0
+
+
+def _watch(arguments: argparse.Namespace, car: str) -> "Watch":
+    """Return what to look for on a city's floor, for a car of that size."""
+    from scm.live import stop_on_signal
+    from scm.play import read_way
+    from scm.play_watch import Watch
+    from scm.vehicles.car import load_car
+
+    x0, x1, y0, y1 = arguments.floor
+    own = load_car(car)
+    known = own.has("body.footprint_x_m")
+    ends = own.vector("body.footprint_x_m") if known else (own.value("body.wheelbase_m") * 1.5,)
+    return Watch(
+        floor=((x0, x1), (y0, y1)),
+        margin_m=max(abs(end) for end in ends),
+        way=read_way(arguments.drive),
+        asked=stop_on_signal(),
+    )
 
 
 def _named(car: str, folder: Path) -> str:

@@ -48,6 +48,7 @@ from scm.mismatch.search import Search
 from scm.mismatch.strayed import strayed
 from scm.recorder.drives import SUFFIX, recordings_of_one
 from scm.recording.read import Recording
+from scm.recording.span import part_of
 from scm.vehicles.car import Car, load_car
 
 POSE = ("position_m", "yaw_rad")
@@ -110,6 +111,7 @@ def diagnose(
     data: Path | None = None,
     *,
     vehicle: str | None = None,
+    span_s: tuple[float | None, float | None] = (None, None),
     budget_s: float = 120.0,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
@@ -121,6 +123,7 @@ def diagnose(
         car_file: The car's name or file; None takes the recordings' own.
         data: Folder of the recordings' tables; None: beside each description.
         vehicle: Of recordings of several cars the name of the one; None: they are of one.
+        span_s: Part of each recording, seconds since its first row; None: its end.
         budget_s: After so long no further effect is looked for; of recordings longer than 90 s
             together, after as many times longer.
         tell: Is told what is being tried.
@@ -129,7 +132,9 @@ def diagnose(
     Raises:
         ScmError: when a recording or the car file cannot be read.
     """
-    recordings = [one for path in paths for one in recordings_of_one(path, data, vehicle)]
+    recordings = [
+        part_of(one, *span_s) for path in paths for one in recordings_of_one(path, data, vehicle)
+    ]
     file = car_file or recordings[0].vehicle
     car = load_car(file, trusted=car_file is not None)
     if car_file is None and any(r.vehicle != file for r in recordings):

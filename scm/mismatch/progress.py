@@ -64,7 +64,8 @@ class Progress:
             self._next = min(after, self._share + ANOTHER_EFFECT)
             self._text, self._step_ns = self._of + text, self._clock.now_ns()
         if self._drawing is None:
-            self._write(f"{self._elapsed_s():5.0f} s  {self._of}{text}\n")
+            share = 100.0 * (self._from + self._part * self._share)
+            self._write(f"{self._elapsed_s():5.0f} s  {share:3.0f} %  {self._of}{text}\n")
         else:
             self._draw()
 

@@ -2,18 +2,22 @@
 
 `scm play next_drive.yaml` drives it, in a city of its own or with a car of a running one, and
 records it; by hand or by a program of one's own, `next_drive.csv` says what to command when.
+`next_drive_way.csv` says where the likeliest explanation takes the car.
 """
 
 import csv
 from pathlib import Path
 
+import numpy as np
 import yaml
 
+from scm.mismatch.drive import STEP_S
 from scm.mismatch.experiment.pace import Floor
 from scm.mismatch.experiment.plan import Placed
 from scm.mismatch.experiment.suggest import Suggestion
 
 NAME = "next_drive"
+WAY_S = 0.1
 _MAP = """# An empty floor for a suggested drive.
 map = 1
 name = "{name}"
@@ -59,11 +63,17 @@ def write_scenario(suggestion: Suggestion, car: str, folder: Path) -> list[Path]
 
 def _written(leg: Placed, name: str, said: str, car: str, floor: Floor, folder: Path) -> Path:
     commands, floor_map = folder / f"{name}.csv", folder / f"{name}.toml"
-    description = folder / f"{name}.yaml"
+    description, way = folder / f"{name}.yaml", folder / f"{name}_way.csv"
     with commands.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("t_s", "throttle", "steering"))
         writer.writerows([f"{v:.4g}" for v in row] for row in leg.manoeuvre.rows())
+    with way.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(("t_s", "x_m", "y_m", "yaw_rad"))
+        every = slice(None, None, round(WAY_S / STEP_S))
+        times = STEP_S * np.arange(leg.path.shape[1])
+        writer.writerows(np.round(np.vstack((times, leg.path))[:, every].T, 4).tolist())
     text = _MAP.format(name=name, x=floor.x_m, y=floor.y_m, start=leg.start)
     floor_map.write_text(text, encoding="utf-8")
     said_all = {

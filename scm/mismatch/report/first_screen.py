@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from scm.mismatch.evidence import Evidence, Tried
 from scm.mismatch.experiment.folders import folders_of
@@ -27,6 +28,15 @@ from scm.mismatch.report.wording import (
 _ENOUGH_STDS = 5.0
 
 
+class Card(NamedTuple):
+    """One thing to know: of what kind it is, its label and title, and facts by name."""
+
+    kind: str
+    label: str
+    title: str
+    rows: Sequence[tuple[str, str]]
+
+
 def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
     """Return the page's head."""
     kind = str(diagnosis.verdict) if can_judge(diagnosis) else "unable"
@@ -38,24 +48,36 @@ def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
     verdict = around("div", head + better(diagnosis, evidence.retuned_m), "words")
     picture = better_picture(diagnosis, evidence.retuned_m)
     bars = around("div", _bars(diagnosis, picture), "bars") if picture else ""
+    cards = "".join(card(*one) for one in cards_of(diagnosis, evidence))
+    return (
+        around("header", verdict + bars, f"verdict {kind}")
+        + around("div", cards, "cards")
+        + _other_problems_line(diagnosis, evidence)
+    )
+
+
+def cards_of(diagnosis: Diagnosis, evidence: Evidence) -> list[Card]:
+    """Return what is to be known at first sight: effects, questions, problems of the recording."""
     cards = [*_effect_cards(diagnosis), *_undecided_cards(diagnosis), *_located_card(diagnosis)]
     if diagnosis.verdict is Verdict.NONE and can_judge(diagnosis):
         cards.append(_checked_card(evidence))
     if diagnosis.verdict is Verdict.MISMATCH and not diagnosis.effects:
         cards.append(_no_name_card(evidence))
     cards += [
-        card("data", "Problem of the recording", title, rows)
+        Card("data", "Problem of the recording", title, rows)
         for title, rows in problem_cards(diagnosis, evidence)
     ]
-    return (
-        around("header", verdict + bars, f"verdict {kind}")
-        + around("div", "".join(cards), "cards")
-        + _other_problems_line(diagnosis, evidence)
-    )
+    return cards
 
 
 def better(diagnosis: Diagnosis, retuned_m: float | None = None) -> str:
-    """Return how much better it got, as a paragraph; nothing where nothing was fitted.
+    """Return `better_said` as a paragraph; nothing where it says nothing."""
+    said = better_said(diagnosis, retuned_m)
+    return tag("p", said) if said else ""
+
+
+def better_said(diagnosis: Diagnosis, retuned_m: float | None = None) -> str:
+    """Return how much better it got, in words; nothing where nothing was fitted.
 
     Args:
         diagnosis: What was found.
@@ -76,12 +98,12 @@ def better(diagnosis: Diagnosis, retuned_m: float | None = None) -> str:
         found = "the likeliest of them" if diagnosis.undecided else "what was found"
         alone = f"; with its own numbers refitted alone, {tuned}" if math.isfinite(own) else ""
         beside = f" as well, {now}" if alone else f" and its own numbers refitted, {now}"
-        return tag("p", f"{said}{alone}; with {found}{beside}.")
+        return f"{said}{alone}; with {found}{beside}."
     if diagnosis.undecided and after < before:
         said += f"; with the best of these, {now}"
     elif diagnosis.verdict is Verdict.NONE:
         said += f"; with its own numbers refitted inside their scatter, {now}"
-    return tag("p", f"{said}. Noise of measuring alone makes {noise}." if floor > 0 else f"{said}.")
+    return f"{said}. Noise of measuring alone makes {noise}." if floor > 0 else f"{said}."
 
 
 def _bars(diagnosis: Diagnosis, picture: Picture) -> str:
@@ -98,7 +120,7 @@ def card(kind: str, label: str, title: str, rows: Sequence[tuple[str, str]]) -> 
     return around("article", head + around("dl", facts), f"card {kind}")
 
 
-def _effect_cards(diagnosis: Diagnosis) -> Iterator[str]:
+def _effect_cards(diagnosis: Diagnosis) -> Iterator[Card]:
     open_names = {name for question in diagnosis.undecided for name in question.between}
     for i, effect in enumerate(diagnosis.effects, start=1):
         number = f", {i} of {len(diagnosis.effects)}" if len(diagnosis.effects) > 1 else ""
@@ -114,7 +136,7 @@ def _effect_cards(diagnosis: Diagnosis) -> Iterator[str]:
         kind = "Measuring off" if effect.equation is Equation.SENSOR else "Left out"
         kind = "Likeliest, but undecided" if effect.name in open_names else kind
         label = f"{kind}{number}" + ("" if effect.listed else ", outside the library")
-        yield card("effect", label, capital(title_of(effect.name)), rows)
+        yield Card("effect", label, capital(title_of(effect.name)), rows)
 
 
 def _located_of(effect: Effect, located: Sequence[Located]) -> Sequence[Located]:
@@ -139,21 +161,21 @@ def name_of(name: str, unit: str) -> str:
     return stem.replace("_", " ")
 
 
-def _located_card(diagnosis: Diagnosis) -> Iterator[str]:
+def _located_card(diagnosis: Diagnosis) -> Iterator[Card]:
     """Yield where the error lies, where no effect says it."""
     if diagnosis.located and not diagnosis.effects:
-        yield card(
+        yield Card(
             "effect", "Located", "Where it lies", [("Where", where_and_when(diagnosis.located))]
         )
 
 
-def _undecided_cards(diagnosis: Diagnosis) -> Iterator[str]:
+def _undecided_cards(diagnosis: Diagnosis) -> Iterator[Card]:
     folders = folders_of(diagnosis.undecided)
     for question, folder in zip(diagnosis.undecided, folders, strict=True):
         yield _undecided_card(question, folder)
 
 
-def _undecided_card(question: Undecided, folder: str) -> str:
+def _undecided_card(question: Undecided, folder: str) -> Card:
     titles = [title_of(name) for name in question.between]
     which = f"Either {joined(titles, 'or')}: each explains this recording, one hardly better."
     rows = [
@@ -162,7 +184,7 @@ def _undecided_card(question: Undecided, folder: str) -> str:
         ("Then" if folder else "By driving", _then(question, folder)),
         ("Or check", "\n".join(checks_of(question.between))),
     ]
-    return card("question", "Undecided", capital(joined(titles, "or")) + "?", rows)
+    return Card("question", "Undecided", capital(joined(titles, "or")) + "?", rows)
 
 
 def _then(question: Undecided, folder: str) -> str:
@@ -181,7 +203,7 @@ def _then(question: Undecided, folder: str) -> str:
     )
 
 
-def _checked_card(evidence: Evidence) -> str:
+def _checked_card(evidence: Evidence) -> Card:
     tried = evidence.tried
     said = "Its ordinary numbers may move inside the scatter that the car file states."
     if tried:
@@ -192,10 +214,10 @@ def _checked_card(evidence: Evidence) -> str:
         ("What to do", "Nothing. If the car still surprises you, record faster turns, harder "
                        "starts and stops, and another part of the floor."),
     ]  # fmt: skip
-    return card("clear", "No mismatch", "What was checked", rows)
+    return Card("clear", "No mismatch", "What was checked", rows)
 
 
-def _no_name_card(evidence: Evidence) -> str:
+def _no_name_card(evidence: Evidence) -> Card:
     """Say what to do about a difference that nothing explains."""
     tried = " No effect that was tried explains it." if evidence.tried else ""
     rows = [
@@ -204,7 +226,7 @@ def _no_name_card(evidence: Evidence) -> str:
                        "its file an honest `std` for each number: one that is far off and may not "
                        "move is the usual cause. Are the commands those of this very drive?"),
     ]  # fmt: skip
-    return card("question", "No name", "Cause unknown", rows)
+    return Card("question", "No name", "Cause unknown", rows)
 
 
 def _best_tried(best: Tried) -> str:

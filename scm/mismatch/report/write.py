@@ -1,10 +1,14 @@
-"""Writes a report: `report.html`, `report.json`, `car.toml` and `pictures/` of one diagnosis."""
+"""Writes a report: `report.html`, `report.json`, `car.toml` and `pictures/` of one diagnosis.
+
+`drawn.json` holds what the pictures draw and the words beside them, for pages that draw themselves.
+"""
 
 from pathlib import Path
 
 from scm.errors import CarError
 from scm.mismatch.evidence import Evidence
 from scm.mismatch.findings import Diagnosis
+from scm.mismatch.report.as_drawn import drawn_text
 from scm.mismatch.report.as_json import json_text
 from scm.mismatch.report.car_file import FILE, write_car
 from scm.mismatch.report.drawings import draw
@@ -12,7 +16,7 @@ from scm.mismatch.report.page import page_html
 from scm.mismatch.report.shown_time import since_start
 from scm.vehicles.car import Car
 
-PAGE, FIELDS, PICTURES = "report.html", "report.json", "pictures"
+PAGE, FIELDS, DRAWN, PICTURES = "report.html", "report.json", "drawn.json", "pictures"
 
 
 def write_report(
@@ -35,6 +39,8 @@ def write_report(
     (out / FIELDS).write_text(json_text(diagnosis), encoding="utf-8")
     use = _written_car(diagnosis, evidence, car, patched, out)
     diagnosis, evidence, start_s = since_start(diagnosis, evidence)
+    drawn = drawn_text(diagnosis, evidence, start_s)
+    (out / DRAWN).write_text(drawn, encoding="utf-8")
     drawings = draw(diagnosis, evidence, start_s)
     for picture in drawings.all():
         (pictures / f"{picture.name}.svg").write_text(picture.as_file(), encoding="utf-8")

@@ -60,7 +60,7 @@ def test_elsewhere_each_step_is_a_plain_line(clock):
     progress = Progress(stream, clock)
     progress.tell("doubting the data")
     progress.close()
-    assert stream.getvalue() == "    0 s  doubting the data\n"
+    assert stream.getvalue() == "    0 s    0 %  doubting the data\n"
 
 
 def test_of_several_cars_each_takes_its_share_and_is_named(clock):

@@ -1,0 +1,209 @@
+"""Mismatch searches as long work: from what, into which folder, how far; and drives that tell more.
+
+Each search is `scm mismatch`, each drive `scm play`: programs of their own that can be called off.
+"""
+
+import re
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from scm.api import uploads
+from scm.api.city import City, not_found
+from scm.api.operations import Operation, Operations, Teller
+from scm.api.problem import RefusedError
+from scm.api.programs import run_scm
+from scm.api.report_folders import Job, ReportFolders
+from scm.clock import Clock
+from scm.errors import RunError
+from scm.v2x.message import Refused
+
+KIND, DRIVE_KIND = "mismatch", "drive"
+_PARTIAL = ".partial"
+_STEP = re.compile(r" *\d+ s +(?P<share>\d+) %  (?P<said>.+)")
+
+
+class MismatchJobs:
+    """Starts searches and drives.
+
+    Args:
+        city: Whose shelves are read and written.
+        work: What runs it.
+        clock: For dates.
+        bus: Words that tell a program of ours where the bus is, and who it is there; empty: no
+            bus can be reached, and nothing can be driven.
+    """
+
+    def __init__(self, city: City, work: Operations, clock: Clock, bus: Sequence[str]) -> None:
+        self._city, self._work, self._clock, self._bus = city, work, clock, bus
+        self.reports = ReportFolders(city.shelves.reports)
+        for left in (city.shelves.reports or Path("/nowhere")).glob(f".*{_PARTIAL}"):
+            shutil.rmtree(left, ignore_errors=True)  # of a server that was killed
+
+    def shelf(self) -> Path:
+        """Return the shelf of reports.
+
+        Raises:
+            RefusedError: when this city has none.
+        """
+        if self._city.shelves.reports is None:
+            detail = "this city keeps no reports: start `scm api` with --data FOLDER"
+            raise RefusedError(Refused(code="offline", detail=detail))
+        self._city.shelves.reports.mkdir(parents=True, exist_ok=True)
+        return self._city.shelves.reports
+
+    def recording(self, name: str) -> Path:
+        """Return a recording of the city's shelf, by its name with or without `.mcap`.
+
+        Raises:
+            RefusedError: when there is none of that name.
+        """
+        shelf = self._city.shelves.recordings
+        if shelf is not None and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}", name):
+            for path in (shelf / name, shelf / f"{name}.mcap"):
+                is_run = path.suffix == ".mcap" and path.is_file()
+                if is_run or (path / "recording.yaml").is_file():
+                    return path
+        raise not_found("recording", name)
+
+    def upload(self, upload: str) -> Path:
+        """Return what was sent as a recording.
+
+        Raises:
+            RefusedError: when there is none of that id, or no longer.
+        """
+        folder = self.shelf() / uploads.FOLDER / upload
+        if not re.fullmatch(uploads.ID, upload) or not folder.is_dir():
+            raise not_found("upload", upload)
+        return uploads.recording_in(folder)
+
+    def again(self, report: str) -> tuple[list[Path], Job]:
+        """Return what a report was made from, and what was driven since to tell more.
+
+        Raises:
+            RefusedError: when that cannot be known.
+        """
+        folder = self.reports.find(report)
+        if folder is None:
+            raise not_found("report", report)
+        job = self.reports.job(folder)
+        if job is None:
+            detail = f"{report}: nobody noted what it was made from; start from the recording"
+            raise RefusedError(Refused(code="conflict", detail=detail))
+        before = [Path(path) for path in job.recordings]
+        gone = next((path for path in before if not path.exists()), None)
+        if gone is not None:
+            detail = f"{report}: the recording it was made from is gone: {gone.name}"
+            raise RefusedError(Refused(code="conflict", detail=detail))
+        return [*before, *self.reports.told(folder)], job
+
+    def search(self, recordings: Sequence[Path], job: Job) -> Operation:
+        """Start a search."""
+        shelf = self.shelf()
+        job = msgspec.structs.replace(
+            job,
+            recordings=tuple(map(str, recordings)),
+            asked_ns=self._clock.now_ns(),
+        )
+        base = _slug(f"{_stem(recordings[0])}-{job.vehicle}".strip("-"))
+
+        def work(tell: Teller) -> str:
+            partial = shelf / f".{base}-{job.asked_ns}{_PARTIAL}"
+            try:
+                run_scm(_words(recordings, job, partial), tell, lambda line: _hear(line, tell))
+                (partial / "job.json").write_bytes(msgspec.json.encode(job))
+                return f"/mismatch/{_placed(partial, shelf, base)}"
+            finally:
+                shutil.rmtree(partial, ignore_errors=True)
+
+        return self._work.start(KIND, job.source, work, owner=job.owner)
+
+    def drive(self, report: str, drive: str, vehicle: str, part: int, owner: str) -> Operation:
+        """Start a part of a suggested drive with a car; its recording is put into the report.
+
+        Raises:
+            RefusedError: when there is no such drive or part, or no bus to send it over.
+        """
+        folder = self.reports.find(report)
+        if folder is None or drive not in self.reports.drives(folder):
+            raise not_found("drive", f"{report}/{drive}")
+        if not self._bus:
+            detail = "this server reaches no city to drive in"
+            raise RefusedError(Refused(code="offline", detail=detail))
+        plans = sorted((folder / drive).glob("*.yaml"))
+        if part > len(plans):
+            detail = f"part: got {part}, expected 1 to {len(plans)}"
+            raise RefusedError(Refused(code="invalid", detail=detail))
+
+        def work(tell: Teller) -> str:
+            tell(f"{vehicle} comes to rest and drives")
+            self._play(plans[part - 1], vehicle, folder, tell)
+            return f"/mismatch/{report}"
+
+        return self._work.start(DRIVE_KIND, f"{drive} of {report} by {vehicle}", work, owner=owner)
+
+    def _play(self, plan: Path, vehicle: str, folder: Path, tell: Teller) -> None:
+        """Play a drive and keep its recording; one that ended early, or was called off, is none."""
+        known = self.reports.told(folder)
+        number = 1 + max((int(one.name.removeprefix("told_")) for one in known), default=0)
+        out, floor = folder / f"told_{number}", self._city.city_map.floor
+        words = ["play", str(plan), *self._bus, "--vehicle", vehicle, "--out", str(out)]
+        words += ["--floor", *(f"{edge:g}" for edge in (*floor.x_m, *floor.y_m))]
+        whole = False
+        try:
+            lines = run_scm(words, tell, lambda _: None, kinder=False)
+            early = next((line for line in lines if line.startswith("stopped")), "")
+            whole = not early
+        finally:
+            if not whole:
+                shutil.rmtree(out, ignore_errors=True)
+        if early:
+            raise RunError(early)
+
+
+def _words(recordings: Sequence[Path], job: Job, out: Path) -> list[str]:
+    words = [
+        "mismatch",
+        *map(str, recordings),
+        "--out",
+        str(out),
+        "--budget-s",
+        f"{job.budget_s:g}",
+    ]
+    for option, value in (
+        ("--vehicle", job.vehicle), ("--car", job.car), ("--from-s", job.from_s),
+        ("--to-s", job.to_s),
+    ):  # fmt: skip
+        words += [option, f"{value}"] if value not in ("", None) else []
+    return words
+
+
+def _hear(line: str, tell: Teller) -> None:
+    found = _STEP.fullmatch(line)
+    if found is not None:
+        tell(found["said"], int(found["share"]) / 100.0)
+
+
+def _placed(partial: Path, shelf: Path, base: str) -> str:
+    """Give a finished report its place on the shelf; return its name, or that of its first car."""
+    number = 1
+    while True:
+        name = base if number == 1 else f"{base}-{number}"
+        if not (shelf / name).exists():
+            break
+        number += 1
+    partial.rename(shelf / name)
+    if (shelf / name / "report.json").is_file():
+        return name
+    cars = sorted(path.parent.name for path in (shelf / name).glob("*/report.json"))
+    return f"{name}.{cars[0]}" if cars else name
+
+
+def _stem(recording: Path) -> str:
+    return recording.stem if recording.suffix == ".mcap" else recording.name
+
+
+def _slug(text: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")[:56] or "report"

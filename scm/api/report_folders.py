@@ -1,0 +1,216 @@
+"""Mismatch reports on their shelf: which there are, what each found, and its files.
+
+A report is a folder with `report.json`; of several cars it is a folder with a report for each, and
+each of those is a report of its own here, `FOLDER.CAR`. `job.json` says what it was made from.
+"""
+
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+NAME = r"^[a-z0-9][a-z0-9_-]{0,63}(\.[a-zA-Z0-9_-]{1,64})?$"
+FILES = {
+    "report.html": "text/html",
+    "report.json": "application/json",
+    "drawn.json": "application/json",
+    "car.toml": "application/toml",
+    "retuned.toml": "application/toml",
+}
+_FIELDS, _DRAWN, _JOB = "report.json", "drawn.json", "job.json"
+_DRIVE, _TOLD = re.compile(r"next_drive(_\d{1,2})?"), re.compile(r"told_\d{1,4}")
+MOST_SHOWN_BYTES = 16 * 2**20
+
+
+class Job(msgspec.Struct, kw_only=True, frozen=True):
+    """What a report was made from.
+
+    Attributes:
+        recordings: Of the shelf, uploads and earlier reports' drives: paths below the shelves.
+        source: The same in words.
+        vehicle: Which car of the recordings; empty: all.
+        car: The car file's name; empty: the recording's own.
+        budget_s: Time allowed for the search.
+        from_s: Part of the recording, seconds since its first row; None: its start.
+        to_s: None: its end.
+        asked_ns: When.
+        owner: Who asked.
+    """
+
+    recordings: tuple[str, ...]
+    source: str
+    vehicle: str = ""
+    car: str = ""
+    budget_s: float = 120.0
+    from_s: float | None = None
+    to_s: float | None = None
+    asked_ns: int = 0
+    owner: str = ""
+
+
+class ReportRow(msgspec.Struct, kw_only=True, frozen=True):
+    """A report in the list.
+
+    Attributes:
+        name: Below `/mismatch/reports`, and the page's address `/mismatch/NAME`.
+        made_ns: When it was written, since 1970.
+        verdict: `none`, `mismatch`, `undecided`, or `unreadable` where its files are damaged.
+        said: The verdict in a sentence.
+        effects: What was found, in words.
+        vehicle: The car file's name.
+        source: What it was made from, in words.
+        before_m: Position error of free runs on unseen parts with the car as given; None: unknown.
+        after_m: The same with what was found.
+        runtime_s: Of the search.
+    """
+
+    name: str
+    made_ns: int
+    verdict: str
+    said: str
+    effects: tuple[str, ...] = ()
+    vehicle: str = ""
+    source: str = ""
+    before_m: float | None = None
+    after_m: float | None = None
+    runtime_s: float = 0.0
+
+
+class _Errors(msgspec.Struct):
+    before: dict[str, float | None] = {}
+    after: dict[str, float | None] = {}
+
+
+class _Fit(msgspec.Struct):
+    confirm: _Errors
+
+
+class _Report(msgspec.Struct):
+    verdict: str
+    runtime_s: float = 0.0
+    fit: _Fit | None = None
+
+
+class _Title(msgspec.Struct):
+    title: str
+
+
+class _Drawn(msgspec.Struct):
+    said: str
+    vehicle: str = ""
+    recordings: tuple[str, ...] = ()
+    effects: tuple[_Title, ...] = ()
+
+
+class ReportFolders:
+    """The shelf of reports; None: there is no such shelf, and it is empty."""
+
+    def __init__(self, shelf: Path | None) -> None:
+        self.shelf = shelf
+        self._rows: dict[Path, tuple[int, ReportRow]] = {}
+
+    def rows(self) -> list[ReportRow]:
+        """Return all reports, newest first."""
+        found = [self._row(name, folder) for name, folder in self._folders()]
+        return sorted(found, key=lambda row: (-row.made_ns, row.name))
+
+    def find(self, name: str) -> Path | None:
+        """Return a report's folder; None: there is none of that name."""
+        if self.shelf is None or not re.fullmatch(NAME, name):
+            return None
+        folder = self.shelf.joinpath(*name.split(".", 1))
+        return folder if (folder / _FIELDS).is_file() else None
+
+    def row(self, name: str, folder: Path) -> ReportRow:
+        """Return one report as the list has it."""
+        return self._row(name, folder)
+
+    def remove(self, name: str) -> bool:
+        """Remove a report; of several cars' the one car's. Return whether there was one."""
+        folder = self.find(name)
+        if folder is None:
+            return False
+        shutil.rmtree(folder)
+        above = folder.parent
+        if above != self.shelf and not any((one / _FIELDS).is_file() for one in above.iterdir()):
+            shutil.rmtree(above)
+        return True
+
+    def job(self, folder: Path) -> Job | None:
+        """Return what a report was made from; None: nobody said."""
+        for place in (folder, folder.parent):
+            try:
+                return msgspec.json.decode((place / _JOB).read_bytes(), type=Job)
+            except (OSError, msgspec.MsgspecError):
+                continue
+        return None
+
+    def fields(self, folder: Path) -> tuple[Any, Any]:
+        """Return `report.json` and `drawn.json`; None for one that is missing or damaged."""
+        return _read(folder / _FIELDS, Any), _read(folder / _DRAWN, Any)
+
+    def drives(self, folder: Path) -> list[str]:
+        """Return the names of the drives that the report suggests."""
+        found = [one.name for one in folder.iterdir() if _DRIVE.fullmatch(one.name)]
+        return sorted(name for name in found if any((folder / name).glob("*.yaml")))
+
+    def told(self, folder: Path) -> list[Path]:
+        """Return recordings of suggested drives that were driven, oldest first."""
+        found = [one for one in folder.iterdir() if _TOLD.fullmatch(one.name)]
+        return sorted(
+            (one for one in found if (one / "recording.yaml").is_file()),
+            key=lambda one: int(one.name.removeprefix("told_")),
+        )
+
+    def _folders(self) -> Iterator[tuple[str, Path]]:
+        if self.shelf is None or not self.shelf.is_dir():
+            return
+        for folder in self.shelf.iterdir():
+            if not re.fullmatch(NAME, folder.name) or not folder.is_dir():
+                continue
+            if (folder / _FIELDS).is_file():
+                yield folder.name, folder
+            elif (folder / "cars.json").is_file():
+                for car in folder.iterdir():
+                    if (car / _FIELDS).is_file():
+                        yield f"{folder.name}.{car.name}", car
+
+    def _row(self, name: str, folder: Path) -> ReportRow:
+        made_ns = (folder / _FIELDS).stat().st_mtime_ns
+        known = self._rows.get(folder)
+        if known is None or known[0] != made_ns:
+            known = self._rows[folder] = made_ns, self._read_row(name, folder, made_ns)
+        return known[1]
+
+    def _read_row(self, name: str, folder: Path, made_ns: int) -> ReportRow:
+        report = _read(folder / _FIELDS, _Report)
+        drawn = _read(folder / _DRAWN, _Drawn)
+        if report is None:
+            said = "Its files are damaged, or of another version."
+            return ReportRow(name=name, made_ns=made_ns, verdict="unreadable", said=said)
+        job = self.job(folder)
+        confirm = report.fit.confirm if report.fit else _Errors()
+        return ReportRow(
+            name=name,
+            made_ns=made_ns,
+            verdict=report.verdict,
+            said=drawn.said if drawn else "",
+            effects=tuple(effect.title for effect in drawn.effects) if drawn else (),
+            vehicle=drawn.vehicle if drawn else "",
+            source=job.source if job else ", ".join(drawn.recordings if drawn else ()),
+            before_m=confirm.before.get("position_m"),
+            after_m=confirm.after.get("position_m"),
+            runtime_s=report.runtime_s,
+        )
+
+
+def _read(path: Path, kind: Any) -> Any:
+    try:
+        if path.stat().st_size > MOST_SHOWN_BYTES:
+            return None
+        return msgspec.json.decode(path.read_bytes(), type=kind)
+    except (OSError, msgspec.MsgspecError):
+        return None

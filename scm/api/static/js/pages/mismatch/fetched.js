@@ -1,0 +1,30 @@
+/** What the server tells: read once, or again and again while somebody looks. */
+import { useCallback, useEffect, useState } from "preact/hooks";
+
+/** @returns `{body, error, again}`: null until it came, and a function that reads it anew. */
+export function useFetched(path, every_ms = 0) {
+  const [found, setFound] = useState({ body: null, error: null });
+  const [count, setCount] = useState(0);
+  const again = useCallback(() => setCount((before) => before + 1), []);
+  useEffect(() => {
+    if (!path) return undefined;
+    const quit = new AbortController();
+    read(path, quit.signal).then(
+      (body) => setFound({ body, error: null }),
+      (error) => quit.signal.aborted || setFound((before) => ({ ...before, error: error.message })),
+    );
+    const next = every_ms ? setTimeout(again, every_ms) : null;
+    return () => {
+      clearTimeout(next);
+      quit.abort();
+    };
+  }, [path, count, every_ms]);
+  return { ...found, again };
+}
+
+async function read(path, signal) {
+  const response = await fetch(`/api/v1${path}`, { signal });
+  const body = await response.json().catch(() => ({}));
+  if (response.ok) return body;
+  throw new Error(body.detail || body.title || `${path}: ${response.status}`);
+}

@@ -1,0 +1,100 @@
+/** What every plot of a report needs: its width on the screen, scales, ticks, lines with gaps. */
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
+import { html } from "scm/shared/html.js";
+
+/** @returns `[ref, width]`: the width [px] of the element that gets the ref, followed as it changes. */
+export function useWidth(least = 260) {
+  const ref = useRef(null);
+  const [width, setWidth] = useState(least); // until it is measured, before anybody sees it
+  useLayoutEffect(() => {
+    const measure = () => setWidth(Math.max(least, Math.floor(ref.current?.clientWidth ?? least)));
+    measure();
+    const watch = new ResizeObserver(measure);
+    watch.observe(ref.current);
+    return () => watch.disconnect();
+  }, []);
+  return [ref, width];
+}
+
+/** A scale from `low..high` to `a..b`; `at.inverse` goes back. */
+export function scale(low, high, a, b) {
+  const wide = high - low || 1;
+  const at = (value) => a + ((value - low) / wide) * (b - a);
+  at.inverse = (place) => low + ((place - a) / (b - a || 1)) * wide;
+  at.low = low;
+  at.high = high;
+  return at;
+}
+
+/** Round numbers between two ends, about so many. */
+export function ticks(low, high, about = 5) {
+  const rough = (high - low) / about || 1;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].find((times) => times * power >= rough) * power;
+  const first = Math.ceil(low / step - 1e-9);
+  const found = [];
+  for (let k = first; k * step <= high + 1e-9 * step; k++) found.push(Number((k * step).toPrecision(10)));
+  return found;
+}
+
+/** Least and most of numbers, those unknown left out; `through` widens them to hold it. */
+export function ends(lists, through = null) {
+  let low = through ?? Infinity;
+  let high = through ?? -Infinity;
+  for (const list of lists) {
+    for (const value of list) {
+      if (value === null || !Number.isFinite(value)) continue;
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+  }
+  return low <= high ? [low, high] : [0, 1];
+}
+
+/** Path data through points; a gap where either number is unknown. */
+export function line(xs, ys, x, y) {
+  let data = "";
+  let pen = "M";
+  for (let i = 0; i < xs.length; i++) {
+    if (xs[i] === null || ys[i] === null || ys[i] === undefined) {
+      pen = "M";
+      continue;
+    }
+    data += `${pen}${x(xs[i]).toFixed(1)} ${y(ys[i]).toFixed(1)}`;
+    pen = "L";
+  }
+  return data;
+}
+
+/** Path data of the area between two lines. */
+export function area(xs, low, high, x, y) {
+  const kept = xs.map((_, i) => i).filter((i) => low[i] !== null && high[i] !== null);
+  if (!kept.length) return "";
+  const point = (i, side) => `${x(xs[i]).toFixed(1)} ${y(side[i]).toFixed(1)}`;
+  const there = kept.map((i) => point(i, high)).join("L");
+  const back = kept.toReversed().map((i) => point(i, low)).join("L");
+  return `M${there}L${back}Z`;
+}
+
+/** Grid lines with their numbers, and what the axes are. */
+export function Grid({ x, y, box, across, up, countX = 6, countY = 4, write = String }) {
+  const { left, right, top, bottom } = box;
+  return html`
+    <g class="grid">
+      ${ticks(y.low, y.high, countY).map(
+        (value) => html`
+          <path d="M${left} ${y(value).toFixed(1)}H${right}" />
+          <text x=${left - 6} y=${y(value) + 4} text-anchor="end">${write(value)}</text>
+        `,
+      )}
+      ${ticks(x.low, x.high, countX).map(
+        (value) => html`
+          <path d="M${x(value).toFixed(1)} ${top}V${bottom}" />
+          <text x=${x(value)} y=${bottom + 15} text-anchor="middle">${write(value)}</text>
+        `,
+      )}
+      <text class="axis" x=${right} y=${bottom + 31} text-anchor="end">${across}</text>
+      <text class="axis" x=${left} y=${top - 8}>${up}</text>
+    </g>
+  `;
+}

@@ -1,0 +1,148 @@
+/** Start a search: of a run of this city, or of a recording of one's own that is sent first. */
+import { useState } from "preact/hooks";
+import { html } from "scm/shared/html.js";
+import { change, notify } from "scm/shell/api.js";
+import { useFetched } from "scm/pages/mismatch/fetched.js";
+import { zipOf } from "scm/pages/mismatch/zip.js";
+
+const KNOWN = /\.(ya?ml|csv|csv\.gz|npz|mat|parquet|bag|db3|mcap)$/i;
+
+export function StartForm({ onStarted }) {
+  const offers = useFetched("/mismatch/offers").body;
+  const [from, setFrom] = useState("city");
+  const [busy, setBusy] = useState("");
+  const start = async (event) => {
+    event.preventDefault();
+    const form = new FormData(event.target);
+    const body = wish(form);
+    if (from === "own") {
+      setBusy("Sending …");
+      const upload = await send(form, offers.most_upload_bytes).finally(() => setBusy(""));
+      if (!upload) return;
+      body.upload = upload;
+    } else {
+      body.recording = form.get("recording");
+    }
+    const said = () => "The search has begun.";
+    if (await change("POST", "/mismatch/jobs", body, said)) onStarted();
+  };
+  return html`
+    <section class="panel start" aria-label="Start a search">
+      <div class="panel-head"><h2>Start a search</h2></div>
+      ${!offers
+        ? html`<p class="empty">Looking what there is …</p>`
+        : html`
+            <form onSubmit=${start}>
+              <div class="tabs" role="group" aria-label="Recording from">
+                <button type="button" class="small" aria-pressed=${from === "city"} onClick=${() => setFrom("city")}>
+                  Run of this city
+                </button>
+                <button type="button" class="small" aria-pressed=${from === "own"} onClick=${() => setFrom("own")}>
+                  My own recording
+                </button>
+              </div>
+              ${from === "city" ? html`<${OfCity} names=${offers.recordings} />` : html`<${OfOwn} />`}
+              <${Which} cars=${offers.cars} />
+              <button class="primary" disabled=${Boolean(busy) || (from === "city" && !offers.recordings.length)}>
+                ${busy || "Search"}
+              </button>
+            </form>
+          `}
+    </section>
+  `;
+}
+
+function OfCity({ names }) {
+  if (!names.length) return html`<p class="empty">This city has recorded nothing yet.</p>`;
+  return html`
+    <label>
+      Recording
+      <select name="recording">${names.map((name) => html`<option key=${name}>${name}</option>`)}</select>
+    </label>
+  `;
+}
+
+function OfOwn() {
+  return html`
+    <label>
+      Folder of the recording
+      <input name="folder" type="file" webkitdirectory multiple />
+    </label>
+    <label>
+      or one file, .zip or .mcap
+      <input name="file" type="file" accept=".zip,.mcap" />
+    </label>
+    <p class="hint">
+      Tables of commands and poses, and beside them a <code>recording.yaml</code> that says what stands where.
+    </p>
+  `;
+}
+
+function Which({ cars }) {
+  return html`
+    <div class="fields">
+      <label>
+        Car
+        <input name="vehicle" placeholder="all" pattern="[A-Za-z0-9_\-]*" maxlength="64" autocomplete="off" />
+      </label>
+      <label>
+        Car file
+        <select name="car">
+          <option value="">the recording's</option>
+          ${cars.map((name) => html`<option key=${name}>${name}</option>`)}
+        </select>
+      </label>
+      <label>From [s] <input name="from_s" type="number" min="0" step="any" placeholder="start" /></label>
+      <label>To [s] <input name="to_s" type="number" min="0" step="any" placeholder="end" /></label>
+      <label>
+        Time for it
+        <select name="budget_s">
+          <option value="30">half a minute</option>
+          <option value="120" selected>two minutes</option>
+          <option value="600">ten minutes</option>
+        </select>
+      </label>
+    </div>
+  `;
+}
+
+function wish(form) {
+  const number = (name) => (form.get(name) === "" ? null : Number(form.get(name)));
+  return {
+    vehicle: form.get("vehicle"),
+    car: form.get("car"),
+    budget_s: Number(form.get("budget_s")),
+    from_s: number("from_s"),
+    to_s: number("to_s"),
+  };
+}
+
+/** @returns the id of what was sent; null when there is nothing to send, or it was refused. */
+async function send(form, most) {
+  const one = form.get("file");
+  const folder = form.getAll("folder").filter((file) => file.size && KNOWN.test(file.name));
+  if (!one?.size && !folder.length) {
+    notify("error", "Choose the folder of a recording, or a .zip or .mcap file.");
+    return null;
+  }
+  const name = one?.size ? one.name : folder[0].webkitRelativePath.split("/")[0];
+  const blob = one?.size ? await packed([one]) : await packed(folder);
+  if (blob.size > most) {
+    notify("error", `The recording is ${Math.ceil(blob.size / 2 ** 20)} MiB, at most ${most / 2 ** 20} MiB are taken.`);
+    return null;
+  }
+  const stem = encodeURIComponent(name.replace(/\.(zip|mcap)$/i, "").slice(0, 100));
+  const reply = await change("POST", `/mismatch/uploads?name=${stem}`, blob);
+  return reply?.upload ?? null;
+}
+
+async function packed(files) {
+  if (files.length === 1 && /\.zip$/i.test(files[0].name)) {
+    return new Blob([files[0]], { type: "application/zip" });
+  }
+  const read = async (file) => ({
+    name: file.webkitRelativePath || file.name,
+    bytes: new Uint8Array(await file.arrayBuffer()),
+  });
+  return zipOf(await Promise.all(files.map(read)));
+}

@@ -1,0 +1,161 @@
+"""Recordings that people send: a zip of a folder with its `recording.yaml`, or of a city's run.
+
+Nothing in it is trusted: only tables are let in, and they may name no file outside and no car but
+those that the city knows, for a car file may bring laws of its own.
+"""
+
+import io
+import re
+import secrets
+import shutil
+import zipfile
+from pathlib import Path, PurePosixPath
+
+import msgspec
+
+from scm.api.problem import RefusedError
+from scm.errors import RecordingError
+from scm.recording.description import FILE_NAME, Description, read_description
+from scm.recording.table import SUFFIXES
+from scm.v2x.message import Refused
+
+FOLDER = "uploads"
+MOST_BYTES = 64 * 2**20
+MOST_UNPACKED_BYTES = 512 * 2**20
+MOST_FILES = 200
+KEPT = 20
+ID = r"^[a-z0-9][a-z0-9_-]{0,63}$"
+_CHUNK = 2**20
+_RUN = ".mcap"
+
+
+class Upload(msgspec.Struct, kw_only=True, frozen=True):
+    """A recording that was sent.
+
+    Attributes:
+        upload: Its id, for a mismatch job; the newest twenty are kept.
+        files: Of how many files it is.
+        size_bytes: Unpacked.
+        vehicles: Car files or cars that its description names; empty of a city's run.
+    """
+
+    upload: str
+    files: int
+    size_bytes: int
+    vehicles: tuple[str, ...]
+
+
+def take(shelf: Path, body: bytes, name: str, cars: tuple[str, ...]) -> Upload:
+    """Unpack a recording below `shelf` and return what it is.
+
+    Args:
+        shelf: Of reports: uploads lie in a folder of it.
+        body: The zip.
+        name: What the sender calls it: the id begins with it.
+        cars: Names of the car files that it may ask for.
+
+    Raises:
+        RefusedError: when it is no such zip, too large, or asks for what lies outside.
+    """
+    stem = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40] or "upload"
+    upload = f"{stem}-{secrets.token_hex(4)}"
+    folder = shelf / FOLDER / upload
+    folder.mkdir(parents=True)
+    try:
+        size = _unpack(body, folder)
+        _lift(folder)
+        vehicles = _check(folder, cars)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    _forget(shelf / FOLDER)
+    files = sum(path.is_file() for path in folder.rglob("*"))
+    return Upload(upload=upload, files=files, size_bytes=size, vehicles=vehicles)
+
+
+def recording_in(folder: Path) -> Path:
+    """Return what `scm mismatch` is to be given of an upload's folder."""
+    run = next(iter(sorted(folder.glob("*" + _RUN))), None)
+    return folder if (folder / FILE_NAME).is_file() or run is None else run
+
+
+def _unpack(body: bytes, folder: Path) -> int:
+    try:
+        with zipfile.ZipFile(io.BytesIO(body)) as packed:
+            infos = [info for info in packed.infolist() if not info.is_dir()]
+            if len(infos) > MOST_FILES:
+                raise _refused(f"files: got {len(infos)}, expected at most {MOST_FILES}")
+            left = MOST_UNPACKED_BYTES
+            for info in infos:
+                left -= _unpack_one(packed, info, folder, left)
+            return MOST_UNPACKED_BYTES - left
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError) as cause:
+        raise _refused(f"the zip cannot be read: {cause}") from cause
+
+
+def _unpack_one(packed: zipfile.ZipFile, info: zipfile.ZipInfo, folder: Path, left: int) -> int:
+    """Write one file; return its size, as it really is and not as the zip says."""
+    inner = PurePosixPath(info.filename.replace("\\", "/"))
+    if inner.is_absolute() or ".." in inner.parts or len(inner.parts) > 6:
+        raise _refused(f"{info.filename!r}: expected a path inside the recording's folder")
+    known = inner.name.endswith((*SUFFIXES, ".yaml"))
+    if not known:
+        return 0
+    path, size = folder.joinpath(*inner.parts), 0
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with packed.open(info) as source, path.open("wb") as target:
+        while chunk := source.read(_CHUNK):
+            size += len(chunk)
+            if size > left:
+                most = MOST_UNPACKED_BYTES // 2**20
+                raise _refused(f"unpacked: more than {most} MiB; send a part of the recording")
+            target.write(chunk)
+    return size
+
+
+def _lift(folder: Path) -> None:
+    """Take a recording out of the one folder that a zip often has around it."""
+    inside = list(folder.iterdir())
+    if len(inside) == 1 and inside[0].is_dir():
+        for path in list(inside[0].iterdir()):
+            path.rename(folder / path.name)
+        if not any(inside[0].iterdir()):
+            inside[0].rmdir()
+
+
+def _check(folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the cars that a recording names, once it names nothing that lies outside."""
+    if not (folder / FILE_NAME).is_file():
+        if len(list(folder.glob("*" + _RUN))) == 1:
+            return ()
+        raise _refused(f"no {FILE_NAME} in it, and no {_RUN} of a city: expected one of them")
+    try:
+        description = read_description(folder / FILE_NAME)
+    except RecordingError as cause:
+        raise _refused(str(cause).replace(f"{folder}/", "")) from cause
+    return _vehicles(description, folder, cars)
+
+
+def _vehicles(description: Description, folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:
+    for table in description.tables:
+        lies = (folder / table.file).resolve()
+        if not lies.is_relative_to(folder.resolve()) or not lies.exists():
+            raise _refused(f"{FILE_NAME}: table {table.file!r}: no such file in the zip")
+    named = [description.vehicle, *(table.vehicle for table in description.tables)]
+    vehicles = tuple(dict.fromkeys(name for name in named if name))
+    unknown = next((name for name in vehicles if name not in cars), None)
+    if unknown is not None:
+        known = ", ".join(cars)
+        raise _refused(f"{FILE_NAME}: vehicle {unknown!r}: expected one of the city's: {known}")
+    return vehicles
+
+
+def _forget(shelf: Path) -> None:
+    """Remove the oldest uploads beyond those that are kept."""
+    there = sorted(shelf.iterdir(), key=lambda path: path.stat().st_mtime_ns)
+    for old in there[: max(0, len(there) - KEPT)]:
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def _refused(detail: str) -> RefusedError:
+    return RefusedError(Refused(code="invalid", detail=f"upload: {detail}"))

@@ -1,0 +1,197 @@
+"""Page 6: reports are read, a drive is sent to a car and stopped, a search runs to its report."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from scm.fleet import LockstepLink
+from scm.lockstep import Lockstep
+from scm.maps.load import load_map
+from scm.mismatch.report.write import write_report
+from scm.play import play, write_recording
+from scm.world.part import WorldPart
+from tests.e2e.city_process import wait_for
+from tests.e2e.pages.visiting import judge
+from tests.unit.mismatch import made_up_findings as made_up
+
+SEARCH_S = 240.0  # on a busy machine
+REPORTS = {"two-effects": "pair", "undecided": "undecided", "healthy": "none"}
+COMMANDS = "t_s,throttle,steering\n0,0,0\n0.2,0.02,0\n40,0,0\n"
+WAY = "t_s,x_m,y_m,yaw_rad\n0,0,0,0\n40,0.01,0,0\n"
+TABLE = "recording: 1\nvehicle: nigel\ntables:\n  - file: a.csv\n    time: {column: t, unit: s}\n"
+CHANNELS = "    channels: {command.throttle: {column: u}, pose.x: {column: x, unit: m}}\n"
+
+
+@pytest.fixture(scope="module")
+def shelf(running):
+    """Return the shelf of reports with three on it; the second asks for a drive."""
+    folder = running.folder / "reports"
+    for name, case in REPORTS.items():
+        write_report(*made_up.CASES[case](), folder / name)
+    drive = folder / "undecided" / "next_drive"
+    drive.mkdir()
+    (drive / "next_drive.yaml").write_text("drive: 1\ncommands: next_drive.csv\n", "utf-8")
+    (drive / "next_drive.csv").write_text(COMMANDS, "utf-8")
+    (drive / "next_drive_way.csv").write_text(WAY, "utf-8")
+    yield folder
+    shutil.rmtree(folder)
+
+
+def arcs():
+    """Return rows to and fro on the spot, left and right: no wall is met."""
+    sides = [(1 if k % 12 < 6 else -1, 1 if k % 24 < 12 else -1) for k in range(32)]
+    return [
+        (0.5 * k, 0.4 * ahead * (0.6 + 0.2 * (k % 3)), 0.9 * left)
+        for k, (ahead, left) in enumerate(sides)
+    ]
+
+
+@pytest.fixture(scope="module")
+def searching(running, shelf, tmp_path_factory):
+    """Send a drive of a simulated car and start a real search of it; it runs meanwhile."""
+    folder = tmp_path_factory.mktemp("sent")
+    with Lockstep([WorldPart(load_map("parking_school"), hosted=(("n1", "nigel"),))]) as city:
+        city.run_for(0.1)
+        write_recording(play(LockstepLink(city), "n1", arcs()), "nigel", folder / "drive")
+    packed = shutil.make_archive(str(folder / "drive"), "zip", folder / "drive")
+    sent = running.web.post("/mismatch/uploads?name=turns", content=Path(packed).read_bytes())
+    body = {"upload": sent.json()["upload"], "budget_s": 5}
+    answer = running.web.post("/mismatch/jobs", json=body)
+    assert answer.status_code == 202, answer.text
+    return answer.json()["id"]
+
+
+@pytest.mark.parametrize("size", ["wide", "narrow"])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_the_report_can_be_looked_at(look, shelf, size, theme):
+    look("/mismatch/two-effects", "mismatch", size, theme, ready=".runs svg path.curve.after")
+
+
+def test_the_list_finds_a_report_and_opens_it(look, shelf, searching):
+    page = look("/mismatch", "mismatch_list", "wide", "light", ready=".jobs progress").page
+    assert page.locator(".reports .cards > li").count() >= 3
+    page.fill("input[type=search]", "healthy")
+    page.wait_for_function("() => document.querySelectorAll('.reports .cards > li').length === 1")
+    page.click(".reports .cards a")
+    page.wait_for_selector(".head .sentence >> text=Nothing beyond noise")
+    assert page.url.endswith("/mismatch/healthy")
+
+
+def test_map_and_time_line_show_the_same_moment(visit, shelf):
+    page = visit("/mismatch/two-effects").page
+    page.wait_for_selector(".time-line")
+    page.locator(".time-line").hover(position={"x": 200, "y": 120})
+    page.wait_for_selector(".time-line .cursor", state="attached")
+    before = page.get_attribute(".floor .moment", "cx")
+    page.focus("input[aria-label='Moment of the recording']")
+    for _ in range(30):
+        page.keyboard.press("ArrowRight")
+    assert page.get_attribute(".floor .moment", "cx") != before
+    assert " s at x " in page.inner_text(".where-when .said")
+    page.click("button:has-text('yaw moment')")
+    assert "yaw moment" in page.inner_text(".where-when .said")
+    assert page.locator(".floor .place").count() == 1
+    assert page.locator(".time-line .span").count() == 4
+
+
+def test_windows_of_free_runs_are_chosen_by_keyboard(visit, shelf):
+    page = visit("/mismatch/two-effects").page
+    window = page.locator("input[aria-label=Window]")
+    first = int(window.input_value())
+    told = page.inner_text(".runs .legend-line")
+    assert "no fit has seen it" in told
+    window.press("Home")
+    assert page.inner_text(".runs .legend-line").startswith("Window 1 of 30")
+    page.click("button:has-text('Worst unseen window')")
+    assert int(window.input_value()) == first
+
+
+def test_rivals_and_files_are_told(visit, shelf, running):
+    visited = visit("/mismatch/two-effects")
+    page = visited.page
+    page.locator("summary", has_text="ruled out").first.click()
+    page.wait_for_selector(".rivals >> text=The error does not grow with time.")
+    with page.expect_download() as saved:
+        page.click("a.button:has-text('report.json')")
+    assert saved.value.suggested_filename == "two-effects-report.json"
+    judge(visited)
+
+
+def test_a_report_that_is_not_there_is_said(visit, shelf):
+    visited = visit("/mismatch/nothing-here")
+    visited.page.wait_for_selector("[role=alert] >> text=nothing-here")
+
+
+def owner_of(running, vehicle):
+    rows = {row["vehicle"]: row["owner"] for row in running.get("/vehicles")["vehicles"]}
+    return rows[vehicle]
+
+
+def test_a_suggested_drive_is_sent_to_a_car_and_stopped(visit, shelf, running):
+    visited = visit("/mismatch/undecided")
+    page = visited.page
+    page.wait_for_selector(".drive select")
+    page.select_option(".drive select", "n2")
+    page.click("button:has-text('Drive this with n2')")
+    page.keyboard.press("Escape")
+    page.wait_for_selector("dialog", state="detached")
+    assert owner_of(running, "n2") == "world"
+    page.click("button:has-text('Drive this with n2')")
+    page.click("dialog .primary")
+    visited.until(lambda: owner_of(running, "n2") == "script", "the drive has the car")
+    judge(visited)
+    page.click("button:has-text('Stop the drive')")
+    visited.until(lambda: owner_of(running, "n2") == "world", "the car is given back")
+    page.wait_for_selector(".driving >> text=The drive was stopped.")
+    assert running.get("/mismatch/reports/undecided")["told"] == 0
+
+
+def test_a_drive_that_leads_off_the_floor_is_refused_in_words(visit, shelf, running):
+    way = shelf / "undecided" / "next_drive" / "next_drive_way.csv"
+    way.write_text("t_s,x_m,y_m,yaw_rad\n0,0,0,0\n40,50,0,0\n", "utf-8")
+    page = visit("/mismatch/undecided").page
+    page.wait_for_selector(".drive .warn >> text=off the floor")
+    page.click("button:has-text('Drive this with')")
+    page.click("dialog .primary")
+    page.wait_for_selector(".driving[data-state=failed] >> text=expected room for all of it")
+
+
+def test_a_recording_of_ones_own_is_sent_and_searched(visit, shelf, running, tmp_path):
+    folder = tmp_path / "short drive"
+    folder.mkdir()
+    (folder / "recording.yaml").write_text(TABLE + CHANNELS, "utf-8")
+    (folder / "a.csv").write_text("t,u,x\n0,0,0\n1,0.1,0.1\n2,0.1,0.2\n", "utf-8")
+    visited = visit("/mismatch")
+    page = visited.page
+    page.click("button:has-text('My own recording')")
+    page.set_input_files("input[name=folder]", str(folder))
+    page.click(".start .primary")
+    page.wait_for_selector(".jobs li:has-text('short-drive')")
+
+    def report():
+        rows = running.get("/mismatch/reports")["items"]
+        return next((row for row in rows if row["name"].startswith("short-drive")), None)
+
+    row = wait_for(report, SEARCH_S, "the report of what was sent")
+    assert "does not allow a verdict" in row["said"]
+    page.click(f".reports a[href='/mismatch/{row['name']}']")
+    page.wait_for_selector(".head >> text=No verdict")
+    page.click("button:has-text('Remove this report')")
+    page.click("dialog .danger")
+    visited.until(lambda: report() is None, "the report is removed")
+    assert visited.complaints == []
+
+
+def test_a_real_search_ends_in_a_report_that_can_be_read(visit, shelf, running, searching):
+    def ended():
+        row = running.get(f"/operations/{searching}")
+        return row if row["state"] not in ("waiting", "running") else None
+
+    row = wait_for(ended, SEARCH_S, "the search ends")
+    assert row["state"] == "done", row
+    assert row["result"].startswith("/mismatch/turns-")
+    page = visit(row["result"]).page
+    page.wait_for_selector(".head .sentence")
+    page.wait_for_selector(".runs svg path.curve.after")
+    assert "nigel" in page.inner_text(".head .facts")

@@ -1,0 +1,320 @@
+"""Mismatch reports over REST: listed, read, downloaded, removed; searches and drives begun."""
+
+import io
+import json
+import zipfile
+
+import pytest
+
+from scm.api import mismatch_jobs, uploads
+from scm.api.app import create_app
+from scm.api.shelves import shelves_in
+from scm.errors import RunError
+from scm.mismatch.report.write import write_report
+from tests.unit.api.conftest import Client
+from tests.unit.mismatch import made_up_findings as made_up
+
+API = "/api/v1/mismatch"
+COMMANDS = "t,throttle,steering\n0,0,0\n1,0.5,0\n"
+DESCRIPTION = """recording: 1
+vehicle: nigel
+tables:
+  - file: commands.csv
+    time: {column: t, unit: s}
+    channels:
+      command.throttle: {column: throttle}
+"""
+
+
+@pytest.fixture
+def shelves(tmp_path):
+    found = shelves_in(tmp_path)
+    found.reports.mkdir()
+    return found
+
+
+@pytest.fixture
+def call(view, fake_city, city_map, shelves):
+    bus = ("--connect", "tcp/127.0.0.1:1")
+    return Client(create_app(view, fake_city.ask, city_map, shelves=shelves, bus=bus))
+
+
+@pytest.fixture
+def ran(monkeypatch):
+    """What programs were started; `then` is what they do."""
+    started = []
+
+    def run(words, tell, hear, *, kinder=True):
+        started.append(words)
+        return run.then(words, tell, hear)
+
+    run.then = lambda *_: []
+    run.started = started
+    monkeypatch.setattr(mismatch_jobs, "run_scm", run)
+    return run
+
+
+def put(shelves, name, case="pair"):
+    write_report(*made_up.CASES[case](), shelves.reports / name)
+    return shelves.reports / name
+
+
+def with_drive(folder):
+    drive = folder / "next_drive"
+    drive.mkdir()
+    (drive / "next_drive.yaml").write_text("drive: 1\ncommands: next_drive.csv\n", "utf-8")
+    (drive / "next_drive.csv").write_text("t_s,throttle,steering\n0,0,0\n2,0.3,0.1\n", "utf-8")
+    (drive / "next_drive_way.csv").write_text("t_s,x_m,y_m,yaw_rad\n0,1,2,0.5\n", "utf-8")
+
+
+def wait_for(call, answer):
+    assert answer.status_code == 202, answer.text
+    address = answer.headers["Location"]
+    for _ in range(400):
+        row = call("GET", address).json()
+        if row["state"] not in ("waiting", "running"):
+            return row
+    raise AssertionError(row)
+
+
+def packed(files):
+    body = io.BytesIO()
+    with zipfile.ZipFile(body, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, text in files.items():
+            file.writestr(name, text)
+    return body.getvalue()
+
+
+def test_a_city_without_a_shelf_has_no_reports_and_says_how_to_have_some(client):
+    assert client("GET", f"{API}/reports").json()["items"] == []
+    answer = client("POST", f"{API}/jobs", json={"upload": "x"})
+    assert answer.status_code == 503
+    assert "--data" in answer.json()["detail"]
+
+
+def test_reports_are_listed_with_what_they_found(call, shelves):
+    put(shelves, "monday")
+    (row,) = call("GET", f"{API}/reports").json()["items"]
+    assert (row["name"], row["verdict"]) == ("monday", "mismatch")
+    assert len(row["effects"]) == 2
+    assert row["before_m"] > row["after_m"] > 0.0
+
+
+def test_the_newest_report_comes_first_and_pages_go_on(call, shelves):
+    import os
+
+    for age, name in enumerate(("new", "middle", "old")):
+        at = 1_700_000_000 - age
+        os.utime(put(shelves, name, "none") / "report.json", (at, at))
+    first = call("GET", f"{API}/reports?limit=2").json()
+    second = call("GET", f"{API}/reports?limit=2&cursor={first['next']}").json()
+    assert [row["name"] for row in first["items"] + second["items"]] == ["new", "middle", "old"]
+
+
+def test_of_several_cars_each_has_its_report(call, shelves):
+    folder = shelves.reports / "fleet"
+    for car in ("n1", "n2"):
+        put(shelves, f"fleet/{car}", "none")
+    (folder / "cars.json").write_text("{}", "utf-8")
+    names = {row["name"] for row in call("GET", f"{API}/reports").json()["items"]}
+    assert names == {"fleet.n1", "fleet.n2"}
+    assert call("GET", f"{API}/reports/fleet.n1").json()["row"]["verdict"] == "none"
+
+
+def test_a_damaged_report_is_listed_as_such_and_takes_nothing_down(call, shelves):
+    folder = put(shelves, "monday")
+    (folder / "report.json").write_text('{"verdict": 3', "utf-8")
+    (row,) = call("GET", f"{API}/reports").json()["items"]
+    assert row["verdict"] == "unreadable"
+    assert call("GET", f"{API}/reports/monday").status_code == 200
+
+
+def test_a_report_tells_its_fields_what_it_draws_and_its_files(call, shelves):
+    with_drive(put(shelves, "monday"))
+    body = call("GET", f"{API}/reports/monday").json()
+    assert body["report"]["effects"][0]["name"] == "drive_lag"
+    drawn = body["drawn"]
+    assert drawn["said"].startswith("The simulator leaves out")
+    assert len(drawn["residuals"]) == 3
+    assert len(drawn["free_runs"]["part"]) == len(drawn["free_runs"]["before"]["x"]) == 30
+    assert drawn["effects"][0]["numbers"][0]["neutral"] == 0.0
+    assert body["drives"] == ["next_drive"]
+    assert set(body["files"]) == {
+        "report.html",
+        "report.json",
+        "drawn.json",
+        "car.toml",
+    }
+
+
+def test_files_are_downloads_and_nothing_else_can_be_had(call, shelves):
+    put(shelves, "monday")
+    answer = call("GET", f"{API}/reports/monday/files/report.html")
+    assert answer.headers["content-disposition"].startswith("attachment")
+    for file in ("job.json", "..%2F..%2Fsecret", "pictures"):
+        assert call("GET", f"{API}/reports/monday/files/{file}").status_code == 404
+    assert call("GET", f"{API}/reports/..%2Fmonday").status_code in (404, 422)
+
+
+def test_a_removed_report_is_gone(call, shelves):
+    folder = put(shelves, "monday")
+    assert call("DELETE", f"{API}/reports/monday").status_code == 204
+    assert not folder.exists()
+    assert call("DELETE", f"{API}/reports/monday").status_code == 404
+
+
+def test_a_search_runs_the_program_and_puts_its_report_on_the_shelf(call, shelves, ran):
+    def search(words, tell, hear):
+        hear("   12 s   16 %  trying 46 effects")
+        out = shelves.reports / words[words.index("--out") + 1]
+        write_report(*made_up.CASES["none"](), out)
+        return []
+
+    ran.then = search
+    (shelves.recordings / "city-1.mcap").write_bytes(b"")
+    body = {"recording": "city-1", "vehicle": "n1", "car": "nigel", "budget_s": 20, "to_s": 40.5}
+    row = wait_for(call, call("POST", f"{API}/jobs", json=body))
+    assert row["result"] == "/mismatch/city-1-n1", row
+    words = ran.started[0]
+    assert words[:2] == ["mismatch", str(shelves.recordings / "city-1.mcap")]
+    for option, value in (("--vehicle", "n1"), ("--car", "nigel"), ("--to-s", "40.5")):
+        assert words[words.index(option) + 1] == value
+    assert "--from-s" not in words
+    job = call("GET", f"{API}/reports/city-1-n1").json()["job"]
+    assert (job["source"], job["recordings"]) == ("city-1", ["city-1.mcap"])
+    assert wait_for(call, call("POST", f"{API}/jobs", json=body))["result"].endswith("-n1-2")
+    assert sorted(path.name for path in shelves.reports.iterdir()) == ["city-1-n1", "city-1-n1-2"]
+
+
+def test_a_search_that_fails_says_why_and_leaves_nothing(call, shelves, ran):
+    def fail(words, tell, hear):
+        (shelves.reports / words[words.index("--out") + 1]).mkdir()
+        raise RunError("scm mismatch: no car 'n9'")
+
+    ran.then = fail
+    (shelves.recordings / "city-1.mcap").write_bytes(b"")
+    row = wait_for(call, call("POST", f"{API}/jobs", json={"recording": "city-1.mcap"}))
+    assert (row["state"], row["error"]) == ("failed", "scm mismatch: no car 'n9'")
+    assert list(shelves.reports.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        ({}, 422),
+        ({"recording": "a", "upload": "b"}, 422),
+        ({"recording": "nothing.mcap"}, 404),
+        ({"recording": "../secret"}, 404),
+        ({"upload": "gone-1"}, 404),
+        ({"upload": "../.."}, 404),
+        ({"again": "gone"}, 404),
+        ({"recording": "city-1", "car": "tank"}, 404),
+        ({"recording": "city-1", "from_s": 5, "to_s": 4}, 422),
+        ({"recording": "city-1", "budget_s": 1e9}, 422),
+        ({"recording": "city-1", "out": "/etc"}, 422),
+    ],
+)
+def test_a_search_that_cannot_be_is_refused(call, shelves, ran, body, status):
+    (shelves.recordings / "city-1.mcap").write_bytes(b"")
+    assert call("POST", f"{API}/jobs", json=body).status_code == status
+    assert ran.started == []
+
+
+def test_a_drive_is_shown_and_sent_to_a_car_on_the_citys_floor(call, shelves, ran, city_map):
+    with_drive(put(shelves, "monday", "undecided"))
+    (part,) = call("GET", f"{API}/reports/monday/drives/next_drive").json()["parts"]
+    assert (part["lasts_s"], part["commands"][1], part["way"]) == (2.0, [2, 0.3, 0.1], [[1, 2, 0.5]])
+
+    def play(words, tell, hear):
+        out = shelves.reports / words[words.index("--out") + 1]
+        out.mkdir()
+        (out / "recording.yaml").write_text("recording: 1\n", "utf-8")
+        return ["12 poses of 2 s recorded"]
+
+    ran.then = play
+    address = f"{API}/reports/monday/drives/next_drive/play"
+    assert wait_for(call, call("POST", address, json={"vehicle": "n1"}))["state"] == "done"
+    words = ran.started[0]
+    assert words[0] == "play"
+    assert words[words.index("--connect") + 1] == "tcp/127.0.0.1:1"
+    floor = words[words.index("--floor") + 1 :]
+    assert list(map(float, floor)) == [*city_map.floor.x_m, *city_map.floor.y_m]
+    assert call("GET", f"{API}/reports/monday").json()["told"] == 1
+    assert call("POST", address, json={"vehicle": "n1", "part": 2}).status_code == 422
+
+
+def test_a_drive_that_ends_early_is_no_recording(call, shelves, ran):
+    folder = put(shelves, "monday", "undecided")
+    with_drive(folder)
+
+    def play(words, tell, hear):
+        (folder / "told_1").mkdir()
+        (folder / "told_1" / "recording.yaml").write_text("", "utf-8")
+        return ["5 poses", "stopped: the car hit something"]
+
+    ran.then = play
+    address = f"{API}/reports/monday/drives/next_drive/play"
+    row = wait_for(call, call("POST", address, json={"vehicle": "n1"}))
+    assert (row["state"], row["error"]) == ("failed", "stopped: the car hit something")
+    assert call("GET", f"{API}/reports/monday").json()["told"] == 0
+
+
+def test_a_search_again_takes_what_was_driven_since(call, shelves, ran):
+    folder = put(shelves, "monday", "undecided")
+    (shelves.recordings / "city-1.mcap").write_bytes(b"")
+    assert call("POST", f"{API}/jobs", json={"again": "monday"}).status_code == 409
+    job = {"recordings": [str(shelves.recordings / "city-1.mcap")], "source": "x", "vehicle": "n1"}
+    (folder / "job.json").write_text(json.dumps(job), "utf-8")
+    for name in ("told_10", "told_2"):
+        (folder / name).mkdir()
+        (folder / name / "recording.yaml").write_text("", "utf-8")
+    wait_for(call, call("POST", f"{API}/jobs", json={"again": "monday"}))
+    given = ran.started[0][1 : ran.started[0].index("--out")]
+    assert given == [*job["recordings"], str(folder / "told_2"), str(folder / "told_10")]
+
+
+def test_an_upload_becomes_a_recording_for_a_search(call, shelves, ran):
+    body = packed({"tuesday/recording.yaml": DESCRIPTION, "tuesday/commands.csv": COMMANDS,
+                   "tuesday/notes.txt": "left out"})  # fmt: skip
+    answer = call("POST", f"{API}/uploads?name=My%20drive", content=body)
+    assert answer.status_code == 201, answer.text
+    upload = answer.json()["upload"]
+    assert upload.startswith("my-drive-")
+    assert (answer.json()["files"], answer.json()["vehicles"]) == (2, ["nigel"])
+    wait_for(call, call("POST", f"{API}/jobs", json={"upload": upload}))
+    assert ran.started[0][1] == str(shelves.reports / "uploads" / upload)
+
+
+@pytest.mark.parametrize(
+    ("files", "why"),
+    [
+        ({"a.csv": COMMANDS}, "recording.yaml"),
+        ({"recording.yaml": DESCRIPTION}, "no such file"),
+        ({"recording.yaml": DESCRIPTION.replace("commands.csv", "/etc/passwd")}, "no such file"),
+        ({"../recording.yaml": DESCRIPTION, "commands.csv": COMMANDS}, "inside"),
+        (
+            {
+                "recording.yaml": DESCRIPTION.replace("nigel", "./mine.toml"),
+                "commands.csv": COMMANDS,
+                "mine.toml": "own_terms = ['x.py']",
+            },
+            "vehicle",
+        ),
+        ({"recording.yaml": "recording: [", "commands.csv": COMMANDS}, "recording.yaml"),
+    ],
+)
+def test_an_upload_that_asks_for_what_lies_outside_is_refused(call, shelves, files, why):
+    answer = call("POST", f"{API}/uploads", content=packed(files))
+    assert answer.status_code == 422
+    assert why in answer.json()["detail"]
+    assert str(shelves.reports) not in answer.json()["detail"]
+    assert list((shelves.reports / "uploads").iterdir()) == []
+
+
+def test_an_upload_that_is_no_zip_or_unpacks_to_too_much_is_refused(call, shelves, monkeypatch):
+    assert call("POST", f"{API}/uploads", content=b"hello").status_code == 422
+    monkeypatch.setattr(uploads, "MOST_UNPACKED_BYTES", 1000)
+    bomb = packed({"recording.yaml": DESCRIPTION, "commands.csv": "0" * 5000})
+    assert call("POST", f"{API}/uploads", content=bomb).status_code == 422
+    monkeypatch.setattr(uploads, "MOST_BYTES", 100)
+    assert call("POST", f"{API}/uploads", content=b"x" * 101).status_code == 422
