@@ -2,8 +2,8 @@
 
 import asyncio
 import uuid
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 from fastapi import APIRouter, FastAPI
@@ -21,32 +21,45 @@ from scm.api.idempotency import Idempotent
 from scm.api.keys import KeyRing
 from scm.api.limits import Limited
 from scm.api.metrics import Measured, Metrics
+from scm.api.mismatch_jobs import MismatchJobs
 from scm.api.operations import Operations
 from scm.api.routes import (
     audit,
     boxes,
     cameras,
     cities,
+    close_up,
+    drive,
     events,
     eye,
     health,
+    leases,
     live,
     map,  # noqa: A004  named for its noun
+    metrics,
     misbehaviour,
+    mismatch,
     ngsi,
     operations,
+    planned_path,
+    recordings,
+    scan,
+    scenarios,
     session,
+    signal_plans,
     signals,
     stations,
     stop,
     traffic,
+    vehicle_frames,
     vehicles,
 )
 from scm.api.routes import keys as key_routes
-from scm.api.routes import metrics as metrics_routes
 from scm.api.shelves import Shelves
+from scm.api.signal_plans import PlanShelf
 from scm.api.stream import Stream
 from scm.api.trace import Traced
+from scm.api.vehicle_frames import VehicleFrames
 from scm.api.view import CityView
 from scm.clock import WallClock
 from scm.maps.model import CityMap
@@ -93,11 +106,13 @@ def create_app(
         link: What is known of the connection to the bus.
         state: The city's store, with its audit log; None: a new one in memory.
     """
-    clock, store = WallClock(), state or MemoryStore()
-    seen = Acknowledgements(store, clock)
-    city = City(view, ask, city_map, plans or {}, shelves or Shelves(), link or Link())
-    work = Operations(clock)
-    stream = Stream(city, uuid.uuid4().hex[:8], seen)
+    clock = WallClock()
+    desk = _Desk(
+        city=City(view, ask, city_map, plans or {}, shelves or Shelves(), link or Link()),
+        keys=keys,
+        store=state or MemoryStore(),
+        clock=clock,
+    )
     app = FastAPI(
         title=f"scm {city_map.name}",
         version="1",
@@ -105,52 +120,101 @@ def create_app(
         redoc_url=None,
         openapi_url="/api/v1/openapi.json",
         generate_unique_id_function=openapi.operation_id,
-        lifespan=_lifespan_of(stream, work),
+        lifespan=desk.lifespan,
     )
-    app.state.stream = stream
+    app.state.stream = desk.stream
+    app.state.frames = desk.frames
     app.state.keys = keys
     problem.install(app)
     openapi.install(app)
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
     app.add_middleware(Idempotent, clock=clock)  # what is added later sees a request earlier
     app.add_middleware(Limited, clock=clock)
-    app.add_middleware(Audited, store=store, clock=clock)
+    app.add_middleware(Audited, store=desk.store, clock=clock)
     app.add_middleware(Gate, keys=keys, policy=policy)
-    metrics = Metrics(city, stream)
-    app.add_middleware(Measured, metrics=metrics, clock=clock)
+    app.add_middleware(Measured, metrics=desk.metrics, clock=clock)
     app.add_middleware(Traced)
     api = APIRouter(prefix="/api/v1")
-    for noun in (
-        cities, vehicles, signals, stations, map, boxes, eye, stop, misbehaviour, traffic,
-    ):  # fmt: skip
-        api.include_router(noun.router(city), responses=problem.RESPONSES)
-    api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
-    api.include_router(events.router(city, seen), responses=problem.RESPONSES)
-    api.include_router(audit.router(store), responses=problem.RESPONSES)
-    api.include_router(operations.router(work), responses=problem.RESPONSES)
-    api.include_router(live.router(stream), responses=problem.RESPONSES)
-    api.include_router(session.router(), responses=problem.RESPONSES)
-    api.include_router(key_routes.router(keys), responses=problem.RESPONSES)
+    for noun in (*desk.of_the_city(), *desk.live(), *desk.of_the_server()):
+        api.include_router(noun, responses=problem.RESPONSES)
     app.include_router(api)
-    app.include_router(ngsi.router(city), responses=problem.RESPONSES)
-    app.include_router(health.router(city), responses=problem.RESPONSES)
-    app.include_router(metrics_routes.router(metrics), responses=problem.RESPONSES)
+    for noun in (health.router(desk.city), ngsi.router(desk.city), metrics.router(desk.metrics)):
+        app.include_router(noun, responses=problem.RESPONSES)
     _add_pages(app)
     return app
 
 
-def _lifespan_of(
-    stream: Stream, work: Operations
-) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
-    @asynccontextmanager
-    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
-        task = asyncio.create_task(stream.run())
-        yield
-        work.close()
-        stream.close()
-        await task
+class _Desk:
+    """What the routes of one server share, and the nouns that are made of it."""
 
-    return lifespan
+    def __init__(
+        self, *, city: City, keys: KeyRing | None, store: Repository, clock: WallClock
+    ) -> None:
+        self.city = city
+        self.keys = keys
+        self.store = store
+        self.seen = Acknowledgements(store, clock)
+        self.work = Operations(clock)
+        self.plans = PlanShelf(city.shelves.plans)
+        self.jobs = MismatchJobs(city, self.work, clock, city.link.words)
+        self.stream = Stream(city, uuid.uuid4().hex[:8], self.seen)
+        self.frames = VehicleFrames(city.view)
+        self.metrics = Metrics(city, self.stream)
+
+    def of_the_city(self) -> tuple[APIRouter, ...]:
+        """Return what is true of the city now, and what may be asked of it."""
+        city = self.city
+        return (
+            cities.router(city),
+            vehicles.router(city),
+            leases.router(city),
+            planned_path.router(city),
+            signals.router(city, self.plans),
+            signal_plans.router(city, self.plans, self.work),
+            stations.router(city),
+            map.router(city),
+            boxes.router(city),
+            eye.router(city),
+            stop.router(city),
+            misbehaviour.router(city),
+            traffic.router(city),
+        )
+
+    def live(self) -> tuple[APIRouter, ...]:
+        """Return what goes on for as long as somebody looks."""
+        city, stream = self.city, self.stream
+        return (
+            live.router(stream),
+            cameras.router(city, stream),
+            scan.router(city, stream),
+            vehicle_frames.router(self.frames),
+            close_up.router(city, stream),
+            drive.router(city, stream),
+        )
+
+    def of_the_server(self) -> tuple[APIRouter, ...]:
+        """Return what the server itself keeps: its logs, files, long work and keys."""
+        city = self.city
+        return (
+            events.router(city, self.seen),
+            audit.router(self.store),
+            operations.router(self.work),
+            recordings.router(city),
+            scenarios.router(city, self.work),
+            mismatch.router(city, self.jobs),
+            session.router(),
+            key_routes.router(self.keys),
+        )
+
+    @asynccontextmanager
+    async def lifespan(self, _app: FastAPI) -> AsyncIterator[None]:
+        """Run the streams while the server runs; call off what is still at work at its end."""
+        tasks = [asyncio.create_task(self.stream.run()), asyncio.create_task(self.frames.run())]
+        yield
+        self.work.close()
+        self.stream.close()
+        self.frames.close()
+        await asyncio.gather(*tasks)
 
 
 def _add_pages(app: FastAPI) -> None:

@@ -43,7 +43,7 @@ class Link:
         rejected: How many arrivals were dropped because they could not be read.
         clock: That of the view's runner; None: time stands still between its steps.
         wire: Says commands on the bus; None: nobody can be driven from here.
-        connect: Endpoint of the city's router, for scripts that are run beside it; empty: not known.
+        connect: Endpoint of the city's router, for scripts run beside it; empty: not known.
         words: What tells a program of ours where the bus is and who it is there; empty: such a
             program cannot reach the city.
         map_file: Name or path of the map, as other programs are told it; empty: its own name.

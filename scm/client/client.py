@@ -14,10 +14,15 @@ from scm.client.nouns.events import EventsNoun
 from scm.client.nouns.eye import EyeNoun
 from scm.client.nouns.health import HealthNoun
 from scm.client.nouns.keys import KeysNoun
+from scm.client.nouns.leases import LeasesNoun
 from scm.client.nouns.map import MapNoun
 from scm.client.nouns.misbehaviour import MisbehaviourNoun
+from scm.client.nouns.mismatch import MismatchNoun
 from scm.client.nouns.ngsi import NgsiNoun
 from scm.client.nouns.operations import OperationsNoun
+from scm.client.nouns.recordings import RecordingsNoun
+from scm.client.nouns.scans import ScansNoun
+from scm.client.nouns.scenarios import ScenariosNoun
 from scm.client.nouns.session import SessionNoun
 from scm.client.nouns.signals import SignalsNoun
 from scm.client.nouns.stations import StationsNoun
@@ -45,10 +50,15 @@ class Client:
         self.eye = EyeNoun(self.connection)
         self.health = HealthNoun(self.connection)
         self.keys = KeysNoun(self.connection)
+        self.leases = LeasesNoun(self.connection)
         self.map = MapNoun(self.connection)
         self.misbehaviour = MisbehaviourNoun(self.connection)
+        self.mismatch = MismatchNoun(self.connection)
         self.ngsi = NgsiNoun(self.connection)
         self.operations = OperationsNoun(self.connection)
+        self.recordings = RecordingsNoun(self.connection)
+        self.scans = ScansNoun(self.connection)
+        self.scenarios = ScenariosNoun(self.connection)
         self.session = SessionNoun(self.connection)
         self.signals = SignalsNoun(self.connection)
         self.stations = StationsNoun(self.connection)

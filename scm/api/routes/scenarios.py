@@ -50,7 +50,7 @@ def router(city: City, work: Operations) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/scenarios", tags=["scenarios"], dependencies=[VIEWER])
     shelf = ScenarioShelf(city.shelves.scenarios)
-    runs = ScenarioRuns(shelf, work, city.connect)
+    runs = ScenarioRuns(shelf, work, city.link.connect)
     _add_scripts(routes, shelf)
 
     @routes.post("/{name}/runs", summary="Run a script", status_code=202, dependencies=[OPERATOR])

@@ -3,8 +3,9 @@
 Written by docs/make/client.py: do not change it here.
 """
 
+from typing import Any, Literal
+
 from scm.client.connection import Connection, part
-from scm.client.records.signals import JunctionRow, Junctions, MonitorStatus, PlanReply
 
 
 class SignalsNoun:
@@ -13,53 +14,425 @@ class SignalsNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def all_signals(self) -> Junctions:
+    def all_signals(self) -> Any:
         """All junctions."""
-        return self._connection.ask("GET", "/api/v1/signals", Junctions)
+        return self._connection.ask("GET", "/api/v1/signals", Any)
 
-    def one_signal(self, name: str) -> JunctionRow:
+    def one_signal(self, name: str) -> Any:
         """One junction.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}", JunctionRow)
+        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}", Any)
+
+    def site(self, name: str) -> Any:
+        """Phases, least times, conflicts, rings, policies.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/site", Any)
+
+    def status(self, name: str) -> Any:
+        """What runs, detectors, greens to come.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/status", Any)
+
+    def history(self, name: str) -> Any:
+        """What each group showed in the last ten minutes.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/history", Any)
+
+    def promises(self, name: str) -> Any:
+        """What SPaT told against what happened.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/promises", Any)
+
+    def wishes(self, name: str, *, limit: int = 100, cursor: str = "") -> Any:
+        """Wishes in force, each with who, why and its end.
+
+        Args:
+            name: a name on the bus
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.ask(
+            "GET",
+            f"/api/v1/signals/{part(name)}/wishes",
+            Any,
+            query={"limit": limit, "cursor": cursor},
+        )
+
+    def call(
+        self,
+        name: str,
+        *,
+        by: str = "api",
+        reason: str = "",
+        groups: tuple[str, ...],
+        expires_s: float = 60.0,
+        idempotency_key: str = "",
+    ) -> Any:
+        """Call groups: each is served once.
+
+        Args:
+            name: a name on the bus
+            by: who asks; told in the log
+            reason: why
+            groups: signal groups
+            expires_s: seconds until it lapses by itself
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/signals/{part(name)}/calls",
+            Any,
+            body={"by": by, "reason": reason, "groups": groups, "expires_s": expires_s},
+            key=idempotency_key,
+        )
+
+    def hold(
+        self,
+        name: str,
+        *,
+        by: str = "api",
+        reason: str = "",
+        groups: tuple[str, ...],
+        expires_s: float = 60.0,
+        idempotency_key: str = "",
+    ) -> Any:
+        """Hold groups: once green, they stay green.
+
+        Args:
+            name: a name on the bus
+            by: who asks; told in the log
+            reason: why
+            groups: signal groups
+            expires_s: seconds until it lapses by itself
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/signals/{part(name)}/holds",
+            Any,
+            body={"by": by, "reason": reason, "groups": groups, "expires_s": expires_s},
+            key=idempotency_key,
+        )
+
+    def force_off(
+        self,
+        name: str,
+        *,
+        by: str = "api",
+        reason: str = "",
+        groups: tuple[str, ...],
+        expires_s: float = 60.0,
+        idempotency_key: str = "",
+    ) -> Any:
+        """Force groups off: their green ends once others are called.
+
+        Args:
+            name: a name on the bus
+            by: who asks; told in the log
+            reason: why
+            groups: signal groups
+            expires_s: seconds until it lapses by itself
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/signals/{part(name)}/force-offs",
+            Any,
+            body={"by": by, "reason": reason, "groups": groups, "expires_s": expires_s},
+            key=idempotency_key,
+        )
+
+    def omit(
+        self,
+        name: str,
+        *,
+        by: str = "api",
+        reason: str = "",
+        groups: tuple[str, ...],
+        expires_s: float = 60.0,
+        idempotency_key: str = "",
+    ) -> Any:
+        """Omit groups: they are not begun.
+
+        Args:
+            name: a name on the bus
+            by: who asks; told in the log
+            reason: why
+            groups: signal groups
+            expires_s: seconds until it lapses by itself
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/signals/{part(name)}/omits",
+            Any,
+            body={"by": by, "reason": reason, "groups": groups, "expires_s": expires_s},
+            key=idempotency_key,
+        )
+
+    def preempt(
+        self,
+        name: str,
+        *,
+        by: str = "api",
+        reason: str = "",
+        groups: tuple[str, ...],
+        expires_s: float = 60.0,
+        idempotency_key: str = "",
+    ) -> Any:
+        """Pre-empt for one group: it comes next and stays.
+
+        Args:
+            name: a name on the bus
+            by: who asks; told in the log
+            reason: why
+            groups: signal groups
+            expires_s: seconds until it lapses by itself
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/signals/{part(name)}/preempts",
+            Any,
+            body={"by": by, "reason": reason, "groups": groups, "expires_s": expires_s},
+            key=idempotency_key,
+        )
+
+    def clear(
+        self,
+        name: str,
+        *,
+        by: str = "api",
+        reason: str = "",
+        groups: tuple[str, ...] | None = None,
+        verb: Literal["", "call", "hold", "force_off", "omit", "preempt", "policy"] = "",
+        idempotency_key: str = "",
+    ) -> Any:
+        """Take wishes back.
+
+        Args:
+            name: a name on the bus
+            by: who asks; told in the log
+            reason: why
+            groups: wishes for any of these groups; empty: whatever they are for
+            verb: wishes of this kind; empty: of any
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/signals/{part(name)}/clear",
+            Any,
+            body={"by": by, "reason": reason, "groups": groups, "verb": verb},
+            key=idempotency_key,
+        )
 
     def plan(
-        self, name: str, *, plan: str, by: str = "api", reason: str = "", idempotency_key: str = ""
-    ) -> PlanReply:
+        self, name: str, *, by: str = "api", reason: str = "", plan: str, idempotency_key: str = ""
+    ) -> Any:
         """Wish for another plan.
 
         Args:
             name: a name on the bus
-            plan: its name, or `flash`
-            by: who wishes it
-            reason: why, for the log
+            by: who asks; told in the log
+            reason: why
+            plan: a plan by name (shipped, the map's own, or saved), a policy, or `flash`
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
             "PUT",
             f"/api/v1/signals/{part(name)}/plan",
-            PlanReply,
-            body={"plan": plan, "by": by, "reason": reason},
+            Any,
+            body={"by": by, "reason": reason, "plan": plan},
             key=idempotency_key,
         )
 
-    def reset(
-        self, name: str, *, by: str = "api", reason: str, idempotency_key: str = ""
-    ) -> MonitorStatus:
+    def policy(
+        self,
+        name: str,
+        *,
+        by: str = "api",
+        reason: str = "",
+        policy: str,
+        expires_s: float = 300.0,
+        idempotency_key: str = "",
+    ) -> Any:
+        """Run a policy for a while.
+
+        Args:
+            name: a name on the bus
+            by: who asks; told in the log
+            reason: why
+            policy: its name
+            expires_s: seconds until it lapses by itself
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "PUT",
+            f"/api/v1/signals/{part(name)}/policy",
+            Any,
+            body={"by": by, "reason": reason, "policy": policy, "expires_s": expires_s},
+            key=idempotency_key,
+        )
+
+    def flash(
+        self,
+        name: str,
+        *,
+        by: str = "api",
+        reason: str = "",
+        engaged: bool,
+        expires_s: float | None = None,
+        idempotency_key: str = "",
+    ) -> Any:
+        """Flash red, or go on.
+
+        Args:
+            name: a name on the bus
+            by: who asks; told in the log
+            reason: why
+            engaged: true: flash; false: go on, all red first
+            expires_s: seconds until it ends by itself; null: not by itself
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "PUT",
+            f"/api/v1/signals/{part(name)}/flash",
+            Any,
+            body={"by": by, "reason": reason, "engaged": engaged, "expires_s": expires_s},
+            key=idempotency_key,
+        )
+
+    def verdicts(self, name: str, *, limit: int = 100, cursor: str = "") -> Any:
+        """What the monitor said, newest first.
+
+        Args:
+            name: a name on the bus
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.ask(
+            "GET",
+            f"/api/v1/signals/{part(name)}/monitor",
+            Any,
+            query={"limit": limit, "cursor": cursor},
+        )
+
+    def reset(self, name: str, *, by: str = "api", reason: str, idempotency_key: str = "") -> Any:
         """Clear a latched fault of the monitor.
 
         Args:
             name: a name on the bus
-            by: who wishes it
-            reason: why it is safe to go on, for the log
+            by: who asks; told in the log
+            reason: why it is over
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
             "POST",
             f"/api/v1/signals/{part(name)}/monitor/reset",
-            MonitorStatus,
+            Any,
             body={"by": by, "reason": reason},
             key=idempotency_key,
+        )
+
+    def plans(self, name: str, *, limit: int = 100, cursor: str = "") -> Any:
+        """All plans of a junction.
+
+        Args:
+            name: a name on the bus
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.ask(
+            "GET",
+            f"/api/v1/signals/{part(name)}/plans",
+            Any,
+            query={"limit": limit, "cursor": cursor},
+        )
+
+    def one_plan(self, name: str, plan: str) -> Any:
+        """One plan.
+
+        Args:
+            name: a name on the bus
+            plan: a plan's name
+        """
+        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/plans/{part(plan)}", Any)
+
+    def save(
+        self,
+        name: str,
+        plan: str,
+        *,
+        about: str = "",
+        by: str = "api",
+        reason: str = "",
+        stages: tuple[StageBody, ...],
+    ) -> Any:
+        """Save a proven plan.
+
+        Args:
+            name: a name on the bus
+            plan: a plan's name
+            about: what it is for
+            by: who asks; told in the log
+            reason: why
+            stages: in the order of the cycle
+        """
+        return self._connection.ask(
+            "PUT",
+            f"/api/v1/signals/{part(name)}/plans/{part(plan)}",
+            Any,
+            body={"about": about, "by": by, "reason": reason, "stages": stages},
+        )
+
+    def delete(self, name: str, plan: str) -> Any:
+        """Delete a saved plan.
+
+        Args:
+            name: a name on the bus
+            plan: a plan's name
+        """
+        return self._connection.ask(
+            "DELETE", f"/api/v1/signals/{part(name)}/plans/{part(plan)}", Any
+        )
+
+    def prove(self, name: str, *, plan: str, stages: tuple[StageBody, ...]) -> Any:
+        """Search every state of kernel and plan for fault.
+
+        Args:
+            name: a name on the bus
+            plan: what the plan will be called
+            stages: in the order of the cycle
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/signals/{part(name)}/proofs",
+            Any,
+            body={"plan": plan, "stages": stages},
+        )
+
+    def proof(self, name: str, digest: str) -> Any:
+        """One proof.
+
+        Args:
+            name: a name on the bus
+            digest: digest
+        """
+        return self._connection.ask(
+            "GET", f"/api/v1/signals/{part(name)}/proofs/{part(digest)}", Any
         )

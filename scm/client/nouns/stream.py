@@ -19,7 +19,11 @@ class StreamNoun:
         """What is live: a snapshot, then what changed, at 20 Hz.
 
         Args:
-            topics: those to hear, comma between: pulse, stop, vehicles, signals, boxes, eye,
-                acknowledgements, stations, events; none: all
+            topics: those to hear, comma between: pulse, stop, vehicles, signals, signal_status,
+                boxes, eye, acknowledgements, stations, events; none: all
         """
         return self._connection.events("/api/v1/stream", query={"topics": topics})
+
+    def states(self) -> Iterator[bytes]:
+        """All cars' states at 20 Hz, binary; the layout stands in docs/dashboard/map.md."""
+        return self._connection.pieces("/api/v1/vehicles.bin")

@@ -3,7 +3,7 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from typing import Literal
+from typing import Any, Literal
 
 from scm.client.connection import Connection, part
 from scm.client.records.vehicles import (
@@ -118,3 +118,27 @@ class VehiclesNoun:
             body={"headlights": headlights, "indicators": indicators},
             key=idempotency_key,
         )
+
+    def path(self, name: str) -> Any:
+        """A car's way ahead, at most 12 m of it.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/path", Any)
+
+    def reports(self, name: str) -> Any:
+        """All that a car reports, as server-sent events `reports`.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/reports", Any)
+
+    def link(self, name: str) -> Any:
+        """How long the way to a car and back is now.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/link", Any)

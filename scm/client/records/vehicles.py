@@ -46,6 +46,8 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
         steering_rad: Angle of the front wheels, + = left [rad].
         owner: Who holds it.
         epoch: Counts the leases of this car: a command of an older one is refused.
+        lease_left_ms: Until the lease ends if it is not renewed; None: it is at home.
+        battery_v: Of the drive battery; None: not measured.
         mode: What governs it now.
         age_ms: How old its newest state is now, the snapshot's own age included.
         alive: Whether it is there; false: it left or died.
@@ -67,6 +69,8 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
     steering_rad: float
     owner: str
     epoch: int
+    lease_left_ms: float | None
+    battery_v: float | None
     mode: str
     age_ms: float
     alive: bool

@@ -11,6 +11,7 @@ import websockets.sync.client
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from scm.api.app import create_app
+from scm.api.city import Link
 from scm.api.keys import KeyRing
 from scm.api.server import serve
 from scm.api.teleop import NOT_YOURS, PROTOCOL
@@ -68,7 +69,7 @@ def connect(view, fake_city, city_map, wire):
     with ExitStack() as stack:
 
         def open_at(keys=None, protocols=(PROTOCOL,), host="", **options):
-            app = create_app(view, fake_city.ask, city_map, keys=keys, wire=wire)
+            app = create_app(view, fake_city.ask, city_map, keys=keys, link=Link(wire=wire))
             address = urlsplit(stack.enter_context(served(app)))
             return websockets.sync.client.connect(
                 f"ws://{host or address.hostname}:{address.port}{DRIVE}",
@@ -277,7 +278,7 @@ def test_the_way_to_a_car_is_measured_by_an_echo(
 ):
     hear(1.0, snapshot(n1=(0.0, 0.0, 0.0)))
     wire.answer = EchoReply(vehicle="n1", t_ns=1)
-    client = client_of(create_app(view, fake_city.ask, city_map, wire=wire))
+    client = client_of(create_app(view, fake_city.ask, city_map, link=Link(wire=wire)))
     row = client("GET", "/api/v1/vehicles/n1/link").json()
     assert row["answered_by"] == "world"
     assert row["round_trip_ms"] >= 0.0

@@ -8,6 +8,7 @@ import pytest
 
 from scm.api import mismatch_jobs, uploads
 from scm.api.app import create_app
+from scm.api.city import Link
 from scm.api.shelves import shelves_in
 from scm.errors import RunError
 from scm.mismatch.report.write import write_report
@@ -36,7 +37,7 @@ def shelves(tmp_path):
 @pytest.fixture
 def call(view, fake_city, city_map, shelves):
     bus = ("--connect", "tcp/127.0.0.1:1")
-    return Client(create_app(view, fake_city.ask, city_map, shelves=shelves, bus=bus))
+    return Client(create_app(view, fake_city.ask, city_map, shelves=shelves, link=Link(words=bus)))
 
 
 @pytest.fixture
@@ -223,7 +224,11 @@ def test_a_search_that_cannot_be_is_refused(call, shelves, ran, body, status):
 def test_a_drive_is_shown_and_sent_to_a_car_on_the_citys_floor(call, shelves, ran, city_map):
     with_drive(put(shelves, "monday", "undecided"))
     (part,) = call("GET", f"{API}/reports/monday/drives/next_drive").json()["parts"]
-    assert (part["lasts_s"], part["commands"][1], part["way"]) == (2.0, [2, 0.3, 0.1], [[1, 2, 0.5]])
+    assert (part["lasts_s"], part["commands"][1], part["way"]) == (
+        2.0,
+        [2, 0.3, 0.1],
+        [[1, 2, 0.5]],
+    )
 
     def play(words, tell, hear):
         out = shelves.reports / words[words.index("--out") + 1]

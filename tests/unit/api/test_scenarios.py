@@ -5,6 +5,7 @@ import time
 import pytest
 
 from scm.api.app import create_app
+from scm.api.city import Link
 from scm.api.shelves import shelves_in
 
 OVER = ("done", "failed", "cancelled")
@@ -13,7 +14,9 @@ OVER = ("done", "failed", "cancelled")
 @pytest.fixture
 def client(view, fake_city, city_map, tmp_path, client_of):
     shelves = shelves_in(tmp_path)
-    return client_of(create_app(view, fake_city.ask, city_map, shelves=shelves, connect="tcp/x:1"))
+    return client_of(
+        create_app(view, fake_city.ask, city_map, shelves=shelves, link=Link(connect="tcp/x:1"))
+    )
 
 
 @pytest.fixture

@@ -1,0 +1,152 @@
+"""Operations on mismatch of a city.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from collections.abc import Iterator
+
+from scm.client.connection import Connection, part
+from scm.client.records.mismatch import DrivePlans, Offers, PageReportRow, Report, Upload
+from scm.client.records.shared import Operation
+
+
+class MismatchNoun:
+    """Operations on mismatch."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def offers(self) -> Offers:
+        """What can be searched."""
+        return self._connection.ask("GET", "/api/v1/mismatch/offers", Offers)
+
+    def search(
+        self,
+        *,
+        recording: str = "",
+        upload: str = "",
+        again: str = "",
+        vehicle: str = "",
+        car: str = "",
+        budget_s: float = 120.0,
+        from_s: float | None = None,
+        to_s: float | None = None,
+        idempotency_key: str = "",
+    ) -> Operation:
+        """Search for what the simulator left out.
+
+        Args:
+            recording: name on the recordings shelf
+            upload: id of an upload, instead
+            again: a report, instead: its recordings and drives since
+            vehicle: which car of it; empty: all
+            car: its car file's name; empty: what the recording says
+            budget_s: no further effect is looked for after it [s]
+            from_s: leave out what is before, since the first row [s]
+            to_s: leave out what is after [s]
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            "/api/v1/mismatch/jobs",
+            Operation,
+            body={
+                "recording": recording,
+                "upload": upload,
+                "again": again,
+                "vehicle": vehicle,
+                "car": car,
+                "budget_s": budget_s,
+                "from_s": from_s,
+                "to_s": to_s,
+            },
+            key=idempotency_key,
+        )
+
+    def upload(self, *, name: str = "", content: bytes, idempotency_key: str = "") -> Upload:
+        """Send a recording: a zip with recording.yaml, or of a run.
+
+        Args:
+            name: what to call it
+            content: What to send.
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.send(
+            "POST",
+            "/api/v1/mismatch/uploads",
+            Upload,
+            content,
+            query={"name": name},
+            key=idempotency_key,
+        )
+
+    def reports(self, *, limit: int = 100, cursor: str = "") -> PageReportRow:
+        """All reports, newest first.
+
+        Args:
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.ask(
+            "GET",
+            "/api/v1/mismatch/reports",
+            PageReportRow,
+            query={"limit": limit, "cursor": cursor},
+        )
+
+    def report(self, name: str) -> Report:
+        """One report.
+
+        Args:
+            name: a report's name
+        """
+        return self._connection.ask("GET", f"/api/v1/mismatch/reports/{part(name)}", Report)
+
+    def remove(self, name: str, *, idempotency_key: str = "") -> Iterator[bytes]:
+        """Remove a report.
+
+        Args:
+            name: a report's name
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.pieces(f"/api/v1/mismatch/reports/{part(name)}")
+
+    def download(self, name: str, file: str) -> Iterator[bytes]:
+        """Download a file of a report.
+
+        Args:
+            name: a report's name
+            file: which file
+        """
+        return self._connection.pieces(f"/api/v1/mismatch/reports/{part(name)}/files/{part(file)}")
+
+    def plans(self, name: str, drive: str) -> DrivePlans:
+        """A suggested drive.
+
+        Args:
+            name: a report's name
+            drive: a suggested drive
+        """
+        return self._connection.ask(
+            "GET", f"/api/v1/mismatch/reports/{part(name)}/drives/{part(drive)}", DrivePlans
+        )
+
+    def play(
+        self, name: str, drive: str, *, vehicle: str, part: int = 1, idempotency_key: str = ""
+    ) -> Operation:
+        """Let a car of the city drive it.
+
+        Args:
+            name: a report's name
+            drive: a suggested drive
+            vehicle: a car of the city
+            part: of a drive in parts, between which the car is changed
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/mismatch/reports/{part(name)}/drives/{part(drive)}/play",
+            Operation,
+            body={"vehicle": vehicle, "part": part},
+            key=idempotency_key,
+        )

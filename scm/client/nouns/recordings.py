@@ -1,0 +1,157 @@
+"""Operations on recordings of a city.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+from scm.client.connection import Connection, part
+
+
+class RecordingsNoun:
+    """Operations on recordings."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def recording_file(self, name: str) -> Iterator[bytes]:
+        """The file as the recorder wrote it, or a range of it.
+
+        Args:
+            name: a recording: its file without .mcap
+        """
+        return self._connection.pieces(f"/api/v1/recordings/{part(name)}.mcap")
+
+    def recording_file(self, name: str) -> Iterator[bytes]:
+        """The file as the recorder wrote it, or a range of it.
+
+        Args:
+            name: a recording: its file without .mcap
+        """
+        return self._connection.pieces(f"/api/v1/recordings/{part(name)}.mcap")
+
+    def foxglove(self, name: str) -> Iterator[bytes]:
+        """The file for Foxglove.
+
+        Args:
+            name: a recording: its file without .mcap
+        """
+        return self._connection.pieces(f"/api/v1/recordings/{part(name)}/foxglove.mcap")
+
+    def as_csv(self, name: str, *, vehicle: str = "") -> Iterator[bytes]:
+        """Its cars as CSV.
+
+        Args:
+            name: a recording: its file without .mcap
+            vehicle: a car's own reports; empty: all cars as the world saw them
+        """
+        return self._connection.pieces(
+            f"/api/v1/recordings/{part(name)}/csv", query={"vehicle": vehicle}
+        )
+
+    def summary(self, name: str) -> Any:
+        """What a replay has to know first.
+
+        Args:
+            name: a recording: its file without .mcap
+        """
+        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}/summary", Any)
+
+    def frames(
+        self, name: str, *, from_s: float = 0.0, to_s: float = 10.0, hz: float = 10.0
+    ) -> Any:
+        """Where everything was, from a time to another.
+
+        Args:
+            name: a recording: its file without .mcap
+            from_s: seconds since the recording began
+            to_s: seconds since the recording began
+            hz: frames a second, at most
+        """
+        return self._connection.ask(
+            "GET",
+            f"/api/v1/recordings/{part(name)}/frames",
+            Any,
+            query={"from_s": from_s, "to_s": to_s, "hz": hz},
+        )
+
+    def events(self, name: str, *, limit: int = 500, cursor: str = "") -> Any:
+        """Its events, in their order.
+
+        Args:
+            name: a recording: its file without .mcap
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.ask(
+            "GET",
+            f"/api/v1/recordings/{part(name)}/events",
+            Any,
+            query={"limit": limit, "cursor": cursor},
+        )
+
+    def map_svg(self, name: str) -> Iterator[bytes]:
+        """The map it was driven on.
+
+        Args:
+            name: a recording: its file without .mcap
+        """
+        return self._connection.pieces(f"/api/v1/recordings/{part(name)}/map.svg")
+
+    def notes(self, name: str) -> Any:
+        """What people wrote about it.
+
+        Args:
+            name: a recording: its file without .mcap
+        """
+        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}/notes", Any)
+
+    def write(
+        self, name: str, *, title: str = "", notes: str = "", idempotency_key: str = ""
+    ) -> Any:
+        """Name it and note something.
+
+        Args:
+            name: a recording: its file without .mcap
+            title: shown first
+            notes: in words, as long as need be
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "PUT",
+            f"/api/v1/recordings/{part(name)}/notes",
+            Any,
+            body={"title": title, "notes": notes},
+            key=idempotency_key,
+        )
+
+    def all_recordings(self, *, limit: int = 100, cursor: str = "") -> Any:
+        """All recordings, the one written last first.
+
+        Args:
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.ask(
+            "GET", "/api/v1/recordings", Any, query={"limit": limit, "cursor": cursor}
+        )
+
+    def one_recording(self, name: str) -> Any:
+        """One recording.
+
+        Args:
+            name: a recording: its file without .mcap
+        """
+        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}", Any)
+
+    def remove(self, name: str, *, idempotency_key: str = "") -> Any:
+        """Delete a recording.
+
+        Args:
+            name: a recording: its file without .mcap
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "DELETE", f"/api/v1/recordings/{part(name)}", Any, key=idempotency_key
+        )

@@ -1,0 +1,86 @@
+"""Operations on scenarios of a city.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from typing import Any
+
+from scm.client.connection import Connection, part
+
+
+class ScenariosNoun:
+    """Operations on scenarios."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def all_scenarios(self, *, limit: int = 100, cursor: str = "") -> Any:
+        """All scripts, one's own first.
+
+        Args:
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.ask(
+            "GET", "/api/v1/scenarios", Any, query={"limit": limit, "cursor": cursor}
+        )
+
+    def one(self, name: str) -> Any:
+        """One script with its text.
+
+        Args:
+            name: a script without .py
+        """
+        return self._connection.ask("GET", f"/api/v1/scenarios/{part(name)}", Any)
+
+    def write(self, name: str, *, text: str, idempotency_key: str = "") -> Any:
+        """Write a script.
+
+        Args:
+            name: a script without .py
+            text: Python that drives the fleet, as `scm.fleet` says
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "PUT", f"/api/v1/scenarios/{part(name)}", Any, body={"text": text}, key=idempotency_key
+        )
+
+    def remove(self, name: str, *, idempotency_key: str = "") -> Any:
+        """Delete a script.
+
+        Args:
+            name: a script without .py
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "DELETE", f"/api/v1/scenarios/{part(name)}", Any, key=idempotency_key
+        )
+
+    def run(
+        self, name: str, *, arguments: tuple[str, ...] | None = None, idempotency_key: str = ""
+    ) -> Any:
+        """Run a script.
+
+        Args:
+            name: a script without .py
+            arguments: of its command line; {connect} becomes the address of this city's router
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/scenarios/{part(name)}/runs",
+            Any,
+            body={"arguments": arguments},
+            key=idempotency_key,
+        )
+
+    def lines(self, run: str, *, after: int = 0) -> Any:
+        """What a run printed.
+
+        Args:
+            run: its operation
+            after: number of the first line
+        """
+        return self._connection.ask(
+            "GET", f"/api/v1/scenarios/runs/{part(run)}/lines", Any, query={"after": after}
+        )

@@ -1,0 +1,150 @@
+"""Records of mismatch.
+
+Written by docs/make/client.py: do not change it here.
+"""
+
+from typing import Any
+
+import msgspec
+
+
+class Offers(msgspec.Struct, kw_only=True, frozen=True):
+    """What a search may be asked of.
+
+    Attributes:
+        recordings: Runs of the city on the shelf, newest first.
+        cars: Names of car files.
+        most_upload_bytes: The largest zip that is taken.
+    """
+
+    recordings: tuple[str, ...]
+    cars: tuple[str, ...]
+    most_upload_bytes: int
+
+
+class Upload(msgspec.Struct, kw_only=True, frozen=True):
+    """A recording that was sent.
+
+    Attributes:
+        upload: Its id, for a mismatch job; the newest twenty are kept.
+        files: Of how many files it is.
+        size_bytes: Unpacked.
+        vehicles: Car files or cars that its description names; empty of a city's run.
+    """
+
+    upload: str
+    files: int
+    size_bytes: int
+    vehicles: tuple[str, ...]
+
+
+class ReportRow(msgspec.Struct, kw_only=True, frozen=True):
+    """A report in the list.
+
+    Attributes:
+        name: Below `/mismatch/reports`, and the page's address `/mismatch/NAME`.
+        made_ns: When it was written, since 1970.
+        verdict: `none`, `mismatch`, `undecided`, or `unreadable` where its files are damaged.
+        said: The verdict in a sentence.
+        effects: What was found, in words.
+        vehicle: The car file's name.
+        source: What it was made from, in words.
+        before_m: Position error of free runs on unseen parts with the car as given; None: unknown.
+        after_m: The same with what was found.
+        runtime_s: Of the search.
+    """
+
+    name: str
+    made_ns: int
+    verdict: str
+    said: str
+    effects: tuple[str, ...] = ()
+    vehicle: str = ""
+    source: str = ""
+    before_m: float | None = None
+    after_m: float | None = None
+    runtime_s: float = 0.0
+
+
+class PageReportRow(msgspec.Struct, kw_only=True, frozen=True):
+    """Some rows of a list.
+
+    Attributes:
+        items: The rows of this page.
+        next_: Cursor of those after them; null at the end.
+    """
+
+    items: tuple[ReportRow, ...]
+    next_: str | None = msgspec.field(name="next")
+
+
+class Job(msgspec.Struct, kw_only=True, frozen=True):
+    """What a report was made from.
+
+    Attributes:
+        recordings: Of the shelf, uploads and earlier reports' drives: paths below the shelves.
+        source: The same in words.
+        vehicle: Which car of the recordings; empty: all.
+        car: The car file's name; empty: the recording's own.
+        budget_s: Time allowed for the search.
+        from_s: Part of the recording, seconds since its first row; None: its start.
+        to_s: None: its end.
+        asked_ns: When.
+        owner: Who asked.
+    """
+
+    recordings: tuple[str, ...]
+    source: str
+    vehicle: str = ""
+    car: str = ""
+    budget_s: float = 120.0
+    from_s: float | None = None
+    to_s: float | None = None
+    asked_ns: int = 0
+    owner: str = ""
+
+
+class Report(msgspec.Struct, kw_only=True, frozen=True):
+    """One report.
+
+    Attributes:
+        row: As in the list.
+        report: The fields of `report.json`, as docs/mismatch.md lists them.
+        drawn: What its pictures draw and the words beside them; None of an older report.
+        job: What it was made from; None: nobody noted it.
+        drives: Names of the drives it suggests.
+        told: How many of them were driven and recorded since.
+        files: What can be downloaded.
+    """
+
+    row: ReportRow
+    report: Any
+    drawn: Any
+    job: Job | None
+    drives: tuple[str, ...]
+    told: int
+    files: tuple[str, ...]
+
+
+class DrivePlan(msgspec.Struct, kw_only=True, frozen=True):
+    """One part of a suggested drive.
+
+    Attributes:
+        commands: Rows of time [s], throttle and steering, each held until the next.
+        way: Where the likeliest explanation takes the car: rows of x [m], y [m], yaw [rad].
+        lasts_s: How long it takes.
+    """
+
+    commands: tuple[tuple[float, ...], ...]
+    way: tuple[tuple[float, ...], ...]
+    lasts_s: float
+
+
+class DrivePlans(msgspec.Struct, kw_only=True, frozen=True):
+    """The parts of a suggested drive, in their order.
+
+    Attributes:
+        parts: One part of a suggested drive.
+    """
+
+    parts: tuple[DrivePlan, ...]
