@@ -403,6 +403,7 @@ def formatted(sources: dict[str, str], folder: Path) -> dict[str, str]:
 
 
 if __name__ == "__main__":
+    written = formatted(files(description()), FOLDER)
     for old in (*FOLDER.glob("nouns/*.py"), *FOLDER.glob("records/*.py")):
-        old.unlink()
-    formatted(files(description()), FOLDER)
+        if str(old.relative_to(FOLDER)) not in written:
+            old.unlink()

@@ -89,8 +89,8 @@ def _vehicle(city: City, car: SnapshotVehicle, seen_ns: int) -> Entity:
 
 def _segment(city: City, lane: Lane) -> Entity:
     path = LanePath(lane)
-    count = max(2, math.ceil(path.length / POINT_EVERY_M) + 1)
-    poses = [path.at(path.length * number / (count - 1)) for number in range(count)]
+    count = max(2, math.ceil(path.length_m / POINT_EVERY_M) + 1)
+    poses = [path.at(path.length_m * number / (count - 1)) for number in range(count)]
     line = [_point(pose.x, pose.y) for pose in poses]
     floor = [[round(pose.x, 4), round(pose.y, 4)] for pose in poses]
     return {
@@ -101,7 +101,7 @@ def _segment(city: City, lane: Lane) -> Entity:
         "location": _place({"type": "LineString", "coordinates": line}),
         "startPoint": _place({"type": "Point", "coordinates": line[0]}),
         "endPoint": _place({"type": "Point", "coordinates": line[-1]}),
-        "length": _property(round(path.length * SCALE / 1000.0, 5), unit="KMT"),
+        "length": _property(round(path.length_m * SCALE / 1000.0, 5), unit="KMT"),
         "width": _property(round(lane.width_m * SCALE, 3), unit="MTR"),
         "totalLaneNumber": _property(1),
         "laneUsage": _property(["forward"]),
@@ -125,7 +125,7 @@ def _flows(city: City, picture: Picture) -> Iterator[Entity]:
 
 def _flow(city: City, lane: Lane, count: LaneCount, told: TrafficCounts) -> Entity:
     path = LanePath(lane)
-    middle = path.at(path.length / 2.0)
+    middle = path.at(path.length_m / 2.0)
     since_ns = told.t_ns - nanoseconds(told.window_s)
     at = _time(told.t_ns)
     entity = {
