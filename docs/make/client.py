@@ -61,7 +61,7 @@ def _homes(nouns: dict[str, list[tuple[str, str, Schema]]], schemas: Schema) -> 
     users: dict[str, set[str]] = defaultdict(set)
     for noun, operations in nouns.items():
         for _, _, operation in operations:
-            todo = list(_references(_success(operation)[1]))
+            todo = [*_references(_success(operation)[1]), *_sent(operation, schemas)]
             while todo:
                 name = todo.pop()
                 if noun not in users[name]:
@@ -104,6 +104,13 @@ def _references(node: Any) -> Iterator[str]:
     elif isinstance(node, list):
         for child in node:
             yield from _references(child)
+
+
+def _sent(operation: Schema, schemas: Schema) -> Iterator[str]:
+    """Return the records that the fields of an operation's body hold."""
+    content = operation.get("requestBody", {}).get("content", {})
+    for name in _references(content.get("application/json", {}).get("schema", {})):
+        yield from _references(schemas[name].get("properties", {}))
 
 
 def _success(operation: Schema) -> tuple[str, Schema]:
@@ -231,7 +238,9 @@ class _Method:
 
     def _add(self, place: str, key: str, schema: Schema, required: bool) -> None:
         own = _name(key)
-        while hasattr(builtins, own) or own in {_name_of(one) for one in self._given}:
+        while (
+            hasattr(builtins, own) or own == "part" or own in {_name_of(one) for one in self._given}
+        ):
             own += "_"
         self._places[place][key] = own
         kind = _type(schema, self._schemas)
@@ -328,6 +337,7 @@ def _noun(
     head += ["        self._connection = connection"]
     body = "\n".join([*head, "", *(method.source() for method in methods)])
     used = {name for one in operations for name in _references(_success(one[2])[1])}
+    used |= {name for one in operations for name in _sent(one[2], schemas)}
     lines = [f'"""Operations on {noun} of a city.', "", f'{BY}\n"""', ""]
     lines += [*_typing(body), *_imports(used, homes)]
     more = ", part" if "{part(" in body else ""

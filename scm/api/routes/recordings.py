@@ -117,12 +117,11 @@ def router(city: City) -> APIRouter:
 def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
     """Add files to take home; before the routes whose names would match them too."""
 
-    @routes.api_route(
+    @routes.head("/{name}.mcap", include_in_schema=False)
+    @routes.get(
         "/{name}.mcap",
-        methods=["GET", "HEAD"],
         summary="The file as the recorder wrote it, or a range of it",
         response_class=Response,
-        operation_id="recording_file",
     )
     def file(request: Request, name: Name) -> Response:
         return send_file(request, shelf.path(name), MCAP)

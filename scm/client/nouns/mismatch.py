@@ -132,7 +132,7 @@ class MismatchNoun:
         )
 
     def play(
-        self, name: str, drive: str, *, vehicle: str, part: int = 1, idempotency_key: str = ""
+        self, name: str, drive: str, *, vehicle: str, part_: int = 1, idempotency_key: str = ""
     ) -> Operation:
         """Let a car of the city drive it.
 
@@ -140,13 +140,13 @@ class MismatchNoun:
             name: a report's name
             drive: a suggested drive
             vehicle: a car of the city
-            part: of a drive in parts, between which the car is changed
+            part_: of a drive in parts, between which the car is changed
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
             "POST",
             f"/api/v1/mismatch/reports/{part(name)}/drives/{part(drive)}/play",
             Operation,
-            body={"vehicle": vehicle, "part": part},
+            body={"vehicle": vehicle, "part": part_},
             key=idempotency_key,
         )

@@ -15,15 +15,7 @@ class RecordingsNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def recording_file(self, name: str) -> Iterator[bytes]:
-        """The file as the recorder wrote it, or a range of it.
-
-        Args:
-            name: a recording: its file without .mcap
-        """
-        return self._connection.pieces(f"/api/v1/recordings/{part(name)}.mcap")
-
-    def recording_file(self, name: str) -> Iterator[bytes]:
+    def file(self, name: str) -> Iterator[bytes]:
         """The file as the recorder wrote it, or a range of it.
 
         Args:

@@ -6,6 +6,7 @@ Written by docs/make/client.py: do not change it here.
 from typing import Any, Literal
 
 from scm.client.connection import Connection, part
+from scm.client.records.signals import StageBody
 
 
 class SignalsNoun:
