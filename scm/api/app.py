@@ -12,7 +12,7 @@ from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
-from scm.api import problem
+from scm.api import openapi, problem
 from scm.api.city import Ask, City
 from scm.api.gate import Gate, content_policy
 from scm.api.keys import KeyRing
@@ -97,12 +97,14 @@ def create_app(
         docs_url=None,  # its page loads from a CDN: ours is static/docs.html
         redoc_url=None,
         openapi_url="/api/v1/openapi.json",
+        generate_unique_id_function=openapi.operation_id,
         lifespan=_lifespan_of(stream, frames, work),
     )
     app.state.stream = stream
     app.state.frames = frames
     app.state.keys = keys
     problem.install(app)
+    openapi.install(app)
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
     app.add_middleware(Gate, keys=keys, policy=policy)
     api = APIRouter(prefix="/api/v1")

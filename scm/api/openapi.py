@@ -1,0 +1,186 @@
+"""The description of the interface (OpenAPI 3.1): records by name, and words on every field.
+
+Routes say what they answer by `scm.api.schemas`. Here the records move below `components`, so that
+each is described once and may hold others of its own kind; what `Attributes:` of a record's
+docstring says goes to its fields, the rest comes from `scm.api.words`, and examples of lists and
+records are put together from those of their parts.
+"""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from fastapi.routing import APIRoute
+
+from scm.api.words import UNITS, WORDS
+from scm.errors import RunError
+
+_DEFS, _COMPONENTS = "#/$defs/", "#/components/schemas/"
+_ENTRY = re.compile(r"^ {0,4}(\w+(?:, \w+)*): ")
+_DEPTH = 6
+Schema = dict[str, Any]
+
+
+def install(app: FastAPI) -> None:
+    """Let an application describe itself so; it is made once, on the first question."""
+
+    def openapi() -> Schema:
+        if app.openapi_schema is None:
+            app.openapi_schema = described(
+                get_openapi(title=app.title, version=app.version, routes=app.routes)
+            )
+        return app.openapi_schema
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
+def operation_id(route: APIRoute) -> str:
+    """Return how an operation is called: its noun and its function, `vehicles_spawn`."""
+    noun = str(route.tags[0]) if route.tags else "page"
+    return re.sub(r"\W", "_", f"{noun}_{route.name}")
+
+
+def described(document: Schema) -> Schema:
+    """Return a description with records below `components`, and words on every field.
+
+    Raises:
+        RunError: when two records of one name differ.
+    """
+    schemas: Schema = document.setdefault("components", {}).setdefault("schemas", {})
+    for holder in list(_records(document)):
+        for name, schema in holder.pop("$defs").items():
+            if schemas.setdefault(name, schema) != schema:
+                msg = f"openapi: two records are named {name!r}; expected one, or another name"
+                raise RunError(msg)
+    _point(document)
+    for schema in schemas.values():
+        _describe_fields(schema)
+    for schema in schemas.values():
+        for name, field in schema.get("properties", {}).items():
+            _add_example(name, field, schemas)
+    for operation in operations(document):
+        for parameter in operation.get("parameters", ()):
+            _add_example(parameter["name"], parameter["schema"], schemas)
+    return document
+
+
+def operations(document: Schema) -> Iterator[Schema]:
+    """Yield every operation of a description."""
+    for path in document["paths"].values():
+        yield from path.values()
+
+
+def _records(node: Any) -> Iterator[Schema]:
+    """Yield all schemas that bring records along."""
+    if isinstance(node, dict):
+        if "$defs" in node:
+            yield node
+        for child in node.values():
+            yield from _records(child)
+    elif isinstance(node, list):
+        for child in node:
+            yield from _records(child)
+
+
+def _point(node: Any) -> None:
+    """Make all references name records below `components`."""
+    if isinstance(node, dict):
+        if str(node.get("$ref", "")).startswith(_DEFS):
+            node["$ref"] = _COMPONENTS + node["$ref"].removeprefix(_DEFS)
+        for child in node.values():
+            _point(child)
+    elif isinstance(node, list):
+        for child in node:
+            _point(child)
+
+
+def _describe_fields(schema: Schema) -> None:
+    fields: Schema = schema.get("properties", {})
+    about, told = _attributes(schema.get("description", ""))
+    if about:
+        schema["description"] = about
+    for name, field in fields.items():
+        words = told.get(name) or (WORDS[name][0] if name in WORDS else "")
+        if words:
+            field.setdefault("description", words)
+        field.pop("title", None)
+
+
+def _attributes(docstring: str) -> tuple[str, dict[str, str]]:
+    """Return a record's own description, and what its docstring says of its fields."""
+    about, _, entries = docstring.partition("Attributes:\n")
+    told: dict[str, str] = {}
+    names: list[str] = []
+    for line in entries.splitlines():
+        entry = _ENTRY.match(line)
+        if entry is not None:
+            names = entry[1].split(", ")
+            told.update(dict.fromkeys(names, line[entry.end() :].strip()))
+        elif line.strip():
+            told.update({name: f"{told[name]} {line.strip()}" for name in names})
+    return " ".join(about.split()), told
+
+
+def _add_example(name: str, field: Schema, schemas: Schema) -> None:
+    if "examples" in field or "example" in field:
+        return
+    found = _example(name, field, schemas, 0)
+    if found is not None:
+        field["examples"] = [found]
+
+
+def _example(name: str, field: Schema, schemas: Schema, depth: int) -> Any:
+    """Return a value that a field may have; None: nobody knows one."""
+    if "examples" in field:
+        return field["examples"][0]
+    if "$ref" in field:
+        return _record(schemas[field["$ref"].removeprefix(_COMPONENTS)], schemas, depth + 1)
+    for choices in ("anyOf", "oneOf"):
+        values = [_example(name, one, schemas, depth) for one in field.get(choices, ())]
+        if choices in field:
+            return next((value for value in values if value is not None), None)
+    if "enum" in field:
+        return next((value for value in field["enum"] if value is not None), None)
+    if "const" in field:
+        return field["const"]
+    return _of_type(name, field, schemas, depth)
+
+
+def _of_type(name: str, field: Schema, schemas: Schema, depth: int) -> Any:
+    kind, known = field.get("type"), WORDS[name][1] if name in WORDS else None
+    if kind == "array":
+        if _is_a("array", known):
+            return known
+        parts = field.get("prefixItems") or [field.get("items") or {}]
+        return [_example(name, part, schemas, depth) for part in parts] if depth < _DEPTH else []
+    if kind == "object":
+        return known if _is_a("object", known) else _record(field, schemas, depth + 1)
+    if kind == "boolean":
+        return known if _is_a("boolean", known) else True
+    if _is_a(str(kind), known):
+        return known
+    unit = UNITS.get(name.rpartition("_")[2])
+    return unit if _is_a(str(kind), unit) else None
+
+
+def _record(schema: Schema, schemas: Schema, depth: int) -> Any:
+    if "properties" not in schema:
+        return _example("", schema, schemas, depth) if "enum" in schema else {}
+    if depth > _DEPTH:
+        return {}
+    fields = schema["properties"].items()
+    return {name: _example(name, field, schemas, depth) for name, field in fields}
+
+
+def _is_a(kind: str, value: object) -> bool:
+    """Say whether a value is of a type of JSON."""
+    if isinstance(value, bool):
+        return kind == "boolean"
+    if isinstance(value, int) and kind == "number":
+        return True
+    types: dict[str, Any] = {
+        "string": str, "integer": int, "number": float, "array": list, "object": dict,
+    }  # fmt: skip
+    return kind in types and isinstance(value, types[kind])

@@ -1,0 +1,52 @@
+"""What routes answer, for the description of the interface: give one of these as `responses=`.
+
+    @routes.get("", summary="All cars", responses=answer(VehiclesTopic))
+    @routes.get("", summary="Long work", responses=answer_page(Operation))
+    @routes.post("/search", summary="Search", status_code=202, responses=answer(Operation, 202))
+    @routes.get("/{name}.mcap", summary="Download", responses=answer_file("application/mcap"))
+
+A record's docstring becomes its description and the lines below `Attributes:` those of its fields;
+what they leave out comes from `scm.api.words`, by the field's name.
+"""
+
+from typing import Any
+
+import msgspec
+
+from scm.api.paging import Page
+
+Responses = dict[int | str, dict[str, Any]]
+
+_CURSOR = {
+    "Link": {
+        "description": 'RFC 8288: the next page, `rel="next"`; absent on the last',
+        "schema": {"type": "string", "examples": ['</api/v1/operations?cursor=x>; rel="next"']},
+    }
+}
+
+
+def answer(kind: Any, status: int = 200, about: str = "What was asked for.") -> Responses:
+    """Describe an answer in JSON.
+
+    Args:
+        kind: A record (`msgspec.Struct`), or any type that msgspec can describe.
+        status: Of the answer: 200, 201 or 202.
+        about: What it is, in a sentence.
+    """
+    content = {"application/json": {"schema": msgspec.json.schema(kind)}}
+    return {status: {"description": about, "content": content}}
+
+
+def answer_page(kind: Any, about: str = "A page of the list.") -> Responses:
+    """Describe a page of records, as `page_response` gives it."""
+    described = answer(Page[kind], about=about)
+    described[200]["headers"] = _CURSOR
+    return described
+
+
+def answer_file(media: str, about: str = "The file.") -> Responses:
+    """Describe an answer that is no JSON: a picture, a download, a stream."""
+    schema = {"type": "string"}
+    if not media.startswith("text/"):
+        schema["contentMediaType"] = media
+    return {200: {"description": about, "content": {media: {"schema": schema}}}}
