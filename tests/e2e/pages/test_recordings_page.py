@@ -1,5 +1,7 @@
 """The recordings page: a drive of the real city seen again, taken home, noted, deleted; scripts."""
 
+import shutil
+
 import pytest
 from mcap.reader import make_reader
 
@@ -17,7 +19,7 @@ SCRIPT = '"""Say a word."""\nimport time\nprint("a word", flush=True)\ntime.slee
 
 
 @pytest.fixture(scope="module")
-def drive(running):
+def drive(running, tmp_path_factory):
     """Keep what was recorded so far, with six cars in it, as a recording of its own."""
     (live,) = (row["name"] for row in running.get("/recordings")["items"])
 
@@ -28,7 +30,9 @@ def drive(running):
 
     wait_for(is_long, 90.0, "six cars have driven for a while")
     path = running.folder / f"{NAME}.mcap"
-    recover(running.folder / f"{live}.mcap", path)
+    so_far = tmp_path_factory.mktemp("copy") / "so_far.mcap"  # the file itself grows meanwhile
+    shutil.copyfile(running.folder / f"{live}.mcap", so_far)
+    recover(so_far, path)
     yield running.get(f"/recordings/{NAME}/summary")
     path.unlink(missing_ok=True)
 
