@@ -26,7 +26,7 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
         min_s: It will not change before; None: not known.
         max_s: It will have changed by then; None: not known.
         likely_s: It will likely change then: a forecast, no promise; None: nobody knows.
-        confidence: Share of such forecasts that come true within a second, 0 to 1.
+        likely_confidence: Share of such forecasts that come true within a second, 0 to 1.
         since_ns: When this colour began, on the controller's clock.
     """
 
@@ -36,7 +36,7 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
     min_s: float | None = None
     max_s: float | None = None
     likely_s: float | None = None
-    confidence: float | None = None
+    likely_confidence: float | None = None
     since_ns: int | None = None
 
 
@@ -163,7 +163,7 @@ def _group(name: str, group: SignalGroup | None, spat: Held[Spat] | None, now_ns
         min_s=left_s(group.min_end_ns),
         max_s=left_s(group.max_end_ns),
         likely_s=left_s(group.likely_end_ns),
-        confidence=group.likely_confidence,
+        likely_confidence=None if flashing else group.likely_confidence,
         since_ns=group.since_ns,
     )
 

@@ -17,7 +17,7 @@ from scm.v2x.messages.stop_request import StopRequest
 from scm.world.part import WorldPart
 
 FLOOR = ((-100.0, 100.0), (-100.0, 100.0))
-ROWS = [(0.0, 0.4, 0.9), (4.0, 0.0, 0.0)]
+ROWS = [(0.0, 0.4, 0.0), (4.0, 0.0, 0.0)]
 
 
 @pytest.fixture

@@ -6,10 +6,12 @@ import threading
 import httpx
 import pytest
 
+from scm.api.acknowledgements import Acknowledgements
 from scm.api.app import create_app
 from scm.api.view import CityView
-from scm.clock import NS_PER_S
+from scm.clock import NS_PER_S, StepClock
 from scm.maps.load import load_map
+from scm.store.memory import MemoryStore
 from scm.v2x.exchange import Incoming
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
@@ -80,6 +82,12 @@ def hear(view):
 @pytest.fixture
 def fake_city():
     return FakeCity()
+
+
+@pytest.fixture
+def seen():
+    """Acknowledgements that nobody has made yet."""
+    return Acknowledgements(MemoryStore(), StepClock())
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 import zipfile
 
 import pytest
@@ -102,8 +103,6 @@ def test_reports_are_listed_with_what_they_found(call, shelves):
 
 
 def test_the_newest_report_comes_first_and_pages_go_on(call, shelves):
-    import os
-
     for age, name in enumerate(("new", "middle", "old")):
         at = 1_700_000_000 - age
         os.utime(put(shelves, name, "none") / "report.json", (at, at))
@@ -224,11 +223,8 @@ def test_a_search_that_cannot_be_is_refused(call, shelves, ran, body, status):
 def test_a_drive_is_shown_and_sent_to_a_car_on_the_citys_floor(call, shelves, ran, city_map):
     with_drive(put(shelves, "monday", "undecided"))
     (part,) = call("GET", f"{API}/reports/monday/drives/next_drive").json()["parts"]
-    assert (part["lasts_s"], part["commands"][1], part["way"]) == (
-        2.0,
-        [2, 0.3, 0.1],
-        [[1, 2, 0.5]],
-    )
+    assert (part["lasts_s"], part["commands"][1]) == (2.0, [2, 0.3, 0.1])
+    assert part["way"] == [[1, 2, 0.5]]
 
     def play(words, tell, hear):
         out = shelves.reports / words[words.index("--out") + 1]

@@ -71,10 +71,10 @@ def test_no_car_and_no_scanner_are_said_in_words(client, hear, snapshot):
 
 
 def test_a_stream_tells_each_turn_once_and_stops_listening_with_its_page(
-    view, hear, snapshot, fake_city, city_map
+    view, hear, snapshot, fake_city, city_map, seen
 ):
     city = City(view, fake_city.ask, city_map)
-    stream = Stream(city, "run")
+    stream = Stream(city, "run", seen)
 
     async def scenario():
         hear(1.0, snapshot(1.0, n1=(0.0, 0.0, 0.0)))

@@ -42,7 +42,9 @@ def test_every_import_leads_to_a_file(path):
             1
         ]
     )["imports"]
-    for target in re.findall(r'(?:from|import\() ?"([^"]+)"', path.read_text("utf-8")):
+    for target in re.findall(
+        r'(?m)^(?:import|\}|export)?[^"\n]*\b(?:from|import\() ?"([^"]+)"', path.read_text("utf-8")
+    ):
         if target.startswith("scm/"):
             assert (STATIC_DIR / "js" / target.removeprefix("scm/")).is_file(), target
         else:

@@ -32,8 +32,8 @@ def test_a_page_first_gets_everything(stream, hear, snapshot, event):
         _, (name, _, body) = await begin(stream)
         assert name == "snapshot"
         assert set(body) == {
-            "acknowledgements", "vehicles", "pulse", "signals", "boxes", "stop", "eye", "stations",
-            "events", "run",
+            "acknowledgements", "signal_status", "vehicles", "pulse", "signals", "boxes", "stop",
+            "eye", "stations", "events", "run",
         }  # fmt: skip
         assert body["vehicles"]["vehicles"][0]["vehicle"] == "n1"
         assert [item["text"] for item in body["events"]] == ["hello"]

@@ -15,14 +15,14 @@ def city(view, fake_city, city_map):
     return City(view, fake_city.ask, city_map)
 
 
-def test_every_topic_can_be_told_before_anything_is_heard(city):
-    for name, topic in topics_of(city).items():
+def test_every_topic_can_be_told_before_anything_is_heard(city, seen):
+    for name, topic in topics_of(city, seen).items():
         assert encode(topic.make(city.view.picture())), name
         assert topic.every >= 1
 
 
-def test_events_are_no_state_and_so_no_topic_made_from_a_picture(city):
-    assert EVENTS not in topics_of(city)
+def test_events_are_no_state_and_so_no_topic_made_from_a_picture(city, seen):
+    assert EVENTS not in topics_of(city, seen)
 
 
 def test_the_pulse_is_unknown_until_the_world_is_heard(view, hear, snapshot):
@@ -33,8 +33,8 @@ def test_the_pulse_is_unknown_until_the_world_is_heard(view, hear, snapshot):
     assert (beats.t_ns, beats.tick, beats.vehicles) == (1_000_000_000, 7, 2)
 
 
-def test_a_topic_follows_the_picture(city, hear, snapshot):
-    vehicles = topics_of(city)["vehicles"].make
+def test_a_topic_follows_the_picture(city, seen, hear, snapshot):
+    vehicles = topics_of(city, seen)["vehicles"].make
     hear(2.0, snapshot(n1=(0, 0, 0)))
     before = encode(vehicles(city.view.picture()))
     hear(2.05, snapshot(at_s=1.05, n1=(0.1, 0, 0)))

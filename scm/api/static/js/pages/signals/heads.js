@@ -84,8 +84,8 @@ function Lamp({ colour, name }) {
 function likely(group, passed_s) {
   if (group.likely_s === null) return "no forecast";
   const left = Math.max(0, group.likely_s - Math.max(0, passed_s)).toFixed(1);
-  if (group.confidence >= 1) return "promised exactly";
-  return `likely ${left} s · ${Math.round(100 * group.confidence)} % sure`;
+  if (group.likely_confidence >= 1) return "promised exactly";
+  return `likely ${left} s · ${Math.round(100 * group.likely_confidence)} % sure`;
 }
 
 function detected(detector) {
