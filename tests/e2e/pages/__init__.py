@@ -1,0 +1,1 @@
+"""Pages of the dashboard over a real city; one city and one browser for the package."""
