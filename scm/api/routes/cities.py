@@ -12,6 +12,7 @@ from scm.api.stations import StationRow
 from scm.clock import seconds
 
 INTERFACE = "v1"
+SOFTWARE = version("scm")
 
 
 class CityRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -85,7 +86,7 @@ def _row(city: City) -> CityRow:
         name=city.name,
         map=city.city_map.name,
         title=city.city_map.title,
-        software=version("scm"),
+        software=SOFTWARE,
         interface=INTERFACE,
         seed=told.seed if told is not None else None,
         lanes=len(city.city_map.lanes),
