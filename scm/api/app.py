@@ -53,6 +53,11 @@ STATIC_DIR = Path(__file__).parent / "static"
 PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
 """First part of the address of each page of the dashboard; what follows is the page's own."""
 
+NOUNS = (
+    vehicles, leases, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic,
+)  # fmt: skip
+"""Routes that need nothing but the city."""
+
 _REVALIDATE = {"Cache-Control": "no-cache"}
 
 
@@ -108,9 +113,7 @@ def create_app(
     policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
     app.add_middleware(Gate, keys=keys, policy=policy)
     api = APIRouter(prefix="/api/v1")
-    for noun in (
-        vehicles, leases, signals, stations, events, map, boxes, eye, stop, misbehaviour, traffic
-    ):  # fmt: skip
+    for noun in NOUNS:
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
     api.include_router(scan.router(city, stream), responses=problem.RESPONSES)
