@@ -82,6 +82,12 @@ def router(city: City) -> APIRouter:
             raise not_found("vehicle", name)
         return json_response(row)
 
+    _add_taking(routes, city)
+    _add_returning(routes, city)
+    return routes
+
+
+def _add_taking(routes: APIRouter, city: City) -> None:
     @routes.post(
         "/{name}",
         summary="Take a car",
@@ -117,6 +123,8 @@ def router(city: City) -> APIRouter:
         )
         return json_response(city.ask(asked, LeaseReply))
 
+
+def _add_returning(routes: APIRouter, city: City) -> None:
     @routes.delete(
         "/{name}",
         summary="Give one's car back",
@@ -140,8 +148,6 @@ def router(city: City) -> APIRouter:
             epoch=epoch,
         )
         return json_response(city.ask(asked, LeaseReply))
-
-    return routes
 
 
 def _owner(request: Request, program: str) -> str:
