@@ -74,14 +74,18 @@ export function VehicleTable() {
 function Rows({ rows }) {
   const box = useRef(null);
   useEffect(() => {
+    const list = box.current;
     const look = () => {
-      scrolled.value = box.current.scrollTop;
-      room.value = box.current.clientHeight;
+      scrolled.value = list.scrollTop;
+      room.value = list.clientHeight;
     };
     const sizes = new ResizeObserver(look);
-    sizes.observe(box.current);
-    box.current.addEventListener("scroll", look, { passive: true });
-    return () => sizes.disconnect();
+    sizes.observe(list);
+    list.addEventListener("scroll", look, { passive: true });
+    return () => {
+      sizes.disconnect();
+      list.removeEventListener("scroll", look);
+    };
   }, []);
   useEffect(() => reveal(box.current, rows.findIndex((row) => fleet.vehicles[row].vehicle === selected.value)), [selected.value]);
   const first = Math.max(0, Math.min(rows.length, Math.floor(scrolled.value / ROW_PX)) - SPARE_ROWS);
