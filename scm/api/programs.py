@@ -4,8 +4,6 @@ What is heavy or holds the interpreter never runs beside the server: it is a pro
 kinder to others than the city is.
 """
 
-import contextlib
-import os
 import subprocess
 import sys
 import threading
@@ -14,10 +12,10 @@ from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
 
 from scm.api.operations import Teller
+from scm.api.priority import stand_back
 from scm.errors import RunError
 from scm.parent_watch import with_parent
 
-NICER = 10
 LOOK_S = 0.2
 GRACE_S = 8.0
 KEPT_LINES = 40
@@ -43,8 +41,7 @@ def run_scm(words: Sequence[str], tell: Teller, hear: Hear, *, kinder: bool = Tr
         text=True, errors="replace", start_new_session=True,
     )  # fmt: skip
     if kinder:
-        with contextlib.suppress(OSError):
-            os.setpriority(os.PRIO_PROCESS, process.pid, NICER)
+        stand_back(process.pid)
     lines: SimpleQueue[str | None] = SimpleQueue()
     reader = threading.Thread(target=_read, args=(process, lines), daemon=True)
     reader.start()

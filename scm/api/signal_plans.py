@@ -14,6 +14,7 @@ from pathlib import Path
 import msgspec
 
 from scm.api.operations import Teller
+from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
 from scm.errors import PlanError
 from scm.v2x.message import Refused
@@ -113,6 +114,7 @@ def _search(file: PlanFile, tell: Teller) -> PlanProof:
     pipe = subprocess.PIPE
     given: bytes | None = msgspec.json.encode(file)
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) as process:
+        stand_back(process.pid)
         try:
             while True:
                 try:

@@ -15,6 +15,7 @@ from scm.api import replay
 from scm.api.city import City, IdempotencyKey, json_response, not_found
 from scm.api.etag import check_match, tagged
 from scm.api.paging import Cursor, Limit, Page, page_of, page_response
+from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
 from scm.api.ranged import send_file
 from scm.api.recordings_shelf import (
@@ -233,6 +234,7 @@ async def _converted(path: FilePath) -> AsyncIterator[bytes]:
     """
     command = (sys.executable, "-m", "scm", "export", "foxglove", str(path))
     process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE)
+    stand_back(process.pid)
     assert process.stdout is not None  # noqa: S101  it was asked for
     try:
         while block := await process.stdout.read(BLOCK):
