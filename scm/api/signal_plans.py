@@ -4,6 +4,7 @@ A plan is proven by another process, `scm plan prove`: the search would keep the
 pages. What was proven is remembered by its digest, so exactly that may be saved.
 """
 
+import re
 import subprocess
 import sys
 import threading
@@ -13,10 +14,13 @@ from pathlib import Path
 import msgspec
 
 from scm.api.operations import Teller
+from scm.api.problem import RefusedError
 from scm.errors import PlanError
+from scm.v2x.message import Refused
 from scm.v2x.plan_file import PlanFile, PlanProof
 
 MOST_PLANS = 50
+PLAN_NAME = re.compile(r"[a-z][a-z0-9_-]{0,31}")
 PROOFS_KEPT = 200
 LOOK_S = 0.2
 
@@ -43,7 +47,7 @@ class PlanShelf:
         """Return a saved plan; None: there is none.
 
         Raises:
-            PlanError: when its file cannot be read.
+            RefusedError: when its file cannot be read.
         """
         path = self._path(junction, plan)
         if path is None or not path.is_file():
@@ -51,7 +55,8 @@ class PlanShelf:
         try:
             return msgspec.json.decode(path.read_bytes(), type=PlanFile)
         except (OSError, msgspec.MsgspecError) as cause:
-            raise PlanError(f"plan file {path}: {cause}") from cause
+            detail = f"plan file {path.name} of {junction}: {cause}"
+            raise RefusedError(Refused(code="unreadable", detail=detail)) from cause
 
     def write(self, file: PlanFile) -> None:
         """Save a plan.
@@ -97,7 +102,10 @@ class PlanShelf:
         return f"/api/v1/signals/{file.junction}/proofs/{found.digest}"
 
     def _path(self, junction: str, plan: str) -> Path | None:
-        return None if self.folder is None else self.folder / junction / f"{plan}.json"
+        """Return where a plan lies; None: nowhere, for that is no name of one."""
+        if self.folder is None or not PLAN_NAME.fullmatch(plan):
+            return None
+        return self.folder / junction / f"{plan}.json"
 
 
 def _search(file: PlanFile, tell: Teller) -> PlanProof:

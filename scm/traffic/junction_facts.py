@@ -73,7 +73,7 @@ class JunctionFacts:
             pending=controller.pending,
             wishes=wishes_of(controller.asked),
             detectors=tuple(
-                SignalDetector(group=name, call=one.call, queue=one.queue, near=one.near)
+                SignalDetector(group=name, call=one.call, queue=one.queue)
                 for name, one in detectors.items()
             ),
             turns=tuple(

@@ -1,5 +1,6 @@
 """Signal plans: list, read, prove, save, delete; a plan is saved when the search has proven it."""
 
+import logging
 from typing import Annotated, Literal
 
 import msgspec
@@ -20,6 +21,8 @@ from scm.v2x.message import Refused
 from scm.v2x.messages.plan_request import SignalStage
 from scm.v2x.messages.signal_site import SignalPlan, SignalSite
 from scm.v2x.plan_file import PlanFile, PlanProof, fits
+
+_LOGGER = logging.getLogger(__name__)
 
 PlanName = Annotated[
     str,
@@ -110,8 +113,7 @@ def _add_reading(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
     @routes.get("/plans", summary="All plans of a junction")
     def plans(request: Request, name: Name, limit: Limit = 100, cursor: Cursor = "") -> Response:
         site = site_of(city, name)
-        saved = (_find(site, shelf, plan) for plan in shelf.names(name))
-        rows = [*(_shipped(site, plan) for plan in site.plans), *filter(None, saved)]
+        rows = [*(_shipped(site, plan) for plan in site.plans), *_readable(site, shelf)]
         page = page_of(rows, lambda row: row.plan, limit=limit, cursor=cursor)
         return page_response(request, page)
 
@@ -205,6 +207,20 @@ def _file(site: SignalSite, plan: str, stages: list[StageBody]) -> PlanFile:
     )
 
 
+def _readable(site: SignalSite, shelf: PlanShelf) -> list[PlanRow]:
+    """Return the saved plans; one whose file is broken must not hide the others."""
+    rows = []
+    for plan in shelf.names(site.junction):
+        try:
+            row = _find(site, shelf, plan)
+        except RefusedError as wrong:
+            _LOGGER.warning("plan_unreadable %s", wrong)
+            continue
+        if row is not None:
+            rows.append(row)
+    return rows
+
+
 def _find(site: SignalSite, shelf: PlanShelf, plan: str) -> PlanRow | None:
     """Return a plan by name; None: there is none.
 
@@ -214,10 +230,7 @@ def _find(site: SignalSite, shelf: PlanShelf, plan: str) -> PlanRow | None:
     shipped = next((one for one in site.plans if one.plan == plan), None)
     if shipped is not None:
         return _shipped(site, shipped)
-    try:
-        file = shelf.read(site.junction, plan)
-    except PlanError as wrong:
-        raise RefusedError(Refused(code="unreadable", detail=str(wrong))) from wrong
+    file = shelf.read(site.junction, plan)
     return None if file is None else _saved(site, file)
 
 

@@ -17,12 +17,11 @@ class SignalTurn(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SignalDetector(msgspec.Struct, kw_only=True, frozen=True):
-    """What the detectors of a group's lanes see; `queue` and `near` count cars."""
+    """What the detectors of a group's lanes see; `queue` counts cars."""
 
     group: str
     call: bool
     queue: int
-    near: int
 
 
 class SignalStatus(Message, kw_only=True, frozen=True):

@@ -201,3 +201,18 @@ def test_a_plan_that_cannot_be_proven_says_why(client, heard):
     found = prove(client, [{**STAGES[0], "green_s": 1.0}, STAGES[1]])
     assert found["state"] == "failed"
     assert "expected at least 2.9 s" in found["error"]
+
+
+def test_one_broken_file_does_not_hide_the_other_plans(client, heard, tmp_path):
+    folder = tmp_path / "plans" / "crossing"
+    folder.mkdir(parents=True)
+    (folder / "bad.json").write_text("{", "utf-8")
+    assert [row["plan"] for row in client("GET", f"{AT}/plans").json()["items"]] == ["calm"]
+    assert "bad.json" in refused(client("GET", f"{AT}/plans/bad"), 409, "unreadable")
+    refused(client("PUT", f"{AT}/plan", json={"plan": "bad"}), 409, "unreadable")
+
+
+def test_no_file_outside_the_shelf_is_read(client, heard, fake_city, tmp_path):
+    (tmp_path / "secret.json").write_text("{", "utf-8")
+    assert client("PUT", f"{AT}/plan", json={"plan": "../../secret"}).status_code == 200
+    assert fake_city.asked[-1].stages == ()  # the controller is asked, which knows no such plan
