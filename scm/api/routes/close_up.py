@@ -12,6 +12,7 @@ from scm.api.close_up import Sample, sample_of
 from scm.api.encoding import encode
 from scm.api.problem import RefusedError
 from scm.api.roles import VIEWER
+from scm.api.schemas import answer, answer_file
 from scm.api.stream import Stream
 from scm.clock import NS_PER_MS, WallClock
 from scm.v2x.message import Refused
@@ -58,7 +59,9 @@ def router(city: City, stream: Stream) -> APIRouter:
     routes = APIRouter(prefix="/vehicles", tags=["vehicles"], dependencies=[VIEWER])
 
     @routes.get(
-        "/{name}/reports", summary="All that a car reports, as server-sent events `reports`"
+        "/{name}/reports",
+        summary="All that a car reports, as server-sent events `reports`",
+        responses=answer_file("text/event-stream"),
     )
     async def reports(name: Name) -> Response:
         _find(city, name)
@@ -68,7 +71,11 @@ def router(city: City, stream: Stream) -> APIRouter:
             headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
         )
 
-    @routes.get("/{name}/link", summary="How long the way to a car and back is now")
+    @routes.get(
+        "/{name}/link",
+        summary="How long the way to a car and back is now",
+        responses=answer(LinkRow),
+    )
     def link(name: Name) -> Response:
         return json_response(_measured(city, _find(city, name)))
 

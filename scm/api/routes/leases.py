@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import OPERATOR, VIEWER
+from scm.api.schemas import answer, answer_page
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 
 _TTL_MS = Field(
@@ -68,20 +69,26 @@ def router(city: City) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/leases", tags=["leases"], dependencies=[VIEWER])
 
-    @routes.get("", summary="Who drives which car")
+    @routes.get("", summary="Who drives which car", responses=answer_page(LeaseRow))
     def all_leases(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
         rows = sorted(_rows(city), key=lambda row: row.vehicle)
         page = page_of(rows, lambda row: row.vehicle, limit=limit, cursor=cursor)
         return page_response(request, page)
 
-    @routes.get("/{name}", summary="Who drives a car")
+    @routes.get("/{name}", summary="Who drives a car", responses=answer(LeaseRow))
     def one_lease(name: Name) -> Response:
         row = next((row for row in _rows(city) if row.vehicle == name), None)
         if row is None:
             raise not_found("vehicle", name)
         return json_response(row)
 
-    @routes.post("/{name}", summary="Take a car", status_code=201, dependencies=[OPERATOR])
+    @routes.post(
+        "/{name}",
+        summary="Take a car",
+        status_code=201,
+        dependencies=[OPERATOR],
+        responses=answer(LeaseReply, 201),
+    )
     def take(request: Request, name: Name, body: TakeBody, key: IdempotencyKey = "") -> Response:
         asked = LeaseRequest(
             request_id=key,
@@ -93,7 +100,12 @@ def router(city: City) -> APIRouter:
         )
         return json_response(city.ask(asked, LeaseReply), 201)
 
-    @routes.put("/{name}", summary="Keep one's car", dependencies=[OPERATOR])
+    @routes.put(
+        "/{name}",
+        summary="Keep one's car",
+        dependencies=[OPERATOR],
+        responses=answer(LeaseReply),
+    )
     def renew(request: Request, name: Name, body: RenewBody, key: IdempotencyKey = "") -> Response:
         asked = LeaseRequest(
             request_id=key,
@@ -105,7 +117,12 @@ def router(city: City) -> APIRouter:
         )
         return json_response(city.ask(asked, LeaseReply))
 
-    @routes.delete("/{name}", summary="Give one's car back", dependencies=[OPERATOR])
+    @routes.delete(
+        "/{name}",
+        summary="Give one's car back",
+        dependencies=[OPERATOR],
+        responses=answer(LeaseReply),
+    )
     def give_back(
         request: Request,
         name: Name,
