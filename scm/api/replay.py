@@ -7,7 +7,7 @@ import csv
 import io
 import re
 from collections.abc import Callable, Iterator
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import msgspec
 
@@ -68,11 +68,14 @@ class CarFacts(msgspec.Struct, kw_only=True, frozen=True):
     owner: str
 
 
+_CARS_AT = msgspec.Meta(examples=[[[0, 1.384, 0.655, -0.785, 0.21, 0.12, "drive", True, ["low"]]]])
+
+
 class Frame(msgspec.Struct, kw_only=True, frozen=True):
     """The city at one moment; `boxes` None: as in the frame before."""
 
     t_s: float
-    cars: tuple[CarAt, ...]
+    cars: Annotated[tuple[CarAt, ...], _CARS_AT]
     boxes: tuple[SnapshotBox, ...] | None
 
 

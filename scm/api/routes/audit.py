@@ -91,8 +91,12 @@ def router(store: Repository) -> APIRouter:
         except StoreError as broken:
             last = log.head()
             return json_response(
-                ChainVerdict(whole=False, entries=last.number, digest=last.digest, error=str(broken))
+                ChainVerdict(
+                    whole=False, entries=last.number, digest=last.digest, error=str(broken)
+                )
             )
-        return json_response(ChainVerdict(whole=True, entries=head.number, digest=head.digest, error=""))
+        return json_response(
+            ChainVerdict(whole=True, entries=head.number, digest=head.digest, error="")
+        )
 
     return routes

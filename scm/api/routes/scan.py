@@ -24,9 +24,7 @@ def router(city: City, stream: Stream) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/vehicles", tags=["scans"], dependencies=[VIEWER])
 
-    @routes.get(
-        "/{name}/scan", summary="The next turn of a car's LIDAR", responses=answer(ScanRow)
-    )
+    @routes.get("/{name}/scan", summary="The next turn of a car's LIDAR", responses=answer(ScanRow))
     async def one(name: Name) -> Response:
         scanner = _check(city, name)
         with city.view.watching_scan(name):
