@@ -72,7 +72,13 @@ _CARS_AT = msgspec.Meta(examples=[[[0, 1.384, 0.655, -0.785, 0.21, 0.12, "drive"
 
 
 class Frame(msgspec.Struct, kw_only=True, frozen=True):
-    """The city at one moment; `boxes` None: as in the frame before."""
+    """The city at one moment.
+
+    Attributes:
+        cars: A row each: its number in `cars` of the stretch, x [m], y [m], yaw [rad], speed
+            [m/s], steering angle [rad], mode, whether it is alive, lights that are on.
+        boxes: None: as in the frame before.
+    """
 
     t_s: float
     cars: Annotated[tuple[CarAt, ...], _CARS_AT]

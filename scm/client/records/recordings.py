@@ -74,12 +74,13 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Frame(msgspec.Struct, kw_only=True, frozen=True):
-    """The city at one moment; `boxes` None: as in the frame before.
+    """The city at one moment.
 
     Attributes:
         t_s: Since the begin of the recording [s].
-        cars: Cars, or names of them.
-        boxes: Boxes that cars can push.
+        cars: A row each: its number in `cars` of the stretch, x [m], y [m], yaw [rad], speed
+            [m/s], steering angle [rad], mode, whether it is alive, lights that are on.
+        boxes: None: as in the frame before.
     """
 
     t_s: float
