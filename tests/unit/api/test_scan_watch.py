@@ -6,11 +6,13 @@ import json
 import numpy as np
 import pytest
 
+from scm.api.acknowledgements import Acknowledgements
 from scm.api.city import City
 from scm.api.routes.scan import _turns
 from scm.api.scan_watch import scanner_of
 from scm.api.stream import Stream
-from scm.clock import NS_PER_S
+from scm.clock import NS_PER_S, StepClock
+from scm.store.memory import MemoryStore
 from scm.v2x.messages.lidar_scan import LidarScan
 
 API = "/api/v1"
@@ -74,7 +76,7 @@ def test_a_stream_tells_each_turn_once_and_stops_listening_with_its_page(
     view, hear, snapshot, fake_city, city_map
 ):
     city = City(view, fake_city.ask, city_map)
-    stream = Stream(city, "run")
+    stream = Stream(city, "run", Acknowledgements(MemoryStore(), StepClock()))
 
     async def scenario():
         hear(1.0, snapshot(1.0, n1=(0.0, 0.0, 0.0)))
