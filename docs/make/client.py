@@ -70,13 +70,18 @@ def _homes(nouns: dict[str, list[tuple[str, str, Schema]]], schemas: Schema) -> 
     homes = {
         name: next(iter(used)) if len(used) == 1 else SHARED
         for name, used in users.items()
-        if "enum" not in schemas[name]
+        if _is_record(schemas[name])
     }
     for home, count in Counter(homes.values()).items():
         if count > MOST_RECORDS:
             for name in _ordered(home, homes, schemas)[: count // 2]:
                 homes[name] = f"{home}_parts"
     return homes
+
+
+def _is_record(schema: Schema) -> bool:
+    """Say whether a schema has a name in the client: lists of words or of columns have none."""
+    return schema.get("type") == "object"
 
 
 def _ordered(home: str, homes: dict[str, str], schemas: Schema) -> list[str]:
@@ -188,7 +193,7 @@ def _type(schema: Schema, schemas: Schema) -> str:
     if "$ref" in schema:
         name = schema["$ref"].removeprefix(REFERENCE)
         target = schemas[name]
-        return _type(target, schemas) if "enum" in target else _class(name)
+        return _class(name) if _is_record(target) else _type(target, schemas)
     choices = schema.get("anyOf") or schema.get("oneOf")
     if choices:
         kinds = list(dict.fromkeys(_type(one, schemas) for one in choices))
@@ -292,7 +297,8 @@ class _Method:
         summary = self._operation["summary"]
         lines = [f"    def {self.name}({given}) -> {kind}:"]
         lines += _docstring(summary, "Args", self._about, 8)[:-1]
-        return "\n".join([*lines, f"        return {call}", ""])
+        does = call if kind == "None" else f"return {call}"
+        return "\n".join([*lines, f"        {does}", ""])
 
     def _call(self, media: str, schema: Schema) -> tuple[str, str]:
         """Return what the method answers, and the call that gets it."""
@@ -301,11 +307,11 @@ class _Method:
         for place, word in (("query", "query"), ("header", "headers")):
             if self._places[place]:
                 facts.append(f"{word}={_dict(self._places[place])}")
-        if media == "application/json" or media.endswith("+json"):
-            kind = _type(schema, self._schemas)
-            verb = "send" if self._sends_bytes else "ask"
-            content = ["content"] if self._sends_bytes else []
-            facts = [f'"{self._method}"', facts[0], kind, *content, *facts[1:]]
+        if not media or media == "application/json" or media.endswith("+json"):
+            kind = _type(schema, self._schemas) if media else "None"
+            verb = "send" if self._sends_bytes else "ask" if media else "tell"
+            more = ([kind] if media else []) + (["content"] if self._sends_bytes else [])
+            facts = [f'"{self._method}"', facts[0], *more, *facts[1:]]
             facts += [f"body={_dict(self._places['body'])}"] if self._body else []
             facts += ["key=idempotency_key"] if self._has_key else []
             return kind, f"self._connection.{verb}({', '.join(facts)})"

@@ -7,7 +7,7 @@ import csv
 import io
 import re
 from collections.abc import Callable, Iterator
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import msgspec
 
@@ -68,11 +68,20 @@ class CarFacts(msgspec.Struct, kw_only=True, frozen=True):
     owner: str
 
 
+_CARS_AT = msgspec.Meta(examples=[[[0, 1.384, 0.655, -0.785, 0.21, 0.12, "drive", True, ["low"]]]])
+
+
 class Frame(msgspec.Struct, kw_only=True, frozen=True):
-    """The city at one moment; `boxes` None: as in the frame before."""
+    """The city at one moment.
+
+    Attributes:
+        cars: A row each: its number in `cars` of the stretch, x [m], y [m], yaw [rad], speed
+            [m/s], steering angle [rad], mode, whether it is alive, lights that are on.
+        boxes: None: as in the frame before.
+    """
 
     t_s: float
-    cars: tuple[CarAt, ...]
+    cars: Annotated[tuple[CarAt, ...], _CARS_AT]
     boxes: tuple[SnapshotBox, ...] | None
 
 

@@ -150,7 +150,7 @@ class ReportFolders:
 
     def fields(self, folder: Path) -> tuple[Any, Any]:
         """Return `report.json` and `drawn.json`; None for one that is missing or damaged."""
-        return _read(folder / _FIELDS, Any), _read(folder / _DRAWN, Any)
+        return _read(folder / _FIELDS, dict), _read(folder / _DRAWN, dict)
 
     def drives(self, folder: Path) -> list[str]:
         """Return the names of the drives that the report suggests."""

@@ -44,9 +44,14 @@ def answer_page(kind: Any, about: str = "A page of the list.") -> Responses:
     return described
 
 
-def answer_file(media: str, about: str = "The file.") -> Responses:
+def answer_file(media: str, about: str = "The file.", status: int = 200) -> Responses:
     """Describe an answer that is no JSON: a picture, a download, a stream."""
     schema = {"type": "string"}
     if not media.startswith("text/"):
         schema["contentMediaType"] = media
-    return {200: {"description": about, "content": {media: {"schema": schema}}}}
+    return {status: {"description": about, "content": {media: {"schema": schema}}}}
+
+
+def answer_nothing(about: str = "It is gone.") -> Responses:
+    """Describe an answer without a body; its route has `status_code=204`."""
+    return {204: {"description": about}}

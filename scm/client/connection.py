@@ -114,6 +114,20 @@ class Connection:
             msg = f"{method} {path}: {cause}; expected {kind}: is the server another version?"
             raise MessageError(msg) from cause
 
+    def tell(
+        self,
+        method: str,
+        path: str,
+        *,
+        query: Values | None = None,
+        headers: Values | None = None,
+        body: Values | None = None,
+        key: str | None = None,
+    ) -> None:
+        """Ask for what has no answer but that it is done; as `ask` otherwise."""
+        content = None if body is None else msgspec.json.encode(_given(body))
+        self._ask(method, path, query, headers, content, key)
+
     def fetch(
         self,
         path: str,

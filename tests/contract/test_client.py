@@ -43,6 +43,14 @@ def test_every_operation_has_a_method_of_its_noun(document):
     client.close()
 
 
+def test_what_answers_nothing_is_told_and_rows_without_names_are_tuples(maker, document):
+    made = maker.files(document)
+    remove = made["nouns/scenarios.py"].partition("def remove(")[2].partition("def ")[0]
+    assert "-> None" in remove
+    assert 'self._connection.tell("DELETE"' in remove
+    assert "cars: tuple[tuple[int, float," in made["records/recordings.py"]
+
+
 def test_a_new_route_would_be_noticed(maker, document):
     """The first test fails for it: it changes what would be written."""
     path = "/api/v1/stations/{name}/mood"

@@ -16,7 +16,7 @@ from scm.store.audit import AuditLog, Head
 from scm.store.repository import Repository
 
 
-class Verdict(msgspec.Struct, kw_only=True, frozen=True):
+class ChainVerdict(msgspec.Struct, kw_only=True, frozen=True):
     """Whether the chain of entries is whole.
 
     Attributes:
@@ -74,7 +74,7 @@ def router(store: Repository) -> APIRouter:
         rows = (row for row in newest_first(store) if wanted.passes(row))
         return table_response(rows, AuditRow, form, "audit")
 
-    @routes.get("/verdict", summary="Check the whole chain", responses=answer(Verdict))
+    @routes.get("/verdict", summary="Check the whole chain", responses=answer(ChainVerdict))
     def verdict(
         number: Annotated[
             int, Query(ge=0, description="of an entry noted before; 0: none", examples=[0])
@@ -91,8 +91,12 @@ def router(store: Repository) -> APIRouter:
         except StoreError as broken:
             last = log.head()
             return json_response(
-                Verdict(whole=False, entries=last.number, digest=last.digest, error=str(broken))
+                ChainVerdict(
+                    whole=False, entries=last.number, digest=last.digest, error=str(broken)
+                )
             )
-        return json_response(Verdict(whole=True, entries=head.number, digest=head.digest, error=""))
+        return json_response(
+            ChainVerdict(whole=True, entries=head.number, digest=head.digest, error="")
+        )
 
     return routes

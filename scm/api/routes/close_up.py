@@ -62,6 +62,7 @@ def router(city: City, stream: Stream) -> APIRouter:
         "/{name}/reports",
         summary="All that a car reports, as server-sent events `reports`",
         responses=answer_file("text/event-stream"),
+        response_class=Response,
     )
     async def reports(name: Name) -> Response:
         _find(city, name)

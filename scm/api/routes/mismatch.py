@@ -18,7 +18,7 @@ from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
 from scm.api.report_folders import FILES, NAME, Job, ReportRow
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
-from scm.api.schemas import answer, answer_file, answer_page
+from scm.api.schemas import answer, answer_file, answer_nothing, answer_page
 from scm.v2x.message import Refused
 from scm.vehicles.car_files import car_files
 
@@ -121,7 +121,7 @@ class Report(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         row: As in the list.
-        report: The fields of `report.json`, as docs/mismatch.md lists them.
+        report: The fields of `report.json`, as docs/mismatch.md lists them; None: damaged.
         drawn: What its pictures draw and the words beside them; None of an older report.
         job: What it was made from; None: nobody noted it.
         drives: Names of the drives it suggests.
@@ -130,8 +130,8 @@ class Report(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     row: ReportRow
-    report: Any
-    drawn: Any
+    report: dict[str, Any] | None
+    drawn: dict[str, Any] | None
     job: Job | None
     drives: tuple[str, ...]
     told: int
@@ -259,7 +259,11 @@ def _add_reports(routes: APIRouter, jobs: MismatchJobs) -> None:
         return json_response(told)
 
     @routes.delete(
-        "/reports/{name}", summary="Remove a report", dependencies=[ENGINEER], status_code=204
+        "/reports/{name}",
+        summary="Remove a report",
+        status_code=204,
+        dependencies=[ENGINEER],
+        responses=answer_nothing(),
     )
     def remove(name: ReportName, key: IdempotencyKey = "") -> Response:
         del key  # removed is removed

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Response
 from scm.api.city import City, Name, json_response, not_found
 from scm.api.planned_path import PathRow, path_ahead
 from scm.api.roles import VIEWER
+from scm.api.schemas import answer
 from scm.geometry import Pose2
 from scm.maps.route import Roads
 
@@ -19,7 +20,11 @@ def router(city: City) -> APIRouter:
     def roads() -> Roads:
         return Roads(city.city_map)
 
-    @routes.get("/{name}/path", summary="A car's way ahead, at most 12 m of it")
+    @routes.get(
+        "/{name}/path",
+        summary="A car's way ahead, at most 12 m of it",
+        responses=answer(PathRow),
+    )
     def path(name: Name) -> Response:
         picture = city.view.picture()
         cars = () if picture.snapshot is None else picture.snapshot.message.vehicles

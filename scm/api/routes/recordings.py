@@ -28,6 +28,7 @@ from scm.api.recordings_shelf import (
     unreadable,
 )
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
+from scm.api.schemas import answer, answer_file, answer_nothing, answer_page
 from scm.errors import RecordingError
 from scm.maps.draw import draw_svg
 from scm.maps.model import Box, Light
@@ -96,17 +97,27 @@ def router(city: City) -> APIRouter:
     _add_moments(routes, shelf, city)
     _add_notes(routes, shelf)
 
-    @routes.get("", summary="All recordings, the one written last first")
+    @routes.get(
+        "",
+        summary="All recordings, the one written last first",
+        responses=answer_page(RecordingRow),
+    )
     def all_recordings(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
         names = page_of(shelf.names(), str, limit=limit, cursor=cursor)
         rows = Page(items=_rows(shelf, names.items), next=names.next)
         return page_response(request, rows)
 
-    @routes.get("/{name}", summary="One recording")
+    @routes.get("/{name}", summary="One recording", responses=answer(RecordingRow))
     def one_recording(name: Name) -> Response:
         return json_response(shelf.row(name))
 
-    @routes.delete("/{name}", summary="Delete a recording", dependencies=[ENGINEER])
+    @routes.delete(
+        "/{name}",
+        summary="Delete a recording",
+        status_code=204,
+        dependencies=[ENGINEER],
+        responses=answer_nothing(),
+    )
     def remove(name: Name, key: IdempotencyKey = "") -> Response:
         del key  # what is gone stays gone
         shelf.remove(name)
@@ -122,17 +133,28 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
     @routes.get(
         "/{name}.mcap",
         summary="The file as the recorder wrote it, or a range of it",
+        responses=answer_file(MCAP) | answer_file(MCAP, "The range of it.", 206),
         response_class=Response,
     )
     def file(request: Request, name: Name) -> Response:
         return send_file(request, shelf.path(name), MCAP)
 
-    @routes.get("/{name}/foxglove.mcap", summary="The file for Foxglove", response_class=Response)
+    @routes.get(
+        "/{name}/foxglove.mcap",
+        summary="The file for Foxglove",
+        responses=answer_file(MCAP),
+        response_class=Response,
+    )
     async def foxglove(name: Name) -> Response:
         index = await asyncio.to_thread(shelf.index, name)
         return StreamingResponse(_converted(index.path), 200, _named(f"{name}.foxglove.mcap"), MCAP)
 
-    @routes.get("/{name}/csv", summary="Its cars as CSV", response_class=Response)
+    @routes.get(
+        "/{name}/csv",
+        summary="Its cars as CSV",
+        responses=answer_file("text/csv"),
+        response_class=Response,
+    )
     def as_csv(name: Name, vehicle: Vehicle = "") -> Response:
         index = shelf.index(name)
         if vehicle and vehicle not in cars_of(index):
@@ -144,7 +166,9 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
 def _add_moments(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:
     """Add what a replay shows."""
 
-    @routes.get("/{name}/summary", summary="What a replay has to know first")
+    @routes.get(
+        "/{name}/summary", summary="What a replay has to know first", responses=answer(Summary)
+    )
     def summary(name: Name) -> Response:
         index = _readable(shelf, name)
         city_map = replay.map_of(index)
@@ -159,7 +183,11 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:
             )
         )
 
-    @routes.get("/{name}/frames", summary="Where everything was, from a time to another")
+    @routes.get(
+        "/{name}/frames",
+        summary="Where everything was, from a time to another",
+        responses=answer(replay.Frames),
+    )
     def frames(
         name: Name,
         from_s: Seconds = 0.0,
@@ -173,13 +201,22 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:
             raise RefusedError(Refused(code="invalid", detail=detail))
         return json_response(replay.frames_of(_readable(shelf, name), from_s, to_s, hz))
 
-    @routes.get("/{name}/events", summary="Its events, in their order")
+    @routes.get(
+        "/{name}/events",
+        summary="Its events, in their order",
+        responses=answer_page(replay.RecordedEvent),
+    )
     def events(request: Request, name: Name, limit: Limit = 500, cursor: Cursor = "") -> Response:
         rows = replay.events_of(_readable(shelf, name))
         page = page_of(rows, lambda row: str(row.number), limit=limit, cursor=cursor)
         return page_response(request, page)
 
-    @routes.get("/{name}/map.svg", summary="The map it was driven on", response_class=Response)
+    @routes.get(
+        "/{name}/map.svg",
+        summary="The map it was driven on",
+        responses=answer_file("image/svg+xml"),
+        response_class=Response,
+    )
     def map_svg(name: Name) -> Response:
         city_map = replay.map_of(_readable(shelf, name)) or city.city_map
         headers = {"Cache-Control": "no-cache"}
@@ -187,11 +224,16 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:
 
 
 def _add_notes(routes: APIRouter, shelf: RecordingsShelf) -> None:
-    @routes.get("/{name}/notes", summary="What people wrote about it")
+    @routes.get("/{name}/notes", summary="What people wrote about it", responses=answer(Notes))
     def notes(request: Request, name: Name) -> Response:
         return tagged(request, shelf.notes(name))
 
-    @routes.put("/{name}/notes", summary="Name it and note something", dependencies=[OPERATOR])
+    @routes.put(
+        "/{name}/notes",
+        summary="Name it and note something",
+        dependencies=[OPERATOR],
+        responses=answer(Notes),
+    )
     def write(request: Request, name: Name, body: NotesBody, key: IdempotencyKey = "") -> Response:
         del key  # the same notes twice are the same notes
         check_match(request, shelf.notes(name))

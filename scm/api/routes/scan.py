@@ -11,6 +11,7 @@ from scm.api.encoding import encode
 from scm.api.problem import RefusedError
 from scm.api.roles import VIEWER
 from scm.api.scan_watch import ScanRow, scan_row, scanner_of
+from scm.api.schemas import answer, answer_file
 from scm.api.stream import Stream
 from scm.v2x.message import Refused
 
@@ -23,7 +24,7 @@ def router(city: City, stream: Stream) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/vehicles", tags=["scans"], dependencies=[VIEWER])
 
-    @routes.get("/{name}/scan", summary="The next turn of a car's LIDAR")
+    @routes.get("/{name}/scan", summary="The next turn of a car's LIDAR", responses=answer(ScanRow))
     async def one(name: Name) -> Response:
         scanner = _check(city, name)
         with city.view.watching_scan(name):
@@ -34,7 +35,12 @@ def router(city: City, stream: Stream) -> APIRouter:
                 await asyncio.sleep(LOOK_S)
         raise not_found("car with a scan", name)
 
-    @routes.get("/{name}/scan/stream", summary="Every turn, as server-sent events")
+    @routes.get(
+        "/{name}/scan/stream",
+        summary="Every turn, as server-sent events",
+        responses=answer_file("text/event-stream", "A `ScanRow` in each event `scan`."),
+        response_class=Response,
+    )
     async def every(name: Name) -> Response:
         scanner = _check(city, name)
         return StreamingResponse(

@@ -7,10 +7,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, json_response, not_found
 from scm.api.etag import check_match, tagged
-from scm.api.operations import Operations, accepted
+from scm.api.operations import Operation, Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import ADMIN, OPERATOR, VIEWER
-from scm.api.scenarios import MOST_BYTES, NAME, ScenarioRuns, ScenarioShelf
+from scm.api.scenarios import MOST_BYTES, NAME, Lines, Scenario, ScenarioRuns, ScenarioShelf
+from scm.api.schemas import answer, answer_nothing, answer_page
 
 Name = Annotated[
     str, Path(pattern=NAME, description="a script without .py", examples=["travel_times"])
@@ -53,12 +54,18 @@ def router(city: City, work: Operations) -> APIRouter:
     runs = ScenarioRuns(shelf, work, city.link.connect)
     _add_scripts(routes, shelf)
 
-    @routes.post("/{name}/runs", summary="Run a script", status_code=202, dependencies=[OPERATOR])
+    @routes.post(
+        "/{name}/runs",
+        summary="Run a script",
+        status_code=202,
+        dependencies=[OPERATOR],
+        responses=answer(Operation, 202),
+    )
     def run(request: Request, name: Name, body: RunBody, key: IdempotencyKey = "") -> Response:
         owner = str(request.scope["scm_owner"])
         return accepted(runs.start(name, body.arguments, owner=owner, key=key))
 
-    @routes.get("/runs/{run}/lines", summary="What a run printed")
+    @routes.get("/runs/{run}/lines", summary="What a run printed", responses=answer(Lines))
     def lines(
         run: Run,
         after: Annotated[
@@ -71,19 +78,24 @@ def router(city: City, work: Operations) -> APIRouter:
 
 
 def _add_scripts(routes: APIRouter, shelf: ScenarioShelf) -> None:
-    @routes.get("", summary="All scripts, one's own first")
+    @routes.get("", summary="All scripts, one's own first", responses=answer_page(Scenario))
     def all_scenarios(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
         page = page_of(shelf.rows(), lambda row: row.name, limit=limit, cursor=cursor)
         return page_response(request, page)
 
-    @routes.get("/{name}", summary="One script with its text")
+    @routes.get("/{name}", summary="One script with its text", responses=answer(Scenario))
     def one(request: Request, name: Name) -> Response:
         found = shelf.find(name)
         if found is None:
             raise not_found("scenario", name)
         return tagged(request, found)
 
-    @routes.put("/{name}", summary="Write a script", dependencies=[ADMIN])
+    @routes.put(
+        "/{name}",
+        summary="Write a script",
+        dependencies=[ADMIN],
+        responses=answer(Scenario) | answer(Scenario, 201, "It is new."),
+    )
     def write(
         request: Request, name: Name, body: ScenarioBody, key: IdempotencyKey = ""
     ) -> Response:
@@ -92,7 +104,13 @@ def _add_scripts(routes: APIRouter, shelf: ScenarioShelf) -> None:
         check_match(request, before)
         return tagged(request, shelf.write(name, body.text), 200 if before else 201)
 
-    @routes.delete("/{name}", summary="Delete a script", dependencies=[ADMIN])
+    @routes.delete(
+        "/{name}",
+        summary="Delete a script",
+        status_code=204,
+        dependencies=[ADMIN],
+        responses=answer_nothing(),
+    )
     def remove(name: Name, key: IdempotencyKey = "") -> Response:
         del key  # what is gone stays gone
         shelf.remove(name)

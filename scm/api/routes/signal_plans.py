@@ -9,11 +9,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, Name, json_response, not_found
 from scm.api.etag import check_match, tagged
-from scm.api.operations import Operations, accepted
+from scm.api.operations import Operation, Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
 from scm.api.routes.signals import By, Reason, junction_of, site_of
+from scm.api.schemas import answer, answer_page
 from scm.api.signal_plans import PlanShelf
 from scm.clock import WallClock
 from scm.errors import PlanError
@@ -27,6 +28,11 @@ _LOGGER = logging.getLogger(__name__)
 PlanName = Annotated[
     str,
     Path(pattern=r"^[a-z][a-z0-9_-]{0,31}$", description="a plan's name", examples=["rush"]),
+]
+
+Digest = Annotated[
+    str,
+    Path(pattern=r"^[0-9a-f]{16}$", description="of a proof", examples=["9f3a51c07be2d418"]),
 ]
 
 
@@ -110,14 +116,14 @@ def router(city: City, shelf: PlanShelf, work: Operations) -> APIRouter:
 
 
 def _add_reading(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
-    @routes.get("/plans", summary="All plans of a junction")
+    @routes.get("/plans", summary="All plans of a junction", responses=answer_page(PlanRow))
     def plans(request: Request, name: Name, limit: Limit = 100, cursor: Cursor = "") -> Response:
         site = site_of(city, name)
         rows = [*(_shipped(site, plan) for plan in site.plans), *_readable(site, shelf)]
         page = page_of(rows, lambda row: row.plan, limit=limit, cursor=cursor)
         return page_response(request, page)
 
-    @routes.get("/plans/{plan}", summary="One plan")
+    @routes.get("/plans/{plan}", summary="One plan", responses=answer(PlanRow))
     def one_plan(request: Request, name: Name, plan: PlanName) -> Response:
         row = _find(site_of(city, name), shelf, plan)
         if row is None:
@@ -131,6 +137,7 @@ def _add_proving(routes: APIRouter, city: City, shelf: PlanShelf, work: Operatio
         summary="Search every state of kernel and plan for fault",
         status_code=202,
         dependencies=[OPERATOR],
+        responses=answer(Operation, 202),
     )
     def prove(request: Request, name: Name, body: StagesBody) -> Response:
         file = _file(site_of(city, name), body.plan, body.stages)
@@ -140,8 +147,8 @@ def _add_proving(routes: APIRouter, city: City, shelf: PlanShelf, work: Operatio
             work.start("plan-proof", what, lambda tell: shelf.prove(file, tell), owner=owner)
         )
 
-    @routes.get("/proofs/{digest}", summary="One proof")
-    def proof(name: Name, digest: Annotated[str, Path(pattern=r"^[0-9a-f]{16}$")]) -> Response:
+    @routes.get("/proofs/{digest}", summary="One proof", responses=answer(PlanProof))
+    def proof(name: Name, digest: Digest) -> Response:
         junction_of(city, name)
         found = shelf.proof_of(digest)
         if found is None:
@@ -150,7 +157,12 @@ def _add_proving(routes: APIRouter, city: City, shelf: PlanShelf, work: Operatio
 
 
 def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
-    @routes.put("/plans/{plan}", summary="Save a proven plan", dependencies=[ENGINEER])
+    @routes.put(
+        "/plans/{plan}",
+        summary="Save a proven plan",
+        dependencies=[ENGINEER],
+        responses=answer(PlanRow) | answer(PlanRow, 201, "It is new."),
+    )
     def save(request: Request, name: Name, plan: PlanName, body: PlanBody) -> Response:
         site = site_of(city, name)
         _check_own(site, plan)
@@ -170,7 +182,12 @@ def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
             raise RefusedError(Refused(code="full", detail=str(refusal))) from refusal
         return tagged(request, _saved(site, file), 200 if before is not None else 201)
 
-    @routes.delete("/plans/{plan}", summary="Delete a saved plan", dependencies=[ENGINEER])
+    @routes.delete(
+        "/plans/{plan}",
+        summary="Delete a saved plan",
+        dependencies=[ENGINEER],
+        responses=answer(PlanRow, about="As it was."),
+    )
     def delete(request: Request, name: Name, plan: PlanName) -> Response:
         site = site_of(city, name)
         _check_own(site, plan)

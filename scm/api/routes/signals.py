@@ -15,14 +15,22 @@ from scm.api.etag import tagged
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
+from scm.api.schemas import answer, answer_page
+from scm.api.signal_history import History, PromiseScore, Verdict
 from scm.api.signal_plans import PlanShelf
-from scm.api.signal_rows import junction_rows, status_row
+from scm.api.signal_rows import JunctionRow, StatusRow, junction_rows, status_row
 from scm.maps.model import Junction
 from scm.v2x.message import Refused
 from scm.v2x.messages.monitor_reset import MonitorReset
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest, SignalStage
-from scm.v2x.messages.signal_request import LONGEST_S, SignalReply, SignalRequest, Verb
+from scm.v2x.messages.signal_request import (
+    LONGEST_S,
+    SignalReply,
+    SignalRequest,
+    SignalWish,
+    Verb,
+)
 from scm.v2x.messages.signal_site import SignalSite
 from scm.v2x.plan_file import fits
 
@@ -109,6 +117,33 @@ class ResetBody(BaseModel):
     )
 
 
+class FlashReply(msgspec.Struct, kw_only=True, frozen=True):
+    """What runs now: a `SignalReply` where the wish has an end of its own, else a `PlanReply`.
+
+    Attributes:
+        policy: In force now; not told by a `PlanReply`.
+        plan: In force now; not told by a `SignalReply`.
+        pending: To come into force at the next safe moment; empty: none.
+        wishes: In force now; not told by a `PlanReply`.
+    """
+
+    junction: str
+    pending: str
+    policy: str | None = None
+    plan: str | None = None
+    wishes: tuple[SignalWish, ...] = ()
+
+
+class Signals(msgspec.Struct, kw_only=True, frozen=True):
+    """All junctions of the map.
+
+    Attributes:
+        signals: One row a junction, in the map's order.
+    """
+
+    signals: tuple[JunctionRow, ...]
+
+
 def router(city: City, shelf: PlanShelf) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/signals", tags=["signals"], dependencies=[VIEWER])
@@ -146,23 +181,31 @@ def site_of(city: City, name: str) -> SignalSite:
 
 
 def _add_reading(routes: APIRouter, city: City) -> None:
-    @routes.get("", summary="All junctions")
+    @routes.get("", summary="All junctions", responses=answer(Signals))
     def all_signals() -> Response:
         rows = junction_rows(city.view.picture(), city.city_map.junctions, city.plans)
-        return json_response({"signals": rows})
+        return json_response(Signals(signals=rows))
 
-    @routes.get("/{name}", summary="One junction")
+    @routes.get("/{name}", summary="One junction", responses=answer(JunctionRow))
     def one_signal(name: Name) -> Response:
         junction = junction_of(city, name)
         (row,) = junction_rows(city.view.picture(), [junction], city.plans)
         return json_response(row)
 
-    @routes.get("/{name}/site", summary="Phases, least times, conflicts, rings, policies")
+    @routes.get(
+        "/{name}/site",
+        summary="Phases, least times, conflicts, rings, policies",
+        responses=answer(SignalSite),
+    )
     def site(request: Request, name: Name) -> Response:
         told = site_of(city, name)
         return tagged(request, msgspec.structs.replace(told, t_ns=0))
 
-    @routes.get("/{name}/status", summary="What runs, detectors, greens to come")
+    @routes.get(
+        "/{name}/status",
+        summary="What runs, detectors, greens to come",
+        responses=answer(StatusRow),
+    )
     def status(name: Name) -> Response:
         junction_of(city, name)
         held = city.view.picture().signal_statuses.get(name)
@@ -170,19 +213,31 @@ def _add_reading(routes: APIRouter, city: City) -> None:
             raise not_found("status of a junction", name)
         return json_response(status_row(held.message))
 
-    @routes.get("/{name}/history", summary="What each group showed in the last ten minutes")
+    @routes.get(
+        "/{name}/history",
+        summary="What each group showed in the last ten minutes",
+        responses=answer(History),
+    )
     def history(name: Name) -> Response:
         groups = [group.name for group in junction_of(city, name).groups]
         return json_response(city.view.signal_history(name, groups))
 
-    @routes.get("/{name}/promises", summary="What SPaT told against what happened")
+    @routes.get(
+        "/{name}/promises",
+        summary="What SPaT told against what happened",
+        responses=answer(PromiseScore),
+    )
     def promises(name: Name) -> Response:
         junction_of(city, name)
         return json_response(city.view.signal_score(name))
 
 
 def _add_wishes(routes: APIRouter, city: City) -> None:
-    @routes.get("/{name}/wishes", summary="Wishes in force, each with who, why and its end")
+    @routes.get(
+        "/{name}/wishes",
+        summary="Wishes in force, each with who, why and its end",
+        responses=answer_page(SignalWish),
+    )
     def wishes(request: Request, name: Name, limit: Limit = 100, cursor: Cursor = "") -> Response:
         junction_of(city, name)
         held = city.view.picture().signal_statuses.get(name)
@@ -193,7 +248,12 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
     for noun, (verb, summary) in _VERBS.items():
         _add_verb(routes, city, noun, verb, summary)
 
-    @routes.post("/{name}/clear", summary="Take wishes back", dependencies=[OPERATOR])
+    @routes.post(
+        "/{name}/clear",
+        summary="Take wishes back",
+        dependencies=[OPERATOR],
+        responses=answer(SignalReply),
+    )
     def clear(name: Name, body: ClearBody, key: IdempotencyKey = "") -> Response:
         junction_of(city, name)
         request = SignalRequest(
@@ -222,12 +282,22 @@ def _add_verb(routes: APIRouter, city: City, noun: str, verb: Verb, summary: str
         )
         return json_response(city.ask(request, SignalReply))
 
-    path, unique = f"/{{name}}/{noun}", f"signals_{verb}"
-    routes.post(path, summary=summary, dependencies=[OPERATOR], operation_id=unique)(wish)
+    routes.post(
+        f"/{{name}}/{noun}",
+        summary=summary,
+        dependencies=[OPERATOR],
+        operation_id=f"signals_{verb}",
+        responses=answer(SignalReply),
+    )(wish)
 
 
 def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
-    @routes.put("/{name}/plan", summary="Wish for another plan", dependencies=[OPERATOR])
+    @routes.put(
+        "/{name}/plan",
+        summary="Wish for another plan",
+        dependencies=[OPERATOR],
+        responses=answer(PlanReply),
+    )
     def plan(name: Name, body: PlanBody, key: IdempotencyKey = "") -> Response:
         junction_of(city, name)
         request = PlanRequest(
@@ -240,12 +310,22 @@ def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         )
         return json_response(city.ask(request, PlanReply))
 
-    @routes.put("/{name}/policy", summary="Run a policy for a while", dependencies=[OPERATOR])
+    @routes.put(
+        "/{name}/policy",
+        summary="Run a policy for a while",
+        dependencies=[OPERATOR],
+        responses=answer(SignalReply),
+    )
     def policy(name: Name, body: PolicyBody, key: IdempotencyKey = "") -> Response:
         junction_of(city, name)
         return json_response(city.ask(_policy(name, body.policy, body, key), SignalReply))
 
-    @routes.put("/{name}/flash", summary="Flash red, or go on", dependencies=[OPERATOR])
+    @routes.put(
+        "/{name}/flash",
+        summary="Flash red, or go on",
+        dependencies=[OPERATOR],
+        responses=answer(FlashReply),
+    )
     def flash(name: Name, body: FlashBody, key: IdempotencyKey = "") -> Response:
         junction_of(city, name)
         if body.engaged and body.expires_s is not None:
@@ -290,7 +370,11 @@ def _policy(name: str, policy: str, body: PolicyBody | FlashBody, key: str) -> S
 
 
 def _add_monitor(routes: APIRouter, city: City) -> None:
-    @routes.get("/{name}/monitor", summary="What the monitor said, newest first")
+    @routes.get(
+        "/{name}/monitor",
+        summary="What the monitor said, newest first",
+        responses=answer_page(Verdict),
+    )
     def verdicts(request: Request, name: Name, limit: Limit = 100, cursor: Cursor = "") -> Response:
         junction_of(city, name)
         rows = city.view.signal_verdicts(name)
@@ -301,6 +385,7 @@ def _add_monitor(routes: APIRouter, city: City) -> None:
         "/{name}/monitor/reset",
         summary="Clear a latched fault of the monitor",
         dependencies=[ENGINEER],
+        responses=answer(MonitorStatus),
     )
     def reset(name: Name, body: ResetBody, key: IdempotencyKey = "") -> Response:
         junction_of(city, name)

@@ -6,7 +6,7 @@ Written by docs/make/client.py: do not change it here.
 from typing import Literal
 
 from scm.client.connection import Connection, part
-from scm.client.records.audit import PageAuditRow, Verdict
+from scm.client.records.audit import ChainVerdict, PageAuditRow
 
 
 class AuditNoun:
@@ -72,7 +72,7 @@ class AuditNoun:
             query={"station": station, "by": by, "kind": kind, "text": text},
         )
 
-    def verdict(self, *, number: int = 0, digest: str = "") -> Verdict:
+    def verdict(self, *, number: int = 0, digest: str = "") -> ChainVerdict:
         """Check the whole chain.
 
         Args:
@@ -80,5 +80,5 @@ class AuditNoun:
             digest: its hash, noted before
         """
         return self._connection.ask(
-            "GET", "/api/v1/audit/verdict", Verdict, query={"number": number, "digest": digest}
+            "GET", "/api/v1/audit/verdict", ChainVerdict, query={"number": number, "digest": digest}
         )

@@ -3,9 +3,8 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from typing import Any
-
 from scm.client.connection import Connection, part
+from scm.client.records.leases import LeaseReply, LeaseRow, PageLeaseRow
 
 
 class LeasesNoun:
@@ -14,7 +13,7 @@ class LeasesNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def all_leases(self, *, limit: int = 100, cursor: str = "") -> Any:
+    def all_leases(self, *, limit: int = 100, cursor: str = "") -> PageLeaseRow:
         """Who drives which car.
 
         Args:
@@ -22,16 +21,16 @@ class LeasesNoun:
             cursor: `next` of the page before; empty: the first page
         """
         return self._connection.ask(
-            "GET", "/api/v1/leases", Any, query={"limit": limit, "cursor": cursor}
+            "GET", "/api/v1/leases", PageLeaseRow, query={"limit": limit, "cursor": cursor}
         )
 
-    def one_lease(self, name: str) -> Any:
+    def one_lease(self, name: str) -> LeaseRow:
         """Who drives a car.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/leases/{part(name)}", Any)
+        return self._connection.ask("GET", f"/api/v1/leases/{part(name)}", LeaseRow)
 
     def take(
         self,
@@ -41,7 +40,7 @@ class LeasesNoun:
         ttl_ms: int = 1000,
         reason: str = "",
         idempotency_key: str = "",
-    ) -> Any:
+    ) -> LeaseReply:
         """Take a car.
 
         Args:
@@ -54,7 +53,7 @@ class LeasesNoun:
         return self._connection.ask(
             "POST",
             f"/api/v1/leases/{part(name)}",
-            Any,
+            LeaseReply,
             body={"program": program, "ttl_ms": ttl_ms, "reason": reason},
             key=idempotency_key,
         )
@@ -67,7 +66,7 @@ class LeasesNoun:
         epoch: int,
         ttl_ms: int = 1000,
         idempotency_key: str = "",
-    ) -> Any:
+    ) -> LeaseReply:
         """Keep one's car.
 
         Args:
@@ -80,14 +79,14 @@ class LeasesNoun:
         return self._connection.ask(
             "PUT",
             f"/api/v1/leases/{part(name)}",
-            Any,
+            LeaseReply,
             body={"program": program, "epoch": epoch, "ttl_ms": ttl_ms},
             key=idempotency_key,
         )
 
     def give_back(
         self, name: str, *, epoch: int, program: str = "", idempotency_key: str = ""
-    ) -> Any:
+    ) -> LeaseReply:
         """Give one's car back.
 
         Args:
@@ -99,7 +98,7 @@ class LeasesNoun:
         return self._connection.ask(
             "DELETE",
             f"/api/v1/leases/{part(name)}",
-            Any,
+            LeaseReply,
             query={"epoch": epoch, "program": program},
             key=idempotency_key,
         )

@@ -102,14 +102,16 @@ class MismatchNoun:
         """
         return self._connection.ask("GET", f"/api/v1/mismatch/reports/{part(name)}", Report)
 
-    def remove(self, name: str, *, idempotency_key: str = "") -> Iterator[bytes]:
+    def remove(self, name: str, *, idempotency_key: str = "") -> None:
         """Remove a report.
 
         Args:
             name: a report's name
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.pieces(f"/api/v1/mismatch/reports/{part(name)}")
+        self._connection.tell(
+            "DELETE", f"/api/v1/mismatch/reports/{part(name)}", key=idempotency_key
+        )
 
     def download(self, name: str, file: str) -> Iterator[bytes]:
         """Download a file of a report.

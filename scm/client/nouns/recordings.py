@@ -4,9 +4,16 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from collections.abc import Iterator
-from typing import Any
 
 from scm.client.connection import Connection, part
+from scm.client.records.recordings import (
+    Frames,
+    Notes,
+    PageRecordedEvent,
+    PageRecordingRow,
+    RecordingRow,
+    Summary,
+)
 
 
 class RecordingsNoun:
@@ -31,28 +38,28 @@ class RecordingsNoun:
         """
         return self._connection.pieces(f"/api/v1/recordings/{part(name)}/foxglove.mcap")
 
-    def as_csv(self, name: str, *, vehicle: str = "") -> Iterator[bytes]:
+    def as_csv(self, name: str, *, vehicle: str = "") -> bytes:
         """Its cars as CSV.
 
         Args:
             name: a recording: its file without .mcap
             vehicle: a car's own reports; empty: all cars as the world saw them
         """
-        return self._connection.pieces(
+        return self._connection.fetch(
             f"/api/v1/recordings/{part(name)}/csv", query={"vehicle": vehicle}
         )
 
-    def summary(self, name: str) -> Any:
+    def summary(self, name: str) -> Summary:
         """What a replay has to know first.
 
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}/summary", Any)
+        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}/summary", Summary)
 
     def frames(
         self, name: str, *, from_s: float = 0.0, to_s: float = 10.0, hz: float = 10.0
-    ) -> Any:
+    ) -> Frames:
         """Where everything was, from a time to another.
 
         Args:
@@ -64,11 +71,11 @@ class RecordingsNoun:
         return self._connection.ask(
             "GET",
             f"/api/v1/recordings/{part(name)}/frames",
-            Any,
+            Frames,
             query={"from_s": from_s, "to_s": to_s, "hz": hz},
         )
 
-    def events(self, name: str, *, limit: int = 500, cursor: str = "") -> Any:
+    def events(self, name: str, *, limit: int = 500, cursor: str = "") -> PageRecordedEvent:
         """Its events, in their order.
 
         Args:
@@ -79,29 +86,29 @@ class RecordingsNoun:
         return self._connection.ask(
             "GET",
             f"/api/v1/recordings/{part(name)}/events",
-            Any,
+            PageRecordedEvent,
             query={"limit": limit, "cursor": cursor},
         )
 
-    def map_svg(self, name: str) -> Iterator[bytes]:
+    def map_svg(self, name: str) -> bytes:
         """The map it was driven on.
 
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.pieces(f"/api/v1/recordings/{part(name)}/map.svg")
+        return self._connection.fetch(f"/api/v1/recordings/{part(name)}/map.svg")
 
-    def notes(self, name: str) -> Any:
+    def notes(self, name: str) -> Notes:
         """What people wrote about it.
 
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}/notes", Any)
+        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}/notes", Notes)
 
     def write(
         self, name: str, *, title: str = "", notes: str = "", idempotency_key: str = ""
-    ) -> Any:
+    ) -> Notes:
         """Name it and note something.
 
         Args:
@@ -113,12 +120,12 @@ class RecordingsNoun:
         return self._connection.ask(
             "PUT",
             f"/api/v1/recordings/{part(name)}/notes",
-            Any,
+            Notes,
             body={"title": title, "notes": notes},
             key=idempotency_key,
         )
 
-    def all_recordings(self, *, limit: int = 100, cursor: str = "") -> Any:
+    def all_recordings(self, *, limit: int = 100, cursor: str = "") -> PageRecordingRow:
         """All recordings, the one written last first.
 
         Args:
@@ -126,24 +133,22 @@ class RecordingsNoun:
             cursor: `next` of the page before; empty: the first page
         """
         return self._connection.ask(
-            "GET", "/api/v1/recordings", Any, query={"limit": limit, "cursor": cursor}
+            "GET", "/api/v1/recordings", PageRecordingRow, query={"limit": limit, "cursor": cursor}
         )
 
-    def one_recording(self, name: str) -> Any:
+    def one_recording(self, name: str) -> RecordingRow:
         """One recording.
 
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}", Any)
+        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}", RecordingRow)
 
-    def remove(self, name: str, *, idempotency_key: str = "") -> Any:
+    def remove(self, name: str, *, idempotency_key: str = "") -> None:
         """Delete a recording.
 
         Args:
             name: a recording: its file without .mcap
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
-            "DELETE", f"/api/v1/recordings/{part(name)}", Any, key=idempotency_key
-        )
+        self._connection.tell("DELETE", f"/api/v1/recordings/{part(name)}", key=idempotency_key)

@@ -3,9 +3,11 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from typing import Any
+from collections.abc import Iterator
 
 from scm.client.connection import Connection, part
+from scm.client.records.scans import ScanRow
+from scm.client.stream import LiveEvent
 
 
 class ScansNoun:
@@ -14,18 +16,18 @@ class ScansNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def one(self, name: str) -> Any:
+    def one(self, name: str) -> ScanRow:
         """The next turn of a car's LIDAR.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/scan", Any)
+        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/scan", ScanRow)
 
-    def every(self, name: str) -> Any:
+    def every(self, name: str) -> Iterator[LiveEvent]:
         """Every turn, as server-sent events.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/scan/stream", Any)
+        return self._connection.events(f"/api/v1/vehicles/{part(name)}/scan/stream")

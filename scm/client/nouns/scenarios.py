@@ -3,9 +3,9 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from typing import Any
-
 from scm.client.connection import Connection, part
+from scm.client.records.scenarios import Lines, PageScenario, Scenario
+from scm.client.records.shared import Operation
 
 
 class ScenariosNoun:
@@ -14,7 +14,7 @@ class ScenariosNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def all_scenarios(self, *, limit: int = 100, cursor: str = "") -> Any:
+    def all_scenarios(self, *, limit: int = 100, cursor: str = "") -> PageScenario:
         """All scripts, one's own first.
 
         Args:
@@ -22,18 +22,18 @@ class ScenariosNoun:
             cursor: `next` of the page before; empty: the first page
         """
         return self._connection.ask(
-            "GET", "/api/v1/scenarios", Any, query={"limit": limit, "cursor": cursor}
+            "GET", "/api/v1/scenarios", PageScenario, query={"limit": limit, "cursor": cursor}
         )
 
-    def one(self, name: str) -> Any:
+    def one(self, name: str) -> Scenario:
         """One script with its text.
 
         Args:
             name: a script without .py
         """
-        return self._connection.ask("GET", f"/api/v1/scenarios/{part(name)}", Any)
+        return self._connection.ask("GET", f"/api/v1/scenarios/{part(name)}", Scenario)
 
-    def write(self, name: str, *, text: str, idempotency_key: str = "") -> Any:
+    def write(self, name: str, *, text: str, idempotency_key: str = "") -> Scenario:
         """Write a script.
 
         Args:
@@ -42,23 +42,25 @@ class ScenariosNoun:
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
-            "PUT", f"/api/v1/scenarios/{part(name)}", Any, body={"text": text}, key=idempotency_key
+            "PUT",
+            f"/api/v1/scenarios/{part(name)}",
+            Scenario,
+            body={"text": text},
+            key=idempotency_key,
         )
 
-    def remove(self, name: str, *, idempotency_key: str = "") -> Any:
+    def remove(self, name: str, *, idempotency_key: str = "") -> None:
         """Delete a script.
 
         Args:
             name: a script without .py
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
-            "DELETE", f"/api/v1/scenarios/{part(name)}", Any, key=idempotency_key
-        )
+        self._connection.tell("DELETE", f"/api/v1/scenarios/{part(name)}", key=idempotency_key)
 
     def run(
         self, name: str, *, arguments: tuple[str, ...] | None = None, idempotency_key: str = ""
-    ) -> Any:
+    ) -> Operation:
         """Run a script.
 
         Args:
@@ -69,12 +71,12 @@ class ScenariosNoun:
         return self._connection.ask(
             "POST",
             f"/api/v1/scenarios/{part(name)}/runs",
-            Any,
+            Operation,
             body={"arguments": arguments},
             key=idempotency_key,
         )
 
-    def lines(self, run: str, *, after: int = 0) -> Any:
+    def lines(self, run: str, *, after: int = 0) -> Lines:
         """What a run printed.
 
         Args:
@@ -82,5 +84,5 @@ class ScenariosNoun:
             after: number of the first line
         """
         return self._connection.ask(
-            "GET", f"/api/v1/scenarios/runs/{part(run)}/lines", Any, query={"after": after}
+            "GET", f"/api/v1/scenarios/runs/{part(run)}/lines", Lines, query={"after": after}
         )

@@ -3,10 +3,24 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from typing import Any, Literal
+from typing import Literal
 
 from scm.client.connection import Connection, part
-from scm.client.records.signals import StageBody
+from scm.client.records.shared import Operation
+from scm.client.records.signals import (
+    FlashReply,
+    History,
+    MonitorStatus,
+    PagePlanRow,
+    PageSignalWish,
+    PageVerdict,
+    PlanProof,
+    PlanReply,
+    PlanRow,
+    PromiseScore,
+    SignalReply,
+)
+from scm.client.records.signals_parts import JunctionRow, Signals, SignalSite, StageBody, StatusRow
 
 
 class SignalsNoun:
@@ -15,51 +29,51 @@ class SignalsNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def all_signals(self) -> Any:
+    def all_signals(self) -> Signals:
         """All junctions."""
-        return self._connection.ask("GET", "/api/v1/signals", Any)
+        return self._connection.ask("GET", "/api/v1/signals", Signals)
 
-    def one_signal(self, name: str) -> Any:
+    def one_signal(self, name: str) -> JunctionRow:
         """One junction.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}", Any)
+        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}", JunctionRow)
 
-    def site(self, name: str) -> Any:
+    def site(self, name: str) -> SignalSite:
         """Phases, least times, conflicts, rings, policies.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/site", Any)
+        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/site", SignalSite)
 
-    def status(self, name: str) -> Any:
+    def status(self, name: str) -> StatusRow:
         """What runs, detectors, greens to come.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/status", Any)
+        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/status", StatusRow)
 
-    def history(self, name: str) -> Any:
+    def history(self, name: str) -> History:
         """What each group showed in the last ten minutes.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/history", Any)
+        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/history", History)
 
-    def promises(self, name: str) -> Any:
+    def promises(self, name: str) -> PromiseScore:
         """What SPaT told against what happened.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/promises", Any)
+        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/promises", PromiseScore)
 
-    def wishes(self, name: str, *, limit: int = 100, cursor: str = "") -> Any:
+    def wishes(self, name: str, *, limit: int = 100, cursor: str = "") -> PageSignalWish:
         """Wishes in force, each with who, why and its end.
 
         Args:
@@ -70,7 +84,7 @@ class SignalsNoun:
         return self._connection.ask(
             "GET",
             f"/api/v1/signals/{part(name)}/wishes",
-            Any,
+            PageSignalWish,
             query={"limit": limit, "cursor": cursor},
         )
 
@@ -83,7 +97,7 @@ class SignalsNoun:
         groups: tuple[str, ...],
         expires_s: float = 60.0,
         idempotency_key: str = "",
-    ) -> Any:
+    ) -> SignalReply:
         """Call groups: each is served once.
 
         Args:
@@ -97,7 +111,7 @@ class SignalsNoun:
         return self._connection.ask(
             "POST",
             f"/api/v1/signals/{part(name)}/calls",
-            Any,
+            SignalReply,
             body={"by": by, "reason": reason, "groups": groups, "expires_s": expires_s},
             key=idempotency_key,
         )
@@ -111,7 +125,7 @@ class SignalsNoun:
         groups: tuple[str, ...],
         expires_s: float = 60.0,
         idempotency_key: str = "",
-    ) -> Any:
+    ) -> SignalReply:
         """Hold groups: once green, they stay green.
 
         Args:
@@ -125,7 +139,7 @@ class SignalsNoun:
         return self._connection.ask(
             "POST",
             f"/api/v1/signals/{part(name)}/holds",
-            Any,
+            SignalReply,
             body={"by": by, "reason": reason, "groups": groups, "expires_s": expires_s},
             key=idempotency_key,
         )
@@ -139,7 +153,7 @@ class SignalsNoun:
         groups: tuple[str, ...],
         expires_s: float = 60.0,
         idempotency_key: str = "",
-    ) -> Any:
+    ) -> SignalReply:
         """Force groups off: their green ends once others are called.
 
         Args:
@@ -153,7 +167,7 @@ class SignalsNoun:
         return self._connection.ask(
             "POST",
             f"/api/v1/signals/{part(name)}/force-offs",
-            Any,
+            SignalReply,
             body={"by": by, "reason": reason, "groups": groups, "expires_s": expires_s},
             key=idempotency_key,
         )
@@ -167,7 +181,7 @@ class SignalsNoun:
         groups: tuple[str, ...],
         expires_s: float = 60.0,
         idempotency_key: str = "",
-    ) -> Any:
+    ) -> SignalReply:
         """Omit groups: they are not begun.
 
         Args:
@@ -181,7 +195,7 @@ class SignalsNoun:
         return self._connection.ask(
             "POST",
             f"/api/v1/signals/{part(name)}/omits",
-            Any,
+            SignalReply,
             body={"by": by, "reason": reason, "groups": groups, "expires_s": expires_s},
             key=idempotency_key,
         )
@@ -195,7 +209,7 @@ class SignalsNoun:
         groups: tuple[str, ...],
         expires_s: float = 60.0,
         idempotency_key: str = "",
-    ) -> Any:
+    ) -> SignalReply:
         """Pre-empt for one group: it comes next and stays.
 
         Args:
@@ -209,7 +223,7 @@ class SignalsNoun:
         return self._connection.ask(
             "POST",
             f"/api/v1/signals/{part(name)}/preempts",
-            Any,
+            SignalReply,
             body={"by": by, "reason": reason, "groups": groups, "expires_s": expires_s},
             key=idempotency_key,
         )
@@ -223,7 +237,7 @@ class SignalsNoun:
         groups: tuple[str, ...] | None = None,
         verb: Literal["", "call", "hold", "force_off", "omit", "preempt", "policy"] = "",
         idempotency_key: str = "",
-    ) -> Any:
+    ) -> SignalReply:
         """Take wishes back.
 
         Args:
@@ -237,14 +251,14 @@ class SignalsNoun:
         return self._connection.ask(
             "POST",
             f"/api/v1/signals/{part(name)}/clear",
-            Any,
+            SignalReply,
             body={"by": by, "reason": reason, "groups": groups, "verb": verb},
             key=idempotency_key,
         )
 
     def plan(
         self, name: str, *, by: str = "api", reason: str = "", plan: str, idempotency_key: str = ""
-    ) -> Any:
+    ) -> PlanReply:
         """Wish for another plan.
 
         Args:
@@ -257,7 +271,7 @@ class SignalsNoun:
         return self._connection.ask(
             "PUT",
             f"/api/v1/signals/{part(name)}/plan",
-            Any,
+            PlanReply,
             body={"by": by, "reason": reason, "plan": plan},
             key=idempotency_key,
         )
@@ -271,7 +285,7 @@ class SignalsNoun:
         policy: str,
         expires_s: float = 300.0,
         idempotency_key: str = "",
-    ) -> Any:
+    ) -> SignalReply:
         """Run a policy for a while.
 
         Args:
@@ -285,7 +299,7 @@ class SignalsNoun:
         return self._connection.ask(
             "PUT",
             f"/api/v1/signals/{part(name)}/policy",
-            Any,
+            SignalReply,
             body={"by": by, "reason": reason, "policy": policy, "expires_s": expires_s},
             key=idempotency_key,
         )
@@ -299,7 +313,7 @@ class SignalsNoun:
         engaged: bool,
         expires_s: float | None = None,
         idempotency_key: str = "",
-    ) -> Any:
+    ) -> FlashReply:
         """Flash red, or go on.
 
         Args:
@@ -313,12 +327,12 @@ class SignalsNoun:
         return self._connection.ask(
             "PUT",
             f"/api/v1/signals/{part(name)}/flash",
-            Any,
+            FlashReply,
             body={"by": by, "reason": reason, "engaged": engaged, "expires_s": expires_s},
             key=idempotency_key,
         )
 
-    def verdicts(self, name: str, *, limit: int = 100, cursor: str = "") -> Any:
+    def verdicts(self, name: str, *, limit: int = 100, cursor: str = "") -> PageVerdict:
         """What the monitor said, newest first.
 
         Args:
@@ -329,11 +343,13 @@ class SignalsNoun:
         return self._connection.ask(
             "GET",
             f"/api/v1/signals/{part(name)}/monitor",
-            Any,
+            PageVerdict,
             query={"limit": limit, "cursor": cursor},
         )
 
-    def reset(self, name: str, *, by: str = "api", reason: str, idempotency_key: str = "") -> Any:
+    def reset(
+        self, name: str, *, by: str = "api", reason: str, idempotency_key: str = ""
+    ) -> MonitorStatus:
         """Clear a latched fault of the monitor.
 
         Args:
@@ -345,12 +361,12 @@ class SignalsNoun:
         return self._connection.ask(
             "POST",
             f"/api/v1/signals/{part(name)}/monitor/reset",
-            Any,
+            MonitorStatus,
             body={"by": by, "reason": reason},
             key=idempotency_key,
         )
 
-    def plans(self, name: str, *, limit: int = 100, cursor: str = "") -> Any:
+    def plans(self, name: str, *, limit: int = 100, cursor: str = "") -> PagePlanRow:
         """All plans of a junction.
 
         Args:
@@ -361,18 +377,20 @@ class SignalsNoun:
         return self._connection.ask(
             "GET",
             f"/api/v1/signals/{part(name)}/plans",
-            Any,
+            PagePlanRow,
             query={"limit": limit, "cursor": cursor},
         )
 
-    def one_plan(self, name: str, plan: str) -> Any:
+    def one_plan(self, name: str, plan: str) -> PlanRow:
         """One plan.
 
         Args:
             name: a name on the bus
             plan: a plan's name
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/plans/{part(plan)}", Any)
+        return self._connection.ask(
+            "GET", f"/api/v1/signals/{part(name)}/plans/{part(plan)}", PlanRow
+        )
 
     def save(
         self,
@@ -383,7 +401,7 @@ class SignalsNoun:
         by: str = "api",
         reason: str = "",
         stages: tuple[StageBody, ...],
-    ) -> Any:
+    ) -> PlanRow:
         """Save a proven plan.
 
         Args:
@@ -397,11 +415,11 @@ class SignalsNoun:
         return self._connection.ask(
             "PUT",
             f"/api/v1/signals/{part(name)}/plans/{part(plan)}",
-            Any,
+            PlanRow,
             body={"about": about, "by": by, "reason": reason, "stages": stages},
         )
 
-    def delete(self, name: str, plan: str) -> Any:
+    def delete(self, name: str, plan: str) -> PlanRow:
         """Delete a saved plan.
 
         Args:
@@ -409,10 +427,10 @@ class SignalsNoun:
             plan: a plan's name
         """
         return self._connection.ask(
-            "DELETE", f"/api/v1/signals/{part(name)}/plans/{part(plan)}", Any
+            "DELETE", f"/api/v1/signals/{part(name)}/plans/{part(plan)}", PlanRow
         )
 
-    def prove(self, name: str, *, plan: str, stages: tuple[StageBody, ...]) -> Any:
+    def prove(self, name: str, *, plan: str, stages: tuple[StageBody, ...]) -> Operation:
         """Search every state of kernel and plan for fault.
 
         Args:
@@ -423,17 +441,17 @@ class SignalsNoun:
         return self._connection.ask(
             "POST",
             f"/api/v1/signals/{part(name)}/proofs",
-            Any,
+            Operation,
             body={"plan": plan, "stages": stages},
         )
 
-    def proof(self, name: str, digest: str) -> Any:
+    def proof(self, name: str, digest: str) -> PlanProof:
         """One proof.
 
         Args:
             name: a name on the bus
-            digest: digest
+            digest: of a proof
         """
         return self._connection.ask(
-            "GET", f"/api/v1/signals/{part(name)}/proofs/{part(digest)}", Any
+            "GET", f"/api/v1/signals/{part(name)}/proofs/{part(digest)}", PlanProof
         )

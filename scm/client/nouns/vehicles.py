@@ -3,17 +3,21 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from typing import Any, Literal
+from collections.abc import Iterator
+from typing import Literal
 
 from scm.client.connection import Connection, part
 from scm.client.records.vehicles import (
     LightReply,
+    LinkRow,
+    PathRow,
     RemoveReply,
     RouteReply,
     SpawnReply,
     VehicleRow,
     VehiclesTopic,
 )
+from scm.client.stream import LiveEvent
 
 
 class VehiclesNoun:
@@ -119,26 +123,26 @@ class VehiclesNoun:
             key=idempotency_key,
         )
 
-    def path(self, name: str) -> Any:
+    def path(self, name: str) -> PathRow:
         """A car's way ahead, at most 12 m of it.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/path", Any)
+        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/path", PathRow)
 
-    def reports(self, name: str) -> Any:
+    def reports(self, name: str) -> Iterator[LiveEvent]:
         """All that a car reports, as server-sent events `reports`.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/reports", Any)
+        return self._connection.events(f"/api/v1/vehicles/{part(name)}/reports")
 
-    def link(self, name: str) -> Any:
+    def link(self, name: str) -> LinkRow:
         """How long the way to a car and back is now.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/link", Any)
+        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/link", LinkRow)

@@ -44,7 +44,7 @@ class PageAuditRow(msgspec.Struct, kw_only=True, frozen=True):
     next_: str | None = msgspec.field(name="next")
 
 
-class Verdict(msgspec.Struct, kw_only=True, frozen=True):
+class ChainVerdict(msgspec.Struct, kw_only=True, frozen=True):
     """Whether the chain of entries is whole.
 
     Attributes:

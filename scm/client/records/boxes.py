@@ -5,21 +5,7 @@ Written by docs/make/client.py: do not change it here.
 
 import msgspec
 
-
-class SnapshotBox(msgspec.Struct, kw_only=True, frozen=True):
-    """One construction box that cars can push; pose of its middle, map frame.
-
-    Attributes:
-        name: What it is called.
-        x_m: To the right on the map [m].
-        y_m: Up on the map [m].
-        yaw_rad: Direction, counter-clockwise from map x [rad].
-    """
-
-    name: str
-    x_m: float
-    y_m: float
-    yaw_rad: float
+from scm.client.records.shared import SnapshotBox
 
 
 class Boxes(msgspec.Struct, kw_only=True, frozen=True):

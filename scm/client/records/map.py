@@ -7,7 +7,24 @@ from typing import Literal
 
 import msgspec
 
-from scm.client.records.map_parts import Area, Conflict, Floor, Group, Lane, MapTag, Wind
+from scm.client.records.map_parts import Area, Conflict, Floor, Lane, MapTag, Wind
+from scm.client.records.shared import Box, Light
+
+
+class Group(msgspec.Struct, kw_only=True, frozen=True):
+    """A signal group and what it releases; `number` is its id in SPATEM.
+
+    Attributes:
+        name: What it is called.
+        number: Its number.
+        movement: Its way through the junction.
+        more: Further ways, where an approach parts: straight on, left, right.
+    """
+
+    name: str
+    number: int
+    movement: Conflict
+    more: tuple[Conflict, ...] = ()
 
 
 class PlanStage(msgspec.Struct, kw_only=True, frozen=True):
@@ -87,26 +104,6 @@ class StopLine(msgspec.Struct, kw_only=True, frozen=True):
     group: str
 
 
-class Light(msgspec.Struct, kw_only=True, frozen=True):
-    """A three-lamp head on a pole; it shows its group's colour.
-
-    Attributes:
-        light_id: Number of the signal head.
-        x_m: To the right on the map [m].
-        y_m: Up on the map [m].
-        yaw_rad: Where the lamps look: towards the cars they are meant for.
-        junction: Name of a junction.
-        group: Name of a signal group: heads that always show the same.
-    """
-
-    light_id: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    junction: str
-    group: str
-
-
 class Crosswalk(msgspec.Struct, kw_only=True, frozen=True):
     """Painted stripes across a lane: centre, direction of the lane there, and size [m].
 
@@ -165,32 +162,6 @@ class Wall(msgspec.Struct, kw_only=True, frozen=True):
     closed: bool = False
     thickness_m: float = 0.01
     height_m: float = 0.2
-
-
-class Box(msgspec.Struct, kw_only=True, frozen=True):
-    """A construction box on the floor.
-
-    Attributes:
-        name: What it is called.
-        x_m: To the right on the map [m].
-        y_m: Up on the map [m].
-        yaw_rad: Direction, counter-clockwise from map x [rad].
-        length_m: How long it is [m].
-        width_m: How wide it is [m].
-        height_m: Above the floor [m].
-        mass_kg: Of one that cars can push; without it nobody moves the box.
-        friction: Between the box and the floor.
-    """
-
-    name: str
-    x_m: float
-    y_m: float
-    yaw_rad: float = 0.0
-    length_m: float
-    width_m: float
-    height_m: float = 0.2
-    mass_kg: float | None = None
-    friction: float = 0.5
 
 
 class Spawn(msgspec.Struct, kw_only=True, frozen=True):

@@ -109,7 +109,7 @@ class Report(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         row: As in the list.
-        report: The fields of `report.json`, as docs/mismatch.md lists them.
+        report: The fields of `report.json`, as docs/mismatch.md lists them; None: damaged.
         drawn: What its pictures draw and the words beside them; None of an older report.
         job: What it was made from; None: nobody noted it.
         drives: Names of the drives it suggests.
@@ -118,8 +118,8 @@ class Report(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     row: ReportRow
-    report: Any
-    drawn: Any
+    report: dict[str, Any] | None
+    drawn: dict[str, Any] | None
     job: Job | None
     drives: tuple[str, ...]
     told: int

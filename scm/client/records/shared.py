@@ -80,3 +80,65 @@ class Operation(msgspec.Struct, kw_only=True, frozen=True):
     asked_ns: int
     began_ns: int | None
     ended_ns: int | None
+
+
+class Light(msgspec.Struct, kw_only=True, frozen=True):
+    """A three-lamp head on a pole; it shows its group's colour.
+
+    Attributes:
+        light_id: Number of the signal head.
+        x_m: To the right on the map [m].
+        y_m: Up on the map [m].
+        yaw_rad: Where the lamps look: towards the cars they are meant for.
+        junction: Name of a junction.
+        group: Name of a signal group: heads that always show the same.
+    """
+
+    light_id: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    junction: str
+    group: str
+
+
+class Box(msgspec.Struct, kw_only=True, frozen=True):
+    """A construction box on the floor.
+
+    Attributes:
+        name: What it is called.
+        x_m: To the right on the map [m].
+        y_m: Up on the map [m].
+        yaw_rad: Direction, counter-clockwise from map x [rad].
+        length_m: How long it is [m].
+        width_m: How wide it is [m].
+        height_m: Above the floor [m].
+        mass_kg: Of one that cars can push; without it nobody moves the box.
+        friction: Between the box and the floor.
+    """
+
+    name: str
+    x_m: float
+    y_m: float
+    yaw_rad: float = 0.0
+    length_m: float
+    width_m: float
+    height_m: float = 0.2
+    mass_kg: float | None = None
+    friction: float = 0.5
+
+
+class SnapshotBox(msgspec.Struct, kw_only=True, frozen=True):
+    """One construction box that cars can push; pose of its middle, map frame.
+
+    Attributes:
+        name: What it is called.
+        x_m: To the right on the map [m].
+        y_m: Up on the map [m].
+        yaw_rad: Direction, counter-clockwise from map x [rad].
+    """
+
+    name: str
+    x_m: float
+    y_m: float
+    yaw_rad: float

@@ -154,3 +154,35 @@ class LightReply(msgspec.Struct, kw_only=True, frozen=True):
     vehicle: str
     headlights: Literal["high", "low", "off"]
     indicators: Literal["hazard", "left", "off", "right"]
+
+
+class PathRow(msgspec.Struct, kw_only=True, frozen=True):
+    """A car's way ahead; empty while it has no trip, or is not on it.
+
+    Attributes:
+        vehicle: Name of a car.
+        trip_id: Of this trip.
+        points_m: x and y in the map frame, every 5 cm, from the car on.
+        is_whole: Whether it ends where the trip does, and not at 12 m.
+    """
+
+    vehicle: str
+    trip_id: str | None
+    points_m: tuple[tuple[float, float], ...]
+    is_whole: bool
+
+
+class LinkRow(msgspec.Struct, kw_only=True, frozen=True):
+    """How long the way to a car's owner and back is.
+
+    Attributes:
+        vehicle: Name of a car.
+        answered_by: `world` for hosted cars, else the car's own `agent`.
+        round_trip_ms: From here to it and back, its wait for its next step (20 ms) included.
+        clock_ahead_ms: Its clock less ours, as if both ways took equally long.
+    """
+
+    vehicle: str
+    answered_by: str
+    round_trip_ms: float
+    clock_ahead_ms: float

@@ -105,6 +105,13 @@ def test_who_is_silent_for_ever_is_given_up(served):
     assert len(asked) == connection.TRIES
 
 
+def test_what_is_only_done_is_told_by_its_own_verb_and_under_a_key(served):
+    own, asked = served(problem(503, "busy"), httpx.Response(204))
+    own.tell("DELETE", "/v/n1", key="k1")
+    assert [one.method for one in asked] == ["DELETE", "DELETE"]
+    assert {one.headers["Idempotency-Key"] for one in asked} == {"k1"}
+
+
 def test_long_answers_come_in_pieces(served):
     own, _ = served(httpx.Response(200, content=b"abcdef"))
     assert b"".join(own.pieces("/film")) == b"abcdef"
