@@ -32,7 +32,7 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
         min_s: It will not change before; None: not known.
         max_s: It will have changed by then; None: not known.
         likely_s: It will likely change then: a forecast, no promise; None: nobody knows.
-        confidence: Share of such forecasts that come true within a second, 0 to 1.
+        likely_confidence: Share of such forecasts that come true within a second, 0 to 1.
         since_ns: When this colour began, on the controller's clock.
     """
 
@@ -42,7 +42,7 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
     min_s: float | None = None
     max_s: float | None = None
     likely_s: float | None = None
-    confidence: float | None = None
+    likely_confidence: float | None = None
     since_ns: int | None = None
 
 
