@@ -26,6 +26,7 @@ from scm.api.routes import (
     cities,
     events,
     eye,
+    eye_calibration,
     health,
     live,
     map,  # noqa: A004  named for its noun
@@ -73,6 +74,7 @@ def create_app(
     plans: Mapping[str, Sequence[str]] | None = None,
     shelves: Shelves | None = None,
     link: Link | None = None,
+    map_file: str = "",
 ) -> FastAPI:
     """Build the application.
 
@@ -85,8 +87,9 @@ def create_app(
         plans: Names of the signal plans each junction offers, beyond those that were seen.
         shelves: Folders of recordings, reports and the like; None: the city offers none.
         link: What is known of the connection to the bus.
+        map_file: Name or path of the map; empty: its own name.
     """
-    city = City(view, ask, city_map, plans or {}, shelves or Shelves(), link or Link())
+    city = City(view, ask, city_map, plans or {}, shelves or Shelves(), link or Link(), map_file)
     work = Operations(WallClock())
     stream = Stream(city, uuid.uuid4().hex[:8])
     app = FastAPI(
@@ -116,6 +119,7 @@ def create_app(
     ):  # fmt: skip
         api.include_router(noun.router(city), responses=problem.RESPONSES)
     api.include_router(cameras.router(city, stream), responses=problem.RESPONSES)
+    api.include_router(eye_calibration.router(city, work), responses=problem.RESPONSES)
     api.include_router(operations.router(work), responses=problem.RESPONSES)
     api.include_router(live.router(stream), responses=problem.RESPONSES)
     api.include_router(session.router(), responses=problem.RESPONSES)

@@ -58,6 +58,7 @@ class City:
         plans: Names of the signal plans each junction offers, beyond those that were seen.
         shelves: Folders that the interface reads and writes.
         link: Its connection to the bus.
+        map_file: Name or path of the map, as other programs are told it; empty: its own name.
     """
 
     view: CityView
@@ -66,6 +67,7 @@ class City:
     plans: Mapping[str, Sequence[str]] = field(default_factory=dict)
     shelves: Shelves = field(default_factory=Shelves)
     link: Link = field(default_factory=Link)
+    map_file: str = ""
 
     @property
     def name(self) -> str:

@@ -54,6 +54,7 @@ def pulse_of(picture: Picture) -> Pulse:
 
 def topics_of(city: City) -> dict[str, Topic]:
     """Return every topic but `events`, by name."""
+    floor = {city.city_map.tag.tag_id: city.city_map.tag}
     return {
         "pulse": Topic(pulse_of, 4),
         "stop": Topic(stop_of, 2),
@@ -62,6 +63,6 @@ def topics_of(city: City) -> dict[str, Topic]:
             lambda picture: junction_rows(picture, city.city_map.junctions, city.plans), 2
         ),
         "boxes": Topic(boxes_of, 2),
-        "eye": Topic(camera_rows, 2),
+        "eye": Topic(lambda picture: camera_rows(picture, floor), 2),
         "stations": Topic(lambda picture: picture.stations, 10),
     }

@@ -52,6 +52,7 @@ def _run(arguments: argparse.Namespace) -> int:
             lambda request, timeout_s: ask(bus, request, timeout_s),
             city_map,
             keys=keys,
+            map_file=arguments.map,
             shelves=shelves_in(arguments.data) if arguments.data else None,
             link=Link(
                 city=arguments.city,

@@ -110,9 +110,7 @@ def _shaped(entity: Entity, options: str) -> Entity:
     return key_values(entity) if options == "keyValues" else entity
 
 
-def _response(
-    request: Request, body: Entity | list[Entity], headers: dict[str, str]
-) -> Response:
+def _response(request: Request, body: Entity | list[Entity], headers: dict[str, str]) -> Response:
     """Return entities with their context inside as JSON-LD, or named in `Link` as JSON."""
     own = {"Cache-Control": "no-store", **headers}
     if JSON_LD in request.headers.get("accept", ""):
