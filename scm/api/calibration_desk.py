@@ -20,6 +20,7 @@ from scm.api.city import not_found
 from scm.api.operations import Cancelled, Teller
 from scm.api.problem import RefusedError
 from scm.errors import RunError
+from scm.parent_watch import with_parent
 from scm.v2x.message import Refused
 
 LARGEST_PICTURE = 8 * 1024 * 1024
@@ -230,7 +231,7 @@ def _run(words: Sequence[str], tell: Teller) -> None:
     """
     with tempfile.TemporaryFile() as said:
         child = subprocess.Popen(
-            [sys.executable, "-m", "scm", "eye", *words],
+            with_parent([sys.executable, "-m", "scm", "eye", *words]),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=said,

@@ -8,7 +8,7 @@ import json
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -54,7 +54,7 @@ class CalibrationFile(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     row: CalibrationRow
-    toml: str
+    toml: Annotated[str, msgspec.Meta(examples=['[[cameras]]\nname = "overhead"\nx_m = 1.384\n'])]
 
 
 class _Lens(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Literal, TypedDict
+from typing import Annotated, Literal, TypedDict
 
 import msgspec
 
@@ -82,7 +82,7 @@ class PoseRow(msgspec.Struct, kw_only=True, frozen=True):
     std_yaw_rad: float
     map_tag_age_ms: float
     age_s: float
-    flags: tuple[str, ...]
+    flags: Annotated[tuple[str, ...], msgspec.Meta(examples=[["bumped"]])]
     residual: Residual | None
 
 

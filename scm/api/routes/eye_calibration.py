@@ -59,7 +59,7 @@ class View(msgspec.Struct, kw_only=True, frozen=True):
 
     name: str
     made_ns: int
-    found: Any
+    found: Annotated[Any, msgspec.Meta(examples=[{"points": 40, "sharpness": 3.1}])]
 
 
 class Views(msgspec.Struct, kw_only=True, frozen=True):
@@ -71,7 +71,7 @@ class Views(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     views: tuple[View, ...]
-    findings: Any
+    findings: Annotated[Any, msgspec.Meta(examples=[{"size_px": [1280, 720], "refused": []}])]
 
 
 class Body(BaseModel):

@@ -24,11 +24,12 @@ export function dismiss(id) {
 
 /**
  * Ask the city for a change and tell the person how it went.
+ * @param {object} extra more headers, as If-Match
  * @returns the reply, or null when it was refused.
  */
-export async function change(method, path, body, done) {
+export async function change(method, path, body, done, extra = {}) {
   try {
-    const reply = await send(method, path, body, crypto.randomUUID?.() ?? String(Math.random()));
+    const reply = await send(method, path, body, crypto.randomUUID?.() ?? String(Math.random()), extra);
     if (done) notify("info", done(reply));
     return reply;
   } catch (error) {
@@ -37,19 +38,20 @@ export async function change(method, path, body, done) {
   }
 }
 
-async function send(method, path, body, requestId) {
-  const headers = { "Idempotency-Key": requestId };
+async function send(method, path, body, requestId, extra) {
+  const headers = { "Idempotency-Key": requestId, ...extra };
   const key = sessionStorage.getItem(KEY);
   if (key) headers.Authorization = `Bearer ${key}`;
-  if (body !== undefined) headers["Content-Type"] = "application/json";
+  const isFile = body instanceof Blob;
+  if (body !== undefined) headers["Content-Type"] = isFile ? body.type : "application/json";
   const response = await fetch(`/api/v1${path}`, {
     method,
     headers,
-    body: body === undefined ? undefined : JSON.stringify(body),
+    body: body === undefined || isFile ? body : JSON.stringify(body),
   });
   const reply = await response.json().catch(() => ({}));
   if (response.ok) return reply;
-  if (response.status === 401 && (await askForKey())) return send(method, path, body, requestId);
+  if (response.status === 401 && (await askForKey())) return send(method, path, body, requestId, extra);
   throw new Error(reply.detail || reply.title || `${method} ${path}: ${response.status}`);
 }
 
