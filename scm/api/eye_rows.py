@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Literal, TypedDict
 
 import msgspec
@@ -111,7 +112,9 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
     complaints: tuple[str, ...]
 
 
-def camera_rows(picture: Picture, floor: Mapping[int, MapTag]) -> tuple[CameraRow, ...]:
+def camera_rows(
+    picture: Picture, floor: Mapping[int, MapTag] = MappingProxyType({})
+) -> tuple[CameraRow, ...]:
     """Return all cameras that were heard, by name; `floor`: the map's tags, by id."""
     names = sorted({*picture.frames, *picture.tags, *picture.eye_statuses})
     return tuple(_row(name, picture, floor) for name in names)

@@ -288,15 +288,16 @@ def _add_shelf(routes: APIRouter, there: Any) -> None:
         "/calibrations/{name}",
         summary="Put a calibration on the shelf, or another text in its place",
         dependencies=[ENGINEER],
-        responses=answer(CalibrationFile),
+        responses={**answer(CalibrationFile), **answer(CalibrationFile, 201, "A new one.")},
     )
     def write(
         request: Request, name: CalibrationName, body: CalibrationBody, key: IdempotencyKey = ""
     ) -> Response:
         del key  # the state that the writer saw is asked for
         shelf = there().shelf
-        check_match(request, shelf.find(name))
-        return tagged(request, shelf.write(name, body.toml))
+        before = shelf.find(name)
+        check_match(request, before)
+        return tagged(request, shelf.write(name, body.toml), 201 if before is None else 200)
 
     @routes.delete(
         "/calibrations/{name}",
