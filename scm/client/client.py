@@ -15,6 +15,7 @@ from scm.client.nouns.health import HealthNoun
 from scm.client.nouns.keys import KeysNoun
 from scm.client.nouns.map import MapNoun
 from scm.client.nouns.misbehaviour import MisbehaviourNoun
+from scm.client.nouns.ngsi import NgsiNoun
 from scm.client.nouns.operations import OperationsNoun
 from scm.client.nouns.session import SessionNoun
 from scm.client.nouns.signals import SignalsNoun
@@ -44,6 +45,7 @@ class Client:
         self.keys = KeysNoun(self.connection)
         self.map = MapNoun(self.connection)
         self.misbehaviour = MisbehaviourNoun(self.connection)
+        self.ngsi = NgsiNoun(self.connection)
         self.operations = OperationsNoun(self.connection)
         self.session = SessionNoun(self.connection)
         self.signals = SignalsNoun(self.connection)

@@ -4,7 +4,8 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection, part
-from scm.client.records.operations import Operation, PageOperation
+from scm.client.records.operations import PageOperation
+from scm.client.records.shared import Operation
 
 
 class OperationsNoun:

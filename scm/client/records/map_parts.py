@@ -266,19 +266,3 @@ class Conflict(msgspec.Struct, kw_only=True, frozen=True):
     lane: str
     from_m: float
     to_m: float
-
-
-class Group(msgspec.Struct, kw_only=True, frozen=True):
-    """A signal group and what it releases; `number` is its id in SPATEM.
-
-    Attributes:
-        name: What it is called.
-        number: Its number.
-        movement: Its way through the junction.
-        more: Further ways, where an approach parts: straight on, left, right.
-    """
-
-    name: str
-    number: int
-    movement: Conflict
-    more: tuple[Conflict, ...] = ()

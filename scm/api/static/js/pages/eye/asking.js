@@ -3,7 +3,9 @@ import { useEffect, useState } from "preact/hooks";
 
 /** @returns the body; throws a sentence where the city says no. */
 export async function read(path) {
-  const response = await fetch(`/api/v1${path}`);
+  const response = await fetch(`/api/v1${path}`).catch(() => {
+    throw new Error("The city's server does not answer; it is asked again.");
+  });
   const body = await response.json().catch(() => ({}));
   if (!response.ok) throw new Error(body.detail || body.title || `${path}: ${response.status}`);
   return body;

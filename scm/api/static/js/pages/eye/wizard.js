@@ -7,7 +7,7 @@ import { Shelf } from "scm/pages/eye/shelf.js";
 
 export function Wizard({ camera }) {
   const shelf = usePolled("/eye/calibrations?limit=200", 5000);
-  if (shelf.error) {
+  if (shelf.error && shelf.body === null) {
     return html`<section class="panel wide" aria-label="Calibrate"><p class="empty" role="alert">${shelf.error}</p></section>`;
   }
   const kept = shelf.body?.items ?? [];
