@@ -108,7 +108,7 @@ function bar(paper, { width, height, scale, gain }) {
   const mm = STEPS.findLast((step) => step * px_per_mm <= BAR_SHARE * width) ?? 1;
   const long = mm * px_per_mm;
   const legend = [[`≤ ${GOOD_MM} mm`, 0], [`≤ ${FAIR_MM} mm`, FAIR_MM], ["more", FAIR_MM + 1]];
-  const wide = Math.max(long, 150) + 24;
+  const wide = Math.max(long + 60, 190) + 12;
   const [x, y] = [10, height - 62];
   paper.fillStyle = "rgba(13, 18, 24, 0.82)";
   paper.beginPath();
@@ -129,9 +129,9 @@ function bar(paper, { width, height, scale, gain }) {
   paper.stroke();
   paper.fillText(`${mm} mm`, x + 18 + long, y + 13);
   legend.forEach(([text, value], i) => {
-    const at = x + 12 + i * 52;
+    const at = x + 12 + i * 64;
     paper.fillStyle = shade(value);
-    paper.fillRect(at, y + 26, 44, 3);
+    paper.fillRect(at, y + 26, 54, 3);
     paper.fillStyle = "#e8ecf1";
     paper.font = "11px system-ui, sans-serif";
     paper.fillText(text, at, y + 39);
