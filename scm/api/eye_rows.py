@@ -94,6 +94,7 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
         frame_t_ns: Exposure of the newest frame, as text: it names the picture exactly, and is
             too long for a number in a browser. None: no frame yet.
         tags: Those of that frame, or of the newest detection when that frame was skipped.
+        tags_t_ns: Exposure of the frame that they were found in, as text; None: none yet.
         known: Tags of the last minute, whose they are, and where.
         good: Whether its poses can be trusted, by its own account; None: not said.
         complaints: What is wrong, in sentences.
@@ -106,6 +107,7 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
     age_s: float | None
     latency_ms: float | None
     tags: tuple[TagSeen, ...]
+    tags_t_ns: Annotated[str | None, msgspec.Meta(examples=["120000000000"])]
     known: tuple[TagRow, ...]
     seen: tuple[SeenRow, ...]
     good: bool | None
@@ -157,6 +159,7 @@ def _row(camera: str, picture: Picture, floor: Mapping[int, MapTag]) -> CameraRo
         age_s=None if frame is None else round(frame.age_s(picture.now_ns), 1),
         latency_ms=None if tags is None else round(tags.message.latency_ms, 1),
         tags=() if tags is None else tags.message.tags,
+        tags_t_ns=None if tags is None else str(tags.message.t_ns),
         known=tuple(_known(camera, picture, floor)),
         seen=tuple(_seen(camera, picture)),
         **_status(said, picture.now_ns),

@@ -74,7 +74,10 @@ class TestReady:
 
     def test_a_view_that_hangs_shows_by_the_clock(self, ready, heard):
         late = ready(clock=StepClock(5 * NS_PER_S))
-        assert late.json()["detail"] == "world: the newest snapshot is 3.0 s old, expected at most 2.0 s"
+        assert (
+            late.json()["detail"]
+            == "world: the newest snapshot is 3.0 s old, expected at most 2.0 s"
+        )
 
     def test_a_full_disk_is_told_with_its_folder(self, ready, heard, monkeypatch, tmp_path):
         usage = namedtuple("usage", "total used free")  # noqa: PYI024  as shutil's own

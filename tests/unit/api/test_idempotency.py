@@ -64,7 +64,8 @@ def test_the_same_change_gets_the_stored_answer(client, done):
 
 
 @pytest.mark.parametrize(
-    ("method", "path", "body"), [("POST", "/x", b"b"), ("PUT", "/x", b"a"), ("POST", "/x?q=1", b"a")]
+    ("method", "path", "body"),
+    [("POST", "/x", b"b"), ("PUT", "/x", b"a"), ("POST", "/x?q=1", b"a")],
 )
 def test_another_request_under_the_key_is_a_mistake(client, done, method, path, body):
     client("POST", "/x", content=b"a", headers=KEY)

@@ -39,5 +39,7 @@ def test_problems_and_the_log_name_it(client, caplog):
 
 
 def test_the_gate_names_it_as_well(app, client_of):
-    refused = client_of(app, "http://evil.example")("GET", "/healthz", headers={"traceparent": PARENT})
+    refused = client_of(app, "http://evil.example")(
+        "GET", "/healthz", headers={"traceparent": PARENT}
+    )
     assert (refused.status_code, refused.json()["trace_id"]) == (403, GIVEN)

@@ -35,11 +35,15 @@ export class EyePicture {
   }
 
   /** Take what the stream tells of the camera's newest frame. */
-  hear({ frame_t_ns, tags, known }) {
+  hear({ frame_t_ns, tags_t_ns, tags, known }) {
     if (frame_t_ns === null) return;
     this.#named = frame_t_ns;
     this.#known = new Map(known.map((one) => [one.tag_id, one]));
-    this.#tags.set(frame_t_ns, tags);
+    if (tags_t_ns !== null) this.#tags.set(tags_t_ns, tags);
+    if (this.#shown?.t_ns === tags_t_ns && this.#shown.tags !== tags) {
+      this.#shown.tags = tags; // they came after their picture
+      this.draw();
+    }
     if (this.#tags.size > TAGS_KEPT) this.#tags.delete(this.#tags.keys().next().value);
     this.#takeWaiting();
     this.#follow();
@@ -124,7 +128,7 @@ export class EyePicture {
     if (!tags && BigInt(t_ns) > BigInt(this.#named)) return;
     this.#waiting = null;
     this.#shown?.image.close();
-    this.#shown = { image, tags: tags ?? [] };
+    this.#shown = { t_ns, image, tags: tags ?? [] };
     this.draw();
     this.#onDrawn(t_ns);
   }

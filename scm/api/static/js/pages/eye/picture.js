@@ -21,7 +21,7 @@ export function Picture({ camera }) {
     watcher.observe(canvas.current);
     return () => watcher.disconnect();
   }, []);
-  useEffect(() => picture.current.hear(camera), [camera.frame_t_ns]);
+  useEffect(() => picture.current.hear(camera), [camera.frame_t_ns, camera.tags_t_ns]);
   useEffect(() => picture.current.show(layers, chosenTag.value), [layers, chosenTag.value]);
   const act = (change) => {
     change(picture.current);
