@@ -88,6 +88,7 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
         age_s: How long ago it was heard last [s].
         latency_ms: From exposure to being taken up [ms].
         tags: Those of that frame, or of the newest detection when that frame was skipped.
+        tags_t_ns: Exposure of the frame that they were found in, as text; None: none yet.
         known: Tags of the last minute, whose they are, and where.
         seen: What is seen.
         good: Whether its poses can be trusted, by its own account; None: not said.
@@ -101,6 +102,7 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
     age_s: float | None
     latency_ms: float | None
     tags: tuple[TagSeen, ...]
+    tags_t_ns: str | None
     known: tuple[TagRow, ...]
     seen: tuple[SeenRow, ...]
     good: bool | None

@@ -11,6 +11,7 @@ from scm.eye.camera import camera_model
 from scm.maps.load import load_map
 
 NUMBERS = ".eye-numbers tbody tr >> nth=1"
+MEASURING_MS = 120_000  # a program of its own that counts: seconds, unless others count too
 COLUMNS, ROWS, SQUARE_M, CELL_PX = 9, 6, 0.1, 40
 
 
@@ -46,7 +47,7 @@ def test_the_place_of_the_camera_is_found_again_from_the_live_picture(visit, run
     visited = visit("/eye/calibrate")
     page = visited.page
     page.click("text=Find the place")
-    page.wait_for_selector(".eye-place .result table")
+    page.wait_for_selector(".eye-place .result table", timeout=MEASURING_MS)
     (row,) = running.get("/eye/calibrations")["items"]
     assert (row["kind"], row["camera"]) == ("place", "overhead")
     found = tomllib.loads(running.get(f"/eye/calibrations/{row['name']}")["toml"])["cameras"][0]
@@ -64,10 +65,11 @@ def test_a_lens_is_measured_from_uploaded_pictures(visit, running, tmp_path):
     page = visited.page
     page.fill("input[name=square_mm]", str(1000 * SQUARE_M))
     page.set_input_files("input[type=file]", [str(path) for path in paths])
-    page.wait_for_selector(f".eye-lens .facts:has-text('{len(paths)} of {len(paths)} pictures')")
+    all_found = f".eye-lens .facts:has-text('{len(paths)} of {len(paths)} pictures')"
+    page.wait_for_selector(all_found, timeout=MEASURING_MS)
     page.wait_for_selector(".coverage canvas[data-percent]")
     page.click("text=Measure the lens")
-    page.wait_for_selector(".eye-lens .result dl")
+    page.wait_for_selector(".eye-lens .result dl", timeout=MEASURING_MS)
     (row,) = running.get("/eye/calibrations")["items"]
     found = tomllib.loads(running.get(f"/eye/calibrations/{row['name']}")["toml"])
     assert found["fx_px"] == pytest.approx(camera.fx_px, rel=0.01)
