@@ -109,26 +109,16 @@ class LensBody(Body):
     )
 
 
-class FloorTagBody(Body):
-    """A tag laid on the floor, measured to a millimetre."""
-
-    id: int = Field(ge=0, le=586, description="printed on it", examples=[100])
-    x_m: float = Field(description="its middle on the map [m]", examples=[0.2])
-    y_m: float = Field(description="its middle on the map [m]", examples=[0.08])
-    yaw_rad: float = Field(0.0, description="where its print's right points", examples=[0.0])
-    size_m: float = Field(gt=0.0, le=2.0, description="its black edge", examples=[0.12])
-
-
 class PlaceBody(Body):
     """From what the camera's place is to be found, and what the result is called."""
 
     lens: SaveAs | None = Field(
         None, description="a lens on the shelf; null: the map's", examples=["overhead-lens"]
     )
-    tags: tuple[FloorTagBody, ...] = Field(
+    tags: tuple[dict[str, float], ...] = Field(
         (),
         max_length=40,
-        description="tags on the floor beside the map's own",
+        description="tags on the floor beside the map's: id, x_m, y_m, yaw_rad, size_m of each",
         examples=[[{"id": 100, "x_m": 0.2, "y_m": 0.08, "yaw_rad": 0.0, "size_m": 0.12}]],
     )
     save_as: SaveAs
@@ -265,7 +255,7 @@ def _add_measuring(routes: APIRouter, city: City, there: Any, work: Operations) 
         if body.lens and desk.shelf.get(body.lens).row.kind != "lens":
             detail = f"lens: expected a lens, got {body.lens!r}, which is a place"
             raise RefusedError(Refused(code="invalid", detail=detail))
-        tags = [FloorTag(**tag.model_dump()) for tag in body.tags]
+        tags = _floor_tags(body)
         job = desk.locate(name, _newest(city, name), body.lens or "", tags, body.save_as)
         return accepted(work.start("calibration", f"place of {name}", job, owner=_owner(request)))
 
@@ -375,3 +365,10 @@ def _board_words(body: LensBody) -> list[str]:
 
 def _owner(request: Request) -> str:
     return str(request.scope.get("scm_owner", ""))
+
+
+def _floor_tags(body: PlaceBody) -> tuple[FloorTag, ...]:
+    try:
+        return msgspec.convert(body.tags, tuple[FloorTag, ...], strict=True)
+    except msgspec.ValidationError as error:
+        raise RefusedError(Refused(code="invalid", detail=f"tags: {error}")) from error

@@ -207,7 +207,7 @@ class EyeNoun:
         name: str,
         *,
         lens: str | None = None,
-        tags: tuple[FloorTagBody, ...] = (),
+        tags: tuple[dict[str, float], ...] = (),
         save_as: str,
         idempotency_key: str = "",
     ) -> Operation:
@@ -216,7 +216,7 @@ class EyeNoun:
         Args:
             name: a name on the bus
             lens: a lens on the shelf; null: the map's
-            tags: tags on the floor beside the map's own
+            tags: tags on the floor beside the map's: id, x_m, y_m, yaw_rad, size_m of each
             save_as: what the result is called
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
