@@ -369,6 +369,6 @@ def _owner(request: Request) -> str:
 
 def _floor_tags(body: PlaceBody) -> tuple[FloorTag, ...]:
     try:
-        return msgspec.convert(body.tags, tuple[FloorTag, ...], strict=True)
+        return msgspec.convert(body.tags, tuple[FloorTag, ...], strict=False)
     except msgspec.ValidationError as error:
         raise RefusedError(Refused(code="invalid", detail=f"tags: {error}")) from error
