@@ -13,7 +13,7 @@ from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import EyeStatus
-from scm.v2x.messages.eye_tags import EyeTags
+from scm.v2x.messages.eye_tags import EyeTags, TagSeen
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.signal_site import SignalSite
 from scm.v2x.messages.signal_status import SignalStatus
@@ -49,6 +49,15 @@ class SeenPose:
 
 
 @dataclass(frozen=True, slots=True)
+class TagSighting:
+    """A tag when a camera saw it last: in the frame exposed at `t_ns`, told at `arrived_ns`."""
+
+    tag: TagSeen
+    t_ns: int
+    arrived_ns: int
+
+
+@dataclass(frozen=True, slots=True)
 class Picture:
     """The newest of everything heard, as of `now_ns`, the time of the view's last step.
 
@@ -57,6 +66,7 @@ class Picture:
         trips: By vehicle.
         traffic: The observer's newest counts; `violations` the last it told, oldest first.
         frames, tags: By camera, the last few, oldest first; `eye_statuses` the newest.
+        tags_seen: By (camera, tag id), all of the last minute.
         poses: By (camera, vehicle).
         stations: Everybody who is there, and who was lost lately.
         event_seq: Number of the newest event in the log; 0: none yet.
@@ -75,6 +85,7 @@ class Picture:
     violations: tuple[Violation, ...] = ()
     frames: dict[str, tuple[Held[EyeFrame], ...]] = field(default_factory=dict)
     tags: dict[str, tuple[Held[EyeTags], ...]] = field(default_factory=dict)
+    tags_seen: dict[tuple[str, int], TagSighting] = field(default_factory=dict)
     eye_statuses: dict[str, Held[EyeStatus]] = field(default_factory=dict)
     poses: dict[tuple[str, str], SeenPose] = field(default_factory=dict)
     stations: tuple[StationRow, ...] = ()

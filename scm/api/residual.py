@@ -14,14 +14,23 @@ from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 
 class Residual(msgspec.Struct, kw_only=True, frozen=True):
-    """Measured minus true: distance on the floor, and yaw (+ = measured further left)."""
+    """Measured minus true: distance on the floor, and yaw (+ = measured further left).
+
+    Attributes:
+        x_mm, y_mm: Along map x and y [mm].
+    """
 
     position_mm: float
+    x_mm: float
+    y_mm: float
     yaw_deg: float
 
 
 def truth_at(history: Sequence[WorldSnapshot], vehicle: str, t_ns: int) -> Pose2 | None:
-    """Return where a car truly was at `t_ns`; None outside the history (oldest first)."""
+    """Return where a car truly was at `t_ns`; None outside the history (oldest first).
+
+    Of a real car nobody knows: the world has its pose from the Eye.
+    """
     before = after = None
     for snapshot in history:
         if snapshot.t_ns <= t_ns:
@@ -47,9 +56,12 @@ def residual_of(measured: Pose2, truth: Pose2) -> Residual:
     """Return the difference in millimetre and degree."""
     return Residual(
         position_mm=round(1000.0 * math.hypot(measured.x - truth.x, measured.y - truth.y), 2),
+        x_mm=round(1000.0 * (measured.x - truth.x), 2),
+        y_mm=round(1000.0 * (measured.y - truth.y), 2),
         yaw_deg=round(math.degrees(wrap_angle(measured.yaw - truth.yaw)), 3),
     )
 
 
 def _car(snapshot: WorldSnapshot, vehicle: str) -> SnapshotVehicle | None:
-    return next((car for car in snapshot.vehicles if car.vehicle == vehicle), None)
+    found = (car for car in snapshot.vehicles if car.vehicle == vehicle and car.kind != "real")
+    return next(found, None)

@@ -57,6 +57,7 @@ def pulse_of(picture: Picture) -> Pulse:
 
 def topics_of(city: City, seen: Acknowledgements) -> dict[str, Topic]:
     """Return every topic but `events`, by name."""
+    floor = {city.city_map.tag.tag_id: city.city_map.tag}
     return {
         "pulse": Topic(pulse_of, 4),
         "stop": Topic(stop_of, 2),
@@ -66,7 +67,7 @@ def topics_of(city: City, seen: Acknowledgements) -> dict[str, Topic]:
         ),
         "signal_status": Topic(status_rows, 4),
         "boxes": Topic(boxes_of, 2),
-        "eye": Topic(camera_rows, 2),
         "acknowledgements": Topic(lambda _: seen.newest(ACKNOWLEDGED_SHOWN), 4),
+        "eye": Topic(lambda picture: camera_rows(picture, floor), 2),
         "stations": Topic(lambda picture: picture.stations, 10),
     }

@@ -13,7 +13,8 @@ from typing import Any
 
 from scm.api.close_up import CloseUps
 from scm.api.event_log import EventLog, LoggedEvent
-from scm.api.picture import Held, Picture, SeenPose
+from scm.api.eye_residuals import ResidualLog, ResidualSample
+from scm.api.picture import Held, Picture, SeenPose, TagSighting
 from scm.api.residual import residual_of, truth_at
 from scm.api.scan_watch import ScanWatch
 from scm.api.signal_history import History, PromiseScore, SignalHistory, Verdict
@@ -80,12 +81,14 @@ class CityView:
         self._violations: deque[Violation] = deque(maxlen=VIOLATIONS_DEPTH)
         self._frames: dict[str, deque[Held[EyeFrame]]] = {}
         self._tags: dict[str, deque[Held[EyeTags]]] = {}
+        self._tags_seen: dict[tuple[str, int], TagSighting] = {}
         self._eye_statuses: dict[str, Held[EyeStatus]] = {}
         self._watched: Counter[tuple[str, str]] = Counter()
         self._camera_frames: dict[tuple[str, str], Held[CameraFrame]] = {}
         self._scans = ScanWatch()
         self._close_ups = CloseUps()
         self._poses: dict[tuple[str, str], SeenPose] = {}
+        self._residuals = ResidualLog()
         self._scores: Held[MisbehaviourScores] | None = None
         self._reports: dict[str, MisbehaviourReport] = {}
         self._stations = StationTable()
@@ -159,6 +162,7 @@ class CityView:
             violations=tuple(self._violations),
             frames={camera: tuple(frames) for camera, frames in self._frames.items()},
             tags={camera: tuple(tags) for camera, tags in self._tags.items()},
+            tags_seen=dict(self._tags_seen),
             eye_statuses=dict(self._eye_statuses),
             poses=dict(self._poses),
             stations=self._stations.rows(self._now_ns),
@@ -174,6 +178,14 @@ class CityView:
         """Return all events that are kept, newest first; safe from any thread."""
         with self._lock:
             return self._log.newest_first()
+
+    def residuals(
+        self, camera: str, window_s: float, vehicle: str = ""
+    ) -> dict[str, tuple[ResidualSample, ...]]:
+        """Return what a camera's poses were off by of late, by car; safe from any thread."""
+        with self._lock:
+            newest_ns = self._truth[-1].t_ns if self._truth else self._now_ns
+            return self._residuals.samples(camera, newest_ns, window_s, vehicle)
 
     def misbehaviour(
         self,
@@ -323,12 +335,16 @@ class CityView:
 
     def _take_tags(self, tags: EyeTags, t_ns: int) -> None:
         self._tags.setdefault(tags.camera, deque(maxlen=TAGS_DEPTH)).append(Held(tags, t_ns))
+        for tag in tags.tags:
+            self._tags_seen[tags.camera, tag.tag_id] = TagSighting(tag, tags.t_ns, t_ns)
 
     def _take_pose(self, pose: EyePose, t_ns: int) -> None:
         truth = truth_at(self._truth, pose.vehicle, pose.t_ns)
         measured = Pose2(pose.x_m, pose.y_m, pose.yaw_rad)
         residual = residual_of(measured, truth) if truth is not None else None
         self._poses[pose.camera, pose.vehicle] = SeenPose(Held(pose, t_ns), residual)
+        if residual is not None:
+            self._residuals.add(pose, residual)
 
     def _take_scores(self, scores: MisbehaviourScores, t_ns: int) -> None:
         self._scores = Held(scores, t_ns)
@@ -346,3 +362,7 @@ class CityView:
             del self._trips[name]
         for key in [k for k, seen in self._poses.items() if seen.held.arrived_ns < oldest_ns]:
             del self._poses[key]
+        for tag in [k for k, one in self._tags_seen.items() if one.arrived_ns < oldest_ns]:
+            del self._tags_seen[tag]
+        if self._truth:
+            self._residuals.forget(self._truth[-1].t_ns)

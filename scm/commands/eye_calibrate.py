@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from scm.command import Command
 
 if TYPE_CHECKING:  # the command line starts without what finds boards
+    from scm.eye.calibrate.board import Board
+    from scm.eye.calibrate.gather import Gathered
     from scm.maps.model import Camera
 
 
@@ -38,34 +40,67 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--first-id", type=int, default=0, metavar="ID", help="of the tag at the lower left"
     )
     parser.add_argument("--fisheye", action="store_true", help="a lens of more than about 100 deg")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="lens.toml")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="lens.toml")
+    parser.add_argument(
+        "--look", action="store_true", help="only find the board in the pictures, measure nothing"
+    )
+    parser.add_argument(
+        "--report", type=Path, metavar="FILE", help="all that was found as JSON, for programs"
+    )
     parser.add_argument("--map", metavar="MAP", help="whose camera it is: checks the frame's size")
     parser.add_argument("--camera-name", metavar="NAME", help="which; default: the map's first")
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.errors import EyeError
-    from scm.eye.calibrate.board import Board
-    from scm.eye.calibrate.gather import from_camera, from_files
-    from scm.eye.calibrate.judge import judge
-    from scm.eye.calibrate.say import report
-    from scm.eye.calibrate.solve import solve
-    from scm.eye.calibration import calibrated
+    from scm.eye.calibrate.told import views_told, write_report
 
     if bool(arguments.image) == (arguments.camera is not None):
         raise EyeError("expected pictures, or a film, or --camera N, and only one of these")
+    if arguments.look == (arguments.out is not None):
+        raise EyeError("expected --out FILE for the lens, or --look, and only one of these")
     owner = _owner(arguments)
+    board, gathered = _gathered(arguments)
+    if arguments.report:  # what follows may refuse them
+        write_report(views_told(board, gathered), arguments.report)
+    if not arguments.look:
+        _measure(arguments, board, gathered, owner)
+        return 0
+    _progress("")
+    for line in gathered.said:
+        print(line)
+    print(f"{board.said}: in {len(gathered.views)} pictures")
+    return 0
+
+
+def _gathered(arguments: argparse.Namespace) -> "tuple[Board, Gathered]":
+    from scm.eye.calibrate.board import Board
+    from scm.eye.calibrate.gather import from_camera, from_files
+
     columns, rows = arguments.squares
     board = Board(
         arguments.board, columns, rows, arguments.square_m, arguments.marker_m,
         arguments.dictionary, arguments.first_id,
     )  # fmt: skip
     if arguments.camera is not None:
-        gathered = from_camera(board, arguments.camera, arguments.views, _progress)
-    else:
-        gathered = from_files(board, arguments.image, _progress)
+        return board, from_camera(board, arguments.camera, arguments.views, _progress)
+    return board, from_files(board, arguments.image, _progress)
+
+
+def _measure(
+    arguments: argparse.Namespace, board: "Board", gathered: "Gathered", owner: "Camera | None"
+) -> None:
+    from scm.errors import EyeError
+    from scm.eye.calibrate.judge import judge
+    from scm.eye.calibrate.say import report
+    from scm.eye.calibrate.solve import solve
+    from scm.eye.calibrate.told import lens_told, write_report
+    from scm.eye.calibration import calibrated
+
     solution = solve(gathered.views, gathered.size, arguments.fisheye, _progress)
     verdict = judge(solution)
+    if arguments.report:
+        write_report(lens_told(board, gathered, solution, verdict), arguments.report)
     _progress("")
     for line in gathered.said:
         print(line)
@@ -78,7 +113,6 @@ def _run(arguments: argparse.Namespace) -> int:
         calibrated(owner, calibration)
     calibration.save(arguments.out)
     print(f"\nwritten to {arguments.out}")
-    return 0
 
 
 def _owner(arguments: argparse.Namespace) -> "Camera | None":

@@ -24,6 +24,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="more tags: [[tags]] id, x_m, y_m, yaw_rad, size_m",
     )
+    parser.add_argument(
+        "--report", type=Path, metavar="FILE", help="all that was found as JSON, for programs"
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -31,6 +34,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
     from scm.errors import EyeError
     from scm.eye.calibrate.locate import known_tags, locate, off_px
+    from scm.eye.calibrate.told import place_told, write_report
     from scm.eye.calibration import calibrated, load_calibration
     from scm.eye.camera import camera_of
     from scm.eye.detect import Settings, detect_tags
@@ -41,10 +45,10 @@ def _run(arguments: argparse.Namespace) -> int:
     city_map = load_map(arguments.map)
     lens = load_calibration(arguments.calibration) if arguments.calibration else None
     if lens is not None and not city_map.cameras:
-        camera = lens.camera(arguments.camera or "overhead")
+        camera = in_force = lens.camera(arguments.camera or "overhead")
     else:
-        camera = camera_of(city_map, arguments.camera)
-        camera = camera if lens is None else calibrated(camera, lens)
+        in_force = camera_of(city_map, arguments.camera)
+        camera = in_force if lens is None else calibrated(in_force, lens)
     grey = grey_of(read_picture(arguments.image))
     if grey.shape != (camera.height_px, camera.width_px):
         wanted = f"{camera.width_px} x {camera.height_px} px"
@@ -64,7 +68,10 @@ def _run(arguments: argparse.Namespace) -> int:
     print("\n".join(_said(located)))
     if lens is None:
         print("# the lens is taken as exact: with --calibration its doubt is in the numbers below")
-    print(_block(located.places[0]))
+    block = _block(located.places[0])
+    print(block)
+    if arguments.report:
+        write_report(place_told(in_force, tags, seen, located, block), arguments.report)
     return 0
 
 

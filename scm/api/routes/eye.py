@@ -1,15 +1,33 @@
-"""The Eye: the overhead cameras, their newest pictures and the tags found in them."""
+"""The Eye: its overhead cameras, their newest pictures, the tags in them, and cars' poses."""
 
 from typing import Annotated
 
 import msgspec
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query, Request, Response
 
 from scm.api.city import City, Name, json_response, not_found
-from scm.api.eye_rows import CameraRow, camera_rows, frame_of, tags_of
+from scm.api.eye_residuals import ResidualSample, ResidualStats, stats_of, thinned
+from scm.api.eye_rows import CameraRow, PoseRow, camera_rows, frame_of, pose_rows, tags_of
+from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import VIEWER
-from scm.api.schemas import answer, answer_file
+from scm.api.schemas import answer, answer_file, answer_page
+from scm.maps.model import Camera
 from scm.v2x.messages.eye_tags import EyeTags
+
+LONGEST_WINDOW_S = 300.0
+MOST_SAMPLES = 3_000
+
+WindowS = Annotated[
+    float,
+    Query(gt=0.0, le=LONGEST_WINDOW_S, description="how far back [s]", examples=[120.0]),
+]
+Vehicle = Annotated[
+    str,
+    Query(pattern=r"^[a-z0-9_-]{0,32}$", description="one car; empty: all", examples=["n1"]),
+]
+Most = Annotated[
+    int, Query(ge=0, le=MOST_SAMPLES, description="samples at most, evenly taken", examples=[500])
+]
 
 
 class Overhead(msgspec.Struct, kw_only=True, frozen=True):
@@ -18,21 +36,81 @@ class Overhead(msgspec.Struct, kw_only=True, frozen=True):
     cameras: tuple[CameraRow, ...]
 
 
+class CameraState(msgspec.Struct, kw_only=True, frozen=True):
+    """One camera.
+
+    Attributes:
+        state: As in the list.
+        mounted: Its lens and where it hangs, by the map; null: the map does not know it.
+    """
+
+    state: CameraRow
+    mounted: Camera | None
+
+
+class VehicleResiduals(msgspec.Struct, kw_only=True, frozen=True):
+    """What one car's poses were off by."""
+
+    vehicle: str
+    stats: ResidualStats
+
+
+class Residuals(msgspec.Struct, kw_only=True, frozen=True):
+    """What a camera's poses were off by, against the truth of a simulated city.
+
+    Attributes:
+        stats: Of all its cars together.
+        vehicles: Of each car.
+        samples: Poses with their residuals, two a second of each car, evenly thinned.
+    """
+
+    camera: str
+    window_s: float
+    stats: ResidualStats
+    vehicles: tuple[VehicleResiduals, ...]
+    samples: tuple[ResidualSample, ...]
+
+
 def router(city: City) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/eye", tags=["eye"], dependencies=[VIEWER])
+    _add_cameras(routes, city)
+    _add_pictures(routes, city)
+    _add_poses(routes, city)
+    return routes
+
+
+def _add_cameras(routes: APIRouter, city: City) -> None:
+    floor = {city.city_map.tag.tag_id: city.city_map.tag}
 
     @routes.get("", summary="All cameras, with tags and poses seen", responses=answer(Overhead))
-    async def cameras() -> Response:
-        return json_response(Overhead(cameras=camera_rows(city.view.picture())))
+    def overhead() -> Response:
+        return json_response(Overhead(cameras=camera_rows(city.view.picture(), floor)))
 
+    @routes.get("/cameras", summary="The cameras, a page", responses=answer_page(CameraRow))
+    def cameras(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
+        rows = camera_rows(city.view.picture(), floor)
+        page = page_of(rows, lambda row: row.camera, limit=limit, cursor=cursor)
+        return page_response(request, page)
+
+    @routes.get("/cameras/{name}", summary="One camera", responses=answer(CameraState))
+    def camera(name: Name) -> Response:
+        rows = camera_rows(city.view.picture(), floor)
+        row = next((row for row in rows if row.camera == name), None)
+        if row is None:
+            raise not_found("camera", name)
+        mounted = next((one for one in city.city_map.cameras if one.name == name), None)
+        return json_response(CameraState(state=row, mounted=mounted))
+
+
+def _add_pictures(routes: APIRouter, city: City) -> None:
     @routes.get(
         "/cameras/{name}/frame.jpg",
         summary="A camera's newest picture",
         response_class=Response,
         responses=answer_file("image/jpeg", "The picture; `X-Time-Ns`: of its exposure."),
     )
-    async def frame(
+    def frame(
         name: Name,
         t_ns: Annotated[
             int | None,
@@ -50,10 +128,45 @@ def router(city: City) -> APIRouter:
         summary="The tags found in a camera's newest picture",
         responses=answer(EyeTags),
     )
-    async def tags(name: Name) -> Response:
+    def tags(name: Name) -> Response:
         held = tags_of(city.view.picture(), name)
         if held is None:
             raise not_found("camera with tags", name)
         return json_response(held.message)
 
-    return routes
+
+def _add_poses(routes: APIRouter, city: City) -> None:
+    @routes.get(
+        "/poses",
+        summary="The newest pose of each car by each camera",
+        responses=answer_page(PoseRow),
+    )
+    def poses(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
+        rows = pose_rows(city.view.picture())
+        page = page_of(rows, lambda row: f"{row.camera}/{row.vehicle}", limit=limit, cursor=cursor)
+        return page_response(request, page)
+
+    @routes.get(
+        "/cameras/{name}/residuals",
+        summary="How far a camera's poses lay from the truth",
+        responses=answer(Residuals),
+    )
+    def residuals(
+        name: Name, window_s: WindowS = 120.0, vehicle: Vehicle = "", most: Most = 1000
+    ) -> Response:
+        picture = city.view.picture()
+        if not any(name in known for known in (picture.frames, picture.tags, picture.eye_statuses)):
+            raise not_found("camera", name)
+        samples = city.view.residuals(name, window_s, vehicle)
+        told = Residuals(
+            camera=name,
+            window_s=window_s,
+            stats=stats_of(one for kept in samples.values() for one in kept),
+            vehicles=tuple(
+                VehicleResiduals(vehicle=car, stats=stats_of(kept))
+                for car, kept in samples.items()
+                if kept
+            ),
+            samples=thinned(samples, most) if most else (),
+        )
+        return json_response(told)

@@ -162,6 +162,7 @@ def router(city: City, jobs: MismatchJobs) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/mismatch", tags=["mismatch"], dependencies=[VIEWER])
     _add_jobs(routes, city, jobs)
+    _add_uploads(routes, jobs)
     _add_reports(routes, jobs)
     _add_drives(routes, jobs)
     return routes
@@ -214,6 +215,8 @@ def _add_jobs(routes: APIRouter, city: City, jobs: MismatchJobs) -> None:
             )
         return accepted(jobs.search(recordings, job))
 
+
+def _add_uploads(routes: APIRouter, jobs: MismatchJobs) -> None:
     @routes.post(
         "/uploads",
         summary="Send a recording: a zip with recording.yaml, or of a run",

@@ -320,6 +320,10 @@ def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         junction_of(city, name)
         return json_response(city.ask(_policy(name, body.policy, body, key), SignalReply))
 
+    _add_flash(routes, city, shelf)
+
+
+def _add_flash(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
     @routes.put(
         "/{name}/flash",
         summary="Flash red, or go on",

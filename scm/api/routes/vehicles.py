@@ -106,6 +106,11 @@ def router(city: City) -> APIRouter:
         request = RemoveRequest(request_id=key, vehicle=name, reason=reason)
         return json_response(city.ask(request, RemoveReply))
 
+    _add_wishes(routes, city)
+    return routes
+
+
+def _add_wishes(routes: APIRouter, city: City) -> None:
     @routes.post(
         "/{name}/route",
         summary="Send a car on a route",
@@ -133,8 +138,6 @@ def router(city: City) -> APIRouter:
             request_id=key, vehicle=name, headlights=body.headlights, indicators=body.indicators
         )
         return json_response(city.ask(request, LightReply))
-
-    return routes
 
 
 def _find(city: City, name: str) -> VehicleRow:

@@ -3,8 +3,23 @@
 Written by docs/make/client.py: do not change it here.
 """
 
+from collections.abc import Iterator
+from typing import Any, Literal
+
 from scm.client.connection import Connection, part
-from scm.client.records.eye import EyeTags, Overhead
+from scm.client.records.eye import (
+    CalibrationFile,
+    CameraState,
+    EyeTags,
+    Overhead,
+    PageCalibrationRow,
+    PageCameraRow,
+    PagePoseRow,
+    Residuals,
+    View,
+    Views,
+)
+from scm.client.records.shared import Operation
 
 
 class EyeNoun:
@@ -13,9 +28,28 @@ class EyeNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def cameras(self) -> Overhead:
+    def overhead(self) -> Overhead:
         """All cameras, with tags and poses seen."""
         return self._connection.ask("GET", "/api/v1/eye", Overhead)
+
+    def cameras(self, *, limit: int = 100, cursor: str = "") -> PageCameraRow:
+        """The cameras, a page.
+
+        Args:
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.ask(
+            "GET", "/api/v1/eye/cameras", PageCameraRow, query={"limit": limit, "cursor": cursor}
+        )
+
+    def camera(self, name: str) -> CameraState:
+        """One camera.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/eye/cameras/{part(name)}", CameraState)
 
     def frame(self, name: str, *, t_ns: int | None = None) -> bytes:
         """A camera's newest picture.
@@ -35,3 +69,230 @@ class EyeNoun:
             name: a name on the bus
         """
         return self._connection.ask("GET", f"/api/v1/eye/cameras/{part(name)}/tags", EyeTags)
+
+    def poses(self, *, limit: int = 100, cursor: str = "") -> PagePoseRow:
+        """The newest pose of each car by each camera.
+
+        Args:
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.ask(
+            "GET", "/api/v1/eye/poses", PagePoseRow, query={"limit": limit, "cursor": cursor}
+        )
+
+    def residuals(
+        self, name: str, *, window_s: float = 120.0, vehicle: str = "", most: int = 1000
+    ) -> Residuals:
+        """How far a camera's poses lay from the truth.
+
+        Args:
+            name: a name on the bus
+            window_s: how far back [s]
+            vehicle: one car; empty: all
+            most: samples at most, evenly taken
+        """
+        return self._connection.ask(
+            "GET",
+            f"/api/v1/eye/cameras/{part(name)}/residuals",
+            Residuals,
+            query={"window_s": window_s, "vehicle": vehicle, "most": most},
+        )
+
+    def views(self, name: str) -> Views:
+        """Pictures of a board, and what was found in them.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.ask("GET", f"/api/v1/eye/cameras/{part(name)}/views", Views)
+
+    def add_view(self, name: str, *, content: bytes, idempotency_key: str = "") -> View:
+        """Keep a picture of a board: one that is sent, or the camera's newest.
+
+        Args:
+            name: a name on the bus
+            content: What to send.
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.send(
+            "POST", f"/api/v1/eye/cameras/{part(name)}/views", View, content, key=idempotency_key
+        )
+
+    def delete_views(self, name: str, *, idempotency_key: str = "") -> Views:
+        """Throw all pictures of a board away.
+
+        Args:
+            name: a name on the bus
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "DELETE", f"/api/v1/eye/cameras/{part(name)}/views", Views, key=idempotency_key
+        )
+
+    def view(self, name: str, view: str) -> bytes:
+        """A picture of a board.
+
+        Args:
+            name: a name on the bus
+            view: a picture's file name
+        """
+        return self._connection.fetch(f"/api/v1/eye/cameras/{part(name)}/views/{part(view)}")
+
+    def delete_view(self, name: str, view: str, *, idempotency_key: str = "") -> Views:
+        """Throw a picture of a board away.
+
+        Args:
+            name: a name on the bus
+            view: a picture's file name
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "DELETE",
+            f"/api/v1/eye/cameras/{part(name)}/views/{part(view)}",
+            Views,
+            key=idempotency_key,
+        )
+
+    def lens(
+        self,
+        name: str,
+        *,
+        board: Literal["chessboard", "charuco", "tags"] = "chessboard",
+        columns: int,
+        rows: int,
+        square_m: float,
+        marker_m: float | None = None,
+        dictionary: str = "DICT_4X4_50",
+        first_id: int = 0,
+        fisheye: bool = False,
+        save_as: str | None = None,
+        idempotency_key: str = "",
+    ) -> Operation:
+        """Look for a board in all pictures, or measure the lens by them.
+
+        Args:
+            name: a name on the bus
+            board: what was printed
+            columns: squares, or tags, across
+            rows: squares, or tags, down
+            square_m: edge of a square; of tags middle to middle
+            marker_m: black edge of a marker or tag
+            dictionary: markers of a ChArUco board
+            first_id: of the tag at the lower left
+            fisheye: a lens of more than about 100 degrees
+            save_as: what the lens is called; null: only look
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/eye/cameras/{part(name)}/lens",
+            Operation,
+            body={
+                "board": board,
+                "columns": columns,
+                "rows": rows,
+                "square_m": square_m,
+                "marker_m": marker_m,
+                "dictionary": dictionary,
+                "first_id": first_id,
+                "fisheye": fisheye,
+                "save_as": save_as,
+            },
+            key=idempotency_key,
+        )
+
+    def place(
+        self,
+        name: str,
+        *,
+        lens: str | None = None,
+        tags: tuple[dict[str, float], ...] = (),
+        save_as: str,
+        idempotency_key: str = "",
+    ) -> Operation:
+        """Find where a camera hangs, by the tags on the floor that it sees now.
+
+        Args:
+            name: a name on the bus
+            lens: a lens on the shelf; null: the map's
+            tags: tags on the floor beside the map's: id, x_m, y_m, yaw_rad, size_m of each
+            save_as: what the result is called
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/eye/cameras/{part(name)}/place",
+            Operation,
+            body={"lens": lens, "tags": tags, "save_as": save_as},
+            key=idempotency_key,
+        )
+
+    def calibrations(self, *, limit: int = 100, cursor: str = "") -> PageCalibrationRow:
+        """All calibrations kept, newest first.
+
+        Args:
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.ask(
+            "GET",
+            "/api/v1/eye/calibrations",
+            PageCalibrationRow,
+            query={"limit": limit, "cursor": cursor},
+        )
+
+    def calibration(self, name: str) -> CalibrationFile:
+        """One.
+
+        Args:
+            name: a calibration's name
+        """
+        return self._connection.ask(
+            "GET", f"/api/v1/eye/calibrations/{part(name)}", CalibrationFile
+        )
+
+    def write(self, name: str, *, toml: str, idempotency_key: str = "") -> CalibrationFile:
+        """Put a calibration on the shelf, or another text in its place.
+
+        Args:
+            name: a calibration's name
+            toml: a lens of `scm eye calibrate`, or one [[cameras]] block
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "PUT",
+            f"/api/v1/eye/calibrations/{part(name)}",
+            CalibrationFile,
+            body={"toml": toml},
+            key=idempotency_key,
+        )
+
+    def delete(self, name: str, *, idempotency_key: str = "") -> CalibrationFile:
+        """Take a calibration off the shelf.
+
+        Args:
+            name: a calibration's name
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "DELETE", f"/api/v1/eye/calibrations/{part(name)}", CalibrationFile, key=idempotency_key
+        )
+
+    def report(self, name: str) -> dict[str, Any]:
+        """How a calibration was found.
+
+        Args:
+            name: a calibration's name
+        """
+        return self._connection.ask(
+            "GET", f"/api/v1/eye/calibrations/{part(name)}/report", dict[str, Any]
+        )
+
+    def download(self, name: str) -> Iterator[bytes]:
+        """Download a calibration.
+
+        Args:
+            name: a calibration's name
+        """
+        return self._connection.pieces(f"/api/v1/eye/calibrations/{part(name)}/file.toml")

@@ -20,7 +20,7 @@ class StreamNoun:
 
         Args:
             topics: those to hear, comma between: pulse, stop, vehicles, signals, signal_status,
-                boxes, eye, acknowledgements, stations, events; none: all
+                boxes, acknowledgements, eye, stations, events; none: all
         """
         return self._connection.events("/api/v1/stream", query={"topics": topics})
 

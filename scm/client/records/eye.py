@@ -3,9 +3,11 @@
 Written by docs/make/client.py: do not change it here.
 """
 
+from typing import Any, Literal
+
 import msgspec
 
-from scm.client.records.shared import Residual
+from scm.client.records.shared import Camera, Residual
 
 
 class TagSeen(msgspec.Struct, kw_only=True, frozen=True):
@@ -24,6 +26,32 @@ class TagSeen(msgspec.Struct, kw_only=True, frozen=True):
         tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]
     ]
     margin: float
+
+
+class TagRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One tag that a camera saw within the last minute.
+
+    Attributes:
+        tag_id: Number of an AprilTag.
+        what: `car`; `map`: it lies on the floor, known to the map; `other`: nobody's.
+        vehicle: The car that wears it; empty: none does.
+        margin: Decision margin of the detector, higher is clearer.
+        size_px: Mean side of its black square in the picture [px].
+        seen_s: How long ago the camera saw it last [s].
+        x_m: Of the car, by this camera; of a map tag as its map has it; null: not known.
+        y_m: Of the car, by this camera; of a map tag as its map has it; null: not known.
+        yaw_rad: Of the car, by this camera; of a map tag as its map has it; null: not known.
+    """
+
+    tag_id: int
+    what: Literal["car", "map", "other"]
+    vehicle: str
+    margin: float
+    size_px: float
+    seen_s: float
+    x_m: float | None
+    y_m: float | None
+    yaw_rad: float | None
 
 
 class SeenRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -60,6 +88,8 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
         age_s: How long ago it was heard last [s].
         latency_ms: From exposure to being taken up [ms].
         tags: Those of that frame, or of the newest detection when that frame was skipped.
+        tags_t_ns: Exposure of the frame that they were found in, as text; None: none yet.
+        known: Tags of the last minute, whose they are, and where.
         seen: What is seen.
         good: Whether its poses can be trusted, by its own account; None: not said.
         complaints: What is wrong, in sentences.
@@ -72,6 +102,8 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
     age_s: float | None
     latency_ms: float | None
     tags: tuple[TagSeen, ...]
+    tags_t_ns: str | None
+    known: tuple[TagRow, ...]
     seen: tuple[SeenRow, ...]
     good: bool | None
     complaints: tuple[str, ...]
@@ -85,6 +117,30 @@ class Overhead(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     cameras: tuple[CameraRow, ...]
+
+
+class PageCameraRow(msgspec.Struct, kw_only=True, frozen=True):
+    """Some rows of a list.
+
+    Attributes:
+        items: The rows of this page.
+        next_: Cursor of those after them; null at the end.
+    """
+
+    items: tuple[CameraRow, ...]
+    next_: str | None = msgspec.field(name="next")
+
+
+class CameraState(msgspec.Struct, kw_only=True, frozen=True):
+    """One camera.
+
+    Attributes:
+        state: As in the list.
+        mounted: Its lens and where it hangs, by the map; null: the map does not know it.
+    """
+
+    state: CameraRow
+    mounted: Camera | None
 
 
 class EyeTags(msgspec.Struct, kw_only=True, frozen=True):
@@ -102,3 +158,204 @@ class EyeTags(msgspec.Struct, kw_only=True, frozen=True):
     t_ns: int
     tags: tuple[TagSeen, ...]
     latency_ms: float
+
+
+class PoseRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One car's pose as one camera measured it last.
+
+    Attributes:
+        camera: Name of a camera.
+        vehicle: Name of a car.
+        tag_id: Number of an AprilTag.
+        t_ns: When the frame was exposed.
+        x_m: To the right on the map [m].
+        y_m: Up on the map [m].
+        yaw_rad: Direction, counter-clockwise from map x [rad].
+        std_x_m: Standard deviations, as the Eye tells them.
+        std_y_m: Standard deviations, as the Eye tells them.
+        std_yaw_rad: Standard deviations, as the Eye tells them.
+        map_tag_age_ms: Since the camera last saw the map's tag.
+        age_s: How long ago it was heard last [s].
+        flags: What is wrong with the camera, by its own account: do not trust it.
+        residual: What it differs from the truth by; null: no truth of that time.
+    """
+
+    camera: str
+    vehicle: str
+    tag_id: int
+    t_ns: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    std_x_m: float
+    std_y_m: float
+    std_yaw_rad: float
+    map_tag_age_ms: float
+    age_s: float
+    flags: tuple[str, ...]
+    residual: Residual | None
+
+
+class PagePoseRow(msgspec.Struct, kw_only=True, frozen=True):
+    """Some rows of a list.
+
+    Attributes:
+        items: The rows of this page.
+        next_: Cursor of those after them; null at the end.
+    """
+
+    items: tuple[PoseRow, ...]
+    next_: str | None = msgspec.field(name="next")
+
+
+class ResidualStats(msgspec.Struct, kw_only=True, frozen=True):
+    """What samples have in common; all null where there is none.
+
+    Attributes:
+        samples: How many.
+        mean_mm: Mean distance from the truth [mm].
+        p95_mm: 95 of 100 lie nearer [mm].
+        worst_mm: The farthest [mm].
+        bias_x_mm: Mean of measured minus true along map x and y [mm].
+        bias_y_mm: Mean of measured minus true along map x and y [mm].
+        bias_yaw_deg: Likewise of yaw, + = measured further left [degree].
+        yaw_std_deg: Standard deviation of yaw around its bias [degree].
+    """
+
+    samples: int
+    mean_mm: float | None
+    p95_mm: float | None
+    worst_mm: float | None
+    bias_x_mm: float | None
+    bias_y_mm: float | None
+    bias_yaw_deg: float | None
+    yaw_std_deg: float | None
+
+
+class VehicleResiduals(msgspec.Struct, kw_only=True, frozen=True):
+    """What one car's poses were off by.
+
+    Attributes:
+        vehicle: Name of a car.
+        stats: What samples have in common; all null where there is none.
+    """
+
+    vehicle: str
+    stats: ResidualStats
+
+
+class ResidualSample(msgspec.Struct, kw_only=True, frozen=True):
+    """One pose against the truth of its instant.
+
+    Attributes:
+        vehicle: Name of a car.
+        t_ns: When the frame was exposed.
+        x_m: Where the car was measured to be.
+        y_m: Where the car was measured to be.
+        x_mm: Measured minus true, along map x and y [mm].
+        y_mm: Measured minus true, along map x and y [mm].
+        yaw_deg: Likewise, + = measured further left [degree].
+    """
+
+    vehicle: str
+    t_ns: int
+    x_m: float
+    y_m: float
+    x_mm: float
+    y_mm: float
+    yaw_deg: float
+
+
+class Residuals(msgspec.Struct, kw_only=True, frozen=True):
+    """What a camera's poses were off by, against the truth of a simulated city.
+
+    Attributes:
+        camera: Name of a camera.
+        window_s: Over how long it was counted [s].
+        stats: Of all its cars together.
+        vehicles: Of each car.
+        samples: Poses with their residuals, two a second of each car, evenly thinned.
+    """
+
+    camera: str
+    window_s: float
+    stats: ResidualStats
+    vehicles: tuple[VehicleResiduals, ...]
+    samples: tuple[ResidualSample, ...]
+
+
+class View(msgspec.Struct, kw_only=True, frozen=True):
+    """One picture of a board.
+
+    Attributes:
+        name: Of its file.
+        made_ns: When it came [ns since 1970].
+        found: What was found in it last, as docs/dashboard/eye.md lists it; null: no board, or
+            nobody looked.
+    """
+
+    name: str
+    made_ns: int
+    found: Any
+
+
+class Views(msgspec.Struct, kw_only=True, frozen=True):
+    """A camera's pictures of a board.
+
+    Attributes:
+        views: In the order they came.
+        findings: Of all together, as docs/dashboard/eye.md lists them; null: nobody looked.
+    """
+
+    views: tuple[View, ...]
+    findings: Any
+
+
+class CalibrationRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One calibration.
+
+    Attributes:
+        name: What it is called.
+        kind: `lens`: for `scm eye --calibration`; `place`: a `[[cameras]]` block for the map.
+        camera: Whose place it is; empty: a lens does not say.
+        made_ns: When its file was written [ns since 1970].
+        width_px: Columns of the picture.
+        height_px: Rows of the picture.
+        rms_px: What was left at the board's points [px]; null: of a place.
+        views: Pictures of the board it was made from; null: of a place.
+        reported: Whether there is a report of how it was found.
+    """
+
+    name: str
+    kind: Literal["lens", "place"]
+    camera: str
+    made_ns: int
+    width_px: int
+    height_px: int
+    rms_px: float | None
+    views: int | None
+    reported: bool
+
+
+class PageCalibrationRow(msgspec.Struct, kw_only=True, frozen=True):
+    """Some rows of a list.
+
+    Attributes:
+        items: The rows of this page.
+        next_: Cursor of those after them; null at the end.
+    """
+
+    items: tuple[CalibrationRow, ...]
+    next_: str | None = msgspec.field(name="next")
+
+
+class CalibrationFile(msgspec.Struct, kw_only=True, frozen=True):
+    """One calibration with its text.
+
+    Attributes:
+        row: As in the list.
+        toml: The file.
+    """
+
+    row: CalibrationRow
+    toml: str

@@ -7,8 +7,22 @@ from typing import Literal
 
 import msgspec
 
-from scm.client.records.map_parts import Area, Conflict, Floor, Lane, MapTag, Wind
-from scm.client.records.shared import Box, Light
+from scm.client.records.map_parts import Area, Floor, Lane, MapTag, Wind
+from scm.client.records.shared import Box, Camera, Light
+
+
+class Conflict(msgspec.Struct, kw_only=True, frozen=True):
+    """The stretch of a lane inside a junction where nobody may stop.
+
+    Attributes:
+        lane: Name of a lane.
+        from_m: Behind the stop line.
+        to_m: Where the rear axle of a car is when its tail has cleared every crossing lane.
+    """
+
+    lane: str
+    from_m: float
+    to_m: float
 
 
 class Group(msgspec.Struct, kw_only=True, frozen=True):
@@ -178,53 +192,6 @@ class Spawn(msgspec.Struct, kw_only=True, frozen=True):
     lane: str | None = None
     at_m: float | None = None
     pose: tuple[float, float, float] | None = None
-
-
-class Camera(msgspec.Struct, kw_only=True, frozen=True):
-    """An overhead camera, looking down: a pinhole with OpenCV's distortion, or a fisheye.
-
-    Attributes:
-        name: What it is called.
-        x_m: Optical centre in the map frame.
-        y_m: Optical centre in the map frame.
-        z_m: Optical centre in the map frame.
-        yaw_rad: Direction of the image's right edge over the floor (x of the picture).
-        tilt_x_rad: Small rotations about the picture's x and y away from straight down.
-        tilt_y_rad: Small rotations about the picture's x and y away from straight down.
-        width_px: Columns of the picture.
-        height_px: Rows of the picture.
-        fx_px: Focal length along a row [px].
-        fy_px: Focal length along a column [px].
-        cx_px: Principal point, column [px].
-        cy_px: Principal point, row [px].
-        lens: `fisheye` is OpenCV's model of wide lenses (angle, not tangent, over the picture).
-        distortion: k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4, 0.
-        rate_hz: How often a second.
-        noise_sigma: Standard deviation of a grey value.
-        place_std: Standard deviations of x, y, z [m], yaw, tilt x, tilt y [rad], as `scm eye
-            locate` found them; without, the Eye takes millimetres and half a milliradian.
-        rolling_s: From the exposure of the first row to that of the last; 0: all at once.
-    """
-
-    name: str
-    x_m: float
-    y_m: float
-    z_m: float
-    yaw_rad: float = 0.0
-    tilt_x_rad: float = 0.0
-    tilt_y_rad: float = 0.0
-    width_px: int
-    height_px: int
-    fx_px: float
-    fy_px: float
-    cx_px: float
-    cy_px: float
-    lens: Literal["fisheye", "pinhole"] = "pinhole"
-    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
-    rate_hz: float = 10.0
-    noise_sigma: float = 2.0
-    place_std: tuple[float, float, float, float, float, float] | None = None
-    rolling_s: float = 0.0
 
 
 class RadioChannel(msgspec.Struct, kw_only=True, frozen=True):

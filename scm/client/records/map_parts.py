@@ -252,17 +252,3 @@ class Area(msgspec.Struct, kw_only=True, frozen=True):
 
     name: str
     points: tuple[tuple[float, float], ...]
-
-
-class Conflict(msgspec.Struct, kw_only=True, frozen=True):
-    """The stretch of a lane inside a junction where nobody may stop.
-
-    Attributes:
-        lane: Name of a lane.
-        from_m: Behind the stop line.
-        to_m: Where the rear axle of a car is when its tail has cleared every crossing lane.
-    """
-
-    lane: str
-    from_m: float
-    to_m: float

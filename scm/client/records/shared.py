@@ -43,10 +43,14 @@ class Residual(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         position_mm: Distance from the truth, on the floor [mm].
+        x_mm: Along map x and y [mm].
+        y_mm: Along map x and y [mm].
         yaw_deg: Measured further left than the truth [degree].
     """
 
     position_mm: float
+    x_mm: float
+    y_mm: float
     yaw_deg: float
 
 
@@ -126,6 +130,53 @@ class Box(msgspec.Struct, kw_only=True, frozen=True):
     height_m: float = 0.2
     mass_kg: float | None = None
     friction: float = 0.5
+
+
+class Camera(msgspec.Struct, kw_only=True, frozen=True):
+    """An overhead camera, looking down: a pinhole with OpenCV's distortion, or a fisheye.
+
+    Attributes:
+        name: What it is called.
+        x_m: Optical centre in the map frame.
+        y_m: Optical centre in the map frame.
+        z_m: Optical centre in the map frame.
+        yaw_rad: Direction of the image's right edge over the floor (x of the picture).
+        tilt_x_rad: Small rotations about the picture's x and y away from straight down.
+        tilt_y_rad: Small rotations about the picture's x and y away from straight down.
+        width_px: Columns of the picture.
+        height_px: Rows of the picture.
+        fx_px: Focal length along a row [px].
+        fy_px: Focal length along a column [px].
+        cx_px: Principal point, column [px].
+        cy_px: Principal point, row [px].
+        lens: `fisheye` is OpenCV's model of wide lenses (angle, not tangent, over the picture).
+        distortion: k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4, 0.
+        rate_hz: How often a second.
+        noise_sigma: Standard deviation of a grey value.
+        place_std: Standard deviations of x, y, z [m], yaw, tilt x, tilt y [rad], as `scm eye
+            locate` found them; without, the Eye takes millimetres and half a milliradian.
+        rolling_s: From the exposure of the first row to that of the last; 0: all at once.
+    """
+
+    name: str
+    x_m: float
+    y_m: float
+    z_m: float
+    yaw_rad: float = 0.0
+    tilt_x_rad: float = 0.0
+    tilt_y_rad: float = 0.0
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    lens: Literal["fisheye", "pinhole"] = "pinhole"
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    rate_hz: float = 10.0
+    noise_sigma: float = 2.0
+    place_std: tuple[float, float, float, float, float, float] | None = None
+    rolling_s: float = 0.0
 
 
 class SnapshotBox(msgspec.Struct, kw_only=True, frozen=True):

@@ -1,9 +1,52 @@
-/** The Eye page. */
+/** The Eye: `/eye` shows what each camera sees and how true it is, `/eye/calibrate` measures one anew. */
 import { html } from "scm/shared/html.js";
-import { useTopics } from "scm/shell/store.js";
-import { EyePanel } from "scm/pages/eye/eye_panel.js";
+import { go, route } from "scm/shell/router.js";
+import { cameras, useTopics } from "scm/shell/store.js";
+import { Picture } from "scm/pages/eye/picture.js";
+import { Residuals } from "scm/pages/eye/residuals.js";
+import { TagTable } from "scm/pages/eye/tag_table.js";
+import { Wizard } from "scm/pages/eye/wizard.js";
 
 export function Page() {
   useTopics("eye", "vehicles");
-  return html`<${EyePanel} />`;
+  const list = cameras.value;
+  if (!list.length) {
+    return html`
+      <section class="panel" aria-label="Eye">
+        <p class="empty">No camera has been heard yet. The Eye is a part of its own: <code>scm eye</code>.</p>
+      </section>
+    `;
+  }
+  const camera = list.find((one) => one.camera === route.value.query.camera) ?? list[0];
+  return html`
+    <${Bar} list=${list} camera=${camera} />
+    ${route.value.rest === "calibrate"
+      ? html`<${Wizard} key=${camera.camera} camera=${camera} />`
+      : html`
+          <${Picture} key=${camera.camera} camera=${camera} />
+          <${TagTable} camera=${camera} />
+          <${Residuals} key=${`${camera.camera} residuals`} camera=${camera} />
+        `}
+  `;
+}
+
+function Bar({ list, camera }) {
+  const calibrates = route.value.rest === "calibrate";
+  const at = (name) => `/eye${calibrates ? "/calibrate" : ""}?camera=${name}`;
+  return html`
+    <div class="bar">
+      <label>Camera
+        <select value=${camera.camera} onChange=${(event) => go(at(event.currentTarget.value))}>
+          ${list.map((one) => html`<option key=${one.camera} value=${one.camera}>${one.camera}</option>`)}
+        </select>
+      </label>
+      <span class="state" data-good=${String(camera.good)}>
+        ${camera.good === false ? "do not trust its poses" : camera.good ? "good" : "says nothing of itself"}
+      </span>
+      <nav aria-label="Eye">
+        <a href=${`/eye?camera=${camera.camera}`} aria-current=${calibrates ? null : "page"}>Live</a>
+        <a href=${`/eye/calibrate?camera=${camera.camera}`} aria-current=${calibrates ? "page" : null}>Calibrate</a>
+      </nav>
+    </div>
+  `;
 }

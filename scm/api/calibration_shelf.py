@@ -1,0 +1,188 @@
+"""Calibrations of overhead cameras on their shelf: a TOML file each, of a lens or of a place.
+
+Both are what the Eye's own commands write: a lens for `scm eye --calibration`, a place as the
+`[[cameras]]` block of a map file. Beside each may lie the report of how it was found.
+"""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from scm.api.city import not_found
+from scm.api.problem import RefusedError
+from scm.maps.model import Camera
+from scm.v2x.message import Refused
+
+NAME = re.compile(r"[a-z0-9_-]{1,48}")
+LARGEST_TOML = 64 * 1024
+MOST_KEPT = 500
+
+
+class CalibrationRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One calibration.
+
+    Attributes:
+        kind: `lens`: for `scm eye --calibration`; `place`: a `[[cameras]]` block for the map.
+        camera: Whose place it is; empty: a lens does not say.
+        made_ns: When its file was written [ns since 1970].
+        rms_px: What was left at the board's points [px]; null: of a place.
+        views: Pictures of the board it was made from; null: of a place.
+        reported: Whether there is a report of how it was found.
+    """
+
+    name: str
+    kind: Literal["lens", "place"]
+    camera: str
+    made_ns: int
+    width_px: int
+    height_px: int
+    rms_px: float | None
+    views: int | None
+    reported: bool
+
+
+class CalibrationFile(msgspec.Struct, kw_only=True, frozen=True):
+    """One calibration with its text.
+
+    Attributes:
+        row: As in the list.
+        toml: The file.
+    """
+
+    row: CalibrationRow
+    toml: Annotated[str, msgspec.Meta(examples=['[[cameras]]\nname = "overhead"\nx_m = 1.384\n'])]
+
+
+class _Lens(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What a lens file holds, as `scm eye calibrate` writes it."""
+
+    lens: Literal["pinhole", "fisheye"]
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    distortion: tuple[float, float, float, float, float]
+    covariance: tuple[tuple[float, ...], ...]
+    rms_px: float
+    views: int
+
+
+class _Place(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    cameras: tuple[Camera, ...]
+
+
+class CalibrationShelf:
+    """A folder of calibrations; its files may also be put there and taken away by hand."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def path(self, name: str) -> Path:
+        """Return where a calibration's file is, or would be."""
+        return self.folder / f"{name}.toml"
+
+    def report_path(self, name: str) -> Path:
+        """Return where the report of a calibration is, or would be."""
+        return self.folder / f"{name}.json"
+
+    def rows(self) -> tuple[CalibrationRow, ...]:
+        """Return all that can be read, newest first."""
+        paths = [path for path in self.folder.glob("*.toml") if NAME.fullmatch(path.stem)]
+        rows = (self._row(path) for path in paths)
+        found = [row for row in rows if row is not None]
+        return tuple(sorted(found, key=lambda row: (-row.made_ns, row.name)))
+
+    def find(self, name: str) -> CalibrationFile | None:
+        """Return a calibration; None: there is no such file, or it is none."""
+        row = self._row(self.path(name))
+        if row is None:
+            return None
+        return CalibrationFile(row=row, toml=self.path(name).read_text("utf-8"))
+
+    def get(self, name: str) -> CalibrationFile:
+        """Return a calibration.
+
+        Raises:
+            RefusedError: there is none of that name.
+        """
+        found = self.find(name)
+        if found is None:
+            raise not_found("calibration", name)
+        return found
+
+    def write(self, name: str, toml: str) -> CalibrationFile:
+        """Put a calibration on the shelf, or in place of the one of that name.
+
+        Raises:
+            RefusedError: the text is neither a lens nor a place, or the shelf is full.
+        """
+        checked(toml)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if not self.path(name).exists() and len(self.rows()) >= MOST_KEPT:
+            detail = f"calibrations: {MOST_KEPT} are kept; delete some first"
+            raise RefusedError(Refused(code="full", detail=detail))
+        whole = self.path(name).with_suffix(".part")
+        whole.write_text(toml, "utf-8")
+        whole.replace(self.path(name))
+        return self.get(name)
+
+    def delete(self, name: str) -> None:
+        """Take a calibration and its report off the shelf."""
+        for path in (self.path(name), self.report_path(name)):
+            path.unlink(missing_ok=True)
+
+    def report(self, name: str) -> Any:
+        """Return the report of how a calibration was found; None: there is none."""
+        return read_json(self.report_path(name))
+
+    def _row(self, path: Path) -> CalibrationRow | None:
+        try:
+            found, made_ns = checked(path.read_text("utf-8")), path.stat().st_mtime_ns
+        except (OSError, UnicodeDecodeError, RefusedError):
+            return None
+        is_lens = isinstance(found, _Lens)
+        return CalibrationRow(
+            name=path.stem,
+            kind="lens" if is_lens else "place",
+            camera="" if isinstance(found, _Lens) else found.name,
+            made_ns=made_ns,
+            width_px=found.width_px,
+            height_px=found.height_px,
+            rms_px=found.rms_px if isinstance(found, _Lens) else None,
+            views=found.views if isinstance(found, _Lens) else None,
+            reported=self.report_path(path.stem).is_file(),
+        )
+
+
+def checked(toml: str) -> _Lens | Camera:
+    """Return what a calibration's text holds.
+
+    Raises:
+        RefusedError: it is neither a lens nor one `[[cameras]]` block; with key, expected and got.
+    """
+    try:
+        read = tomllib.loads(toml)
+        if "cameras" not in read:
+            return msgspec.convert(read, _Lens)
+        place = msgspec.convert(read, _Place)
+    except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+        detail = f"toml: expected a lens or one [[cameras]] block: {error}"
+        raise RefusedError(Refused(code="invalid", detail=detail)) from error
+    if len(place.cameras) != 1:
+        detail = f"toml: expected one [[cameras]] block, got {len(place.cameras)}"
+        raise RefusedError(Refused(code="invalid", detail=detail))
+    return place.cameras[0]
+
+
+def read_json(path: Path) -> Any:
+    """Return what a JSON file holds; None: there is none that can be read."""
+    try:
+        return json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError):
+        return None

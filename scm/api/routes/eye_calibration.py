@@ -1,0 +1,374 @@
+"""Calibrating overhead cameras: pictures of a board, measuring lens and place, what is kept."""
+
+from pathlib import Path as FilePath
+from typing import Annotated, Any, Literal
+
+import msgspec
+from fastapi import APIRouter, Path, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from scm.api.calibration_desk import LARGEST_PICTURE, CalibrationDesk, FloorTag
+from scm.api.calibration_shelf import (
+    LARGEST_TOML,
+    CalibrationFile,
+    CalibrationRow,
+    CalibrationShelf,
+)
+from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
+from scm.api.etag import check_match, tagged
+from scm.api.eye_rows import frame_of
+from scm.api.operations import Operation, Operations, accepted
+from scm.api.paging import Cursor, Limit, page_of, page_response
+from scm.api.problem import RefusedError
+from scm.api.roles import ENGINEER, VIEWER
+from scm.api.schemas import answer, answer_file, answer_page
+from scm.v2x.message import Refused
+
+_NAME = r"^[a-z0-9_-]{1,48}$"
+_MEDIA = {".jpg": "image/jpeg", ".png": "image/png"}
+_PICTURES = {
+    media: {"schema": {"type": "string", "contentMediaType": media}} for media in _MEDIA.values()
+}
+
+CalibrationName = Annotated[
+    str, Path(pattern=_NAME, description="a calibration's name", examples=["overhead-place"])
+]
+ViewName = Annotated[
+    str,
+    Path(
+        pattern=r"^[0-9]{4}\.(jpg|png)$",
+        description="a picture's file name",
+        examples=["0001.jpg"],
+    ),
+]
+SaveAs = Annotated[
+    str,
+    Field(pattern=_NAME, description="what the result is called", examples=["overhead-2025"]),
+]
+
+
+class View(msgspec.Struct, kw_only=True, frozen=True):
+    """One picture of a board.
+
+    Attributes:
+        name: Of its file.
+        made_ns: When it came [ns since 1970].
+        found: What was found in it last, as docs/dashboard/eye.md lists it; null: no board, or
+            nobody looked.
+    """
+
+    name: str
+    made_ns: int
+    found: Annotated[Any, msgspec.Meta(examples=[{"points": 40, "sharpness": 3.1}])]
+
+
+class Views(msgspec.Struct, kw_only=True, frozen=True):
+    """A camera's pictures of a board.
+
+    Attributes:
+        views: In the order they came.
+        findings: Of all together, as docs/dashboard/eye.md lists them; null: nobody looked.
+    """
+
+    views: tuple[View, ...]
+    findings: Annotated[Any, msgspec.Meta(examples=[{"size_px": [1280, 720], "refused": []}])]
+
+
+class Body(BaseModel):
+    """What a route takes: nothing beyond its fields."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class LensBody(Body):
+    """What was printed, and whether the lens is to be measured or the board only found."""
+
+    board: Literal["chessboard", "charuco", "tags"] = Field(
+        "chessboard", description="what was printed", examples=["chessboard"]
+    )
+    columns: int = Field(ge=2, le=60, description="squares, or tags, across", examples=[9])
+    rows: int = Field(ge=2, le=60, description="squares, or tags, down", examples=[6])
+    square_m: float = Field(
+        gt=0.0, le=2.0, description="edge of a square; of tags middle to middle", examples=[0.03]
+    )
+    marker_m: float | None = Field(
+        None, gt=0.0, le=2.0, description="black edge of a marker or tag", examples=[0.022]
+    )
+    dictionary: str = Field(
+        "DICT_4X4_50",
+        pattern=r"^DICT_[A-Za-z0-9_]{1,40}$",
+        description="markers of a ChArUco board",
+        examples=["DICT_4X4_50"],
+    )
+    first_id: int = Field(0, ge=0, le=586, description="of the tag at the lower left", examples=[0])
+    fisheye: bool = Field(
+        default=False, description="a lens of more than about 100 degrees", examples=[False]
+    )
+    save_as: SaveAs | None = Field(
+        None, description="what the lens is called; null: only look", examples=["overhead-lens"]
+    )
+
+
+class PlaceBody(Body):
+    """From what the camera's place is to be found, and what the result is called."""
+
+    lens: SaveAs | None = Field(
+        None, description="a lens on the shelf; null: the map's", examples=["overhead-lens"]
+    )
+    tags: tuple[dict[str, float], ...] = Field(
+        (),
+        max_length=40,
+        description="tags on the floor beside the map's: id, x_m, y_m, yaw_rad, size_m of each",
+        examples=[[{"id": 100, "x_m": 0.2, "y_m": 0.08, "yaw_rad": 0.0, "size_m": 0.12}]],
+    )
+    save_as: SaveAs
+
+
+class CalibrationBody(Body):
+    """A calibration's text."""
+
+    toml: str = Field(
+        min_length=1,
+        max_length=LARGEST_TOML,
+        description="a lens of `scm eye calibrate`, or one [[cameras]] block",
+        examples=['[[cameras]]\nname = "overhead"\nx_m = 1.384\n'],
+    )
+
+
+def router(city: City, work: Operations) -> APIRouter:
+    """Return the routes."""
+    routes = APIRouter(prefix="/eye", tags=["eye"], dependencies=[VIEWER])
+    folder = city.shelves.calibrations
+    desk = (
+        None
+        if folder is None
+        else CalibrationDesk(CalibrationShelf(folder), city.link.map_file or city.city_map.name)
+    )
+
+    def there() -> CalibrationDesk:
+        if desk is None:
+            detail = "this city keeps no calibrations: start its interface with --data FOLDER"
+            raise RefusedError(Refused(code="not_found", detail=detail))
+        return desk
+
+    _add_views(routes, city, there)
+    _add_measuring(routes, city, there, work)
+    _add_shelf(routes, there)
+    _add_files(routes, there)
+    return routes
+
+
+def _add_views(routes: APIRouter, city: City, there: Any) -> None:
+    @routes.get(
+        "/cameras/{name}/views",
+        summary="Pictures of a board, and what was found in them",
+        responses=answer(Views),
+    )
+    def views(name: Name) -> Response:
+        return json_response(_views(there(), name))
+
+    @routes.post(
+        "/cameras/{name}/views",
+        summary="Keep a picture of a board: one that is sent, or the camera's newest",
+        status_code=201,
+        dependencies=[ENGINEER],
+        responses=answer(View, 201),
+        openapi_extra={"requestBody": {"required": False, "content": _PICTURES}},
+    )
+    async def add_view(request: Request, name: Name, key: IdempotencyKey = "") -> Response:
+        del key  # the same key gets the same answer, and no second picture
+        picture = bytearray()
+        async for chunk in request.stream():
+            picture += chunk
+            if len(picture) > LARGEST_PICTURE:
+                detail = f"picture: expected at most {LARGEST_PICTURE // 2**20} MiB, got more"
+                raise RefusedError(Refused(code="invalid", detail=detail))
+        path = there().add_view(name, bytes(picture) or _newest(city, name))
+        where = f"/api/v1/eye/cameras/{name}/views/{path.name}"
+        return json_response(_view(path, {}), 201, {"Location": where})
+
+    @routes.delete(
+        "/cameras/{name}/views",
+        summary="Throw all pictures of a board away",
+        dependencies=[ENGINEER],
+        responses=answer(Views),
+    )
+    def delete_views(name: Name, key: IdempotencyKey = "") -> Response:
+        del key  # once away they stay away
+        there().delete_views(name)
+        return json_response(_views(there(), name))
+
+    @routes.get(
+        "/cameras/{name}/views/{view}",
+        summary="A picture of a board",
+        response_class=Response,
+        responses=answer_file("image/jpeg", "The picture, JPEG or PNG."),
+    )
+    def view(name: Name, view: ViewName) -> Response:
+        path = there().view(name, view)
+        return Response(path.read_bytes(), media_type=_MEDIA[path.suffix])
+
+    @routes.delete(
+        "/cameras/{name}/views/{view}",
+        summary="Throw a picture of a board away",
+        dependencies=[ENGINEER],
+        responses=answer(Views),
+    )
+    def delete_view(name: Name, view: ViewName, key: IdempotencyKey = "") -> Response:
+        del key  # once away it stays away
+        there().view(name, view).unlink(missing_ok=True)
+        return json_response(_views(there(), name))
+
+
+def _add_measuring(routes: APIRouter, city: City, there: Any, work: Operations) -> None:
+    @routes.post(
+        "/cameras/{name}/lens",
+        summary="Look for a board in all pictures, or measure the lens by them",
+        status_code=202,
+        dependencies=[ENGINEER],
+        responses=answer(Operation, 202),
+    )
+    def lens(request: Request, name: Name, body: LensBody, key: IdempotencyKey = "") -> Response:
+        del key  # the same key gets the same operation
+        desk = there()
+        if not desk.views(name):
+            raise not_found("camera with pictures of a board", name)
+        save_as = body.save_as or ""
+        _check_free(desk, save_as)
+        what = f"lens of {name}" if save_as else f"board in pictures of {name}"
+        job = desk.measure_lens(name, _board_words(body), save_as)
+        return accepted(work.start("calibration", what, job, owner=_owner(request)))
+
+    @routes.post(
+        "/cameras/{name}/place",
+        summary="Find where a camera hangs, by the tags on the floor that it sees now",
+        status_code=202,
+        dependencies=[ENGINEER],
+        responses=answer(Operation, 202),
+    )
+    def place(request: Request, name: Name, body: PlaceBody, key: IdempotencyKey = "") -> Response:
+        del key  # the same key gets the same operation
+        desk = there()
+        if all(camera.name != name for camera in city.city_map.cameras):
+            raise not_found("camera on the map", name)
+        _check_free(desk, body.save_as)
+        if body.lens and desk.shelf.get(body.lens).row.kind != "lens":
+            detail = f"lens: expected a lens, got {body.lens!r}, which is a place"
+            raise RefusedError(Refused(code="invalid", detail=detail))
+        tags = _floor_tags(body)
+        job = desk.locate(name, _newest(city, name), body.lens or "", tags, body.save_as)
+        return accepted(work.start("calibration", f"place of {name}", job, owner=_owner(request)))
+
+
+def _add_shelf(routes: APIRouter, there: Any) -> None:
+    @routes.get(
+        "/calibrations",
+        summary="All calibrations kept, newest first",
+        responses=answer_page(CalibrationRow),
+    )
+    def calibrations(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
+        page = page_of(there().shelf.rows(), lambda row: row.name, limit=limit, cursor=cursor)
+        return page_response(request, page)
+
+    @routes.get("/calibrations/{name}", summary="One", responses=answer(CalibrationFile))
+    def calibration(request: Request, name: CalibrationName) -> Response:
+        return tagged(request, there().shelf.get(name))
+
+    @routes.put(
+        "/calibrations/{name}",
+        summary="Put a calibration on the shelf, or another text in its place",
+        dependencies=[ENGINEER],
+        responses={**answer(CalibrationFile), **answer(CalibrationFile, 201, "A new one.")},
+    )
+    def write(
+        request: Request, name: CalibrationName, body: CalibrationBody, key: IdempotencyKey = ""
+    ) -> Response:
+        del key  # the state that the writer saw is asked for
+        shelf = there().shelf
+        before = shelf.find(name)
+        check_match(request, before)
+        return tagged(request, shelf.write(name, body.toml), 201 if before is None else 200)
+
+    @routes.delete(
+        "/calibrations/{name}",
+        summary="Take a calibration off the shelf",
+        dependencies=[ENGINEER],
+        responses=answer(CalibrationFile),
+    )
+    def delete(request: Request, name: CalibrationName, key: IdempotencyKey = "") -> Response:
+        del key  # the state that the writer saw is asked for
+        shelf = there().shelf
+        found = shelf.get(name)
+        check_match(request, found)
+        shelf.delete(name)
+        return json_response(found)
+
+
+def _add_files(routes: APIRouter, there: Any) -> None:
+    @routes.get(
+        "/calibrations/{name}/report",
+        summary="How a calibration was found",
+        responses=answer(dict[str, Any]),
+    )
+    def report(name: CalibrationName) -> Response:
+        found = there().shelf.report(name)
+        if found is None:
+            raise not_found("calibration with a report", name)
+        return json_response(found)
+
+    @routes.get(
+        "/calibrations/{name}/file.toml",
+        summary="Download a calibration",
+        response_class=Response,
+        responses=answer_file("application/toml", "The file, as the Eye's commands take it."),
+    )
+    def download(name: CalibrationName) -> Response:
+        toml = there().shelf.get(name).toml
+        headers = {"Content-Disposition": f'attachment; filename="{name}.toml"'}
+        return Response(toml, headers=headers, media_type="application/toml")
+
+
+def _views(desk: CalibrationDesk, camera: str) -> Views:
+    findings = desk.findings(camera) or {}
+    by_name = {FilePath(one["name"]).name: one for one in findings.get("views", ())}
+    rest = {key: value for key, value in findings.items() if key not in ("views", "said")}
+    views = tuple(_view(path, by_name) for path in desk.views(camera))
+    return Views(views=views, findings=rest or None)
+
+
+def _view(path: FilePath, found: dict[str, Any]) -> View:
+    one = found.get(path.name)
+    told = None if one is None else {key: one[key] for key in one if key != "name"}
+    return View(name=path.name, made_ns=path.stat().st_mtime_ns, found=told)
+
+
+def _newest(city: City, camera: str) -> bytes:
+    held = frame_of(city.view.picture(), camera)
+    if held is None:
+        raise not_found("camera with a picture", camera)
+    return held.message.payload
+
+
+def _check_free(desk: CalibrationDesk, name: str) -> None:
+    if name and desk.shelf.path(name).exists():
+        detail = f"save_as: there is a calibration named {name!r}; choose another name"
+        raise RefusedError(Refused(code="exists", detail=detail))
+
+
+def _board_words(body: LensBody) -> list[str]:
+    words = ["--board", body.board, "--squares", f"{body.columns}x{body.rows}"]
+    words += ["--square-m", str(body.square_m), "--dictionary", body.dictionary]
+    words += ["--first-id", str(body.first_id)]
+    words += ["--marker-m", str(body.marker_m)] if body.marker_m is not None else []
+    return [*words, *(["--fisheye"] if body.fisheye else [])]
+
+
+def _owner(request: Request) -> str:
+    return str(request.scope.get("scm_owner", ""))
+
+
+def _floor_tags(body: PlaceBody) -> tuple[FloorTag, ...]:
+    try:
+        return msgspec.convert(body.tags, tuple[FloorTag, ...], strict=False)
+    except msgspec.ValidationError as error:
+        raise RefusedError(Refused(code="invalid", detail=f"tags: {error}")) from error

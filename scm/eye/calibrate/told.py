@@ -1,0 +1,195 @@
+"""What a calibration found, as plain data for programs: `--report FILE` of its commands writes it.
+
+Lengths are metres, angles radians, places in a picture pixels; None stands for "not known".
+"""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from scm.arrays import Floats, Image
+from scm.errors import EyeError
+from scm.eye.calibrate.board import Board, View
+from scm.eye.calibrate.gather import Gathered
+from scm.eye.calibrate.judge import CELLS, Verdict
+from scm.eye.calibrate.locate import NAMES, Located, off_px
+from scm.eye.calibrate.solve import Solution
+from scm.eye.calibration import LENS_NAMES, Calibration
+from scm.eye.camera import CameraModel, camera_model
+from scm.eye.picture import read_picture
+from scm.eye.source import grey_of
+from scm.maps.model import Camera, MapTag
+from scm.v2x.messages.eye_tags import TagSeen
+
+Told = dict[str, Any]
+
+
+def write_report(told: Told, path: Path) -> None:
+    """Write a report as JSON.
+
+    Raises:
+        EyeError: It cannot be written there.
+    """
+    try:
+        path.write_text(json.dumps(told, allow_nan=False), encoding="utf-8")
+    except OSError as error:
+        raise EyeError(f"{path}: cannot write the report: {error}") from error
+
+
+def views_told(board: Board, gathered: Gathered) -> Told:
+    """Return in which pictures the board is, where, and how sharp."""
+    return {
+        "size_px": list(gathered.size),
+        "views": [_view(board, view) for view in gathered.views],
+        "said": list(gathered.said),
+        "cover": _cover(gathered.views, gathered.size),
+        "ray_std_px": None,
+        "refused": [],
+        "shots": [],
+        "lens": None,
+    }
+
+
+def lens_told(board: Board, gathered: Gathered, solution: Solution, verdict: Verdict) -> Told:
+    """Return the same and what the views tell of the lens."""
+    told = views_told(board, gathered)
+    kept = zip(solution.views, solution.errors, verdict.tilts_rad, strict=True)
+    more = {
+        view.name: {"rms_px": _rms(errors), "tilt_rad": float(tilt)} for view, errors, tilt in kept
+    }
+    for view in told["views"]:
+        view.update(more.get(view["name"], {}))
+        view["used"] = view["name"] in more
+    rays = [[_finite(float(ray)) for ray in row] for row in verdict.ray_std_px]
+    return {
+        **told,
+        "said": [*gathered.said, *solution.said],
+        "ray_std_px": rays,
+        "refused": list(verdict.refused),
+        "shots": list(verdict.shots),
+        "lens": _lens(solution.calibration()),
+    }
+
+
+def place_told(
+    camera: Camera,
+    tags: Mapping[int, MapTag],
+    seen: Sequence[TagSeen],
+    located: Located,
+    block: str,
+) -> Told:
+    """Return where a camera was found to hang, against where its map has it.
+
+    Args:
+        camera: As it is in force: of the map, with the map's own lens.
+        tags: By id, those whose place is known.
+        seen: In the picture.
+        located: What was found.
+        block: Of the map file, with what was found.
+    """
+    known = [tag for tag in seen if tag.tag_id in tags]
+    before, after = camera_model(camera), located.places[0].model
+    deviations = [_finite(float(one)) for one in located.places[0].deviations]
+    return {
+        "camera": camera.name,
+        "size_px": [camera.width_px, camera.height_px],
+        "names": list(NAMES),
+        "before": _stance(camera),
+        "after": _stance(after.camera),
+        "deviations": deviations,
+        "tags": [_tag(tags[tag.tag_id], tag, before, after, located) for tag in known],
+        "places": [
+            {"rms_px": place.rms_px, "weight": place.weight, **_stance(place.model.camera)}
+            for place in located.places
+        ],
+        "is_sure": len(located.places) == 1 or located.is_sure,
+        "toml": block,
+    }
+
+
+def _view(board: Board, view: View) -> Told:
+    grey = grey_of(read_picture(Path(view.name))) if Path(view.name).is_file() else None
+    outline = cv2.convexHull(view.pixels.astype(np.float32)).reshape(-1, 2)
+    return {
+        "name": view.name,
+        "points": len(view.points),
+        "outline_px": [[round(float(x), 1), round(float(y), 1)] for x, y in outline],
+        "sharpness": None if grey is None else _sharpness(board, view, grey),
+        "rms_px": None,
+        "tilt_rad": None,
+        "used": None,
+    }
+
+
+def _sharpness(board: Board, view: View, grey: Image) -> float:
+    """Return how steep the board's edges are, for views of one set: independent of size and light.
+
+    The variance of the Laplacian over that of the picture, times the pixels of a square.
+    """
+    left, top = np.maximum(view.pixels.min(axis=0).astype(int), 0)
+    right, bottom = view.pixels.max(axis=0).astype(int) + 1
+    cut = grey[top:bottom, left:right].astype(np.float64)
+    areas = [
+        float(cv2.contourArea(cv2.convexHull(at.astype(np.float32))))
+        for at in (view.pixels, view.points[:, :2])
+    ]
+    if cut.size == 0 or areas[1] <= 0.0:
+        return 0.0
+    square_px = math.sqrt(areas[0] / areas[1]) * board.square_m
+    return float(cv2.Laplacian(cut, cv2.CV_64F).var() / max(float(cut.var()), 1.0)) * square_px
+
+
+def _cover(views: Sequence[View], size: tuple[int, int]) -> list[list[int]]:
+    columns, rows = CELLS
+    points = np.vstack([view.pixels for view in views])
+    counts, _, _ = np.histogram2d(
+        points[:, 1], points[:, 0], bins=(rows, columns), range=((0, size[1]), (0, size[0]))
+    )
+    return [[int(count) for count in row] for row in counts]
+
+
+def _lens(calibration: Calibration) -> Told:
+    rows = zip(
+        LENS_NAMES[calibration.lens], calibration.values, calibration.deviations, strict=True
+    )
+    numbers = [
+        {"name": name, "value": float(value), "std": _finite(float(std))}
+        for name, value, std in rows
+        if name != "none"
+    ]
+    return {"lens": calibration.lens, "rms_px": calibration.rms_px, "numbers": numbers}
+
+
+def _stance(camera: Camera) -> Told:
+    return {name: float(getattr(camera, name)) for name in NAMES}
+
+
+def _tag(
+    tag: MapTag, seen: TagSeen, before: CameraModel, after: CameraModel, located: Located
+) -> Told:
+    corners = np.array(seen.corners_px)
+    was, now = (_rms(off_px(model, tag, corners)) for model in (before, after))
+    sides = np.hypot(*(corners - np.roll(corners, 1, axis=0)).T)
+    mm_per_px = 1000.0 * tag.size_m / float(sides.mean())
+    return {
+        "tag_id": seen.tag_id,
+        "before_px": was,
+        "after_px": now,
+        "before_mm": was * mm_per_px,
+        "after_mm": now * mm_per_px,
+        "left_out": seen.tag_id in located.wrong,
+    }
+
+
+def _rms(errors: Floats) -> float:
+    """Return the root mean square of pixels off, (n, 2) [px]."""
+    return math.sqrt(float((errors**2).sum(axis=1).mean()))
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

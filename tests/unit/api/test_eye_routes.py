@@ -1,0 +1,267 @@
+"""The Eye over REST: cameras, poses, how far they lay from the truth, and calibrations."""
+
+import struct
+import time
+
+import cv2
+import numpy as np
+import pytest
+
+from scm.api.app import create_app
+from scm.api.calibration_desk import LARGEST_PICTURE, MOST_VIEWS, size_of
+from scm.api.problem import RefusedError
+from scm.api.shelves import shelves_in
+from scm.v2x.messages.eye_frame import EyeFrame
+from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.eye_tags import EyeTags, TagSeen
+
+API = "/api/v1"
+EYE = f"{API}/eye"
+LENS = """lens = "pinhole"
+width_px = 800
+height_px = 500
+fx_px = 660.0
+fy_px = 663.0
+cx_px = 404.0
+cy_px = 246.0
+distortion = [-0.15, 0.05, 0.0005, -0.0004, 0.0]
+rms_px = 0.09
+views = 14
+covariance = []
+"""
+PLACE = """[[cameras]]
+name = "overhead"
+x_m = 1.0
+y_m = 0.5
+z_m = 2.5
+width_px = 800
+height_px = 500
+fx_px = 660.0
+fy_px = 663.0
+cx_px = 404.0
+cy_px = 246.0
+"""
+
+
+@pytest.fixture
+def app(view, fake_city, city_map, tmp_path):
+    return create_app(view, fake_city.ask, city_map, shelves=shelves_in(tmp_path))
+
+
+@pytest.fixture
+def seen(hear, snapshot):
+    """Let a car drive 4 s along x at 0.5 m/s while the Eye sees it `off` metres wrong."""
+
+    def drive(*offs, camera="overhead", car="n1"):
+        for i, (x_off, y_off) in enumerate(offs):
+            at_s = 1.0 + 0.5 * i
+            hear(at_s, snapshot(at_s, tick=i + 1, n1=(0.5 * at_s, 1.0, 0.0)))
+            pose = EyePose(
+                camera=camera, vehicle=car, tag_id=1, t_ns=round(at_s * 1e9),
+                x_m=0.5 * at_s + x_off, y_m=1.0 + y_off, yaw_rad=0.01,
+                covariance=(4e-6, 0.0, 0.0, 0.0, 9e-6, 0.0, 0.0, 0.0, 1e-4),
+            )  # fmt: skip
+            hear(at_s, pose)
+        tags = EyeTags(camera=camera, t_ns=round(at_s * 1e9), latency_ms=20.0, tags=TAGS)
+        hear(at_s, tags)
+
+    return drive
+
+
+def tag(tag_id, side=30.0):
+    corners = ((0.0, side), (side, side), (side, 0.0), (0.0, 0.0))
+    return TagSeen(tag_id=tag_id, centre_px=(side / 2, side / 2), corners_px=corners, margin=80.0)
+
+
+TAGS = (tag(0, 28.0), tag(1), tag(77))
+
+
+def jpeg(width=64, height=48, value=128):
+    return cv2.imencode(".jpg", np.full((height, width), value, np.uint8))[1].tobytes()
+
+
+def png(width=64, height=48):
+    return cv2.imencode(".png", np.zeros((height, width), np.uint8))[1].tobytes()
+
+
+class TestPoses:
+    def test_a_pose_has_its_doubt_and_its_residual(self, client, seen):
+        seen((0.003, 0.004))
+        (row,) = client("GET", f"{EYE}/poses").json()["items"]
+        assert (row["camera"], row["vehicle"], row["tag_id"]) == ("overhead", "n1", 1)
+        assert (row["std_x_m"], row["std_y_m"], row["std_yaw_rad"]) == (0.002, 0.003, 0.01)
+        assert row["residual"] == {"position_mm": 5.0, "x_mm": 3.0, "y_mm": 4.0, "yaw_deg": 0.573}
+
+    def test_residuals_have_mean_share_worst_and_bias(self, client, seen):
+        seen((0.003, 0.004), (0.0, 0.0), (0.006, 0.008))
+        told = client("GET", f"{EYE}/cameras/overhead/residuals").json()
+        stats = told["stats"]
+        assert (stats["samples"], stats["mean_mm"], stats["worst_mm"]) == (3, 5.0, 10.0)
+        assert (stats["bias_x_mm"], stats["bias_y_mm"]) == (3.0, 4.0)
+        assert (stats["bias_yaw_deg"], stats["yaw_std_deg"]) == (0.573, 0.0)
+        assert [one["vehicle"] for one in told["vehicles"]] == ["n1"]
+        assert [one["x_mm"] for one in told["samples"]] == [3.0, 0.0, 6.0]
+
+    def test_a_shorter_window_and_fewer_samples_can_be_asked_for(self, client, seen):
+        seen(*[(0.001 * i, 0.0) for i in range(8)])
+        path = f"{EYE}/cameras/overhead/residuals"
+        short = client("GET", f"{path}?window_s=1").json()
+        assert [one["x_mm"] for one in short["samples"]] == [5.0, 6.0, 7.0]
+        few = client("GET", f"{path}?most=4").json()
+        assert few["stats"]["samples"] == 8
+        assert [one["x_mm"] for one in few["samples"]] == [1.0, 3.0, 5.0, 7.0]
+        none = client("GET", f"{path}?vehicle=n2").json()
+        assert (none["stats"]["samples"], none["stats"]["mean_mm"]) == (0, None)
+
+    def test_residuals_of_a_camera_never_heard_are_not_found(self, client):
+        assert client("GET", f"{EYE}/cameras/other/residuals").status_code == 404
+
+    def test_a_tag_is_told_with_its_owner_size_and_place(self, client, seen):
+        seen((0.0, 0.0))
+        state = client("GET", f"{EYE}/cameras/overhead").json()
+        floor, car, stray = state["state"]["known"]
+        assert (floor["what"], floor["size_px"], floor["x_m"]) == ("map", 28.0, 0.0)
+        assert (car["what"], car["vehicle"], car["x_m"]) == ("car", "n1", 0.5)
+        assert (stray["what"], stray["vehicle"], stray["x_m"]) == ("other", "", None)
+        assert state["mounted"]["z_m"] == 2.8
+
+    def test_a_tag_is_forgotten_after_a_minute(self, client, seen, hear):
+        seen((0.0, 0.0))
+        hear(30.0)
+        assert client("GET", f"{EYE}/cameras/overhead").json()["state"]["known"][1]["seen_s"] == 29
+        hear(62.0)
+        assert client("GET", f"{EYE}/cameras/overhead").json()["state"]["known"] == []
+
+
+class TestViews:
+    path = f"{EYE}/cameras/overhead/views"
+
+    def test_pictures_are_kept_shown_and_thrown_away(self, client):
+        assert client("POST", self.path, content=jpeg()).json()["name"] == "0001.jpg"
+        made = client("POST", self.path, content=png())
+        assert (made.status_code, made.json()["name"]) == (201, "0002.png")
+        shown = client("GET", made.headers["location"])
+        assert (shown.headers["content-type"], shown.content) == ("image/png", png())
+        left = client("DELETE", f"{self.path}/0001.jpg").json()["views"]
+        assert [one["name"] for one in left] == ["0002.png"]
+        assert client("DELETE", self.path).json() == {"views": [], "findings": None}
+
+    def test_without_a_body_it_is_the_newest_frame(self, client, hear):
+        assert client("POST", self.path).status_code == 404
+        picture = jpeg(value=90)
+        hear(1.0, EyeFrame(camera="overhead", t_ns=7, width_px=64, height_px=48, payload=picture))
+        made = client("POST", self.path)
+        assert client("GET", made.headers["location"]).content == picture
+
+    @pytest.mark.parametrize("what", [b"GIF89a", b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"x" * 99])
+    def test_what_is_no_picture_is_refused(self, client, what):
+        refused = client("POST", self.path, content=what)
+        assert (refused.status_code, refused.json()["code"]) == (422, "invalid")
+        assert "JPEG or PNG" in refused.json()["detail"]
+
+    def test_a_picture_of_another_size_is_refused(self, client):
+        client("POST", self.path, content=jpeg())
+        refused = client("POST", self.path, content=jpeg(width=80))
+        assert "expected 64 x 48 px as 0001.jpg, got 80 x 48 px" in refused.json()["detail"]
+
+    def test_a_file_too_large_is_refused(self, client):
+        refused = client("POST", self.path, content=b"\xff" * (LARGEST_PICTURE + 1))
+        assert (refused.status_code, "at most 8 MiB" in refused.json()["detail"]) == (422, True)
+
+    def test_too_many_pictures_are_refused(self, client, tmp_path):
+        folder = tmp_path / "calibrations" / "views" / "overhead"
+        folder.mkdir(parents=True)
+        for number in range(MOST_VIEWS):
+            (folder / f"{number:04d}.jpg").write_bytes(jpeg())
+        assert client("POST", self.path, content=jpeg()).status_code == 409
+
+    def test_a_progressive_jpeg_has_its_size_read_behind_other_segments(self):
+        head = b"\xff\xd8" + b"\xff\xe0" + struct.pack(">H", 6) + b"abcd"
+        frame = b"\xff\xc2" + struct.pack(">HBHH", 17, 8, 300, 400)
+        assert size_of(head + frame) == (400, 300)
+        with pytest.raises(RefusedError):
+            size_of(head)
+
+
+class TestShelf:
+    @pytest.mark.parametrize(("toml", "kind"), [(LENS, "lens"), (PLACE, "place")])
+    def test_a_calibration_is_kept_read_and_downloaded(self, client, toml, kind):
+        new = {"If-None-Match": "*"}
+        made = client("PUT", f"{EYE}/calibrations/lab", json={"toml": toml}, headers=new)
+        assert (made.status_code, made.json()["row"]["kind"]) == (201, kind)
+        (row,) = client("GET", f"{EYE}/calibrations").json()["items"]
+        assert (row["name"], row["width_px"], row["reported"]) == ("lab", 800, False)
+        file = client("GET", f"{EYE}/calibrations/lab/file.toml")
+        assert file.text == toml
+        assert 'filename="lab.toml"' in file.headers["content-disposition"]
+        assert client("GET", f"{EYE}/calibrations/lab/report").status_code == 404
+
+    def test_nobody_overwrites_what_he_did_not_see(self, client):
+        path, new = f"{EYE}/calibrations/lab", {"If-None-Match": "*"}
+        first = client("PUT", path, json={"toml": PLACE}, headers=new)
+        assert client("PUT", path, json={"toml": LENS}, headers=new).status_code == 412
+        assert client("PUT", path, json={"toml": LENS}).status_code == 428
+        mine = {"If-Match": first.headers["etag"]}
+        assert client("PUT", path, json={"toml": LENS}, headers=mine).status_code == 200
+        assert client("DELETE", path, headers=mine).status_code == 412
+        tag = client("GET", path).headers["etag"]
+        assert client("DELETE", path, headers={"If-Match": tag}).status_code == 200
+        assert client("GET", path).status_code == 404
+
+    @pytest.mark.parametrize(
+        "toml",
+        ["[", "x = 1", PLACE + PLACE, PLACE.replace("0.5", '"a"'), LENS.replace("pinhole", "eye")],
+    )
+    def test_what_is_no_calibration_is_refused_with_the_reason(self, client, toml):
+        new = {"If-None-Match": "*"}
+        refused = client("PUT", f"{EYE}/calibrations/lab", json={"toml": toml}, headers=new)
+        assert refused.status_code == 422
+        assert "toml: expected" in refused.json()["detail"]
+
+    def test_a_file_put_there_by_hand_that_is_none_is_passed_over(self, client, tmp_path):
+        folder = tmp_path / "calibrations"
+        folder.mkdir()
+        (folder / "notes.toml").write_bytes(b"\xff\xfe")
+        assert client("GET", f"{EYE}/calibrations").json()["items"] == []
+
+    def test_without_a_shelf_it_says_how_to_get_one(self, view, fake_city, city_map, client_of):
+        client = client_of(create_app(view, fake_city.ask, city_map))
+        assert "--data FOLDER" in client("GET", f"{EYE}/calibrations").json()["detail"]
+
+
+BOARD = {"columns": 9, "rows": 6, "square_m": 0.03}
+
+
+class TestMeasuring:
+    def wait(self, client, accepted):
+        assert accepted.status_code == 202, accepted.text
+        for _ in range(1200):
+            row = client("GET", accepted.headers["location"]).json()
+            if row["state"] not in ("waiting", "running"):
+                return row
+            time.sleep(0.05)
+        raise AssertionError(row)
+
+    def test_without_pictures_there_is_nothing_to_measure(self, client):
+        assert client("POST", f"{EYE}/cameras/overhead/lens", json=BOARD).status_code == 404
+
+    def test_pictures_without_a_board_fail_in_words(self, client):
+        client("POST", TestViews.path, content=jpeg())
+        row = self.wait(client, client("POST", f"{EYE}/cameras/overhead/lens", json=BOARD))
+        assert row["state"] == "failed"
+        assert "chessboard of 9 x 6 squares" in row["error"]
+
+    def test_a_name_that_is_taken_is_refused_before_the_work(self, client):
+        new = {"If-None-Match": "*"}
+        client("PUT", f"{EYE}/calibrations/lab", json={"toml": PLACE}, headers=new)
+        client("POST", TestViews.path, content=jpeg())
+        path = f"{EYE}/cameras/overhead"
+        for noun, body in (("lens", BOARD), ("place", {})):
+            refused = client("POST", f"{path}/{noun}", json={**body, "save_as": "lab"})
+            assert (refused.status_code, refused.json()["code"]) == (409, "exists")
+        body = {"save_as": "new", "lens": "lab"}
+        assert "which is a place" in client("POST", f"{path}/place", json=body).json()["detail"]
+
+    def test_a_camera_that_the_map_does_not_know_has_no_place_to_find(self, client):
+        refused = client("POST", f"{EYE}/cameras/other/place", json={"save_as": "x"})
+        assert refused.status_code == 404
