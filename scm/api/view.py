@@ -93,7 +93,16 @@ class CityView:
         self._reports: dict[str, MisbehaviourReport] = {}
         self._stations = StationTable()
         self._log = EventLog()
-        self._takers: dict[type[Message], Callable[[Any, int], None]] = {
+        self._takers = self._always_heard()
+        self._always = tuple(Hears(kind) for kind in self._takers)
+        self._takers[CameraFrame] = self._take_camera_frame
+        self._takers[LidarScan] = self._scans.take
+        self._takers[VehicleState] = self._close_ups.take
+        self.hears: Sequence[Hears] = self._always
+
+    def _always_heard(self) -> dict[type[Message], Callable[[Any, int], None]]:
+        """Return who takes each message that is heard whether somebody looks or not."""
+        return {
             WorldSnapshot: self._take_snapshot,
             WorldDefinition: self._take_definition,
             Spat: self._take_spat,
@@ -114,11 +123,6 @@ class CityView:
             MisbehaviourScores: self._take_scores,
             MisbehaviourReport: self._take_report,
         }
-        self._always = tuple(Hears(kind) for kind in self._takers)
-        self._takers[CameraFrame] = self._take_camera_frame
-        self._takers[LidarScan] = self._scans.take
-        self._takers[VehicleState] = self._close_ups.take
-        self.hears: Sequence[Hears] = self._always
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Keep what came in; never answers."""
