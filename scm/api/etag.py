@@ -1,13 +1,16 @@
 """ETag and If-Match: who edits says which state he saw, so that nobody's work is overwritten."""
 
 import hashlib
+from typing import Annotated, NamedTuple
 
-from fastapi import Request, Response
+from fastapi import Depends, Header, Request, Response
 
 from scm.api.city import json_response
 from scm.api.encoding import encode
 from scm.api.problem import RefusedError
 from scm.v2x.message import Refused
+
+_READS = frozenset({"GET", "HEAD"})
 
 
 def etag_of(body: bytes) -> str:
@@ -16,36 +19,63 @@ def etag_of(body: bytes) -> str:
 
 
 def tagged(request: Request, body: object, status: int = 200) -> Response:
-    """Return a resource that can be edited as JSON with its ETag; 304 when the reader has it."""
+    """Return a resource that can be edited as JSON with its ETag; 304 to a reader who has it."""
     tag = etag_of(encode(body))
-    if status == 200 and _names(request.headers.get("if-none-match", ""), tag):
+    if request.method in _READS and _names(request.headers.get("if-none-match", ""), tag):
         return Response(status_code=304, headers={"ETag": tag, "Cache-Control": "no-cache"})
     return json_response(body, status, {"ETag": tag, "Cache-Control": "no-cache"})
 
 
-def check_match(request: Request, body: object | None) -> None:
-    """Let a change pass when its writer saw the present state.
+class Condition(NamedTuple):
+    """Which state a writer saw, by the headers of the request; None: not given."""
 
-    Args:
-        request: Carries `If-Match`, or `If-None-Match: *` for what is new.
-        body: The resource as it is now; None: there is none yet.
+    if_match: str | None = None
+    if_none_match: str | None = None
 
-    Raises:
-        RefusedError: 428 where neither header is given, 412 where the state is another.
-    """
-    wanted, new = request.headers.get("if-match"), request.headers.get("if-none-match")
-    if wanted is None and new is None:
-        detail = "send If-Match with the ETag that you edited, or If-None-Match: * for a new one"
-        raise RefusedError(Refused(code="precondition_required", detail=detail))
-    if body is None:
-        if wanted is not None:
-            raise _stale("If-Match", wanted, "none: it does not exist")
-        return
-    tag = etag_of(encode(body))
-    if wanted is None:
-        raise _stale("If-None-Match", str(new), f"{tag}: it exists")
-    if not _names(wanted, tag):
-        raise _stale("If-Match", wanted, tag)
+    def check(self, body: object | None) -> None:
+        """Let a change pass when its writer saw the present state.
+
+        Args:
+            body: The resource as it is now; None: there is none yet.
+
+        Raises:
+            RefusedError: 428 where neither header is given, 412 where the state is another.
+        """
+        if self.if_match is None and self.if_none_match is None:
+            detail = (
+                "send If-Match with the ETag that you edited, or If-None-Match: * for a new one"
+            )
+            raise RefusedError(Refused(code="precondition_required", detail=detail))
+        if body is None:
+            if self.if_match is not None:
+                raise _stale("If-Match", self.if_match, "none: it does not exist")
+            return
+        tag = etag_of(encode(body))
+        if self.if_match is None:
+            raise _stale("If-None-Match", str(self.if_none_match), f"{tag}: it exists")
+        if not _names(self.if_match, tag):
+            raise _stale("If-Match", self.if_match, tag)
+
+
+def _condition(
+    if_match: Annotated[
+        str | None,
+        Header(
+            max_length=200,
+            description="ETag of the state that was edited; `*`: whichever there is",
+            examples=['"5f2b8c1d9e0a4763"'],
+        ),
+    ] = None,
+    if_none_match: Annotated[
+        str | None,
+        Header(max_length=200, description="`*`: only where there is none yet", examples=["*"]),
+    ] = None,
+) -> Condition:
+    return Condition(if_match, if_none_match)
+
+
+Matching = Annotated[Condition, Depends(_condition)]
+"""What a route that changes what can be edited takes, and checks against the present state."""
 
 
 def _names(header: str, tag: str) -> bool:

@@ -57,6 +57,10 @@ class Connection:
         key: API key, where the city asks for one.
         timeout_s: For one answer.
         transport: Another way to the server than the network, for tests.
+
+    Attributes:
+        etag: ETag of the last answer; empty: it had none. Give it as `if_match` with a change of
+            what that answer told.
     """
 
     def __init__(
@@ -72,6 +76,7 @@ class Connection:
             base_url=url, headers=headers, timeout=timeout_s, transport=transport
         )
         self._closed = threading.Event()
+        self.etag = ""
 
     def close(self) -> None:
         """End the connection, and streams at their next turn."""
@@ -204,6 +209,7 @@ class Connection:
 
         response = self._again(once) if method == "GET" or key is not None else _reach(once)
         _check(response)
+        self.etag = response.headers.get("ETag", "")
         return response
 
     def _again(self, once: Callable[[], httpx.Response]) -> httpx.Response:

@@ -15,7 +15,7 @@ from scm.api.calibration_shelf import (
     CalibrationShelf,
 )
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
-from scm.api.etag import check_match, tagged
+from scm.api.etag import Matching, tagged
 from scm.api.eye_rows import frame_of
 from scm.api.operations import Operation, Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
@@ -281,12 +281,16 @@ def _add_shelf(routes: APIRouter, there: Any) -> None:
         responses={**answer(CalibrationFile), **answer(CalibrationFile, 201, "A new one.")},
     )
     def write(
-        request: Request, name: CalibrationName, body: CalibrationBody, key: IdempotencyKey = ""
+        request: Request,
+        name: CalibrationName,
+        body: CalibrationBody,
+        condition: Matching,
+        key: IdempotencyKey = "",
     ) -> Response:
         del key  # the state that the writer saw is asked for
         shelf = there().shelf
         before = shelf.find(name)
-        check_match(request, before)
+        condition.check(before)
         return tagged(request, shelf.write(name, body.toml), 201 if before is None else 200)
 
     @routes.delete(
@@ -295,11 +299,11 @@ def _add_shelf(routes: APIRouter, there: Any) -> None:
         dependencies=[ENGINEER],
         responses=answer(CalibrationFile),
     )
-    def delete(request: Request, name: CalibrationName, key: IdempotencyKey = "") -> Response:
+    def delete(name: CalibrationName, condition: Matching, key: IdempotencyKey = "") -> Response:
         del key  # the state that the writer saw is asked for
         shelf = there().shelf
         found = shelf.get(name)
-        check_match(request, found)
+        condition.check(found)
         shelf.delete(name)
         return json_response(found)
 

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api import replay
 from scm.api.city import City, IdempotencyKey, json_response, not_found
-from scm.api.etag import check_match, tagged
+from scm.api.etag import Matching, tagged
 from scm.api.paging import Cursor, Limit, Page, page_of, page_response
 from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
@@ -234,9 +234,15 @@ def _add_notes(routes: APIRouter, shelf: RecordingsShelf) -> None:
         dependencies=[OPERATOR],
         responses=answer(Notes),
     )
-    def write(request: Request, name: Name, body: NotesBody, key: IdempotencyKey = "") -> Response:
+    def write(
+        request: Request,
+        name: Name,
+        body: NotesBody,
+        condition: Matching,
+        key: IdempotencyKey = "",
+    ) -> Response:
         del key  # the same notes twice are the same notes
-        check_match(request, shelf.notes(name))
+        condition.check(shelf.notes(name))
         fresh = Notes(title=body.title.strip(), notes=body.notes.strip())
         shelf.write_notes(name, fresh)
         return tagged(request, fresh)

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, json_response, not_found
-from scm.api.etag import check_match, tagged
+from scm.api.etag import Matching, tagged
 from scm.api.operations import Operation, Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import ADMIN, OPERATOR, VIEWER
@@ -97,11 +97,15 @@ def _add_scripts(routes: APIRouter, shelf: ScenarioShelf) -> None:
         responses=answer(Scenario) | answer(Scenario, 201, "It is new."),
     )
     def write(
-        request: Request, name: Name, body: ScenarioBody, key: IdempotencyKey = ""
+        request: Request,
+        name: Name,
+        body: ScenarioBody,
+        condition: Matching,
+        key: IdempotencyKey = "",
     ) -> Response:
         del key  # the same script twice is the same script
         before = shelf.find(name)
-        check_match(request, before)
+        condition.check(before)
         return tagged(request, shelf.write(name, body.text), 200 if before else 201)
 
     @routes.delete(

@@ -7,8 +7,8 @@ import msgspec
 from fastapi import APIRouter, Path, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from scm.api.city import City, Name, json_response, not_found
-from scm.api.etag import check_match, tagged
+from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
+from scm.api.etag import Matching, tagged
 from scm.api.operations import Operation, Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
@@ -163,11 +163,19 @@ def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         dependencies=[ENGINEER],
         responses=answer(PlanRow) | answer(PlanRow, 201, "It is new."),
     )
-    def save(request: Request, name: Name, plan: PlanName, body: PlanBody) -> Response:
+    def save(
+        request: Request,
+        name: Name,
+        plan: PlanName,
+        body: PlanBody,
+        condition: Matching,
+        key: IdempotencyKey = "",
+    ) -> Response:
+        del key  # the state that the writer saw is asked for
         site = site_of(city, name)
         _check_own(site, plan)
         before = _find(site, shelf, plan)
-        check_match(request, before)
+        condition.check(before)
         file = _file(site, plan, body.stages)
         proof = shelf.proof_of(file.digest) or (before.proof if before is not None else None)
         if proof is None or proof.digest != file.digest:
@@ -188,13 +196,16 @@ def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         dependencies=[ENGINEER],
         responses=answer(PlanRow, about="As it was."),
     )
-    def delete(request: Request, name: Name, plan: PlanName) -> Response:
+    def delete(
+        name: Name, plan: PlanName, condition: Matching, key: IdempotencyKey = ""
+    ) -> Response:
+        del key  # the state that the writer saw is asked for
         site = site_of(city, name)
         _check_own(site, plan)
         before = _find(site, shelf, plan)
         if before is None:
             raise not_found("plan", plan)
-        check_match(request, before)
+        condition.check(before)
         shelf.delete(name, plan)
         return json_response(before)
 

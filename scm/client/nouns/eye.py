@@ -252,11 +252,21 @@ class EyeNoun:
             "GET", f"/api/v1/eye/calibrations/{part(name)}", CalibrationFile
         )
 
-    def write(self, name: str, *, toml: str, idempotency_key: str = "") -> CalibrationFile:
+    def write(
+        self,
+        name: str,
+        *,
+        if_match: str | None = None,
+        if_none_match: str | None = None,
+        toml: str,
+        idempotency_key: str = "",
+    ) -> CalibrationFile:
         """Put a calibration on the shelf, or another text in its place.
 
         Args:
             name: a calibration's name
+            if_match: ETag of the state that was edited; `*`: whichever there is
+            if_none_match: `*`: only where there is none yet
             toml: a lens of `scm eye calibrate`, or one [[cameras]] block
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
@@ -264,19 +274,33 @@ class EyeNoun:
             "PUT",
             f"/api/v1/eye/calibrations/{part(name)}",
             CalibrationFile,
+            headers={"if-match": if_match, "if-none-match": if_none_match},
             body={"toml": toml},
             key=idempotency_key,
         )
 
-    def delete(self, name: str, *, idempotency_key: str = "") -> CalibrationFile:
+    def delete(
+        self,
+        name: str,
+        *,
+        if_match: str | None = None,
+        if_none_match: str | None = None,
+        idempotency_key: str = "",
+    ) -> CalibrationFile:
         """Take a calibration off the shelf.
 
         Args:
             name: a calibration's name
+            if_match: ETag of the state that was edited; `*`: whichever there is
+            if_none_match: `*`: only where there is none yet
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
-            "DELETE", f"/api/v1/eye/calibrations/{part(name)}", CalibrationFile, key=idempotency_key
+            "DELETE",
+            f"/api/v1/eye/calibrations/{part(name)}",
+            CalibrationFile,
+            headers={"if-match": if_match, "if-none-match": if_none_match},
+            key=idempotency_key,
         )
 
     def report(self, name: str) -> dict[str, Any]:

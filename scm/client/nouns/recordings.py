@@ -107,12 +107,21 @@ class RecordingsNoun:
         return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}/notes", Notes)
 
     def write(
-        self, name: str, *, title: str = "", notes: str = "", idempotency_key: str = ""
+        self,
+        name: str,
+        *,
+        if_match: str | None = None,
+        if_none_match: str | None = None,
+        title: str = "",
+        notes: str = "",
+        idempotency_key: str = "",
     ) -> Notes:
         """Name it and note something.
 
         Args:
             name: a recording: its file without .mcap
+            if_match: ETag of the state that was edited; `*`: whichever there is
+            if_none_match: `*`: only where there is none yet
             title: shown first
             notes: in words, as long as need be
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -121,6 +130,7 @@ class RecordingsNoun:
             "PUT",
             f"/api/v1/recordings/{part(name)}/notes",
             Notes,
+            headers={"if-match": if_match, "if-none-match": if_none_match},
             body={"title": title, "notes": notes},
             key=idempotency_key,
         )

@@ -33,11 +33,21 @@ class ScenariosNoun:
         """
         return self._connection.ask("GET", f"/api/v1/scenarios/{part(name)}", Scenario)
 
-    def write(self, name: str, *, text: str, idempotency_key: str = "") -> Scenario:
+    def write(
+        self,
+        name: str,
+        *,
+        if_match: str | None = None,
+        if_none_match: str | None = None,
+        text: str,
+        idempotency_key: str = "",
+    ) -> Scenario:
         """Write a script.
 
         Args:
             name: a script without .py
+            if_match: ETag of the state that was edited; `*`: whichever there is
+            if_none_match: `*`: only where there is none yet
             text: Python that drives the fleet, as `scm.fleet` says
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
@@ -45,6 +55,7 @@ class ScenariosNoun:
             "PUT",
             f"/api/v1/scenarios/{part(name)}",
             Scenario,
+            headers={"if-match": if_match, "if-none-match": if_none_match},
             body={"text": text},
             key=idempotency_key,
         )

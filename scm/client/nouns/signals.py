@@ -397,37 +397,60 @@ class SignalsNoun:
         name: str,
         plan: str,
         *,
+        if_match: str | None = None,
+        if_none_match: str | None = None,
         about: str = "",
         by: str = "api",
         reason: str = "",
         stages: tuple[StageBody, ...],
+        idempotency_key: str = "",
     ) -> PlanRow:
         """Save a proven plan.
 
         Args:
             name: a name on the bus
             plan: a plan's name
+            if_match: ETag of the state that was edited; `*`: whichever there is
+            if_none_match: `*`: only where there is none yet
             about: what it is for
             by: who asks; told in the log
             reason: why
             stages: in the order of the cycle
+            idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
             "PUT",
             f"/api/v1/signals/{part(name)}/plans/{part(plan)}",
             PlanRow,
+            headers={"if-match": if_match, "if-none-match": if_none_match},
             body={"about": about, "by": by, "reason": reason, "stages": stages},
+            key=idempotency_key,
         )
 
-    def delete(self, name: str, plan: str) -> PlanRow:
+    def delete(
+        self,
+        name: str,
+        plan: str,
+        *,
+        if_match: str | None = None,
+        if_none_match: str | None = None,
+        idempotency_key: str = "",
+    ) -> PlanRow:
         """Delete a saved plan.
 
         Args:
             name: a name on the bus
             plan: a plan's name
+            if_match: ETag of the state that was edited; `*`: whichever there is
+            if_none_match: `*`: only where there is none yet
+            idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
-            "DELETE", f"/api/v1/signals/{part(name)}/plans/{part(plan)}", PlanRow
+            "DELETE",
+            f"/api/v1/signals/{part(name)}/plans/{part(plan)}",
+            PlanRow,
+            headers={"if-match": if_match, "if-none-match": if_none_match},
+            key=idempotency_key,
         )
 
     def prove(self, name: str, *, plan: str, stages: tuple[StageBody, ...]) -> Operation:

@@ -166,3 +166,13 @@ class TestStream:
         seen = list(states(parse(iter(lines))))
         assert seen[0] == {"stop": 1, "events": [1]}
         assert seen[2] == {"stop": 3, "vehicles": 2}
+
+
+def test_the_etag_of_an_answer_is_kept_for_the_change_that_follows(served):
+    told = httpx.Response(200, json={"x": 1}, headers={"ETag": '"a1"'})
+    own, asked = served(told, httpx.Response(200, json={}))
+    own.ask("GET", "/x", dict)
+    assert own.etag == '"a1"'
+    own.ask("PUT", "/x", dict, headers={"if-match": own.etag, "if-none-match": None})
+    assert asked[-1].headers["if-match"] == '"a1"'
+    assert "if-none-match" not in asked[-1].headers
