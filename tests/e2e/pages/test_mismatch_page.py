@@ -36,9 +36,6 @@ def shelf(running):
     (drive / "next_drive_way.csv").write_text(WAY, "utf-8")
     yield folder
     shutil.rmtree(folder)
-    for row in running.get("/vehicles")["vehicles"]:
-        if row["owner"] == "world" and row["trip"] is None:  # it was driven, and stands in the way
-            running.web.post(f"/vehicles/{row['vehicle']}/route", json={}).raise_for_status()
 
 
 def arcs():
