@@ -50,7 +50,7 @@ class MismatchJobs:
         """
         if self._city.shelves.reports is None:
             detail = "this city keeps no reports: start `scm api` with --data FOLDER"
-            raise RefusedError(Refused(code="offline", detail=detail))
+            raise RefusedError(Refused(code="not_kept", detail=detail))
         self._city.shelves.reports.mkdir(parents=True, exist_ok=True)
         return self._city.shelves.reports
 

@@ -24,7 +24,7 @@ class PathRow(msgspec.Struct, kw_only=True, frozen=True):
 
     vehicle: str
     trip_id: str | None
-    points_m: tuple[tuple[float, float], ...]
+    points_m: tuple[tuple[float, ...], ...]
     is_whole: bool
 
 

@@ -31,6 +31,14 @@ LOOK_S, GRACE_S = 0.1, 8.0
 SHIPPED = Path(scm.__file__).parents[1] / "examples"
 KIND = "scenario"
 _CONNECT = "{connect}"
+_LAUNCH = """
+import runpy, signal, sys
+from pathlib import Path
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ours may have been started without
+sys.argv = sys.argv[1:]
+sys.path[0] = str(Path(sys.argv[0]).parent)
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
 
 
 class Scenario(msgspec.Struct, kw_only=True, frozen=True):
@@ -125,7 +133,7 @@ class ScenarioShelf:
     def _check_own(self, name: str) -> None:
         if self._folder is None:
             detail = "this city keeps no scenarios: start it with a folder (scm api --data FOLDER)"
-            raise RefusedError(Refused(code="offline", detail=detail))
+            raise RefusedError(Refused(code="not_kept", detail=detail))
         found = self.find(name)
         if found is not None and found.shipped:
             detail = f"{name} came with the program: save it under another name"
@@ -201,7 +209,7 @@ class ScenarioRuns:
         environment = {**os.environ, "SCM_CONNECT": self._connect, "PYTHONUNBUFFERED": "1"}
         try:
             process = subprocess.Popen(
-                [sys.executable, str(path), *arguments],
+                [sys.executable, "-c", _LAUNCH, str(path), *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,

@@ -76,6 +76,7 @@ class Connection:
             base_url=url, headers=headers, timeout=timeout_s, transport=transport
         )
         self._closed = threading.Event()
+        self._timeout_s = timeout_s
         self.etag = ""
 
     def close(self) -> None:
@@ -179,7 +180,7 @@ class Connection:
 
     def _lines(self, path: str, query: Values | None, last_id: str) -> Lines:
         headers = {"Last-Event-ID": last_id} if last_id else {}
-        timeout = httpx.Timeout(self._http.timeout, read=SILENT_S)
+        timeout = httpx.Timeout(self._timeout_s, read=SILENT_S)
         with self._http.stream(
             "GET", path, params=_given(query), headers=headers, timeout=timeout
         ) as response:

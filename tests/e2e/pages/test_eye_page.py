@@ -74,7 +74,7 @@ def test_a_lens_is_measured_from_uploaded_pictures(visit, running, tmp_path):
     found = tomllib.loads(running.get(f"/eye/calibrations/{row['name']}")["toml"])
     assert found["fx_px"] == pytest.approx(camera.fx_px, rel=0.01)
     assert re.search(r"seen in \d+ %", page.inner_text("figcaption"))
-    page.wait_for_selector(f".eye-place option[value={row['name']}]", state="attached")
+    page.wait_for_selector(f".eye-place option:text('{row['name']}')", state="attached")
     page.click("text=Throw all away")
     page.click(f"button[aria-label='Throw {row['name']} away']")
     visited.until(lambda: not running.get("/eye/calibrations")["items"], "the shelf is empty")

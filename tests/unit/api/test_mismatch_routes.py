@@ -90,7 +90,7 @@ def packed(files):
 def test_a_city_without_a_shelf_has_no_reports_and_says_how_to_have_some(client):
     assert client("GET", f"{API}/reports").json()["items"] == []
     answer = client("POST", f"{API}/jobs", json={"upload": "x"})
-    assert answer.status_code == 503
+    assert answer.status_code == 409
     assert "--data" in answer.json()["detail"]
 
 

@@ -55,6 +55,7 @@ async function readBox() {
 }
 
 function draw(canvas, box, samples, gain) {
+  if (!canvas) return; // the page was left while its floor was read
   const ratio = window.devicePixelRatio || 1;
   const { clientWidth: width, clientHeight: height } = canvas;
   [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];

@@ -1,6 +1,7 @@
 /** What the chosen car sees and means to do: its LIDAR's scans and its way ahead, heard while they are shown. */
 import { effect } from "@preact/signals";
 import { selected } from "scm/shared/selection.js";
+import { fleet } from "scm/pages/map/fleet.js";
 import { layers } from "scm/pages/map/layers.js";
 
 const PATH_MS = 700;
@@ -33,6 +34,7 @@ function hearScans(vehicle) {
 function askPaths(vehicle) {
   let ended = false;
   const ask = async () => {
+    if (!fleet.rows.has(vehicle)) return; // it left
     const response = await fetch(`/api/v1/vehicles/${vehicle}/path`).catch(() => null);
     const path = response?.ok ? await response.json().catch(() => null) : null;
     if (!ended) closeUp.path = path;

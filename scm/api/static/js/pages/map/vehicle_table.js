@@ -71,8 +71,9 @@ export function VehicleTable() {
   `;
 }
 
-function Rows({ rows }) {
+function Rows({ rows: all }) {
   const box = useRef(null);
+  const rows = all.filter((row) => row < fleet.count); // cars that left since the order was made
   useEffect(() => {
     const list = box.current;
     const look = () => {
@@ -122,6 +123,7 @@ function Head({ column }) {
 }
 
 function Car({ row, number }) {
+  if (row >= fleet.count) return null; // it left a moment ago
   const { vehicle, kind: sort, owner } = fleet.vehicles[row];
   const chosen = selected.value === vehicle;
   const mode = modeOf(row);

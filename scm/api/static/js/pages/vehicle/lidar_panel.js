@@ -45,6 +45,7 @@ export function LidarPanel({ car }) {
 }
 
 function draw(canvas, scan, carFile, reach) {
+  if (!canvas) return; // nothing to draw on yet, or no longer
   const ratio = window.devicePixelRatio || 1;
   const { clientWidth: width, clientHeight: height } = canvas;
   canvas.width = Math.round(width * ratio);
