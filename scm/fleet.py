@@ -10,6 +10,7 @@ computation; live it waits for the real city.
 import itertools
 import logging
 import math
+import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -355,13 +356,15 @@ def open_city(
         connect: Router of a running city; None: a city of its own, in lockstep.
         city: Whose keys to use.
         seed: Of all randomness in lockstep.
-        credentials: File of an operator, where the running city lets in nobody else.
+        credentials: File of an operator, where the running city lets in nobody else; None: the
+            one that `SCM_CREDENTIALS` names, which a city tells the scripts that it runs.
     """
     if connect is None:
         with _lockstep_city(map_name, city, seed) as lockstep:
             yield City(LockstepLink(lockstep))
         return
-    who = read_credentials(credentials) if credentials is not None else None
+    given = credentials or os.environ.get("SCM_CREDENTIALS")
+    who = read_credentials(Path(given)) if given else None
     with ZenohBus(city, "script", connect, credentials=who) as bus:
         live = City(LiveLink(bus))
         try:

@@ -6,11 +6,13 @@ this holds across restarts too: an answer leaves only when it, the state behind 
 the audit log are stored.
 """
 
+import logging
 from collections.abc import Iterable, Sequence
 from typing import cast
 
 import msgspec
 
+from scm.log import event
 from scm.part import Hears, Part
 from scm.store.audit import Deed
 from scm.store.repository import Table
@@ -29,6 +31,8 @@ DEPTH = {
     Delivery.PRESENCE: 1024,
 }
 RAW_DEPTH = 16384
+
+_log = logging.getLogger(__name__)
 
 
 class Station:
@@ -119,6 +123,7 @@ class Station:
             if isinstance(item, Call):
                 self._bus.call(item, self._replies.put)
             elif isinstance(item, Answer):
+                self._log_traced(item)
                 if self._keeper is None:
                     self._settle(item)
                 else:
@@ -165,6 +170,13 @@ class Station:
         else:
             for answer in answers:
                 self._settle(answer)
+
+    def _log_traced(self, answer: Answer) -> None:
+        """Say in the log what became of a request that somebody traces."""
+        request = cast("Request", answer.to.message)
+        if request.trace_id and _has_effect(answer.to):
+            kind, reply = type(request).__name__, type(answer.reply).__name__
+            event(_log, "answered", request=kind, reply=reply, trace_id=request.trace_id[:32])
 
     def _deed(self, answer: Answer) -> Deed:
         request = cast("Request", answer.to.message)

@@ -24,7 +24,8 @@ class Motion:
         accel: Along the body [m/s^2].
         steering: Mean road-wheel angle [rad], + = left.
         source: Where the pose comes from: `simulated`, `eye`, `odometry`.
-        battery_v: Of the drive battery; a simulated one is without load. None: not measured.
+        battery_v: Of the drive battery, under load as it is. None: not measured.
+        battery_charge: What is left in it, 0 to 1, counted or estimated. None: not known.
     """
 
     pose: Pose2
@@ -35,6 +36,7 @@ class Motion:
     steering: float
     source: str
     battery_v: float | None = None
+    battery_charge: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

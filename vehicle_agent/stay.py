@@ -5,7 +5,7 @@ hear -> move the body up to now -> decide -> guard -> command the body -> report
 
 import logging
 
-from scm.clock import NS_PER_S
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import MapError
 from scm.log import event
 from scm.maps.model import CityMap
@@ -87,6 +87,7 @@ class Stay:
         self._seq = self._felt = 0
         self._commanded = 0.0, 0.0
         self._turn: Indicators = "off"
+        self._is_led = False
 
     def see(self, track: EyeTrack, now_ns: int) -> None:
         """Learn where the overhead cameras see the car."""
@@ -116,7 +117,7 @@ class Stay:
         """
         self._body.advance(now_ns)
         self._begin_anew_if_lifted(now_ns)
-        led_here, self._turn = self._commanded, "off"
+        led_here, self._turn, self._is_led = self._commanded, "off", epoch is None
         if epoch is not None:
             self.guard.take(self._own_command(now_ns, epoch), now_ns)
         self._body.show(self._shown(hazard=self.guard.lost))
@@ -186,6 +187,11 @@ class Stay:
         ]
         return [*outbox, *self.trips.reports(now_ns)]
 
+    def _command_age_ms(self, now_ns: int) -> float | None:
+        """Return the age of the newest command of somebody else who drives it."""
+        age_ns = self.guard.command_age_ns(now_ns) if self._is_led else None
+        return None if age_ns is None else age_ns / NS_PER_MS
+
     def _state(self, guarded: Guarded, led_here: tuple[float, float], now_ns: int) -> VehicleState:
         motion = self._body.motion()
         throttle, steering = led_here
@@ -217,5 +223,7 @@ class Stay:
             ),
             car=self._car,
             battery_v=motion.battery_v,
+            battery_charge=motion.battery_charge,
+            command_age_ms=self._command_age_ms(now_ns),
             contacts=self._felt,
         )

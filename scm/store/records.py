@@ -8,6 +8,7 @@ plans    traffic/<junction>   PlanRecord       the plan in force, and the wish f
 answers  <station>/<digest>   StoredAnswer     see scm.v2x.answers
 marks    <station>                             which batch of which run was written last
 seen     event/<id>           Acknowledgement  who took note of an event (scm.api.acknowledgements)
+calibrations  eye.../<camera>  SightRecord     what a camera sees by (scm.eye.sight)
 """
 
 from typing import TypeVar
@@ -75,12 +76,14 @@ class PlanRecord(msgspec.Struct, kw_only=True, frozen=True):
         flash: Whether a person asked for flashing red.
         by: Who asked, and why, in one sentence.
         stages: Of a plan that is none of the junction's own.
+        offset_s: Of that plan; None: it is in step with nobody.
     """
 
     plan: str
     flash: bool = False
     by: str = ""
     stages: tuple[StageRecord, ...] = ()
+    offset_s: float | None = None
 
 
 class FaultRecord(msgspec.Struct, kw_only=True, frozen=True):

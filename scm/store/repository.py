@@ -10,7 +10,9 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from typing import Literal, NamedTuple, Protocol, get_args
 
-Table = Literal["leases", "plans", "answers", "credentials", "latches", "marks", "seen"]
+Table = Literal[
+    "leases", "plans", "answers", "credentials", "latches", "marks", "seen", "calibrations"
+]
 Log = Literal["audit"]
 
 TABLES: tuple[Table, ...] = get_args(Table)

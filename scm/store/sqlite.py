@@ -31,6 +31,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
     ),
     tuple(_TABLE.format(name) for name in ("latches", "marks")),
     (_TABLE.format("seen"),),
+    (_TABLE.format("calibrations"),),
 )
 """What each schema version adds to the one before; `PRAGMA user_version` counts them."""
 

@@ -35,6 +35,9 @@ CITY_PARTS = (
     "ros2",
 )
 
+SCRIPT = "script"
+"""Who a script is that the dashboard runs: an operator, however much the server itself may do."""
+
 _Rule = dict[str, object]
 
 
@@ -90,7 +93,8 @@ def guard_of(
 
 def own_stations(eyes: Iterable[str], agents: Iterable[str]) -> dict[str, str]:
     """Return the stations that a whole city starts itself, with their roles."""
-    return dict.fromkeys((*CITY_PARTS, *eyes), "part") | dict.fromkeys(agents, "vehicle")
+    parts, cars = dict.fromkeys((*CITY_PARTS, *eyes), "part"), dict.fromkeys(agents, "vehicle")
+    return parts | {SCRIPT: "operator"} | cars
 
 
 def router_settings(fleet: Fleet, city: str, listen: str) -> dict[str, object]:

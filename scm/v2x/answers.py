@@ -31,7 +31,7 @@ class StoredAnswer(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         t_ns: When the request arrived.
-        asked: Digest of the request, its id included.
+        asked: Digest of the request, its id included, its trace not.
         refused: Whether the reply is a `Refused`.
         reply: The reply as JSON.
     """
@@ -164,7 +164,8 @@ def key_of(request: Request) -> str:
 
 
 def _digest(request: Request) -> str:
-    return hashlib.blake2b(encode(request)[0], digest_size=16).hexdigest()
+    untraced = msgspec.structs.replace(request, trace_id="")
+    return hashlib.blake2b(encode(untraced)[0], digest_size=16).hexdigest()
 
 
 def _request(item: Incoming) -> Request:

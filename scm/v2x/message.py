@@ -50,6 +50,8 @@ class Request(Message, kw_only=True, frozen=True):
 
     Attributes:
         request_id: Same id, same effect, once: a retry gets the stored answer. Empty: not retried.
+        trace_id: W3C trace id of what led to it, a click perhaps; whoever does it notes that. It
+            makes no difference to what is asked. Empty: nobody traces it.
         HAS_EFFECT: Whether it changes anything: what does not is in no audit log.
     """
 
@@ -58,6 +60,7 @@ class Request(Message, kw_only=True, frozen=True):
     HAS_EFFECT: ClassVar[bool] = True
 
     request_id: str = ""
+    trace_id: str = ""
 
 
 class Refused(Message, kw_only=True, frozen=True):

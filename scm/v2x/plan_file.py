@@ -37,6 +37,7 @@ class PlanFile(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         phases, conflicts: Of the junction when the plan was made.
+        offset_s: When its cycle begins, see `PlanRequest`; no part of what is proven.
         by: Who saved it; `reason` why, `saved_ns` when.
     """
 
@@ -46,6 +47,7 @@ class PlanFile(msgspec.Struct, kw_only=True, frozen=True):
     phases: tuple[SignalPhase, ...]
     conflicts: tuple[tuple[str, str], ...]
     about: str = ""
+    offset_s: float | None = None
     by: str = ""
     reason: str = ""
     saved_ns: int = 0

@@ -60,6 +60,7 @@ EVERY_REQUEST = (
     "tl/*/req",
     "tl/*/wish",
     "tl/*/mon/reset",
+    "eye/*/req",
 )
 
 _EVERYBODY = Rights(
@@ -141,6 +142,7 @@ _OF_PART: dict[str, Rights] = {
     "eye": Rights(
         says=("eye/*/*", "eye/*/pose/*", "eye/pose/*", "eye/*/@preview", "v2x/tx/*/cpm"),
         hears=("world/snapshot", "v/*/emulated", "eye/*/pose/*", "eye/*/@picture"),
+        serves=("eye/*/req",),
     ),
     "camera": Rights(says=("v/*/@camera/*",), hears=("world/snapshot", "world/def", "tl/*/spat")),
     "record": _WATCHES,

@@ -102,6 +102,12 @@ class Guard:
         self._lost = False
         return True
 
+    def command_age_ns(self, now_ns: int) -> int | None:
+        """Return how old the newest command under this epoch is; None: none came yet."""
+        if self._seq is None or self._heard_ns is None:
+            return None
+        return max(0, now_ns - self._heard_ns)
+
     def stop(self, engaged: bool) -> None:
         """Engage or release the city-wide stop: while engaged the car stops for everybody."""
         self._stopped = engaged

@@ -4,7 +4,11 @@ Straight lines between the points of the usual 1C rest chart (3.27 V empty, 3.69
 3.84 V at half, 4.20 V full); cells differ by some 20 mV from it.
 """
 
-from scm.vehicles.jit import law
+import numpy as np
+
+from scm.vehicles.jit import law, plain
+
+_BENDS = (0.0, 0.05, 0.1, 0.3, 0.5, 0.8, 1.0)
 
 
 @law
@@ -46,3 +50,8 @@ def pack_current(
     """Current out of the pack, never negative [A]; arguments as of `loaded_voltage`."""
     taken = throttle * (throttle * voltage * (1.0 / nominal) - turn)
     return idle_current + motor_current * max(0.0, taken)
+
+
+def charge_of(volts: float) -> float:
+    """Return the state of charge, 0 to 1, of a cell that rests at a voltage [V]."""
+    return float(np.interp(volts, [plain(cell_voltage)(bend) for bend in _BENDS], _BENDS))

@@ -45,7 +45,7 @@ def take_over(world: World, car: HostedCar, lease: rules.Lease, now_ns: int) -> 
         car.guard.set_epoch(lease.epoch, now_ns)
     car.lease = lease
     world.keep(car)
-    world.errands.end(car.slot)
+    world.errands.end(car.slot, now_ns)
     world.slots.driven[car.slot] = False
     world.slots.hazard[car.slot] = False
 

@@ -13,6 +13,7 @@ from scm.log import event
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.ground import Ground
+from scm.vehicles.packs import Packs
 from scm.world.hull import hull_of
 from scm.world.slots import Slots
 from scm.world.solids import Hull
@@ -38,6 +39,7 @@ class Garage:
         self._cars: dict[str, Car] = {}
         self._hulls: dict[tuple[str, bool], Hull] = {}
         self.fleets: dict[str, Fleet] = {}
+        self._packs: dict[str, Packs] = {}
         self._rows: dict[str, Ints] = {}
         self._slots: dict[str, Ints] = {}
         self._threads = 1
@@ -79,6 +81,7 @@ class Garage:
                 if name not in self.fleets:
                     fleet = Fleet(self.car(name), self._capacity)
                     fleet.threads = self._threads
+                    self._packs[name] = Packs(fleet)
                     self.fleets[name] = fleet
         return self.fleets[name]
 
@@ -91,6 +94,7 @@ class Garage:
         """
         fleet = self.prepare(name)
         row = fleet.add(pose)
+        self._packs[name].renew(row)
         self._rows[name] = np.append(self.rows(name), row)
         self._slots[name] = np.append(self.slots(name), slot)
         return fleet, row
@@ -129,6 +133,11 @@ class Garage:
                 ground.feel(self.fleets[name], t_ns)
                 self.fleets[name].advance(duration)
 
+    def drain(self, duration: float) -> None:
+        """Take out of all batteries what the cars draw over a time [s]."""
+        for name, rows in self._rows.items():
+            self._packs[name].drain(rows, duration)
+
     def locate(self, slots: Slots) -> None:
         """Write where all cars are and how they move into the slots."""
         for name, rows in self._rows.items():
@@ -146,6 +155,14 @@ class Garage:
             of_fleet = cast("Floats", getattr(self.fleets[car_file], name))
             values[self._slots[car_file]] = of_fleet[rows]
         return values
+
+    def batteries(self) -> tuple[Floats, Floats]:
+        """Return voltage under load [V] and charge left by slot; NaN: there is no battery."""
+        volts, charge = np.full((2, self._capacity), np.nan)
+        for name, rows in self._rows.items():
+            own, packs = self._slots[name], self._packs[name]
+            volts[own], charge[own] = packs.volts[rows], packs.charge[rows]
+        return volts, charge
 
     def frozen(self) -> Ints:
         """Return the slots of cars whose numbers left every physical range."""

@@ -5,6 +5,7 @@ Its dynamics live in the `Garage`, what it does now in the `Slots`, its driver i
 
 from dataclasses import dataclass, field
 
+from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
 from scm.v2x.etsi_path import SlowNews
 from scm.vehicles.car import Car
@@ -61,6 +62,11 @@ class HostedCar:
     def hazard(self) -> bool:
         """Whether its hazard lights flash: its commander was lost."""
         return bool(self.slots.hazard[self.slot])
+
+    def command_age_ms(self, now_ns: int) -> float | None:
+        """Return the age of its leaseholder's newest command; None: there is none."""
+        age_ns = None if self.guard is None else self.guard.command_age_ns(now_ns)
+        return None if age_ns is None else age_ns / NS_PER_MS
 
     @property
     def is_sent(self) -> bool:

@@ -4,6 +4,7 @@ Hosted cars report themselves in turns, `STATES_A_TICK` a tick at most: up to so
 reports every tick, beyond that each one's rate falls in proportion (1000 cars: 20 Hz each).
 """
 
+import math
 from collections.abc import Iterator
 from typing import TypedDict
 
@@ -67,12 +68,12 @@ def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
     columns = (
         slots.seq, slots.x, slots.y, slots.yaw, slots.speed, signal("lateral_speed"),
         slots.yaw_rate, signal("accel_x") + signal("impact_x"), signal("steer_angle"),
-        slots.throttle, slots.steering, slots.mode, signal("battery"),
+        slots.throttle, slots.steering, slots.mode, *world.garage.batteries(),
     )  # fmt: skip
     rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)
     for (
         (car, lit), seq, x, y, yaw, speed, lateral, yaw_rate, accel, wheels,
-        throttle, steering, mode, volts,
+        throttle, steering, mode, volts, charge,
     ) in rows:  # fmt: skip
         yield VehicleState(
             vehicle=car.name,
@@ -93,7 +94,9 @@ def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
             mode=MODES[mode],
             lights=lamps(car.switches, throttle, speed, now_ns, **lit),
             car=car.car_file,
-            battery_v=volts or None,
+            battery_v=None if math.isnan(volts) else volts,
+            battery_charge=None if math.isnan(charge) else charge,
+            command_age_ms=car.command_age_ms(now_ns),
         )
 
 
@@ -126,10 +129,12 @@ def _hosted_in_snapshot(world: World, now_ns: int) -> Iterator[SnapshotVehicle]:
     of = np.flatnonzero(slots.hosted)
     columns = (
         slots.x, slots.y, slots.yaw, slots.speed, slots.throttle, signal("steer_angle"),
-        signal("roll"), signal("pitch"), slots.mode, signal("battery"),
+        signal("roll"), signal("pitch"), slots.mode, *world.garage.batteries(),
     )  # fmt: skip
     rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)
-    for (car, lit), x, y, yaw, speed, throttle, steering, roll, pitch, mode, volts in rows:
+    for (
+        (car, lit), x, y, yaw, speed, throttle, steering, roll, pitch, mode, volts, charge,
+    ) in rows:  # fmt: skip
         yield SnapshotVehicle(
             vehicle=car.name,
             kind=car.kind,
@@ -146,14 +151,16 @@ def _hosted_in_snapshot(world: World, now_ns: int) -> Iterator[SnapshotVehicle]:
             owner=car.lease.owner,
             epoch=car.lease.epoch,
             lease_left_ms=rules.left_ms(car.lease, now_ns),
-            battery_v=volts or None,
+            battery_v=None if math.isnan(volts) else volts,
+            battery_charge=None if math.isnan(charge) else charge,
+            command_age_ms=car.command_age_ms(now_ns),
             mode=MODES[mode],
             lights=lamps(car.switches, throttle, speed, now_ns, **lit),
         )
 
 
 def _remote_in_snapshot(car: RemoteCar, now_ns: int) -> SnapshotVehicle:
-    state = car.state
+    state, age_ms = car.state, car.age_ns(now_ns) / NS_PER_MS
     x, y, yaw = car.pose
     return SnapshotVehicle(
         vehicle=car.name,
@@ -170,11 +177,19 @@ def _remote_in_snapshot(car: RemoteCar, now_ns: int) -> SnapshotVehicle:
         epoch=car.lease.epoch,
         lease_left_ms=rules.left_ms(car.lease, now_ns),
         battery_v=None if state is None else state.battery_v,
+        battery_charge=car.battery_charge,
+        command_age_ms=_command_age_ms(state, age_ms),
         mode="idle" if state is None else state.mode,
-        age_ms=car.age_ns(now_ns) / NS_PER_MS,
+        age_ms=age_ms,
         alive=car.alive,
         lights=() if state is None else state.lights,
     )
+
+
+def _command_age_ms(state: VehicleState | None, age_ms: float) -> float | None:
+    if state is None or state.command_age_ms is None:
+        return None
+    return state.command_age_ms + age_ms
 
 
 def _whose_turn(world: World) -> Ints:

@@ -95,6 +95,12 @@ class RemoteCar:
         """As reported [m/s]; 0 before the first report."""
         return self.state.speed_mps if self.state is not None else 0.0
 
+    @property
+    def battery_charge(self) -> float | None:
+        """What is left in its battery, 0 to 1, as reported; None: not known, or no such share."""
+        charge = None if self.state is None else self.state.battery_charge
+        return charge if charge is not None and 0.0 <= charge <= 1.0 else None
+
     def age_ns(self, now_ns: int) -> int:
         """Return how old its newest report is, on the world's clock."""
         return max(0, now_ns - self.heard_ns)

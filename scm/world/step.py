@@ -44,4 +44,5 @@ def move(world: World, now_ns: int) -> None:
         t_ns = now_ns - left * CONTACT_STEP_NS
         world.garage.advance(world.ground, t_ns, seconds(CONTACT_STEP_NS))
         collide(world, t_ns + CONTACT_STEP_NS)
+    world.garage.drain(steps * seconds(CONTACT_STEP_NS))
     world.locate()

@@ -1,4 +1,6 @@
-"""Watching over cars: agents that vanish, leases that run out, dynamics that leave all ranges."""
+"""Watching over cars: who vanishes, whose lease or battery runs out, who leaves all ranges."""
+
+import math
 
 from scm.clock import NS_PER_S, seconds
 from scm.vehicles.fleet import VehicleStatus
@@ -23,6 +25,18 @@ def watch(world: World, now_ns: int) -> None:
             status = VehicleStatus(int(hosted.fleet.status[hosted.row]))
             name = f"vehicle_{status.name.lower()}"
             world.say("error", name, status.sentence, now_ns, hosted.name)
+    if world.every["battery"].is_due(now_ns):
+        _watch_batteries(world, now_ns)
+
+
+def _watch_batteries(world: World, now_ns: int) -> None:
+    _, left = world.garage.batteries()
+    hosted = {name: float(left[car.slot]) for name, car in world.hosted.items()}
+    remote = {name: car.battery_charge for name, car in world.remote.items()}
+    charges = {name: None if math.isnan(c) else c for name, c in hosted.items()} | remote
+    for name in world.batteries.news(charges):
+        text = f"the battery of {name} is low: {100.0 * (charges[name] or 0.0):.0f} % left"
+        world.say("warning", "battery_low", text, now_ns, name)
 
 
 def lose(world: World, car: RemoteCar, why: str, now_ns: int, *, dead: bool) -> None:

@@ -34,6 +34,7 @@ from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sensor
 from scm.world import lease as rules
+from scm.world.batteries import Batteries
 from scm.world.blows import Blows
 from scm.world.busy import Busy
 from scm.world.cams import CamTriggers
@@ -56,7 +57,7 @@ SENSORS = "scm.vehicles.sensors"
 SCANNER = "lidar"
 DEFAULT_CAR = "nigel"
 EYE = "eye"
-RATES_HZ = {"snapshot": 20.0, "second": 1.0, "radio": 1.0, "denm": 10.0}
+RATES_HZ = {"snapshot": 20.0, "second": 1.0, "radio": 1.0, "denm": 10.0, "battery": 1.0}
 
 AnyCar = HostedCar | RemoteCar
 
@@ -94,6 +95,7 @@ class World:
         ignored: Messages that fitted nothing: unknown cars, commands without the lease.
         last_hit_ns: When a car's contact was last told.
         dangers: What is known of warnings on the air.
+        batteries: Which of them were told to be low.
         highest_epoch: Of any car that left: a newcomer's is higher, whatever its name.
     """
 
@@ -149,6 +151,7 @@ class World:
         self.ignored = self.highest_epoch = 0
         self.last_hit_ns: dict[str, int] = {}
         self.dangers = Dangers()
+        self.batteries = Batteries()
         self._tags = Numbers(city_map.first_vehicle_tag_id, never=city_map.tag.tag_id)
         self._unnamed = 0
         self._came = 0

@@ -21,6 +21,7 @@ from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.lights import Switches
+from scm.vehicles.pack import pack_of
 from vehicle_agent.body import Body, BodyKind, Motion, Obeyed, Wiring
 from vehicle_agent.lidar_port import LidarPort, open_lidar
 from vehicle_agent.nigel.helm import Helm
@@ -57,6 +58,8 @@ class NigelBody:
         if not (raw or self._undo.deadband):
             event(_log, "no_deadband", level=logging.WARNING, car=car.name, key=DEADBAND)
         self._helm, self._lidar = helm, lidar
+        self._pack, self._wheel_m = pack_of(car), car.value("wheel.radius_m")
+        self._throttle = 0.0
         self._start = Pose2(0.0, 0.0, 0.0)
         self._track: EyeTrack | None = None
         self._heard_ns = self._now_ns = 0
@@ -114,9 +117,9 @@ class NigelBody:
         """Pass a command on; where it is unfit, whatever is commanded, zeros."""
         if self.unfit(self._now_ns):
             self._helm.steer(Wish(lamps=self._lamps), self._now_ns)
-            self._wanted = 0.0
+            self._wanted = self._throttle = 0.0
             return
-        self._wanted = steering * self.limits.steer_limit
+        self._wanted, self._throttle = steering * self.limits.steer_limit, throttle
         told = Wish(self._undo.throttle(throttle), self._undo.steering(steering), self._lamps)
         self._helm.steer(told, self._now_ns)
 
@@ -137,15 +140,18 @@ class NigelBody:
         """Return where the Eye saw it, carried forward to now."""
         track = self._track
         is_seen = track is not None and not track.stale
+        speed = track.speed_mps if track is not None and is_seen else 0.0
+        volts = None if self._helm.told is None else self._helm.told.battery_v
         return Motion(
             pose=self._pose(self._now_ns),
-            speed=track.speed_mps if track is not None and is_seen else 0.0,
+            speed=speed,
             lateral_speed=track.lateral_speed_mps if track is not None and is_seen else 0.0,
             yaw_rate=track.yaw_rate_radps if track is not None and is_seen else 0.0,
             accel=self._accel,
             steering=self._wheels,
             source="eye",
-            battery_v=None if self._helm.told is None else self._helm.told.battery_v,
+            battery_v=volts,
+            battery_charge=None if volts is None else self._charge(volts, speed),
         )
 
     def sensors(self, vehicle: str, now_ns: int) -> Sequence[VehicleSensors | LidarScan]:
@@ -177,6 +183,12 @@ class NigelBody:
                 gyro_radps=(0.0, 0.0, reading.gyro_radps),
             )
         ]
+
+    def _charge(self, volts: float, speed: float) -> float | None:
+        """Return the charge that a voltage tells of, with what the car draws just now undone."""
+        if self._pack is None:
+            return None
+        return self._pack.charge_at(volts, self._throttle, speed / self._wheel_m)
 
     def _pose(self, now_ns: int) -> Pose2:
         """Return the last seen pose, carried forward by at most `STALE_NS`."""

@@ -6,6 +6,8 @@ body's time never jumps: after a stall of the process it has moved by at most 0.
 
 import math
 
+import numpy as np
+
 from scm import registry
 from scm.arrays import Floats
 from scm.clock import NS_PER_MS, seconds
@@ -15,11 +17,12 @@ from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.bank import Bank
-from scm.vehicles.car import load_car
+from scm.vehicles.car import Car, load_car
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
 from scm.vehicles.lights import Switches
+from scm.vehicles.packs import Packs
 from scm.vehicles.sensed import ENCODERS, KINDS, sensors_message
 from scm.vehicles.sensor import Sensor
 from vehicle_agent.body import Body, BodyKind, Motion, Wiring
@@ -37,8 +40,7 @@ class SimulatedBody:
 
     def __init__(self, car: str, seed: int) -> None:
         self._car = load_car(car)
-        self._fleet = Fleet(self._car, 1)
-        self._row = self._fleet.add(Pose2(0.0, 0.0, 0.0))
+        self._build(self._car, Pose2(0.0, 0.0, 0.0))
         self._now_ns: int | None = None
         self.limits = limits_of(self._fleet.car)
         self._ground: Ground | None = None
@@ -51,10 +53,15 @@ class SimulatedBody:
         self._ground = Ground(city_map, seed)
         car = self._ground.fit(self._car)
         if car.terms != self._fleet.car.terms:
-            pose = self._fleet.pose(self._row)
-            self._fleet, self._banks = Fleet(car, 1), []
-            self._row = self._fleet.add(pose)
+            self._build(car, self._fleet.pose(self._row))
+            self._banks = []
         self._ground.warm(self._fleet)
+
+    def _build(self, car: Car, pose: Pose2) -> None:
+        self._fleet = Fleet(car, 1)
+        self._row = self._fleet.add(pose)
+        self._packs, self._rows = Packs(self._fleet), np.array([self._row])
+        self._packs.renew(self._row)
 
     def place(self, pose: Pose2, now_ns: int) -> None:
         """Stand at a pose."""
@@ -85,6 +92,7 @@ class SimulatedBody:
             if self._ground is not None:
                 self._ground.feel(self._fleet, self._now_ns)
             self._fleet.advance(seconds(step_ns))
+            self._packs.drain(self._rows, seconds(step_ns))
             self._now_ns += step_ns
 
     def command(self, throttle: float, steering: float) -> None:
@@ -118,6 +126,7 @@ class SimulatedBody:
     def motion(self) -> Motion:
         """Return the kernel's state."""
         fleet, row = self._fleet, self._row
+        volts, charge = (float(told[row]) for told in (self._packs.volts, self._packs.charge))
         return Motion(
             pose=fleet.pose(row),
             speed=float(fleet.speed[row]),
@@ -126,7 +135,8 @@ class SimulatedBody:
             accel=float(fleet.accel_x[row] + fleet.impact_x[row]),
             steering=float(fleet.steer_angle[row]),
             source="simulated",
-            battery_v=float(fleet.battery[row]) or None,
+            battery_v=None if math.isnan(volts) else volts,
+            battery_charge=None if math.isnan(charge) else charge,
         )
 
     def sensors(self, vehicle: str, now_ns: int) -> list[VehicleSensors]:

@@ -15,12 +15,14 @@ class TagSeen(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         corners_px: Lower left, lower right, upper right, upper left of the printed tag.
         margin: Decision margin of the detector.
+        hamming: Bits of 36 that were read wrong and corrected; None: not told.
     """
 
     tag_id: int
     centre_px: Pixel
     corners_px: tuple[Pixel, Pixel, Pixel, Pixel]
     margin: float
+    hamming: int | None = None
 
 
 class EyeTags(Message, kw_only=True, frozen=True):

@@ -41,6 +41,8 @@ class PlanRequest(Request, kw_only=True, frozen=True):
     Attributes:
         stages: Of a plan that the junction does not have: it is checked, taken and run under that
             name for as long as it is wanted. Empty: one of its own.
+        offset_s: Of these stages: when their cycle begins, after a time that is a whole number of
+            cycles on the controller's clock. None: it begins whenever it can, in step with nobody.
     """
 
     KEY: ClassVar[str] = "tl/{junction}/req"
@@ -51,6 +53,7 @@ class PlanRequest(Request, kw_only=True, frozen=True):
     by: str
     reason: str = ""
     stages: tuple[SignalStage, ...] = ()
+    offset_s: float | None = None
 
 
 MESSAGE = PlanRequest

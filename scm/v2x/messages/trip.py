@@ -1,12 +1,14 @@
 """How far a car is on the route it was given."""
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from scm.v2x.message import Delivery, Message
 
 
 class Trip(Message, kw_only=True, frozen=True):
-    """Progress of one trip; sent twice a second and when it ends.
+    """Progress of one trip; sent twice a second, when it ends, and when somebody takes the car.
+
+    Whoever sends the car along `via`, with the same speed and the same end, has it go on with it.
 
     Attributes:
         trip_id: The id the route request gave it.
@@ -15,6 +17,10 @@ class Trip(Message, kw_only=True, frozen=True):
         length_m: Of the whole route; None for a route without end.
         arrived_ns: When it ended; None while under way.
         waiting_for: What holds the car now: `signal`, `vehicle`, `stop`, or None.
+        via: Lanes that it still has to pass, in order, the laps written out; a lane counts as
+            passed at its end. Empty: it circulates.
+        speed_mps: Wished for it on free road; None: the lanes' limits.
+        then: What it does on arrival, as in `RouteRequest`.
     """
 
     KEY: ClassVar[str] = "v/{vehicle}/trip"
@@ -30,6 +36,9 @@ class Trip(Message, kw_only=True, frozen=True):
     started_ns: int
     arrived_ns: int | None = None
     waiting_for: str | None = None
+    via: tuple[str, ...] = ()
+    speed_mps: float | None = None
+    then: Literal["stop", "circulate"] = "stop"
 
 
 MESSAGE = Trip

@@ -18,7 +18,11 @@ class VehicleState(Message, kw_only=True, frozen=True):
         mode: `drive`, `hold` (commands late), `stop` (commands lost or city stopped), `idle`.
         lights: Names of those that are on: `head_low head_high left right tail brake reverse`.
         car: Its car file's name.
-        battery_v: Of the drive battery; a simulated one is without load. None: not measured.
+        battery_v: Of the drive battery, under load as it is. None: not measured.
+        battery_charge: What is left in it, 0 to 1: a simulated car counts what it draws, a real one
+            estimates it from the voltage. None: not known.
+        command_age_ms: How old the newest command of its leaseholder is, since it arrived here;
+            None: nobody else drives it, or none came yet.
         contacts: Number of the newest `Contact` that this motion has felt; 0: it tells nothing.
     """
 
@@ -44,6 +48,8 @@ class VehicleState(Message, kw_only=True, frozen=True):
     lights: tuple[str, ...] = ()
     car: str = "nigel"
     battery_v: float | None = None
+    battery_charge: float | None = None
+    command_age_ms: float | None = None
     contacts: int = 0
 
 

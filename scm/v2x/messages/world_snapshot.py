@@ -18,7 +18,10 @@ class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True):
         throttle: As commanded, or as its agent reports it; None: it has not reported yet.
         owner: Who holds its lease.
         lease_left_ms: Until that ends if it is not renewed; None: it is at home, and never ends.
-        battery_v: Of its drive battery; a simulated one is without load. None: not measured.
+        battery_v: Of its drive battery, under load as it is. None: not measured.
+        battery_charge: What is left in it, 0 to 1; of a real car estimated. None: not known.
+        command_age_ms: How old the newest command of its leaseholder is, since it reached the car;
+            None: nobody else drives it, or none came yet.
         age_ms: How old its newest state is: 0 for hosted cars.
         alive: False from the moment its agent is known to be gone until it is taken off the map.
     """
@@ -39,6 +42,8 @@ class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True):
     epoch: int = 0
     lease_left_ms: float | None = None
     battery_v: float | None = None
+    battery_charge: float | None = None
+    command_age_ms: float | None = None
     mode: str = "drive"
     age_ms: float = 0.0
     alive: bool = True

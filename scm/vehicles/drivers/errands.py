@@ -6,6 +6,8 @@ car is becomes `Trip` messages: twice a second, and at once when it arrives.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
+from typing import Literal
 
 import numpy as np
 
@@ -30,8 +32,11 @@ class _Errand:
     route: tuple[str, ...]
     length_m: float | None
     started_ns: int
-    goes_on: bool
     count: int
+    passes: tuple[tuple[str, float], ...] = ()
+    """The lanes asked for, laps written out, and how far along the route each of them ends."""
+    speed_mps: float | None = None
+    then: Literal["stop", "circulate"] = "stop"
 
 
 class Errands:
@@ -71,19 +76,27 @@ class Errands:
         Raises:
             MapError: when the lanes do not exist or cannot be reached.
         """
-        place, roads, length_m = self._place(vehicle, pose), self._crowd.streets.roads, None
+        place, roads = self._place(vehicle, pose), self._crowd.streets.roads
+        length_m: float | None = None
+        passes: tuple[tuple[str, float], ...] = ()
         if request.via:
             route = roads.route(place.lane, request.via, request.laps)
             self._crowd.send(slot, route, place.s, request.then, request.speed_mps)
-            length_m = sum(roads.length_of(name) for name in route) - place.s
+            ends_m = [m - place.s for m in accumulate(map(roads.length_of, route))]
+            length_m, passes = ends_m[-1], _passes(request, route, ends_m)
         else:
             route = self._crowd.circulate(slot, place.lane, place.s, request.speed_mps)
         errand = self._note(slot, vehicle, route, length_m, now_ns, request.request_id)
-        errand.goes_on = request.then == "circulate" and bool(request.via)
+        errand.passes, errand.speed_mps, errand.then = passes, request.speed_mps, request.then
         return RouteReply(vehicle=vehicle, trip_id=errand.trip_id, route=route, length_m=length_m)
 
-    def end(self, slot: int) -> None:
-        """Forget a car's trip: somebody else drives it now, or it leaves."""
+    def end(self, slot: int, now_ns: int) -> None:
+        """Forget a car's trip, but for a last word on it: somebody else drives it now."""
+        if self._under_way[slot]:
+            self._unsent.append(self._report(slot, now_ns))
+        self._halt(slot)
+
+    def _halt(self, slot: int) -> None:
         self._crowd.halt(slot)
         self._under_way[slot] = False
         errand = self._errands.get(slot)
@@ -92,7 +105,7 @@ class Errands:
 
     def forget(self, slot: int) -> None:
         """Forget that a car was ever sent; its slot is free for another one."""
-        self.end(slot)
+        self._halt(slot)
         self._errands.pop(slot, None)
 
     def look(self, now_ns: int) -> None:
@@ -102,9 +115,10 @@ class Errands:
             self._unsent.append(self._report(slot, now_ns, arrived_ns=now_ns))
             self._under_way[slot] = False
             self._due_ns[slot] = -_SOON
-            if errand.goes_on:
+            if errand.then == "circulate" and errand.passes:
                 route = self._crowd.go_on(slot)
-                self._note(slot, errand.vehicle, route, None, now_ns, "")
+                after = self._note(slot, errand.vehicle, route, None, now_ns, "")
+                after.speed_mps = errand.speed_mps
 
     def reports(self, now_ns: int) -> list[Trip]:
         """Return what is to be told now."""
@@ -124,16 +138,20 @@ class Errands:
 
     def _report(self, slot: int, now_ns: int, arrived_ns: int | None = None) -> Trip:
         errand, crowd = self._errands[slot], self._crowd
+        done_m = float(crowd.done_m[slot])
         return Trip(
             vehicle=errand.vehicle,
             trip_id=errand.trip_id,
             t_ns=now_ns,
             route=errand.route,
-            done_m=float(crowd.done_m[slot]),
+            done_m=done_m,
             length_m=errand.length_m,
             started_ns=errand.started_ns,
             arrived_ns=arrived_ns,
             waiting_for=WAITING_FOR[crowd.waiting[slot]],
+            via=tuple(lane for lane, end_m in errand.passes if end_m > done_m),
+            speed_mps=errand.speed_mps,
+            then=errand.then,
         )
 
     def _note(
@@ -148,9 +166,7 @@ class Errands:
         before = self._errands.get(slot)
         count = 1 + (before.count if before is not None and before.vehicle == vehicle else 0)
         trip_id = trip_id or f"{vehicle}-{count}"
-        errand = _Errand(
-            vehicle, trip_id, tuple(route), length_m, now_ns, goes_on=False, count=count
-        )
+        errand = _Errand(vehicle, trip_id, tuple(route), length_m, now_ns, count)
         self._errands[slot] = errand
         self._due_ns[slot] = _SOON
         self._under_way[slot] = True
@@ -162,3 +178,14 @@ class Errands:
             msg = f"{vehicle}: no lane runs its way at ({pose.x:.2f}, {pose.y:.2f}) m"
             raise MapError(msg)
         return place
+
+
+def _passes(
+    request: RouteRequest, route: Sequence[str], ends_m: Sequence[float]
+) -> tuple[tuple[str, float], ...]:
+    """Return the lanes asked for and where along the route each of them ends."""
+    at, passes = -1, []
+    for lane in request.via * request.laps:
+        at = route.index(lane, at + 1)
+        passes.append((lane, ends_m[at]))
+    return tuple(passes)

@@ -92,6 +92,16 @@ def test_a_seen_pose_is_carried_forward_on_its_arc(body):
     assert body.motion().pose.x < 1.0 + 0.2 * STALE_NS / 1e9 + 1e-9
 
 
+def test_the_charge_of_a_real_battery_is_estimated_from_its_voltage(body):
+    told = Told(phase="ready", trouble="", opened=1, readings=1, battery_v=None, telemetry=None)
+    body._helm.told = told
+    assert (body.motion().battery_v, body.motion().battery_charge) == (None, None)
+    body._helm.told = msgspec.structs.replace(told, battery_v=3 * 3.84 - 0.03 * 0.8)
+    assert body.motion().battery_charge == pytest.approx(0.5, abs=1e-6), "0.8 A through 0.03 ohm"
+    body.command(1.0, 0.0)
+    assert body.motion().battery_charge > 0.54, "motors that still stand draw 3 A and more"
+
+
 def test_before_the_eye_has_seen_it_it_stands_where_the_city_put_it():
     body = NigelBody(calibrated(drive_deadband=0.2), FakeHelm())
     body.place(Pose2(0.3, 0.4, 0.5), BEGIN_NS)

@@ -503,6 +503,7 @@ def test_a_city_with_a_fleet_file_brings_its_own_stations_along(tmp_path):
     assert guard.arguments("n5")[0] == "--credentials"
     known = {subject["id"] for subject in guard.settings["access_control"]["subjects"]}
     assert known == {"n9", *stations}
+    assert guard.credentials("script").role == "operator"  # not all that the server may do
 
 
 def test_a_fleet_that_does_not_suit_the_endpoint_is_left_as_it_was(tmp_path):

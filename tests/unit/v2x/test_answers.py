@@ -1,6 +1,7 @@
 """The answer book: one effect an id, whatever comes twice, late, or under a used id."""
 
 import pytest
+from msgspec import structs
 
 from scm.clock import NS_PER_S
 from scm.v2x.answers import KEPT_NS, LONGEST_ID, SURE_NS, AnswerBook
@@ -23,6 +24,14 @@ def test_a_retry_gets_the_answer_that_was_given():
     book.settle(done(first))
     met = book.meet(asked())
     assert met.reply == PlanReply(junction="x1", plan="calm")
+
+
+def test_a_retry_under_another_trace_is_the_same_request():
+    book, first = AnswerBook(), asked()
+    book.meet(first)
+    book.settle(done(first))
+    again = structs.replace(asked().message, trace_id="4bf92f3577b34da6a3ce929d0e0e4736")
+    assert book.meet(Incoming(again, 0)).reply == PlanReply(junction="x1", plan="calm")
 
 
 def test_who_asks_while_it_is_done_waits_and_gets_the_same_answer():

@@ -225,6 +225,18 @@ def test_a_foreign_command_with_a_newer_epoch_takes_over(inside):
     assert (state.throttle, state.steering) == (0.3, 0.0)
 
 
+def test_it_tells_the_age_of_a_foreign_command_and_none_of_its_own_driver_s(inside):
+    assert inside.steps(0.1).command_age_ms is None
+    inside.step(command(EPOCH + 1))
+    assert inside.steps(0.1).command_age_ms == pytest.approx(100.0)
+
+
+def test_a_simulated_body_counts_what_it_draws(inside):
+    first, later = inside.steps(0.02), inside.steps(1.0)
+    assert 1.0 > first.battery_charge > later.battery_charge > 0.9999
+    assert 12.0 < later.battery_v < 12.58
+
+
 @pytest.mark.parametrize("epoch", [EPOCH - 1, EPOCH])
 def test_a_foreign_command_without_a_newer_epoch_is_ignored(inside, epoch):
     inside.steps(0.5)

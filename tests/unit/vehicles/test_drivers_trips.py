@@ -9,6 +9,7 @@ from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.v2x.messages.route_request import RouteRequest
 from scm.vehicles.driver import CarLimits, RouteView
+from scm.vehicles.drivers.alone import OWN
 from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.signal_view import SignalView
 
@@ -91,6 +92,28 @@ def test_an_impossible_trip_is_refused_and_changes_nothing(trips, start):
 def test_a_car_beside_all_lanes_cannot_begin(roads):
     with pytest.raises(MapError, match="n7"):
         Trips("n7", roads, LIMITS, Pose2(50.0, 50.0, 0.0), 0)
+
+
+def test_a_trip_tells_what_is_left_of_it_so_that_it_can_go_on(trips, roads, view, start):
+    request = RouteRequest(
+        vehicle="n7", via=("west_loop", "east_loop"), laps=2, speed_mps=0.1, then="circulate"
+    )
+    route = trips.begin(request, start, 0).route
+    (trip,) = trips.reports(0)
+    assert trip.via == ("west_loop", "east_loop", "west_loop", "east_loop")
+    assert (trip.speed_mps, trip.then) == (0.1, "circulate")
+    passed_m, left = -0.5, []
+    for t_s, lane in enumerate(route, 1):
+        passed_m += roads.lane(lane).length_m
+        trips.driver.crowd.done_m[OWN] = passed_m + 0.01
+        (trip,) = trips.reports(t_s * 1000 * NS_PER_MS)
+        left.append(trip.via)
+    after_west = [via for lane, via in zip(route, left, strict=True) if lane == "west_loop"]
+    assert list(map(len, after_west)) == [3, 1]
+    assert left[-1] == ()
+    trips.driver.crowd.done_m[OWN] = 0.0
+    trips.begin(RouteRequest(vehicle="n7", speed_mps=0.2), start, 0)
+    assert [(t.via, t.speed_mps) for t in trips.reports(0)] == [((), 0.2)]
 
 
 @pytest.mark.parametrize("then", ["stop", "circulate"])

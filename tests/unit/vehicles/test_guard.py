@@ -164,6 +164,15 @@ def test_a_granted_epoch_ends_a_loss_but_does_not_drive(guard):
     assert guard.output(at(2500)).mode == "lost"
 
 
+def test_the_age_of_the_newest_command_is_told_once_there_is_one(guard):
+    assert Guard().command_age_ns(START_NS) is None
+    assert guard.command_age_ns(at(80)) == 80 * NS_PER_MS
+    guard.take(command(seq=1, throttle=0.1), at(90))
+    assert guard.command_age_ns(at(100)) == 100 * NS_PER_MS, "a refused one is none"
+    guard.set_epoch(9, at(110))
+    assert guard.command_age_ns(at(120)) is None, "the new holder has said nothing"
+
+
 def test_a_clock_that_steps_back_never_makes_a_command_younger(guard):
     guard.output(at(900))
     guard.output(at(100))

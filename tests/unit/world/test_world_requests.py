@@ -415,8 +415,19 @@ def test_the_snapshot_tells_how_long_a_lease_lives_on_and_the_voltage_of_the_bat
     city.run_for(0.2)
     (at_home,) = city.heard(WorldSnapshot)[-1].vehicles
     assert at_home.lease_left_ms is None
-    assert at_home.battery_v == load_car("nigel").value("drive.battery_nominal_v")
+    assert (at_home.command_age_ms, at_home.battery_v) == (None, pytest.approx(12.576, abs=1e-3))
+    assert 0.9999 < at_home.battery_charge < 1.0
     city.ask(LeaseRequest(vehicle="n1", owner="desk", verb="acquire", ttl_ms=900))
     city.run_for(0.2)
     (leased,) = city.heard(WorldSnapshot)[-1].vehicles
     assert 500.0 < leased.lease_left_ms < 900.0
+
+
+def test_a_trip_taken_away_is_told_a_last_time_with_what_is_left_of_it(city):
+    city.ask(SpawnRequest(vehicle="n1"))
+    city.ask(RouteRequest(vehicle="n1", via=("west_loop",), laps=2, speed_mps=0.1))
+    city.run(2)
+    before = len(city.heard(Trip))
+    city.lease()
+    (last,) = city.heard(Trip)[before:]
+    assert (last.via, last.speed_mps) == (("west_loop", "west_loop"), 0.1)

@@ -1,0 +1,68 @@
+"""A wish for an overhead camera: see by this calibration from the next frame on."""
+
+from typing import ClassVar, Literal
+
+import msgspec
+
+from scm.maps.model import Camera
+from scm.v2x.message import Message, Request
+from scm.v2x.messages.eye_status import InForce
+
+
+class MeasuredLens(msgspec.Struct, kw_only=True, frozen=True):
+    """A lens as `scm eye calibrate` measures it.
+
+    Attributes:
+        distortion: k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4, 0.
+        covariance: Of fx, fy, cx, cy and the distortion, nine rows of nine.
+        rms_px: Of what was left at the board's points.
+        views: Pictures of the board it was made from.
+    """
+
+    lens: Literal["pinhole", "fisheye"]
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    distortion: tuple[float, float, float, float, float]
+    covariance: tuple[tuple[float, ...], ...]
+    rms_px: float
+    views: int
+
+
+class CalibrationReply(Message, kw_only=True, frozen=True):
+    """The wish was taken: what the camera sees by from its next frame on."""
+
+    KEY: ClassVar[str] = "eye/{camera}/req/reply"
+
+    camera: str
+    in_force: InForce
+
+
+class CalibrationRequest(Request, kw_only=True, frozen=True):
+    """See by a lens, by a place, or by what was in force before; with who asks and why.
+
+    It is checked first, and refused where the floor's tags, as they are seen now, contradict it.
+
+    Attributes:
+        verb: `use` what follows; `back`: what was in force before, whatever the tags say of it.
+        calibration: What it is called.
+        place: Where the camera hangs, and the lens it was found with: the map file's block.
+        lens: Alone: in place of the lens in force. With a place: the doubt of that place's lens.
+    """
+
+    KEY: ClassVar[str] = "eye/{camera}/req"
+    REPLY: ClassVar[type[Message]] = CalibrationReply
+
+    camera: str
+    verb: Literal["use", "back"] = "use"
+    calibration: str = ""
+    place: Camera | None = None
+    lens: MeasuredLens | None = None
+    by: str
+    reason: str = ""
+
+
+MESSAGE = CalibrationRequest
