@@ -3,11 +3,12 @@
 import argparse
 from pathlib import Path
 
-from scm.command import Command, part_arguments, run_part
+from scm.command import Command, part_arguments, run_part, state_argument, state_of
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
+    state_argument(parser)
     parser.add_argument("--camera", help="which camera of the map; default: its first")
     parser.add_argument(
         "--frames",
@@ -41,8 +42,11 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.eye.calibration import load_calibration
     from scm.eye.camera import camera_of
     from scm.eye.part import EyePart
+    from scm.eye.sight import SightRecord
     from scm.eye.sources.choose import source_of
+    from scm.eye.station import eye_station
     from scm.maps.load import load_map
+    from scm.store.records import record
 
     cv2.setNumThreads(1)  # the city needs the other cores, and one frame at a time is fast enough
     city_map = load_map(arguments.map)
@@ -57,10 +61,21 @@ def _run(arguments: argparse.Namespace) -> int:
     lens = load_calibration(arguments.calibration) if arguments.calibration else None
     more = known_tags(city_map, arguments.tags)
     more.pop(city_map.tag.tag_id)
-    part = EyePart(
-        city_map, camera.name, arguments.seed, source or None, lens=lens, tags=tuple(more.values())
-    )
-    return run_part(part, arguments)
+    station = eye_station(camera.name, first=camera is city_map.cameras[0])
+    with state_of(arguments) as state:
+        kept = None
+        if state is not None:
+            kept = record(state, "calibrations", station, camera.name, SightRecord)
+        part = EyePart(
+            city_map,
+            camera.name,
+            arguments.seed,
+            source or None,
+            lens=lens,
+            tags=tuple(more.values()),
+            kept=kept,
+        )
+        return run_part(part, arguments, state)
 
 
 COMMAND = Command(

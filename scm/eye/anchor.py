@@ -172,6 +172,21 @@ class Anchor:
         """Return where the corners of a map tag should be, (4, 2) [px]; by default from now."""
         return (model or self.model).project(floor_corners(tag))
 
+    def surprise(self, seen: Mapping[int, Floats]) -> float:
+        """Return how far map tags are from where the calibration has them, over what explains it.
+
+        Args:
+            seen: Corners by tag id, (4, 2) [px], of one tag at least.
+        """
+        tags = [one for one in self.map_tags if one.tag_id in seen]
+        corners = np.array([seen[one.tag_id] for one in tags])
+        points = np.array([floor_corners(one) for one in tags])
+        return self._surprise(corners, points, self._base[1], self._noise(tags, points))
+
+    def averaged(self) -> dict[int, Floats]:
+        """Return the corners of the tags seen, mean of the last frames, (4, 2) [px] by tag id."""
+        return {tag_id: one.corners.copy() for tag_id, one in self._averages.items()}
+
     def doubt_m(self) -> float:
         """Return the largest deviation of a roof's place over the frame, from the camera alone."""
         camera = self.model.camera
@@ -235,7 +250,17 @@ class Anchor:
         return noise
 
     def _if_knocked(self, corners: Floats, points: Floats, prior: Floats, noise: Floats) -> Floats:
-        """Return the prior, wide if a tag is where its tolerance cannot have put it.
+        """Return the prior, wide if a tag is where its tolerance cannot have put it."""
+        sigmas = self._surprise(corners, points, prior, noise)
+        knocked = sigmas > KNOCKED_SIGMAS
+        if knocked and not self._knocked:
+            facts = {"camera": self.model.camera.name, "surprise_sigmas": round(sigmas, 1)}
+            event(LOGGER, "eye_camera_moved", level=logging.WARNING, **facts)
+        self._knocked = knocked
+        return prior * KNOCKED_TOLERANCE**2 if knocked else prior
+
+    def _surprise(self, corners: Floats, points: Floats, prior: Floats, noise: Floats) -> float:
+        """Return the largest distance of a tag from the prior's place, over its deviation.
 
         Judged by tags' middles, which hardly depend on how well this camera's corners are found.
         """
@@ -246,13 +271,7 @@ class Anchor:
         floor = noise[:8, :8].max() * np.eye(2)
         doubt = by_camera @ prior @ np.swapaxes(by_camera, -1, -2) + floor
         squared = (off[:, None] @ np.linalg.solve(doubt, off[..., None])).max()
-        knocked = bool(squared > KNOCKED_SIGMAS**2)
-        if knocked and not self._knocked:
-            sigmas = round(float(np.sqrt(squared)), 1)
-            facts = {"camera": self.model.camera.name, "surprise_sigmas": sigmas}
-            event(LOGGER, "eye_camera_moved", level=logging.WARNING, **facts)
-        self._knocked = knocked
-        return prior * KNOCKED_TOLERANCE**2 if knocked else prior
+        return float(np.sqrt(squared))
 
     def _probes(self) -> tuple[tuple[CameraModel, CameraModel], ...]:
         at = parameters(self.model)[: len(self.covariance)]

@@ -1,6 +1,7 @@
 """A lens as `scm eye calibrate` measured it: a small file, and the camera that looks through it."""
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -98,7 +99,7 @@ def load_calibration(path: Path) -> Calibration:
         calibration = msgspec.convert(read, Calibration)
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise EyeError(f"{path}: expected a calibration of `scm eye calibrate`: {error}") from error
-    faults = _faults(calibration)
+    faults = covariance_faults(calibration.covariance)
     if faults:
         raise EyeError(f"{path}: covariance: {faults}")
     return calibration
@@ -132,11 +133,11 @@ def _numbers(row: tuple[float, ...]) -> str:
     return ", ".join(repr(float(value)) for value in row)
 
 
-def _faults(calibration: Calibration) -> str:
-    rows = calibration.covariance
+def covariance_faults(rows: Sequence[Sequence[float]]) -> str:
+    """Return why rows are no covariance of a lens; empty: they are one."""
     if len(rows) != LENS_PARAMETERS or any(len(row) != LENS_PARAMETERS for row in rows):
         return f"expected nine rows of nine, got {len(rows)} of {sorted({len(r) for r in rows})}"
-    matrix = calibration.lens_covariance
+    matrix = np.array(rows)
     size = np.sqrt(np.abs(np.diag(matrix)))
     scaled = matrix / np.maximum(np.outer(size, size), 1e-300)
     if not np.isfinite(matrix).all() or not np.allclose(scaled, scaled.T, atol=1e-6):

@@ -145,6 +145,7 @@ def moved(tag: TagSeen, right: float, down: float) -> TagSeen:
         centre_px=(x + right, y + down),
         corners_px=(a, b, c, d),
         margin=tag.margin,
+        hamming=tag.hamming,
     )
 
 
@@ -164,6 +165,7 @@ def _seen(one: pupil_apriltags.Detection) -> TagSeen:
         centre_px=(x, y),
         corners_px=(corners[0], corners[1], corners[2], corners[3]),
         margin=float(one.decision_margin),
+        hamming=int(one.hamming),
     )
 
 

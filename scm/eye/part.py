@@ -6,23 +6,26 @@ file a vehicle is (so where its tag sits). A city with real cars only knows thes
 no pose is ever read from it.
 
 Each camera has a part of its own, which tells what it sees. The one of the map's first camera hears
-the others and tells where cars are by all of them.
+the others and tells where cars are by all of them. Another calibration is put in force on request.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 
 from scm.arrays import Floats
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import EyeError
 from scm.eye.anchor import Anchor
-from scm.eye.calibration import Calibration, calibrated
-from scm.eye.camera import CameraModel, camera_model, camera_of
+from scm.eye.calibration import Calibration
+from scm.eye.camera import CameraModel, camera_of
 from scm.eye.detect import Settings
 from scm.eye.find.finder import TagFinder
 from scm.eye.overlay import jpeg, preview
 from scm.eye.pose import car_poses
 from scm.eye.roofs import at_middle_row, expected_tags
+from scm.eye.sight import SightRecord, Sights, said, started
 from scm.eye.source import Frame, Listener, Source
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.eye.station import eye_station
@@ -31,12 +34,14 @@ from scm.eye.track.perception import collective_perception
 from scm.eye.track.sighting import Sighting
 from scm.eye.track.tracks import Tracks
 from scm.eye.watch import Watch
-from scm.maps.model import Camera, CityMap, MapTag
-from scm.part import Hears, IsWanted
+from scm.maps.model import CityMap, MapTag
+from scm.part import Hears, IsWanted, Serves
 from scm.scenery.bodies import NIGEL, CarBody, car_body
-from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
 from scm.v2x.key import is_name
-from scm.v2x.message import Message
+from scm.v2x.message import Message, Refused
+from scm.v2x.messages.calibration_request import CalibrationReply, CalibrationRequest
+from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.cpm_tx import CpmTx
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
@@ -73,13 +78,13 @@ class EyePart:
         settings: Of the search for tags.
         lens: Takes the place of the map's lens.
         tags: That lie on the floor beside the map's own.
+        kept: What was put in force in an earlier run.
 
     Raises:
         EyeError: The map has no such camera, or it cannot be one.
     """
 
     role = "part"
-    serves = ()
 
     def __init__(
         self,
@@ -90,13 +95,17 @@ class EyePart:
         settings: Settings | None = None,
         lens: Calibration | None = None,
         tags: Sequence[MapTag] = (),
+        kept: SightRecord | None = None,
     ) -> None:
         chosen = camera_of(city_map, camera)
-        model = _model(chosen, lens)
+        at_start = started(chosen, lens)
+        model = at_start.model()
         self.camera = model.camera.name
+        self._sights = Sights(at_start, kept)
         self._camera_ns = round(NS_PER_S / model.camera.rate_hz)
         self.period_ns = min(self._camera_ns, TRACKS_PERIOD_NS)
-        self.watch = Watch(Anchor(model, (city_map.tag, *tags)))
+        self.watch = Watch(Anchor(self._sights.now.model(), (city_map.tag, *tags)))
+        self.serves = (Serves(CalibrationRequest, {"camera": self.camera}),)
         self.tracks = Tracks([one.name for one in city_map.cameras])
         self.tells_tracks = chosen is city_map.cameras[0]
         self.name = eye_station(self.camera, first=self.tells_tracks)
@@ -115,11 +124,16 @@ class EyePart:
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Take the newest frame, if there is one, and say what is in it; tell where cars are."""
+        out = self._lapsed(now_ns) if self._sights.lapsed else []
         for item in inbox:
-            self._hear(item, now_ns)
+            if isinstance(item.message, CalibrationRequest):
+                out += self._serve(item, item.message, now_ns)
+            else:
+                self._hear(item, now_ns)
         frame = self._source.take(now_ns, self._light)
-        out = [] if frame is None else self._look(frame, now_ns)
-        if self.tells_tracks and (self._is_due(EyeTrack, now_ns, TRACKS_PERIOD_NS) or out):
+        seen = [] if frame is None else self._look(frame, now_ns)
+        out += seen
+        if self.tells_tracks and (self._is_due(EyeTrack, now_ns, TRACKS_PERIOD_NS) or seen):
             out += self._tracked(now_ns)
         if self._is_due(EyeStatus, now_ns, STATUS_PERIOD_NS):
             out.append(self._status(now_ns))
@@ -155,6 +169,35 @@ class EyePart:
                 self.tracks.see([sighting_of(item.message)], now_ns)
         elif isinstance(self._source, Listener):
             self._source.hear(item)
+
+    def _serve(self, item: Incoming, request: CalibrationRequest, now_ns: int) -> list[Outgoing]:
+        """Put a calibration in force from the next frame on, or refuse it."""
+        try:
+            self.watch = self._sights.serve(request, self.watch, now_ns)
+        except EyeError as refusal:
+            return [Answer(item, Refused(code="invalid", detail=str(refusal)))]
+        self._due_ns[EyeStatus] = now_ns
+        told = self._sights.told()
+        return [
+            Keep("calibrations", self.camera, self._sights.record),
+            Answer(item, CalibrationReply(camera=self.camera, in_force=told)),
+            self._event("calibration_in_force", said(self.camera, told), now_ns),
+        ]
+
+    def _lapsed(self, now_ns: int) -> list[Outgoing]:
+        """Say once that what was kept is not in force, and forget it."""
+        self._sights.lapsed = False
+        text = (
+            f"camera {self.camera} sees by the map file: what was put in force before is of "
+            "another map file or lens"
+        )
+        forget = Keep("calibrations", self.camera, None)
+        return [forget, self._event("calibration_lapsed", text, now_ns, "warning")]
+
+    def _event(
+        self, name: str, text: str, now_ns: int, severity: Literal["info", "warning"] = "info"
+    ) -> CityEvent:
+        return CityEvent(severity=severity, source=self.name, t_ns=now_ns, name=name, text=text)
 
     def _look(self, frame: Frame, now_ns: int) -> list[Outgoing]:
         grey, known = frame.grey(), self._known()
@@ -223,11 +266,17 @@ class EyePart:
 
     def _status(self, now_ns: int) -> EyeStatus:
         trouble, spoiled = self._source.trouble, self.watch.flags(now_ns)
-        said = self.watch.complaints(now_ns)
+        complaints = self.watch.complaints(now_ns)
         if trouble:
-            said = (*said, Complaint(code=SOURCE, said=trouble))
+            complaints = (*complaints, Complaint(code=SOURCE, said=trouble))
         good = not trouble and not spoiled
-        return EyeStatus(camera=self.camera, t_ns=now_ns, good=good, complaints=said)
+        return EyeStatus(
+            camera=self.camera,
+            t_ns=now_ns,
+            good=good,
+            complaints=complaints,
+            in_force=self._sights.told(),
+        )
 
     def _picture(
         self, frame: Frame, tags: Sequence[TagSeen], known: dict[int, tuple[str, CarBody]],
@@ -241,8 +290,8 @@ class EyePart:
         if self._is_wanted(EyePreview, {"camera": self.camera}):
             names = {tag_id: vehicle for tag_id, (vehicle, _) in known.items()}
             names |= {tag.tag_id: f"map {tag.tag_id}" for tag in self.watch.anchor.map_tags}
-            said = [one.said for one in self.watch.complaints(now_ns)]
-            told.append(EyePreview(payload=preview(frame.image, tags, names, said), **size))
+            wrong = [one.said for one in self.watch.complaints(now_ns)]
+            told.append(EyePreview(payload=preview(frame.image, tags, names, wrong), **size))
         return told
 
     def _is_due(self, kind: type[Message], now_ns: int, period_ns: int) -> bool:
@@ -257,12 +306,6 @@ def _nobody(kind: type[Message], where: Mapping[str, str]) -> bool:
     """Say that nobody asked: on a bus without wishes."""
     del kind, where
     return False
-
-
-def _model(camera: Camera, lens: Calibration | None) -> CameraModel:
-    if lens is None:
-        return camera_model(camera)
-    return camera_model(calibrated(camera, lens), lens.lens_covariance)
 
 
 def _emulated(city_map: CityMap, model: CameraModel, seed: int) -> SyntheticSource:

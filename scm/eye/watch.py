@@ -95,7 +95,7 @@ class Watch:
         for tag_id, found in ours.items():
             self._settle(tag_id, found)
             self._judge_blur(tag_id, grey, found)
-        self._judge_place(ours)
+        self._said.update(self.misplaced(ours))
         self._judge_bump(t_ns)
         self._judge_doubt()
 
@@ -109,6 +109,11 @@ class Watch:
         """Return the codes of what spoils poses now; without any the camera is good."""
         codes = (one.code for one in self.complaints(now_ns))
         return tuple(code for code in codes if code not in INFORMS)
+
+    def tags_seen(self, now_ns: int) -> dict[int, Floats]:
+        """Return the corners of the map's tags, (4, 2) [px] by id, if any is seen these days."""
+        late = self.anchor.age_ms(now_ns) * NS_PER_MS > UNSEEN_NS
+        return {} if late or self.anchor.seen_ns is None else self.anchor.averaged()
 
     def _look(self, t_ns: int, grey: Image) -> None:
         camera = self.anchor.model.camera
@@ -216,8 +221,9 @@ class Watch:
                 "mm only: locate it with more tags, far apart"
             )
 
-    def _judge_place(self, ours: Mapping[int, Floats]) -> None:
-        """Say when tags are of another size, or elsewhere, than the calibration has them."""
+    def misplaced(self, ours: Mapping[int, Floats]) -> dict[str, str]:
+        """Return by code what tags of another size, or elsewhere, than the calibration has say."""
+        told = {}
         for tag_id, found in ours.items():
             tag = self._map_tag(tag_id)
             there = self.anchor.expected(tag, self.anchor.calibrated)
@@ -225,18 +231,19 @@ class Watch:
             shift, turn = _moved(there, found)
             away = shift / _side(there) * tag.size_m
             if away > ELSEWHERE_M or abs(turn) > ELSEWHERE_RAD:
-                self._said["calibration"] = (
+                told["calibration"] = (
                     f"map tag {tag_id} is {away:.2f} m and {math.degrees(turn):.0f} deg from where "
                     "the calibration puts it: is it another camera's?"
                 )
             if abs(ratio - 1.0) > SIZE:
                 height = self.anchor.calibrated.position[2]
-                self._said["tag_size"] = (
+                told["tag_size"] = (
                     f"map tag {tag_id} looks {100.0 * (ratio - 1.0):+.1f} % larger than it should: "
                     f"its edge is {1e3 * ratio * tag.size_m:.1f} mm instead of "
                     f"{1e3 * tag.size_m:.1f} mm, or the camera hangs at {height / ratio:.2f} m "
                     f"instead of {height:.2f} m"
                 )
+        return told
 
     def _judge_blur(self, tag_id: int, grey: Image, found: Floats) -> None:
         watched = self._tags[tag_id]

@@ -216,7 +216,16 @@ def eliminate(by_lens: Floats, by_pose: Floats) -> Floats:
 
 
 def _settle(solution: Solution) -> Solution:
-    """Go to the bottom by damped Gauss-Newton; then tell what is known there."""
+    """Go to the bottom; then tell what is known there."""
+    return _known(_descend(solution))
+
+
+def _descend(solution: Solution) -> Solution:
+    """Go to the bottom by damped Gauss-Newton.
+
+    Raises:
+        LinAlgError: from a start so far off that a board ran away beyond all measure.
+    """
     lens, poses = solution.lens, solution.poses
     damping, cost = 1e-6, _cost(solution)
     for _ in range(_ITERATIONS):
@@ -237,7 +246,7 @@ def _settle(solution: Solution) -> Solution:
         damping = max(damping / 10.0, 1e-12)
         if gain <= _SETTLED * cost:
             break
-    return _known(solution)
+    return solution
 
 
 def _cost(solution: Solution) -> float:
@@ -299,8 +308,10 @@ def _depth_correlation(solution: Solution, seen: Sequence[tuple[Floats, Floats, 
         by_lens -= (normal @ pose_part.T @ lens_part)[5] / len(seen)
         own += solution.corner_std_px**2 * float(normal[5, 5]) / len(seen) ** 2
     depth = float(by_lens @ covariance @ by_lens) + own
-    both = float(focal @ covariance @ by_lens)
-    return both / math.sqrt(float(focal @ covariance @ focal) * depth)
+    spread = float(focal @ covariance @ focal) * depth
+    if not spread > 0.0:  # a view that tells no pose: nor do they tell the two apart
+        return 1.0
+    return float(focal @ covariance @ by_lens) / math.sqrt(spread)
 
 
 def _without(solution: Solution, term: int) -> Solution:
@@ -421,7 +432,10 @@ def _fisheye_starts(views: tuple[View, ...], size: tuple[int, int]) -> list[Solu
             continue
         started = Solution(lens, np.array(poses), views, size)
         first = replace(started, lens=replace(lens, free=np.arange(LENS_PARAMETERS) < 5))
-        settled = _settle(first)
+        try:
+            settled = _descend(first)
+        except np.linalg.LinAlgError:
+            continue
         starts.append(replace(settled, lens=replace(settled.lens, free=free)))
     return starts
 

@@ -157,7 +157,7 @@ class TagFinder:
             if not is_good:
                 lost.append(place)
                 continue
-            tag = _sighting(place.tag_id, corners, float(verdict[MARGIN]))
+            tag = _sighting(place.tag_id, corners, verdict)
             twins = by_id.setdefault(place.tag_id, [])
             if not any(is_same(tag, other) for other in twins):
                 twins.append(tag)
@@ -219,10 +219,16 @@ class TagFinder:
         self._seen = places
 
 
-def _sighting(tag_id: int, corners: Floats, margin: float) -> TagSeen:
+def _sighting(tag_id: int, corners: Floats, verdict: Floats) -> TagSeen:
     """Return a tag of measured corners; its centre is where their diagonals meet."""
     a, b, c, d = ((x, y) for x, y in corners.tolist())
     ux, uy, vx, vy = c[0] - a[0], c[1] - a[1], d[0] - b[0], d[1] - b[1]
     share = ((b[0] - a[0]) * vy - (b[1] - a[1]) * vx) / (ux * vy - uy * vx)
     centre = (a[0] + share * ux, a[1] + share * uy)
-    return TagSeen(tag_id=tag_id, centre_px=centre, corners_px=(a, b, c, d), margin=margin)
+    return TagSeen(
+        tag_id=tag_id,
+        centre_px=centre,
+        corners_px=(a, b, c, d),
+        margin=float(verdict[MARGIN]),
+        hamming=int(verdict[BITS]),
+    )

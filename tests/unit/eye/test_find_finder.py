@@ -38,6 +38,17 @@ def test_the_first_frame_is_searched_whole(rng):
     assert np.sqrt(np.mean(error**2)) < 0.03
 
 
+@pytest.mark.parametrize("wrong", [0, 1])
+def test_a_tag_is_told_with_how_many_of_its_bits_were_wrong(rng, wrong):
+    grey = picture([(5, corners_at(320.0, 240.0, 80.0))], rng=rng)
+    if wrong:
+        grey[241:249, 321:329] = 255 - grey[241:249, 321:329]  # a cell, ink for paper
+    finder, settings = TagFinder(), Settings(quad_decimate=1.0)
+    (whole,), (kept,) = finder.find(grey), finder.find(grey)
+    (library,) = look(grey, settings, 1.0, 0.0)
+    assert [tag.hamming for tag in (whole, kept, library)] == [wrong] * 3
+
+
 def test_a_new_tag_is_found_within_the_scan(rng):
     tags = many(rng, 21, size=SIZE)
     finder = TagFinder(scan_frames=8)
