@@ -1,7 +1,7 @@
 """The picture of a map: one SVG in map metres, for the dashboard, the docs and `scm show map`.
 
 Things that change have ids: `light-1` with its lamps `light-1-red`, `light-1-yellow` and
-`light-1-green`, `movement-<group>`, `stop-<name>`, `lane-<name>`, `spawn-<name>`.
+`light-1-green`, `movement-<junction>-<group>`, `stop-<name>`, `lane-<name>`, `spawn-<name>`.
 """
 
 import itertools
@@ -193,7 +193,7 @@ def _movements(roads: Roads) -> list[str]:
         drawn.append(
             element(
                 "path",
-                id=f"movement-{group}" if count == 0 else f"movement-{group}-{count}",
+                id=f"movement-{junction}-{group}" + (f"-{count}" if count else ""),
                 class_="movement",
                 fill="none",
                 d=outline(points, closed=False),

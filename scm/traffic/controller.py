@@ -40,6 +40,7 @@ from scm.traffic.promise import (
 )
 from scm.traffic.timetables import Tables, Timetables
 from scm.traffic.timing import NIGEL, CarFacts
+from scm.traffic.wave import Wave
 from scm.v2x.messages.signal_request import SignalRequest
 from scm.v2x.messages.spat import Colour, SignalGroup, Spat
 
@@ -196,9 +197,9 @@ class Controller:
             self._usual = FIXED
         self.failure = self._failed = ""
 
-    def ask_for_guest(self, table: Timetable) -> None:
+    def ask_for_guest(self, table: Timetable, wave: Wave | None = None) -> None:
         """Wish for a plan that somebody made; it comes once every promise reckons with it."""
-        self._timetables.offer(table)
+        self._timetables.offer(table, wave)
         self._usual = FIXED
         self.failure = self._failed = ""
 

@@ -17,6 +17,7 @@ from scm.traffic.plan_asked import stages_of
 from scm.traffic.policy import load_policy, policy_names, site_of
 from scm.traffic.program import STEP_NS
 from scm.traffic.timetables import Tables
+from scm.traffic.wave import Wave
 from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.signal_request import SignalWish
 from scm.v2x.messages.signal_site import (
@@ -138,9 +139,7 @@ def _site(junction: str, program: Program, tables: Tables) -> SignalSite:
             tuple(tuple(names[i] for i in sequence) for sequence in section)
             for section in layout.sections
         ),
-        plans=tuple(
-            _plan(table, program, in_step=wave is not None) for table, wave in tables.values()
-        ),
+        plans=tuple(_plan(table, program, wave) for table, wave in tables.values()),
         policies=tuple(
             SignalPolicy(policy=name, about=one.about, has_detectors=one.needs_detectors)
             for name, one in policies
@@ -148,7 +147,7 @@ def _site(junction: str, program: Program, tables: Tables) -> SignalSite:
     )
 
 
-def _plan(table: Timetable, program: Program, *, in_step: bool) -> SignalPlan:
+def _plan(table: Timetable, program: Program, wave: Wave | None) -> SignalPlan:
     if table.plan == OWN:
         about = "the stages of the map"
     else:
@@ -166,5 +165,6 @@ def _plan(table: Timetable, program: Program, *, in_step: bool) -> SignalPlan:
             )
             for slot in table.slots
         ),
-        in_step=in_step,
+        in_step=wave is not None,
+        offset_s=None if wave is None else wave.offset_ns / NS_PER_S,
     )

@@ -8,12 +8,13 @@ from msgspec.structs import replace
 from scm.clock import NS_PER_MS
 from scm.maps.model import Junction
 from scm.store.records import PlanRecord
+from scm.traffic.asked import NEED_RINGS
 from scm.traffic.controller import Controller, Heard
 from scm.traffic.detectors import Detector, Watcher
 from scm.traffic.junction_facts import JunctionFacts, wishes_of
 from scm.traffic.plan import FLASH
-from scm.traffic.plan_asked import check_name, recalled, records_of, table_of
-from scm.traffic.policy import policy_names
+from scm.traffic.plan_asked import check_name, recalled, records_of, table_of, wave_of
+from scm.traffic.policy import FIXED, policy_names
 from scm.traffic.priority_air import PriorityDesk
 from scm.traffic.program import STEP_NS
 from scm.v2x.etsi_convert import roadside_station, spatem_of
@@ -82,13 +83,12 @@ class JunctionSignals:
         Raises:
             PlanError: when there is no such plan any more.
         """
-        stages = recalled(record.stages)
-        for plan in (record.plan, FLASH if record.flash else ""):
-            if plan:
-                more = stages if plan == record.plan else ()
-                self.serve_plan(
-                    PlanRequest(junction=self.junction.name, plan=plan, by=record.by, stages=more)
-                )
+        asked = PlanRequest(junction=self.junction.name, plan=record.plan, by=record.by)
+        if record.plan:
+            stages = recalled(record.stages)
+            self.serve_plan(replace(asked, stages=stages, offset_s=record.offset_s))
+        if record.flash:
+            self.serve_plan(replace(asked, plan=FLASH))
 
     def serve_plan(self, request: PlanRequest) -> PlanReply:
         """Take a wish for a plan, or for flash; `record` is what should outlive the process.
@@ -104,12 +104,15 @@ class JunctionSignals:
             return PlanReply(junction=request.junction, plan=FLASH)
         if request.stages:
             check_name(request.plan, self._names)
-            controller.ask_for_guest(table_of(request.plan, request.stages, self._facts.program))
+            table = table_of(request.plan, request.stages, self._facts.program)
+            controller.ask_for_guest(table, wave_of(table, request.offset_s))
             self._taken = f"takes plan {request.plan} ({who})"
         else:
             controller.ask(request.plan)
         stages = records_of(request.stages)
-        self.record = PlanRecord(plan=request.plan, by=request.by, stages=stages)
+        self.record = PlanRecord(
+            plan=request.plan, by=request.by, stages=stages, offset_s=request.offset_s
+        )
         self._asked = who
         self._flash("person", who, on=False)
         plan = FLASH if controller.is_flashing else controller.running
@@ -205,7 +208,8 @@ class JunctionSignals:
             self._tell("info", "plan_taken", self._taken, now_ns)
             self._taken = ""
         if running != now[1]:
-            text = f"runs plan {now[1]}, before {running} ({self._asked})"
+            what = "plan" if controller.policy == FIXED else "policy"
+            text = f"runs {what} {now[1]}, before {running} ({self._why_runs()})"
             self._tell("info", "plan_changed", text, now_ns)
         if now[2] and failure != now[2]:
             text = f"falls back to fixed time: {now[2]}"
@@ -217,6 +221,13 @@ class JunctionSignals:
             self._tell("info", "signals_restart", "restarts all red", now_ns)
         if mode != "preempt" and now[0] == "preempt":
             self._tell("info", "signals_preempted", "is pre-empted", now_ns)
+
+    def _why_runs(self) -> str:
+        """Say who wants what runs now: whoever asked for it, or a wish that a plan cannot grant."""
+        if self.controller.policy == FIXED:
+            return self._asked
+        wishes = [one for one in self.controller.asked if one.verb in NEED_RINGS]
+        return ", ".join(f"{one.verb} of {one.by}" for one in wishes) or self._asked
 
     def _tell(self, severity: Severity, name: str, what: str, now_ns: int) -> None:
         text = f"junction {self.junction.name} {what}"

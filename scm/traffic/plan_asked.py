@@ -16,6 +16,7 @@ from scm.traffic.plan import FLASH, Stage, Timetable, least_between_ns, timetabl
 from scm.traffic.program import whole_steps_ns
 from scm.traffic.proof_load import check_table
 from scm.traffic.proof_plan import prove_plan
+from scm.traffic.wave import Wave
 from scm.v2x.messages.plan_request import SignalStage
 from scm.v2x.messages.signal_site import SignalPhase
 from scm.v2x.plan_file import PlanFile, PlanProof
@@ -49,6 +50,20 @@ def table_of(plan: str, stages: Sequence[SignalStage], program: Program) -> Time
         raise PlanError(msg)
     check_table(table, program)
     return table
+
+
+def wave_of(table: Timetable, offset_s: float | None) -> Wave | None:
+    """Return the place of a plan's cycle in time; None: it has none.
+
+    Raises:
+        PlanError: when it is not inside the cycle.
+    """
+    if offset_s is None:
+        return None
+    if not 0.0 <= offset_s < table.length_ns / 1e9:
+        expected = f"expected 0 to less than the cycle of {table.length_ns / 1e9:g} s"
+        raise PlanError(f"plan {table.plan!r}: offset_s: got {offset_s:g} s, {expected}")
+    return Wave(table.length_ns, round(offset_s * 1e9))
 
 
 def check_name(plan: str, taken: Collection[str]) -> None:

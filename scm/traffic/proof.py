@@ -82,9 +82,8 @@ def prove(kernel: Kernel, program: Program, dts: Sequence[int] = (1,)) -> Walked
         PlanError: saying what is unsafe.
     """
     walked = _walk(kernel, program, dts)
-    for state in walked.states:
-        for index in range(len(program.groups)):
-            _must_serve(kernel, program, state, index)
+    for index in range(len(program.groups)):
+        _must_serve(kernel, program, walked.states, index)
     return walked
 
 
@@ -176,10 +175,16 @@ def _wrong_start(program: Program, name: str, after: Sequence[_Seen]) -> str:
     return ""
 
 
-def _must_serve(kernel: Kernel, program: Program, state: State, index: int) -> None:
+def _must_serve(kernel: Kernel, program: Program, states: Collection[State], index: int) -> None:
+    """Go on from each state under one wish until its green, or where that is known to come."""
     wish = {program.groups[index]}
-    for _ in range(2 * sum(map(sum, program.times)) + 10):
-        if _of(state[index]) == "green":
-            return
-        state = kernel.step(program, state, wish, 1)
-    raise PlanError(f"unsafe: group {program.groups[index]!r} is never served")
+    longest = 2 * sum(map(sum, program.times)) + 10
+    served = {state for state in states if _of(state[index]) == "green"}
+    for begun in states:
+        state, way = begun, set[State]()
+        while state not in served and _of(state[index]) != "green":
+            if state in way or len(way) > longest:
+                raise PlanError(f"unsafe: group {program.groups[index]!r} is never served")
+            way.add(state)
+            state = kernel.step(program, state, wish, 1)
+        served |= way

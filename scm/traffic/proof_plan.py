@@ -72,12 +72,15 @@ def prove_plan(kernel: Kernel, program: Program, table: Timetable) -> Proven:
 def _all_come_to_rest(kernel: Kernel, program: Program, states: frozenset[State]) -> State:
     """Return the state that all others end in when nobody wishes anything."""
     longest = max(sum(times) for times in program.times) + 2
-    ends = set()
+    passed, ends = set[State](), set[State]()
     for begun in states:
-        state = begun
-        for _ in range(longest):
+        state, way = begun, set[State]()
+        while state not in passed and state not in way and len(way) <= longest:
+            way.add(state)
             state = kernel.step(program, state, (), 1)
-        ends.add(state)
+        if state not in passed:
+            ends.add(state)
+        passed |= way
     if len(ends) != 1 or any(group.phase is not Phase.RED for group in next(iter(ends))):
         raise PlanError("unsafe: not all come to red when nobody wishes anything")
     return ends.pop()

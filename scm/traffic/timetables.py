@@ -25,7 +25,7 @@ class Timetables:
     def __init__(self, tables: Tables, plan: str) -> None:
         self._own = dict(tables)
         self._tables = dict(tables)
-        self._entering: dict[str, Timetable] = {}
+        self._entering: dict[str, tuple[Timetable, Wave | None]] = {}
         self.plan = plan
         self.pending = ""
         self.clear(0, 0)
@@ -41,9 +41,9 @@ class Timetables:
         if plan == self.plan:
             self._entering.pop(plan, None)
 
-    def offer(self, guest: Timetable) -> None:
+    def offer(self, guest: Timetable, wave: Wave | None) -> None:
         """Take a plan that somebody made, and let it come; one of its name makes room for it."""
-        self._entering = {guest.plan: guest}
+        self._entering = {guest.plan: (guest, wave)}
         self.pending = guest.plan
 
     def clear(self, now_ns: int, until_ns: int) -> None:
@@ -101,7 +101,7 @@ class Timetables:
             for name, pair in self._tables.items()
             if name in self._own or name in (self.plan, self.pending)
         }
-        self._tables = {**stay, **{name: (table, None) for name, table in entering.items()}}
+        self._tables = {**stay, **entering}
 
     def _beginning(self, plan: str, began_ns: int) -> Timetable:
         """Return a plan's timetable for a cycle that begins at a time."""

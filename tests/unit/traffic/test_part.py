@@ -15,6 +15,7 @@ from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
+from scm.v2x.messages.signal_request import SignalRequest
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx
 
@@ -105,6 +106,14 @@ def test_a_plan_that_is_asked_for_comes_with_the_next_cycle_and_is_told(city):
     event = next(event for event in told.read()[2] if event.name == "plan_changed")
     assert "runs plan calm, before brisk (test asked: rush hour)" in event.text
     assert ask(city, "calm") == PlanReply(junction="crossing", plan="calm")
+
+
+def test_a_wish_that_no_plan_can_grant_is_named_as_the_cause_of_the_policy(city):
+    told = Told(city)
+    city.call(SignalRequest(junction="crossing", verb="hold", groups=("south_east",), by="ada"))
+    city.run_for(40.0)
+    event = next(event for event in told.read()[2] if event.name == "plan_changed")
+    assert "runs policy actuated, before brisk (hold of ada)" in event.text
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from scm.traffic.controller import Controller
 from scm.traffic.kernel import GroupTimes, Program
 from scm.traffic.part import TrafficPart
 from scm.traffic.plan import load_timetable
-from scm.traffic.plan_asked import prove_file, recalled, records_of, stages_of, table_of
+from scm.traffic.plan_asked import prove_file, recalled, records_of, stages_of, table_of, wave_of
 from scm.traffic.program import STEP_NS
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
@@ -59,6 +59,13 @@ def test_a_plan_that_cannot_be_is_refused_with_the_reason(stages, said):
     assert said in str(refusal.value)
 
 
+@pytest.mark.parametrize("offset_s", [-0.1, 60.0, float("nan")])
+def test_an_offset_outside_the_cycle_is_refused(offset_s):
+    table = table_of("rush", (stage("a"), stage("b"), stage("c")), PROGRAM)
+    with pytest.raises(PlanError, match=r"offset_s: got .* less than the cycle of"):
+        wave_of(table, offset_s)
+
+
 @pytest.mark.parametrize("name", ["brisk", "calm"])
 def test_the_stages_of_a_timetable_make_it_again(name):
     table = load_timetable(name, PROGRAM)
@@ -91,7 +98,9 @@ def test_no_promise_is_broken_while_plans_of_people_come_and_go(seed):
             greens = [dice.randrange(30, 200) / 10 for _ in range(3)]
             groups = dice.sample("abc", 3)
             made = tuple(stage(g, green_s=s) for g, s in zip(groups, greens, strict=True))
-            controller.ask_for_guest(table_of(dice.choice(["rush", "night"]), made, PROGRAM))
+            table = table_of(dice.choice(["rush", "night"]), made, PROGRAM)
+            offset_s = dice.choice([None, dice.randrange(200) / 10])
+            controller.ask_for_guest(table, wave_of(table, offset_s))
         elif dice.random() < 0.002:
             controller.ask(dice.choice(["calm", "brisk"]))
     assert kept > 100
@@ -122,10 +131,9 @@ def city():
         yield running
 
 
-def ask(city, plan, stages=()):
-    return city.call(
-        PlanRequest(junction="crossing", plan=plan, by="ada", reason="school", stages=stages)
-    )
+def ask(city, plan, stages=(), **more):
+    who = {"by": "ada", "reason": "school"}
+    return city.call(PlanRequest(junction="crossing", plan=plan, stages=stages, **who, **more))
 
 
 def messages(box):
@@ -146,6 +154,24 @@ def test_a_plan_of_the_bus_is_run_told_and_comes_back_after_a_restart(city):
         spats = again.hear(Hears(Spat))
         again.run_for(8.0)
         assert messages(spats)[-1].plan == "rush"
+
+
+def test_a_plan_with_an_offset_begins_its_cycles_in_step_with_the_clock_also_after_a_restart(city):
+    city.run_for(6.0)
+    cycle_s, offset_s = 20.5, 7.3
+    assert ask(city, "rush", RUSH, offset_s=offset_s).pending == "rush"
+    kept = PlanRecord(plan="rush", by="ada", stages=records_of(RUSH), offset_s=offset_s)
+    with Lockstep([TrafficPart(MAP, "brisk", kept={"crossing": kept})]) as again:
+        for running in (city, again):
+            told = running.hear(Hears(SignalStatus))
+            running.run_for(100.0)
+            greens = [turn for one in messages(told)[-20:] for turn in one.turns]
+            starts_s = {t.start_ns / 1e9 for t in greens if t.groups == ("south_east",)}
+            late_s = [(start_s - offset_s) % cycle_s for start_s in starts_s]
+            assert len(starts_s) >= 2
+            assert max(late_s) == pytest.approx(min(late_s))
+            assert max(late_s) < 1.0
+    assert isinstance(ask(city, "rush", RUSH, offset_s=cycle_s), Refused)
 
 
 @pytest.mark.parametrize(("plan", "stages"), [("calm", RUSH), ("flash", RUSH), ("priority", RUSH)])
