@@ -35,6 +35,8 @@ BLOCK = 256 * 1024
 CARS_EVERY_NS = NS_PER_S
 NIGEL_M = -0.07, 0.23, 0.175
 LEVELS = {"info": 2, "warning": 3, "error": 4}
+FLOOR = fox.Colour(r=0.13, g=0.15, b=0.18)  # so that lanes show on Foxglove's light ground too
+FLOOR_THICK_M = 0.01
 ROAD, LANE = fox.Colour(r=0.45, g=0.48, b=0.53), fox.Colour(r=0.93, g=0.93, b=0.88)
 WHITE = fox.Colour(r=1.0, g=1.0, b=1.0)
 KINDS = {
@@ -49,6 +51,7 @@ LIGHTS = {
     "yellow": fox.Colour(r=1.0, g=0.76, b=0.2),
     "green": fox.Colour(r=0.2, g=0.82, b=0.55),
 }
+LETTERS = {"red": "R", "flashing_red": "F", "yellow": "Y", "green": "G"}
 _WANTED = (
     WorldDefinition, WorldSnapshot, VehicleState, Spat, CityEvent, EyeFrame, CameraFrame, LidarScan,
 )  # fmt: skip
@@ -170,7 +173,11 @@ class _Writing:
             return
         self._has_map, self._lights = True, told.map.lights
         entity = fox.Entity(
-            timestamp=_time(t_ns), frame_id=MAP, id="roads", lines=_road_lines(told.map)
+            timestamp=_time(t_ns),
+            frame_id=MAP,
+            id="roads",
+            cubes=(_floor(told.map),),
+            lines=_road_lines(told.map),
         )
         self._add("/map", t_ns, fox.SceneUpdate(entities=(entity,)))
 
@@ -298,7 +305,21 @@ def _light(at: fox.Time, light: Light, colour: str) -> fox.Entity:
     pose = fox.Pose(position=fox.Vector(x=light.x_m, y=light.y_m, z=0.2))
     size = fox.Vector(x=0.08, y=0.08, z=0.08)
     lamp = fox.Cube(pose=pose, size=size, color=LIGHTS.get(colour, GREY))
-    return fox.Entity(timestamp=at, frame_id=MAP, id=f"light {light.light_id}", spheres=(lamp,))
+    letter = fox.Label(  # for who cannot tell the colours apart
+        pose=fox.Pose(position=fox.Vector(x=light.x_m, y=light.y_m, z=0.3)),
+        color=WHITE,
+        text=LETTERS.get(colour, "D"),
+    )
+    return fox.Entity(
+        timestamp=at, frame_id=MAP, id=f"light {light.light_id}", spheres=(lamp,), texts=(letter,)
+    )
+
+
+def _floor(city_map: CityMap) -> fox.Cube:
+    (x0, x1), (y0, y1) = city_map.floor.x_m, city_map.floor.y_m
+    middle = fox.Vector(x=0.5 * (x0 + x1), y=0.5 * (y0 + y1), z=-FLOOR_THICK_M)
+    size = fox.Vector(x=x1 - x0, y=y1 - y0, z=FLOOR_THICK_M)
+    return fox.Cube(pose=fox.Pose(position=middle), size=size, color=FLOOR)
 
 
 def _road_lines(city_map: CityMap) -> tuple[fox.Line, ...]:

@@ -1,4 +1,6 @@
-"""A short run in a file: two cars, a junction that turns green, two events, the map, a picture."""
+"""A short run in a file: two cars, a junction that turns green, two events, map, picture, scan."""
+
+import struct
 
 import msgspec
 
@@ -16,11 +18,16 @@ from scm.v2x.messages.world_snapshot import SnapshotBox, SnapshotVehicle, WorldS
 BEGIN_NS = 1_700_000_000 * NS_PER_S
 HZ = 20
 GREEN_S = 2.0
+YAW_RAD = 0.5
 PICTURE = b"\xff\xd8 a picture \xff\xd9"
+RANGES_M = (1.0, 2.0, float("inf"), 0.5)  # ahead, left, a miss behind, right
 
 
-def write_run(path, seconds=5.0, *, finish=True):
-    """Write the run, a chunk each quarter of a second; without `finish` as a kill leaves it."""
+def write_run(path, seconds=5.0, *, finish=True, leaves_s=float("inf")):
+    """Write the run, a chunk each quarter of a second; without `finish` as a kill leaves it.
+
+    From `leaves_s` on the world tells of n10 no more.
+    """
     file = RunFile(path, "city")
     file.write(_sample(0.0, "world/def", _definition()))
     file.write(_sample(0.0, "event/info/world", _event("info", "n1 stands on the map")))
@@ -28,12 +35,13 @@ def write_run(path, seconds=5.0, *, finish=True):
         at_s = tick / HZ
         for name, x_m in (("n1", at_s), ("n10", -at_s)):
             file.write(_sample(at_s, f"v/{name}/state", _state(name, at_s, x_m, tick)))
-        file.write(_sample(at_s, "world/snapshot", _snapshot(at_s, tick)))
+        file.write(_sample(at_s, "world/snapshot", _snapshot(at_s, tick, leaves_s)))
         if tick % 2 == 0:
             file.write(_sample(at_s, "tl/crossing/spat", _spat(at_s)))
         if tick == 3 * HZ:
             file.write(_sample(at_s, "event/warning/world", _event("warning", "n1 hit a wall")))
             file.write(_picture(at_s))
+            file.write(_scan(at_s))
         if tick % 5 == 0:
             file.flush()
     file.flush()
@@ -53,6 +61,13 @@ def _picture(at_s):
     head = {"camera": "overhead", "t_ns": BEGIN_NS, "width_px": 4, "height_px": 3}
     key = prefix("city") + "eye/overhead/frame"
     return RawSample(key, PICTURE, msgspec.json.encode(head), BEGIN_NS + round(at_s * NS_PER_S))
+
+
+def _scan(at_s):
+    t_ns = BEGIN_NS + round(at_s * NS_PER_S)
+    head = {"vehicle": "n1", "t_ns": t_ns, "beams": 4, "range_min_m": 0.15, "range_max_m": 12.0}
+    ranges = struct.pack("<4f", *RANGES_M)
+    return RawSample(prefix("city") + "v/n1/scan", ranges, msgspec.json.encode(head), t_ns)
 
 
 def _definition():
@@ -82,7 +97,7 @@ def _state(name, at_s, x_m, tick):
     )
 
 
-def _snapshot(at_s, tick):
+def _snapshot(at_s, tick, leaves_s):
     cars = tuple(
         SnapshotVehicle(
             vehicle=name,
@@ -91,11 +106,12 @@ def _snapshot(at_s, tick):
             tag_id=number,
             x_m=x_m,
             y_m=0.5,
-            yaw_rad=0.0,
+            yaw_rad=YAW_RAD,
             speed_mps=1.0,
             steering_rad=0.1,
         )
         for number, (name, x_m) in enumerate((("n1", at_s), ("n10", -at_s)))
+        if name == "n1" or at_s < leaves_s
     )
     boxes = (SnapshotBox(name="box1", x_m=0.0 if at_s < 1.0 else 0.1, y_m=0.0, yaw_rad=0.0),)
     return WorldSnapshot(t_ns=BEGIN_NS, tick=tick, vehicles=cars, boxes=boxes)

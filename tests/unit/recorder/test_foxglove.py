@@ -1,23 +1,31 @@
 """What Foxglove gets: channels of its own schemas, in the form that its reader understands."""
 
+import base64
 import io
 import json
+import math
+import struct
+from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
 
 from scm.recorder.foxglove import write_foxglove
 from scm.recorder.run_index import read_index
-from tests.unit.recorder.short_run import PICTURE, write_run
+from tests.unit.recorder.short_run import PICTURE, YAW_RAD, write_run
 
+LAYOUT = Path(__file__).parents[3] / "scm/api/static/foxglove_layout.json"
 READABLE = {"boolean", "string", "number", "integer", "object", "array"}
 
 
 @pytest.fixture(scope="module")
 def channels(tmp_path_factory):
-    """Messages by topic, with their schemas."""
-    index = read_index(write_run(tmp_path_factory.mktemp("run") / "run.mcap"))
-    stream = io.BytesIO(b"".join(write_foxglove(index)))
+    return channels_of(write_run(tmp_path_factory.mktemp("run") / "run.mcap"))
+
+
+def channels_of(run):
+    """Return a run's messages by topic, with their schemas."""
+    stream = io.BytesIO(b"".join(write_foxglove(read_index(run))))
     found = {}
     for schema, channel, message in make_reader(stream).iter_messages():
         assert (channel.message_encoding, schema.encoding) == ("json", "jsonschema")
@@ -35,6 +43,7 @@ def test_cars_roads_signals_numbers_pictures_and_the_log_are_there(channels):
         "/signals": "foxglove.SceneUpdate",
         "/events": "foxglove.Log",
         "/eye/overhead": "foxglove.CompressedImage",
+        "/n1/scan": "foxglove.PointCloud",
         "/n1/state": "scm.CarState",
         "/n10/state": "scm.CarState",
     }
@@ -77,6 +86,9 @@ def test_a_car_is_where_the_run_had_it(channels):
     _, rows = channels["/tf"]
     at = {one["child_frame_id"]: one["translation"]["x"] for one in rows[40]["transforms"]}
     assert at == {"n1": 2.0, "n10": -2.0}
+    for one in rows[40]["transforms"]:
+        turned = one["rotation"]
+        assert 2.0 * math.atan2(turned["z"], turned["w"]) == pytest.approx(YAW_RAD)
 
 
 def test_cars_are_told_again_each_second_because_a_seek_knows_one_message(channels):
@@ -85,16 +97,69 @@ def test_cars_are_told_again_each_second_because_a_seek_knows_one_message(channe
     assert [one["id"] for one in rows[-1]["entities"]] == ["n1", "n10"]
 
 
+def test_a_car_that_left_is_taken_away(tmp_path):
+    _, rows = channels_of(write_run(tmp_path / "run.mcap", 2.0, leaves_s=1.5))["/cars"]
+    gone = [[one["id"] for one in row["deletions"]] for row in rows]
+    assert gone == [[], [], ["n10"]]
+    assert [one["id"] for one in rows[-1]["entities"]] == ["n1"]
+
+
 def test_signals_are_told_when_they_change(channels):
     _, rows = channels["/signals"]
     assert len(rows) == 2
-    green = [one for one in rows[1]["entities"] if one["spheres"][0]["color"]["g"] > 0.8]
-    assert green
+    shown = [{one["texts"][0]["text"] for one in row["entities"]} for row in rows]
+    assert shown == [{"R", "D"}, {"G", "D"}]
+    for light in rows[1]["entities"]:
+        is_green = light["spheres"][0]["color"]["g"] > 0.8
+        assert is_green == (light["texts"][0]["text"] == "G")
+
+
+def test_the_floor_lies_under_the_roads(channels):
+    _, (update,) = channels["/map"]
+    (roads,) = update["entities"]
+    (floor,) = roads["cubes"]
+    middle, size = floor["pose"]["position"], floor["size"]
+    assert middle["z"] + 0.5 * size["z"] < 0.0
+    lines = [(point["x"], point["y"]) for line in roads["lines"] for point in line["points"]]
+    assert all(
+        abs(at - middle[axis]) <= 0.5 * size[axis] + 1e-9
+        for place in lines
+        for axis, at in zip("xy", place, strict=True)
+    )
+
+
+def test_a_scan_is_points_where_its_beams_hit_from_where_the_scanner_is(channels):
+    _, (cloud,) = channels["/n1/scan"]
+    assert cloud["frame_id"] == "n1"
+    scanner = cloud["pose"]["position"]
+    assert (scanner["x"], scanner["z"]) == pytest.approx((0.1445, 0.1757), abs=1e-4)
+    points = list(struct.iter_unpack("<3f", base64.b64decode(cloud["data"])))
+    ahead, left, right = [(1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, -0.5, 0.0)]
+    assert [pytest.approx(one, abs=1e-6) for one in (ahead, left, right)] == points
+    assert cloud["point_stride"] == 12
+    assert [(one["name"], one["offset"]) for one in cloud["fields"]] == [
+        ("x", 0),
+        ("y", 4),
+        ("z", 8),
+    ]
+
+
+def test_the_layout_shows_topics_and_fields_that_there_are(channels):
+    panels = json.loads(LAYOUT.read_text())["configById"]
+    topics = set(panels["3D!city"]["topics"])
+    topics |= {panels["Image!eye"]["imageMode"]["imageTopic"]}
+    topics |= {panels["RosOut!events"]["topicToRender"]}
+    assert topics <= set(channels)
+    fields = json.loads(channels["/n1/state"][0].data)["properties"]
+    for name in ("Plot!speed", "Plot!command"):
+        for path in panels[name]["paths"]:
+            topic, field = path["value"].split(".")
+            assert topic.startswith("/n")
+            assert topic.endswith("/state")
+            assert field in fields
 
 
 def test_a_picture_is_the_jpeg_that_was_recorded(channels):
-    import base64
-
     _, rows = channels["/eye/overhead"]
     assert base64.b64decode(rows[0]["data"]) == PICTURE
 
