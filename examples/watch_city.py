@@ -15,7 +15,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--url", default="http://127.0.0.1:8000", help="of its dashboard")
     parser.add_argument("--key", default="", help="API key, where the city asks for one")
-    parser.add_argument("--seconds", type=float, default=10.0, help="how long to watch")
+    parser.add_argument("--seconds", type=float, default=5.0, help="how long to watch")
     arguments = parser.parse_args()
     with Client(arguments.url, arguments.key) as client:
         (city,) = client.cities.all_cities().cities

@@ -28,6 +28,57 @@ SHARED = "shared"
 WIDTH = 99
 MOST_RECORDS = 20
 BY = "Written by docs/make/client.py: do not change it here."
+CLIENT = '''"""The client of a city, noun by noun.
+
+{by}
+"""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Self
+
+from scm.client.connection import Connection
+{imports}
+from scm.client.records.shared import Operation
+from scm.client.teleop import Wheel, taken
+from scm.client.work import finished
+
+
+class Client:
+    """A city over its web interface; close it, or use it in a `with`.
+
+    Args:
+        url: Where its dashboard is: `http://127.0.0.1:8000`.
+        key: API key, where the city asks for one.
+    """
+
+    def __init__(self, url: str = "http://127.0.0.1:8000", key: str = "") -> None:
+        self.connection = Connection(url, key)
+{nouns}
+
+    def wheel(self, vehicle: str, reason: str = "") -> AbstractContextManager[Wheel]:
+        """Take a car's wheel; with a reason, from whoever holds it. See `scm.client.teleop`."""
+        return taken(self.connection, vehicle, reason)
+
+    def wait(
+        self,
+        work: Operation,
+        hear: Callable[[Operation], object] | None = None,
+        timeout_s: float = 600.0,
+    ) -> Operation:
+        """Return long work once it is done; `hear` is told of every step. See `scm.client.work`."""
+        return finished(self.connection, work, hear, timeout_s)
+
+    def close(self) -> None:
+        """End the connection."""
+        self.connection.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+'''
 Schema = dict[str, Any]
 
 
@@ -353,19 +404,9 @@ def _noun(
 
 
 def _client(nouns: list[str]) -> str:
-    lines = [f'"""The client of a city, noun by noun.\n\n{BY}\n"""', "", "from typing import Self"]
-    lines += [f"from scm.client.nouns.{_file(noun)} import {_class(noun)}Noun" for noun in nouns]
-    lines += ["from scm.client.connection import Connection", "", "", "class Client:"]
-    lines += ['    """A city over its web interface; close it, or use it in a `with`.', ""]
-    lines += ["    Args:", "        url: Where its dashboard is: `http://127.0.0.1:8000`."]
-    lines += ["        key: API key, where the city asks for one.", '    """', ""]
-    lines += ['    def __init__(self, url: str = "http://127.0.0.1:8000", key: str = "") -> None:']
-    lines += ["        self.connection = Connection(url, key)"]
-    lines += [f"        self.{_file(noun)} = {_class(noun)}Noun(self.connection)" for noun in nouns]
-    lines += ["", "    def close(self) -> None:", '        """End the connection."""']
-    lines += ["        self.connection.close()", "", "    def __enter__(self) -> Self:"]
-    lines += ["        return self", "", "    def __exit__(self, *_: object) -> None:"]
-    return "\n".join([*lines, "        self.close()", ""])
+    imports = [f"from scm.client.nouns.{_file(noun)} import {_class(noun)}Noun" for noun in nouns]
+    own = [f"        self.{_file(noun)} = {_class(noun)}Noun(self.connection)" for noun in nouns]
+    return CLIENT.format(by=BY, imports="\n".join(imports), nouns="\n".join(own))
 
 
 def _docstring(about: str, title: str, entries: list[str], indent: int) -> list[str]:

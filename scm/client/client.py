@@ -3,6 +3,8 @@
 Written by docs/make/client.py: do not change it here.
 """
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Self
 
 from scm.client.connection import Connection
@@ -30,6 +32,9 @@ from scm.client.nouns.stop import StopNoun
 from scm.client.nouns.stream import StreamNoun
 from scm.client.nouns.traffic import TrafficNoun
 from scm.client.nouns.vehicles import VehiclesNoun
+from scm.client.records.shared import Operation
+from scm.client.teleop import Wheel, taken
+from scm.client.work import finished
 
 
 class Client:
@@ -66,6 +71,19 @@ class Client:
         self.stream = StreamNoun(self.connection)
         self.traffic = TrafficNoun(self.connection)
         self.vehicles = VehiclesNoun(self.connection)
+
+    def wheel(self, vehicle: str, reason: str = "") -> AbstractContextManager[Wheel]:
+        """Take a car's wheel; with a reason, from whoever holds it. See `scm.client.teleop`."""
+        return taken(self.connection, vehicle, reason)
+
+    def wait(
+        self,
+        work: Operation,
+        hear: Callable[[Operation], object] | None = None,
+        timeout_s: float = 600.0,
+    ) -> Operation:
+        """Return long work once it is done; `hear` is told of every step. See `scm.client.work`."""
+        return finished(self.connection, work, hear, timeout_s)
 
     def close(self) -> None:
         """End the connection."""

@@ -7,11 +7,15 @@ lost or the server is busy: under one key an effect happens once.
 import threading
 import uuid
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from typing import Any, TypeVar
 from urllib.parse import quote
 
 import httpx
 import msgspec
+from websockets.exceptions import InvalidHandshake, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 from scm.client.stream import Lines, LiveEvent, events_of
 from scm.errors import LinkError, MessageError, ScmError
@@ -178,6 +182,34 @@ class Connection:
         """
         yield from events_of(lambda last_id: self._lines(path, query, last_id), self._pause)
 
+    @contextmanager
+    def socket(self, path: str, protocol: str) -> Iterator[ClientConnection]:
+        """Open a WebSocket that speaks a protocol, and close it in the end.
+
+        Raises:
+            ProblemError: when the city says no.
+            LinkError: when it cannot be reached.
+        """
+        url, key = self._http.base_url, self._http.headers.get("Authorization")
+        address = url.copy_with(scheme={"https": "wss"}.get(url.scheme, "ws"))
+        with ExitStack() as opened:
+            try:
+                opening = connect(
+                    str(address).rstrip("/") + path,
+                    subprotocols=[Subprotocol(protocol)],
+                    additional_headers={"Authorization": key} if key else None,
+                    open_timeout=self._timeout_s,
+                    close_timeout=PAUSE_S,
+                    max_queue=None,
+                )
+                socket = opened.enter_context(opening)
+            except InvalidStatus as refused:
+                answer = refused.response
+                raise _problem(answer.status_code, bytes(answer.body or b"")) from None
+            except (OSError, InvalidHandshake) as cause:
+                raise _no_answer(cause) from cause
+            yield socket
+
     def _lines(self, path: str, query: Values | None, last_id: str) -> Lines:
         headers = {"Last-Event-ID": last_id} if last_id else {}
         timeout = httpx.Timeout(self._timeout_s, read=SILENT_S)
@@ -246,17 +278,23 @@ def _reach(once: Callable[[], httpx.Response]) -> httpx.Response:
     try:
         return once()
     except httpx.TransportError as cause:
-        msg = f"no answer from the city: {type(cause).__name__}: {cause}; is `scm up` running?"
-        raise LinkError(msg) from cause
+        raise _no_answer(cause) from cause
+
+
+def _no_answer(cause: Exception) -> LinkError:
+    said = f"{type(cause).__name__}: {cause}"
+    return LinkError(f"no answer from the city: {said}; is `scm up` running?")
 
 
 def _check(response: httpx.Response) -> None:
     """Raise what the city refused."""
-    if response.is_success:
-        return
-    response.read()
+    if not response.is_success:
+        raise _problem(response.status_code, response.read())
+
+
+def _problem(status: int, body: bytes) -> ProblemError:
     try:
-        problem = msgspec.json.decode(response.content, type=Problem)
+        problem = msgspec.json.decode(body, type=Problem)
     except msgspec.MsgspecError:
-        problem = Problem(status=response.status_code, detail=response.text[:200])
-    raise ProblemError(problem)
+        problem = Problem(status=status, detail=body.decode(errors="replace")[:200])
+    return ProblemError(problem)

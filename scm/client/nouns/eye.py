@@ -9,16 +9,14 @@ from typing import Any, Literal
 from scm.client.connection import Connection, part
 from scm.client.records.eye import (
     CalibrationFile,
-    CameraState,
-    EyeTags,
-    Overhead,
+    CalibrationReply,
     PageCalibrationRow,
-    PageCameraRow,
     PagePoseRow,
     Residuals,
     View,
     Views,
 )
+from scm.client.records.eye_parts import CameraState, EyeTags, Overhead, PageCameraRow
 from scm.client.records.shared import Operation
 
 
@@ -320,3 +318,48 @@ class EyeNoun:
             name: a calibration's name
         """
         return self._connection.pieces(f"/api/v1/eye/calibrations/{part(name)}/file.toml")
+
+    def use(
+        self,
+        name: str,
+        *,
+        by: str = "api",
+        reason: str,
+        calibration: str,
+        idempotency_key: str = "",
+    ) -> CalibrationReply:
+        """See by a calibration from the next frame on.
+
+        Args:
+            name: a name on the bus
+            by: who asks; with API keys the key's owner
+            reason: why
+            calibration: a calibration on the shelf
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "PUT",
+            f"/api/v1/eye/cameras/{part(name)}/calibration",
+            CalibrationReply,
+            body={"by": by, "reason": reason, "calibration": calibration},
+            key=idempotency_key,
+        )
+
+    def back(
+        self, name: str, *, by: str = "api", reason: str, idempotency_key: str = ""
+    ) -> CalibrationReply:
+        """Put back what the camera saw by before.
+
+        Args:
+            name: a name on the bus
+            by: who asks; with API keys the key's owner
+            reason: why
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/eye/cameras/{part(name)}/calibration/back",
+            CalibrationReply,
+            body={"by": by, "reason": reason},
+            key=idempotency_key,
+        )

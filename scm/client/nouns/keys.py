@@ -17,10 +17,13 @@ class KeysNoun:
         """All API keys, without their secrets."""
         return self._connection.ask("GET", "/api/v1/keys", AllKeys)
 
-    def revoke(self, key_id: str) -> KeyRow:
+    def revoke(self, key_id: str, *, idempotency_key: str = "") -> KeyRow:
         """End an API key at once.
 
         Args:
             key_id: public part of the key
+            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask("DELETE", f"/api/v1/keys/{part(key_id)}", KeyRow)
+        return self._connection.ask(
+            "DELETE", f"/api/v1/keys/{part(key_id)}", KeyRow, key=idempotency_key
+        )

@@ -33,10 +33,13 @@ class OperationsNoun:
         """
         return self._connection.ask("GET", f"/api/v1/operations/{part(name)}", Operation)
 
-    def cancel(self, name: str) -> Operation:
+    def cancel(self, name: str, *, idempotency_key: str = "") -> Operation:
         """Call work off.
 
         Args:
             name: a name on the bus
+            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask("DELETE", f"/api/v1/operations/{part(name)}", Operation)
+        return self._connection.ask(
+            "DELETE", f"/api/v1/operations/{part(name)}", Operation, key=idempotency_key
+        )

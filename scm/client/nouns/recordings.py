@@ -90,6 +90,18 @@ class RecordingsNoun:
             query={"limit": limit, "cursor": cursor},
         )
 
+    def picture(self, name: str, camera: str, *, t_s: float = 0.0) -> bytes:
+        """What an overhead camera saw, at a time.
+
+        Args:
+            name: a recording: its file without .mcap
+            camera: an overhead camera
+            t_s: seconds since the recording began
+        """
+        return self._connection.fetch(
+            f"/api/v1/recordings/{part(name)}/eye/{part(camera)}.jpg", query={"t_s": t_s}
+        )
+
     def map_svg(self, name: str) -> bytes:
         """The map it was driven on.
 

@@ -403,6 +403,7 @@ class SignalsNoun:
         by: str = "api",
         reason: str = "",
         stages: tuple[StageBody, ...],
+        offset_s: float | None = None,
         idempotency_key: str = "",
     ) -> PlanRow:
         """Save a proven plan.
@@ -416,6 +417,9 @@ class SignalsNoun:
             by: who asks; told in the log
             reason: why
             stages: in the order of the cycle
+            offset_s: when its cycle begins, after a time that is a whole number of cycles on the
+                controller's clock, less than the cycle; plans with the same cycle keep step so;
+                null: with nobody
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
@@ -423,7 +427,13 @@ class SignalsNoun:
             f"/api/v1/signals/{part(name)}/plans/{part(plan)}",
             PlanRow,
             headers={"if-match": if_match, "if-none-match": if_none_match},
-            body={"about": about, "by": by, "reason": reason, "stages": stages},
+            body={
+                "about": about,
+                "by": by,
+                "reason": reason,
+                "stages": stages,
+                "offset_s": offset_s,
+            },
             key=idempotency_key,
         )
 
@@ -453,19 +463,23 @@ class SignalsNoun:
             key=idempotency_key,
         )
 
-    def prove(self, name: str, *, plan: str, stages: tuple[StageBody, ...]) -> Operation:
+    def prove(
+        self, name: str, *, plan: str, stages: tuple[StageBody, ...], idempotency_key: str = ""
+    ) -> Operation:
         """Search every state of kernel and plan for fault.
 
         Args:
             name: a name on the bus
             plan: what the plan will be called
             stages: in the order of the cycle
+            idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
             "POST",
             f"/api/v1/signals/{part(name)}/proofs",
             Operation,
             body={"plan": plan, "stages": stages},
+            key=idempotency_key,
         )
 
     def proof(self, name: str, digest: str) -> PlanProof:

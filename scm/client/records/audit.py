@@ -18,6 +18,8 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
         kind: The request's class, or method and path of a call of the web.
         by: Who asked.
         request_id: Id of the request; empty: it had none.
+        trace_id: Of what led to it: the call of the web and what the city did for it have the
+            same; empty: nobody traced it.
         request: What was asked and answered, as the station noted it.
         reply: What was asked and answered, as the station noted it.
     """
@@ -28,6 +30,7 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
     kind: str
     by: str
     request_id: str
+    trace_id: str
     request: dict[str, Any]
     reply: dict[str, Any]
 

@@ -30,11 +30,12 @@ class Misbehaviour(msgspec.Struct, kw_only=True, frozen=True):
     """What is held against those who speak on the air.
 
     Attributes:
-        watched: Whether a misbehaviour part is there at all.
+        watched: Whether a misbehaviour part is there: it has told scores within the last seconds.
         witness: Whether an Eye is there to hold claims against.
         t_ns: Of these scores; None: there are none.
         stations: With the score of each.
-        reported: Names of those with a report against them.
+        reported: Names of those that were ever reported; who is suspected now stands in
+            `stations`.
     """
 
     watched: bool

@@ -104,6 +104,20 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     owner: str = ""
 
 
+class Together(msgspec.Struct, kw_only=True, frozen=True):
+    """What the cars of one search have in common.
+
+    Attributes:
+        said: In a sentence.
+        conclusions: A sentence or two on each effect that several may share.
+        cars: Names of their reports, this one's among them.
+    """
+
+    said: str
+    conclusions: tuple[str, ...]
+    cars: tuple[str, ...]
+
+
 class Report(msgspec.Struct, kw_only=True, frozen=True):
     """One report.
 
@@ -115,6 +129,7 @@ class Report(msgspec.Struct, kw_only=True, frozen=True):
         drives: Names of the drives it suggests.
         told: How many of them were driven and recorded since.
         files: What can be downloaded.
+        together: What its car has in common with others of the search; None: it was alone.
     """
 
     row: ReportRow
@@ -124,6 +139,7 @@ class Report(msgspec.Struct, kw_only=True, frozen=True):
     drives: tuple[str, ...]
     told: int
     files: tuple[str, ...]
+    together: Together | None
 
 
 class DrivePlan(msgspec.Struct, kw_only=True, frozen=True):

@@ -63,6 +63,7 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
         lights: Lamps that burn.
         boxes: Boxes that cars can push.
         first_frame_s: When the world first told where cars are: it may have begun later.
+        eye_cameras: The overhead cameras of which it has pictures.
     """
 
     recording: RecordingRow
@@ -71,6 +72,7 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
     lights: tuple[Light, ...]
     boxes: tuple[Box, ...]
     first_frame_s: float
+    eye_cameras: tuple[str, ...]
 
 
 class Frame(msgspec.Struct, kw_only=True, frozen=True):
@@ -102,6 +104,18 @@ class SignalChange(msgspec.Struct, kw_only=True, frozen=True):
     colour: str
 
 
+class PictureAt(msgspec.Struct, kw_only=True, frozen=True):
+    """From when on a picture of an overhead camera is the newest one.
+
+    Attributes:
+        t_s: Since the begin of the recording [s].
+        camera: Name of a camera.
+    """
+
+    t_s: float
+    camera: str
+
+
 class Frames(msgspec.Struct, kw_only=True, frozen=True):
     """A stretch of a recording.
 
@@ -112,6 +126,7 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
         cars: Whom the frames' numbers mean.
         frames: Moments, in order of time.
         signals: Changes, the colours at `from_s` first; a group is `junction/group`.
+        pictures: The Eye's, of each camera the one that is newest at `from_s` first.
         damaged: What of the stretch cannot be read, in words.
     """
 
@@ -121,6 +136,7 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
     cars: tuple[CarFacts, ...]
     frames: tuple[Frame, ...]
     signals: tuple[SignalChange, ...]
+    pictures: tuple[PictureAt, ...]
     damaged: tuple[str, ...]
 
 

@@ -254,6 +254,8 @@ class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
         usable: Whether it is proven for the junction as it is now.
         cycle_s: How long its cycle is [s].
         stages: Its stages, in the order of the cycle.
+        offset_s: When its cycle begins, after a time that is a whole number of cycles on the
+            controller's clock; null: in step with nobody.
         by: Who wished it.
         reason: Why.
         saved_ns: When it was saved; 0: it was not.
@@ -267,6 +269,7 @@ class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
     usable: bool
     cycle_s: float
     stages: tuple[SignalStage, ...]
+    offset_s: float | None = None
     by: str = ""
     reason: str = ""
     saved_ns: int = 0

@@ -154,6 +154,7 @@ class SignalPlan(msgspec.Struct, kw_only=True, frozen=True):
         stages: What makes it.
         slots: Its timetable; yellow and red clear lie between two of them.
         in_step: Whether it keeps a common cycle with other junctions: a green wave.
+        offset_s: When its cycle begins in the common one; None: it keeps none.
     """
 
     plan: str
@@ -162,6 +163,7 @@ class SignalPlan(msgspec.Struct, kw_only=True, frozen=True):
     stages: tuple[SignalStage, ...]
     slots: tuple[SignalSlot, ...]
     in_step: bool = False
+    offset_s: float | None = None
 
 
 class SignalPolicy(msgspec.Struct, kw_only=True, frozen=True):

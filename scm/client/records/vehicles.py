@@ -47,7 +47,11 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
         owner: Who holds it.
         epoch: Counts the leases of this car: a command of an older one is refused.
         lease_left_ms: Until the lease ends if it is not renewed; None: it is at home.
-        battery_v: Of the drive battery; None: not measured.
+        battery_v: Of the drive battery, under load as it is; None: not measured.
+        battery_charge: What is left in it, 0 to 1: counted by a simulated car, estimated from the
+            voltage by a real one; None: not known.
+        command_age_ms: How old the newest command of its leaseholder is, since it reached the car,
+            the snapshot's age included; None: nobody else drives it, or none came yet.
         mode: What governs it now.
         age_ms: How old its newest state is now, the snapshot's own age included.
         alive: Whether it is there; false: it left or died.
@@ -71,6 +75,8 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
     epoch: int
     lease_left_ms: float | None
     battery_v: float | None
+    battery_charge: float | None
+    command_age_ms: float | None
     mode: str
     age_ms: float
     alive: bool
