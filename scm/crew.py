@@ -106,10 +106,10 @@ class Crew:
         job, pid = member.job, member.process.pid if member.process else 0
         member.silent_ns = None
         if member.was_up:
-            self._say(f"  {job.name:<9} is back, pid {pid}")
+            self._say(f"  {job.name:<12} is back, pid {pid}")
         else:
             member.was_up = True
-            self._say(f"  {job.name:<9} {job.what:<52} pid {pid}")
+            self._say(f"  {job.name:<12} {job.what:<52} pid {pid}")
 
     def look(self) -> None:
         """Start what is due, and see who died."""
@@ -142,10 +142,10 @@ class Crew:
         name = member.job.name
         if member.silent_ns is not None and now_ns > member.silent_ns + SILENT_NS:
             member.silent_ns = None
-            self._say(f"  {name:<9} is silent: it runs, but gives no sign of life on the bus")
+            self._say(f"  {name:<12} is silent: it runs, but gives no sign of life on the bus")
         if not (member.was_up or member.told_slow) and now_ns > member.started_ns + SLOW_NS:
             member.told_slow = True
-            self._say(f"  {name:<9} is still starting (a first start compiles and takes longer)")
+            self._say(f"  {name:<12} is still starting (a first start compiles and takes longer)")
 
     def _ended(self, member: Member, code: int, now_ns: int) -> None:
         name = member.job.name
@@ -153,7 +153,7 @@ class Crew:
         member.silent_ns = None
         member.sessions.clear()
         if code == 0:
-            self._say(f"  {name:<9} left")
+            self._say(f"  {name:<12} left")
             return
         how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
         member.died_ns.append(now_ns)
@@ -161,11 +161,11 @@ class Crew:
         is_bad = code == BAD_INPUT and not (member.was_up and member.job.role == "part")
         if is_bad or recent > RESTARTS_A_MINUTE:
             why = "its input is bad" if is_bad else f"{recent} times within a minute"
-            self._say(f"  {name:<9} died {how}: {why}; it is not started again")
+            self._say(f"  {name:<12} died {how}: {why}; it is not started again")
             return
         pause_ns = FIRST_PAUSE_NS * 2 ** (recent - 1)
         member.due_ns = now_ns + pause_ns
-        self._say(f"  {name:<9} died {how}: starts again in {seconds(pause_ns):g} s")
+        self._say(f"  {name:<12} died {how}: starts again in {seconds(pause_ns):g} s")
 
     def stop(self) -> None:
         """Ask everybody to stop, the last ones last, and end what is left after 1.5 s."""
@@ -181,7 +181,7 @@ class Crew:
             self._wait_for(stopping, until_ns)
         for member in self.members.values():
             if member.process is not None and member.process.poll() is None:
-                self._say(f"  {member.job.name:<9} did not stop: killed")
+                self._say(f"  {member.job.name:<12} did not stop: killed")
             if member.process is not None:
                 _send(member.process, signal.SIGKILL)
                 member.process.wait()

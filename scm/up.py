@@ -18,7 +18,7 @@ from scm.maps.radio import with_radio
 from scm.store.open import open_store
 from scm.traffic.demand import DemandPart
 from scm.traffic.demand_table import load_demand
-from scm.v2x.access import Guard, guard_of, is_loopback, own_stations
+from scm.v2x.access import SCRIPT, Guard, guard_of, is_loopback, own_stations
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.presence import Presence
@@ -194,14 +194,16 @@ def _parts(plan: _Plan) -> list[Job]:
         return Job(name, "part", what, lambda: scm(name, *more))
 
     def eye(station: str, camera: str) -> Job:
-        command = partial(scm, "eye", "--camera", camera, station=station)
+        command = partial(scm, "eye", "--camera", camera, *kept, station=station)
         return Job(station, "part", f"overhead camera {camera}: tags, poses, tracks", command)
 
     cars = f"cars, walls, sensors, radio; {plan.wanted.hosted} hosted"
     kept = ("--state", plan.state)
     keys = () if plan.wanted.keys is None else ("--keys", plan.wanted.keys)
     data = ("--data", str(plan.wanted.record_dir))
-    web = ("--host", plan.wanted.host, "--port", str(plan.port), *keys, *data, *kept)
+    own = plan.guard.files.get(SCRIPT)
+    scripts = ("--script-credentials", str(own)) if own is not None else ()
+    web = ("--host", plan.wanted.host, "--port", str(plan.port), *keys, *data, *kept, *scripts)
 
     air = [word for setting in plan.wanted.radio for word in ("--radio", setting)]
 

@@ -56,29 +56,33 @@ class Acknowledgements:
 
     def add(self, events: Sequence[str], by: str, note: str = "") -> tuple[Acknowledgement, ...]:
         """Acknowledge events by their ids; one already acknowledged stays as it was."""
-        with self._lock, self._store.transaction():
-            for event in events:
-                if event not in self._rows:
-                    row = Acknowledgement(event=event, by=by, note=note, at_ns=self._clock.now_ns())
+        with self._lock:
+            now_ns = self._clock.now_ns()
+            fresh = {
+                event: Acknowledgement(event=event, by=by, note=note, at_ns=now_ns)
+                for event in events
+                if event not in self._rows
+            }
+            rows = self._rows | fresh
+            gone = tuple(rows)[: max(0, len(rows) - KEPT)]
+            with self._store.transaction():
+                for event, row in fresh.items():
                     self._store.put("seen", _PREFIX + event, msgspec.json.encode(row))
-                    self._rows[event] = row
-            self._forget()
-            return tuple(self._rows[event] for event in events if event in self._rows)
+                for event in gone:
+                    self._store.delete("seen", _PREFIX + event)
+            for event in gone:
+                del rows[event]
+            self._rows = rows  # what is not stored was not done
+            return tuple(rows[event] for event in events if event in rows)
 
     def take_back(self, event: str) -> Acknowledgement | None:
         """Take one back; return what it was, or None."""
         with self._lock:
-            row = self._rows.pop(event, None)
+            row = self._rows.get(event)
             if row is not None:
                 self._store.delete("seen", _PREFIX + event)
-            return row
-
-    def _forget(self) -> None:
-        over = len(self._rows) - KEPT
-        if over > 0:
-            for event in tuple(self._rows)[:over]:
                 del self._rows[event]
-                self._store.delete("seen", _PREFIX + event)
+            return row
 
 
 def _read(key: str, body: bytes) -> Acknowledgement:

@@ -33,6 +33,7 @@ from scm.api.routes import (
     events,
     eye,
     eye_calibration,
+    eye_in_force,
     health,
     leases,
     live,
@@ -68,6 +69,8 @@ from scm.store.memory import MemoryStore
 from scm.store.repository import Repository
 
 STATIC_DIR = Path(__file__).parent / "static"
+LARGEST_BODY = 2**20
+"""Bytes of a request's body; a route that takes files says how much it takes."""
 PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
 """First part of the address of each page of the dashboard; what follows is the page's own."""
 
@@ -121,6 +124,7 @@ def create_app(
         redoc_url=None,
         openapi_url="/api/v1/openapi.json",
         generate_unique_id_function=openapi.operation_id,
+        max_body_size=LARGEST_BODY,  # read whole before anybody asks whether the caller may
         lifespan=desk.lifespan,
     )
     app.state.stream = desk.stream
@@ -128,13 +132,7 @@ def create_app(
     app.state.keys = keys
     problem.install(app)
     openapi.install(app)
-    policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
-    app.add_middleware(Idempotent, clock=clock)  # what is added later sees a request earlier
-    app.add_middleware(Limited, clock=clock)
-    app.add_middleware(Audited, store=desk.store, clock=clock)
-    app.add_middleware(Gate, keys=keys, policy=policy)
-    app.add_middleware(Measured, metrics=desk.metrics, clock=clock)
-    app.add_middleware(Traced)
+    _add_layers(app, desk, clock)
     api = APIRouter(prefix="/api/v1")
     for noun in (*desk.of_the_city(), *desk.live(), *desk.of_the_server()):
         api.include_router(noun, responses=problem.RESPONSES)
@@ -190,7 +188,7 @@ class _Desk:
             scan.router(city, stream),
             vehicle_frames.router(self.frames),
             close_up.router(city, stream),
-            drive.router(city, stream),
+            drive.router(city, stream, self.keys),
         )
 
     def of_the_server(self) -> tuple[APIRouter, ...]:
@@ -203,6 +201,7 @@ class _Desk:
             recordings.router(city),
             scenarios.router(city, self.work),
             eye_calibration.router(city, self.work),
+            eye_in_force.router(city),
             mismatch.router(city, self.jobs),
             session.router(),
             key_routes.router(self.keys),
@@ -217,6 +216,16 @@ class _Desk:
         self.stream.close()
         self.frames.close()
         await asyncio.gather(*tasks)
+
+
+def _add_layers(app: FastAPI, desk: _Desk, clock: WallClock) -> None:
+    policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
+    app.add_middleware(Idempotent, clock=clock)  # what is added later sees a request earlier
+    app.add_middleware(Limited, clock=clock)
+    app.add_middleware(Audited, store=desk.store, clock=clock)
+    app.add_middleware(Gate, keys=desk.keys, policy=policy)
+    app.add_middleware(Measured, metrics=desk.metrics, clock=clock)
+    app.add_middleware(Traced)
 
 
 def _add_pages(app: FastAPI) -> None:

@@ -37,6 +37,8 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
         kind: The request's class, or method and path of a call of the web.
         by: Who asked.
         request_id: Id of the request; empty: it had none.
+        trace_id: Of what led to it: the call of the web and what the city did for it have the same;
+            empty: nobody traced it.
         request, reply: What was asked and answered, as the station noted it.
     """
 
@@ -46,6 +48,7 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
     kind: str
     by: str
     request_id: str
+    trace_id: str
     request: dict[str, Any]
     reply: dict[str, Any]
 
@@ -163,6 +166,7 @@ def _raw(body: object) -> msgspec.Raw:
 
 
 def _row(number: int, deed: Deed) -> AuditRow:
+    request = _object(deed.request)
     return AuditRow(
         number=number,
         t_ns=deed.t_ns,
@@ -170,7 +174,8 @@ def _row(number: int, deed: Deed) -> AuditRow:
         kind=deed.kind,
         by=deed.by,
         request_id=deed.request_id,
-        request=_object(deed.request),
+        trace_id=str(request.get("trace_id", "")),
+        request=request,
         reply=_object(deed.reply),
     )
 

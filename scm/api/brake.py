@@ -1,8 +1,13 @@
-"""Slow down who guesses keys: so many wrong ones an address, then one every few seconds."""
+"""Slow down who guesses a key: so many wrong ones an address, then one every few seconds.
+
+Only for that key, by its public part: a page left open with a key that has ended asks for ever, and
+must not keep those beside it, behind the same address, from the red button.
+"""
 
 import ipaddress
 from collections import OrderedDict
 
+from scm.api.keys import public_part
 from scm.clock import Clock, seconds
 
 BURST = 10.0
@@ -11,19 +16,19 @@ ADDRESSES_KEPT = 4096
 
 
 class Brake:
-    """A bucket of tries for each address; a wrong key takes one, time gives it back."""
+    """A bucket of tries for each address and key; a wrong one takes a try, time gives it back."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._buckets: OrderedDict[str, tuple[float, int]] = OrderedDict()
 
-    def wait_s(self, address: str) -> float:
+    def wait_s(self, address: str, key: str) -> float:
         """Return how long an address has to wait before it may try a key again; 0: not at all."""
-        return max(0.0, (1.0 - self._tries(_whose(address))) / REFILL_PER_S)
+        return max(0.0, (1.0 - self._tries(_whose(address, key))) / REFILL_PER_S)
 
-    def note_wrong(self, address: str) -> None:
+    def note_wrong(self, address: str, key: str) -> None:
         """Take a try away."""
-        whose = _whose(address)
+        whose = _whose(address, key)
         self._buckets[whose] = (self._tries(whose) - 1.0, self._clock.now_ns())
         self._buckets.move_to_end(whose)
         if len(self._buckets) > ADDRESSES_KEPT:
@@ -34,10 +39,11 @@ class Brake:
         return min(BURST, left + REFILL_PER_S * seconds(self._clock.now_ns() - at_ns))
 
 
-def _whose(address: str) -> str:
-    """Return the address, or the network of one household: IPv6 gives each 2^64 of them."""
+def _whose(address: str, key: str) -> str:
+    """Return who guesses which key: the household of an address, IPv6 gives each 2^64 of them."""
     try:
-        version = ipaddress.ip_address(address).version
+        if ipaddress.ip_address(address).version == 6:
+            address = str(ipaddress.ip_network((address, 64), strict=False))
     except ValueError:
-        return address
-    return address if version == 4 else str(ipaddress.ip_network((address, 64), strict=False))
+        pass  # no address: as it is called
+    return f"{address} {public_part(key)}"

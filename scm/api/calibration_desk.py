@@ -210,7 +210,9 @@ def _jpeg_size(picture: bytes) -> tuple[int, int]:
     """Walk the segments of a JPEG file up to the one that tells its size."""
     at = 2
     while True:
-        _, marker, length = struct.unpack_from(">BBH", picture, at)
+        begin, marker, length = struct.unpack_from(">BBH", picture, at)
+        if begin != 0xFF or length < 2:
+            raise struct.error("no segment")
         if marker in _JPEG_SIZES:
             height, width = struct.unpack_from(">HH", picture, at + 5)
             return width, height

@@ -6,6 +6,7 @@ Both are what the Eye's own commands write: a lens for `scm eye --calibration`, 
 
 import json
 import re
+import threading
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,6 +17,7 @@ from scm.api.city import not_found
 from scm.api.problem import RefusedError
 from scm.maps.model import Camera
 from scm.v2x.message import Refused
+from scm.v2x.messages.calibration_request import MeasuredLens
 
 NAME = re.compile(r"[a-z0-9_-]{1,48}")
 LARGEST_TOML = 64 * 1024
@@ -57,20 +59,8 @@ class CalibrationFile(msgspec.Struct, kw_only=True, frozen=True):
     toml: Annotated[str, msgspec.Meta(examples=['[[cameras]]\nname = "overhead"\nx_m = 1.384\n'])]
 
 
-class _Lens(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+class _Lens(MeasuredLens, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """What a lens file holds, as `scm eye calibrate` writes it."""
-
-    lens: Literal["pinhole", "fisheye"]
-    width_px: int
-    height_px: int
-    fx_px: float
-    fy_px: float
-    cx_px: float
-    cy_px: float
-    distortion: tuple[float, float, float, float, float]
-    covariance: tuple[tuple[float, ...], ...]
-    rms_px: float
-    views: int
 
 
 class _Place(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -78,10 +68,16 @@ class _Place(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
 
 
 class CalibrationShelf:
-    """A folder of calibrations; its files may also be put there and taken away by hand."""
+    """A folder of calibrations; its files may also be put there and taken away by hand.
+
+    Attributes:
+        folder: Where they lie.
+        editing: Held from looking at one to changing it: of two writers the second is told.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self.editing = threading.Lock()
 
     def path(self, name: str) -> Path:
         """Return where a calibration's file is, or would be."""
@@ -115,6 +111,21 @@ class CalibrationShelf:
         if found is None:
             raise not_found("calibration", name)
         return found
+
+    def holds(self, name: str) -> tuple[Camera | None, MeasuredLens | None]:
+        """Return the place and the lens of a calibration, as `CalibrationRequest` wants them.
+
+        With a place goes the measured lens that it was found with, if that is on the shelf.
+
+        Raises:
+            RefusedError: there is none of that name.
+        """
+        found = checked(self.get(name).toml)
+        if isinstance(found, MeasuredLens):
+            return None, found
+        lenses = (checked(self.get(row.name).toml) for row in self.rows() if row.kind == "lens")
+        mine = (one for one in lenses if isinstance(one, _Lens) and _is_lens_of(one, found))
+        return found, next(mine, None)
 
     def write(self, name: str, toml: str) -> CalibrationFile:
         """Put a calibration on the shelf, or in place of the one of that name.
@@ -178,6 +189,12 @@ def checked(toml: str) -> _Lens | Camera:
         detail = f"toml: expected one [[cameras]] block, got {len(place.cameras)}"
         raise RefusedError(Refused(code="invalid", detail=detail))
     return place.cameras[0]
+
+
+def _is_lens_of(lens: MeasuredLens, camera: Camera) -> bool:
+    """Return whether a camera looks through this lens, to the last digit."""
+    shared = set(MeasuredLens.__struct_fields__) & set(Camera.__struct_fields__)
+    return all(getattr(lens, name) == getattr(camera, name) for name in shared)
 
 
 def read_json(path: Path) -> Any:

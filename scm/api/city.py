@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path as FilePath
 from typing import Annotated, TypeVar
 
 from fastapi import Header, Path, Response
@@ -44,6 +45,7 @@ class Link:
         clock: That of the view's runner; None: time stands still between its steps.
         wire: Says commands on the bus; None: nobody can be driven from here.
         connect: Endpoint of the city's router, for scripts run beside it; empty: not known.
+        script_credentials: File of who those scripts are; None: the city asks nobody.
         words: What tells a program of ours where the bus is and who it is there; empty: such a
             program cannot reach the city.
         map_file: Name or path of the map, as other programs are told it; empty: its own name.
@@ -55,6 +57,7 @@ class Link:
     clock: Clock | None = None
     wire: Wire | None = None
     connect: str = ""
+    script_credentials: FilePath | None = None
     words: Sequence[str] = ()
     map_file: str = ""
 

@@ -79,7 +79,8 @@ Matching = Annotated[Condition, Depends(_condition)]
 
 
 def _names(header: str, tag: str) -> bool:
-    return "*" in header or tag in (part.strip() for part in header.split(","))
+    named = [part.strip() for part in header.split(",")]
+    return named == ["*"] or tag in named
 
 
 def _stale(header: str, got: str, have: str) -> RefusedError:

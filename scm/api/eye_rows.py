@@ -13,7 +13,7 @@ from scm.clock import seconds
 from scm.maps.model import MapTag
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
-from scm.v2x.messages.eye_status import EyeStatus
+from scm.v2x.messages.eye_status import EyeStatus, InForce
 from scm.v2x.messages.eye_tags import EyeTags, TagSeen
 
 POSE_SHOWN_S = 2.0
@@ -44,6 +44,7 @@ class TagRow(msgspec.Struct, kw_only=True, frozen=True):
         what: `car`; `map`: it lies on the floor, known to the map; `other`: nobody's.
         vehicle: The car that wears it; empty: none does.
         margin: Decision margin of the detector, higher is clearer.
+        hamming: Bits of 36 that were read wrong and corrected; null: not told.
         size_px: Mean side of its black square in the picture [px].
         seen_s: How long ago the camera saw it last [s].
         x_m, y_m, yaw_rad: Of the car, by this camera; of a map tag as its map has it; null: not
@@ -54,6 +55,7 @@ class TagRow(msgspec.Struct, kw_only=True, frozen=True):
     what: Literal["car", "map", "other"]
     vehicle: str
     margin: float
+    hamming: int | None
     size_px: float
     seen_s: float
     x_m: float | None
@@ -98,6 +100,7 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
         known: Tags of the last minute, whose they are, and where.
         good: Whether its poses can be trusted, by its own account; None: not said.
         complaints: What is wrong, in sentences.
+        in_force: By which calibration it sees; null: not said.
     """
 
     camera: str
@@ -112,6 +115,7 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
     seen: tuple[SeenRow, ...]
     good: bool | None
     complaints: tuple[str, ...]
+    in_force: InForce | None
 
 
 def camera_rows(
@@ -163,6 +167,7 @@ def _row(camera: str, picture: Picture, floor: Mapping[int, MapTag]) -> CameraRo
         known=tuple(_known(camera, picture, floor)),
         seen=tuple(_seen(camera, picture)),
         **_status(said, picture.now_ns),
+        in_force=None if said is None else said.message.in_force,
     )
 
 
@@ -220,6 +225,7 @@ def _tag(
         what="map" if on_floor is not None else "car" if vehicle else "other",
         vehicle="" if on_floor is not None else vehicle,
         margin=round(one.tag.margin, 1),
+        hamming=one.tag.hamming,
         size_px=round(sum(sides) / len(sides), 1),
         seen_s=round(max(0.0, seconds(picture.now_ns - one.arrived_ns)), 1),
         x_m=None if at is None else round(at.x_m, 4),

@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from scm.api.brake import Brake
+from scm.api.brake import REFILL_PER_S, Brake
 from scm.api.keys import KeyRing
 from scm.api.problem import problem
 from scm.clock import WallClock
@@ -33,6 +33,7 @@ COOKIE = "scm_key"
 KEY_PROTOCOL = "scm.key."
 GUARDED = ("/api/", "/ngsi-ld/", "/metrics")
 OPEN = frozenset({"/api/v1/openapi.json"})
+RETRY_S = str(math.ceil(1.0 / REFILL_PER_S))
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _INLINE_SCRIPT = re.compile(r"<script(?![^>]*\bsrc=)[^>]*>(.*?)</script>", re.DOTALL)
 
@@ -108,7 +109,7 @@ class Gate:
         status, code, detail = refusal
         response = problem(status, code, detail, instance=scope["path"])
         if status == HTTPStatus.TOO_MANY_REQUESTS:
-            response.headers["Retry-After"] = str(math.ceil(self._brake.wait_s(_address(scope))))
+            response.headers["Retry-After"] = RETRY_S
         await response(scope, receive, send_guarded)
 
     def _refusal(self, headers: Headers, *, is_safe: bool) -> _Refusal | None:
@@ -116,11 +117,11 @@ class Gate:
         if self._keys is None and _name_of(host) not in LOOPBACK_NAMES:
             detail = f"Host: got {host!r}, expected one of {sorted(LOOPBACK_NAMES)}"
             return HTTPStatus.FORBIDDEN, "host", detail
-        if is_safe:
+        if is_safe and not _is_embedded_elsewhere(headers):
             return None
         origin = headers.get("origin")
         foreign = origin is not None and urlsplit(origin).netloc != host
-        if foreign or headers.get("sec-fetch-site") == "cross-site":
+        if is_safe or foreign or headers.get("sec-fetch-site") == "cross-site":
             detail = f"Origin: got {origin!r}, expected this site ({host}) or none"
             return HTTPStatus.FORBIDDEN, "origin", detail
         return None
@@ -135,17 +136,29 @@ class Gate:
             return None
         key = _key_of(headers, with_cookie=is_safe) or _key_offered(scope)
         address = _address(scope)
-        if key and self._brake.wait_s(address) > 0.0:
-            detail = f"too many wrong keys from {address}; wait a little"
+        if key and self._brake.wait_s(address, key) > 0.0:
+            detail = f"this key was wrong too often from {address}; wait a little"
             return HTTPStatus.TOO_MANY_REQUESTS, "too_many", detail
         record = self._keys.find(key)
         if record is None:
             if key:
-                self._brake.note_wrong(address)
+                self._brake.note_wrong(address, key)
             detail = "this needs an API key: send `Authorization: Bearer <key>`"
             return HTTPStatus.UNAUTHORIZED, "unauthorised", detail
         scope.update(scm_role=record.role, scm_owner=record.owner, scm_key=key)
         return None
+
+
+def _is_embedded_elsewhere(headers: Headers) -> bool:
+    """Return whether a page of another site asks, which could not even read what it gets.
+
+    Its pictures and frames would let us work, and use up what its reader may ask. A link that a
+    person follows is none of these.
+    """
+    follows = headers.get("sec-fetch-mode") == "navigate"
+    is_shown = headers.get("sec-fetch-dest", "document") == "document"
+    elsewhere = headers.get("sec-fetch-site") in ("cross-site", "same-site")
+    return elsewhere and not (follows and is_shown)
 
 
 def caller_of(scope: Scope) -> str:

@@ -36,16 +36,15 @@ class _Answer:
     body: bytes = b""
     is_whole: bool = False
     is_too_large: bool = False
+    sets_cookie: bool = False
 
     def note(self, message: Message) -> None:
         """Keep a piece of an answer that is being sent."""
         if message["type"] == "http.response.start":
             self.status = message["status"]
-            self.headers = [
-                (name, value)
-                for name, value in message["headers"]
-                if name.decode("latin-1").lower() in _TOLD
-            ]
+            named = [(name.decode("latin-1").lower(), value) for name, value in message["headers"]]
+            self.sets_cookie = any(name == "set-cookie" for name, _ in named)
+            self.headers = [(name.encode(), value) for name, value in named if name in _TOLD]
         elif message["type"] == "http.response.body":
             piece = message.get("body", b"")
             self.is_too_large = self.is_too_large or len(self.body) + len(piece) > LARGEST_ANSWER
@@ -55,8 +54,9 @@ class _Answer:
 
     @property
     def can_be_kept(self) -> bool:
-        """Whether the change took effect and the answer is all here."""
-        return 200 <= self.status < 300 and self.is_whole and not self.is_too_large
+        """Whether the change took effect, the answer is all here, and it holds no secret."""
+        is_here = self.is_whole and not self.is_too_large and not self.sets_cookie
+        return 200 <= self.status < 300 and is_here
 
     def again(self) -> Response:
         """Return the same answer, marked as such."""

@@ -97,6 +97,12 @@ class KeyRing:
         return record if hmac.compare_digest(given, record.digest) else None
 
 
+def public_part(key: str) -> str:
+    """Return what tells a key from others and is no secret; empty: it is no key."""
+    match = _KEY.fullmatch(key)
+    return match[1] if match is not None else ""
+
+
 def _digest(secret: str, salt: bytes) -> str:
     return hashlib.blake2b(secret.encode(), salt=salt, person=_PERSON).hexdigest()
 

@@ -17,6 +17,7 @@ from scm.api.city import City
 from scm.api.picture import Picture
 from scm.api.stream import Stream
 from scm.clock import Clock, seconds
+from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 BUCKETS_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 1.0, 2.5)
 _ENDLESS = "text/event-stream", "multipart/x-mixed-replace", "application/octet-stream"
@@ -139,6 +140,8 @@ class _OfCity(Collector):
             oldest_s[car.kind,] = max(oldest_s.get((car.kind,), 0.0), car.age_ms / 1000.0 + age_s)
         what = "Age of the state that is oldest among cars of a kind."
         yield _by("scm_vehicle_state_age_seconds", what, ("kind",), oldest_s)
+        what = "Age of the newest command, oldest among leased cars of a kind, since it came there."
+        yield _by("scm_cmd_age_seconds", what, ("kind",), _command_ages(world, age_s))
 
     def _of_monitors(self, picture: Picture) -> Iterator[Metric]:
         latched: Labels = {}
@@ -158,6 +161,15 @@ class _OfCity(Collector):
         ).items():
             counter.add_metric(labels, count)
         yield counter
+
+
+def _command_ages(world: WorldSnapshot, age_s: float) -> Labels:
+    oldest_s: Labels = {}
+    for car in world.vehicles:
+        if car.command_age_ms is not None:
+            told_s = car.command_age_ms / 1000.0 + age_s
+            oldest_s[car.kind,] = max(oldest_s.get((car.kind,), 0.0), told_s)
+    return oldest_s
 
 
 def _of_parts(picture: Picture) -> Iterator[Metric]:

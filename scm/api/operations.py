@@ -7,7 +7,7 @@ kind runs one at a time, in the order of asking.
 import itertools
 import logging
 import threading
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Callable
 from typing import Literal
 
@@ -89,11 +89,12 @@ class Operations:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
+        self._moved = threading.Condition(self._lock)
         self._numbers = itertools.count(1)
         self._rows: OrderedDict[str, Operation] = OrderedDict()
         self._cancels: dict[str, threading.Event] = {}
-        self._turns: dict[str, threading.Lock] = {}
+        self._queues: dict[str, deque[str]] = {}
 
     def start(self, kind: str, what: str, work: Work, *, owner: str = "") -> Operation:
         """Begin work on a thread of its own, or let it wait for the one of its kind that runs.
@@ -125,10 +126,11 @@ class Operations:
             )
             self._rows[row.id] = row
             self._cancels[row.id] = threading.Event()
-            turn = self._turns.setdefault(kind, threading.Lock())
+            queue = self._queues.setdefault(kind, deque())
+            queue.append(row.id)
             self._forget()
         thread = threading.Thread(
-            target=self._run, args=(row.id, work, turn), name=row.id, daemon=True
+            target=self._run, args=(row.id, work, queue), name=row.id, daemon=True
         )
         thread.start()
         return row
@@ -144,11 +146,12 @@ class Operations:
             return self._rows.get(name)
 
     def cancel(self, name: str) -> Operation | None:
-        """Call work off: it ends at its next word about itself; over, it stays as it is."""
-        with self._lock:
+        """Call work off: what waits ends at once, what runs at its next word about itself."""
+        with self._moved:
             cancel = self._cancels.get(name)
-        if cancel is not None:
-            cancel.set()
+            if cancel is not None:
+                cancel.set()
+                self._moved.notify_all()
         return self.find(name)
 
     def change(self, name: str, **changes: object) -> None:
@@ -160,26 +163,37 @@ class Operations:
 
     def close(self) -> None:
         """Call all work off, without waiting for it."""
-        with self._lock:
+        with self._moved:
             for cancel in self._cancels.values():
                 cancel.set()
+            self._moved.notify_all()
 
-    def _run(self, name: str, work: Work, turn: threading.Lock) -> None:
+    def _run(self, name: str, work: Work, queue: deque[str]) -> None:
         tell = Teller(self, name, self._cancels[name])
-        with turn:
-            try:
-                self.change(name, state="running", began_ns=self._clock.now_ns())
-                tell("begins")
-                result = work(tell)
-            except Cancelled:
-                self._end(name, "cancelled")
-            except ScmError as error:
-                self._end(name, "failed", error=str(error))
-            except Exception:
-                _LOGGER.exception("operation_failed id=%s", name)
-                self._end(name, "failed", error="the server failed on this; its log says why")
-            else:
-                self._end(name, "done", result=result, progress=1.0)
+        with self._moved:
+            self._moved.wait_for(lambda: queue[0] == name or tell.cancelled.is_set())
+        try:
+            self._work(name, work, tell)
+        finally:
+            with self._moved:
+                queue.remove(name)
+                self._moved.notify_all()
+
+    def _work(self, name: str, work: Work, tell: Teller) -> None:
+        try:
+            tell.check()
+            self.change(name, state="running", began_ns=self._clock.now_ns())
+            tell("begins")
+            result = work(tell)
+        except Cancelled:
+            self._end(name, "cancelled")
+        except ScmError as error:
+            self._end(name, "failed", error=str(error))
+        except Exception:
+            _LOGGER.exception("operation_failed id=%s", name)
+            self._end(name, "failed", error="the server failed on this; its log says why")
+        else:
+            self._end(name, "done", result=result, progress=1.0)
 
     def _end(self, name: str, state: State, **changes: object) -> None:
         over = {"state": state, "doing": "", "ended_ns": self._clock.now_ns()}

@@ -3,6 +3,7 @@
 On top of the RFC's members every problem has a `code`, a short machine word.
 """
 
+import errno
 from http import HTTPStatus
 from typing import Annotated, Any
 
@@ -11,12 +12,15 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from msgspec import Meta
 from starlette.exceptions import HTTPException
+from starlette.middleware.body_limit import MAX_BODY_SIZE_SCOPE_KEY
 
 from scm.api.trace import trace_id
+from scm.errors import StoreError
 from scm.v2x.message import Refused
 
 STATUS_OF_CODE = {
     "not_found": 404,
+    "not_written": 507,
     "owned": 409,
     "precondition_failed": 412,
     "invalid": 422,
@@ -32,13 +36,19 @@ _CODE_OF_STATUS = {
     403: "forbidden",
     404: "not_found",
     405: "method_not_allowed",
+    413: "too_large",
     422: "invalid",
     429: "too_many",
     500: "internal",
 }
 
 
-_STATUSES = (400, 401, 403, 404, 409, 412, 422, 428, 429, 500, 503, 504)
+DISK_TROUBLE = frozenset(
+    {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO}
+)
+"""What the server's disk says when nothing can be written, whoever asks."""
+
+_STATUSES = (400, 401, 403, 404, 409, 412, 413, 422, 428, 429, 500, 503, 504, 507)
 
 
 class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
@@ -118,6 +128,8 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(RefusedError, _on_refused)
     app.add_exception_handler(RequestValidationError, _on_invalid)
     app.add_exception_handler(HTTPException, _on_http)
+    app.add_exception_handler(OSError, _on_disk)
+    app.add_exception_handler(StoreError, _on_store)
     app.add_exception_handler(Exception, _on_bug)
 
 
@@ -140,8 +152,22 @@ async def _on_invalid(request: Request, error: Exception) -> Response:
 
 async def _on_http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)  # noqa: S101  the type it was registered for
-    code = _CODE_OF_STATUS.get(error.status_code, "http")
-    return problem(error.status_code, code, str(error.detail), instance=request.url.path)
+    code, detail = _CODE_OF_STATUS.get(error.status_code, "http"), str(error.detail)
+    if code == "too_large":
+        detail = f"body: expected at most {request.scope[MAX_BODY_SIZE_SCOPE_KEY]} bytes, got more"
+    return problem(error.status_code, code, detail, instance=request.url.path)
+
+
+async def _on_disk(request: Request, error: Exception) -> Response:
+    """Say what keeps a shelf from being written; any other trouble with files is a bug."""
+    if not isinstance(error, OSError) or error.errno not in DISK_TROUBLE:
+        raise error
+    detail = f"the server's disk: {error.strerror}"
+    return problem(507, "not_written", detail, instance=request.url.path)
+
+
+async def _on_store(request: Request, error: Exception) -> Response:
+    return problem(507, "not_written", str(error), instance=request.url.path)
 
 
 async def _on_bug(request: Request, _error: Exception) -> Response:

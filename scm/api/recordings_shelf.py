@@ -57,10 +57,15 @@ class RecordingRow(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class RecordingsShelf:
-    """One folder of recordings; safe from any thread."""
+    """One folder of recordings; safe from any thread.
+
+    Attributes:
+        editing: Held from looking at notes to changing them: of two writers the second is told.
+    """
 
     def __init__(self, folder: Path | None, clock: Clock | None = None) -> None:
         self._folder, self._clock = folder, clock or WallClock()
+        self.editing = threading.Lock()
         self._lock = threading.Lock()
         self._indexes: OrderedDict[str, RunIndex] = OrderedDict()
 

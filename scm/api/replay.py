@@ -5,18 +5,20 @@ Times are seconds since the recording's first message, on the recorder's clock.
 
 import csv
 import io
+import math
 import re
 from collections.abc import Callable, Iterator
 from typing import Annotated, TypeVar
 
 import msgspec
 
-from scm.clock import NS_PER_S
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.model import CityMap
 from scm.recorder.mcap_file import Recorded
 from scm.recorder.run_index import RunIndex
 from scm.v2x.message import Message
 from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
@@ -37,7 +39,8 @@ def _key(form: str) -> Wanted:
 
 SNAPSHOT, SPAT, EVENT = _key("world/snapshot"), _key("tl/[^/]+/spat"), _key("event/[^/]+/[^/]+")
 DEFINITION = _key("world/def")
-_DRAWN = _key("(?:world/snapshot|tl/[^/]+/spat)")
+EYE = _key("eye/[^/]+/frame")
+_DRAWN = _key("(?:world/snapshot|tl/[^/]+/spat|eye/[^/]+/frame)")
 
 
 class CarAt(msgspec.Struct, kw_only=True, frozen=True, array_like=True):
@@ -93,6 +96,13 @@ class SignalChange(msgspec.Struct, kw_only=True, frozen=True):
     colour: str
 
 
+class PictureAt(msgspec.Struct, kw_only=True, frozen=True):
+    """From when on a picture of an overhead camera is the newest one."""
+
+    t_s: float
+    camera: str
+
+
 class Frames(msgspec.Struct, kw_only=True, frozen=True):
     """A stretch of a recording.
 
@@ -100,6 +110,7 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
         to_s: How far it goes: less than was asked where that would be too much for one answer.
         cars: Whom the frames' numbers mean.
         signals: Changes, the colours at `from_s` first; a group is `junction/group`.
+        pictures: The Eye's, of each camera the one that is newest at `from_s` first.
         damaged: What of the stretch cannot be read, in words.
     """
 
@@ -109,6 +120,7 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
     cars: tuple[CarFacts, ...]
     frames: tuple[Frame, ...]
     signals: tuple[SignalChange, ...]
+    pictures: tuple[PictureAt, ...]
     damaged: tuple[str, ...]
 
 
@@ -133,6 +145,7 @@ def frames_of(index: RunIndex, from_s: float, to_s: float, hz: float) -> Frames:
     gathering = _Frames(index, hz)
     begin_ns, end_ns = (index.begin_ns + round(at * NS_PER_S) for at in (from_s, to_s))
     gathering.lights_before(begin_ns)
+    gathering.pictures_before(begin_ns)
     damage: list[str] = []
     for one in index.read(begin_ns, end_ns, _DRAWN, damage):
         if not gathering.take(one):
@@ -145,6 +158,7 @@ def frames_of(index: RunIndex, from_s: float, to_s: float, hz: float) -> Frames:
         cars=tuple(gathering.cars),
         frames=tuple(gathering.frames),
         signals=tuple(gathering.signals),
+        pictures=tuple(gathering.pictures),
         damaged=tuple(damage),
     )
 
@@ -162,6 +176,7 @@ class _Frames:
         self.cars: list[CarFacts] = []
         self.frames: list[Frame] = []
         self.signals: list[SignalChange] = []
+        self.pictures: list[PictureAt] = []
 
     def seconds(self, t_ns: float) -> float:
         """Return a time since the recording's begin [s]."""
@@ -175,8 +190,18 @@ class _Frames:
             if spat is not None:
                 self._lights(begin_ns, spat)
 
+    def pictures_before(self, begin_ns: int) -> None:
+        """Note what each camera had pictured last when the stretch begins."""
+        for key in [key for key in self._index.topics.values() if EYE(key)]:
+            found = self._index.newest(begin_ns - 1, key.__eq__)
+            if found is not None:
+                self._picture(found)
+
     def take(self, one: Recorded) -> bool:
         """Take a message; return False when the answer is full."""
+        if EYE(one.key):
+            self._picture(one)
+            return True
         if SPAT(one.key):
             spat = read(one, Spat)
             if spat is not None:
@@ -216,6 +241,11 @@ class _Frames:
             lights=car.lights,
         )
 
+    def _picture(self, one: Recorded) -> None:
+        # Rounded up: what is asked for at this time is this picture, not the one before.
+        t_s = math.ceil((one.t_ns - self._index.begin_ns) / NS_PER_MS) / 1000
+        self.pictures.append(PictureAt(t_s=t_s, camera=_camera_of(one.key)))
+
     def _lights(self, t_ns: int, spat: Spat) -> None:
         for group in spat.groups:
             name = f"{spat.junction}/{group.group}"
@@ -251,6 +281,29 @@ def events_of(index: RunIndex) -> tuple[RecordedEvent, ...]:
         if len(found) == MOST_EVENTS:
             break
     return tuple(found)
+
+
+def eye_cameras(index: RunIndex) -> tuple[str, ...]:
+    """Return the overhead cameras of which a recording has pictures."""
+    return tuple(sorted(_camera_of(key) for key in index.topics.values() if EYE(key)))
+
+
+def picture_at(index: RunIndex, camera: str, t_s: float) -> tuple[int, bytes] | None:
+    """Return the newest picture of a camera at a time: its exposure [ns] and the JPEG file.
+
+    No more of the file is unpacked than the piece that holds it.
+
+    Raises:
+        RecordingError: when the file cannot be opened any more.
+    """
+    before_ns = index.begin_ns + round(t_s * NS_PER_S)
+    found = index.newest(before_ns, _key(f"eye/{re.escape(camera)}/frame"))
+    frame = read(found, EyeFrame) if found is not None else None
+    return (frame.t_ns, frame.payload) if frame is not None else None
+
+
+def _camera_of(key: str) -> str:
+    return key.split("/")[-2]
 
 
 def map_of(index: RunIndex) -> CityMap | None:

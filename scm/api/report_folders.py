@@ -20,7 +20,7 @@ FILES = {
     "car.toml": "application/toml",
     "retuned.toml": "application/toml",
 }
-_FIELDS, _DRAWN, _JOB = "report.json", "drawn.json", "job.json"
+_FIELDS, _DRAWN, _JOB, _CARS = "report.json", "drawn.json", "job.json", "cars.json"
 _DRIVE, _TOLD = re.compile(r"next_drive(_\d{1,2})?"), re.compile(r"told_\d{1,4}")
 MOST_SHOWN_BYTES = 16 * 2**20
 
@@ -79,6 +79,25 @@ class ReportRow(msgspec.Struct, kw_only=True, frozen=True):
     runtime_s: float = 0.0
 
 
+class Together(msgspec.Struct, kw_only=True, frozen=True):
+    """What the cars of one search have in common.
+
+    Attributes:
+        said: In a sentence.
+        conclusions: A sentence or two on each effect that several may share.
+        cars: Names of their reports, this one's among them.
+    """
+
+    said: str
+    conclusions: tuple[str, ...]
+    cars: tuple[str, ...]
+
+
+class _Cars(msgspec.Struct):
+    said: str
+    conclusions: tuple[str, ...] = ()
+
+
 class _Errors(msgspec.Struct):
     before: dict[str, float | None] = {}
     after: dict[str, float | None] = {}
@@ -135,7 +154,7 @@ class ReportFolders:
             return False
         shutil.rmtree(folder)
         above = folder.parent
-        if above != self.shelf and not any((one / _FIELDS).is_file() for one in above.iterdir()):
+        if above != self.shelf and not _cars_in(above):
             shutil.rmtree(above)
         return True
 
@@ -151,6 +170,15 @@ class ReportFolders:
     def fields(self, folder: Path) -> tuple[Any, Any]:
         """Return `report.json` and `drawn.json`; None for one that is missing or damaged."""
         return _read(folder / _FIELDS, dict), _read(folder / _DRAWN, dict)
+
+    def together(self, folder: Path) -> Together | None:
+        """Return what a report's car has in common with those beside it; None: it is alone."""
+        above = folder.parent
+        found = _read(above / _CARS, _Cars) if above != self.shelf else None
+        if found is None:
+            return None
+        cars = sorted(f"{above.name}.{car.name}" for car in _cars_in(above))
+        return Together(said=found.said, conclusions=found.conclusions, cars=tuple(cars))
 
     def drives(self, folder: Path) -> list[str]:
         """Return the names of the drives that the report suggests."""
@@ -173,10 +201,9 @@ class ReportFolders:
                 continue
             if (folder / _FIELDS).is_file():
                 yield folder.name, folder
-            elif (folder / "cars.json").is_file():
-                for car in folder.iterdir():
-                    if (car / _FIELDS).is_file():
-                        yield f"{folder.name}.{car.name}", car
+            elif (folder / _CARS).is_file():
+                for car in _cars_in(folder):
+                    yield f"{folder.name}.{car.name}", car
 
     def _row(self, name: str, folder: Path) -> ReportRow:
         made_ns = (folder / _FIELDS).stat().st_mtime_ns
@@ -205,6 +232,10 @@ class ReportFolders:
             after_m=confirm.after.get("position_m"),
             runtime_s=report.runtime_s,
         )
+
+
+def _cars_in(folder: Path) -> list[Path]:
+    return [car for car in folder.iterdir() if (car / _FIELDS).is_file()]
 
 
 def _read(path: Path, kind: Any) -> Any:

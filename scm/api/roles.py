@@ -1,10 +1,12 @@
 """Roles of those who call the interface: each may do what the one before may, and more.
 
 A viewer looks. An operator runs the city: cars, routes, plans, the stop. An engineer also clears
-faults that the monitor latched. An admin also sees and ends keys. Every route names its least role.
+faults that the monitor latched, and calibrates cameras. An admin also sees and ends keys. Every
+route names its least role.
 """
 
-from typing import Literal, get_args
+from collections.abc import Callable
+from typing import Annotated, Literal, get_args
 
 from fastapi import Depends
 from fastapi.params import Depends as Dependency
@@ -36,8 +38,8 @@ class AtLeast:
     def __init__(self, role: Role) -> None:
         self.role = role
 
-    def __call__(self, connection: HTTPConnection) -> None:
-        """Pass, or refuse."""
+    async def __call__(self, connection: HTTPConnection) -> None:
+        """Pass, or refuse; in the event loop, so that busy threads keep nobody waiting."""
         own: Role | None = connection.scope.get("scm_role")
         if own is None or ROLES.index(own) < ROLES.index(self.role):
             detail = f"your key is one of a {own}; this needs {self.role} or above"
@@ -53,3 +55,12 @@ VIEWER = _at_least("viewer")
 OPERATOR = _at_least("operator")
 ENGINEER = _at_least("engineer")
 ADMIN = _at_least("admin")
+
+
+async def _signer(connection: HTTPConnection) -> Callable[[str], str]:
+    owner = str(connection.scope["scm_owner"]) if connection.scope["scm_key"] else ""
+    return lambda named: owner or named
+
+
+Signer = Annotated[Callable[[str], str], Depends(_signer)]
+"""Who signs a deed, by whom its body names: with keys the key's owner, whatever the body says."""

@@ -1,7 +1,8 @@
 """Fleet scenarios: Python scripts of a folder, and running one beside the live city.
 
 A script is a program with all rights of the server: who may write one may do anything there. It
-hears where the city is in `SCM_CONNECT` and by `{connect}` among its arguments.
+hears where the city is in `SCM_CONNECT` and by `{connect}` among its arguments, and who it is
+there in `SCM_CREDENTIALS`, which `scm.fleet.open_city` heeds.
 """
 
 import os
@@ -59,10 +60,15 @@ class Lines(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class ScenarioShelf:
-    """The scripts of a folder, and those that came with the program."""
+    """The scripts of a folder, and those that came with the program.
+
+    Attributes:
+        editing: Held from looking at one to changing it: of two writers the second is told.
+    """
 
     def __init__(self, folder: Path | None, shipped: Path = SHIPPED) -> None:
         self._folder, self._shipped = folder, shipped
+        self.editing = threading.Lock()
 
     def rows(self) -> tuple[Scenario, ...]:
         """Return all scripts without their texts; people's own first."""
@@ -160,23 +166,24 @@ class ScenarioShelf:
 class ScenarioRuns:
     """Scripts that run or ran: each an operation, with what it printed."""
 
-    def __init__(self, shelf: ScenarioShelf, work: Operations, connect: str) -> None:
+    def __init__(
+        self, shelf: ScenarioShelf, work: Operations, connect: str, credentials: Path | None
+    ) -> None:
         self._shelf, self._work, self._connect = shelf, work, connect
+        self._told = {"SCM_CONNECT": connect, "PYTHONUNBUFFERED": "1"}
+        if credentials is not None:
+            self._told["SCM_CREDENTIALS"] = str(credentials.absolute())
         self._lock = threading.Lock()
         self._printed: OrderedDict[str, _Printed] = OrderedDict()
-        self._of_key: dict[str, str] = {}
 
-    def start(self, name: str, arguments: Sequence[str], *, owner: str, key: str) -> Operation:
-        """Run a script, once for each idempotency key.
+    def start(self, name: str, arguments: Sequence[str], *, owner: str) -> Operation:
+        """Run a script.
 
         Raises:
             RefusedError: when there is none of that name, or too many wait.
         """
         path = self._shelf.path(name)
         with self._lock:
-            known = self._work.find(self._of_key.get(key, "")) if key else None
-            if known is not None:
-                return known
             printed = _Printed()
             filled = [one.replace(_CONNECT, self._connect) for one in arguments]
 
@@ -186,11 +193,8 @@ class ScenarioRuns:
             row = self._work.start(KIND, name, work, owner=owner)
             printed.run = row.id
             self._printed[row.id] = printed
-            if key:
-                self._of_key[key] = row.id
             while len(self._printed) > KEPT_RUNS:
-                gone, _ = self._printed.popitem(last=False)
-                self._of_key = {key: run for key, run in self._of_key.items() if run != gone}
+                self._printed.popitem(last=False)
         return row
 
     def lines(self, run: str, after: int) -> Lines:
@@ -206,7 +210,6 @@ class ScenarioRuns:
         return printed.after(after)
 
     def _run(self, path: Path, arguments: list[str], printed: "_Printed", tell: Teller) -> str:
-        environment = {**os.environ, "SCM_CONNECT": self._connect, "PYTHONUNBUFFERED": "1"}
         try:
             process = subprocess.Popen(
                 [sys.executable, "-c", _LAUNCH, str(path), *arguments],
@@ -215,7 +218,7 @@ class ScenarioRuns:
                 stderr=subprocess.STDOUT,
                 text=True,
                 errors="replace",
-                env=environment,
+                env={**os.environ, **self._told},
                 start_new_session=True,
             )
         except OSError as cause:

@@ -6,14 +6,17 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 
+import h11
 import uvicorn
 from fastapi import FastAPI
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from scm.api.gate import check_bind
 from scm.errors import RunError
 
 _POLL_S = 0.05
 LONGEST_PACKET = 4096  # bytes; a drive packet has about a hundred
+PATIENCE_S = 10.0
 
 
 class _Server(uvicorn.Server):
@@ -22,6 +25,36 @@ class _Server(uvicorn.Server):
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
         yield
+
+
+class _Impatient(H11Protocol):
+    """HTTP of uvicorn, which waits for ever for a request's head; connections are not endless."""
+
+    patience_s = PATIENCE_S
+    _waits: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Wait for the first request."""
+        super().connection_made(transport)
+        self._wait()
+
+    def data_received(self, data: bytes) -> None:
+        """Wait on while a head comes in pieces, and no longer when it is whole."""
+        super().data_received(data)
+        if self.conn.their_state is h11.IDLE:
+            self._wait()
+        elif self._waits is not None:
+            self._waits.cancel()
+            self._waits = None
+
+    def _wait(self) -> None:
+        if self._waits is None:
+            self._waits = self.loop.call_later(self.patience_s, self._give_up)
+
+    def _give_up(self) -> None:
+        self._waits = None
+        if self.conn.their_state is h11.IDLE and not self.transport.is_closing():
+            self.transport.close()
 
 
 def serve(
@@ -48,6 +81,8 @@ def serve(
     listener = _bind(host, port)
     config = uvicorn.Config(
         app,
+        http=_Impatient,
+        proxy_headers=app.state.keys is not None,  # without keys only this machine calls
         ws="websockets-sansio",
         ws_max_size=LONGEST_PACKET,
         ws_per_message_deflate=False,

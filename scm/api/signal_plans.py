@@ -31,10 +31,12 @@ class PlanShelf:
 
     Attributes:
         folder: Where they lie; None: nothing can be saved.
+        editing: Held from looking at a plan to changing it: of two writers the second is told.
     """
 
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder
+        self.editing = threading.Lock()
         self._lock = threading.Lock()
         self._proofs: OrderedDict[str, PlanProof] = OrderedDict()
 

@@ -101,6 +101,7 @@ class Seat:
         vehicle: The car.
         owner: The name of the lease: of nobody else's connection.
         is_closed: Tells when the server ends.
+        may_drive: Tells whether the person's key is still good; asked whenever the lease is kept.
     """
 
     def __init__(
@@ -111,10 +112,13 @@ class Seat:
         socket: WebSocket,
         vehicle: str,
         owner: str,
+        *,
         is_closed: Callable[[], bool],
+        may_drive: Callable[[], bool],
     ) -> None:
         self._city, self._wire, self._clock, self._socket = city, wire, clock, socket
-        self._vehicle, self._owner, self._is_closed = vehicle, owner, is_closed
+        self._vehicle, self._owner = vehicle, owner
+        self._is_closed, self._may_drive = is_closed, may_drive
         self._news = asyncio.Event()
         self._over: Over | None = None
         self._renewing: asyncio.Task[None] | None = None
@@ -228,6 +232,10 @@ class Seat:
         await self._send(told)
 
     async def _renew(self, request: LeaseRequest) -> None:
+        if not self._may_drive():
+            self._over = self._over or Over(code="ended", detail="your API key has ended")
+            self._news.set()
+            return
         try:
             reply = await asyncio.to_thread(self._wire.ask_once, request, RENEW_TIMEOUT_S)
         except LinkError as closed:
@@ -259,9 +267,13 @@ class Seat:
     async def _resume(self, trip: Trip) -> str:
         """Send the car on; an agent first waits to be sure that nobody drives it any more."""
         until_ns = self._clock.now_ns() + RESUME_NS
-        via = () if trip.length_m is None else trip.route[-1:]
+        last = self._city.view.trips.get(self._vehicle)
+        if last is not None and last.message.trip_id == trip.trip_id:
+            trip = last.message  # as it was when the car was taken
         while True:
-            request = RouteRequest(vehicle=self._vehicle, via=via)
+            request = RouteRequest(
+                vehicle=self._vehicle, via=trip.via, speed_mps=trip.speed_mps, then=trip.then
+            )
             answer = await asyncio.to_thread(self._ask_route, request)
             if not isinstance(answer, Refused):
                 return f"{self._vehicle} goes on by itself"

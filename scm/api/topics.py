@@ -22,6 +22,7 @@ EVENTS = "events"
 """The one topic that is no state: its entries come one by one, and never twice."""
 
 ACKNOWLEDGED_SHOWN = 500
+STANDS_MPS = 0.02  # slower than that is how a real car that stands is measured
 
 
 class Topic(NamedTuple):
@@ -32,19 +33,24 @@ class Topic(NamedTuple):
 
 
 class Pulse(msgspec.Struct, kw_only=True, frozen=True):
-    """How alive the world is; `t_ns` and `tick` are None until it is heard."""
+    """How alive the world is; `t_ns` and `tick` are None until it is heard.
+
+    Attributes:
+        moving: How many of its vehicles move: after a stop, those that do not stand yet.
+    """
 
     t_ns: int | None
     tick: int | None
     real_time_factor: float
     late_ticks: int
     vehicles: int
+    moving: int
 
 
 def pulse_of(picture: Picture) -> Pulse:
     """Return the world's time, tick and count of vehicles."""
     if picture.snapshot is None:
-        return Pulse(t_ns=None, tick=None, real_time_factor=0.0, late_ticks=0, vehicles=0)
+        return Pulse(t_ns=None, tick=None, real_time_factor=0.0, late_ticks=0, vehicles=0, moving=0)
     told = picture.snapshot.message
     return Pulse(
         t_ns=told.t_ns,
@@ -52,6 +58,7 @@ def pulse_of(picture: Picture) -> Pulse:
         real_time_factor=round(told.real_time_factor, 3),
         late_ticks=told.late_ticks,
         vehicles=len(told.vehicles),
+        moving=sum(abs(car.speed_mps) > STANDS_MPS for car in told.vehicles),
     )
 
 

@@ -1,20 +1,25 @@
 """W3C trace context: the id that a caller gives a piece of work, or a new one, in answer and log.
 
 A caller sends `traceparent: 00-<trace id>-<span id>-<flags>`; the trace id comes back in the header
-`Trace-Id`, in problems, and with every failed request in the server's log. It ends here: messages
-on the bus have the request's `Idempotency-Key` as their id instead.
+`Trace-Id`, in problems, and with every failed request in the server's log. What the request asks of
+the city carries it along, a wheel's requests that of its connection: whoever does it notes the id
+in log and audit.
 """
 
 import logging
 import re
 import secrets
 from contextvars import ContextVar
+from typing import TypeVar
 
+import msgspec
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from scm.log import event
+from scm.v2x.message import Request
 
+R = TypeVar("R", bound=Request)
 HEADER = "Trace-Id"
 _PARENT = re.compile(r"(?!ff)[0-9a-f]{2}-(?!0{32})([0-9a-f]{32})-(?!0{16})[0-9a-f]{16}-[0-9a-f]{2}")
 _LOGGER = logging.getLogger(__name__)
@@ -32,6 +37,11 @@ def trace_id_of(traceparent: str) -> str:
     return match[1] if match is not None else secrets.token_hex(16)
 
 
+def traced(request: R) -> R:
+    """Return a request to the city with the trace of what is being answered."""
+    return msgspec.structs.replace(request, trace_id=trace_id())
+
+
 class Traced:
     """ASGI middleware, outermost of all: every answer carries its trace id."""
 
@@ -40,7 +50,7 @@ class Traced:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request under its trace id."""
-        if scope["type"] != "http":
+        if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
         own = trace_id_of(Headers(scope=scope).get("traceparent", ""))

@@ -4,16 +4,17 @@ Nothing in it is trusted: only tables are let in, and they may name no file outs
 those that the city knows, for a car file may bring laws of its own.
 """
 
-import io
 import re
 import secrets
 import shutil
 import zipfile
 from pathlib import Path, PurePosixPath
+from typing import BinaryIO
 
 import msgspec
+import yaml
 
-from scm.api.problem import RefusedError
+from scm.api.problem import DISK_TROUBLE, RefusedError
 from scm.errors import RecordingError
 from scm.recording.description import FILE_NAME, Description, read_description
 from scm.recording.table import SUFFIXES
@@ -23,10 +24,13 @@ FOLDER = "uploads"
 MOST_BYTES = 64 * 2**20
 MOST_UNPACKED_BYTES = 512 * 2**20
 MOST_FILES = 200
+MOST_ENTRIES = 10 * MOST_FILES  # folders and what is left out among them
+MOST_DESCRIPTION_BYTES = 256 * 1024
 KEPT = 20
 ID = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 _CHUNK = 2**20
 _RUN = ".mcap"
+_ENTRY = b"PK\x01\x02"  # begins each entry of a zip's list of contents
 
 
 class Upload(msgspec.Struct, kw_only=True, frozen=True):
@@ -45,12 +49,12 @@ class Upload(msgspec.Struct, kw_only=True, frozen=True):
     vehicles: tuple[str, ...]
 
 
-def take(shelf: Path, body: bytes, name: str, cars: tuple[str, ...]) -> Upload:
+def take(shelf: Path, body: BinaryIO, name: str, cars: tuple[str, ...]) -> Upload:
     """Unpack a recording below `shelf` and return what it is.
 
     Args:
         shelf: Of reports: uploads lie in a folder of it.
-        body: The zip.
+        body: The zip, wherever it was read to.
         name: What the sender calls it: the id begins with it.
         cars: Names of the car files that it may ask for.
 
@@ -79,18 +83,39 @@ def recording_in(folder: Path) -> Path:
     return folder if (folder / FILE_NAME).is_file() or run is None else run
 
 
-def _unpack(body: bytes, folder: Path) -> int:
+def _unpack(body: BinaryIO, folder: Path) -> int:
+    entries = _entries(body)
+    if entries > MOST_ENTRIES:  # to read such a list alone takes seconds and a lot of memory
+        raise _refused(f"entries: got {entries}, expected at most {MOST_ENTRIES}")
     try:
-        with zipfile.ZipFile(io.BytesIO(body)) as packed:
-            infos = [info for info in packed.infolist() if not info.is_dir()]
-            if len(infos) > MOST_FILES:
-                raise _refused(f"files: got {len(infos)}, expected at most {MOST_FILES}")
+        with zipfile.ZipFile(body) as packed:
             left = MOST_UNPACKED_BYTES
-            for info in infos:
+            for info in _files_of(packed):
                 left -= _unpack_one(packed, info, folder, left)
             return MOST_UNPACKED_BYTES - left
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError) as cause:
+    except RefusedError:
+        raise
+    except Exception as cause:  # whatever a library makes of a damaged zip
+        if isinstance(cause, OSError) and cause.errno in DISK_TROUBLE:
+            raise
         raise _refused(f"the zip cannot be read: {cause}") from cause
+
+
+def _entries(body: BinaryIO) -> int:
+    """Return how many entries a zip may list."""
+    count, edge = 0, b""
+    body.seek(0)
+    while chunk := body.read(_CHUNK):
+        count += (edge + chunk).count(_ENTRY)
+        edge = (edge + chunk)[1 - len(_ENTRY) :]
+    return count
+
+
+def _files_of(packed: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
+    infos = [info for info in packed.infolist() if not info.is_dir()]
+    if len(infos) > MOST_FILES:
+        raise _refused(f"files: got {len(infos)}, expected at most {MOST_FILES}")
+    return infos
 
 
 def _unpack_one(packed: zipfile.ZipFile, info: zipfile.ZipInfo, folder: Path, left: int) -> int:
@@ -129,11 +154,27 @@ def _check(folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:
         if len(list(folder.glob("*" + _RUN))) == 1:
             return ()
         raise _refused(f"no {FILE_NAME} in it, and no {_RUN} of a city: expected one of them")
+    _check_size(folder / FILE_NAME)
     try:
         description = read_description(folder / FILE_NAME)
     except RecordingError as cause:
         raise _refused(str(cause).replace(f"{folder}/", "")) from cause
     return _vehicles(description, folder, cars)
+
+
+def _check_size(description: Path) -> None:
+    """Refuse a description that would take minutes to read: a long one, or one that unfolds."""
+    size = description.stat().st_size
+    if size > MOST_DESCRIPTION_BYTES:
+        most = MOST_DESCRIPTION_BYTES // 1024
+        raise _refused(f"{FILE_NAME}: got {size // 1024} KiB, expected at most {most} KiB")
+    try:
+        with description.open("rb") as text:
+            unfolds = any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(text))
+    except yaml.YAMLError:
+        return  # its reader tells what is wrong
+    if unfolds:
+        raise _refused(f"{FILE_NAME}: got an alias (*name), expected everything written out")
 
 
 def _vehicles(description: Description, folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:

@@ -30,7 +30,11 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
         cameras: Those that its file gives it; may be empty.
         age_ms: How old its newest state is now, the snapshot's own age included.
         lease_left_ms: Until the lease ends if it is not renewed; None: it is at home.
-        battery_v: Of the drive battery; None: not measured.
+        battery_v: Of the drive battery, under load as it is; None: not measured.
+        battery_charge: What is left in it, 0 to 1: counted by a simulated car, estimated from the
+            voltage by a real one; None: not known.
+        command_age_ms: How old the newest command of its leaseholder is, since it reached the car,
+            the snapshot's age included; None: nobody else drives it, or none came yet.
         throttle: As the car reports it; None: it reports nothing.
         eye: What the Eye's newest pose differs from the truth; None: not seen lately.
     """
@@ -49,6 +53,8 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
     epoch: int
     lease_left_ms: float | None
     battery_v: float | None
+    battery_charge: float | None
+    command_age_ms: float | None
     mode: str
     age_ms: float
     alive: bool
@@ -115,6 +121,10 @@ def _row(
         epoch=car.epoch,
         lease_left_ms=None if car.lease_left_ms is None else round(car.lease_left_ms),
         battery_v=None if car.battery_v is None else round(car.battery_v, 2),
+        battery_charge=None if car.battery_charge is None else round(car.battery_charge, 4),
+        command_age_ms=None
+        if car.command_age_ms is None
+        else round(car.command_age_ms + since_ms, 1),
         mode=car.mode,
         age_ms=round(car.age_ms + since_ms, 1),
         alive=car.alive,

@@ -9,7 +9,7 @@ Whatever passes here passes the car's own guard as well, which stops it when thi
 """
 
 import math
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -37,14 +37,14 @@ class DrivePacket(
     """What is wished for now.
 
     Attributes:
-        seq: Counts up.
+        seq: Counts up, below 2^53: more than that is no exact number in a browser.
         t_ms: On the person's clock; comes back in the answer to this packet.
         held: Whether a hand is on the dead-man: a key, a trigger, a pad.
         throttle: -1 to 1, + = forward.
         steering: -1 to 1, + = left.
     """
 
-    seq: int
+    seq: Annotated[int, msgspec.Meta(ge=-(2**53), le=2**53)]
     t_ms: float
     held: bool
     throttle: float

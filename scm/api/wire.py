@@ -1,8 +1,10 @@
-"""How the interface speaks on the bus beside requests with an id: commands, and questions."""
+"""How the interface speaks on the bus: requests, commands, and questions that nobody stores."""
 
 import threading
 from typing import Protocol
 
+from scm.api.trace import traced
+from scm.v2x.ask import ask
 from scm.v2x.bus import Bus
 from scm.v2x.exchange import Call, Incoming
 from scm.v2x.message import Message, Refused, Request
@@ -39,6 +41,10 @@ class BusWire:
     def say(self, message: Message) -> None:
         """Publish."""
         self._bus.publish(message)
+
+    def ask(self, request: Request, timeout_s: float) -> Message:
+        """Ask until there is an answer, under an id, and the trace of what is being answered."""
+        return ask(self._bus, traced(request), timeout_s)
 
     def ask_once(self, request: Request, timeout_s: float) -> Message:
         """Ask, and wait for the reply."""

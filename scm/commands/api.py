@@ -29,6 +29,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="folder of recordings; reports, scenarios, calibrations and plans lie below it",
     )
+    parser.add_argument(
+        "--script-credentials",
+        metavar="FILE",
+        type=Path,
+        help="who the scripts are that it runs, where the city lets in nobody else: an operator",
+    )
 
 
 def _at_bus(arguments: argparse.Namespace) -> list[str]:
@@ -51,18 +57,18 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
     from scm.registry import names
     from scm.store.open import open_store
-    from scm.v2x.ask import ask
     from scm.v2x.bus_zenoh import ZenohBus
 
     keys = KeyRing(open_store(arguments.keys)) if arguments.keys else None
     check_bind(arguments.host, keys)
-    stop = stop_on_signal()
-    view, city_map = CityView(), load_map(arguments.map)
+    stop, failures = stop_on_signal(), list[Exception]()
+    view, city_map, shipped = CityView(), load_map(arguments.map), names("scm.traffic.plans")
     credentials = credentials_of(arguments, view.name)
     with ZenohBus(arguments.city, view.name, arguments.connect, credentials=credentials) as bus:
+        wire = BusWire(bus)
         app = create_app(
             view,
-            lambda request, timeout_s: ask(bus, request, timeout_s),
+            wire.ask,
             city_map,
             keys=keys,
             state=open_store(arguments.state) if arguments.state else None,
@@ -72,12 +78,13 @@ def _run(arguments: argparse.Namespace) -> int:
                 is_connected=lambda: bus.connected,
                 rejected=lambda: bus.rejected,
                 clock=WallClock(),
-                wire=BusWire(bus),
+                wire=wire,
                 connect=arguments.connect,
+                script_credentials=arguments.script_credentials,
                 words=_at_bus(arguments),
                 map_file=arguments.map,
             ),
-            plans={junction.name: names("scm.traffic.plans") for junction in city_map.junctions},
+            plans={one.name: shipped for one in city_map.junctions},
         )
 
         def hear() -> None:
@@ -88,7 +95,6 @@ def _run(arguments: argparse.Namespace) -> int:
             finally:
                 stop.set()  # a server that hears nothing any more would show an old city for ever
 
-        failures: list[Exception] = []
         hearing = threading.Thread(target=hear, name="view")
         hearing.start()
         try:

@@ -1,5 +1,6 @@
-"""How `make test` spreads tests over two processes, and ends when one of them dies."""
+"""How `make test` spreads tests over processes, and ends when one of them dies."""
 
+import os
 import re
 import shlex
 import subprocess
@@ -37,14 +38,19 @@ def tree(tmp_path: Path, root: Path) -> Path:
 
 
 def made(root: Path, tree: Path) -> subprocess.CompletedProcess[str]:
-    """Run the Makefile's command there, in two processes."""
+    """Run the Makefile's command there, in two processes, with the plugins that it needs."""
     found = re.search(r"-m pytest (.*) \$\(PYTEST_ARGS\)", (root / "Makefile").read_text())
     assert found
     options = shlex.split(found[1].replace("-n auto", "-n 2"))
     command = [sys.executable, "-m", "pytest", *options]
+    plugins = {
+        "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+        "PYTEST_PLUGINS": "xdist.plugin,pytest_timeout",
+    }
     return subprocess.run(
-        command, cwd=tree, capture_output=True, text=True, check=False, timeout=200.0
-    )
+        command, cwd=tree, capture_output=True, text=True, check=False, timeout=200.0,
+        env=os.environ | plugins,
+    )  # fmt: skip
 
 
 def test_a_file_stays_in_one_process_and_all_cities_in_another(root: Path, tree: Path) -> None:

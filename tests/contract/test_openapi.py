@@ -30,6 +30,13 @@ def fields_of(document):
             yield f"{record}.{name}", field
 
 
+CHANGES = ("POST", "PUT", "PATCH", "DELETE")
+WITHOUT_KEY = {
+    "PUT /api/v1/session": "sets the caller's cookie, the same each time",
+    "DELETE /api/v1/session": "forgets the caller's cookie, each time",
+}
+
+
 def said(problems):
     return "\n".join(["", *sorted(problems)])
 
@@ -55,6 +62,27 @@ def test_every_operation_has_an_answer_with_a_schema(document):
         schemas = [media.get("schema") for one in told for media in one.get("content", {}).values()]
         if not schemas or not all(schemas):
             wrong.append(where)
+    assert not wrong, said(wrong)
+
+
+def test_every_change_takes_an_idempotency_key_or_needs_none(document):
+    without = {
+        where
+        for where, operation in operations_of(document)
+        if where.startswith(CHANGES)
+        and not any(one["name"] == "Idempotency-Key" for one in operation.get("parameters", ()))
+    }
+    assert without == set(WITHOUT_KEY), said(without ^ set(WITHOUT_KEY))
+
+
+def test_every_list_bounds_its_page(document):
+    wrong = [
+        where
+        for where, operation in operations_of(document)
+        for one in operation.get("parameters", ())
+        if one["name"] == "limit"
+        and not (one["schema"].get("minimum", 0) >= 0 and one["schema"].get("maximum", 0) > 0)
+    ]
     assert not wrong, said(wrong)
 
 
@@ -106,7 +134,8 @@ def test_examples_hold_by_their_own_schema(document):
     jsonschema = pytest.importorskip("jsonschema_rs")
     wrong = []
     for where, field in fields_of(document):
-        schema = {**field, "components": document["components"]}
+        refers = "$ref" in str(field)
+        schema = {**field, "components": document["components"]} if refers else field
         validator = jsonschema.validator_for(schema)
         for example in field.get("examples", ()):
             wrong += [f"{where}: {fault.message}" for fault in validator.iter_errors(example)]

@@ -8,6 +8,7 @@ import secrets
 from fastapi import APIRouter, WebSocket
 
 from scm.api.city import City, Name
+from scm.api.keys import KeyRing
 from scm.api.problem import RefusedError
 from scm.api.roles import OPERATOR
 from scm.api.stream import Stream
@@ -16,7 +17,7 @@ from scm.clock import WallClock
 from scm.v2x.message import Refused
 
 
-def router(city: City, stream: Stream) -> APIRouter:
+def router(city: City, stream: Stream, keys: KeyRing | None) -> APIRouter:
     """Return the route."""
     routes = APIRouter(prefix="/vehicles", tags=["vehicles"], dependencies=[OPERATOR])
 
@@ -30,8 +31,16 @@ def router(city: City, stream: Stream) -> APIRouter:
             raise RefusedError(Refused(code="invalid", detail=detail))
         await socket.accept(subprotocol=PROTOCOL)
         owner = f"{socket.scope['scm_owner']} #{secrets.token_hex(2)}"
+        key = str(socket.scope["scm_key"])
         await Seat(
-            city, city.wire, WallClock(), socket, name, owner, lambda: stream.is_closed
+            city,
+            city.wire,
+            WallClock(),
+            socket,
+            name,
+            owner,
+            is_closed=lambda: stream.is_closed,
+            may_drive=lambda: keys is None or keys.find(key) is not None,
         ).run()
 
     return routes

@@ -11,7 +11,7 @@ from scm.api.acknowledgements import Acknowledgement, Acknowledgements
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
 from scm.api.event_log import EventFilter, LoggedEvent
 from scm.api.paging import Cursor, Limit, page_of, page_response
-from scm.api.roles import OPERATOR, VIEWER
+from scm.api.roles import OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer, answer_file, answer_page
 from scm.api.tables import Form, table_response
 
@@ -141,8 +141,10 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
         responses=answer(Acknowledged),
         dependencies=[OPERATOR],
     )
-    def acknowledge(body: AcknowledgeBody, request: Request, key: IdempotencyKey = "") -> Response:
-        by = body.by or str(request.scope["scm_owner"])
+    def acknowledge(
+        body: AcknowledgeBody, request: Request, signer: Signer, key: IdempotencyKey = ""
+    ) -> Response:
+        by = signer(body.by) or str(request.scope["scm_owner"])
         return json_response(Acknowledged(acknowledgements=seen.add(body.events, by, body.note)))
 
     @routes.delete(

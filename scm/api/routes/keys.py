@@ -5,7 +5,7 @@ from typing import Annotated
 import msgspec
 from fastapi import APIRouter, Path, Response
 
-from scm.api.city import json_response, not_found
+from scm.api.city import IdempotencyKey, json_response, not_found
 from scm.api.keys import KeyRecord, KeyRing
 from scm.api.roles import ADMIN, Role
 from scm.api.schemas import answer
@@ -51,7 +51,9 @@ def router(keys: KeyRing | None) -> APIRouter:
         key_id: Annotated[
             str, Path(max_length=64, description="public part of the key", examples=["1f0c9a2e"])
         ],
+        key: IdempotencyKey = "",
     ) -> Response:
+        del key  # kept by the server: a second end would find no such key
         if keys is None:
             raise not_found("key", key_id)
         try:

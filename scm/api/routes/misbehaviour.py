@@ -9,16 +9,18 @@ from scm.api.schemas import answer
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.messages.misbehaviour_scores import StationScore
 
+FRESH_S = 5.0
+
 
 class Misbehaviour(msgspec.Struct, kw_only=True, frozen=True):
     """What is held against those who speak on the air.
 
     Attributes:
-        watched: Whether a misbehaviour part is there at all.
+        watched: Whether a misbehaviour part is there: it has told scores within the last seconds.
         witness: Whether an Eye is there to hold claims against.
         t_ns: Of these scores; None: there are none.
         stations: With the score of each.
-        reported: Names of those with a report against them.
+        reported: Names of those that were ever reported; who is suspected now stands in `stations`.
     """
 
     watched: bool
@@ -37,7 +39,8 @@ def router(city: City) -> APIRouter:
     )
     async def scores() -> Response:
         held, reports = city.view.misbehaviour()
-        told = None if held is None else held.message
+        is_fresh = held is not None and held.age_s(city.now_ns()) <= FRESH_S
+        told = held.message if held is not None and is_fresh else None
         body = Misbehaviour(
             watched=told is not None,
             witness=told is not None and told.witness,

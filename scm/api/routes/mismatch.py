@@ -2,6 +2,7 @@
 
 import csv
 from pathlib import Path as FilePath
+from tempfile import TemporaryFile
 from typing import Annotated, Any
 
 import msgspec
@@ -16,7 +17,7 @@ from scm.api.mismatch_jobs import MismatchJobs
 from scm.api.operations import Operation, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
-from scm.api.report_folders import FILES, NAME, Job, ReportRow
+from scm.api.report_folders import FILES, NAME, Job, ReportRow, Together
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
 from scm.api.schemas import answer, answer_file, answer_nothing, answer_page
 from scm.v2x.message import Refused
@@ -127,6 +128,7 @@ class Report(msgspec.Struct, kw_only=True, frozen=True):
         drives: Names of the drives it suggests.
         told: How many of them were driven and recorded since.
         files: What can be downloaded.
+        together: What its car has in common with others of the search; None: it was alone.
     """
 
     row: ReportRow
@@ -136,6 +138,7 @@ class Report(msgspec.Struct, kw_only=True, frozen=True):
     drives: tuple[str, ...]
     told: int
     files: tuple[str, ...]
+    together: Together | None
 
 
 class DrivePlan(msgspec.Struct, kw_only=True, frozen=True):
@@ -224,18 +227,19 @@ def _add_uploads(routes: APIRouter, jobs: MismatchJobs) -> None:
         dependencies=[OPERATOR],
         responses=answer(uploads.Upload, 201),
         openapi_extra={"requestBody": {"required": True, "content": _ZIP}},
+        max_body_size=uploads.MOST_BYTES + 1,  # one more: then it is the route that says so
     )
     async def upload(request: Request, name: Title = "", key: IdempotencyKey = "") -> Response:
         del key  # a second copy is a second upload; the oldest are forgotten
-        body = bytearray()
-        async for chunk in request.stream():
-            body += chunk
-            if len(body) > uploads.MOST_BYTES:
-                most = uploads.MOST_BYTES // 2**20
-                detail = f"upload: more than {most} MiB; send a part of the recording"
-                raise RefusedError(Refused(code="invalid", detail=detail))
-        cars = tuple(sorted(car_files()))
-        taken = await run_in_threadpool(uploads.take, jobs.shelf(), bytes(body), name, cars)
+        shelf, cars = jobs.shelf(), tuple(sorted(car_files()))
+        with TemporaryFile(dir=shelf) as body:  # of no name: gone with this request
+            async for chunk in request.stream():
+                if body.tell() + len(chunk) > uploads.MOST_BYTES:
+                    most = uploads.MOST_BYTES // 2**20
+                    detail = f"upload: more than {most} MiB; send a part of the recording"
+                    raise RefusedError(Refused(code="invalid", detail=detail))
+                await run_in_threadpool(body.write, chunk)
+            taken = await run_in_threadpool(uploads.take, shelf, body, name, cars)
         return json_response(taken, 201)
 
 
@@ -258,6 +262,7 @@ def _add_reports(routes: APIRouter, jobs: MismatchJobs) -> None:
             drives=tuple(jobs.reports.drives(folder)),
             told=len(jobs.reports.told(folder)),
             files=tuple(file for file in FILES if (folder / file).is_file()),
+            together=jobs.reports.together(folder),
         )
         return json_response(told)
 

@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter, Request, Response
 
-from scm.api.city import Name, json_response, not_found
+from scm.api.city import IdempotencyKey, Name, json_response, not_found
 from scm.api.operations import Operation, Operations
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import OPERATOR, VIEWER
@@ -32,7 +32,8 @@ def router(operations: Operations) -> APIRouter:
         dependencies=[OPERATOR],
         responses=answer(Operation, 202, "It ends at its next word about itself; look again."),
     )
-    def cancel(name: Name) -> Response:
+    def cancel(name: Name, key: IdempotencyKey = "") -> Response:
+        del key  # called off is called off
         row = operations.cancel(name)
         if row is None:
             raise not_found("operation", name)

@@ -38,6 +38,8 @@ from scm.v2x.message import Refused
 MCAP = "application/octet-stream"
 MOST_S = 120.0
 BLOCK = 256 * 1024
+PICTURE_KEPT = "private, max-age=60"  # looped and stepped through without asking again
+MOST_EXPORTS = 2  # programs at once; further ones wait for their turn
 
 Name = Annotated[
     str,
@@ -61,6 +63,9 @@ Vehicle = Annotated[
 ]
 
 
+Camera = Annotated[str, Path(pattern=NAME, description="an overhead camera", examples=["overhead"])]
+
+
 class NotesBody(BaseModel):
     """What to call a recording, and what to know of it; its file keeps its name."""
 
@@ -79,6 +84,7 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
         cars: All cars that it tells of.
         map_title: Of the map that was driven on; empty: it does not tell.
         first_frame_s: When the world first told where cars are: it may have begun later.
+        eye_cameras: The overhead cameras of which it has pictures.
     """
 
     recording: RecordingRow
@@ -87,6 +93,7 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
     lights: tuple[Light, ...]
     boxes: tuple[Box, ...]
     first_frame_s: float
+    eye_cameras: tuple[str, ...]
 
 
 def router(city: City) -> APIRouter:
@@ -94,7 +101,8 @@ def router(city: City) -> APIRouter:
     routes = APIRouter(prefix="/recordings", tags=["recordings"], dependencies=[VIEWER])
     shelf = RecordingsShelf(city.shelves.recordings)
     _add_downloads(routes, shelf)
-    _add_moments(routes, shelf, city)
+    _add_moments(routes, shelf)
+    _add_pictures(routes, shelf, city)
     _add_notes(routes, shelf)
 
     @routes.get(
@@ -128,6 +136,7 @@ def router(city: City) -> APIRouter:
 
 def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
     """Add files to take home; before the routes whose names would match them too."""
+    turns = asyncio.Semaphore(MOST_EXPORTS)
 
     @routes.head("/{name}.mcap", include_in_schema=False)
     @routes.get(
@@ -147,7 +156,9 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
     )
     async def foxglove(name: Name) -> Response:
         index = await asyncio.to_thread(shelf.index, name)
-        return StreamingResponse(_converted(index.path), 200, _named(f"{name}.foxglove.mcap"), MCAP)
+        return StreamingResponse(
+            _converted(index.path, turns), 200, _named(f"{name}.foxglove.mcap"), MCAP
+        )
 
     @routes.get(
         "/{name}/csv",
@@ -163,7 +174,7 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
         return StreamingResponse(replay.csv_of(index, vehicle), 200, _named(file), "text/csv")
 
 
-def _add_moments(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:
+def _add_moments(routes: APIRouter, shelf: RecordingsShelf) -> None:
     """Add what a replay shows."""
 
     @routes.get(
@@ -180,6 +191,7 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:
                 lights=city_map.lights if city_map else (),
                 boxes=city_map.boxes if city_map else (),
                 first_frame_s=replay.first_frame_s(index),
+                eye_cameras=replay.eye_cameras(index),
             )
         )
 
@@ -210,6 +222,23 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:
         rows = replay.events_of(_readable(shelf, name))
         page = page_of(rows, lambda row: str(row.number), limit=limit, cursor=cursor)
         return page_response(request, page)
+
+
+def _add_pictures(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:
+    @routes.get(
+        "/{name}/eye/{camera}.jpg",
+        summary="What an overhead camera saw, at a time",
+        responses=answer_file("image/jpeg", "The newest picture then; `X-Time-Ns`: its exposure."),
+        response_class=Response,
+    )
+    def picture(name: Name, camera: Camera, t_s: Seconds = 0.0) -> Response:
+        found = replay.picture_at(_readable(shelf, name), camera, t_s)
+        if found is None:
+            detail = f"{name}: camera {camera!r} has no picture of {t_s:g} s or before"
+            raise RefusedError(Refused(code="not_found", detail=detail))
+        t_ns, jpeg = found
+        headers = {"Cache-Control": PICTURE_KEPT, "X-Time-Ns": str(t_ns)}
+        return Response(jpeg, 200, headers, "image/jpeg")
 
     @routes.get(
         "/{name}/map.svg",
@@ -242,9 +271,10 @@ def _add_notes(routes: APIRouter, shelf: RecordingsShelf) -> None:
         key: IdempotencyKey = "",
     ) -> Response:
         del key  # the same notes twice are the same notes
-        condition.check(shelf.notes(name))
         fresh = Notes(title=body.title.strip(), notes=body.notes.strip())
-        shelf.write_notes(name, fresh)
+        with shelf.editing:
+            condition.check(shelf.notes(name))
+            shelf.write_notes(name, fresh)
         return tagged(request, fresh)
 
 
@@ -275,22 +305,23 @@ def _named(file: str) -> dict[str, str]:
     return {"Content-Disposition": f'attachment; filename="{file}"', "Cache-Control": "no-store"}
 
 
-async def _converted(path: FilePath) -> AsyncIterator[bytes]:
+async def _converted(path: FilePath, turns: asyncio.Semaphore) -> AsyncIterator[bytes]:
     """Yield what `scm export foxglove` writes; it works beside the server, so that it stays quick.
 
     A reader who goes away ends it.
     """
-    command = (sys.executable, "-m", "scm", "export", "foxglove", str(path))
-    process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE)
-    stand_back(process.pid)
-    assert process.stdout is not None  # noqa: S101  it was asked for
-    try:
-        while block := await process.stdout.read(BLOCK):
-            yield block
-        if await process.wait():
-            msg = f"{path}: the export for Foxglove failed; the server's log says why"
-            raise RecordingError(msg)  # the answer breaks off: a cut file must not look whole
-    finally:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()
+    async with turns:
+        command = (sys.executable, "-m", "scm", "export", "foxglove", str(path))
+        process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE)
+        stand_back(process.pid)
+        assert process.stdout is not None  # noqa: S101  it was asked for
+        try:
+            while block := await process.stdout.read(BLOCK):
+                yield block
+            if await process.wait():
+                msg = f"{path}: the export for Foxglove failed; the server's log says why"
+                raise RecordingError(msg)  # the answer breaks off: a cut file must not look whole
+        finally:
+            if process.returncode is None:
+                process.kill()
+                await process.wait()

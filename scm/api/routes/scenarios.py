@@ -39,7 +39,7 @@ class RunBody(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    arguments: list[Annotated[str, Field(max_length=200)]] = Field(
+    arguments: list[Annotated[str, Field(max_length=200, pattern=r"^[^\x00]*$")]] = Field(
         default_factory=list,
         max_length=50,
         description="of its command line; {connect} becomes the address of this city's router",
@@ -51,7 +51,7 @@ def router(city: City, work: Operations) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/scenarios", tags=["scenarios"], dependencies=[VIEWER])
     shelf = ScenarioShelf(city.shelves.scenarios)
-    runs = ScenarioRuns(shelf, work, city.link.connect)
+    runs = ScenarioRuns(shelf, work, city.link.connect, city.link.script_credentials)
     _add_scripts(routes, shelf)
 
     @routes.post(
@@ -62,8 +62,9 @@ def router(city: City, work: Operations) -> APIRouter:
         responses=answer(Operation, 202),
     )
     def run(request: Request, name: Name, body: RunBody, key: IdempotencyKey = "") -> Response:
+        del key  # the same key gets the same operation
         owner = str(request.scope["scm_owner"])
-        return accepted(runs.start(name, body.arguments, owner=owner, key=key))
+        return accepted(runs.start(name, body.arguments, owner=owner))
 
     @routes.get("/runs/{run}/lines", summary="What a run printed", responses=answer(Lines))
     def lines(
@@ -104,9 +105,11 @@ def _add_scripts(routes: APIRouter, shelf: ScenarioShelf) -> None:
         key: IdempotencyKey = "",
     ) -> Response:
         del key  # the same script twice is the same script
-        before = shelf.find(name)
-        condition.check(before)
-        return tagged(request, shelf.write(name, body.text), 200 if before else 201)
+        with shelf.editing:
+            before = shelf.find(name)
+            condition.check(before)
+            written = shelf.write(name, body.text)
+        return tagged(request, written, 200 if before else 201)
 
     @routes.delete(
         "/{name}",

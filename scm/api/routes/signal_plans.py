@@ -12,7 +12,7 @@ from scm.api.etag import Matching, tagged
 from scm.api.operations import Operation, Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
-from scm.api.roles import ENGINEER, OPERATOR, VIEWER
+from scm.api.roles import ENGINEER, OPERATOR, VIEWER, Signer
 from scm.api.routes.signals import By, Reason, junction_of, site_of
 from scm.api.schemas import answer, answer_page
 from scm.api.signal_plans import PlanShelf
@@ -82,6 +82,15 @@ class PlanBody(BaseModel):
         description="in the order of the cycle",
         examples=[[{"groups": ["north"], "green_s": 12.0, "extra_red_s": 0.0}]],
     )
+    offset_s: float | None = Field(
+        None,
+        ge=0.0,
+        lt=300.0,
+        description="when its cycle begins, after a time that is a whole number of cycles on the "
+        "controller's clock, less than the cycle; plans with the same cycle keep step so; null: "
+        "with nobody",
+        examples=[9.6],
+    )
 
 
 class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -90,6 +99,8 @@ class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         source: `shipped` with the city or its map, or `saved` by somebody.
         usable: Whether it is proven for the junction as it is now.
+        offset_s: When its cycle begins, after a time that is a whole number of cycles on the
+            controller's clock; null: in step with nobody.
         saved_ns: When it was saved; 0: it was not.
     """
 
@@ -100,6 +111,7 @@ class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
     usable: bool
     cycle_s: float
     stages: tuple[SignalStage, ...]
+    offset_s: float | None = None
     by: str = ""
     reason: str = ""
     saved_ns: int = 0
@@ -139,7 +151,8 @@ def _add_proving(routes: APIRouter, city: City, shelf: PlanShelf, work: Operatio
         dependencies=[OPERATOR],
         responses=answer(Operation, 202),
     )
-    def prove(request: Request, name: Name, body: StagesBody) -> Response:
+    def prove(request: Request, name: Name, body: StagesBody, key: IdempotencyKey = "") -> Response:
+        del key  # proven twice is proven
         file = _file(site_of(city, name), body.plan, body.stages)
         owner = str(request.scope.get("scm_owner", ""))
         what = f"plan {body.plan} of junction {name}"
@@ -168,27 +181,19 @@ def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         name: Name,
         plan: PlanName,
         body: PlanBody,
+        signer: Signer,
         condition: Matching,
         key: IdempotencyKey = "",
     ) -> Response:
         del key  # the state that the writer saw is asked for
         site = site_of(city, name)
         _check_own(site, plan)
-        before = _find(site, shelf, plan)
-        condition.check(before)
         file = _file(site, plan, body.stages)
-        proof = shelf.proof_of(file.digest) or (before.proof if before is not None else None)
-        if proof is None or proof.digest != file.digest:
-            detail = f"plan {plan!r}: these stages are not proven; POST them to .../proofs first"
-            raise RefusedError(Refused(code="unproven", detail=detail))
-        named = {"about": body.about, "by": body.by, "reason": body.reason}
-        now_ns = WallClock().now_ns()
-        file = msgspec.structs.replace(file, **named, saved_ns=now_ns, proof=proof)
-        try:
-            shelf.write(file)
-        except PlanError as refusal:
-            raise RefusedError(Refused(code="full", detail=str(refusal))) from refusal
-        return tagged(request, _saved(site, file), 200 if before is not None else 201)
+        with shelf.editing:
+            before = _find(site, shelf, plan)
+            condition.check(before)
+            row = _saved(site, _keep(shelf, file, body, signer(body.by), before))
+        return tagged(request, row, 200 if before is not None else 201)
 
     @routes.delete(
         "/plans/{plan}",
@@ -202,12 +207,36 @@ def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         del key  # the state that the writer saw is asked for
         site = site_of(city, name)
         _check_own(site, plan)
-        before = _find(site, shelf, plan)
-        if before is None:
-            raise not_found("plan", plan)
-        condition.check(before)
-        shelf.delete(name, plan)
+        with shelf.editing:
+            before = _find(site, shelf, plan)
+            if before is None:
+                raise not_found("plan", plan)
+            condition.check(before)
+            shelf.delete(name, plan)
         return json_response(before)
+
+
+def _keep(
+    shelf: PlanShelf, file: PlanFile, body: PlanBody, by: str, before: PlanRow | None
+) -> PlanFile:
+    """Save a plan with its proof, and return it.
+
+    Raises:
+        RefusedError: when nobody proved it, its offset is beyond its cycle, or no more are kept.
+    """
+    proof = shelf.proof_of(file.digest) or (before.proof if before is not None else None)
+    if proof is None or proof.digest != file.digest:
+        detail = f"plan {file.plan!r}: these stages are not proven; POST them to .../proofs first"
+        raise RefusedError(Refused(code="unproven", detail=detail))
+    _check_offset(file.plan, body.offset_s, proof.cycle_s)
+    named = {"about": body.about, "by": by, "reason": body.reason}
+    made = {"offset_s": body.offset_s, "saved_ns": WallClock().now_ns(), "proof": proof}
+    file = msgspec.structs.replace(file, **named, **made)
+    try:
+        shelf.write(file)
+    except PlanError as refusal:
+        raise RefusedError(Refused(code="full", detail=str(refusal))) from refusal
+    return file
 
 
 def _check_own(site: SignalSite, plan: str) -> None:
@@ -220,6 +249,17 @@ def _check_own(site: SignalSite, plan: str) -> None:
     if plan in taken:
         detail = f"plan {plan!r}: the junction has one of that name; save it under another"
         raise RefusedError(Refused(code="name_taken", detail=detail))
+
+
+def _check_offset(plan: str, offset_s: float | None, cycle_s: float) -> None:
+    """Refuse an offset that is not inside the cycle.
+
+    Raises:
+        RefusedError: saying so.
+    """
+    if offset_s is not None and offset_s >= cycle_s:
+        detail = f"plan {plan!r}: offset_s: got {offset_s:g}, expected less than {cycle_s:g}"
+        raise RefusedError(Refused(code="invalid", detail=f"{detail}, its cycle"))
 
 
 def _file(site: SignalSite, plan: str, stages: list[StageBody]) -> PlanFile:
@@ -271,6 +311,7 @@ def _shipped(site: SignalSite, plan: SignalPlan) -> PlanRow:
         usable=True,
         cycle_s=plan.cycle_s,
         stages=plan.stages,
+        offset_s=plan.offset_s,
     )
 
 
@@ -283,6 +324,7 @@ def _saved(site: SignalSite, file: PlanFile) -> PlanRow:
         usable=file.is_proven and fits(file, site),
         cycle_s=file.proof.cycle_s if file.proof is not None else 0.0,
         stages=file.stages,
+        offset_s=file.offset_s,
         by=file.by,
         reason=file.reason,
         saved_ns=file.saved_ns,

@@ -14,7 +14,7 @@ from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
 from scm.api.etag import tagged
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
-from scm.api.roles import ENGINEER, OPERATOR, VIEWER
+from scm.api.roles import ENGINEER, OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer, answer_page
 from scm.api.signal_history import History, PromiseScore, Verdict
 from scm.api.signal_plans import PlanShelf
@@ -23,7 +23,7 @@ from scm.maps.model import Junction
 from scm.v2x.message import Refused
 from scm.v2x.messages.monitor_reset import MonitorReset
 from scm.v2x.messages.monitor_status import MonitorStatus
-from scm.v2x.messages.plan_request import PlanReply, PlanRequest, SignalStage
+from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.signal_request import (
     LONGEST_S,
     SignalReply,
@@ -254,7 +254,7 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
         dependencies=[OPERATOR],
         responses=answer(SignalReply),
     )
-    def clear(name: Name, body: ClearBody, key: IdempotencyKey = "") -> Response:
+    def clear(name: Name, body: ClearBody, signer: Signer, key: IdempotencyKey = "") -> Response:
         junction_of(city, name)
         request = SignalRequest(
             request_id=key,
@@ -262,21 +262,21 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
             verb="clear",
             groups=tuple(body.groups),
             clears=body.verb,
-            by=body.by,
+            by=signer(body.by),
             reason=body.reason,
         )
         return json_response(city.ask(request, SignalReply))
 
 
 def _add_verb(routes: APIRouter, city: City, noun: str, verb: Verb, summary: str) -> None:
-    def wish(name: Name, body: WishBody, key: IdempotencyKey = "") -> Response:
+    def wish(name: Name, body: WishBody, signer: Signer, key: IdempotencyKey = "") -> Response:
         junction_of(city, name)
         request = SignalRequest(
             request_id=key,
             junction=name,
             verb=verb,
             groups=tuple(body.groups),
-            by=body.by,
+            by=signer(body.by),
             reason=body.reason,
             expires_s=body.expires_s,
         )
@@ -298,17 +298,11 @@ def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         dependencies=[OPERATOR],
         responses=answer(PlanReply),
     )
-    def plan(name: Name, body: PlanBody, key: IdempotencyKey = "") -> Response:
+    def plan(name: Name, body: PlanBody, signer: Signer, key: IdempotencyKey = "") -> Response:
         junction_of(city, name)
-        request = PlanRequest(
-            request_id=key,
-            junction=name,
-            plan=body.plan,
-            by=body.by,
-            reason=body.reason,
-            stages=_saved_stages(city, shelf, name, body.plan),
-        )
-        return json_response(city.ask(request, PlanReply))
+        request = _wish_for(city, shelf, name, body.plan)
+        who = {"by": signer(body.by), "reason": body.reason, "request_id": key}
+        return json_response(city.ask(msgspec.structs.replace(request, **who), PlanReply))
 
     @routes.put(
         "/{name}/policy",
@@ -316,9 +310,10 @@ def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         dependencies=[OPERATOR],
         responses=answer(SignalReply),
     )
-    def policy(name: Name, body: PolicyBody, key: IdempotencyKey = "") -> Response:
+    def policy(name: Name, body: PolicyBody, signer: Signer, key: IdempotencyKey = "") -> Response:
         junction_of(city, name)
-        return json_response(city.ask(_policy(name, body.policy, body, key), SignalReply))
+        request = _policy(name, body.policy, body, signer(body.by), key)
+        return json_response(city.ask(request, SignalReply))
 
     _add_flash(routes, city, shelf)
 
@@ -330,10 +325,11 @@ def _add_flash(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         dependencies=[OPERATOR],
         responses=answer(FlashReply),
     )
-    def flash(name: Name, body: FlashBody, key: IdempotencyKey = "") -> Response:
+    def flash(name: Name, body: FlashBody, signer: Signer, key: IdempotencyKey = "") -> Response:
         junction_of(city, name)
+        by = signer(body.by)
         if body.engaged and body.expires_s is not None:
-            return json_response(city.ask(_policy(name, "flashing", body, key), SignalReply))
+            return json_response(city.ask(_policy(name, "flashing", body, by, key), SignalReply))
         held = city.view.picture().signal_statuses.get(name)
         if held is None:
             raise not_found("status of a junction", name)
@@ -343,31 +339,25 @@ def _add_flash(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
                 junction=name,
                 verb="clear",
                 clears="policy",
-                by=body.by,
+                by=by,
                 reason=body.reason,
             )
             city.ask(request, SignalReply)
         runs = held.message.plan if held.message.policy == "fixed" else held.message.policy
-        wanted = "flash" if body.engaged else runs
-        stages = () if body.engaged else _saved_stages(city, shelf, name, wanted)
-        asked = PlanRequest(
-            request_id=key,
-            junction=name,
-            plan=wanted,
-            by=body.by,
-            reason=body.reason,
-            stages=stages,
-        )
-        return json_response(city.ask(asked, PlanReply))
+        asked = _wish_for(city, shelf, name, "flash" if body.engaged else runs)
+        who = {"by": by, "reason": body.reason, "request_id": key}
+        return json_response(city.ask(msgspec.structs.replace(asked, **who), PlanReply))
 
 
-def _policy(name: str, policy: str, body: PolicyBody | FlashBody, key: str) -> SignalRequest:
+def _policy(
+    name: str, policy: str, body: PolicyBody | FlashBody, by: str, key: str
+) -> SignalRequest:
     return SignalRequest(
         request_id=key,
         junction=name,
         verb="policy",
         policy=policy,
-        by=body.by,
+        by=by,
         reason=body.reason,
         expires_s=body.expires_s or LONGEST_S,
     )
@@ -391,22 +381,24 @@ def _add_monitor(routes: APIRouter, city: City) -> None:
         dependencies=[ENGINEER],
         responses=answer(MonitorStatus),
     )
-    def reset(name: Name, body: ResetBody, key: IdempotencyKey = "") -> Response:
+    def reset(name: Name, body: ResetBody, signer: Signer, key: IdempotencyKey = "") -> Response:
         junction_of(city, name)
-        request = MonitorReset(request_id=key, junction=name, by=body.by, reason=body.reason)
+        by, reason = signer(body.by), body.reason
+        request = MonitorReset(request_id=key, junction=name, by=by, reason=reason)
         return json_response(city.ask(request, MonitorStatus))
 
 
-def _saved_stages(city: City, shelf: PlanShelf, name: str, plan: str) -> tuple[SignalStage, ...]:
-    """Return the stages of a saved plan; none: it is one that the junction has itself.
+def _wish_for(city: City, shelf: PlanShelf, name: str, plan: str) -> PlanRequest:
+    """Return a wish for a plan, which brings its stages where somebody saved it.
 
     Raises:
         RefusedError: when it was proven for a junction that has changed since.
     """
-    file = shelf.read(name, plan)
+    asked = PlanRequest(junction=name, plan=plan, by="")
+    file = None if plan == "flash" else shelf.read(name, plan)
     if file is None:
-        return ()
+        return asked
     if not file.is_proven or not fits(file, site_of(city, name)):
         detail = f"plan {plan!r} is not proven for junction {name!r} as it is now: prove it again"
         raise RefusedError(Refused(code="unproven", detail=detail))
-    return file.stages
+    return msgspec.structs.replace(asked, stages=file.stages, offset_s=file.offset_s)

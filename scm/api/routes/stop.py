@@ -1,11 +1,18 @@
-"""The red button: stop every car of the city, or let them drive again."""
+"""The red button: stop every car of the city, or let them drive again.
+
+It has threads of its own: however much others ask of the server, it never waits behind them.
+"""
+
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, json_response
 from scm.api.picture import Picture
-from scm.api.roles import OPERATOR, VIEWER
+from scm.api.roles import OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.stop_request import StopRequest
@@ -23,6 +30,9 @@ class StopBody(BaseModel):
     )
 
 
+THREADS = 8
+
+
 def stop_of(picture: Picture) -> CityStop:
     """Return the stop as last told by the world; released when it never spoke of it."""
     return picture.stop or CityStop(t_ns=0, engaged=False)
@@ -31,6 +41,7 @@ def stop_of(picture: Picture) -> CityStop:
 def router(city: City) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/stop", tags=["stop"], dependencies=[VIEWER])
+    threads = ThreadPoolExecutor(THREADS, thread_name_prefix="stop")
 
     @routes.get("", summary="Whether the city-wide stop is engaged", responses=answer(CityStop))
     async def stop() -> Response:
@@ -42,8 +53,12 @@ def router(city: City) -> APIRouter:
         dependencies=[OPERATOR],
         responses=answer(CityStop),
     )
-    def set_stop(body: StopBody, key: IdempotencyKey = "") -> Response:
-        request = StopRequest(request_id=key, engaged=body.engaged, by=body.by, reason=body.reason)
-        return json_response(city.ask(request, CityStop))
+    async def set_stop(body: StopBody, signer: Signer, key: IdempotencyKey = "") -> Response:
+        by, reason = signer(body.by), body.reason
+        request = StopRequest(request_id=key, engaged=body.engaged, by=by, reason=reason)
+        loop = asyncio.get_running_loop()
+        ask = copy_context().run  # the trace of this request goes along
+        told = await loop.run_in_executor(threads, ask, city.ask, request, CityStop)
+        return json_response(told)
 
     return routes

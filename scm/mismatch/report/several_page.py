@@ -71,6 +71,8 @@ def write_several(
             }
             for name, diagnosis in cars.items()
         ],
+        "said": common_sentence(common),
+        "conclusions": _conclusions(common),
         "common": [plain(one) for one in common],
         "runtime_s": runtime_s,
     }
@@ -90,9 +92,7 @@ def several_html(
     where = f"Cars {joined(list(cars))}, {word} {joined(titles) or 'unnamed'}"
     sentence = common_sentence(common)
     head = tag("p", where, "inputs") + tag("h1", sentence)
-    head += "".join(tag("p", f"{capital(title_of(one.name))}: {one.conclusion}") for one in common)
-    if not common:
-        head += tag("p", _NOTHING)
+    head += "".join(tag("p", conclusion) for conclusion in _conclusions(common))
     kind = "mismatch" if common or any(one.effects for one in cars.values()) else "none"
     body = around("header", around("div", head, "words"), f"verdict {kind}")
     body += around("div", "".join(_car_card(*one) for one in cars.items()), "cards")
@@ -112,6 +112,11 @@ def common_sentence(common: Sequence[Common]) -> str:
         are = "is" if len(common) == 1 else "are"
         return f"Nothing that the cars have in common was found; {own} {are} not shared."
     return "Nothing that the cars have in common was found."
+
+
+def _conclusions(common: Sequence[Common]) -> list[str]:
+    found = [f"{capital(title_of(one.name))}: {one.conclusion}" for one in common]
+    return found or [_NOTHING]
 
 
 def several_summary(cars: Mapping[str, Diagnosis], common: Sequence[Common], out: Path) -> str:

@@ -4,17 +4,24 @@ import json
 import socket as sockets
 import threading
 from contextlib import ExitStack, contextmanager
+from time import monotonic
 from urllib.parse import urlsplit
 
+import msgspec
 import pytest
 import websockets.sync.client
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from scm.api import teleop as server_side
 from scm.api.app import create_app
 from scm.api.city import Link
 from scm.api.keys import KeyRing
 from scm.api.server import serve
 from scm.api.teleop import NOT_YOURS, PROTOCOL
+from scm.client import Client, ProblemError
+from scm.client import teleop as client_side
+from scm.client.teleop import WheelError
+from scm.errors import LinkError
 from scm.store.memory import MemoryStore
 from scm.v2x.message import Refused
 from scm.v2x.messages.drive_command import DriveCommand
@@ -59,8 +66,8 @@ def ring():
 
 
 @pytest.fixture
-def connect(view, fake_city, city_map, wire):
-    """Connect to the wheel of n1: a context manager with the socket."""
+def serving(view, fake_city, city_map, wire):
+    """Serve a city whose n1 may be driven; returns its address."""
     fake_city.answers[LeaseRequest] = LeaseReply(vehicle="n1", owner="x", epoch=7, ttl_ms=1000)
     fake_city.answers[RouteRequest] = RouteReply(
         vehicle="n1", trip_id="t", route=("a",), length_m=None
@@ -68,17 +75,27 @@ def connect(view, fake_city, city_map, wire):
 
     with ExitStack() as stack:
 
-        def open_at(keys=None, protocols=(PROTOCOL,), host="", **options):
+        def serve_at(keys=None):
             app = create_app(view, fake_city.ask, city_map, keys=keys, link=Link(wire=wire))
-            address = urlsplit(stack.enter_context(served(app)))
-            return websockets.sync.client.connect(
-                f"ws://{host or address.hostname}:{address.port}{DRIVE}",
-                sock=sockets.create_connection((address.hostname, address.port)),
-                subprotocols=list(protocols),
-                **options,
-            )
+            return stack.enter_context(served(app))
 
-        yield open_at
+        yield serve_at
+
+
+@pytest.fixture
+def connect(serving):
+    """Connect to the wheel of n1: a context manager with the socket."""
+
+    def open_at(keys=None, protocols=(PROTOCOL,), host="", **options):
+        address = urlsplit(serving(keys))
+        return websockets.sync.client.connect(
+            f"ws://{host or address.hostname}:{address.port}{DRIVE}",
+            sock=sockets.create_connection((address.hostname, address.port)),
+            subprotocols=list(protocols),
+            **options,
+        )
+
+    return open_at
 
 
 @contextmanager
@@ -154,19 +171,40 @@ def test_giving_back_returns_the_lease_and_says_so(connect, fake_city):
     assert release.owner == fake_city.asked[0].owner
 
 
-@pytest.mark.parametrize(("length_m", "via"), [(None, ()), (3.0, ("b",))])
-def test_the_car_goes_on_where_it_was_going(connect, fake_city, hear, snapshot, length_m, via):
-    trip = Trip(
-        vehicle="n1", trip_id="t1", t_ns=1, route=("a", "b"), done_m=0.1, length_m=length_m,
-        started_ns=0,
-    )  # fmt: skip
+@pytest.mark.parametrize(
+    "trip",
+    [
+        Trip(vehicle="n1", trip_id="t1", t_ns=1, route=("a",), done_m=0.1, length_m=None,
+             started_ns=0, speed_mps=0.1),
+        Trip(vehicle="n1", trip_id="t1", t_ns=1, route=("a", "b", "a", "b"), done_m=0.1,
+             length_m=3.0, started_ns=0, via=("b", "b"), then="circulate"),
+    ],
+)  # fmt: skip
+def test_the_car_goes_on_where_it_was_going(connect, fake_city, hear, snapshot, trip):
     hear(1.0, snapshot(n1=(0.0, 0.0, 0.0)), trip)
     with connect() as socket:
         say(socket, TAKE)
         until(socket, "taken")
         say(socket, {"type": "give_back"})
         assert until(socket, "over")["detail"] == "n1 goes on by itself"
-    assert fake_city.asked[-1] == RouteRequest(vehicle="n1", via=via)
+    assert fake_city.asked[-1] == RouteRequest(
+        vehicle="n1", via=trip.via, speed_mps=trip.speed_mps, then=trip.then
+    )
+
+
+def test_it_goes_on_from_where_it_was_taken_and_not_from_what_was_last_told_before(
+    connect, fake_city, hear, snapshot
+):
+    told = {"vehicle": "n1", "trip_id": "t1", "route": ("a", "b"), "started_ns": 0, "length_m": 2.0}
+    trip = Trip(t_ns=1, done_m=0.4, via=("a", "b"), **told)
+    hear(1.0, snapshot(n1=(0.0, 0.0, 0.0)), trip)
+    with connect() as socket:
+        say(socket, TAKE)
+        until(socket, "taken")
+        hear(1.1, Trip(t_ns=2, done_m=0.6, via=("b",), **told))
+        say(socket, {"type": "give_back"})
+        until(socket, "over")
+    assert fake_city.asked[-1].via == ("b",)
 
 
 def test_a_page_that_goes_away_gives_the_car_back(connect, fake_city):
@@ -223,11 +261,12 @@ def test_a_first_word_that_is_no_take_ends_it(connect, fake_city, first):
     assert fake_city.asked == []
 
 
-def test_a_bad_packet_gives_the_car_back(connect, fake_city):
+@pytest.mark.parametrize("wrong", [{"type": "drive", "seq": "one"}, drive(2**70)])
+def test_a_bad_packet_gives_the_car_back(connect, fake_city, wrong):
     with connect() as socket:
         say(socket, TAKE)
         until(socket, "taken")
-        say(socket, {"type": "drive", "seq": "one"})
+        say(socket, wrong)
         assert until(socket, "over")["code"] == "invalid"
     assert fake_city.asked[-1].verb == "release"
 
@@ -250,6 +289,16 @@ class TestWhoMay:
             until(socket, "taken")
         assert fake_city.asked[0].owner.startswith("anna #")
 
+    def test_who_loses_the_key_loses_the_wheel(self, connect, ring, fake_city):
+        secret = ring.add("anna", "operator", 1)
+        with connect(keys=ring, protocols=[PROTOCOL, f"scm.key.{secret}"]) as socket:
+            say(socket, TAKE)
+            until(socket, "taken")
+            ring.revoke(secret.split("_")[1])
+            over = until(socket, "over")
+        assert (over["code"], "key has ended" in over["detail"]) == ("ended", True)
+        assert fake_city.asked[-1].verb == "release"
+
     def test_a_viewer_does_not_drive(self, connect, ring, fake_city):
         key = f"scm.key.{ring.add('vera', 'viewer', 1)}"
         assert refusal_of(connect, keys=ring, protocols=[PROTOCOL, key]) == (403, "forbidden")
@@ -271,6 +320,96 @@ class TestWhoMay:
 
     def test_another_protocol_is_not_spoken(self, connect):
         assert refusal_of(connect, protocols=["chat"]) == (422, "invalid")
+
+
+class TestTheClient:
+    """`scm.client` at the wheel."""
+
+    def driven(self, wheel):
+        """Drive until the car was told so: on a busy machine a packet may come too late."""
+        until_s = monotonic() + 5.0
+        while monotonic() < until_s:
+            told = wheel.drive(0.4, -0.2)
+            if told.why == "driving":
+                return told
+        raise AssertionError(wheel.told)
+
+    def test_it_drives_at_a_beat_and_gives_the_car_back(self, serving, wire, fake_city):
+        with Client(serving()) as city, city.wheel("n1") as wheel:
+            began_s = monotonic()
+            told = wheel.drive(0.4, -0.2, for_s=0.3)
+            assert monotonic() - began_s >= 0.3
+            assert 1 <= told.seq <= 8  # a packet each 50 ms
+            told = self.driven(wheel)
+            assert (told.throttle, told.steering) == (0.4, -0.2)
+            assert 0.4 in {command.throttle for command in wire.commands}
+        assert (wheel.over.code, wheel.over.detail) == ("given_back", "n1 stands")
+        assert [request.verb for request in fake_city.asked] == ["acquire", "release"]
+
+    def test_a_program_that_hangs_drives_nothing(self, serving, wire):
+        """Nothing is sent behind its back: the city lets go of the throttle."""
+        with Client(serving()) as city, city.wheel("n1", reason="it is in the way") as wheel:
+            assert self.driven(wheel).throttle == 0.4
+            until_s = monotonic() + 5.0
+            while wire.commands[-1].throttle and monotonic() < until_s:
+                threading.Event().wait(0.01)
+            assert (wire.commands[-1].throttle, wire.commands[-1].steering) == (0.0, -0.2)
+            assert self.driven(wheel).throttle == 0.4
+
+    def test_an_error_in_the_program_lets_go(self, serving, fake_city):
+        with (
+            Client(serving()) as city,
+            pytest.raises(ZeroDivisionError),
+            city.wheel("n1") as wheel,
+        ):
+            wheel.drive(1 / 0, 0.0)
+        assert wheel.over.code == "given_back"
+        assert [request.verb for request in fake_city.asked] == ["acquire", "release"]
+
+    def test_a_wheel_that_is_lost_says_to_whom(self, serving, wire):
+        wire.answer = Refused(code="owned", detail="'bo' holds it under epoch 8")
+        with Client(serving()) as city, city.wheel("n1") as wheel:
+            with pytest.raises(WheelError, match="n1: lost: 'bo' holds it"):
+                wheel.drive(0.1, 0.0, for_s=30.0)
+            with pytest.raises(WheelError, match="lost"):
+                wheel.drive(0.1, 0.0)
+        assert wheel.over.code == "lost"
+
+    def test_a_car_in_other_hands_is_refused(self, serving, fake_city):
+        fake_city.answers[LeaseRequest] = Refused(code="owned", detail="leased to 'bo'")
+        with (
+            Client(serving()) as city,
+            pytest.raises(WheelError, match="n1: owned: leased to"),
+            city.wheel("n1"),
+        ):
+            pass
+
+    def test_its_key_has_to_be_an_operator_s(self, serving, ring, fake_city):
+        url, vera = serving(ring), ring.add("vera", "viewer", 1)
+        with (
+            Client(url, vera) as city,
+            pytest.raises(ProblemError, match="403 forbidden"),
+            city.wheel("n1"),
+        ):
+            pass
+        with Client(url, ring.add("anna", "operator", 1)) as city, city.wheel("n1"):
+            assert fake_city.asked[0].owner.startswith("anna #")
+
+    def test_where_no_city_is_there_is_no_wheel(self):
+        with (
+            Client("http://127.0.0.1:9") as city,
+            pytest.raises(LinkError, match="scm up"),
+            city.wheel("n1"),
+        ):
+            pass
+
+    @pytest.mark.parametrize("word", ["Taken", "Told", "Over"])
+    def test_its_words_are_those_of_the_city(self, word):
+        def fields(module):
+            return [(one.name, one.type) for one in msgspec.structs.fields(getattr(module, word))]
+
+        assert fields(client_side) == fields(server_side)
+        assert client_side.PROTOCOL == PROTOCOL
 
 
 def test_the_way_to_a_car_is_measured_by_an_echo(

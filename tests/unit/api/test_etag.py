@@ -51,6 +51,8 @@ def test_a_change_of_what_was_seen_passes(headers, body):
         ({}, BODY, "precondition_required"),
         ({}, None, "precondition_required"),
         ({"if_match": OTHER}, BODY, "precondition_failed"),
+        ({"if_match": '"a*"'}, BODY, "precondition_failed"),
+        ({"if_match": f"{OTHER}*"}, BODY, "precondition_failed"),
         ({"if_match": TAG}, None, "precondition_failed"),
         ({"if_none_match": "*"}, BODY, "precondition_failed"),
     ],

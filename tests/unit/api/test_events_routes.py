@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from contextlib import contextmanager
 
 import msgspec
 import pytest
@@ -205,3 +206,22 @@ class TestAudit:
         store.close()
         assert own_client("PUT", f"{API}/stop", json={"engaged": True}).status_code == 200
         assert "audit_failed" in caplog.text
+
+
+def test_what_could_not_be_stored_is_said_so_and_was_not_done(
+    view, hear, fake_city, city_map, client_of
+):
+    class Full(MemoryStore):
+        @contextmanager
+        def transaction(self):
+            with super().transaction():
+                yield
+                raise StoreError("state city.db: database or disk is full")
+
+    hear(1.0, *LOG)
+    client = client_of(create_app(view, fake_city.ask, city_map, state=Full()))
+    body = {"events": [id_of(LOG[0])]}
+    answer = client("POST", f"{API}/events/acknowledgements", json=body)
+    assert (answer.status_code, answer.json()["code"]) == (507, "not_written")
+    assert "disk is full" in answer.json()["detail"]
+    assert len(client("GET", f"{API}/events?open=true").json()["items"]) == len(LOG)

@@ -1,18 +1,25 @@
 """The Eye over REST: cameras, poses, how far they lay from the truth, and calibrations."""
 
+import os
 import struct
 import time
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
 from scm.api.app import create_app
-from scm.api.calibration_desk import LARGEST_PICTURE, MOST_VIEWS, size_of
+from scm.api.calibration_desk import LARGEST_PICTURE, MOST_CAMERAS, MOST_VIEWS, size_of
+from scm.api.keys import KeyRing
 from scm.api.problem import RefusedError
-from scm.api.shelves import shelves_in
+from scm.api.shelves import Shelves, shelves_in
+from scm.store.memory import MemoryStore
+from scm.v2x.message import Refused
+from scm.v2x.messages.calibration_request import CalibrationReply, CalibrationRequest
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.eye_status import Calibrated, EyeStatus, InForce
 from scm.v2x.messages.eye_tags import EyeTags, TagSeen
 
 API = "/api/v1"
@@ -42,6 +49,8 @@ cx_px = 404.0
 cy_px = 246.0
 """
 
+PLACE_BENT = PLACE + "distortion = [-0.15, 0.05, 0.0005, -0.0004, 0.0]\n"
+
 
 @pytest.fixture
 def app(view, fake_city, city_map, tmp_path):
@@ -52,9 +61,9 @@ def app(view, fake_city, city_map, tmp_path):
 def seen(hear, snapshot):
     """Let a car drive 4 s along x at 0.5 m/s while the Eye sees it `off` metres wrong."""
 
-    def drive(*offs, camera="overhead", car="n1"):
+    def drive(*offs, camera="overhead", car="n1", from_s=1.0, every_s=0.5):
         for i, (x_off, y_off) in enumerate(offs):
-            at_s = 1.0 + 0.5 * i
+            at_s = from_s + every_s * i
             hear(at_s, snapshot(at_s, tick=i + 1, n1=(0.5 * at_s, 1.0, 0.0)))
             pose = EyePose(
                 camera=camera, vehicle=car, tag_id=1, t_ns=round(at_s * 1e9),
@@ -68,12 +77,15 @@ def seen(hear, snapshot):
     return drive
 
 
-def tag(tag_id, side=30.0):
+def tag(tag_id, side=30.0, hamming=None):
     corners = ((0.0, side), (side, side), (side, 0.0), (0.0, 0.0))
-    return TagSeen(tag_id=tag_id, centre_px=(side / 2, side / 2), corners_px=corners, margin=80.0)
+    return TagSeen(
+        tag_id=tag_id, centre_px=(side / 2, side / 2), corners_px=corners, margin=80.04,
+        hamming=hamming,
+    )  # fmt: skip
 
 
-TAGS = (tag(0, 28.0), tag(1), tag(77))
+TAGS = (tag(0, 28.0, 0), tag(1, hamming=1), tag(77))
 
 
 def jpeg(width=64, height=48, value=128):
@@ -113,16 +125,30 @@ class TestPoses:
         none = client("GET", f"{path}?vehicle=n2").json()
         assert (none["stats"]["samples"], none["stats"]["mean_mm"]) == (0, None)
 
+    def test_two_samples_a_second_are_kept(self, client, seen):
+        seen(*[(0.001 * i, 0.0) for i in range(9)], every_s=0.25)
+        samples = client("GET", f"{EYE}/cameras/overhead/residuals").json()["samples"]
+        assert [one["x_mm"] for one in samples] == [0.0, 2.0, 4.0, 6.0, 8.0]
+
+    def test_a_world_started_again_begins_anew(self, client, seen):
+        seen((0.001, 0.0), (0.002, 0.0), from_s=20.0)
+        seen((0.005, 0.0), from_s=2.0)
+        samples = client("GET", f"{EYE}/cameras/overhead/residuals").json()["samples"]
+        assert [one["x_mm"] for one in samples] == [5.0]
+
     def test_residuals_of_a_camera_never_heard_are_not_found(self, client):
         assert client("GET", f"{EYE}/cameras/other/residuals").status_code == 404
 
     def test_a_tag_is_told_with_its_owner_size_and_place(self, client, seen):
+        seen((0.0, 0.0), car="tag-77")
         seen((0.0, 0.0))
         state = client("GET", f"{EYE}/cameras/overhead").json()
         floor, car, stray = state["state"]["known"]
         assert (floor["what"], floor["size_px"], floor["x_m"]) == ("map", 28.0, 0.0)
         assert (car["what"], car["vehicle"], car["x_m"]) == ("car", "n1", 0.5)
-        assert (stray["what"], stray["vehicle"], stray["x_m"]) == ("other", "", None)
+        assert (stray["what"], stray["vehicle"], stray["x_m"]) == ("other", "", 0.5)
+        assert [one["hamming"] for one in (floor, car, stray)] == [0, 1, None]
+        assert {one["margin"] for one in (floor, car, stray)} == {80.0}
         assert state["mounted"]["z_m"] == 2.8
 
     def test_a_tag_is_forgotten_after_a_minute(self, client, seen, hear):
@@ -144,6 +170,7 @@ class TestViews:
         assert (shown.headers["content-type"], shown.content) == ("image/png", png())
         left = client("DELETE", f"{self.path}/0001.jpg").json()["views"]
         assert [one["name"] for one in left] == ["0002.png"]
+        assert client("POST", self.path, content=png()).json()["name"] == "0003.png"
         assert client("DELETE", self.path).json() == {"views": [], "findings": None}
 
     def test_without_a_body_it_is_the_newest_frame(self, client, hear):
@@ -153,7 +180,16 @@ class TestViews:
         made = client("POST", self.path)
         assert client("GET", made.headers["location"]).content == picture
 
-    @pytest.mark.parametrize("what", [b"GIF89a", b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"x" * 99])
+    @pytest.mark.parametrize(
+        "what",
+        [
+            b"GIF89a",
+            b"\xff\xd8\xff",
+            b"\x89PNG\r\n\x1a\n",
+            b"x" * 99,
+            b"\xff\xd8\xff\xe0\0\2\0\xc0\0\x11\x08\0\x30\0\x40",
+        ],
+    )
     def test_what_is_no_picture_is_refused(self, client, what):
         refused = client("POST", self.path, content=what)
         assert (refused.status_code, refused.json()["code"]) == (422, "invalid")
@@ -175,6 +211,12 @@ class TestViews:
             (folder / f"{number:04d}.jpg").write_bytes(jpeg())
         assert client("POST", self.path, content=jpeg()).status_code == 409
 
+    def test_pictures_of_too_many_cameras_are_refused(self, client, tmp_path):
+        for number in range(MOST_CAMERAS):
+            (tmp_path / "calibrations" / "views" / f"c{number}").mkdir(parents=True)
+        refused = client("POST", self.path, content=jpeg())
+        assert (refused.status_code, refused.json()["code"]) == (409, "full")
+
     def test_a_progressive_jpeg_has_its_size_read_behind_other_segments(self):
         head = b"\xff\xd8" + b"\xff\xe0" + struct.pack(">H", 6) + b"abcd"
         frame = b"\xff\xc2" + struct.pack(">HBHH", 17, 8, 300, 400)
@@ -184,6 +226,13 @@ class TestViews:
 
 
 class TestShelf:
+    def test_a_disk_that_cannot_be_written_is_told(self, view, fake_city, city_map, client_of):
+        nowhere = Shelves(calibrations=Path("/sys/calibrations"))
+        client = client_of(create_app(view, fake_city.ask, city_map, shelves=nowhere))
+        body, new = {"toml": LENS}, {"If-None-Match": "*"}
+        answer = client("PUT", f"{EYE}/calibrations/lab", json=body, headers=new)
+        assert (answer.status_code, answer.json()["code"]) == (507, "not_written")
+
     @pytest.mark.parametrize(("toml", "kind"), [(LENS, "lens"), (PLACE, "place")])
     def test_a_calibration_is_kept_read_and_downloaded(self, client, toml, kind):
         new = {"If-None-Match": "*"}
@@ -217,6 +266,28 @@ class TestShelf:
         refused = client("PUT", f"{EYE}/calibrations/lab", json={"toml": toml}, headers=new)
         assert refused.status_code == 422
         assert "toml: expected" in refused.json()["detail"]
+
+    def test_the_newest_comes_first_and_its_report_goes_with_it(self, client, tmp_path):
+        new, folder = {"If-None-Match": "*"}, tmp_path / "calibrations"
+        for name in ("a", "b", "c"):
+            client("PUT", f"{EYE}/calibrations/{name}", json={"toml": PLACE}, headers=new)
+        for age, name in enumerate("bca"):
+            os.utime(folder / f"{name}.toml", (1000 - age, 1000 - age))
+        rows = client("GET", f"{EYE}/calibrations").json()["items"]
+        assert [row["name"] for row in rows] == ["b", "c", "a"]
+        (folder / "b.json").write_text('{"is_sure": true}')
+        assert client("GET", f"{EYE}/calibrations/b/report").json() == {"is_sure": True}
+        tag = client("GET", f"{EYE}/calibrations/b").headers["etag"]
+        client("DELETE", f"{EYE}/calibrations/b", headers={"If-Match": tag})
+        assert sorted(path.name for path in folder.iterdir()) == ["a.toml", "c.toml"]
+
+    def test_a_full_shelf_takes_no_more(self, client, monkeypatch):
+        monkeypatch.setattr("scm.api.calibration_shelf.MOST_KEPT", 1)
+        new = {"If-None-Match": "*"}
+        for name, status in (("a", 201), ("b", 409)):
+            path = f"{EYE}/calibrations/{name}"
+            made = client("PUT", path, json={"toml": PLACE}, headers=new)
+            assert made.status_code == status
 
     def test_a_file_put_there_by_hand_that_is_none_is_passed_over(self, client, tmp_path):
         folder = tmp_path / "calibrations"
@@ -265,3 +336,93 @@ class TestMeasuring:
     def test_a_camera_that_the_map_does_not_know_has_no_place_to_find(self, client):
         refused = client("POST", f"{EYE}/cameras/other/place", json={"save_as": "x"})
         assert refused.status_code == 404
+
+
+WHY = {"by": "ada", "reason": "it was moved"}
+
+
+class TestInForce:
+    """`PLACE` was found with `LENS`, so its doubt goes with it."""
+
+    path = f"{EYE}/cameras/overhead/calibration"
+
+    @pytest.fixture
+    def shelf(self, client):
+        def put(**texts):
+            for name, toml in texts.items():
+                new = {"If-None-Match": "*"}
+                path = f"{EYE}/calibrations/{name}"
+                assert client("PUT", path, json={"toml": toml}, headers=new).is_success
+
+        return put
+
+    @pytest.fixture
+    def eye(self, fake_city):
+        told = InForce(now=Calibrated(place="lab"), since_ns=7, by="ada", before=Calibrated())
+        reply = CalibrationReply(camera="overhead", in_force=told)
+        fake_city.answers[CalibrationRequest] = reply
+        return fake_city
+
+    def test_a_place_is_asked_for_with_the_lens_it_was_found_with(self, client, shelf, eye):
+        shelf(lab=PLACE_BENT, glass=LENS, other=LENS.replace("660.0", "661.0"))
+        body = {"calibration": "lab", **WHY}
+        reply = client("PUT", self.path, json=body, headers={"Idempotency-Key": "k1"})
+        assert reply.json()["in_force"]["now"] == {"lens": "", "place": "lab"}
+        (asked,) = eye.asked
+        assert (asked.camera, asked.verb, asked.calibration) == ("overhead", "use", "lab")
+        assert (asked.by, asked.reason, asked.request_id) == ("ada", "it was moved", "k1")
+        assert (asked.place.name, asked.place.z_m, asked.lens.views) == ("overhead", 2.5, 14)
+
+    def test_a_place_found_with_the_map_s_lens_goes_alone(self, client, shelf, eye):
+        shelf(lab=PLACE, glass=LENS)
+        client("PUT", self.path, json={"calibration": "lab", **WHY})
+        assert (eye.asked[0].place.z_m, eye.asked[0].lens) == (2.5, None)
+
+    def test_a_lens_goes_without_a_place(self, client, shelf, eye):
+        shelf(glass=LENS)
+        client("PUT", self.path, json={"calibration": "glass", **WHY})
+        assert (eye.asked[0].place, eye.asked[0].lens.fx_px) == (None, 660.0)
+
+    def test_what_was_before_is_put_back(self, client, eye):
+        assert client("POST", f"{self.path}/back", json=WHY).status_code == 200
+        (asked,) = eye.asked
+        assert (asked.camera, asked.verb, asked.reason) == ("overhead", "back", "it was moved")
+
+    def test_nothing_is_asked_that_cannot_be(self, client, shelf, eye):
+        shelf(lab=PLACE.replace("overhead", "south"))
+        other = f"{EYE}/cameras/south/calibration"
+        for path, body, status, said in (
+            (self.path, {"calibration": "lab", **WHY}, 422, "place of camera 'south'"),
+            (self.path, {"calibration": "none", **WHY}, 404, "calibration named 'none'"),
+            (other, {"calibration": "lab", **WHY}, 404, "camera on the map named 'south'"),
+            (self.path, {"calibration": "lab", "reason": ""}, 422, ""),
+        ):
+            refused = client("PUT", path, json=body)
+            assert (refused.status_code, said in refused.json()["detail"]) == (status, True)
+        assert client("POST", f"{other}/back", json=WHY).status_code == 404
+        assert eye.asked == []
+
+    def test_the_eye_s_own_no_is_told_in_its_words(self, client, shelf, fake_city):
+        shelf(lab=PLACE)
+        no = Refused(code="invalid", detail="map tags are 34.2 px from where")
+        fake_city.answers[CalibrationRequest] = no
+        refused = client("PUT", self.path, json={"calibration": "lab", **WHY})
+        assert (refused.status_code, refused.json()["detail"]) == (422, no.detail)
+
+    def test_a_camera_tells_what_it_sees_by(self, client, hear):
+        told = InForce(now=Calibrated(lens="glass"), since_ns=7, by="ada", reason="new lens")
+        hear(1.0, EyeStatus(camera="overhead", t_ns=1, good=True, in_force=told))
+        state = client("GET", f"{EYE}/cameras/overhead").json()["state"]
+        assert state["in_force"]["now"] == {"lens": "glass", "place": ""}
+        assert (state["in_force"]["since_ns"], state["in_force"]["reason"]) == (7, "new lens")
+
+    def test_it_takes_an_engineer_and_tells_whose_key_it_was(
+        self, view, eye, city_map, client_of, tmp_path
+    ):
+        ring = KeyRing(MemoryStore())
+        app = create_app(view, eye.ask, city_map, keys=ring, shelves=shelves_in(tmp_path))
+        for owner, role, status in (("ben", "operator", 403), ("eva", "engineer", 200)):
+            headers = {"Authorization": f"Bearer {ring.add(owner, role, now_s=0)}"}
+            reply = client_of(app)("POST", f"{self.path}/back", json=WHY, headers=headers)
+            assert reply.status_code == status
+        assert [asked.by for asked in eye.asked] == ["eva"]

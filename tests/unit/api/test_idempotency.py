@@ -30,7 +30,10 @@ def app(clock, done):
         body = await request.body()
         done.append(body)
         status = int(request.query_params.get("status", 201))
-        return JSONResponse({"done": len(done)}, status, {"Location": "/x/1", "X-Other": "no"})
+        answer = JSONResponse({"done": len(done)}, status, {"Location": "/x/1", "X-Other": "no"})
+        if "cookie" in request.query_params:
+            answer.set_cookie("scm_key", "secret")
+        return answer
 
     async def long(_request):
         done.append(b"")
@@ -63,6 +66,13 @@ def test_the_same_change_gets_the_stored_answer(client, done):
     assert done == [b"a"]
 
 
+def test_an_answer_with_a_cookie_is_made_anew_and_never_kept(client, done):
+    for number in (1, 2):
+        answer = client("POST", "/x?cookie=1", content=b"a", headers=KEY)
+        assert answer.headers["set-cookie"].startswith("scm_key=secret")
+        assert len(done) == number
+
+
 @pytest.mark.parametrize(
     ("method", "path", "body"),
     [("POST", "/x", b"b"), ("PUT", "/x", b"a"), ("POST", "/x?q=1", b"a")],
@@ -80,6 +90,12 @@ def test_without_a_key_and_for_looking_nothing_is_kept(client, done):
     client("GET", "/x", headers=KEY)
     client("GET", "/x", headers=KEY)
     assert len(done) == 4
+
+
+def test_a_key_too_long_is_left_to_the_route_to_refuse(client, done):
+    for _ in range(2):
+        client("POST", "/x", content=b"a", headers={"Idempotency-Key": "k" * 129})
+    assert len(done) == 2
 
 
 def test_a_refusal_is_not_kept_and_its_key_is_free_again(client, done):

@@ -23,9 +23,10 @@ def test_all_leases_are_listed_by_pages(client, hear, snapshot):
     told = snapshot(n2=(0.0, 0.0, 0.0), n1=(0.0, 0.0, 0.0))
     first, second = told.vehicles
     first = msgspec.structs.replace(first, owner="desk", epoch=3, lease_left_ms=640.4)
+    second = msgspec.structs.replace(second, epoch=9)
     hear(1.0, msgspec.structs.replace(told, vehicles=(first, second)))
     page = client("GET", f"{LEASES}?limit=1").json()
-    assert page["items"] == [{"vehicle": "n1", "owner": "world", "epoch": 0, "left_ms": None}]
+    assert page["items"] == [{"vehicle": "n1", "owner": "world", "epoch": 9, "left_ms": None}]
     page = client("GET", f"{LEASES}?limit=1&cursor={page['next']}").json()
     assert page["items"] == [{"vehicle": "n2", "owner": "desk", "epoch": 3, "left_ms": 640}]
     assert page["next"] is None

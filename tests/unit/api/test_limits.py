@@ -29,6 +29,8 @@ def test_a_bucket_gives_what_it_holds_then_what_time_brings_back(clock):
     assert buckets.take("a") == (0.5, 1.0)
     clock.set_ns(clock.now_ns() + NS_PER_S)
     assert buckets.take("a") == (0.0, 0.0)
+    clock.set_ns(clock.now_ns() + 3600 * NS_PER_S)
+    assert buckets.take("a") == (2.0, 0.0)  # never more than it holds
 
 
 def test_callers_have_buckets_of_their_own_and_the_oldest_is_forgotten(clock, monkeypatch):

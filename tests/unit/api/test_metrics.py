@@ -1,11 +1,20 @@
 """Metrics say what the city and the server do, in the text that Prometheus reads."""
 
+import msgspec
 import pytest
+from msgspec import structs
 from prometheus_client.parser import text_string_to_metric_families
+from starlette.responses import Response
 
+from scm.api.acknowledgements import Acknowledgements
 from scm.api.app import create_app
-from scm.api.city import Link
+from scm.api.city import City, Link
 from scm.api.keys import KeyRing
+from scm.api.metrics import Measured, Metrics
+from scm.api.shelves import Shelves
+from scm.api.stream import Stream
+from scm.clock import StepClock
+from scm.store.memory import MemoryStore
 from scm.store.open import open_store
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.monitor_status import MonitorStatus
@@ -34,14 +43,28 @@ def test_before_anything_is_heard_there_is_no_world_but_a_server(read):
 
 
 def test_the_world_its_cars_and_the_stop_are_told(read, hear, snapshot):
-    hear(2.0, snapshot(at_s=1.0, n1=(0, 0, 0), n2=(1, 0, 0)), CityStop(t_ns=1, engaged=True))
+    world = snapshot(at_s=1.0, n1=(0, 0, 0), n2=(1, 0, 0))
+    n1, n2 = world.vehicles
+    world = msgspec.structs.replace(world, vehicles=(msgspec.structs.replace(n1, age_ms=250.0), n2))
+    hear(2.0, world, CityStop(t_ns=1, engaged=True))
     hear(2.5)
     told = read()
     assert told["scm_vehicles", "hosted"] == 2.0
     assert told["scm_snapshot_age_seconds",] == pytest.approx(0.5)
-    assert told["scm_vehicle_state_age_seconds", "hosted"] == pytest.approx(0.5)
+    assert told["scm_vehicle_state_age_seconds", "hosted"] == pytest.approx(0.75)
     assert told["scm_city_stopped",] == 1.0
     assert told["scm_late_ticks_total",] == 0.0
+
+
+def test_of_commands_the_oldest_of_each_kind_of_car_is_told(read, hear, snapshot):
+    told = snapshot(n1=(0, 0, 0), n2=(1, 0, 0), n3=(2, 0, 0))
+    first, second, third = told.vehicles
+    cars = structs.replace(first, command_age_ms=20.0), structs.replace(second, command_age_ms=90.0)
+    hear(1.0, structs.replace(told, vehicles=(*cars, structs.replace(third, kind="real"))))
+    hear(1.1)
+    numbers = read()
+    assert numbers["scm_cmd_age_seconds", "hosted"] == pytest.approx(0.19)
+    assert ("scm_cmd_age_seconds", "real") not in numbers, "nobody drives it from outside"
 
 
 def test_parts_tell_their_slowest_step_and_what_they_lost(read, hear):
@@ -52,6 +75,10 @@ def test_parts_tell_their_slowest_step_and_what_they_lost(read, hear):
     assert told["scm_part_step_seconds", "world"] == pytest.approx(0.004)
     assert told["scm_part_late_steps_total", "world"] == 3.0
     assert told["scm_part_dropped_messages_total", "world"] == 2.0
+    hear(2.0, msgspec.structs.replace(here, alive=False))
+    told = read()
+    assert told["scm_part_up", "world"] == 0.0
+    assert ("scm_part_step_seconds", "world") not in told
 
 
 def test_a_latched_fault_counts_once_however_often_it_is_told(read, hear):
@@ -72,6 +99,18 @@ def test_requests_are_counted_by_route_not_by_address(read, client):
     assert told["scm_requests_total", "GET", route, "404"] == 2.0
     assert told["scm_request_seconds_count", "GET", route] == 2.0
     assert told["scm_requests_total", "GET", "none", "404"] == 1.0
+
+
+def test_an_endless_answer_is_counted_and_not_timed(view, fake_city, city_map, client_of):
+    city = City(view, fake_city.ask, city_map, {}, Shelves(), Link())
+    metrics = Metrics(city, Stream(city, "r", Acknowledgements(MemoryStore(), StepClock())))
+    for media in ("text/event-stream", "text/plain"):
+        client_of(Measured(Response("", media_type=media), metrics=metrics, clock=StepClock()))(
+            "GET", "/"
+        )
+    text = metrics.text().decode()
+    assert 'scm_requests_total{method="GET",route="none",status="200"} 2.0' in text
+    assert 'scm_request_seconds_count{method="GET",route="none"} 1.0' in text
 
 
 def test_losses_of_the_bus_are_told(view, fake_city, city_map, client_of):

@@ -40,6 +40,13 @@ def test_scores_and_who_is_reported(client, hear):
     assert told["reported"] == ["n2"]
 
 
+def test_scores_of_a_part_that_fell_silent_are_told_no_longer(client, hear):
+    hear(1.0, scores(), report())
+    hear(7.0)
+    told = client("GET", URL).json()
+    assert (told["watched"], told["stations"], told["reported"]) == (False, [], ["n2"])
+
+
 def test_the_newest_report_on_a_station(client, hear):
     hear(1.0, report(1), report(11))
     told = client("GET", f"{URL}/n2").json()

@@ -115,10 +115,15 @@ def test_of_several_cars_each_has_its_report(call, shelves):
     folder = shelves.reports / "fleet"
     for car in ("n1", "n2"):
         put(shelves, f"fleet/{car}", "none")
-    (folder / "cars.json").write_text("{}", "utf-8")
+    told = {"said": "They share a camera.", "conclusions": ["It is tilted."], "common": []}
+    (folder / "cars.json").write_text(json.dumps(told), "utf-8")
     names = {row["name"] for row in call("GET", f"{API}/reports").json()["items"]}
     assert names == {"fleet.n1", "fleet.n2"}
-    assert call("GET", f"{API}/reports/fleet.n1").json()["row"]["verdict"] == "none"
+    report = call("GET", f"{API}/reports/fleet.n1").json()
+    assert report["row"]["verdict"] == "none"
+    assert report["together"]["said"] == told["said"]
+    assert report["together"]["conclusions"] == told["conclusions"]
+    assert report["together"]["cars"] == ["fleet.n1", "fleet.n2"]
 
 
 def test_a_damaged_report_is_listed_as_such_and_takes_nothing_down(call, shelves):
@@ -302,6 +307,11 @@ def test_an_upload_becomes_a_recording_for_a_search(call, shelves, ran):
             "vehicle",
         ),
         ({"recording.yaml": "recording: [", "commands.csv": COMMANDS}, "recording.yaml"),
+        ({"recording.yaml": DESCRIPTION + "#" * 300_000, "commands.csv": COMMANDS}, "256 KiB"),
+        (
+            {"recording.yaml": f"source: &a x\nnote: *a\n{DESCRIPTION}", "commands.csv": COMMANDS},
+            "alias",
+        ),
     ],
 )
 def test_an_upload_that_asks_for_what_lies_outside_is_refused(call, shelves, files, why):
@@ -318,4 +328,17 @@ def test_an_upload_that_is_no_zip_or_unpacks_to_too_much_is_refused(call, shelve
     bomb = packed({"recording.yaml": DESCRIPTION, "commands.csv": "0" * 5000})
     assert call("POST", f"{API}/uploads", content=bomb).status_code == 422
     monkeypatch.setattr(uploads, "MOST_BYTES", 100)
-    assert call("POST", f"{API}/uploads", content=b"x" * 101).status_code == 422
+    large = call("POST", f"{API}/uploads", content=bomb)
+    assert large.json()["detail"].startswith("upload: more than ")
+    assert [one.name for one in shelves.reports.iterdir()] == ["uploads"]
+
+
+def test_an_upload_with_a_long_list_or_damaged_is_refused(call, monkeypatch):
+    monkeypatch.setattr(uploads, "_CHUNK", 1001)  # entries lie across the edges of pieces
+    long = packed({f"{number}/": "" for number in range(uploads.MOST_ENTRIES + 1)})
+    detail = call("POST", f"{API}/uploads", content=long).json()["detail"]
+    assert f"entries: got {uploads.MOST_ENTRIES + 1}" in detail
+    damaged = bytearray(packed({"recording.yaml": DESCRIPTION * 9, "commands.csv": COMMANDS}))
+    damaged[60:90] = bytes(30)
+    answer = call("POST", f"{API}/uploads", content=bytes(damaged))
+    assert (answer.status_code, "cannot be read" in answer.json()["detail"]) == (422, True)

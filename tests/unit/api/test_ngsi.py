@@ -2,6 +2,7 @@
 
 import math
 
+import msgspec
 import pytest
 
 from scm.v2x.etsi import SCALE
@@ -27,6 +28,17 @@ def test_a_car_is_a_vehicle_in_the_units_of_the_model(client, city_of_two):
     place = place_of(round(latitude * 1e7), round(longitude * 1e7))
     assert place == pytest.approx((1.384, 0.655), abs=1e-3)
     assert car["location"]["observedAt"] == "1970-01-01T00:00:02.000Z"
+
+
+def test_who_stands_has_no_heading_and_who_is_lost_is_broken(client, hear, snapshot):
+    told = snapshot(at_s=1.0, n1=(0.0, 0.0, 0.0), n2=(1.0, 0.0, 0.0))
+    n1, n2 = told.vehicles
+    stands = msgspec.structs.replace(n1, speed_mps=0.0)
+    lost = msgspec.structs.replace(n2, alive=False)
+    hear(2.0, msgspec.structs.replace(told, vehicles=(stands, lost)))
+    one, other = client("GET", f"{WHERE}?type=Vehicle&options=keyValues").json()
+    assert (one["heading"], one["serviceStatus"]) == (-1, "parked")
+    assert (other["heading"], other["serviceStatus"]) == (90.0, "broken")
 
 
 def test_a_lane_is_a_road_segment_of_full_size(client, city_map):

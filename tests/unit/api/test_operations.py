@@ -141,10 +141,25 @@ def test_what_is_called_off_while_it_waits_never_runs(work, held):
     assert held.runs.wait(PATIENCE_S)
     second = work.start("export", "b", lambda _tell: ran.append(1) or "")
     work.cancel(second.id)
+    finish(second)  # at once, though the first still runs
+    assert (work.find(second.id).state, work.find(first.id).state) == ("cancelled", "running")
     held.go.set()
-    finish(first, second)
-    assert work.find(second.id).state == "cancelled"
+    finish(first)
     assert ran == []
+
+
+def test_what_waits_runs_in_the_order_of_asking(work, held):
+    ran = []
+    first = work.start("export", "a", held)
+    assert held.runs.wait(PATIENCE_S)
+
+    def noting(number):
+        return lambda _tell: ran.append(number) or ""
+
+    rows = [work.start("export", str(number), noting(number)) for number in range(8)]
+    held.go.set()
+    finish(first, *rows)
+    assert ran == list(range(8))
 
 
 def test_nobody_knows_an_operation_that_never_was(work):

@@ -1,16 +1,24 @@
 """Recordings over REST: the list, any moment, files, notes, and an end."""
 
+import asyncio
 import csv
 import io
 import os
+import threading
 import time
+from contextlib import suppress
+from pathlib import Path
 
+import httpx
 import pytest
 
 from scm.api.app import create_app
+from scm.api.problem import RefusedError
 from scm.api.ranged import BLOCK
+from scm.api.recordings_shelf import RecordingsShelf
+from scm.api.routes.recordings import _converted
 from scm.api.shelves import shelves_in
-from tests.unit.recorder.short_run import BEGIN_NS, write_run
+from tests.unit.recorder.short_run import BEGIN_NS, PICTURE, write_run
 
 
 @pytest.fixture
@@ -78,6 +86,8 @@ def test_names_that_leave_the_folder_find_nothing(client, folder):
     write_run(folder.parent / "outside.mcap")
     for name in ("..%2Foutside", "%2e%2e%2foutside", "....", "outside"):
         assert client("GET", f"/api/v1/recordings/{name}").status_code in (404, 422)
+    with pytest.raises(RefusedError):
+        RecordingsShelf(folder).path("../outside")
 
 
 def test_long_lists_come_in_pages(ask, folder):
@@ -99,6 +109,8 @@ def test_frames_tell_where_cars_were_and_what_signals_showed(ask, folder):
     assert (car, x_m) == (0, times[5])
     shown = [(one["t_s"], one["colour"]) for one in found["signals"]]
     assert shown == [(1.0, "red"), (2.0, "green")]
+    between = ask("/run/frames?from_s=1.05&to_s=1.08")["signals"]  # none was told of meanwhile
+    assert [(one["t_s"], one["colour"]) for one in between] == [(1.05, "red")]
 
 
 def test_boxes_are_told_at_the_begin_and_when_they_move(ask, folder):
@@ -106,6 +118,23 @@ def test_boxes_are_told_at_the_begin_and_when_they_move(ask, folder):
     frames = ask("/run/frames?from_s=0&to_s=2")["frames"]
     moved = [(frame["t_s"], frame["boxes"][0]["x_m"]) for frame in frames if frame["boxes"]]
     assert moved == [(0.0, 0.0), (1.0, 0.1)]
+
+
+def test_the_eyes_picture_of_a_time_is_the_newest_by_then(ask, client, folder):
+    write_run(folder / "run.mcap")  # pictured at 3 s
+    assert ask("/run/summary")["eye_cameras"] == ["overhead"]
+    told = [{"t_s": 3.0, "camera": "overhead"}]
+    assert ask("/run/frames?from_s=0&to_s=2.9")["pictures"] == []
+    assert ask("/run/frames?from_s=2&to_s=4")["pictures"] == told
+    assert ask("/run/frames?from_s=4&to_s=5")["pictures"] == told
+    for t_s in (3.0, 4.5):
+        answer = client("GET", f"/api/v1/recordings/run/eye/overhead.jpg?t_s={t_s}")
+        assert answer.content == PICTURE
+        assert answer.headers["content-type"] == "image/jpeg"
+        assert answer.headers["x-time-ns"] == str(BEGIN_NS)
+    early = ask("/run/eye/overhead.jpg?t_s=2.9", status=404)
+    assert early["detail"] == "run: camera 'overhead' has no picture of 2.9 s or before"
+    ask("/run/eye/elsewhere.jpg?t_s=4", status=404)
 
 
 def test_too_much_at_once_is_cut_and_says_so(ask, folder, monkeypatch):
@@ -158,6 +187,8 @@ def test_the_file_comes_whole_or_in_ranges(client, folder):
     assert client("GET", at, headers={"Range": "bytes=-50"}).content == content[-50:]
     assert client("GET", at, headers={"Range": "bytes=50-"}).content == content[50:]
     assert client("GET", at, headers={"Range": f"bytes={len(content)}-"}).status_code == 416
+    for endless in (f"bytes={'9' * 5000}-", f"bytes=-{'9' * 5000}"):  # no number at all
+        assert client("GET", at, headers={"Range": endless}).status_code == 200
     old = client("GET", at, headers={"Range": "bytes=0-9", "If-Range": '"older"'})
     assert (old.status_code, len(old.content)) == (200, len(content))
     head = client("HEAD", at)
@@ -192,6 +223,43 @@ def test_a_recording_can_be_deleted_but_not_while_it_is_written(ask, folder):
     path = write_run(folder / "run.mcap", finish=False)
     assert ask("/run", status=409, method="DELETE")["code"] == "being_written"
     quiet(path)
+    (folder / "run.notes.json").write_text('{"title": "Brisk", "notes": ""}', "utf-8")
     ask("/run", status=204, method="DELETE")
-    assert not path.exists()
+    assert list(folder.iterdir()) == []
     ask("/run", status=404)
+
+
+def test_of_two_who_edit_the_same_notes_one_is_obeyed(client, folder, monkeypatch):
+    write_run(folder / "run.mcap")
+    at = "http://127.0.0.1/api/v1/recordings/run/notes"
+    seen = {"If-Match": client("GET", at).headers["etag"]}
+    both, write = threading.Barrier(2), Path.write_bytes
+
+    def write_together(path, body):
+        with suppress(threading.BrokenBarrierError):
+            both.wait(0.5)
+        return write(path, body)
+
+    monkeypatch.setattr(Path, "write_bytes", write_together)
+
+    async def at_once():
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(client.app)) as editors:
+            own = [editors.put(at, json={"title": name}, headers=seen) for name in ("a", "b")]
+            return [answer.status_code for answer in await asyncio.gather(*own)]
+
+    assert sorted(asyncio.run(at_once())) == [200, 412]
+
+
+def test_an_export_holds_its_turn_until_its_reader_goes_away(folder):
+    folder.mkdir()
+    path = write_run(folder / "run.mcap")
+
+    async def hold():
+        turns = asyncio.Semaphore(1)
+        export = _converted(path, turns)
+        await anext(export)
+        held = turns.locked()
+        await export.aclose()
+        return held, turns.locked()
+
+    assert asyncio.run(hold()) == (True, False)

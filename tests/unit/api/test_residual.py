@@ -2,8 +2,10 @@ import math
 
 import pytest
 
-from scm.api.residual import residual_of, truth_at
+from scm.api.eye_residuals import KEPT_NS, ResidualLog, ResidualSample, stats_of
+from scm.api.residual import Residual, residual_of, truth_at
 from scm.geometry import Pose2
+from scm.v2x.messages.eye_pose import EyePose
 
 
 def test_between_two_snapshots_the_truth_is_linear(snapshot):
@@ -35,3 +37,22 @@ def test_measured_further_left_is_positive_yaw():
     residual = residual_of(Pose2(0.003, 0.004, -math.pi + 0.01), Pose2(0.0, 0.0, math.pi - 0.01))
     assert residual.position_mm == 5.0
     assert residual.yaw_deg == pytest.approx(math.degrees(0.02), abs=1e-3)
+
+
+def test_a_car_out_of_sight_for_long_is_forgotten():
+    log, off = ResidualLog(), Residual(position_mm=1.0, x_mm=1.0, y_mm=0.0, yaw_deg=0.0)
+    pose = EyePose(
+        camera="c", vehicle="n1", tag_id=1, t_ns=5, x_m=0.0, y_m=0.0, yaw_rad=0.0,
+        covariance=(0.0,) * 9,
+    )  # fmt: skip
+    log.add(pose, off)
+    log.forget(5 + KEPT_NS)
+    assert list(log.samples("c", 5, 1.0)) == ["n1"]
+    log.forget(6 + KEPT_NS)
+    assert log.samples("c", 5, 1.0) == {}
+
+
+def test_95_of_100_samples_lie_nearer():
+    one = {"vehicle": "n1", "t_ns": 0, "x_m": 0.0, "y_m": 0.0, "y_mm": 0.0, "yaw_deg": 0.0}
+    stats = stats_of(ResidualSample(x_mm=float(mm), **one) for mm in range(20, 0, -1))
+    assert (stats.p95_mm, stats.worst_mm) == (19.0, 20.0)

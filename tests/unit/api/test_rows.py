@@ -39,6 +39,14 @@ class TestCars:
         cars = vehicles_topic(view.picture()).vehicles
         assert [(car.vehicle, car.age_ms) for car in cars] == [("n1", 250.0), ("n2", 250.0)]
 
+    def test_battery_and_command_come_with_their_car(self, view, hear, snapshot):
+        told, replace = snapshot(n1=(0.0, 0.0, 0.0)), msgspec.structs.replace
+        known = {"battery_v": 11.4567, "battery_charge": 0.456789, "command_age_ms": 20.04}
+        hear(1.0, replace(told, vehicles=(replace(told.vehicles[0], **known),)))
+        hear(1.1)
+        (car,) = vehicles_topic(view.picture()).vehicles
+        assert (car.battery_v, car.battery_charge, car.command_age_ms) == (11.46, 0.4568, 120.0)
+
     def test_a_trip_is_shown_until_it_has_not_been_told_for_ten_seconds(self, view, hear, snapshot):
         trip = Trip(
             vehicle="n1",

@@ -1,6 +1,7 @@
 """Scripts of a folder: kept, edited, run beside the city, stopped."""
 
 import time
+from pathlib import Path
 
 import pytest
 
@@ -12,11 +13,14 @@ OVER = ("done", "failed", "cancelled")
 
 
 @pytest.fixture
-def client(view, fake_city, city_map, tmp_path, client_of):
+def link():
+    return Link(connect="tcp/x:1")
+
+
+@pytest.fixture
+def client(view, fake_city, city_map, tmp_path, client_of, link):
     shelves = shelves_in(tmp_path)
-    return client_of(
-        create_app(view, fake_city.ask, city_map, shelves=shelves, link=Link(connect="tcp/x:1"))
-    )
+    return client_of(create_app(view, fake_city.ask, city_map, shelves=shelves, link=link))
 
 
 @pytest.fixture
@@ -99,6 +103,14 @@ def test_a_run_hears_where_the_city_is_and_its_lines_are_told(client, keep, run,
     assert (row["state"], row["result"]) == ("done", f"/recordings/scenarios?run={number}")
     assert lines_of(client, number) == ["tcp/x:1 ['--connect', 'tcp/x:1']", "b"]
     assert lines_of(client, number, after=1) == ["b"]
+
+
+@pytest.mark.parametrize("link", [Link(script_credentials=Path("/c/script.toml"))])
+def test_a_run_is_told_who_it_is_in_a_city_that_asks(client, keep, run, operation):
+    keep("who", 'import os\nprint(os.environ["SCM_CREDENTIALS"])\n')
+    number = run("who")
+    assert operation(number)["state"] == "done"
+    assert lines_of(client, number) == ["/c/script.toml"]
 
 
 def test_the_same_key_runs_a_script_once(keep, run):

@@ -2,12 +2,13 @@ import json
 import socket
 import threading
 from contextlib import contextmanager
+from urllib.parse import urlsplit
 
 import httpx
 import pytest
 
 from scm.api.app import create_app
-from scm.api.server import serve
+from scm.api.server import _Impatient, serve
 from scm.clock import NS_PER_S, WallClock
 from scm.errors import RunError
 
@@ -98,3 +99,31 @@ def test_a_server_told_to_stop_before_it_began_returns(view, fake_city, city_map
     stop = threading.Event()
     stop.set()
     serve(create_app(view, fake_city.ask, city_map), "127.0.0.1", 0, stop)
+
+
+@pytest.mark.parametrize("begun", [b"", b"GET / HTTP/1.1\r\nHost: "])
+def test_who_never_ends_a_request_s_head_is_let_go(app, monkeypatch, begun):
+    monkeypatch.setattr(_Impatient, "patience_s", 0.2)
+    with served(app) as (url, _, _), socket.create_connection(address_of(url), 5.0) as idle:
+        idle.sendall(begun)
+        assert idle.recv(100) == b""
+
+
+def test_who_asks_and_asks_again_is_not_let_go(app, monkeypatch):
+    monkeypatch.setattr(_Impatient, "patience_s", 0.2)
+    with served(app) as (url, _, _), httpx.Client(base_url=url) as client:
+        with client.stream("GET", "/api/v1/stream") as response:
+            beats = (name for name, _ in events_of(response) if name == "beat")
+            assert next(beats) == "beat"  # a second later
+        assert client.get("/healthz").status_code == 200
+
+
+def test_nobody_calls_in_the_name_of_another_address(app, client_of):
+    with served(app) as (url, _, _):
+        httpx.post(f"{url}/api/v1/boxes/reset", headers={"X-Forwarded-For": "10.9.8.7"})
+    (deed,) = client_of(app)("GET", "/api/v1/audit").json()["items"]
+    assert deed["request"]["address"] == "127.0.0.1"
+
+
+def address_of(url):
+    return urlsplit(url).hostname, urlsplit(url).port

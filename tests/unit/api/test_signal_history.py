@@ -18,11 +18,14 @@ class Teller:
         self.t_s = 0.0
         self._colour, self._since_s = None, 0.0
 
-    def tell(self, colour, lasts_s, least_s, most_s=None, likely_s=None, mode="plan", plan="calm"):
-        for _ in range(round(10 * lasts_s)):
+    def tell(
+        self, colour, lasts_s, least_s, most_s=None, likely_s=None, mode="plan", plan="calm", lost=0
+    ):
+        for step in range(round(10 * lasts_s)):
             if colour != self._colour:
                 self._colour, self._since_s = colour, self.t_s
-            self.history.take(self._spat(least_s, most_s, likely_s, mode, plan))
+            if step >= lost:
+                self.history.take(self._spat(least_s, most_s, likely_s, mode, plan))
             self.t_s = round(self.t_s + 0.1, 3)
 
     def _spat(self, least_s, most_s, likely_s, mode, plan):
@@ -60,6 +63,13 @@ def test_bars_lie_end_to_end_and_the_last_one_is_open(teller):
     teller.tell("green", 5, 8)
     teller.tell("yellow", 1, 9)
     assert teller.bars() == [("red", 0, 3), ("green", 3, 8), ("yellow", 8, None)]
+
+
+def test_a_bar_ends_when_the_next_colour_began_though_it_was_heard_later(teller):
+    teller.tell("green", 5, 5.0, 5.2)
+    teller.tell("yellow", 1, 6, lost=3)
+    assert teller.bars() == [("green", 0, 5), ("yellow", 5, None)]
+    assert (teller.score().early, teller.score().late) == (0, 0)
 
 
 def test_nothing_is_kept_for_ever(teller):
@@ -143,12 +153,15 @@ def test_changes_of_what_runs_are_kept(teller):
 
 def test_the_monitors_words_are_kept_when_they_change():
     history = SignalHistory()
-    for t_ns, fault in enumerate((None, None, "stale", "stale", None)):
-        history.take_monitor(MonitorStatus(junction="x", t_ns=t_ns, fault=fault, since_ns=0))
-    assert [(one.t_ns, one.fault) for one in history.verdicts("x")] == [
-        (4, None),
-        (2, "stale"),
-        (0, None),
+    said = ((None, ""), (None, ""), ("stale", "0.6 s"), ("stale", "0.6 s"), ("stale", "2 s"))
+    for t_ns, (fault, detail) in enumerate((*said, (None, ""))):
+        status = MonitorStatus(junction="x", t_ns=t_ns, fault=fault, since_ns=0, detail=detail)
+        history.take_monitor(status)
+    assert [(one.t_ns, one.fault, one.detail) for one in history.verdicts("x")] == [
+        (5, None, ""),
+        (4, "stale", "2 s"),
+        (2, "stale", "0.6 s"),
+        (0, None, ""),
     ]
 
 

@@ -143,9 +143,10 @@ def test_before_the_controller_is_heard_there_are_no_plans(client):
     refused(client("GET", "/api/v1/signals/moon/plans"), 404, "not_found")
 
 
-def put(client, stages=STAGES, plan="rush", **headers):
+def put(client, stages=STAGES, plan="rush", offset_s=None, **headers):
     named = {name.replace("_", "-"): value for name, value in headers.items()}
     body = {"about": "for the east", "by": "ada", "reason": "school", "stages": stages}
+    body["offset_s"] = offset_s
     return client("PUT", f"{AT}/plans/{plan}", json=body, headers=named)
 
 
@@ -184,9 +185,13 @@ def test_a_plan_is_proven_saved_edited_asked_for_and_deleted(client, fake_city, 
     tag = client("GET", f"{AT}/plans/rush").headers["etag"]
     changed = [STAGES[1], STAGES[0]]
     refused(put(client, changed, If_Match=tag), 409, "unproven")
-    assert put(client, If_Match=tag).status_code == 200
+    outside = refused(put(client, If_Match=tag, offset_s=20.5), 422, "invalid")
+    assert "offset_s: got 20.5, expected less than 20.5, its cycle" in outside
+    in_step = put(client, If_Match=tag, offset_s=7.5)
+    assert (in_step.status_code, in_step.json()["offset_s"]) == (200, 7.5)
     client("PUT", f"{AT}/plan", json={"plan": "rush"})
     assert fake_city.asked[-1].stages == tuple(msgspec.convert(STAGES, list[SignalStage]))
+    assert fake_city.asked[-1].offset_s == 7.5
     slower = msgspec.structs.replace(phase("south_west"), red_clear_s=6.0)
     hear(2.0, site(phases=(phase("south_east"), slower)))
     assert client("GET", f"{AT}/plans/rush").json()["usable"] is False
@@ -213,6 +218,7 @@ def test_one_broken_file_does_not_hide_the_other_plans(client, heard, tmp_path):
 
 
 def test_no_file_outside_the_shelf_is_read(client, heard, fake_city, tmp_path):
+    (tmp_path / "plans" / "crossing").mkdir(parents=True)  # without it no way leads out
     (tmp_path / "secret.json").write_text("{", "utf-8")
     assert client("PUT", f"{AT}/plan", json={"plan": "../../secret"}).status_code == 200
     assert fake_city.asked[-1].stages == ()  # the controller is asked, which knows no such plan

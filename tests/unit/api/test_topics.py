@@ -31,6 +31,7 @@ def test_the_pulse_is_unknown_until_the_world_is_heard(view, hear, snapshot):
     hear(2.0, snapshot(at_s=1.0, tick=7, n1=(0, 0, 0), n2=(1, 0, 0)))
     beats = pulse_of(view.picture())
     assert (beats.t_ns, beats.tick, beats.vehicles) == (1_000_000_000, 7, 2)
+    assert (still.moving, beats.moving) == (0, 2)
 
 
 def test_a_topic_follows_the_picture(city, seen, hear, snapshot):

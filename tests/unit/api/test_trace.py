@@ -4,7 +4,18 @@ import logging
 
 import pytest
 
-from scm.api.trace import HEADER, trace_id, trace_id_of
+from scm.api.app import create_app
+from scm.api.audit_trail import newest_first
+from scm.api.trace import HEADER, trace_id, trace_id_of, traced
+from scm.clock import StepClock
+from scm.part import Serves
+from scm.station import Station
+from scm.store.memory import MemoryStore
+from scm.v2x.bus_memory import MemoryNetwork
+from scm.v2x.exchange import Answer, Call
+from scm.v2x.keeping import Keeper
+from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.stop_request import StopRequest
 
 GIVEN = "4bf92f3577b34da6a3ce929d0e0e4736"
 PARENT = f"00-{GIVEN}-00f067aa0ba902b7-01"
@@ -36,6 +47,34 @@ def test_problems_and_the_log_name_it(client, caplog):
         answer = client("GET", "/readyz", headers={"traceparent": PARENT})
     assert answer.json()["trace_id"] == GIVEN
     assert f"request_failed method=GET path=/readyz status=503 trace_id={GIVEN}" in caplog.text
+
+
+def test_what_is_asked_of_the_city_carries_it(view, fake_city, city_map, client_of):
+    fake_city.answers[StopRequest] = CityStop(t_ns=1, engaged=True)
+    app = create_app(view, lambda request, wait_s: fake_city.ask(traced(request), wait_s), city_map)
+    body = {"engaged": True, "by": "ada", "reason": "a hand"}
+    headers = {"traceparent": PARENT}
+    assert client_of(app)("PUT", "/api/v1/stop", json=body, headers=headers).status_code == 200
+    assert [request.trace_id for request in fake_city.asked] == [GIVEN]
+    assert traced(StopRequest(engaged=False, by="ada")).trace_id == "", "nothing is answered here"
+
+
+class Button:
+    """A part with nothing but a red button."""
+
+    name, role, period_ns, hears = "world", "part", 1, ()
+    serves = (Serves(StopRequest),)
+
+
+def test_a_station_says_in_log_and_audit_under_which_trace_it_did_something(caplog):
+    store, network = MemoryStore(), MemoryNetwork(StepClock(0))
+    station = Station(Button(), network.bus("city", "world"), Keeper(store, "world", "s"))
+    request = StopRequest(engaged=True, by="ada", trace_id=GIVEN)
+    network.bus("city", "api").call(Call(request), print)
+    with caplog.at_level(logging.INFO, "scm.station"):
+        station.send(Answer(item, CityStop(t_ns=1, engaged=True)) for item in station.inbox())
+    assert f"answered request=StopRequest reply=CityStop trace_id={GIVEN}" in caplog.text
+    assert [row.trace_id for row in newest_first(store)] == [GIVEN]
 
 
 def test_the_gate_names_it_as_well(app, client_of):

@@ -4,6 +4,7 @@ import asyncio
 import json
 import struct
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -93,10 +94,17 @@ def test_names_are_told_again_only_when_they_changed(frames, hear, snapshot):
         same = await anext(viewer)
         hear(1.2, snapshot(1.2, 3, n1=(1, 0, 0), n2=(2, 0, 0)))
         assert frames.look()
-        return first, same, await anext(viewer)
+        more = await anext(viewer)
+        told = snapshot(1.3, 4, n1=(1, 0, 0), n2=(2, 0, 0))
+        first_car, other = told.vehicles
+        stopped = msgspec.structs.replace(first_car, mode="stop")
+        hear(1.3, msgspec.structs.replace(told, vehicles=(stopped, other)))
+        assert frames.look()
+        return first, same, more, await anext(viewer)
 
-    first, same, more = asyncio.run(scenario())
-    assert [read(frame)[0].keys() for frame in (first, same, more)] == [{1}, set(), {2}]
+    told = [read(frame)[0] for frame in asyncio.run(scenario())]
+    assert [names.keys() for names in told] == [{1}, set(), {2}, {3}]
+    assert "stop" in told[3][3]["modes"], "a word that is new, of cars that are not"
 
 
 def test_a_slow_viewer_gets_the_newest_and_no_backlog(frames, hear, snapshot):

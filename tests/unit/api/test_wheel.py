@@ -4,10 +4,11 @@ import math
 
 import pytest
 
-from scm.api.wheel import GONE_NS, RENEW_NS, SILENT_NS, DrivePacket, Wheel
-from scm.clock import NS_PER_MS
+from scm.api.wheel import RENEW_NS, DrivePacket, Wheel
+from scm.clock import NS_PER_MS, NS_PER_S
 
 T0 = 1_000 * NS_PER_MS
+SILENT_NS, GONE_NS = 250 * NS_PER_MS, 5 * NS_PER_S
 
 
 @pytest.fixture

@@ -79,7 +79,10 @@ def test_the_page_says_each_verdict_and_what_is_common(tmp_path):
     assert "Nothing beyond noise" in first
     assert not re.search(r"(src|href)=.?https?:|<script|@import", page)
     write_several(cars, {"n1": ("run",), "n2": ("run",)}, [found], 3.0, tmp_path)
-    told = json.loads((tmp_path / "cars.json").read_text(encoding="utf-8"))["common"][0]
+    fields = json.loads((tmp_path / "cars.json").read_text(encoding="utf-8"))
+    assert fields["said"] == "The cars have in common: camera tilt."
+    assert "Camera tilt: Both cars see it alike" in fields["conclusions"][0]
+    told = fields["common"][0]
     assert told["shared"] is True
     assert told["cars"][1]["sight"] == "sees"
     assert "Both cars see it alike" in several_summary(cars, [found], tmp_path)

@@ -59,6 +59,7 @@ def searched(drive):
     return Search(model, part, library, lambda _: None), 1.0 - part
 
 
+@cache
 def gusty_drive():
     return lawful_drive(gust().numbers(GUST))
 
