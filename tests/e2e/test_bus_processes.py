@@ -215,14 +215,14 @@ def test_a_crew_gives_up_on_bad_input_at_once(supervise):
     toys = supervise(a="exit2")
     toys.until(lambda: toys.crew.settled)
     assert toys.said == [
-        "  a         died with exit code 2: its input is bad; it is not started again"
+        "  a            died with exit code 2: its input is bad; it is not started again"
     ]
 
 
 def test_a_member_that_leaves_by_itself_is_let_go(supervise):
     toys = supervise(a="exit0")
     toys.until(lambda: toys.crew.settled)
-    assert toys.said == ["  a         left"]
+    assert toys.said == ["  a            left"]
 
 
 @pytest.mark.slow
@@ -242,7 +242,7 @@ def test_a_crew_is_stopped_within_two_seconds_even_if_one_does_not_listen(superv
     assert CLOCK.now_ns() - began_ns < 2 * NS_PER_S
     assert len(pids) == 3
     assert not any(is_running(pid) for pid in pids)
-    assert toys.said[-1] == "  b         did not stop: killed"
+    assert toys.said[-1] == "  b            did not stop: killed"
 
 
 SUPERVISOR = """

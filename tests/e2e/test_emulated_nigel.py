@@ -20,7 +20,6 @@ from tests.e2e.city_process import START_S, wait_for
 from tests.e2e.emulated_stage import EmulatedStage
 from vehicle_agent.nigel.rosserial import REQUEST_TOPICS, Decoder, Frame, pack, pack_float
 
-BOOTED_S = 2.2
 TAG = 9
 
 
@@ -67,6 +66,19 @@ def say(port, throttle, steering, seconds):
         time.sleep(0.02)
 
 
+def answer(port):
+    """Ask for the topics until the board, which boots first, tells them."""
+    decoder, frames = Decoder(), []
+
+    def heard():
+        port.write(pack(REQUEST_TOPICS))
+        frames.extend(decoder.feed(port.read(220), 0))
+        return len(frames) >= 3
+
+    wait_for(heard, 20.0, "the board tells its topics")
+    return frames
+
+
 def gap(a, b):
     return math.hypot(a.x_m - b.x_m, a.y_m - b.y_m)
 
@@ -82,19 +94,20 @@ def seen_and_true(stage):
 def test_bytes_on_the_port_move_what_the_eye_sees(stage):
     start = wait_for(lambda: stage.newest(stage.eye), START_S, "the Eye sees the car")
     with serial.Serial(str(stage.link), 57600, timeout=0.5) as port:
-        time.sleep(BOOTED_S)
-        port.write(pack(REQUEST_TOPICS))
-        assert [frame.topic for frame in Decoder().feed(port.read(220), 0)] == [10, 1, 1]
+        assert [frame.topic for frame in answer(port)[:3]] == [10, 1, 1]
         say(port, 0.8, 0.3, 2.0)
         seen, true = seen_and_true(stage)
         assert 0.15 < gap(seen, start) < 0.4
         assert gap(seen, true) < 0.01
-    time.sleep(0.5)  # nobody holds the port any more, and the car drives on
-    later, _ = seen_and_true(stage)
-    assert gap(later, seen) > 0.05
+    drives_on = lambda: gap(seen_and_true(stage)[0], seen) > 0.05  # noqa: E731
+    wait_for(drives_on, 5.0, "the car drives on though nobody holds the port any more")
+
+    def stands():
+        now, true = seen_and_true(stage)
+        return now if abs(true.speed_mps) < 0.005 else None
+
     with serial.Serial(str(stage.link), 57600):
-        time.sleep(0.5)  # opening it resets the board
-        stopped, _ = seen_and_true(stage)
+        stopped = wait_for(stands, 5.0, "the car stands: opening the port resets its board")
         time.sleep(0.5)
         assert gap(seen_and_true(stage)[0], stopped) < 0.005
     said = [re.sub(r".* (host_\w+) .*", r"\1", line) for line in stage.lines if "host_" in line]

@@ -9,7 +9,10 @@ from typing import Any
 
 import pytest
 
+from scm.api.keys import KeyRing
+from scm.client import Client
 from scm.errors import LinkError
+from scm.store.open import open_store
 from scm.v2x.bus_zenoh import ZenohBus
 from tests.e2e.city_process import CityProcess, city, wait_for
 
@@ -26,7 +29,11 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
     fleet = tmp_path_factory.mktemp("fleet") / "fleet.toml"
     scm("fleet", "add", "n9", "--fleet", fleet, "--role", "vehicle", "--password")
     runs = tmp_path_factory.mktemp("runs")
-    with city(runs, "--fleet", str(fleet), "--hosted", "1", "--agents", "1") as process:
+    keys = f"sqlite:{runs}/keys.db"
+    admin = KeyRing(open_store(keys)).add("ann", "admin", 1)
+    guarded = ("--fleet", str(fleet), "--keys", keys, "--hosted", "1", "--agents", "1")
+    with city(runs, *guarded) as process:
+        process.web.headers["Authorization"] = f"Bearer {admin}"
         wait_for(
             lambda: len(process.get("/vehicles")["vehicles"]) == 2, 60.0, "two cars are on the map"
         )
@@ -36,6 +43,30 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
 def test_who_has_no_credentials_stays_outside(running: CityProcess) -> None:
     with pytest.raises(LinkError):
         ZenohBus("city", "n8", running.endpoint, connect_timeout_s=1.0)
+
+
+SCRIPT = """
+import os
+from scm.fleet import open_city
+
+with open_city(connect=os.environ["SCM_CONNECT"]) as city:
+    print(city.spawn("nigel", name="guest").name)
+"""
+
+
+def test_scripts_enter_as_an_operator_and_people_drive_by_their_keys(running: CityProcess) -> None:
+    admin = running.web.headers["Authorization"].removeprefix("Bearer ")
+    ring = KeyRing(open_store(f"sqlite:{running.folder}/keys.db"))
+    with Client(running.url, admin) as ann:
+        ann.scenarios.write("visit", text=SCRIPT, if_none_match="*")
+    with Client(running.url, ring.add("ben", "operator", 1)) as ben:
+        run = ben.wait(ben.scenarios.run("visit"), timeout_s=60.0)
+        assert ben.scenarios.lines(run.id).lines == ("guest",)
+        with ben.wheel("n1") as wheel:
+            while wheel.drive(0.4, 0.0).why != "driving":
+                pass
+        assert wheel.over is not None
+        assert wheel.over.code == "given_back"
 
 
 def test_the_plan_asked_for_is_still_in_force_when_traffic_dies(running: CityProcess) -> None:

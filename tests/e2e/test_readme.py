@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -18,11 +19,12 @@ from scm.world.part import WorldPart
 from tests.e2e.city_process import CityProcess, city, wait_for
 
 README = Path(__file__).parents[2] / "README.md"
+REST = README.parent / "docs/rest.md"
 
 
-def commands() -> list[str]:
-    """Return the shell lines of README's fenced blocks, comments taken off."""
-    blocks = re.findall(r"```sh\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+def commands(page: Path = README) -> list[str]:
+    """Return the shell lines of a page's fenced blocks, comments taken off."""
+    blocks = re.findall(r"```sh\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     lines = [line.partition("  #")[0].strip() for block in blocks for line in block.splitlines()]
     return [line for line in lines if line]
 
@@ -107,6 +109,28 @@ def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         command, shell=True, cwd=folder, capture_output=True, text=True, timeout=280.0, check=False
     )
+
+
+def test_the_client_s_examples_work_beside_each_other(
+    running: CityProcess, workplace: Path, root: Path, recorded: Path
+) -> None:
+    """One waits for a cycle's end, one for a search: together they take no longer than one."""
+    shutil.copy(recorded, running.folder)
+    shell = [here(command, running, root) for command in commands(REST)]
+    with ThreadPoolExecutor(len(shell)) as pool:
+        wheel, signals, diagnosis = pool.map(lambda command: run(command, workplace), shell)
+    for done in (wheel, signals, diagnosis):
+        assert done.returncode == 0, f"{done.args}\n{done.stdout}\n{done.stderr}"
+    came = re.search(r"n1 came (\d+\.\d+) m by hand", wheel.stdout)
+    assert came is not None, wheel.stdout
+    assert float(came[1]) > 0.02, wheel.stdout
+    assert "n1 goes on by itself" in wheel.stdout
+    assert re.search(r"\d+ colours ended as SPaT had promised, 0 otherwise", signals.stdout)
+    plans = running.get("/signals/crossing/plans")["items"]
+    assert [row["plan"] for row in plans] == ["brisk", "calm"]
+    (report,) = running.get("/mismatch/reports")["items"]
+    assert report["said"] in diagnosis.stdout
+    assert f"{running.url}/mismatch/{report['name']}" in diagnosis.stdout
 
 
 def test_every_example_is_in_the_readme(root: Path) -> None:

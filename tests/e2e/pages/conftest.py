@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from tests.e2e.city_process import CityProcess, city, wait_for
-from tests.e2e.pages.visiting import Visit, judge, photograph
+from tests.e2e.pages.visiting import SIZES, Visit, judge, photograph
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 ARGUMENTS = [
@@ -24,7 +24,6 @@ ARGUMENTS = [
     "--disable-sync",
     "--no-first-run",
 ]
-SIZES = {"wide": (1440, 900), "narrow": (390, 844)}
 THEMES = ("light", "dark")
 
 
@@ -102,5 +101,22 @@ def look(visit: Callable[..., Visit]) -> Callable[..., Visit]:
         judge(visited)
         photograph(visited, f"{name}_{size}_{theme}")
         return visited
+
+    return at
+
+
+@pytest.fixture
+def look_around() -> Callable[[Visit, str, str], None]:
+    """Look at an open page in both sizes and both themes, each once."""
+
+    def at(visited: Visit, part: str, name: str) -> None:
+        """Judge the page, and keep `name_size_theme.png` with the selector `part` in view."""
+        for size, theme in zip(SIZES, THEMES, strict=True):
+            width, height = SIZES[size]
+            visited.page.set_viewport_size({"width": width, "height": height})
+            visited.page.emulate_media(color_scheme=theme)
+            visited.page.locator(part).scroll_into_view_if_needed()
+            judge(visited)
+            photograph(visited, f"{name}_{size}_{theme}")
 
     return at

@@ -10,10 +10,11 @@ ROWS = ".at-events .entries > li"
 
 
 def stop_and_go(running, reason):
-    """Make two events and four deeds that everybody sees."""
+    """Make two events and four deeds that everybody sees; return the trace of the last two."""
     for engaged in (True, False):
         body = {"engaged": engaged, "by": "ada", "reason": reason}
-        running.web.put("/stop", json=body).raise_for_status()
+        answer = running.web.put("/stop", json=body).raise_for_status()
+    return answer.headers["trace-id"]
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -74,13 +75,24 @@ def test_a_paused_log_stands_still_until_it_is_followed_again(visit, running):
 
 
 def test_the_audit_names_who_did_what_and_its_chain_is_whole(visit, running):
-    stop_and_go(running, "for the audit")
+    trace = stop_and_go(running, "for the audit")
     page = visit("/events/audit").page
     page.fill("input[aria-label='Find in deeds']", "for the audit")
-    deed = ".at-events [data-deed]:has-text('StopRequest')"
+    deed = ".at-events [data-deed]:has-text('stop the city')"
     page.wait_for_selector(deed)
     assert "world" in page.locator(deed).first.inner_text()
+    page.set_viewport_size({"width": 390, "height": 844})
+    for cell in ("what", "by", "answer"):  # a telephone shows who did it without being pushed aside
+        box = page.locator(f"{deed} .{cell}").first.bounding_box()
+        assert box["x"] + box["width"] <= 390
     page.locator(f"{deed} .name").first.click()
     assert "for the audit" in page.inner_text(".at-events .whole pre")
+    page.click(".at-events .whole .trace button")
+    page.wait_for_selector(".at-events [data-deed]:has-text('PUT /stop')")
+    deeds = running.get(f"/audit?text={trace}")["items"]
+    assert [(deed["station"], deed["trace_id"]) for deed in deeds] == [
+        ("api", trace),
+        ("world", trace),
+    ], "a click, and what the world did for it"
     page.click("text=Check the chain")
     page.wait_for_selector(".chain >> text=whole:")

@@ -41,6 +41,11 @@ def is_drawn(page, colour, least, most=10**9):
     raise AssertionError(f"{count} pixels of {colour}, expected {least} to {most}")
 
 
+def ages_of(page):
+    """Read the table's ages, row by row."""
+    return page.locator(".cars tbody .age").all_inner_texts()
+
+
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("size", ["wide", "narrow"])
 def test_the_map_looks_right(look, size, theme):
@@ -162,6 +167,9 @@ def test_the_table_is_searched_filtered_sorted_and_walked_by_keyboard(visit):
     page = visited.page
     names = ".cars tbody tr[data-car] .name"
     page.wait_for_selector('tr[data-car="n6"]')
+    for _ in range(3):  # the rows live while nobody touches them
+        told = ages_of(page)
+        visited.until(lambda told=told: ages_of(page) != told, "ages go on")
     page.select_option(".filters select", "remote")
     visited.until(lambda: page.locator(names).all_inner_texts() == ["n5", "n6"], "only agents")
     page.select_option(".filters select", "")
@@ -211,6 +219,8 @@ def test_signals_have_letter_and_time_and_lead_to_their_junction(visit):
             return heads.length && heads.every(head => /^[RYGF]$/.test(head.innerText.trim()));
         }"""
     )
+    groups = page.locator(".signals-short li").all_inner_texts()
+    assert [text.split()[1:3] for text in groups] == [["south", "east"], ["south", "west"]]
     assert page.get_attribute(".signals-short a", "href") == "/signals/crossing"
 
 

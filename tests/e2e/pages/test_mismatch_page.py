@@ -8,6 +8,7 @@ import pytest
 from scm.fleet import LockstepLink
 from scm.lockstep import Lockstep
 from scm.maps.load import load_map
+from scm.mismatch.report.several_page import write_several
 from scm.mismatch.report.write import write_report
 from scm.play import play, write_recording
 from scm.world.part import WorldPart
@@ -29,6 +30,11 @@ def shelf(running):
     folder = running.folder / "reports"
     for name, case in REPORTS.items():
         write_report(*made_up.CASES[case](), folder / name)
+    cars = {car: made_up.CASES["none"]() for car in ("n1", "n2")}
+    for car, made in cars.items():
+        write_report(*made, folder / "fleet" / car)
+    found = {car: made[0] for car, made in cars.items()}
+    write_several(found, dict.fromkeys(cars, ("run",)), [], 3.0, folder / "fleet")
     drive = folder / "undecided" / "next_drive"
     drive.mkdir()
     (drive / "next_drive.yaml").write_text("drive: 1\ncommands: next_drive.csv\n", "utf-8")
@@ -76,6 +82,16 @@ def test_the_list_finds_a_report_and_opens_it(look, shelf, searching):
     page.click(".reports .cards a")
     page.wait_for_selector(".head .sentence >> text=Nothing beyond noise")
     assert page.url.endswith("/mismatch/healthy")
+
+
+def test_cars_of_one_search_tell_what_they_share_and_lead_to_each_other(visit, shelf):
+    visited = visit("/mismatch/fleet.n1")
+    page = visited.page
+    page.wait_for_selector(".card >> text=Nothing that the cars have in common was found.")
+    judge(visited)
+    page.click(".card a:has-text('n2')")
+    page.wait_for_selector(".card a:has-text('n1')")
+    assert page.url.endswith("/mismatch/fleet.n2")
 
 
 def test_map_and_time_line_show_the_same_moment(visit, shelf):

@@ -8,7 +8,8 @@ from mcap.reader import make_reader
 from scm.recorder.recover import recover
 from scm.recorder.run_index import read_index
 from tests.e2e.city_process import wait_for
-from tests.e2e.pages.visiting import judge
+from tests.e2e.pages.conftest import SIZES, THEMES
+from tests.e2e.pages.visiting import judge, photograph
 
 NAME = "morning_drive"
 AT = f"/recordings/{NAME}"
@@ -16,6 +17,18 @@ DRIVEN_S = 12.0
 READY = '.sheet[data-shown="cars"]'
 ALL_SHOWN = "() => document.querySelectorAll('.cars tbody tr').length === 6"
 SCRIPT = '"""Say a word."""\nimport time\nprint("a word", flush=True)\ntime.sleep(60)\n'
+
+
+def judge_everywhere(visited, name):
+    """Judge and photograph a page in every size and theme; it is left wide and light."""
+    for size in reversed(SIZES):
+        width, height = SIZES[size]
+        visited.page.set_viewport_size({"width": width, "height": height})
+        for theme in reversed(THEMES):
+            visited.page.emulate_media(color_scheme=theme)
+            visited.page.wait_for_selector(f':root[data-theme="{theme}"]')
+            judge(visited)
+            photograph(visited, f"{name}_{size}_{theme}")
 
 
 @pytest.fixture(scope="module")
@@ -26,9 +39,10 @@ def drive(running, tmp_path_factory):
     def is_long():
         summary = running.get(f"/recordings/{live}/summary")
         length_s = summary["recording"]["length_s"] - summary["first_frame_s"]
-        return len(summary["cars"]) == 6 and length_s > DRIVEN_S
+        is_pictured = bool(summary["eye_cameras"])  # a busy machine has few pictures
+        return len(summary["cars"]) == 6 and length_s > DRIVEN_S and is_pictured
 
-    wait_for(is_long, 90.0, "six cars have driven for a while")
+    wait_for(is_long, 90.0, "six cars have driven for a while, and were pictured")
     path = running.folder / f"{NAME}.mcap"
     so_far = tmp_path_factory.mktemp("copy") / "so_far.mcap"  # the file itself grows meanwhile
     shutil.copyfile(running.folder / f"{live}.mcap", so_far)
@@ -52,9 +66,18 @@ def test_a_replay_is_calm_accessible_and_fits(look, last_s, size, theme):
     assert visited.page.title().startswith("NOT LIVE")
 
 
-def test_the_list_tells_what_is_written_and_opens_a_replay_that_leaves_no_trace(look, drive):
-    visited = look("/recordings", "recordings_list", "wide", "light", ready="tbody tr")
+def test_the_list_tells_what_is_written_and_opens_a_replay_that_leaves_no_trace(
+    visit, running, drive
+):
+    bad = running.folder / "bad.mcap"
+    bad.write_bytes(b"no recording")
+    visited = visit("/recordings", "narrow", "dark")
     page = visited.page
+    try:
+        page.wait_for_selector('tr[data-state="unreadable"] >> text=an MCAP file begins otherwise')
+        judge_everywhere(visited, "recordings_list")
+    finally:
+        bad.unlink()
     assert page.locator('tr[data-state="being written"]').count() == 1
     page.click(f'tr[data-recording="{NAME}"] a')
     page.wait_for_selector(".not-live")
@@ -77,6 +100,25 @@ def test_cars_stand_where_the_recording_has_them(visit, running, drive, last_s):
     assert set(shown) == set(cars)
     for name, speed_mps in cars.items():
         assert shown[name] == pytest.approx(speed_mps, abs=0.15)
+
+
+def test_the_picture_is_the_newest_that_the_eye_had_by_then(visit, running, drive):
+    end_s = drive["recording"]["length_s"]  # it was kept when there was one
+    visited = visit(f"{AT}?t={end_s}")
+    page = visited.page
+    told = running.get(f"/recordings/{NAME}/frames?from_s={end_s}&to_s={end_s}")["pictures"]
+    page.wait_for_selector(".seen[data-at]")
+    shown_s = float(page.get_attribute(".seen", "data-at"))
+    assert shown_s == max(picture["t_s"] for picture in told)
+    assert page.evaluate("document.querySelector('.seen img').naturalWidth") == 1280
+    assert page.locator(".seen .stamp").inner_text().upper() == "NOT LIVE"
+    page.click(".seen")
+    page.wait_for_selector(".seen.large")
+    judge(visited)
+    page.keyboard.press("Escape")
+    page.wait_for_selector(".seen:not(.large)")
+    page.locator("input[type=range]").fill("0")
+    page.wait_for_selector("text=No picture was recorded by then")
 
 
 def test_it_plays_pauses_steps_and_jumps_by_mouse_and_keyboard(visit, drive, last_s):
@@ -194,8 +236,8 @@ def test_a_recording_that_cannot_be_read_says_so(visit, running):
         bad.unlink()
 
 
-def test_a_script_is_written_run_watched_and_stopped(look, running):
-    visited = look("/recordings/scenarios", "scenarios", "wide", "dark", ready=".code")
+def test_a_script_is_written_run_watched_and_stopped(visit, running):
+    visited = visit("/recordings/scenarios")
     page = visited.page
     page.click(".scripts >> text=New")
     page.fill("dialog input", "say_a_word")
@@ -206,10 +248,16 @@ def test_a_script_is_written_run_watched_and_stopped(look, running):
     page.wait_for_selector(".run button:not([disabled])")
     page.click(".run button")
     page.wait_for_selector("pre >> text=a word")
+    judge_everywhere(visited, "scenarios")
     page.click(".runs >> text=Stop")
     page.wait_for_selector('.runs [data-state="cancelled"]')
     page.click(".script .tools >> text=Delete")
     visited.until(
         lambda: all(row["shipped"] for row in running.get("/scenarios")["items"]), "it is deleted"
+    )
+    page.click(".scripts >> text=watch_city")
+    visited.until(
+        lambda: page.input_value(".run input") == f"--url {page.evaluate('location.origin')}",
+        "it is offered this very city",
     )
     assert visited.complaints == []

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.e2e.pages.visiting import judge
+from tests.e2e.pages.visiting import judge, photograph
 
 PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
 
@@ -32,6 +32,13 @@ def test_an_address_that_is_no_page_says_so(visit):
 def test_the_red_stop_is_on_every_page(visit, name):
     page = visit(f"/{name}", "narrow").page
     assert page.locator("#city-stop").is_visible()
+    link = page.locator("header nav [aria-current]").bounding_box()
+    frame = page.locator("header nav").bounding_box()
+    assert frame["x"] - 1 <= link["x"], "the page's own link is out of sight"
+    assert link["x"] + link["width"] <= frame["x"] + frame["width"] + 1
+    page.set_viewport_size({"width": 360, "height": 740})
+    stop, light = (page.locator(one).bounding_box() for one in ("#city-stop", ".link-state"))
+    assert stop["y"] < light["y"] + light["height"], "the red button fell into another line"
 
 
 def test_the_red_stop_stops_the_city_by_keyboard_and_lets_it_go(visit, running):
@@ -53,6 +60,22 @@ def test_the_red_stop_stops_the_city_by_keyboard_and_lets_it_go(visit, running):
     page.wait_for_selector(".banner.stopped", state="detached")
 
 
+def test_enter_stops_the_city_though_somebody_was_faster(visit, running):
+    visited = visit("/map")
+    page = visited.page
+    page.click("#city-stop")
+    page.wait_for_selector("dialog[open]")
+    try:
+        running.web.put("/stop", json={"engaged": True, "by": "somebody"}).raise_for_status()
+        page.wait_for_selector(".banner.stopped")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("text=All cars are told to stop.")
+        assert running.get("/stop")["engaged"]
+    finally:
+        running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
+    page.wait_for_selector(".banner.stopped", state="detached")
+
+
 def test_escape_leaves_the_question_and_the_city_alone(visit, running):
     page = visit("/map").page
     page.click("#city-stop")
@@ -68,9 +91,18 @@ def test_a_silent_world_greys_the_page_then_says_so_and_comes_back_by_itself(vis
     with running.frozen("world"):
         page.wait_for_selector('.page[data-link="stale"]')
         page.wait_for_selector('.page[data-link="lost"] .banner.lost')
-    page.wait_for_selector('.page[data-link="live"]')
-    page.wait_for_selector(".banner.lost", state="detached")
-    assert visited.complaints == []
+        page.click("#city-stop")
+        page.wait_for_selector("dialog[open]")
+        page.keyboard.press("Enter")
+        page.wait_for_selector(".banner.lost >> text=The stop is not confirmed")
+        photograph(visited, "stop_not_confirmed")
+    try:
+        running.web.put("/stop", json={"engaged": True, "by": "tests"}).raise_for_status()
+        page.wait_for_selector(".banner.stopped >> text=all cars stand")
+        page.wait_for_selector(".banner.lost", state="detached")
+    finally:
+        running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
+    assert [one for one in visited.complaints if "status of 50" not in one] == []
 
 
 def test_a_server_that_comes_back_is_heard_again(visit, running):

@@ -3,8 +3,8 @@
 import pytest
 
 from tests.e2e.city_process import wait_for
-from tests.e2e.pages.conftest import SIZES, THEMES
-from tests.e2e.pages.visiting import judge, photograph
+from tests.e2e.pages.conftest import THEMES
+from tests.e2e.pages.visiting import SIZES, in_each_look, judge, photograph
 
 pytestmark = pytest.mark.e2e
 
@@ -74,6 +74,7 @@ def test_a_hold_is_asked_for_by_keyboard_shown_and_taken_back(visit, running):
     page.wait_for_selector(READY)
     page.focus('[aria-label="hold south east"]')
     page.keyboard.press("Enter")
+    page.wait_for_selector(".means >> text=up to two cycles")
     page.keyboard.type("a parade")
     page.keyboard.press("Enter")
     page.wait_for_selector('.held li[data-verb="hold"] >> text=dashboard: a parade')
@@ -92,6 +93,13 @@ def test_a_hold_is_asked_for_by_keyboard_shown_and_taken_back(visit, running):
     page.wait_for_selector(".wishes .empty >> text=No wish is in force")
 
 
+def judged(visited, name):
+    """Judge what is open on a page in both sizes and themes, and photograph it."""
+    for size, theme in in_each_look(visited):
+        judge(visited)
+        photograph(visited, f"{name}_{size}_{theme}")
+
+
 def test_a_plan_is_made_proven_saved_asked_for_and_deleted(visit, running):
     visited = visit(AT)
     page = visited.page
@@ -104,13 +112,14 @@ def test_a_plan_is_made_proven_saved_asked_for_and_deleted(visit, running):
     assert prove.is_disabled()
     page.check(".editor tbody tr:first-child .chip:nth-child(2) input")
     page.wait_for_selector(".verdict[data-state=bad] >> text=conflict and cannot share it")
+    judged(visited, "signals_editor_faults")
     page.uncheck(".editor tbody tr:first-child .chip:nth-child(2) input")
     page.fill(green, "14")
     assert save.is_disabled()
     prove.click()
-    page.wait_for_selector(".verdict[data-state=good] >> text=Proven: 212 states")
-    photograph(visited, "signals_editor")
-    judge(visited)
+    proven = ".verdict[data-state=good] >> text=Proven: 212 states"
+    page.wait_for_selector(proven, timeout=120_000)  # the search stands back behind all else
+    judged(visited, "signals_editor_proven")
     page.fill(green, "14.5")  # what is proven is not this any more
     page.wait_for_selector(".verdict >> text=The search has to prove it")
     assert save.is_disabled()
@@ -120,6 +129,7 @@ def test_a_plan_is_made_proven_saved_asked_for_and_deleted(visit, running):
     saved = running.get("/signals/crossing/plans/rush")
     assert (saved["source"], saved["stages"][0]["green_s"], saved["usable"]) == ("saved", 14, True)
     page.click('[aria-label="Run plan rush"]')
+    judged(visited, "signals_run")
     page.fill("dialog input[name=reason]", "morning")
     page.keyboard.press("Enter")
     page.wait_for_selector('[data-plan="rush"] .badge >> text=next')
@@ -144,11 +154,16 @@ def test_flash_is_shown_at_once_with_its_letter_and_ended_with_a_reason(visit, r
         page.fill("dialog input[name=reason]", reason)
         page.keyboard.press("Enter")
 
+    page.click(".wishes >> text=Flash red…")
+    judged(visited, "signals_flash")
+    page.keyboard.press("Escape")
     answer("Flash red…", "works on the road")
     page.wait_for_selector('.runs[data-mode="flash"]')
     try:
         assert running.get("/signals/crossing")["mode"] == "flash"
         assert set(page.locator('.lamps i[data-lit="true"]').all_inner_texts()) == {"F"}
+        assert "until somebody ends it" in page.inner_text(".runs")
+        assert page.locator(".head >> text=stop, look, go in turn").count() == 2
     finally:
         answer("End flash…", "done")
         wait_for(lambda: running.get("/signals/crossing")["mode"] != "flash", 20.0, "it goes on")
@@ -171,6 +186,7 @@ def test_a_fault_of_the_monitor_is_shown_kept_and_cleared_with_a_reason(visit, r
     page.fill("dialog input[name=reason]", "it was frozen by a test")
     page.keyboard.press("Enter")
     visited.until(lambda: fault() is None, "the fault is cleared")
+    page.wait_for_selector(".lately >> text=it was frozen by a test")
     page.click(".monitor >> text=History")
     page.wait_for_selector("dialog .said >> text=stale")
     page.keyboard.press("Escape")

@@ -1,10 +1,24 @@
 """The vehicle page in a real city: looked at, driven by keys, pads and a gamepad, given back."""
 
+import threading
+from contextlib import contextmanager
+
 import pytest
 
+from scm.clock import NS_PER_MS, WallClock
+from scm.live import run
+from scm.part import Serves
+from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.exchange import Answer, Call
+from scm.v2x.messages.echo_request import EchoReply, EchoRequest
+from scm.v2x.messages.join_request import JoinRequest
+from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
+from scm.v2x.messages.remove_request import RemoveRequest
+from scm.v2x.messages.vehicle_state import VehicleState
 from tests.e2e.city_process import wait_for
+from tests.e2e.pages.visiting import judge, photograph
 
-CAR, AGENT = "n1", "n5"
+CAR, AGENT, TIRED = "n1", "n5", "n9"
 PADS = """
 window.gamepad = null;
 navigator.getGamepads = () => [window.gamepad];
@@ -46,6 +60,65 @@ def drives_by_itself(running, name=CAR):
     wait_for(drives, 20.0, f"{name} drives by itself again")
 
 
+class Tired:
+    """A real car's agent, as far as the city sees: it stands, and its battery is nearly empty."""
+
+    name, role, period_ns, hears = TIRED, "v", 50 * NS_PER_MS, ()
+    serves = (Serves(EchoRequest, {"vehicle": TIRED}),)
+
+    def __init__(self, session):
+        self.session, self.seq = session, 0
+
+    def step(self, now_ns, inbox):
+        self.seq += 1
+        echoes = []
+        for item in inbox:
+            if isinstance(item.message, EchoRequest):
+                echoes.append(Answer(item, EchoReply(vehicle=TIRED, t_ns=now_ns)))
+            else:
+                self.place = item.message
+        if self.seq == 1:
+            return [Call(JoinRequest(vehicle=TIRED, session=self.session, kind="real"))]
+        if not hasattr(self, "place"):
+            return []
+        state = VehicleState(
+            vehicle=TIRED, t_ns=now_ns, seq=self.seq, x_m=self.place.x_m, y_m=self.place.y_m,
+            yaw_rad=self.place.yaw_rad, speed_mps=0.0, yaw_rate_radps=0.0, steering_rad=0.0,
+            throttle=0.0, source="eye", mode="idle", battery_v=11.08, battery_charge=0.1249,
+        )  # fmt: skip
+        report = MisbehaviourReport(
+            suspect=TIRED, suspect_id=9, t_ns=now_ns, since_ns=now_ns, score=6.0, observations=(),
+            evidence=(),
+        )  # fmt: skip
+        return [*echoes, state, report]
+
+    def finish(self, now_ns):
+        return [Call(RemoveRequest(vehicle=TIRED))]
+
+
+@contextmanager
+def tired(running):
+    """Have a car in the city whose battery is low, and that was reported once."""
+    bus, stop = ZenohBus("city", TIRED, running.endpoint), threading.Event()
+    thread = threading.Thread(target=run, args=(Tired(bus.session), bus, WallClock(), stop))
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join(10.0)
+        wait_for(lambda: len(running.get("/vehicles")["vehicles"]) == 6, 10.0, "it left")
+
+
+def looks_right(visited, name):
+    """Judge and photograph what is driven by hand just now, in both colours."""
+    for theme in ("light", "dark"):
+        visited.page.emulate_media(color_scheme=theme)
+        visited.page.wait_for_selector('.now[data-why="driving"]')
+        photograph(visited, f"{name}_{theme}")
+        judge(visited, ".wheel")  # a page that is silent for 5 s gives the car back
+
+
 @pytest.mark.parametrize("size", ["wide", "narrow"])
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_the_table_of_all_vehicles_looks_right(look, size, theme):
@@ -59,6 +132,48 @@ def test_one_vehicle_looks_right(visit, look, size, theme):
     ready = '.film[data-seen="true"]'
     visited = look(f"/vehicles/{CAR}", "vehicle", size, theme, ready=ready)
     visited.page.wait_for_selector(".lidar canvas")
+
+
+def test_the_held_wheel_looks_right_under_keys_and_under_pads(visit, running):
+    visited = visit(f"/vehicles/{CAR}")
+    page = visited.page
+    take(visited, running)
+    page.fill(".most input", "0.1")  # a crawl: it stays on its lane
+    page.keyboard.down("w")
+    looks_right(visited, "wheel_wide")
+    page.keyboard.up("w")
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.hover('[data-pad="back"]')
+    page.mouse.down()
+    looks_right(visited, "wheel_narrow")
+    assert page.get_attribute('[data-pad="back"]', "data-down") == "true"
+    command_age = '[data-fact="command"]:has-text("ms")'
+    page.wait_for_selector(command_age)
+    page.mouse.up()
+    give_back(visited, running)
+    page.wait_for_selector(command_age, state="detached")
+
+
+def test_a_low_battery_is_told_by_sign_and_word_and_once_in_the_events(visit, running):
+    with tired(running):
+        visited = visit("/vehicles", "narrow", "dark")
+        page = visited.page
+        low = f'tr[data-car={TIRED}] .charge.%s[data-battery="low"]:has-text("low")'
+        page.wait_for_selector(low % "narrow")
+        photograph(visited, "battery_table_narrow_dark")
+        page.set_viewport_size({"width": 1440, "height": 900})
+        page.wait_for_selector(low % "wide" + ":has-text('12 %')")
+        photograph(visited, "battery_table_wide_dark")
+        page.click(f"tr[data-car={TIRED}] a")
+        page.wait_for_selector('.who .charge[data-battery="low"] >> text=battery low')
+        told = page.inner_text('[data-fact="battery"]')
+        assert " ".join(told.split()) == "11.08 V, 12 % low, estimated from its voltage"
+        page.set_viewport_size({"width": 390, "height": 844})
+        page.wait_for_selector("text=not on the air, was reported")
+        judge(visited)
+        photograph(visited, "battery_narrow_dark")
+        events = running.get(f"/events?vehicle={TIRED}&name=battery_low")["items"]
+        assert [event["text"] for event in events] == [f"the battery of {TIRED} is low: 12 % left"]
 
 
 def test_a_car_is_found_by_typing_and_opened_by_the_keyboard(visit):

@@ -1,11 +1,12 @@
 """A page that is looked at: what it waits for, what it complains of, and what must hold of all."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+SIZES = {"wide": (1440, 900), "narrow": (390, 844)}
 PATIENCE_MS = 30_000
 SERIOUS = {"serious", "critical"}
 
@@ -41,28 +42,41 @@ class Visit:
             self.complaints.append(message.text)
 
 
-def judge(visited: Visit) -> None:
-    """Fail where the page complains, asks another host, scrolls sideways, or axe finds fault."""
+def judge(visited: Visit, within: str | None = None) -> None:
+    """Fail where the page complains, asks another host, scrolls sideways, or axe finds fault.
+
+    Axe looks `within` what a selector names: it keeps the page from all else meanwhile.
+    """
     page = visited.page
     assert visited.complaints == []
     assert visited.hosts == {urlsplit(page.url).netloc}
     wide = "() => [document.documentElement.scrollWidth, window.innerWidth]"
     content, window = page.evaluate(wide)
     assert content <= window, f"the page is {content} px wide in a window of {window} px"
-    assert faults_of(page) == []
+    assert faults_of(page, within) == []
 
 
-def faults_of(page: Any) -> list[str]:
+def faults_of(page: Any, within: str | None = None) -> list[str]:
     """Return what axe-core calls serious or critical, each with what it is about."""
     from axe_playwright_python.sync_playwright import Axe
 
-    found = Axe().run(page).response["violations"]
+    found = Axe().run(page, within).response["violations"]
     return [
         f"{fault['id']}: {node['html'][:160]} ({node['failureSummary'][:300]})"
         for fault in found
         if fault["impact"] in SERIOUS
         for node in fault["nodes"]
     ]
+
+
+def in_each_look(visited: Visit) -> Iterator[tuple[str, str]]:
+    """Show an open page wide in light and narrow in dark; it stays wide and light."""
+    for size, theme in (("narrow", "dark"), ("wide", "light")):
+        width, height = SIZES[size]
+        visited.page.set_viewport_size({"width": width, "height": height})
+        visited.page.emulate_media(color_scheme=theme)
+        visited.wait("theme => document.documentElement.dataset.theme === theme", theme)
+        yield size, theme
 
 
 def photograph(visited: Visit, name: str) -> None:

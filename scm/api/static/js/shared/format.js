@@ -12,6 +12,9 @@ export function fixed(value, digits, unit = "") {
 /** Names in the order people count: n2 before n17. */
 export const byName = new Intl.Collator("en", { numeric: true }).compare;
 
+/** A name as people say it: south_east is "south east". */
+export const spaced = (name) => name.replaceAll("_", " ");
+
 /** An age or a span in seconds, short. */
 export function span(seconds) {
   if (seconds === null || seconds === undefined) return UNKNOWN;
@@ -32,4 +35,11 @@ export function clock(t_ns) {
   const s = ms / 1000;
   const two = (n) => String(Math.floor(n)).padStart(2, "0");
   return `${two(s / 3600)}:${two((s / 60) % 60)}:${two(s % 60)}`;
+}
+
+/** Wall time of a stamp, with its day where that is not today. */
+export function moment(t_ns) {
+  const at = new Date(t_ns / 1e6);
+  const old = t_ns / 1e6 > 1e12 && at.toDateString() !== new Date().toDateString();
+  return old ? `${at.toLocaleDateString("en-GB", { day: "numeric", month: "short" })} ${clock(t_ns)}` : clock(t_ns);
 }

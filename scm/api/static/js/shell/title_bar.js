@@ -1,5 +1,6 @@
 /** The bar on top: which city, its pages, how alive it is, and the red button. */
 import { signal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { change } from "scm/shell/api.js";
 import { Dialog } from "scm/shared/dialog.js";
@@ -7,7 +8,11 @@ import { clock, fixed, span, UNKNOWN } from "scm/shared/format.js";
 import { city, isConnected, link, pulse, quiet_s, stop } from "scm/shell/store.js";
 import { nextTheme, theme } from "scm/shell/theme.js";
 
-const asking = signal(false);
+/** What is asked: whether the stop was engaged when the question came up; null: nothing. */
+const asking = signal(null);
+
+/** Whether a stop was asked for and nobody said that it is engaged. */
+const unconfirmed = signal(false);
 
 const LINK_WORDS = { connecting: "Connecting", live: "Live", stale: "Stale", lost: "No data" };
 
@@ -15,6 +20,8 @@ const THEMES = { system: ["◐", "as the system"], light: ["☀", "light"], dark
 
 export function TitleBar({ pages, here }) {
   const { t_ns, real_time_factor, late_ticks } = pulse.value;
+  const nav = useRef(null);
+  useEffect(() => showHere(nav.current), [here]);
   const heard = t_ns !== null;
   const vitals = heard
     ? `real-time factor ${fixed(real_time_factor, 2)}, ${late_ticks} late ticks`
@@ -25,7 +32,7 @@ export function TitleBar({ pages, here }) {
         <img class="mark" src="/static/icon.svg" alt="" />
         <h1>${city.value ? city.value.title : "Smart City Manager"}</h1>
       </a>
-      <nav aria-label="Pages">
+      <nav aria-label="Pages" ref=${nav}>
         ${pages.map(
           (page) => html`
             <a key=${page.name} href="/${page.name}" aria-current=${page.name === here ? "page" : null}>
@@ -47,6 +54,12 @@ export function TitleBar({ pages, here }) {
   `;
 }
 
+/** On a narrow screen the row of pages scrolls: the one that is open stands in its middle. */
+function showHere(nav) {
+  const link = nav.querySelector("[aria-current]");
+  if (link) nav.scrollLeft = link.offsetLeft - nav.offsetLeft - (nav.clientWidth - link.offsetWidth) / 2;
+}
+
 function ThemeButton() {
   const [sign, words] = THEMES[theme.value];
   const label = `Colours: ${words}`;
@@ -63,23 +76,26 @@ function StopButton() {
       id="city-stop"
       class="city-stop"
       aria-pressed=${engaged}
-      onClick=${() => (asking.value = true)}
+      onClick=${() => (asking.value = { engaged })}
     >
       ${label}
     </button>
-    ${asking.value && html`<${StopDialog} engaged=${engaged} />`}
+    ${asking.value && html`<${StopDialog} engaged=${asking.value.engaged} />`}
   `;
 }
 
+/** The question stays what it was though somebody else stops the city meanwhile: Enter must not release it. */
 function StopDialog({ engaged }) {
-  const close = () => (asking.value = false);
+  const close = () => (asking.value = null);
   const submit = async (event) => {
     event.preventDefault();
     const reason = event.target.elements.reason.value;
     close();
-    await change("PUT", "/stop", { engaged: !engaged, by: "dashboard", reason }, (reply) =>
-      reply.engaged ? "All cars are told to stop." : "The stop is released.",
+    const body = { engaged: !engaged, by: "dashboard", reason };
+    const reply = await change("PUT", "/stop", body, (told) =>
+      told.engaged ? "All cars are told to stop." : "The stop is released.",
     );
+    unconfirmed.value = !engaged && reply === null;
   };
   // Enter must stop the city: the button has the focus, not the reason.
   const verb = engaged ? "Let all cars drive again" : "Stop all cars";
@@ -108,7 +124,13 @@ export function Banners() {
     ${engaged &&
     html`<div class="banner stopped" role="alert">
       <b>City stopped</b>
-      <span>${[by && `by ${by}`, reason].filter(Boolean).join(" · ")}</span>
+      <span>${[by && `by ${by}`, reason, obeyed()].filter(Boolean).join(" · ")}</span>
+    </div>`}
+    ${unconfirmed.value &&
+    !engaged &&
+    html`<div class="banner lost" role="alert">
+      <b>The stop is not confirmed</b>
+      <span>Cars may still drive. Press City stop again, or switch them off by hand.</span>
     </div>`}
     ${lost &&
     html`<div class="banner lost" role="alert">
@@ -120,6 +142,13 @@ export function Banners() {
       </span>
     </div>`}
   `;
+}
+
+/** What became of the stop, as far as that is known now. */
+function obeyed() {
+  const { moving, vehicles } = pulse.value;
+  if (link.value !== "live") return "";
+  return moving ? `${moving} of ${vehicles} cars still move` : "all cars stand";
 }
 
 function quietSinceStart() {

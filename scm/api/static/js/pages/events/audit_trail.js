@@ -1,7 +1,8 @@
 /** Who changed what, when, by which request, and how it ended; and whether the chain is whole. */
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
-import { clock } from "scm/shared/format.js";
+import { moment } from "scm/shared/format.js";
+import { said } from "scm/pages/events/deeds.js";
 import { Export } from "scm/pages/events/event_log.js";
 import { useRested, useRows } from "scm/pages/events/rows.js";
 
@@ -36,7 +37,7 @@ export function AuditTrail() {
             <th>Done by</th><th>Answer</th>
           </tr>
         </thead>
-        <tbody>${list.rows.map((row) => html`<${Deed} key=${row.number} row=${row} />`)}</tbody>
+        <tbody>${list.rows.map((row) => html`<${Deed} key=${row.number} row=${row} onTrace=${setText} />`)}</tbody>
       </table>
       ${!list.rows.length &&
       html`<p class="empty">${list.loading ? "Reading the audit." : "Nobody changed anything that fits."}</p>`}
@@ -46,38 +47,33 @@ export function AuditTrail() {
   `;
 }
 
-function Deed({ row }) {
+function Deed({ row, onTrace }) {
   const [whole, setWhole] = useState(false);
   const { ended, bad } = outcome(row);
   return html`
     <tr data-deed=${row.number}>
       <td class="number">${row.number}</td>
-      <td><time>${clock(row.t_ns)}</time></td>
-      <td>
-        <button class="name" aria-expanded=${whole} onClick=${() => setWhole(!whole)}>${row.kind}</button>
-        <small>${gist(row)}</small>
+      <td class="when"><time>${moment(row.t_ns)}</time></td>
+      <td class="what">
+        <button class="name" aria-expanded=${whole} onClick=${() => setWhole(!whole)}>${said(row)}</button>
+        ${row.request.reason && html` <small>${row.request.reason}</small>`}
       </td>
-      <td>${row.by || row.request.by || row.request.vehicle || ""}</td>
-      <td>${row.station}</td>
-      <td class=${bad ? "warn" : ""}>${ended}</td>
+      <td class="by">${row.by || row.request.by || row.request.vehicle || ""}</td>
+      <td class="station">${row.station}</td>
+      <td class="answer ${bad ? "warn" : ""}">${ended}</td>
     </tr>
     ${whole &&
     html`
       <tr class="whole">
         <td colspan="6">
-          <pre tabindex="0">${JSON.stringify({ request: row.request, reply: row.reply, request_id: row.request_id }, null, 2)}</pre>
+          ${row.trace_id &&
+          html`<p class="trace">Trace <code>${row.trace_id}</code>
+            <button class="small" onClick=${() => onTrace(row.trace_id)}>All that this led to</button></p>`}
+          <pre tabindex="0">${JSON.stringify({ kind: row.kind, request: row.request, reply: row.reply, request_id: row.request_id }, null, 2)}</pre>
         </td>
       </tr>
     `}
   `;
-}
-
-/** What a request was about, in its own words: to which car or junction, what, and why. */
-function gist({ station, request }) {
-  if (station === "api") return request.query;
-  const { vehicle, junction, plan, engaged, reason } = request;
-  const stop = engaged === undefined ? null : engaged ? "engaged" : "released";
-  return [vehicle, junction, plan, stop, reason].filter(Boolean).join(" · ");
 }
 
 /** How a deed ended, in a word or two. */

@@ -1,7 +1,7 @@
 /** The log of the city: filtered, folded, followed live, acknowledged, exported. */
 import { useMemo, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
-import { byName, clock, span } from "scm/shared/format.js";
+import { byName, moment, span } from "scm/shared/format.js";
 import { change } from "scm/shell/api.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { events as heard, stations, topic, useTopics } from "scm/shell/store.js";
@@ -132,7 +132,7 @@ function Group({ group, onAcknowledge }) {
   const [first, last] = [events.at(-1), newest];
   return html`
     <li data-severity=${newest.severity} data-open=${open.length > 0} data-name=${newest.name}>
-      <time>${clock(newest.t_ns)}</time>
+      <time>${moment(newest.t_ns)}</time>
       <i class="sign" role="img" aria-label=${newest.severity}>${SIGNS[newest.severity]}</i>
       <span class="said">
         ${newest.text}
@@ -161,7 +161,7 @@ function Group({ group, onAcknowledge }) {
       ${whole &&
       html`
         <ol class="single">
-          ${events.map((event) => html`<li key=${event.id}><time>${clock(event.t_ns)}</time>${event.text}</li>`)}
+          ${events.map((event) => html`<li key=${event.id}><time>${moment(event.t_ns)}</time>${event.text}</li>`)}
         </ol>
       `}
     </li>

@@ -11,7 +11,7 @@ const WANTED = 15;
 const BLURRED = 0.4; // of the median sharpness of the set
 const BOARDS = { chessboard: "Chessboard", charuco: "ChArUco", tags: "Grid of tags" };
 
-export function LensStep({ camera, kept, done }) {
+export function LensStep({ camera, kept, done, put }) {
   const root = `/eye/cameras/${camera.camera}`;
   const { body, error, again } = usePolled(`${root}/views`, 0);
   const [board, setBoard] = useState({ board: "chessboard", columns: 9, rows: 6, square_mm: 30, marker_mm: 22, first_id: 0, fisheye: false });
@@ -26,7 +26,8 @@ export function LensStep({ camera, kept, done }) {
     const over = await finished(asked, setRow);
     again();
     if (over.state === "done" && save_as) {
-      setLens(await read(`/eye/calibrations/${save_as}/report`).catch(() => null));
+      const report = await read(`/eye/calibrations/${save_as}/report`).catch(() => null);
+      setLens(report && { ...report.lens, called: save_as });
       notify("info", `The lens is kept as ${save_as}.`);
       done();
     }
@@ -40,7 +41,7 @@ export function LensStep({ camera, kept, done }) {
     <section class="panel eye-lens" aria-label="Lens">
       <div class="panel-head">
         <h2><b class="step">1</b> Lens <small>by a printed board</small></h2>
-        <span class="facts">${`${views.filter((one) => one.found).length} of ${views.length} pictures show the board`}</span>
+        <span class="facts">${views.length ? `${views.filter((one) => one.found).length} of ${views.length} pictures show the board` : "no pictures yet"}</span>
       </div>
       <p class="note">
         Hold the board still in every part of the frame, near and far, leaning 30 to 45° to different sides. Take 15 to 25
@@ -70,10 +71,10 @@ export function LensStep({ camera, kept, done }) {
           <button class="primary" disabled=${busy || !views.some((one) => one.found)} onClick=${() => run(name)}>
             Measure the lens
           </button>
-          <small>${`kept as ${name}`}</small>
+          <small>${`will be kept as ${name}`}</small>
         </div>
       `}
-      ${lens?.lens && html`<${Lens} lens=${lens.lens} />`}
+      ${lens?.numbers && html`<${Lens} lens=${lens} put=${put} />`}
     </section>
   `;
 }
@@ -180,7 +181,7 @@ function Advice({ views, findings }) {
   `;
 }
 
-function Lens({ lens }) {
+function Lens({ lens, put }) {
   return html`
     <div class="result">
       <h3>${`${lens.lens} lens, ${fixed(lens.rms_px, 3)} px left at the points`}</h3>
@@ -189,6 +190,7 @@ function Lens({ lens }) {
           <div key=${name}><dt>${name}</dt><dd>${fixed(value, i < 4 ? 2 : 5)} <small>±${fixed(std, i < 4 ? 2 : 5)}</small></dd></div>
         `)}
       </dl>
+      <button onClick=${() => put(lens.called)}>Put it in force…</button>
     </div>
   `;
 }

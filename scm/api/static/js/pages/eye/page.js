@@ -2,6 +2,7 @@
 import { html } from "scm/shared/html.js";
 import { go, route } from "scm/shell/router.js";
 import { cameras, useTopics } from "scm/shell/store.js";
+import { InForce } from "scm/pages/eye/in_force.js";
 import { Picture } from "scm/pages/eye/picture.js";
 import { Residuals } from "scm/pages/eye/residuals.js";
 import { TagTable } from "scm/pages/eye/tag_table.js";
@@ -43,6 +44,7 @@ function Bar({ list, camera }) {
       <span class="state" data-good=${String(camera.good)}>
         ${camera.good === false ? "do not trust its poses" : camera.good ? "good" : "says nothing of itself"}
       </span>
+      <${InForce} camera=${camera} />
       <nav aria-label="Eye">
         <a href=${`/eye?camera=${camera.camera}`} aria-current=${calibrates ? null : "page"}>Live</a>
         <a href=${`/eye/calibrate?camera=${camera.camera}`} aria-current=${calibrates ? "page" : null}>Calibrate</a>

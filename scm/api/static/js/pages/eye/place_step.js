@@ -6,10 +6,11 @@ import { finished, read } from "scm/pages/eye/asking.js";
 import { freeName, Progress } from "scm/pages/eye/progress.js";
 import { change, notify } from "scm/shell/api.js";
 
+const VAGUE_M = 0.01;
 const TURNS = ["yaw_rad", "tilt_x_rad", "tilt_y_rad"];
 const WORDS = { x_m: "x", y_m: "y", z_m: "height", yaw_rad: "yaw", tilt_x_rad: "tilt about x", tilt_y_rad: "tilt about y" };
 
-export function PlaceStep({ camera, kept, lenses, done }) {
+export function PlaceStep({ camera, kept, lenses, done, put }) {
   const [lens, setLens] = useState("");
   const [tags, setTags] = useState([]);
   const [row, setRow] = useState(null);
@@ -23,7 +24,8 @@ export function PlaceStep({ camera, kept, lenses, done }) {
     if (!asked) return;
     const over = await finished(asked, setRow);
     if (over.state !== "done") return;
-    setFound(await read(`/eye/calibrations/${name}/report`).catch(() => null));
+    const report = await read(`/eye/calibrations/${name}/report`).catch(() => null);
+    setFound(report && { ...report, name });
     notify("info", `The place is kept as ${name}.`);
     done();
   };
@@ -46,10 +48,10 @@ export function PlaceStep({ camera, kept, lenses, done }) {
       <${FloorTags} tags=${tags} set=${setTags} />
       <div class="row">
         <button class="primary" disabled=${busy || (!seen.length && !tags.length)} onClick=${run}>Find the place</button>
-        <small>${`kept as ${name}`}</small>
+        <small>${`will be kept as ${name}`}</small>
       </div>
       <${Progress} row=${row} cancel=${() => change("DELETE", `/operations/${row.id}`)} />
-      ${found && html`<${Found} found=${found} />`}
+      ${found && html`<${Found} found=${found} put=${put} />`}
     </section>
   `;
 }
@@ -88,11 +90,13 @@ function FloorTags({ tags, set }) {
   `;
 }
 
-export function Found({ found }) {
+function Found({ found, put }) {
+  const vague_m = Math.max(...found.deviations.slice(0, 3));
   return html`
     <div class="result">
       <h3>${found.is_sure ? "Found" : "Found, but not for sure"}</h3>
       ${!found.is_sure && html`<p class="warn">Two places would show these tags alike: lay a second tag far from the first.</p>`}
+      ${vague_m > VAGUE_M && html`<p class="warn">${`Known to ${fixed(1000 * vague_m, 0)} mm only: the Eye would not trust its poses. Lay more tags, far apart.`}</p>`}
       <table>
         <thead><tr><th scope="col">Camera</th><th scope="col" class="number">on the map</th><th scope="col" class="number">found</th><th scope="col" class="number">±</th></tr></thead>
         <tbody>
@@ -119,6 +123,7 @@ export function Found({ found }) {
           `)}
         </tbody>
       </table>
+      <button class=${vague_m > VAGUE_M ? "" : "primary"} onClick=${() => put(found.name)}>Put it in force…</button>
     </div>
   `;
 }

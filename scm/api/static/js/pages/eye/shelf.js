@@ -4,38 +4,40 @@ import { html } from "scm/shared/html.js";
 import { clock, fixed } from "scm/shared/format.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { read } from "scm/pages/eye/asking.js";
+import { named } from "scm/pages/eye/in_force.js";
 import { change } from "scm/shell/api.js";
 
-export function Shelf({ kept, known, changed }) {
+export function Shelf({ camera, kept, known, changed, put }) {
   const [open, setOpen] = useState(null);
   return html`
     <section class="panel eye-shelf" aria-label="Calibrations">
-      <div class="panel-head"><h2><b class="step">3</b> Use <small>what was found and kept</small></h2></div>
+      <div class="panel-head">
+        <h2><b class="step">3</b> Use <small>what was found and kept</small></h2>
+        ${camera.in_force?.before &&
+        html`<button class="small" title=${named(camera.in_force.before)} onClick=${() => put(null)}>Put back…</button>`}
+      </div>
       ${kept.length
         ? html`
             <div class="scroll" tabindex="0" role="region" aria-label="Table of calibrations">
               <table>
-                <thead>
-                  <tr>
-                    <th scope="col">Name</th><th scope="col">Kind</th><th scope="col">Made</th>
-                    <th scope="col" class="number">Frame</th><th scope="col" class="number">Left</th><th scope="col"></th>
-                  </tr>
-                </thead>
-                <tbody>${kept.map((one) => html`<${Row} key=${one.name} one=${one} open=${setOpen} changed=${changed} />`)}</tbody>
+                <thead class="hidden"><tr><th scope="col">Calibration</th><th scope="col">What to do with it</th></tr></thead>
+                <tbody>${kept.map((one) => html`<${Row} key=${one.name} camera=${camera} one=${one} open=${setOpen} changed=${changed} put=${put} />`)}</tbody>
               </table>
             </div>
           `
         : html`<p class="empty">${known ? "Nothing is kept yet: measure a lens or find a place." : "Reads the shelf …"}</p>`}
       <div class="note">
-        The running Eye reads calibrations when it starts. A lens: <code>scm eye MAP --calibration NAME.toml</code>. A
-        place: its block takes the one of the same name in the map file. Then start the city anew.
+        Put in force, it holds until another one is; over a restart too where the city keeps its state. For good: a
+        lens by <code>scm eye MAP --calibration NAME.toml</code>, a place by its block in the map file.
       </div>
       ${open && html`<${Text} file=${open} close=${() => setOpen(null)} />`}
     </section>
   `;
 }
 
-function Row({ one, open, changed }) {
+function Row({ camera, one, open, changed, put }) {
+  const fits = one.kind === "lens" ? one.width_px === camera.width_px && one.height_px === camera.height_px : one.camera === camera.camera;
+  const inForce = camera.in_force?.now[one.kind] === one.name;
   const path = `/eye/calibrations/${one.name}`;
   const remove = async () => {
     const tag = await fetch(`/api/v1${path}`).then((response) => response.headers.get("ETag"));
@@ -44,17 +46,25 @@ function Row({ one, open, changed }) {
   };
   return html`
     <tr>
-      <td><button class="name" title="Show the file" onClick=${async () => open(await read(path).catch(() => null))}>${one.name}</button></td>
-      <td>${one.kind}</td>
-      <td>${clock(one.made_ns)}</td>
-      <td class="number">${`${one.width_px} × ${one.height_px}`}</td>
-      <td class="number">${one.rms_px === null ? "—" : fixed(one.rms_px, 3, " px")}</td>
       <td>
+        <button class="name" title="Show the file" onClick=${async () => open(await read(path).catch(() => null))}>${one.name}</button>
+        <small>${factsOf(one, fits)}</small>
+      </td>
+      <td>
+        ${inForce
+          ? html`<span class="good">in force</span>`
+          : fits && html`<button class="small" aria-label="Put ${one.name} in force" onClick=${() => put(one.name)}>Put in force…</button>`}
         <a href=${`/api/v1${path}/file.toml`} download=${`${one.name}.toml`}>Download</a>
         <button class="plain" aria-label="Throw ${one.name} away" onClick=${remove}>×</button>
       </td>
     </tr>
   `;
+}
+
+function factsOf(one, fits) {
+  const kind = one.kind === "place" && !fits ? `place of ${one.camera}` : one.kind;
+  const left = one.rms_px === null ? [] : [`${fixed(one.rms_px, 3)} px left`];
+  return [kind, `made ${clock(one.made_ns)}`, `${one.width_px} × ${one.height_px} px`, ...left].join(" · ");
 }
 
 function Text({ file, close }) {

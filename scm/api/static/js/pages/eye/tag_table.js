@@ -26,6 +26,7 @@ function Table({ tags }) {
           <th scope="col">Tag</th>
           <th scope="col">Whose</th>
           <th scope="col" class="number" title="Decision margin of the detector: higher is clearer">Margin</th>
+          <th scope="col" class="number" title="Bits of its 36 that were read wrong and corrected (hamming)">Bits</th>
           <th scope="col" class="number" title="Mean side of its black square in the picture">Size</th>
           <th scope="col" class="number" title="x, y on the map">Place</th>
           <th scope="col" class="number">Yaw</th>
@@ -51,6 +52,7 @@ function Row({ tag }) {
       </td>
       <td>${whose(tag)}</td>
       <td class="number">${fixed(tag.margin, 0)}</td>
+      <td class="number ${tag.hamming ? "warn" : ""}">${tag.hamming ?? UNKNOWN}</td>
       <td class="number">${fixed(tag.size_px, 1, " px")}</td>
       <td class="number">${tag.x_m === null ? UNKNOWN : `${fixed(tag.x_m, 2)}, ${fixed(tag.y_m, 2)} m`}</td>
       <td class="number">${tag.yaw_rad === null ? UNKNOWN : fixed((tag.yaw_rad * 180) / Math.PI, 0, "°")}</td>

@@ -1,5 +1,6 @@
 /** Every junction in a line: its plan, each group's colour, letter and time to change, and what is wrong. */
 import { html } from "scm/shared/html.js";
+import { spaced } from "scm/shared/format.js";
 import { LETTERS } from "scm/shared/light_shape.js";
 import { now, signals, signalsAt } from "scm/shell/store.js";
 import { timeToChange } from "scm/pages/map/signal_times.js";
@@ -21,7 +22,8 @@ export function SignalsShort() {
 
 function Junction({ junction, passed_s }) {
   const { junction: name, fresh, mode, plan, monitor } = junction;
-  const state = !fresh ? "silent" : mode === "flash" ? "flashing" : `plan ${plan}`;
+  const kind = mode === "plan" || mode === "start" ? "plan" : "policy";
+  const state = !fresh ? "silent" : mode === "flash" ? "flashing" : `${kind} ${plan.replaceAll("_", " ")}`;
   return html`
     <div class="junction" data-fault=${Boolean(monitor?.fault)}>
       <a href="/signals/${name}">${name}</a>
@@ -37,11 +39,14 @@ function Group({ group, passed_s }) {
   const colour = group.colour ?? "unknown";
   const time = timeToChange(group, passed_s);
   return html`
-    <li title="${group.group}: ${WORDS[colour] ?? "not known"}">
-      <span class="head" data-colour=${colour} role="img" aria-label="${group.group} ${WORDS[colour] ?? "not known"}">
+    <li title="${spaced(group.group)}: ${WORDS[colour] ?? "not known"}">
+      <span class="head" data-colour=${colour} role="img" aria-label="${spaced(group.group)} ${WORDS[colour] ?? "not known"}">
         <i></i><b>${LETTERS[colour] ?? "?"}</b>
       </span>
-      <span class="time">${time || "—"}</span>
+      <span class="words">
+        <span class="group">${spaced(group.group)}</span>
+        <span class="time">${time || "—"}</span>
+      </span>
     </li>
   `;
 }

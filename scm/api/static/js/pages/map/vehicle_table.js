@@ -115,7 +115,7 @@ function Head({ column }) {
   const turn = () => (order.value = { column: column.name, turned: here && !turned });
   return html`
     <th class="${column.number ? "number" : ""} of-${column.name}" aria-sort=${sort}>
-      <button class="plain" onClick=${turn}>
+      <button class="plain" title=${column.unit && `${column.title} in ${column.unit}`} onClick=${turn}>
         ${column.title}<span class="arrow" aria-hidden="true">${here ? (turned ? "▾" : "▴") : ""}</span>
       </button>
     </th>
@@ -123,6 +123,7 @@ function Head({ column }) {
 }
 
 function Car({ row, number }) {
+  fleetBeat.value; // its properties stay the same while what `fleet` tells of it moves
   if (row >= fleet.count) return null; // it left a moment ago
   const { vehicle, kind: sort, owner } = fleet.vehicles[row];
   const chosen = selected.value === vehicle;

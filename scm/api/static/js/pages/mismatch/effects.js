@@ -90,6 +90,22 @@ function chance(probability) {
   return `${short(100 * probability)} %`;
 }
 
+/** What the cars of one search share, and the way to each one's report. */
+export function TogetherCard({ name, together }) {
+  const others = together.cars.filter((car) => car !== name);
+  return html`
+    <article class="panel card" data-kind="together">
+      <p class="label">Together with the other cars</p>
+      <h2>${together.said}</h2>
+      ${together.conclusions.map((said) => html`<p key=${said}>${said}</p>`)}
+      <p>
+        Their reports:
+        ${others.map((car, i) => html`${i ? ", " : " "}<a key=${car} href="/mismatch/${car}">${car.split(".")[1]}</a>`)}
+      </p>
+    </article>
+  `;
+}
+
 export function PlainCard({ card }) {
   return html`
     <article class="panel card" data-kind=${card.kind}>

@@ -1,7 +1,7 @@
 /** One report as a page: what, where, when, how much, how sure, how much better, and what to drive next. */
 import { html } from "scm/shared/html.js";
 import { Curves } from "scm/pages/mismatch/curves.js";
-import { EffectCard, PlainCard } from "scm/pages/mismatch/effects.js";
+import { EffectCard, PlainCard, TogetherCard } from "scm/pages/mismatch/effects.js";
 import { useFetched } from "scm/pages/mismatch/fetched.js";
 import { FreeRuns } from "scm/pages/mismatch/free_runs.js";
 import { Head } from "scm/pages/mismatch/head.js";
@@ -39,6 +39,7 @@ function Whole({ report, again }) {
           (card, i) => html`<${EffectCard} key=${i} card=${card} index=${i} report=${fields} drawn=${drawn} />`,
         )}
         ${others.map((card, i) => html`<${PlainCard} key=${i} card=${card} />`)}
+        ${report.together && html`<${TogetherCard} name=${report.row.name} together=${report.together} />`}
       </div>
       ${fields.undecided.map(
         (question, i) => html`

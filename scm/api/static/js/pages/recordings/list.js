@@ -40,8 +40,8 @@ function Table({ rows }) {
       <table>
         <thead>
           <tr>
-            <th>Recording</th><th>Began</th><th class="number">Length</th>
-            <th class="cars">Cars</th><th class="number">Size</th><th>State</th>
+            <th>Recording</th><th class="wide">Began</th><th class="number">Length</th>
+            <th class="wide">Cars</th><th class="number wide">Size</th><th>State</th>
           </tr>
         </thead>
         <tbody>${rows.map((row) => html`<${Row} key=${row.name} row=${row} />`)}</tbody>
@@ -52,22 +52,28 @@ function Table({ rows }) {
 
 function Row({ row }) {
   const path = `/recordings/${encodeURIComponent(row.name)}`;
+  const began = row.begin_ns ? moment(row.begin_ns) : "—";
   const open = (event) => event.target.closest("a") || go(path);
   return html`
     <tr data-recording=${row.name} data-state=${row.state} onClick=${open}>
       <td class="what">
         <a href=${path}>${row.title || row.name}</a>
         ${row.title && html`<small>${row.name}</small>`}
+        <small class="slim">${row.begin_ns && `${began} · `}${counted(row.cars)} · ${size(row.size_bytes)}</small>
         ${row.trouble && html`<small class="why">${row.trouble}</small>`}
         ${row.notes && html`<small class="note">${row.notes}</small>`}
       </td>
-      <td>${row.begin_ns ? moment(row.begin_ns) : "—"}</td>
+      <td class="wide">${began}</td>
       <td class="number">${minutes(row.length_s)}</td>
-      <td class="cars" title=${row.cars.join(", ")}>${cars(row.cars)}</td>
-      <td class="number">${size(row.size_bytes)}</td>
+      <td class="wide" title=${row.cars.join(", ")}>${cars(row.cars)}</td>
+      <td class="number wide">${size(row.size_bytes)}</td>
       <td><span class="state" data-state=${row.state}>${row.state}</span></td>
     </tr>
   `;
+}
+
+function counted(names) {
+  return names.length === 1 ? "1 car" : `${names.length} cars`;
 }
 
 function cars(names) {

@@ -183,6 +183,12 @@ export class Player {
     return { before, after };
   }
 
+  /** The newest picture of a camera by this moment: `{t_s}`; null: there is none, or it is on its way. */
+  pictureOf(camera) {
+    const told = this.stretchAt(this.t_s)?.pictures ?? [];
+    return told.findLast((picture) => picture.camera === camera && picture.t_s <= this.t_s + 0.05) ?? null;
+  }
+
   /** Where each car came from: `{vehicle: [[x, y], ...]}` of the last seconds. */
   trails(span_s) {
     const found = new Map();

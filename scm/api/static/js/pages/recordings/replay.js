@@ -3,6 +3,7 @@ import { signal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
+import { EyeThen } from "scm/pages/recordings/eye_then.js";
 import { MismatchDialog } from "scm/pages/recordings/mismatch_dialog.js";
 import { DeleteDialog, NotesDialog } from "scm/pages/recordings/notes_dialog.js";
 import { Player } from "scm/pages/recordings/player.js";
@@ -97,6 +98,7 @@ function Played({ player, summary, events, more, onChanged }) {
         <${Timeline} player=${player} events=${events} begin_ns=${recording.begin_ns} />
       </section>
       <${Cars} player=${player} chosen=${chosen} onChoose=${setChosen} />
+      ${summary.eye_cameras.length > 0 && html`<${EyeThen} player=${player} cameras=${summary.eye_cameras} />`}
       <${Events} player=${player} events=${events} more=${more} />
       ${asking.value === "take" && html`<${TakeHomeDialog} recording=${recording} cars=${cars} onClose=${close} />`}
       ${asking.value === "mismatch" &&

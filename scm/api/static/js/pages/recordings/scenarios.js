@@ -95,6 +95,12 @@ function NameDialog({ title, text, onClose, onKept }) {
   `;
 }
 
+/** Arguments that lead a script to this city, where it takes such: without them it looks at the usual port. */
+function offered(text) {
+  if (text.includes('"--live"')) return LIVE;
+  return text.includes('"--url"') ? `--url ${location.origin}` : "";
+}
+
 function Script({ name, again, seen }) {
   const [known, setKnown] = useState(null);
   const [error, setError] = useState("");
@@ -157,7 +163,7 @@ function RunForm({ name, edited, text, seen }) {
   };
   return html`
     <form class="run" onSubmit=${submit}>
-      <label>Arguments <input name="given" maxlength="400" value=${text.includes('"--live"') ? LIVE : ""} placeholder="none" /></label>
+      <label>Arguments <input name="given" maxlength="400" value=${offered(text)} placeholder="none" /></label>
       <button class="primary" disabled=${edited}>Run</button>
       <small>${edited ? "Save it first: what is saved is run." : "{connect} becomes the address of this city's router."}</small>
     </form>

@@ -16,6 +16,7 @@ export function spoken(seconds) {
 }
 
 export function size(bytes) {
+  if (bytes < 1e3) return `${bytes} B`;
   const [value, unit] = bytes < 1e6 ? [bytes / 1e3, "kB"] : bytes < 1e9 ? [bytes / 1e6, "MB"] : [bytes / 1e9, "GB"];
   return `${value.toFixed(value < 10 ? 1 : 0)} ${unit}`;
 }

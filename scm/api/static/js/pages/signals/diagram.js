@@ -4,7 +4,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { now } from "scm/shell/store.js";
 import { colours } from "scm/shell/theme.js";
-import { barAt, heightOf, paint } from "scm/pages/signals/diagram_paint.js";
+import { barAt, barriersOf, comingOf, heightOf, paint, ringsOf } from "scm/pages/signals/diagram_paint.js";
 import { bars, barsRead, clockNow, row, site, status } from "scm/pages/signals/store.js";
 import { plain, WORDS } from "scm/pages/signals/words.js";
 
@@ -82,21 +82,25 @@ export function Diagram() {
           <button class="small" aria-label="Zoom in" disabled=${span.value === SPANS_S[0]} onClick=${() => zoom(-1)}>+</button>
         </div>
       </div>
-      <canvas
-        ref=${canvas}
-        tabindex="0"
-        role="img"
-        style=${{ height: `${height}px` }}
-        aria-label=${inWords()}
-        onKeyDown=${onKey}
-        onPointerMove=${(event) => (readout.value = under(event, canvas.current))}
-        onPointerLeave=${() => (readout.value = "")}
-      ></canvas>
+      <div class="sheet" style=${{ minHeight: `${height}px` }}>
+        <canvas
+          ref=${canvas}
+          tabindex="0"
+          role="img"
+          aria-label=${inWords()}
+          aria-describedby="diagram-rings"
+          onKeyDown=${onKey}
+          onPointerMove=${(event) => (readout.value = under(event, canvas.current))}
+          onPointerLeave=${() => (readout.value = "")}
+        ></canvas>
+      </div>
+      <p id="diagram-rings" class="hidden">${ringsInWords()}</p>
       <ul class="key" aria-hidden="true">
         <li><i data-sign="green"></i>green</li>
         <li><i data-sign="yellow"></i>yellow change</li>
         <li><i data-sign="clear"></i>red clear</li>
         <li><i data-sign="red"></i>red</li>
+        <li><i data-sign="flash"></i>flashing red</li>
         <li><i data-sign="coming"></i>to come</li>
         <li><i data-sign="promise"></i>SPaT: earliest to latest end</li>
         <li><i data-sign="likely"></i>likely end</li>
@@ -112,12 +116,29 @@ function inWords() {
   return `Timing diagram: ${shows.join(", ")}; arrow keys move it, plus and minus zoom`;
 }
 
+/** Rings and barriers as they are drawn, for who does not see them. */
+function ringsInWords() {
+  now.value, barsRead.value;
+  const [shown, told] = [view(), row()];
+  if (!site.value || !shown || !told) return "";
+  const { rings, sections } = ringsOf(site.value);
+  const sequences = rings.map(({ name }, at) => {
+    const parts = sections.map((section) => (section[at] ?? []).map(plain).join(", ") || "nobody");
+    return `${name}: ${parts.join(", barrier, ")}.`;
+  });
+  const crossed = barriersOf(site.value, bars.of, comingOf(status(), told, shown), shown).map((t) => {
+    const whole = Math.round(Math.abs(t - shown.now));
+    return t > shown.now ? `in ${whole} s` : `${whole} s ago`;
+  });
+  return `${sequences.join(" ")} Barriers shown: ${crossed.join(", ") || "none"}.`;
+}
+
 function under(event, canvas) {
   const shown = view();
   const told = row();
   if (!shown || !told) return "";
   const box = canvas.getBoundingClientRect();
-  const found = barAt(event.clientX - box.left, event.clientY - box.top, box.width, shown, {
+  const found = barAt(event.clientX - box.left, event.clientY - box.top, box, shown, {
     told,
     site: site.value,
     bars: bars.of,

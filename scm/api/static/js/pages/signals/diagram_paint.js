@@ -9,15 +9,16 @@
 import { LETTERS, plain } from "scm/pages/signals/words.js";
 
 const AXIS = 22;
-const ROW = 36;
-const BAR = 24;
+const LEAST_ROW = 36;
+const MOST_ROW = 56;
 const SPLIT = 12;
+const BELOW = 6;
 const TICKS_S = [5, 10, 15, 30, 60, 120];
 const LEAST_LETTER_PX = 13;
 
 const left = (width) => (width < 560 ? 84 : 116);
 
-/** Rings as rows: `[{name, phases}]`, and group to its section; the widest section says how many. */
+/** Rings as rows, `[{name, phases}]`: the widest section says how many. */
 export function ringsOf(site) {
   const sections = site?.rings ?? [];
   const count = Math.max(0, ...sections.map((section) => section.length));
@@ -25,13 +26,19 @@ export function ringsOf(site) {
     name: count > 1 ? `Ring ${at + 1}` : "Ring",
     phases: sections.flatMap((section) => section[at] ?? []),
   }));
-  const sectionOf = new Map(sections.flatMap((s, at) => s.flat().map((group) => [group, at])));
-  return { rings, sectionOf, sections };
+  return { rings, sections };
 }
 
+const rowsOf = (site, told) => ringsOf(site).rings.length + (told?.groups.length ?? 2);
+
+/** The least height that the diagram needs; with more, its rows are higher. */
 export function heightOf(site, told) {
-  const { rings } = ringsOf(site);
-  return AXIS + ROW * rings.length + SPLIT + ROW * (told?.groups.length ?? 2) + 6;
+  return AXIS + SPLIT + BELOW + LEAST_ROW * rowsOf(site, told);
+}
+
+function rowOf(height, site, told) {
+  const room = (height - AXIS - SPLIT - BELOW) / rowsOf(site, told);
+  return Math.floor(Math.min(MOST_ROW, Math.max(LEAST_ROW, room)));
 }
 
 /** @param {{now: number, from: number, until: number}} view in seconds of the controller's clock. */
@@ -49,25 +56,26 @@ export function paint(canvas, view, { told, site, status, bars }) {
   const origin = left(width);
   const scale = (width - origin - 4) / (view.until - view.from);
   const x = (t) => origin + (t - view.from) * scale;
-  const sheet = { paper, width, height, origin, x, view, ink: inkOf(canvas) };
-  const { rings, sectionOf, sections } = ringsOf(site);
+  const row = rowOf(height, site, told);
+  const sheet = { paper, width, height, origin, x, view, row, bar: Math.round((2 / 3) * row), ink: inkOf(canvas) };
+  const { rings } = ringsOf(site);
   const times = new Map((site?.phases ?? []).map((phase) => [phase.group, phase]));
-  const coming = comingOf(status, told, view, bars);
+  const coming = comingOf(status, told, view);
   drawAxis(sheet);
   paper.save();
   paper.beginPath();
   paper.rect(origin, 0, width - origin, height);
   paper.clip();
-  rings.forEach((ring, at) => drawRing(sheet, ring, AXIS + ROW * at, { bars, times, coming }));
-  const below = AXIS + ROW * rings.length + SPLIT;
+  rings.forEach((ring, at) => drawRing(sheet, ring, AXIS + row * at, { bars, times, coming }));
+  const below = AXIS + row * rings.length + SPLIT;
   told.groups.forEach((group, at) => {
-    drawPhase(sheet, group, below + ROW * at, { bars, times, coming, told });
+    drawPhase(sheet, group, below + row * at, { bars, times, coming, told });
   });
-  if (site) drawBarriers(sheet, bars, coming, sectionOf, sections, AXIS + ROW * rings.length);
+  drawBarriers(sheet, barriersOf(site, bars, coming, view), AXIS + row * rings.length);
   drawNow(sheet);
   paper.restore();
-  rings.forEach((ring, at) => drawName(sheet, ring.name, AXIS + ROW * at, true));
-  told.groups.forEach((group, at) => drawName(sheet, plain(group.group), below + ROW * at, false));
+  rings.forEach((ring, at) => drawName(sheet, ring.name, AXIS + row * at, true));
+  told.groups.forEach((group, at) => drawName(sheet, plain(group.group), below + row * at, false));
 }
 
 function inkOf(canvas) {
@@ -90,7 +98,7 @@ function inkOf(canvas) {
 }
 
 /** Greens that are not yet: `{groups, start, end}` in seconds; end null: nobody knows. */
-function comingOf(status, told, view) {
+export function comingOf(status, told, view) {
   if (!told.fresh || told.mode === "flash") return [];
   return (status?.turns ?? [])
     .map((turn) => ({
@@ -127,12 +135,12 @@ function minutes(at) {
   return `${at > 0 ? "+" : "−"}${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
 }
 
-function drawName({ paper, origin, ink }, name, top, strong) {
+function drawName({ paper, origin, row, ink }, name, top, strong) {
   paper.font = `${strong ? 600 : 500} 12px ${ink.font}`;
   paper.textAlign = "left";
   paper.textBaseline = "middle";
   paper.fillStyle = strong ? ink.text : ink.muted;
-  paper.fillText(name, 0, top + ROW / 2, origin - 8);
+  paper.fillText(name, 0, top + row / 2, origin - 8);
 }
 
 function drawNow({ paper, height, x, view, ink }) {
@@ -166,25 +174,25 @@ function hatch(paper, fromX, top, width, height, colour) {
 }
 
 /** One colour from `from` to `to`, in the shape that says which. */
-function drawBar({ paper, x, ink, view }, colour, from, to, top, ...labels) {
+function drawBar({ paper, x, row, bar, ink, view }, colour, from, to, top, ...labels) {
   const [a, b] = [Math.max(x(from), x(view.from)), Math.min(x(to), x(view.until))];
   if (b <= a) return;
-  const y = top + (ROW - BAR) / 2;
+  const y = top + (row - bar) / 2;
   if (colour === "green") {
     paper.fillStyle = ink.green;
-    paper.fillRect(a, y, b - a, BAR);
+    paper.fillRect(a, y, b - a, bar);
   } else if (colour === "yellow") {
-    hatch(paper, a, y, b - a, BAR, ink.yellow);
+    hatch(paper, a, y, b - a, bar, ink.yellow);
   } else if (colour === "flashing_red") {
-    hatch(paper, a, y + 5, b - a, BAR - 10, ink.red);
+    hatch(paper, a, y + 5, b - a, bar - 10, ink.red);
   } else if (colour === "clear") {
     paper.fillStyle = ink.clear;
-    paper.fillRect(a, y + 5, b - a, BAR - 10);
+    paper.fillRect(a, y + 5, b - a, bar - 10);
   } else {
     paper.fillStyle = colour === "dark" ? ink.muted : ink.red;
-    paper.fillRect(a, y + BAR / 2 - 1, b - a, 2);
+    paper.fillRect(a, y + bar / 2 - 1, b - a, 2);
   }
-  if (b - a > LEAST_LETTER_PX) write(paper, ink, colour === "green" ? ink.onGreen : ink.text, labels, a, b, y + BAR / 2);
+  if (b - a > LEAST_LETTER_PX) write(paper, ink, colour === "green" ? ink.onGreen : ink.text, labels, a, b, y + bar / 2);
 }
 
 /** The first of some texts that fits between `a` and `b`; none: nothing. */
@@ -205,7 +213,7 @@ function write(paper, ink, colour, texts, a, b, y) {
 }
 
 function drawComing(sheet, turn, top, times, label) {
-  const { paper, x, ink, view } = sheet;
+  const { paper, x, row, bar, ink, view } = sheet;
   const from = Math.max(turn.start, view.now);
   const to = turn.end ?? view.until;
   if (to <= from) return;
@@ -220,10 +228,10 @@ function drawComing(sheet, turn, top, times, label) {
   paper.save();
   paper.setLineDash([4, 3]);
   paper.strokeStyle = ink.green;
-  paper.strokeRect(x(from) + 0.5, top + (ROW - BAR) / 2 + 0.5, x(to) - x(from) - 1, BAR - 1);
+  paper.strokeRect(x(from) + 0.5, top + (row - bar) / 2 + 0.5, x(to) - x(from) - 1, bar - 1);
   paper.restore();
   if (label && turn.start > view.now) {
-    write(paper, ink, ink.text, [label], x(from), x(Math.min(to, view.until)), top + ROW / 2);
+    write(paper, ink, ink.text, [label], x(from), x(Math.min(to, view.until)), top + row / 2);
   }
 }
 
@@ -300,8 +308,14 @@ function drawPromise({ paper, x, view, ink }, group, top, told) {
   paper.stroke();
 }
 
-/** A barrier wherever all rings go on to phases of another section, or begin their sequence again. */
-function drawBarriers({ paper, x, view, ink }, bars, coming, sectionOf, sections, bottom) {
+/**
+ * The times in view at which all rings crossed or will cross a barrier: the next green is one of another
+ * section; at a junction of one single ring, its sequence begins again.
+ */
+export function barriersOf(site, bars, coming, view) {
+  const { sections } = ringsOf(site);
+  const sectionOf = new Map(sections.flatMap((section, at) => section.flat().map((group) => [group, at])));
+  const single = sections.length === 1 && sections[0].length === 1 ? sections[0][0] : null;
   const starts = [];
   for (const [group, list] of bars) {
     for (const bar of list) if (bar.colour === "green") starts.push([bar.start, group]);
@@ -310,40 +324,39 @@ function drawBarriers({ paper, x, view, ink }, bars, coming, sectionOf, sections
     if (turn.start > view.now) for (const group of turn.groups) starts.push([turn.start, group]);
   }
   starts.sort((one, other) => one[0] - other[0]);
-  const placeOf = new Map(
-    sections.flatMap((section) => section.flatMap((ring) => ring.map((group, at) => [group, at]))),
-  );
-  let before = null;
-  for (const [t, group] of starts) {
-    const [section, place] = [sectionOf.get(group), placeOf.get(group)];
-    const again = before && section === before.section && place < before.place;
-    if (before && t - before.t > 0.05 && (section !== before.section || again)) {
-      const px = Math.round(x(t)) - 2.5;
-      if (t >= view.from && t <= view.until) {
-        paper.strokeStyle = t > view.now ? ink.muted : ink.text;
-        paper.lineWidth = 1.5;
-        for (const shift of [0, 3]) {
-          paper.beginPath();
-          paper.moveTo(px - shift, AXIS);
-          paper.lineTo(px - shift, bottom);
-          paper.stroke();
-        }
-        paper.lineWidth = 1;
-      }
+  const isCrossed = ([, one], [, other]) =>
+    single ? single.indexOf(other) <= single.indexOf(one) : sectionOf.get(one) !== sectionOf.get(other);
+  return starts
+    .filter((start, at) => at > 0 && isCrossed(starts[at - 1], start))
+    .map(([t]) => t)
+    .filter((t) => t >= view.from && t <= view.until);
+}
+
+function drawBarriers({ paper, x, view, ink }, times, bottom) {
+  paper.lineWidth = 1.5;
+  for (const t of times) {
+    const px = Math.round(x(t)) - 2.5;
+    paper.strokeStyle = t > view.now ? ink.muted : ink.text;
+    for (const shift of [0, 3]) {
+      paper.beginPath();
+      paper.moveTo(px - shift, AXIS);
+      paper.lineTo(px - shift, bottom);
+      paper.stroke();
     }
-    before = { t, section, place };
   }
+  paper.lineWidth = 1;
 }
 
 /** @returns the bar under a point of the canvas, with its group; null: there is none. */
-export function barAt(px, py, width, view, { told, site, bars }) {
+export function barAt(px, py, { width, height }, view, { told, site, bars }) {
   const origin = left(width);
+  const row = rowOf(height, site, told);
   if (px < origin) return null;
   const t = view.from + ((px - origin) / (width - origin - 4)) * (view.until - view.from);
   const { rings } = ringsOf(site);
-  const below = AXIS + ROW * rings.length + SPLIT;
-  const ring = rings[Math.floor((py - AXIS) / ROW)];
-  const phase = told.groups[Math.floor((py - below) / ROW)];
+  const below = AXIS + row * rings.length + SPLIT;
+  const ring = rings[Math.floor((py - AXIS) / row)];
+  const phase = told.groups[Math.floor((py - below) / row)];
   const groups = py < below - SPLIT ? (ring?.phases ?? []) : phase ? [phase.group] : [];
   const wanted = py < below - SPLIT ? ["green", "yellow", "flashing_red"] : null;
   for (const group of groups) {

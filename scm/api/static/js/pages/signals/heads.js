@@ -42,7 +42,7 @@ function Head({ group, junction, detector }) {
       <div class="told">
         <h3>${name} <small>${lights.map((light) => light.light_id).join(" ")}</small></h3>
         <p class="left"><b>${heard ? promised(group, passed_s) : "—"}</b>
-          <small>${heard && group.next_colour ? `then ${WORDS[group.next_colour]}` : ""}</small></p>
+          <small>${heard ? next(group) : ""}</small></p>
         <p class="likely">${heard ? likely(group, passed_s) : "not heard"}</p>
         <p class="seen">${detected(detector)}</p>
       </div>
@@ -81,7 +81,13 @@ function Lamp({ colour, name }) {
   `;
 }
 
+function next({ colour, next_colour }) {
+  if (colour === "flashing_red") return "stop, look, go in turn";
+  return next_colour ? `then ${WORDS[next_colour]}` : "";
+}
+
 function likely(group, passed_s) {
+  if (group.colour === "flashing_red") return "no promise while it flashes";
   if (group.likely_s === null) return "no forecast";
   const left = Math.max(0, group.likely_s - Math.max(0, passed_s)).toFixed(1);
   if (group.likely_confidence >= 1) return "promised exactly";

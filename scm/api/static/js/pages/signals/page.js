@@ -10,7 +10,7 @@ import { editing, PlanEditor } from "scm/pages/signals/plan_editor.js";
 import { Plans } from "scm/pages/signals/plans.js";
 import { Promises } from "scm/pages/signals/promises.js";
 import { keep, look, row, status, trouble } from "scm/pages/signals/store.js";
-import { plain } from "scm/pages/signals/words.js";
+import { plain, toCome } from "scm/pages/signals/words.js";
 import { Wishes } from "scm/pages/signals/wishes.js";
 
 export function Page() {
@@ -62,19 +62,24 @@ const MODES = {
   adaptive: "adaptive",
   priority: "priority",
   preempt: "pre-empted",
-  flash: "flashing red",
 };
+
+/** How the lights are run; of a flash, what ends it. */
+function modeOf({ mode, monitor }) {
+  if (mode !== "flash") return MODES[mode] ?? mode;
+  return monitor?.fault ? "until the monitor's fault is reset" : "until somebody ends it";
+}
 
 /** Which junction, what runs, and what the monitor says: the line that is read first. */
 function Bar({ told, names }) {
   const now = status();
   const runs = !told.fresh
     ? "not heard"
-    : told.mode === "plan"
-      ? `plan ${told.plan}`
-      : told.mode === "flash"
-        ? "flashing red"
-        : `policy ${now?.policy ?? told.plan}`;
+    : told.mode === "flash"
+      ? "flashing red"
+      : told.mode === "plan" || now?.policy === "fixed"
+        ? `plan ${told.plan}`
+        : `policy ${plain(now?.policy ?? told.plan)}`;
   const choose = (event) => go(`/signals/${event.target.value}`);
   return html`
     <section class="panel bar" aria-label="Junction ${told.junction}">
@@ -90,10 +95,10 @@ function Bar({ told, names }) {
         : html`<h2>${plain(told.junction)}</h2>`}
       <span class="runs" data-mode=${told.fresh ? told.mode : "unheard"}>
         <b>${runs}</b>
-        <small>${told.fresh ? (MODES[told.mode] ?? told.mode) : "its controller is silent"}</small>
+        <small>${told.fresh ? modeOf(told) : "its controller is silent"}</small>
       </span>
       ${now?.pending &&
-      html`<span class="pending" role="status">${now.pending} begins at the next safe moment</span>`}
+      html`<span class="pending" role="status">${toCome(now.pending, told.mode)}</span>`}
       ${now?.failure && html`<span class="failure" role="alert">${now.failure}</span>`}
       ${trouble.value && html`<span class="failure" role="status">${trouble.value}</span>`}
       <${Monitor} told=${told} />

@@ -11,7 +11,7 @@ const MOST_STAGES = 24;
 const LOOK_MS = 400;
 const NAME = /^[a-z][a-z0-9_-]{0,31}$/;
 
-/** The plan in the editor: `{plan, about, stages, isNew, tag}`; null: it is closed. */
+/** The plan in the editor: `{plan, about, offset_s, stages, isNew, tag}`; null: it is closed. */
 export const editing = signal(null);
 
 /** The search: `{of, state, words}`; `of` is what it proves, as text. */
@@ -31,8 +31,8 @@ export async function edit(plan) {
       return null;
     });
     if (!found) return;
-    const { about, stages } = found.body;
-    editing.value = { plan: plan.plan, about, stages: copy(stages), isNew: false, tag: found.tag };
+    const { about, offset_s, stages } = found.body;
+    editing.value = { plan: plan.plan, about, offset_s, stages: copy(stages), isNew: false, tag: found.tag };
     if (plan.usable) search.value = { of: contentOf(editing.value), state: "proven", words: proofWords(found.body.proof) };
     return;
   }
@@ -43,7 +43,8 @@ export async function edit(plan) {
         green_s: 2 * phase.min_green_s,
         extra_red_s: 0,
       }));
-  editing.value = { plan: "", about: "", stages: copy(stages), isNew: true, tag: null };
+  const offset_s = typeof plan?.offset_s === "number" ? Math.round(10 * plan.offset_s) / 10 : null;
+  editing.value = { plan: "", about: "", offset_s, stages: copy(stages), isNew: true, tag: null };
 }
 
 /** @returns all that is wrong with a draft, in words; what only the search can find is not among it. */
@@ -68,7 +69,21 @@ export function faultsOf(draft) {
   }
   const cycle = cycleOf(draft.stages);
   if (cycle > LONGEST_CYCLE_S) faults.push(`The cycle of ${secs(cycle)} is longer than ${LONGEST_CYCLE_S} s.`);
+  if (draft.offset_s !== null && !(draft.offset_s >= 0 && draft.offset_s < cycle)) {
+    faults.push(`Offset: from 0 to less than the cycle of ${secs(cycle)}, or empty.`);
+  }
   return faults;
+}
+
+/** @returns what is right and yet may surprise: phases of two stages that follow each other. */
+function remarksOf({ stages }) {
+  if (stages.length < 2) return [];
+  return stages.flatMap((stage, at) => {
+    const next = (at + 1) % stages.length;
+    const both = stage.groups.filter((group) => stages[next].groups.includes(group)).map(plain);
+    const they = both.length > 1 ? "they go" : "it goes";
+    return both.length ? [`Stages ${at + 1} and ${next + 1} both have ${both.join(" and ")}: ${they} through yellow and red between them.`] : [];
+  });
 }
 
 function nameFault(draft) {
@@ -129,8 +144,20 @@ export function PlanEditor() {
           />
         </label>
         <label>
-          <span>Cycle (stretches greens)</span>
+          <span>Cycle, s (stretches greens)</span>
           <input type="number" id="plan-cycle" step="0.1" min="1" max=${LONGEST_CYCLE_S} value=${cycleOf(draft.stages).toFixed(1)} onChange=${scale} />
+        </label>
+        <label>
+          <span>Offset, s (empty: in step with nobody)</span>
+          <input
+            type="number"
+            id="plan-offset"
+            step="0.1"
+            min="0"
+            max=${LONGEST_CYCLE_S}
+            value=${draft.offset_s ?? ""}
+            onInput=${({ target }) => put({ offset_s: target.value === "" ? null : Number(target.value) })}
+          />
         </label>
       </div>
       <${PlanStrip} stages=${draft.stages} tall=${true} />
@@ -142,10 +169,10 @@ export function PlanEditor() {
               <th scope="col">Stage</th>
               <th scope="col">Phases</th>
               <th scope="col" class="number">Min green</th>
-              <th scope="col" class="number">Green</th>
+              <th scope="col" class="number">Green, s</th>
               <th scope="col" class="number">Yellow change</th>
               <th scope="col" class="number">Red clear</th>
-              <th scope="col" class="number">Extra red</th>
+              <th scope="col" class="number">Extra red, s</th>
               <th scope="col" class="number">Split</th>
               <th scope="col"><span class="hidden">Order</span></th>
             </tr>
@@ -167,6 +194,13 @@ export function PlanEditor() {
           </tbody>
         </table>
       </div>
+      <p class="why">
+        Min green, yellow change and red clear belong to the signal kernel, not to a plan: they follow from the map and
+        the slowest and fastest cars that drive here, so nobody can make them too short. What you set is green and extra
+        red. A cycle with an offset begins so long after whole cycles of the city's clock: junctions with the same
+        cycle keep step, and the first green of a cycle is longer until they do.
+      </p>
+      ${remarksOf(draft).map((one) => html`<p key=${one} class="remark" role="status">${one}</p>`)}
       <div class="foot">
         <button
           class="small"
@@ -202,7 +236,7 @@ function Stage({ at, stage, count, onPut, onMove, onRemove }) {
   return html`
     <tr>
       <th scope="row">${at + 1}</th>
-      <td class="chips">
+      <td class="chips" data-name="Phases">
         ${phases.map(
           (phase) => html`
             <label key=${phase.group} class="chip">
@@ -215,8 +249,8 @@ function Stage({ at, stage, count, onPut, onMove, onRemove }) {
           `,
         )}
       </td>
-      <td class="number">${secs(least)}</td>
-      <td class="number">
+      <td class="number" data-name="Min green">${secs(least)}</td>
+      <td class="number" data-name="Green, s">
         <input
           type="number"
           aria-label="Green of stage ${at + 1} in seconds"
@@ -227,9 +261,9 @@ function Stage({ at, stage, count, onPut, onMove, onRemove }) {
           onInput=${(event) => onPut({ green_s: number(event) })}
         />
       </td>
-      <td class="number">${secs(yellow_s)}</td>
-      <td class="number">${secs(red_clear_s)}</td>
-      <td class="number">
+      <td class="number" data-name="Yellow change">${secs(yellow_s)}</td>
+      <td class="number" data-name="Red clear">${secs(red_clear_s)}</td>
+      <td class="number" data-name="Extra red, s">
         <input
           type="number"
           aria-label="Extra red after stage ${at + 1} in seconds"
@@ -240,7 +274,7 @@ function Stage({ at, stage, count, onPut, onMove, onRemove }) {
           onInput=${(event) => onPut({ extra_red_s: number(event) })}
         />
       </td>
-      <td class="number"><b>${secs(splitOf(stage))}</b></td>
+      <td class="number" data-name="Split"><b>${secs(splitOf(stage))}</b></td>
       <td class="order">
         <button class="small" aria-label="Stage ${at + 1} earlier" disabled=${at === 0} onClick=${() => onMove(-1)}>▲</button>
         <button class="small" aria-label="Stage ${at + 1} later" disabled=${at === count - 1} onClick=${() => onMove(1)}>▼</button>
@@ -252,7 +286,8 @@ function Stage({ at, stage, count, onPut, onMove, onRemove }) {
 
 function Verdict({ faults, found }) {
   if (faults.length) {
-    return html`<ul class="verdict" data-state="bad" role="status">${faults.map((one) => html`<li key=${one}>${one}</li>`)}</ul>`;
+    const list = faults.map((one) => html`<li key=${one}>${one}</li>`);
+    return html`<div class="verdict" data-state="bad" role="status"><ul>${list}</ul></div>`;
   }
   if (!found) {
     return html`<p class="verdict" role="status">Nothing is wrong at sight. The search has to prove it before it can be saved.</p>`;
@@ -293,7 +328,8 @@ async function prove(draft) {
 
 async function save(draft) {
   const headers = draft.isNew ? { "If-None-Match": "*" } : { "If-Match": draft.tag };
-  const body = { about: draft.about, stages: draft.stages, by: "dashboard", reason: "edited on the dashboard" };
+  const { about, offset_s, stages } = draft;
+  const body = { about, offset_s, stages, by: "dashboard", reason: "edited on the dashboard" };
   const path = `/signals/${junction.value}/plans/${draft.plan}`;
   const reply = await change("PUT", path, body, () => `Plan ${draft.plan} is saved.`, headers);
   if (!reply) return;

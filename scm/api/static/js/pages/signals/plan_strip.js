@@ -33,7 +33,7 @@ export function PlanStrip({ stages, tall = false }) {
         const red_s = splitOf(stage) - (stage.green_s || 0) - yellow_s;
         return html`
           <i key=${`g${at}`} data-sign="green" style=${{ flexGrow: stage.green_s || 0.01 }}>
-            ${tall && stage.groups.map(plain).join(" + ")}
+            ${tall && html`<span>${stage.groups.map(plain).join(" + ")}</span>`}
           </i>
           <i key=${`y${at}`} data-sign="yellow" style=${{ flexGrow: yellow_s }}></i>
           <i key=${`r${at}`} data-sign="clear" style=${{ flexGrow: red_s }}></i>

@@ -5,8 +5,8 @@ import { change } from "scm/shell/api.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { edit } from "scm/pages/signals/plan_editor.js";
 import { PlanStrip } from "scm/pages/signals/plan_strip.js";
-import { plans, read, readPlans, site, status } from "scm/pages/signals/store.js";
-import { plain, secs } from "scm/pages/signals/words.js";
+import { plans, read, readPlans, row, site, status } from "scm/pages/signals/store.js";
+import { plain, secs, toCome } from "scm/pages/signals/words.js";
 
 /** `{plan}` or `{policy}` that is asked about. */
 const asking = signal(null);
@@ -46,7 +46,10 @@ function Plan({ plan, now, told }) {
         ${plan.source === "saved" && html`<span class="badge" data-usable=${plan.usable}>${plan.usable ? "proven" : "not proven"}</span>`}
         <small>${plan.about || "no words about it"}</small>
       </div>
-      <span class="cycle">${secs(plan.cycle_s)}</span>
+      <span class="cycle">
+        ${secs(plan.cycle_s)}
+        ${plan.offset_s !== null && html`<small>offset ${secs(plan.offset_s)}</small>`}
+      </span>
       <${PlanStrip} stages=${plan.stages} />
       <div class="acts">
         <button
@@ -101,7 +104,7 @@ function Run({ junction, wanted }) {
     close();
     change("PUT", `/signals/${junction}/plan`, body, (reply) =>
       reply.pending
-        ? `${plain(reply.pending)} begins at the next safe moment.`
+        ? `${toCome(reply.pending, row()?.mode)}.`
         : `${plain(reply.plan)} is in force.`,
     );
   };

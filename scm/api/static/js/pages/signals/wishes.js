@@ -5,8 +5,8 @@ import { change, notify } from "scm/shell/api.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { clock, span } from "scm/shared/format.js";
 import { events } from "scm/shell/store.js";
-import { clockNow, site, status } from "scm/pages/signals/store.js";
-import { plain, VERBS } from "scm/pages/signals/words.js";
+import { clockNow, row, site, status } from "scm/pages/signals/store.js";
+import { plain, toCome, VERBS } from "scm/pages/signals/words.js";
 
 const ROUTES = {
   call: "calls",
@@ -24,6 +24,10 @@ const MEANS = {
   preempt: "It comes next, out of order, and stays.",
   policy: "Run a policy for a while, then go back.",
 };
+
+/** What fixed time cannot grant: the junction runs actuated meanwhile, after what it has promised. */
+const LEAVES_PLAN = new Set(["hold", "force_off", "omit", "preempt"]);
+const WAITS = " The plan first keeps what it promised, up to two cycles; the time asked for runs meanwhile.";
 
 const LASTS = [
   [30, "30 s"],
@@ -56,7 +60,7 @@ export function Wishes({ told }) {
           ${told.mode === "flash" ? "End flash…" : "Flash red…"}
         </button>
       </div>
-      <${Form} junction=${told.junction} names=${told.groups.map((one) => one.group)} />
+      <${Form} junction=${told.junction} mode=${told.mode} names=${told.groups.map((one) => one.group)} />
       <${Held} junction=${told.junction} held=${held} />
       <${Lately} junction=${told.junction} />
       ${flashing.value && html`<${Flash} junction=${told.junction} on=${told.mode !== "flash"} />`}
@@ -64,7 +68,7 @@ export function Wishes({ told }) {
   `;
 }
 
-function Form({ junction, names }) {
+function Form({ junction, mode, names }) {
   const isPolicy = verb.value === "policy";
   const policies = (site.value?.policies ?? []).filter((one) => one.policy !== "flashing");
   const flip = (name) => {
@@ -141,14 +145,14 @@ function Form({ junction, names }) {
         <input id="wish-reason" name="reason" required maxlength="200" placeholder="Reason" />
       </label>
       <button class="primary">Ask</button>
-      <p class="means">${MEANS[verb.value]}</p>
+      <p class="means">${MEANS[verb.value]}${mode === "plan" && LEAVES_PLAN.has(verb.value) ? WAITS : ""}</p>
     </form>
   `;
 }
 
 const taken = (what) => (reply) =>
   reply.pending
-    ? `Taken: ${what}. ${plain(reply.pending)} begins at the next safe moment.`
+    ? `Taken: ${what}. ${toCome(reply.pending, row()?.mode)}.`
     : `Taken: ${what}.`;
 
 function Held({ junction, held }) {
@@ -179,11 +183,12 @@ function Held({ junction, held }) {
 }
 
 const SHOWN = 8;
+const SAYING = new Set(["traffic", "monitor"]);
 
 /** What was asked for and what came of it, from the log. */
 function Lately({ junction }) {
-  const about = `junction ${junction} `;
-  const told = events.value.filter((event) => event.text.includes(about)).slice(0, SHOWN);
+  const about = new RegExp(`\\b${junction}\\b`);
+  const told = events.value.filter((event) => SAYING.has(event.source) && about.test(event.text)).slice(0, SHOWN);
   return html`
     <h3>Lately <a href="/events">all events</a></h3>
     <ul class="lately">
@@ -191,7 +196,7 @@ function Lately({ junction }) {
         (event) => html`
           <li key=${event.seq} data-severity=${event.severity}>
             <time>${clock(event.t_ns)}</time>
-            <span>${event.text.replace(about, "")}</span>
+            <span>${event.text.replace(`junction ${junction}`, "").replace(/^:? /, "")}</span>
           </li>
         `,
       )}

@@ -1,5 +1,5 @@
 /** Colours of signals in letters, words and signs, and times as they are promised. */
-import { UNKNOWN } from "scm/shared/format.js";
+import { spaced, UNKNOWN } from "scm/shared/format.js";
 
 export const LETTERS = { red: "R", yellow: "Y", green: "G", flashing_red: "F", dark: "D" };
 
@@ -34,7 +34,11 @@ export function promised({ min_s, max_s }, passed_s) {
 }
 
 /** Names of groups as people say them. */
-export const plain = (name) => name.replaceAll("_", " ");
+export const plain = spaced;
+
+/** What was asked for and is not yet in force. */
+export const toCome = (pending, mode) =>
+  `${plain(pending)} begins ${mode === "flash" ? "when the flash ends" : "at the next safe moment"}`;
 
 /** A number of seconds, without needless digits. */
 export const secs = (value) => `${Number(value.toFixed(1))} s`;

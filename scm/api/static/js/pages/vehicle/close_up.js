@@ -3,6 +3,7 @@ import { html } from "scm/shared/html.js";
 import { go } from "scm/shell/router.js";
 import { world } from "scm/shell/store.js";
 import { byName, fixed } from "scm/shared/format.js";
+import { batteryState, batteryWord, BatterySign } from "scm/pages/vehicle/battery.js";
 import { CameraPanel } from "scm/pages/vehicle/camera_panel.js";
 import { FactsPanel } from "scm/pages/vehicle/facts_panel.js";
 import { LidarPanel } from "scm/pages/vehicle/lidar_panel.js";
@@ -27,6 +28,7 @@ export function CloseUp({ car }) {
       <span class="kind" data-kind=${car.kind}>${car.kind}</span>
       <span>${car.car}, tag ${car.tag_id}</span>
       <span class="mode" data-mode=${mode}>${mode}</span>
+      ${batteryWord(car) && html`<span class="charge" data-battery=${batteryState(car)}><${BatterySign} car=${car} /> battery ${batteryWord(car)}</span>`}
       <span class="speed"><b>${fixed(car.speed_mps, 2)}</b> m/s</span>
     </header>
     <${CameraPanel} car=${car} />

@@ -2,11 +2,13 @@
 import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { age, fixed, span, UNKNOWN } from "scm/shared/format.js";
+import { Battery } from "scm/pages/vehicle/battery.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
 import { doubtOf, misbehaviour, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
 
 const LINK_MS = 1000;
 const STALE_MS = 500;
+const LATE_MS = 150; // from here on the car's guard lets go of the throttle
 const DEGREES = 180 / Math.PI;
 
 export function FactsPanel({ car }) {
@@ -20,15 +22,16 @@ export function FactsPanel({ car }) {
         <dt>Pose</dt><dd>${fixed(x, 2)}, ${fixed(y, 2)} m, ${fixed(yaw * DEGREES, 0, "°")}</dd>
         <dt>Throttle</dt><dd>${fixed(car.throttle, 2)}</dd>
         <dt>Steering</dt><dd>${fixed(car.steering_rad * DEGREES, 1, "°")} <small>${side(car.steering_rad)}</small></dd>
-        <dt>Battery</dt><dd>${car.battery_v === null ? "not measured" : fixed(car.battery_v, 2, " V")}</dd>
+        <dt>Battery</dt><dd data-fact="battery"><${Battery} car=${car} /></dd>
         <dt>Trip</dt><dd>${tripOf(car.trip)}</dd>
         <dt>Driven by</dt><dd class=${isAtHome(car) ? "" : "warn"}>${ownerOf(car)}</dd>
         <dt>Lease</dt><dd>${isAtHome(car) ? "at home" : `ends in ${span(car.lease_left_ms / 1000)}`}</dd>
         <dt>Epoch</dt><dd>${car.epoch}</dd>
+        <dt>Command age</dt><dd data-fact="command" class=${car.command_age_ms > LATE_MS ? "warn" : ""}>${commandOf(car)}</dd>
         <dt>Last report</dt><dd class=${car.age_ms > STALE_MS ? "warn" : ""}>${age(car.age_ms)} <small>ago</small></dd>
         <dt>Round trip</dt><dd data-fact="link" title=${link?.title ?? ""}>${link?.text ?? UNKNOWN}</dd>
         <dt>Eye sees it off by</dt><dd>${eyeOf(car.eye)}</dd>
-        <dt>Misbehaviour</dt><dd class=${doubtOf(car.vehicle).reported ? "bad" : ""}>${doubtText(car.vehicle)}</dd>
+        <dt>Misbehaviour</dt><dd class=${doubtOf(car.vehicle).suspected ? "bad" : ""}>${doubtText(car.vehicle)}</dd>
       </dl>
     </section>
   `;
@@ -65,6 +68,11 @@ function side(angle) {
   return angle > 0 ? "left" : "right";
 }
 
+function commandOf(car) {
+  if (isAtHome(car)) return "drives itself";
+  return car.command_age_ms === null ? "none came yet" : age(car.command_age_ms);
+}
+
 function tripOf(trip) {
   if (!trip) return "none";
   if (trip.arrived) return "arrived";
@@ -78,7 +86,8 @@ function eyeOf(eye) {
 
 function doubtText(vehicle) {
   if (!misbehaviour.value?.watched) return "nobody watches";
-  const { score, reported } = doubtOf(vehicle);
-  if (score === null) return "not on the air";
-  return `score ${fixed(score, 1)}${reported ? ", reported" : ""}`;
+  const { score, suspected, reported } = doubtOf(vehicle);
+  const now = score === null ? "not on the air" : `score ${fixed(score, 1)}`;
+  if (suspected) return `${now}, suspected`;
+  return reported ? `${now}, was reported` : now;
 }

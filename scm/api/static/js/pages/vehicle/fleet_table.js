@@ -3,6 +3,7 @@ import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { age, byName, fixed, UNKNOWN } from "scm/shared/format.js";
 import { world } from "scm/shell/store.js";
+import { batteryState, batteryWord, BatterySign, percent } from "scm/pages/vehicle/battery.js";
 import { doubtOf, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
 
@@ -64,14 +65,19 @@ function Row({ car }) {
   return html`
     <tr data-car=${car.vehicle} data-alive=${car.alive}>
       <td><a class="to" href="/vehicles/${car.vehicle}">${car.vehicle}</a></td>
-      <td><span class="mode" data-mode=${mode}>${mode}</span></td>
+      <td>
+        <span class="mode" data-mode=${mode}>${mode}</span>
+        ${batteryWord(car) && html` <span class="charge narrow" data-battery=${batteryState(car)}><${BatterySign} car=${car} />${batteryWord(car)}</span>`}
+      </td>
       <td><span class="kind" data-kind=${car.kind}>${car.kind}</span></td>
       <td class="wide">${car.car}</td>
       <td class=${isAtHome(car) ? "" : "warn"}>${ownerOf(car)}</td>
       <td class="number">${fixed(car.speed_mps, 2)} <small>m/s</small></td>
       <td class="wide">${tripOf(car)}</td>
-      <td class="number wide">${fixed(car.battery_v, 1)} <small>${car.battery_v === null ? "" : "V"}</small></td>
-      <td class="number wide ${doubt.reported ? "bad" : ""}">${doubt.reported ? "reported" : doubt.score === null ? UNKNOWN : fixed(doubt.score, 1)}</td>
+      <td class="number wide charge" data-battery=${batteryState(car)} title=${fixed(car.battery_v, 2, " V")}>
+        ${batteryWord(car)} <${BatterySign} car=${car} /> ${percent(car) || fixed(car.battery_v, 1, " V")}
+      </td>
+      <td class="number wide ${doubt.suspected ? "bad" : ""}">${doubt.suspected ? "suspected" : doubt.score === null ? UNKNOWN : fixed(doubt.score, 1)}</td>
       <td class="number ${car.age_ms > STALE_MS ? "warn" : ""}">${age(car.age_ms)}</td>
     </tr>
   `;

@@ -41,6 +41,8 @@ export function hands(onLetGo) {
       else held.delete(what);
       if (!held.size) onLetGo();
     },
+    /** What keys and pads are held, by name. */
+    held: () => [...held].sort().join(" "),
     wish(most) {
       const now = performance.now();
       const passed = Math.min(0.1, (now - last) / 1000);

@@ -23,9 +23,13 @@ export function useMisbehaviour() {
   }, []);
 }
 
-/** `{score, reported}` of a car; the score is null where nobody watches it. */
+/** `{score, suspected, reported}` of a car, now and ever; the score is null where it is not heard. */
 export function doubtOf(vehicle) {
   const told = misbehaviour.value;
   const row = told?.stations.find((one) => one.station === vehicle);
-  return { score: row?.score ?? null, reported: told?.reported.includes(vehicle) ?? false };
+  return {
+    score: row?.score ?? null,
+    suspected: row?.suspected ?? false,
+    reported: told?.reported.includes(vehicle) ?? false,
+  };
 }

@@ -2,7 +2,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
 import { html } from "scm/shared/html.js";
-import { UNKNOWN } from "scm/shared/format.js";
+import { fixed } from "scm/shared/format.js";
 import { colours } from "scm/shell/theme.js";
 import { fresh, reportsNow, SHOWN_S, useReports } from "scm/pages/vehicle/reports.js";
 
@@ -89,8 +89,7 @@ function Plot({ plot, paused }) {
 }
 
 function number({ name, digits, unit }, newest) {
-  const value = newest[name];
-  return value === undefined || value === null ? UNKNOWN : `${value.toFixed(digits)}${unit}`;
+  return fixed(newest[name], digits, unit);
 }
 
 /** Columns of a plot; time counts back from the newest report. */

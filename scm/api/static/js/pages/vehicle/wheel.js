@@ -16,6 +16,9 @@ export const wheel = signal(FREE);
 /** The greatest throttle that a key asks for. */
 export const most = signal(0.4);
 
+/** Which keys and pads are held: `ahead left`. */
+export const down = signal("");
+
 let socket = null;
 let hand = null;
 let timer = null;
@@ -89,12 +92,14 @@ function stopHands() {
   clearInterval(timer);
   hand?.end();
   hand = null;
+  down.value = "";
 }
 
 /** Say what is wished for now; who lets go says so at once. */
 function send() {
   if (socket?.readyState !== WebSocket.OPEN || !hand) return;
   const { held, throttle, steering } = hand.wish(most.value);
+  down.value = hand.held();
   seq += 1;
   socket.send(JSON.stringify({ type: "drive", seq, t_ms: performance.now(), held, throttle, steering }));
 }

@@ -4,7 +4,7 @@ import { html } from "scm/shared/html.js";
 import { fixed, UNKNOWN } from "scm/shared/format.js";
 import { stop } from "scm/shell/store.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
-import { drop, giveBack, most, pad, take, wheel } from "scm/pages/vehicle/wheel.js";
+import { down, drop, giveBack, most, pad, take, wheel } from "scm/pages/vehicle/wheel.js";
 
 const PADS = [
   ["ahead", "▲", "Ahead", "W"],
@@ -37,7 +37,7 @@ function Free({ car }) {
   const taken = !isAtHome(car);
   return html`
     <p>
-      ${taken ? html`${car.vehicle} is driven by <b>${ownerOf(car)}</b>.` : `${car.vehicle} is driven by ${ownerOf(car)}, which goes on when you give it back.`}
+      ${taken ? html`${car.vehicle} is driven by <b>${ownerOf(car)}</b>.` : afterwards(car)}
     </p>
     ${over && html`<p class="over" role="status" data-code=${over.code}>${said(over)}</p>`}
     ${taken
@@ -51,6 +51,12 @@ function Free({ car }) {
         `}
     <${Help} />
   `;
+}
+
+/** What becomes of a car that nobody has taken, when you give it back. */
+function afterwards(car) {
+  if (car.trip && !car.trip.arrived) return `${car.vehicle} is driven by ${ownerOf(car)}, which goes on when you give it back.`;
+  return `${car.vehicle} stands, and stands again when you give it back.`;
 }
 
 /** Who takes a car from somebody says why: it stands in the events. */
@@ -95,7 +101,7 @@ function Held({ car }) {
 }
 
 function Pad({ what, sign, word, letter }) {
-  const down = (event) => {
+  const press = (event) => {
     event.currentTarget.setPointerCapture?.(event.pointerId);
     pad(what, true);
   };
@@ -105,7 +111,8 @@ function Pad({ what, sign, word, letter }) {
       class="pad"
       data-pad=${what}
       aria-label="${word}: hold"
-      onPointerDown=${down}
+      data-down=${down.value.split(" ").includes(what)}
+      onPointerDown=${press}
       onPointerUp=${up}
       onPointerCancel=${up}
       onLostPointerCapture=${up}

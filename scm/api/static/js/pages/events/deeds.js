@@ -1,0 +1,30 @@
+/** Deeds of the audit in words: what somebody asked of the world, the signals, the monitor or the web. */
+import { span, spaced } from "scm/shared/format.js";
+
+const LEASES = { acquire: "take", renew: "keep", release: "give back", steal: "take from its owner" };
+const names = (list) => list.map(spaced).join(", ");
+
+const SAYINGS = {
+  StopRequest: ({ engaged }) => (engaged ? "stop the city" : "release the city stop"),
+  MonitorReset: ({ junction }) => `reset the monitor of ${junction}`,
+  PlanRequest: ({ junction, plan }) => `${plan === "flash" ? "flash red" : `run ${spaced(plan)}`} at ${junction}`,
+  SignalRequest: wished,
+  JoinRequest: ({ vehicle, kind, car }) => `join as ${vehicle}, a ${kind} ${car}`,
+  LeaseRequest: ({ vehicle, verb }) => `${LEASES[verb] ?? verb} the wheel of ${vehicle}`,
+  SpawnRequest: ({ vehicle, car }) => `add ${vehicle || "a car"}, a ${car}`,
+  RemoveRequest: ({ vehicle }) => `take ${vehicle} off the map`,
+  RouteRequest: ({ vehicle, via }) => `send ${vehicle} ${via.length ? `through ${names(via)}` : "on its way"}`,
+  LightRequest: ({ vehicle }) => `set the lights of ${vehicle}`,
+};
+
+function wished({ junction, verb, groups, policy, clears, expires_s }) {
+  const what = [verb === "clear" ? `take back ${clears || "wishes"}` : spaced(verb), spaced(policy), names(groups)];
+  const lasts = verb === "clear" ? "" : ` for ${span(expires_s)}`;
+  return `${what.filter(Boolean).join(" ")} at ${junction}${lasts}`;
+}
+
+/** One deed as a sentence; of the web, the request itself. */
+export function said({ station, kind, request }) {
+  if (station === "api") return kind.replace("/api/v1/", "/") + (request.query ? `?${request.query}` : "");
+  return SAYINGS[kind]?.(request) ?? kind;
+}

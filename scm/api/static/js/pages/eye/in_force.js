@@ -1,0 +1,64 @@
+/** By which calibration the camera sees, and the question before another one is put in force. */
+import { useEffect, useState } from "preact/hooks";
+import { html } from "scm/shared/html.js";
+import { clock } from "scm/shared/format.js";
+import { Dialog } from "scm/shared/dialog.js";
+import { read } from "scm/pages/eye/asking.js";
+import { change } from "scm/shell/api.js";
+
+/** `{lens, place}` as people say it. */
+export function named({ lens, place }) {
+  return [place && `place ${place}`, lens && `lens ${lens}`].filter(Boolean).join(", ") || "as started";
+}
+
+export function InForce({ camera }) {
+  const told = camera.in_force;
+  if (!told) return null;
+  const since = told.since_ns === null ? "" : `since ${clock(told.since_ns)} by ${told.by}`;
+  return html`
+    <span class="in-force" title=${told.reason || "By the map file, and the lens it was started with"}>
+      Calibration <b>${named(told.now)}</b> ${since}
+    </span>
+  `;
+}
+
+/** Ask for a reason, then put `wish` in force: the name of a calibration, or null for what was before. */
+export function PutInForce({ camera, wish, close }) {
+  const report = useReport(wish);
+  const what = wish ?? named(camera.in_force.before);
+  const submit = async (event) => {
+    event.preventDefault();
+    const body = { by: "dashboard", reason: event.target.elements.reason.value };
+    const path = `/eye/cameras/${camera.camera}/calibration`;
+    close();
+    if (wish) await change("PUT", path, { ...body, calibration: wish }, said);
+    else await change("POST", `${path}/back`, body, said);
+  };
+  const said = (reply) => `${camera.camera} sees by: ${named(reply.in_force.now)}.`;
+  return html`
+    <${Dialog} title=${wish ? `Put ${what} in force?` : `Put back: ${what}?`} onClose=${close}>
+      <p>
+        ${wish
+          ? "The Eye sees by it from its next frame on, if the map tags in view agree with it. What is in force now can be put back."
+          : "The Eye sees by it from its next frame on, and says so if the map tags no longer agree with it."}
+      </p>
+      ${report?.is_sure === false && html`<p class="warn">Two places would show its tags alike: it may be the wrong one.</p>`}
+      <form onSubmit=${submit}>
+        <input name="reason" required maxlength="200" placeholder="Reason" aria-label="Reason" data-first />
+        <div class="actions">
+          <button type="button" onClick=${close}>Cancel</button>
+          <button class="primary">${wish ? "Put in force" : "Put back"}</button>
+        </div>
+      </form>
+    <//>
+  `;
+}
+
+/** How a calibration was found; null: nobody wrote it down. */
+function useReport(name) {
+  const [report, setReport] = useState(null);
+  useEffect(() => {
+    if (name) read(`/eye/calibrations/${name}`).then(({ row }) => row.reported && read(`/eye/calibrations/${name}/report`).then(setReport)).catch(() => null);
+  }, [name]);
+  return report;
+}

@@ -1,0 +1,99 @@
+"""A city in lockstep behind its real pages: all of one process, as fast as the clock on the wall.
+
+Where the machine is busy the city's time goes slower instead of parts coming late, so nothing is
+latched; and it starts in a second.
+"""
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from scm.api.app import create_app
+from scm.api.server import serve
+from scm.api.shelves import shelves_in
+from scm.api.view import CityView
+from scm.lockstep import Lockstep
+from scm.maps.load import load_map
+from scm.registry import names
+from scm.traffic.monitor_part import MonitorPart
+from scm.traffic.part import TrafficPart
+from scm.v2x.message import Message, Request
+from scm.world.part import WorldPart
+
+BEFORE_S = 150.0  # for the signals alone: what the pages show of the past
+PIECE_S = 0.05
+BEGIN_NS = 1_800_000_000_000_000_000
+
+
+class Town:
+    """Signals, monitor, world and pages of a map."""
+
+    def __init__(self, map_name: str, folder: Path, cars: int) -> None:
+        city_map, view = load_map(map_name), CityView()
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._ready = threading.Event()
+        signals = TrafficPart(city_map)
+        self.city = Lockstep([signals, MonitorPart(city_map), view], start_ns=BEGIN_NS)
+        self.city.run_for(BEFORE_S)
+        hosted = tuple((f"n{number}", "nigel") for number in range(1, cars + 1))
+        self.city.add(WorldPart(city_map, hosted=hosted))
+        plans = {junction.name: names("scm.traffic.plans") for junction in city_map.junctions}
+        app = create_app(view, self._ask, city_map, shelves=shelves_in(folder), plans=plans)
+        self._threads = [
+            threading.Thread(target=self._drive),
+            threading.Thread(
+                target=serve,
+                args=(app, "127.0.0.1", 0, self._stop),
+                kwargs={"on_ready": self._served},
+            ),
+        ]
+        for thread in self._threads:
+            thread.start()
+        assert self._ready.wait(30.0), "the pages are not served"
+
+    def get(self, path: str) -> Any:
+        """Return the JSON of a resource."""
+        answer = self.web.get(path)
+        answer.raise_for_status()
+        return answer.json()
+
+    def close(self) -> None:
+        """End all of it."""
+        self._stop.set()
+        for thread in self._threads:
+            thread.join(10.0)
+        self.city.close()
+        self.web.close()
+
+    def _served(self, url: str) -> None:
+        self.url = url
+        self.web = httpx.Client(base_url=url + "/api/v1", timeout=10.0)
+        self._ready.set()
+
+    def _ask(self, request: Request, timeout_s: float) -> Message:
+        with self._lock:
+            return self.city.call(request, timeout_s)
+
+    def _drive(self) -> None:
+        due_s = time.monotonic()
+        while not self._stop.is_set():
+            with self._lock:
+                self.city.run_for(PIECE_S)
+            due_s = max(due_s + PIECE_S, time.monotonic() - 1.0)
+            self._stop.wait(max(0.0, due_s - time.monotonic()))
+
+
+@contextmanager
+def town(map_name: str, folder: Path, cars: int = 2) -> Iterator[Town]:
+    """Run a town for tests."""
+    running = Town(map_name, folder, cars)
+    try:
+        yield running
+    finally:
+        running.close()
