@@ -9,8 +9,8 @@ STAMP := $(VENV)/.installed
 run: $(STAMP)
 	@$(VENV)/bin/scm up $(MAP) $(UP_ARGS)
 
-test: $(STAMP)
-	$(VENV)/bin/python -m pytest -n auto --no-loadscope-reorder --max-worker-restart=0 $(PYTEST_ARGS)
+test: $(STAMP)  # hundreds of processes are started: they share what the first compiled
+	PYTHONDONTWRITEBYTECODE= $(VENV)/bin/python -m pytest -n auto --no-loadscope-reorder --max-worker-restart=0 $(PYTEST_ARGS)
 
 bench: $(STAMP)
 	$(VENV)/bin/pip install --quiet -e '.[bench]'

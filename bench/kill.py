@@ -331,7 +331,7 @@ def measure(firmware: str, rows: list[Row], times: int, town: Town) -> Iterator[
 
 def main() -> None:
     """Print the table; end with 1 when a bar was missed."""
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(prog="python -m bench kill", description=__doc__)
     parser.add_argument("firmware", nargs="*", help="published, ours; default: both")
     parser.add_argument("--only", default="", metavar="WORD")
     parser.add_argument("--times", type=int, default=5)

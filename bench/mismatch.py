@@ -5,9 +5,9 @@ minutes and is not part of `make bench`: `python -m bench mismatch [CASES [SEED]
 of cases that are there, `python -m bench mismatch DIR`; diagnoses in `DIR/found` are taken.
 """
 
+import argparse
 import os
 import statistics
-import sys
 import tempfile
 import time
 import warnings
@@ -33,19 +33,27 @@ ROWS = ("this engine", "PySINDy as shipped", "PySINDy, largest term", "PySINDy c
 
 def main():
     """Print the table."""
-    arguments = sys.argv[1:]
+    parser = argparse.ArgumentParser(prog="python -m bench mismatch", description=__doc__)
+    parser.add_argument(
+        "cases", nargs="?", type=count_or_folder, default=CASES,
+        help=f"how many (default {CASES}), or a folder of cases that are there",
+    )  # fmt: skip
+    parser.add_argument("seed", nargs="?", type=int, default=SEED)
+    given = parser.parse_args()
     warnings.simplefilter("ignore")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with tempfile.TemporaryDirectory() as made:
-        folder = Path(made) / "cases"
-        if arguments and Path(arguments[0]).is_dir():
-            folder = Path(arguments[0])
-        else:
-            cases, seed = ([int(a) for a in arguments] + [CASES, SEED][len(arguments) :])[:2]
-            make_cases(Wish(seed=seed, cases=cases), folder, lambda _: None)
+        folder = given.cases
+        if isinstance(folder, int):
+            folder = Path(made) / "cases"
+            make_cases(Wish(seed=given.seed, cases=given.cases), folder, lambda _: None)
         healthy = Path(made) / "healthy"
         make_cases(Wish(seed=HEALTHY_SEED, cases=HEALTHY, kind="none"), healthy, lambda _: None)
         compare(folder, healthy)
+
+
+def count_or_folder(text):
+    return Path(text) if Path(text).is_dir() else int(text)
 
 
 def compare(folder, healthy):

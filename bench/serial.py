@@ -1,9 +1,9 @@
 """Rubbish from a Nigel's cable: wrong commands and time to recover, over ten million bytes.
 
-python -m bench serial [MILLIONS]
+`python -m bench serial [MILLIONS]`
 """
 
-import sys
+import argparse
 import time
 
 from tests.unit.nigel.fuzzed_line import fuzz
@@ -13,7 +13,11 @@ RUNS = 10
 
 def main() -> None:
     """Fuzz several hosts, each with a seed of its own; a wrong command ends with code 1."""
-    millions = float(sys.argv[1]) if len(sys.argv) > 1 and sys.argv[1] != "serial" else 10.0
+    parser = argparse.ArgumentParser(prog="python -m bench serial", description=__doc__)
+    parser.add_argument(
+        "millions", nargs="?", type=float, default=10.0, help="bytes, in millions (default 10)"
+    )
+    millions = parser.parse_args().millions
     began, wrong, sent, slowest_ns = time.monotonic(), 0, 0, 0
     for seed in range(RUNS):
         found = fuzz(round(millions * 1e6 / RUNS), seed)

@@ -63,7 +63,7 @@ def row(firmware: str, cars: int, times: int) -> bool:
 
 def main() -> None:
     """Print the table; end with 1 when a press was late."""
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(prog="python -m bench stop", description=__doc__)
     parser.add_argument("firmware", nargs="*", help="published, ours; default: both")
     parser.add_argument("--cars", type=int, nargs="+", default=[0, 20])
     parser.add_argument("--times", type=int, default=20)
