@@ -1,7 +1,8 @@
 """SUMO's signal programs as stages of our junctions: which groups are green together, how long.
 
     a phase         a stage of all lanes that show green on each of their ways
-    yellow, all red are left to the kernel, which takes what our cars need
+    yellow, all red are left to the kernel, which takes what our cars need, and keeps those green
+                    meanwhile who are so before and after
     same greens     in phases that follow one another are one stage
 
 Whether a stage is safe is not asked here: `scm.traffic.own_plan` has the kernel's rules do that.
@@ -63,6 +64,8 @@ def stages_of(
     stages: list[PlanStage] = []
     for phase in phases:
         groups = tuple(lane for lane in numbers if _is_green(phase, lane, numbers[lane]))
+        if stages and YELLOW & set(phase.state) and set(groups) <= set(stages[-1].groups):
+            continue
         if stages and stages[-1].groups == groups:
             both_s = stages[-1].green_s + phase.duration_s
             stages[-1] = PlanStage(groups=groups, green_s=both_s)

@@ -30,10 +30,10 @@ from scm.traffic.policy import (
 )
 from scm.traffic.program import STEP_NS
 from scm.traffic.promise import (
+    SLACK_NS,
     Promise,
     earliest_green,
     end_after,
-    green_end,
     red_end,
     still_ns,
     wished_green,
@@ -150,7 +150,7 @@ class Controller:
         self._is_late = False
         self._seq = 0
         self._foreseen_ns = 0
-        self._forecasts: dict[str, int] = {}
+        self._forecasts: Mapping[str, int | None] = {}
         self._coming: tuple[Coming, ...] = ()
         self._restart_ns = max(times.clearance for times in program.times) + STEP_NS
 
@@ -309,6 +309,7 @@ class Controller:
                 self.mode = "plan"
         if self.policy == FIXED:
             self.priority = {one.key: "rejected" for one in heard.priority}
+            self._timetables.settle(now_ns, goes_on=wanted == FIXED)
             return self._timetables.wishes(now_ns)
         return self._ask_policy(now_ns, dt_ns, heard)
 
@@ -369,9 +370,11 @@ class Controller:
             return
         if self.policy == FIXED:
             if self._wanted() == FIXED:
-                start_ns = self._timetables.next_start_ns
-                reds = [name for name, shown in self._shown.items() if shown.colour == "red"]
-                self._forecasts = {name: start_ns(name) for name in reds}
+                self._forecasts = {
+                    name: self._timetables.likely_end_ns(name, now_ns, red=shown.colour == "red")
+                    for name, shown in self._shown.items()
+                    if not shown.promise.is_exact
+                }
             return
         view, promises = self._view(now_ns, 0, heard), self._promises()
         try:
@@ -399,9 +402,10 @@ class Controller:
         passed = set(wishes)
         for name, shown in self._shown.items():
             is_green = shown.colour == "green"
+            latest_ns = shown.promise.max_end_ns
             if now_ns < shown.promise.min_end_ns:
                 (passed.add if is_green else passed.discard)(name)
-            elif is_green and shown.promise.max_end_ns is not None:
+            elif is_green and latest_ns is not None and now_ns >= latest_ns - SLACK_NS:
                 passed.discard(name)
         return frozenset(passed)
 
@@ -428,9 +432,16 @@ class Controller:
             elif colour == "red":
                 promise = self._promise(index, colour, now_ns, before)
                 shown.promise = promise if self._is_late else shown.promise.narrowed(promise)
-            elif colour == "green" and shown.promise.max_end_ns is None:
-                least_ns, wished = self._program.times[index].min_green, name in self._wished
-                shown.promise = wished_green(shown.promise, now_ns, least_ns, wished=wished)
+            elif colour == "green" and not shown.promise.is_exact:
+                shown.promise = self._of_green(index, shown, now_ns)
+
+    def _of_green(self, index: int, shown: _Shown, now_ns: int) -> Promise:
+        """Return what can be promised by now of a green whose end was not known."""
+        name, least_ns = self._program.groups[index], self._program.times[index].min_green
+        if self.policy != FIXED or self._timetables.cycle.timetable is None:
+            return wished_green(shown.promise, now_ns, least_ns, wished=name in self._wished)
+        promise = self._timetables.green_end(name, now_ns, shown.since_ns + least_ns)
+        return promise if self._is_late else shown.promise.narrowed(promise)
 
     def _promise(
         self, index: int, colour: Colour, now_ns: int, before: list[Promise | None]
@@ -444,7 +455,7 @@ class Controller:
             case "red":
                 return earliest_green(self._program, self._state, index, before, now_ns)
             case "green" if is_timed:
-                return green_end(name, self._timetables.cycle, now_ns, times.min_green)
+                return self._timetables.green_end(name, now_ns, now_ns + times.min_green)
             case "green":
                 return wished_green(None, now_ns, times.min_green, wished=True)
             case "yellow":

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from scm.clock import NS_PER_S
 from scm.traffic.kernel import Phase, Program, State
 from scm.traffic.policy import Turn
-from scm.traffic.promise import SLACK_NS, Promise, still_ns
+from scm.traffic.promise import Promise, still_ns
 
 CERTAIN, AS_PLANNED = 1.0, 0.98
 FREED = 0.98
@@ -50,7 +50,7 @@ def within(
         planned: Whether a timetable says so.
     """
     latest_ns = promise.max_end_ns
-    if latest_ns is not None and latest_ns - promise.min_end_ns <= SLACK_NS:
+    if promise.is_exact:
         return Likely(promise.min_end_ns, CERTAIN)
     if forecast_ns is None:
         return None

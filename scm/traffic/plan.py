@@ -5,10 +5,15 @@ it makes a cycle of stages, each a set of groups that are green together, and fo
 and clearance between two stages are not the plan's business: the timetable adds what the kernel
 takes, and a step for each of the three changes between two greens, so that steps that come late
 never push the next stage: SPaT's promises hang on that.
+
+A group of two stages that follow each other stays green between them: only who leaves is waited
+for. Over a cycle's end too, where the next cycle begins with it. Which plan that will be of is not
+known to this one, so there everybody's yellow and clearance are left room for.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from scm import registry
 from scm.errors import PlanError
@@ -21,7 +26,7 @@ FLASH = "flash"
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """Groups that are green together, for how long, and how much longer all are red then [ns]."""
+    """Groups that are green together, for how long, and how much later the next stage is [ns]."""
 
     groups: tuple[str, ...]
     green_ns: int
@@ -45,6 +50,13 @@ class Slot:
     end_ns: int
 
 
+class Green(NamedTuple):
+    """A group's green in a cycle, through all stages that it lasts [ns]."""
+
+    start_ns: int
+    end_ns: int
+
+
 @dataclass(frozen=True, slots=True)
 class Timetable:
     """One cycle of a plan at one junction; positions count from its start [ns]."""
@@ -53,19 +65,41 @@ class Timetable:
     slots: tuple[Slot, ...]
     length_ns: int
 
-    def wishes(self, position_ns: int) -> frozenset[str]:
-        """Return the groups wished green at a position of the cycle."""
-        for slot in self.slots:
-            if slot.start_ns <= position_ns < slot.end_ns:
-                return slot.groups
-        return frozenset()
+    def wishes(self, position_ns: int, going_on: frozenset[str] = frozenset()) -> frozenset[str]:
+        """Return the groups wished green at a position of the cycle.
 
-    def slot_of(self, group: str, position_ns: int) -> Slot | None:
-        """Return the group's green that is on, or the next one in this cycle."""
+        Args:
+            position_ns: Where.
+            going_on: Who stays green from the last stage into the next cycle.
+        """
+        before = frozenset[str]()
         for slot in self.slots:
-            if group in slot.groups and position_ns < slot.end_ns:
-                return slot
-        return None
+            if position_ns < slot.start_ns:
+                return before & slot.groups
+            if position_ns < slot.end_ns:
+                return slot.groups
+            before = slot.groups
+        return going_on if position_ns < self.length_ns else frozenset()
+
+    def into(self, following: "Timetable") -> frozenset[str]:
+        """Return who stays green when a cycle of `following` comes next."""
+        return self.slots[-1].groups & following.slots[0].groups
+
+    def greens_of(self, group: str) -> list[Green]:
+        """Return the group's greens in their order; stages that follow each other make one."""
+        greens: list[Green] = []
+        before = frozenset[str]()
+        for slot in self.slots:
+            if group in before & slot.groups:
+                greens[-1] = Green(greens[-1].start_ns, slot.end_ns)
+            elif group in slot.groups:
+                greens.append(Green(slot.start_ns, slot.end_ns))
+            before = slot.groups
+        return greens
+
+    def green_of(self, group: str, position_ns: int) -> Green | None:
+        """Return the group's green that is on, or the next one in this cycle."""
+        return next((one for one in self.greens_of(group) if position_ns < one.end_ns), None)
 
     def first_start_ns(self, group: str) -> int:
         """Return when the group's first green of a cycle begins."""
@@ -129,17 +163,25 @@ def timetable(name: str, cycle: tuple[Stage, ...], program: Program) -> Timetabl
         raise PlanError(f"plan {name!r}: " + "; ".join(problems))
     slots: list[Slot] = []
     position_ns = 0
-    for stage in cycle:
+    for number, stage in enumerate(cycle, 1):
         end_ns = position_ns + stage.green_ns
         slots.append(Slot(frozenset(stage.groups), position_ns, end_ns))
-        position_ns = end_ns + least_between_ns(stage.groups, program) + stage.extra_red_ns
+        following = cycle[number].groups if number < len(cycle) else ()
+        between_ns = least_between_ns(stage.groups, following, program)
+        position_ns = end_ns + between_ns + stage.extra_red_ns
     return Timetable(name, tuple(slots), position_ns)
 
 
-def least_between_ns(groups: tuple[str, ...], program: Program) -> int:
-    """Return the least time from the end of a stage's green to the next green [ns]."""
-    times = [times_of(program, group) for group in groups]
-    return max(t.yellow + t.clearance for t in times) + 3 * STEP_NS
+def least_between_ns(groups: Collection[str], following: Collection[str], program: Program) -> int:
+    """Return the least time from the end of a stage's green to the next one's [ns].
+
+    Args:
+        groups: Of the stage.
+        following: Of the next one in its cycle; none: it is the last one.
+        program: Of the junction.
+    """
+    leaving = [times_of(program, group) for group in groups if group not in following]
+    return max(t.yellow + t.clearance for t in leaving) + 3 * STEP_NS if leaving else 0
 
 
 def _problems(stage: Stage, program: Program) -> list[str]:

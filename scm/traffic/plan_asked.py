@@ -12,7 +12,7 @@ from scm.errors import PlanError
 from scm.store.records import StageRecord
 from scm.traffic import kernel
 from scm.traffic.kernel import GroupTimes, Program
-from scm.traffic.plan import FLASH, Stage, Timetable, least_between_ns, timetable
+from scm.traffic.plan import FLASH, Slot, Stage, Timetable, least_between_ns, timetable
 from scm.traffic.program import whole_steps_ns
 from scm.traffic.proof_load import check_table
 from scm.traffic.proof_plan import prove_plan
@@ -79,11 +79,12 @@ def check_name(plan: str, taken: Collection[str]) -> None:
 
 def stages_of(table: Timetable, program: Program) -> tuple[SignalStage, ...]:
     """Return the stages that make a timetable."""
-    ends = [*(slot.start_ns for slot in table.slots[1:]), table.length_ns]
+    following = [*table.slots[1:], Slot(frozenset(), table.length_ns, table.length_ns)]
     made = []
-    for slot, next_ns in zip(table.slots, ends, strict=True):
+    for slot, after in zip(table.slots, following, strict=True):
         groups = tuple(name for name in program.groups if name in slot.groups)
-        extra_ns = next_ns - slot.end_ns - least_between_ns(groups, program)
+        between_ns = least_between_ns(slot.groups, after.groups, program)
+        extra_ns = after.start_ns - slot.end_ns - between_ns
         made.append(
             SignalStage(
                 groups=groups,

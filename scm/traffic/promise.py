@@ -4,6 +4,8 @@ Under a timetable a plan only ever changes at the end of a cycle. So inside a cy
 known; and of the first red end beyond it, only that some plan's cycle begins there: the earliest
 start of all plans is promised as the minimum, the latest as the maximum. When the next cycle
 begins, the promise narrows to one of them; it never widens. The maximum allows for two late steps.
+A green of the last stage may go on in the next cycle: until that is settled, when the last stage
+begins, the end of that stage is its minimum, and the latest end that any plan gives it the maximum.
 
 Under any other policy nobody knows how long a green will be wished for. A green that is still
 wished is promised for `AHEAD_NS` more, from step to step, so that a car which hears two SPATEM a
@@ -28,6 +30,11 @@ class Promise:
 
     min_end_ns: int
     max_end_ns: int | None
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the end is known but for late steps."""
+        return self.max_end_ns is not None and self.max_end_ns - self.min_end_ns <= SLACK_NS
 
     def narrowed(self, by: "Promise") -> "Promise":
         """Return what is left when both hold."""
@@ -54,11 +61,34 @@ def end_after(end_ns: int) -> Promise:
     return Promise(end_ns, end_ns + SLACK_NS)
 
 
-def green_end(group: str, cycle: Cycle, now_ns: int, min_green_ns: int) -> Promise:
-    """Return when a green that starts now will end."""
-    least_ns = now_ns + min_green_ns
-    slot = cycle.timetable and cycle.timetable.slot_of(group, now_ns - cycle.began_ns)
-    return end_after(max(cycle.began_ns + slot.end_ns, least_ns) if slot else least_ns)
+def green_end(
+    group: str, cycle: Cycle, now_ns: int, least_ns: int, onward: Iterable[Timetable | None]
+) -> Promise:
+    """Return when a green that is on will end.
+
+    Args:
+        group: Which one.
+        cycle: That runs now.
+        now_ns: The present time.
+        least_ns: When it may end at the earliest.
+        onward: Timetables in whose cycle it may go on after this one; None: it may go on in none.
+    """
+    if cycle.timetable is None:
+        return end_after(least_ns)
+    green = cycle.timetable.green_of(group, now_ns - cycle.began_ns)
+    last_ns = cycle.began_ns + cycle.timetable.slots[-1].end_ns
+    if green is not None and cycle.began_ns + green.end_ns < last_ns:
+        return end_after(max(cycle.began_ns + green.end_ns, least_ns))
+    ends_ns, is_open = [], False
+    for table in onward:
+        if table is None or group not in table.slots[0].groups:
+            ends_ns.append(last_ns)
+            continue
+        first = table.greens_of(group)[0]
+        ends_ns.append(cycle.ends_ns + first.end_ns)
+        is_open |= first.end_ns == table.slots[-1].end_ns  # perhaps beyond that cycle as well
+    latest_ns = None if is_open else max(*ends_ns, least_ns) + SLACK_NS
+    return Promise(max(min(ends_ns), least_ns), latest_ns)
 
 
 def red_end(group: str, cycle: Cycle, now_ns: int, plans: Iterable[Timetable]) -> Promise:
@@ -70,9 +100,9 @@ def red_end(group: str, cycle: Cycle, now_ns: int, plans: Iterable[Timetable]) -
         now_ns: The present time.
         plans: All that may run in the next cycle; none: another policy follows it.
     """
-    slot = cycle.timetable and cycle.timetable.slot_of(group, now_ns - cycle.began_ns)
-    if slot:
-        return end_after(cycle.began_ns + slot.start_ns)
+    green = cycle.timetable and cycle.timetable.green_of(group, now_ns - cycle.began_ns)
+    if green:
+        return end_after(cycle.began_ns + green.start_ns)
     starts = [plan.first_start_ns(group) for plan in plans]
     if not starts:
         return Promise(cycle.ends_ns, None)

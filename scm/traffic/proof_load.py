@@ -50,7 +50,8 @@ def check_table(table: Timetable, program: Program) -> None:
     for cycle in range(2):
         shown = set[str]()
         for at_ns in range(0, table.length_ns, STEP_NS):
-            state = kernel.step(program, state, table.wishes(at_ns), STEP_NS)
+            wishes = table.wishes(at_ns, table.into(table))
+            state = kernel.step(program, state, wishes, STEP_NS)
             shown |= _green(program, state)
         if cycle and shown != set(program.groups):
             late = sorted(set(program.groups) - shown)

@@ -6,10 +6,16 @@ a cycle begins. Then the plan over the kernel: from the begin of its cycle throu
 kernel state and place in the cycle, with steps of one or two tenths of a second in any order, as a
 busy computer makes them. The observer of the first search looks on, and:
 
-    whenever a stage's green is wished, all its groups are green at that very step
-    every group is green in every stage that names it, in every cycle
+    whenever a group's green is wished, it is green at that very step; between two stages that
+    both name a group it is wished, so it stays green
+    a cycle begins with any groups of its first stage green already, and ends with any of its last
+    one green still, as the plans before and after it may want; all others are red and clear
+
+So a cycle ends as any other may begin: plans that are proven each may follow one another.
 """
 
+from collections.abc import Collection, Iterator
+from itertools import chain, combinations
 from typing import NamedTuple
 
 from scm.errors import PlanError
@@ -39,11 +45,16 @@ class Proven(NamedTuple):
 
 
 class _Node(NamedTuple):
-    """A place in the cycle [steps], what the kernel does there, what was seen of it."""
+    """A place in the cycle [steps], what the kernel does there, what was seen of it.
+
+    Attributes:
+        going_on: Once the last stage is over: who stays green into the next cycle.
+    """
 
     at: int
     state: State
     memory: Memory
+    going_on: frozenset[str]
 
 
 def prove_plan(kernel: Kernel, program: Program, table: Timetable) -> Proven:
@@ -87,20 +98,25 @@ def _all_come_to_rest(kernel: Kernel, program: Program, states: frozenset[State]
 
 
 def _walk(kernel: Kernel, program: Program, table: Timetable, cleared: State) -> tuple[int, int]:
-    length = table.length_ns // STEP_NS
-    memory = first_memory(cleared)
-    for _ in range(max(times.clearance for times in program.times)):
-        memory = watch(program, memory, cleared, (), 1)
-    first = _Node(length - 1, cleared, memory)
-    todo, seen, transitions = [first], {first}, 0
+    first, last = table.slots[0].groups, table.slots[-1].groups
+    rests = {
+        green: _resting(kernel, program, cleared, green)
+        for green in {*_some_of(first), *_some_of(last)}
+    }
+    begin = table.length_ns // STEP_NS - LATEST
+    todo = [_Node(begin, *rests[green], green) for green in _some_of(first)]
+    seen, transitions = set(todo), 0
     while todo:
         node = todo.pop()
-        for dt in range(1, LATEST + 1):
-            at = (node.at + dt) % length
-            wishes = table.wishes(at * STEP_NS)
+        for dt, at, going_on in _onward(table, node):
+            if at < node.at:
+                _check_end(kernel, program, table, node, dt, rests[node.going_on])
+                if not node.going_on <= first:
+                    continue  # a cycle of another plan follows
+            wishes = table.wishes(at * STEP_NS, going_on)
             state = kernel.step(program, node.state, wishes, dt)
-            after = _Node(at, state, watch(program, node.memory, state, wishes, dt))
-            _check_stage(program, table, after)
+            after = _Node(at, state, watch(program, node.memory, state, wishes, dt), going_on)
+            _check_green(program, table, after, wishes)
             transitions += 1
             if after not in seen:
                 seen.add(after)
@@ -111,11 +127,59 @@ def _walk(kernel: Kernel, program: Program, table: Timetable, cleared: State) ->
     return len(seen), transitions
 
 
-def _check_stage(program: Program, table: Timetable, node: _Node) -> None:
+def _some_of(groups: Collection[str]) -> Iterator[frozenset[str]]:
+    """Return all sets of some, all or none of these groups."""
+    names = sorted(groups)
+    sets = chain.from_iterable(combinations(names, n) for n in range(len(names) + 1))
+    return map(frozenset, sets)
+
+
+def _resting(
+    kernel: Kernel, program: Program, cleared: State, green: frozenset[str]
+) -> tuple[State, Memory]:
+    """Return what a cycle begins with, and what was seen of it: some green, all others clear."""
+    longest = max(max(times) for times in program.times) + 1
+    state, memory = cleared, first_memory(cleared)
+    for wishes in (frozenset[str](), green):
+        for _ in range(longest):
+            state = kernel.step(program, state, wishes, 1)
+            memory = watch(program, memory, state, wishes, 1)
+    return state, memory
+
+
+def _onward(table: Timetable, node: _Node) -> Iterator[tuple[int, int, frozenset[str]]]:
+    """Yield each next step: how long it takes, where it leads to, and who goes on from there."""
+    length, last = table.length_ns // STEP_NS, table.slots[-1]
+    for dt in range(1, LATEST + 1):
+        at = node.at + dt
+        if at >= length:
+            yield dt, at - length, frozenset()
+        elif node.at * STEP_NS < last.end_ns <= at * STEP_NS:
+            for going_on in _some_of(last.groups):
+                yield dt, at, going_on
+        else:
+            yield dt, at, node.going_on
+
+
+def _check_end(
+    kernel: Kernel,
+    program: Program,
+    table: Timetable,
+    node: _Node,
+    dt: int,
+    rest: tuple[State, Memory],
+) -> None:
+    """Refuse a cycle at whose end somebody is not as the next one may find it."""
+    state = kernel.step(program, node.state, node.going_on, dt)
+    if (state, watch(program, node.memory, state, node.going_on, dt)) != rest:
+        msg = f"plan {table.plan!r}: its cycle ends before all who went last are clear"
+        raise PlanError(msg)
+
+
+def _check_green(program: Program, table: Timetable, node: _Node, wishes: frozenset[str]) -> None:
     """Refuse a wished group that is not green."""
-    wished = table.wishes(node.at * STEP_NS)
     for name, group in zip(program.groups, node.state, strict=True):
-        if name in wished and group.phase is not Phase.GREEN:
+        if name in wishes and group.phase is not Phase.GREEN:
             at_s = node.at * STEP_NS / 1e9
             msg = f"group {name!r} is {group.phase.value} at {at_s:g} s, where its green should be"
             raise PlanError(f"plan {table.plan!r}: {msg}")

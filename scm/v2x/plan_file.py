@@ -1,7 +1,7 @@
 """A signal plan that a person made, as it is stored, proven and shown: for one junction as it is.
 
 What is proven is the stages together with the junction's times and conflicts: its `digest`. When
-the junction changes, or one stage does, the proof is one of something else.
+the junction changes, or one stage does, or what stages mean, the proof is one of something else.
 """
 
 import hashlib
@@ -10,6 +10,9 @@ import msgspec
 
 from scm.v2x.messages.plan_request import SignalStage
 from scm.v2x.messages.signal_site import SignalPhase, SignalSite
+
+MEANING = 2
+"""Of stages, and of what the search proves of them; 1: all went red between two stages."""
 
 
 class PlanProof(msgspec.Struct, kw_only=True, frozen=True):
@@ -57,7 +60,8 @@ class PlanFile(msgspec.Struct, kw_only=True, frozen=True):
     def digest(self) -> str:
         """Name of what a proof of it proves."""
         kept = [(p.group, p.min_green_s, p.yellow_s, p.red_clear_s) for p in self.phases]
-        proven = msgspec.json.encode([self.junction, self.stages, kept, self.conflicts])
+        said = [MEANING, self.junction, self.stages, kept, self.conflicts]
+        proven = msgspec.json.encode(said)
         return hashlib.sha256(proven).hexdigest()[:16]
 
     @property

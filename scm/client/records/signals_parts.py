@@ -117,11 +117,14 @@ class SignalPhase(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SignalStage(msgspec.Struct, kw_only=True, frozen=True):
-    """Groups that are green together, for how long, and how much longer all are red ....
+    """Groups that are green together, for how long, and how much later the next stage begins.
+
+    Groups of the next stage as well stay green between them; all others are red meanwhile.
 
     Attributes:
         groups: Signal groups.
-        green_s: The stage's split without yellow and red clear, which the kernel adds.
+        green_s: The stage's split without yellow and red clear of those that leave it, which the
+            kernel adds.
         extra_red_s: On top of red clear.
     """
 
@@ -131,7 +134,7 @@ class SignalStage(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SignalSlot(msgspec.Struct, kw_only=True, frozen=True):
-    """A green of a cycle: wished from `start_s` to `end_s` after the cycle's begin.
+    """A stage of a cycle: green from `start_s` to `end_s` after the cycle's begin.
 
     Attributes:
         groups: Signal groups.
@@ -152,7 +155,8 @@ class SignalPlan(msgspec.Struct, kw_only=True, frozen=True):
         about: What it is for, in a sentence.
         cycle_s: How long its cycle is [s].
         stages: What makes it.
-        slots: Its timetable; yellow and red clear lie between two of them.
+        slots: Its timetable; yellow and red clear lie between two of them, for groups that are not
+            in both.
         in_step: Whether it keeps a common cycle with other junctions: a green wave.
         offset_s: When its cycle begins in the common one; None: it keeps none.
     """
@@ -238,6 +242,8 @@ class SignalDetector(msgspec.Struct, kw_only=True, frozen=True):
 
 class SignalTurn(msgspec.Struct, kw_only=True, frozen=True):
     """Groups that will likely be green together; `end_ns` None: nobody knows until when.
+
+    Groups of the next turn as well stay green between them.
 
     Attributes:
         groups: Signal groups.

@@ -8,10 +8,13 @@ from scm.v2x.message import Message, Request
 
 
 class SignalStage(msgspec.Struct, kw_only=True, frozen=True):
-    """Groups that are green together, for how long, and how much longer all are red afterwards.
+    """Groups that are green together, for how long, and how much later the next stage begins.
+
+    Groups of the next stage as well stay green between them; all others are red meanwhile.
 
     Attributes:
-        green_s: The stage's split without yellow and red clear, which the kernel adds.
+        green_s: The stage's split without yellow and red clear of those that leave it, which the
+            kernel adds.
         extra_red_s: On top of red clear.
     """
 

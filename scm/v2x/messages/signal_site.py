@@ -28,7 +28,7 @@ class SignalPhase(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SignalSlot(msgspec.Struct, kw_only=True, frozen=True):
-    """A green of a cycle: wished from `start_s` to `end_s` after the cycle's begin."""
+    """A stage of a cycle: green from `start_s` to `end_s` after the cycle's begin."""
 
     groups: tuple[str, ...]
     start_s: float
@@ -40,7 +40,8 @@ class SignalPlan(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         stages: What makes it.
-        slots: Its timetable; yellow and red clear lie between two of them.
+        slots: Its timetable; yellow and red clear lie between two of them, for groups that are
+            not in both.
         in_step: Whether it keeps a common cycle with other junctions: a green wave.
         offset_s: When its cycle begins in the common one; None: it keeps none.
     """

@@ -9,7 +9,10 @@ from scm.v2x.messages.signal_request import SignalWish
 
 
 class SignalTurn(msgspec.Struct, kw_only=True, frozen=True):
-    """Groups that will likely be green together; `end_ns` None: nobody knows until when."""
+    """Groups that will likely be green together; `end_ns` None: nobody knows until when.
+
+    Groups of the next turn as well stay green between them.
+    """
 
     groups: tuple[str, ...]
     start_ns: int

@@ -67,7 +67,8 @@ def test_a_stage_of_two_rings_is_edited_and_a_plan_keeps_its_offset(visit, runni
     page.wait_for_selector(".verdict[data-state=bad] >> text=west and east left conflict")
     page.uncheck(f"{second} >> text=west")
     page.check(f"{second}:first-child >> text=east")
-    page.wait_for_selector(".remark >> text=Stages 1 and 2 both have east: it goes through yellow")
+    page.wait_for_selector(".remark >> text=Stages 1 and 2 both have east: it stays green between")
+    page.wait_for_selector('.editor .strip[aria-label*="east on into the next"] [data-on="true"]')
     page.fill("#plan-offset", "60")
     page.wait_for_selector(".verdict[data-state=bad] >> text=Offset: from 0 to less than the cycle")
     for size, theme in in_each_look(visited):

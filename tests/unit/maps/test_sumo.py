@@ -149,6 +149,7 @@ def test_a_signal_program_that_lets_ways_cross_is_left_out_and_says_why(tmp_path
         ([(9, "Gr"), (3, "yr"), (5, "rG"), (4, "rg"), (3, "ry")], [("a", 9), ("b", 9)]),
         ([(2, "Gr"), (3, "yr"), (5, "rG"), (3, "ry"), (4, "Gr")], [("a", 6), ("b", 5)]),
         ([(9, "GG"), (2, "rr")], [("ab", 9)]),
+        ([(9, "GG"), (3, "yG"), (5, "rG"), (3, "ry")], [("ab", 9), ("b", 5)]),
     ],
 )
 def test_phases_become_stages(phases, expected):

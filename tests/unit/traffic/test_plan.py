@@ -31,8 +31,42 @@ def test_a_timetable_wishes_its_slots_and_nothing_between():
     assert table.wishes(3 * S) == frozenset()
     assert table.wishes(12 * S) == {"b"}
     assert table.first_start_ns("b") == 12 * S
-    assert table.slot_of("a", 3 * S) is None
-    assert table.slot_of("b", 0).start_ns == 12 * S
+    assert table.green_of("a", 3 * S) is None
+    assert table.green_of("b", 0).start_ns == 12 * S
+
+
+OVERLAP = (
+    Stage(("a", "c"), 3 * S),
+    Stage(("b", "c"), 6 * S),
+    Stage(("c",), S),
+    Stage(("a",), 4 * S),
+)
+
+
+def test_who_is_in_two_stages_that_follow_each_other_stays_green_between_them():
+    table = timetable("p", OVERLAP, program("ab"))
+    assert [slot.start_ns // S for slot in table.slots] == [0, 12, 23, 29]
+    assert [table.wishes(at * S) for at in (2, 3, 11)] == [{"a", "c"}, {"c"}, {"c"}]
+    assert table.wishes(28 * S) == frozenset()
+    assert table.greens_of("c") == [(0, 24 * S)]
+    assert table.greens_of("a") == [(0, 3 * S), (29 * S, 33 * S)]
+    assert table.green_of("c", 11 * S) == (0, 24 * S)
+
+
+def test_who_only_joins_waits_for_nobody():
+    cycle = (Stage(("a",), 3 * S, S), Stage(("a", "c"), 4 * S), Stage(("b",), 5 * S))
+    table = timetable("p", cycle, program("ab", "bc"))
+    assert [slot.start_ns // S for slot in table.slots] == [0, 4, 17]
+    assert table.wishes(3 * S) == {"a"}
+
+
+def test_over_the_end_of_a_cycle_goes_on_who_begins_the_next_and_room_is_left_for_all():
+    table = timetable("p", OVERLAP, program("ab"))
+    other = timetable("q", (Stage(("b", "c"), 6 * S), Stage(("a",), 3 * S)), program("ab"))
+    assert table.length_ns == (33 + 9) * S
+    assert (table.into(table), table.into(other)) == ({"a"}, frozenset())
+    assert table.wishes(41 * S, frozenset("a")) == {"a"}
+    assert table.wishes(41 * S) == table.wishes(42 * S, frozenset("a")) == frozenset()
 
 
 def test_every_problem_of_a_cycle_is_named_at_once():

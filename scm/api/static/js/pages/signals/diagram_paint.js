@@ -97,16 +97,26 @@ function inkOf(canvas) {
   };
 }
 
-/** Greens that are not yet: `{groups, start, end}` in seconds; end null: nobody knows. */
+/**
+ * Greens from now on, of each group: `{group, start, end}` in seconds; end null: nobody knows. A group of turns
+ * that follow each other stays green between them.
+ */
 export function comingOf(status, told, view) {
   if (!told.fresh || told.mode === "flash") return [];
-  return (status?.turns ?? [])
-    .map((turn) => ({
-      groups: turn.groups,
-      start: turn.start_ns / 1e9,
-      end: turn.end_ns === null ? null : turn.end_ns / 1e9,
-    }))
-    .filter((turn) => turn.end === null || turn.end > view.now);
+  const lit = told.groups.filter(({ colour }) => colour === "green");
+  let before = new Map(lit.map(({ group }) => [group, { group, start: view.now }]));
+  const greens = new Set();
+  for (const turn of status?.turns ?? []) {
+    const following = new Map();
+    for (const group of turn.groups) {
+      const green = before.get(group) ?? { group, start: turn.start_ns / 1e9 };
+      green.end = turn.end_ns === null ? null : turn.end_ns / 1e9;
+      following.set(group, green);
+      greens.add(green);
+    }
+    before = following;
+  }
+  return [...greens].filter((green) => green.end === null || green.end > view.now);
 }
 
 function drawAxis({ paper, width, height, origin, x, view, ink }) {
@@ -212,15 +222,15 @@ function write(paper, ink, colour, texts, a, b, y) {
   paper.fillText(text, (a + b) / 2, y + 0.5);
 }
 
-function drawComing(sheet, turn, top, times, label) {
+function drawComing(sheet, green, top, times, label) {
   const { paper, x, row, bar, ink, view } = sheet;
-  const from = Math.max(turn.start, view.now);
-  const to = turn.end ?? view.until;
+  const from = Math.max(green.start, view.now);
+  const to = green.end ?? view.until;
   if (to <= from) return;
   paper.save();
   paper.globalAlpha = 0.38;
   drawBar(sheet, "green", from, to, top);
-  if (turn.end !== null && times) {
+  if (green.end !== null && times) {
     drawBar(sheet, "yellow", to, to + times.yellow_s, top);
     drawBar(sheet, "clear", to + times.yellow_s, to + times.yellow_s + times.red_clear_s, top);
   }
@@ -230,7 +240,7 @@ function drawComing(sheet, turn, top, times, label) {
   paper.strokeStyle = ink.green;
   paper.strokeRect(x(from) + 0.5, top + (row - bar) / 2 + 0.5, x(to) - x(from) - 1, bar - 1);
   paper.restore();
-  if (label && turn.start > view.now) {
+  if (label && green.start > view.now) {
     write(paper, ink, ink.text, [label], x(from), x(Math.min(to, view.until)), top + row / 2);
   }
 }
@@ -254,8 +264,8 @@ function drawRing(sheet, ring, top, { bars, times, coming }) {
         drawBar(sheet, "flashing_red", bar.start, end, top);
       }
     });
-    for (const turn of coming) {
-      if (turn.groups.includes(group)) drawComing(sheet, turn, top, times.get(group), plain(group));
+    for (const green of coming) {
+      if (green.group === group) drawComing(sheet, green, top, times.get(group), plain(group));
     }
   }
 }
@@ -268,8 +278,8 @@ function drawPhase(sheet, group, top, { bars, times, coming, told }) {
     drawBar(sheet, bar.colour, bar.start, end, top, LETTERS[bar.colour]);
   }
   if (!told.fresh) return;
-  for (const turn of coming) {
-    if (turn.groups.includes(group.group)) drawComing(sheet, turn, top, times.get(group.group), "");
+  for (const green of coming) {
+    if (green.group === group.group) drawComing(sheet, green, top, times.get(group.group), "");
   }
   drawPromise(sheet, group, top, told);
 }
@@ -320,8 +330,8 @@ export function barriersOf(site, bars, coming, view) {
   for (const [group, list] of bars) {
     for (const bar of list) if (bar.colour === "green") starts.push([bar.start, group]);
   }
-  for (const turn of coming) {
-    if (turn.start > view.now) for (const group of turn.groups) starts.push([turn.start, group]);
+  for (const green of coming) {
+    if (green.start > view.now) starts.push([green.start, green.group]);
   }
   starts.sort((one, other) => one[0] - other[0]);
   const isCrossed = ([, one], [, other]) =>

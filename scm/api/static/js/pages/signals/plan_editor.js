@@ -2,7 +2,7 @@
 import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { change, notify } from "scm/shell/api.js";
-import { changeOf, cycleOf, PlanStrip, splitOf } from "scm/pages/signals/plan_strip.js";
+import { changeOf, cycleOf, goingOn, PlanStrip, splitOf } from "scm/pages/signals/plan_strip.js";
 import { junction, plans, read, readPlans, site } from "scm/pages/signals/store.js";
 import { plain, secs } from "scm/pages/signals/words.js";
 
@@ -75,14 +75,15 @@ export function faultsOf(draft) {
   return faults;
 }
 
-/** @returns what is right and yet may surprise: phases of two stages that follow each other. */
+/** @returns what is right and may surprise: phases that stay green from a stage into the next one. */
 function remarksOf({ stages }) {
-  if (stages.length < 2) return [];
-  return stages.flatMap((stage, at) => {
+  return stages.flatMap((_, at) => {
     const next = (at + 1) % stages.length;
-    const both = stage.groups.filter((group) => stages[next].groups.includes(group)).map(plain);
-    const they = both.length > 1 ? "they go" : "it goes";
-    return both.length ? [`Stages ${at + 1} and ${next + 1} both have ${both.join(" and ")}: ${they} through yellow and red between them.`] : [];
+    const both = goingOn(stages, at).map(plain);
+    if (!both.length) return [];
+    const they = both.length > 1 ? "they stay" : "it stays";
+    const while_ = next ? "" : ", from cycle to cycle while this plan runs";
+    return [`Stages ${at + 1} and ${next + 1} both have ${both.join(" and ")}: ${they} green between them${while_}.`];
   });
 }
 
@@ -179,12 +180,11 @@ export function PlanEditor() {
           </thead>
           <tbody>
             ${draft.stages.map(
-              (stage, at) => html`
+              (_, at) => html`
                 <${Stage}
                   key=${at}
                   at=${at}
-                  stage=${stage}
-                  count=${draft.stages.length}
+                  stages=${draft.stages}
                   onPut=${(changes) => putStage(at, changes)}
                   onMove=${(by) => move(at, by)}
                   onRemove=${() => put({ stages: draft.stages.filter((_, i) => i !== at) })}
@@ -196,8 +196,8 @@ export function PlanEditor() {
       </div>
       <p class="why">
         Min green, yellow change and red clear belong to the signal kernel, not to a plan: they follow from the map and
-        the slowest and fastest cars that drive here, so nobody can make them too short. What you set is green and extra
-        red. A cycle with an offset begins so long after whole cycles of the city's clock: junctions with the same
+        the slowest and fastest cars that drive here, so nobody can make them too short; they count for the phases that
+        leave a stage, and after the last one for all. What you set is green and extra red. A cycle with an offset begins so long after whole cycles of the city's clock: junctions with the same
         cycle keep step, and the first green of a cycle is longer until they do.
       </p>
       ${remarksOf(draft).map((one) => html`<p key=${one} class="remark" role="status">${one}</p>`)}
@@ -222,10 +222,12 @@ export function PlanEditor() {
   `;
 }
 
-function Stage({ at, stage, count, onPut, onMove, onRemove }) {
+function Stage({ at, stages, onPut, onMove, onRemove }) {
+  const stage = stages[at];
+  const count = stages.length;
   const phases = site.value?.phases ?? [];
   const least = Math.max(0, ...phases.filter((p) => stage.groups.includes(p.group)).map((p) => p.min_green_s));
-  const { yellow_s, red_clear_s } = changeOf(stage.groups);
+  const { yellow_s, red_clear_s } = changeOf(stages, at);
   const flip = (group) =>
     onPut({
       groups: phases
@@ -274,7 +276,7 @@ function Stage({ at, stage, count, onPut, onMove, onRemove }) {
           onInput=${(event) => onPut({ extra_red_s: number(event) })}
         />
       </td>
-      <td class="number" data-name="Split"><b>${secs(splitOf(stage))}</b></td>
+      <td class="number" data-name="Split"><b>${secs(splitOf(stages, at))}</b></td>
       <td class="order">
         <button class="small" aria-label="Stage ${at + 1} earlier" disabled=${at === 0} onClick=${() => onMove(-1)}>▲</button>
         <button class="small" aria-label="Stage ${at + 1} later" disabled=${at === count - 1} onClick=${() => onMove(1)}>▼</button>
