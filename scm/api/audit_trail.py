@@ -13,6 +13,7 @@ from typing import Any
 import msgspec
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from scm.api.event_log import as_read
 from scm.api.idempotency import CHANGES
 from scm.api.trace import trace_id
 from scm.clock import Clock
@@ -60,7 +61,7 @@ class AuditFilter(msgspec.Struct, kw_only=True, frozen=True):
         station: Who did it.
         by: Who asked: a part of the name.
         kind: A part of the request's class or path.
-        text: To be found anywhere in the entry; case does not matter.
+        text: To be found anywhere in the entry; case does not matter, nor underscores or spaces.
     """
 
     station: str = ""
@@ -74,7 +75,7 @@ class AuditFilter(msgspec.Struct, kw_only=True, frozen=True):
             self.station in ("", row.station)
             and self.by.casefold() in row.by.casefold()
             and self.kind.casefold() in row.kind.casefold()
-            and (not self.text or self.text.casefold() in _said(row))
+            and (not self.text or as_read(self.text) in as_read(_said(row)))
         )
 
 
@@ -186,4 +187,4 @@ def _object(raw: msgspec.Raw) -> dict[str, Any]:
 
 
 def _said(row: AuditRow) -> str:
-    return msgspec.json.encode(row).decode().casefold()
+    return msgspec.json.encode(row).decode()

@@ -40,7 +40,8 @@ class EventFilter(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         severity, source, name: One or more of each, comma between.
         vehicle: The car it is about.
-        text: To be found in the sentence, the name or the source; case does not matter.
+        text: To be found in the sentence, the name or the source; case does not matter, nor
+            whether a name has underscores or, as pages say it, spaces.
         since_ns, until_ns: When it happened, both ends included [ns since 1970].
     """
 
@@ -59,10 +60,15 @@ class EventFilter(msgspec.Struct, kw_only=True, frozen=True):
             and _names(self.source, event.source)
             and _names(self.name, event.name)
             and self.vehicle in ("", event.vehicle)
-            and self.text.casefold() in f"{event.text} {event.name} {event.source}".casefold()
+            and as_read(self.text) in as_read(f"{event.text} {event.name} {event.source}")
             and (self.since_ns is None or event.t_ns >= self.since_ns)
             and (self.until_ns is None or event.t_ns <= self.until_ns)
         )
+
+
+def as_read(text: str) -> str:
+    """Return a text as it is looked for: in small letters, names in words as pages say them."""
+    return text.casefold().replace("_", " ")
 
 
 class EventLog:

@@ -84,6 +84,7 @@ class MisbehaviourPart:
         if not found.memory.is_news:
             return [report]
         checks = [one.check for one in report.observations[:3]]
+        said = ", ".join(check.replace("_", " ") for check in checks)
         facts = {"station": report.suspect, "score": report.score, "checks": ",".join(checks)}
         event(_log, "station_suspected", level=logging.WARNING, **facts)
         news = CityEvent(
@@ -91,7 +92,7 @@ class MisbehaviourPart:
             source=NAME,
             t_ns=now_ns,
             name="misbehaviour",
-            text=f"{report.suspect} is suspected of lying on the air: {', '.join(checks)}",
+            text=f"{report.suspect} is suspected of lying on the air: {said}",
             vehicle=report.suspect,
         )
         return [report, news]

@@ -59,6 +59,16 @@ def test_a_person_finds_follows_acknowledges_and_takes_back(visit, running):
     assert visited.complaints == []
 
 
+def test_names_are_read_and_found_as_people_say_them_and_stay_as_they_are_in_data(visit, running):
+    wish = {"groups": ["south_east"], "by": "tests", "reason": "a bus"}
+    running.web.post("/signals/crossing/calls", json=wish).raise_for_status()
+    page = visit("/events").page
+    page.fill("input[aria-label='Find in events']", "call south east")
+    page.wait_for_selector(f"{ROWS}:has-text('crossing call south east (tests asked: a bus)')")
+    (row, *_) = running.get("/events?text=call%20south%20east")["items"]
+    assert "call south_east" in row["text"]
+
+
 def test_a_paused_log_stands_still_until_it_is_followed_again(visit, running):
     visited = visit("/events")
     page = visited.page

@@ -61,6 +61,8 @@ class TestFilter:
             ("vehicle=n", []),
             ("text=WALL", [2, 0]),
             ("text=monitor", [3]),
+            ("text=plan%20changed", [1]),
+            ("text=PLAN_CALM", [1]),
             ("since_ns=20&until_ns=30", [2, 1]),
             ("", [3, 2, 1, 0]),
         ],
@@ -173,12 +175,19 @@ class TestAudit:
 
     @pytest.mark.parametrize(
         ("query", "found"),
-        [("station=world", [1]), ("by=BOB", [2]), ("kind=plan", [2]), ("text=crossing", [2])],
+        [
+            ("station=world", [1]),
+            ("by=BOB", [2]),
+            ("kind=plan", [2]),
+            ("text=crossing", [2]),
+            ("text=south_gate", [2]),
+            ("text=South%20gate", [2]),
+        ],
     )
     def test_deeds_are_filtered(self, own_client, store, query, found):
         log = AuditLog(store)
         log.note(Deed(t_ns=1, station="world", kind="StopRequest", by="ada"))
-        request = json.dumps({"junction": "crossing"}).encode()
+        request = json.dumps({"junction": "crossing", "reason": "south_gate"}).encode()
         log.note(
             Deed(t_ns=2, station="traffic", kind="PlanRequest", by="bob",
                  request=msgspec.Raw(request))

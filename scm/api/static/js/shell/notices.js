@@ -1,6 +1,7 @@
 /** What the page has to say or ask: short notices, and the question for the API key. */
 import { html } from "scm/shared/html.js";
 import { dismiss, keyWanted, notices } from "scm/shell/api.js";
+import { prose } from "scm/shell/prose.js";
 import { Dialog } from "scm/shared/dialog.js";
 
 export function Notices() {
@@ -9,7 +10,7 @@ export function Notices() {
       ${notices.value.map(
         ({ id, kind, text }) => html`
           <div key=${id} class="notice ${kind}">
-            <span>${text}</span>
+            <span>${prose(text)}</span>
             <button class="plain" aria-label="Dismiss" onClick=${() => dismiss(id)}>✕</button>
           </div>
         `,

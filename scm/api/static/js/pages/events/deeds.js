@@ -6,8 +6,8 @@ const names = (list) => list.map(spaced).join(", ");
 
 const SAYINGS = {
   StopRequest: ({ engaged }) => (engaged ? "stop the city" : "release the city stop"),
-  MonitorReset: ({ junction }) => `reset the monitor of ${junction}`,
-  PlanRequest: ({ junction, plan }) => `${plan === "flash" ? "flash red" : `run ${spaced(plan)}`} at ${junction}`,
+  MonitorReset: ({ junction }) => `reset the monitor of ${spaced(junction)}`,
+  PlanRequest: ({ junction, plan }) => `${plan === "flash" ? "flash red" : `run ${spaced(plan)}`} at ${spaced(junction)}`,
   SignalRequest: wished,
   JoinRequest: ({ vehicle, kind, car }) => `join as ${vehicle}, a ${kind} ${car}`,
   LeaseRequest: ({ vehicle, verb }) => `${LEASES[verb] ?? verb} the wheel of ${vehicle}`,
@@ -20,7 +20,7 @@ const SAYINGS = {
 function wished({ junction, verb, groups, policy, clears, expires_s }) {
   const what = [verb === "clear" ? `take back ${clears || "wishes"}` : spaced(verb), spaced(policy), names(groups)];
   const lasts = verb === "clear" ? "" : ` for ${span(expires_s)}`;
-  return `${what.filter(Boolean).join(" ")} at ${junction}${lasts}`;
+  return `${what.filter(Boolean).join(" ")} at ${spaced(junction)}${lasts}`;
 }
 
 /** One deed as a sentence; of the web, the request itself. */

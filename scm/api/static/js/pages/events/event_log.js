@@ -1,8 +1,9 @@
 /** The log of the city: filtered, folded, followed live, acknowledged, exported. */
 import { useMemo, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
-import { byName, moment, span } from "scm/shared/format.js";
+import { byName, moment, spaced, span } from "scm/shared/format.js";
 import { change } from "scm/shell/api.js";
+import { prose } from "scm/shell/prose.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { events as heard, stations, topic, useTopics } from "scm/shell/store.js";
 import { folded } from "scm/pages/events/folding.js";
@@ -104,11 +105,11 @@ function merged(read, live, wanted, acknowledged, open, pausedAt) {
 }
 
 function passes(row, { severity, source, text }) {
-  const said = `${row.text} ${row.name} ${row.source}`.toLowerCase();
+  const said = spaced(`${row.text} ${row.name} ${row.source}`.toLowerCase());
   return (
     (!severity || row.severity === severity) &&
     (!source || row.source === source) &&
-    said.includes(text.toLowerCase())
+    said.includes(spaced(text.toLowerCase()))
   );
 }
 
@@ -135,7 +136,7 @@ function Group({ group, onAcknowledge }) {
       <time>${moment(newest.t_ns)}</time>
       <i class="sign" role="img" aria-label=${newest.severity}>${SIGNS[newest.severity]}</i>
       <span class="said">
-        ${newest.text}
+        ${prose(newest.text)}
         ${events.length > 1 &&
         html`
           <button class="small repeats" aria-expanded=${whole} onClick=${() => setWhole(!whole)}>
@@ -152,7 +153,7 @@ function Group({ group, onAcknowledge }) {
           ? html`
               <button
                 class="small"
-                aria-label="Acknowledge: ${newest.text}"
+                aria-label="Acknowledge: ${prose(newest.text)}"
                 onClick=${() => onAcknowledge(open)}
               >Acknowledge</button>
             `
@@ -161,7 +162,7 @@ function Group({ group, onAcknowledge }) {
       ${whole &&
       html`
         <ol class="single">
-          ${events.map((event) => html`<li key=${event.id}><time>${moment(event.t_ns)}</time>${event.text}</li>`)}
+          ${events.map((event) => html`<li key=${event.id}><time>${moment(event.t_ns)}</time>${prose(event.text)}</li>`)}
         </ol>
       `}
     </li>
@@ -173,7 +174,7 @@ function Seen({ event }) {
   const takeBack = () => change("DELETE", `/events/acknowledgements/${event.id}`);
   return html`
     <small title=${said}>✓ ${said}</small>
-    <button class="plain" aria-label="Take back: ${event.text}" title="Take it back" onClick=${takeBack}>↶</button>
+    <button class="plain" aria-label="Take back: ${prose(event.text)}" title="Take it back" onClick=${takeBack}>↶</button>
   `;
 }
 
@@ -190,7 +191,7 @@ function AcknowledgeDialog({ rows, onClose }) {
   const title = rows.length === 1 ? "Acknowledge this event?" : `Acknowledge ${rows.length} events?`;
   return html`
     <${Dialog} title=${title} onClose=${onClose}>
-      <p>${rows.length === 1 ? rows[0].text : "Everybody sees that somebody took note of them."}</p>
+      <p>${rows.length === 1 ? prose(rows[0].text) : "Everybody sees that somebody took note of them."}</p>
       <form onSubmit=${submit}>
         <input name="note" maxlength="500" placeholder="Note (optional)" aria-label="Note" />
         <div class="actions">

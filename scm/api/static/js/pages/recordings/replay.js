@@ -13,6 +13,7 @@ import { TakeHomeDialog } from "scm/pages/recordings/take_home_dialog.js";
 import { Timeline } from "scm/pages/recordings/timeline.js";
 import { minutes, moment, size } from "scm/pages/recordings/words.js";
 import { route } from "scm/shell/router.js";
+import { prose } from "scm/shell/prose.js";
 import { city } from "scm/shell/store.js";
 
 const EVENTS = 500;
@@ -207,7 +208,7 @@ function Events({ player, events, more }) {
                   onClick=${() => player.seek(event.t_s)}
                 >
                   <time>${minutes(event.t_s, true)}</time>
-                  <span>${event.severity !== "info" && html`<em>${event.severity}</em> `}${event.text}</span>
+                  <span>${event.severity !== "info" && html`<em>${event.severity}</em> `}${prose(event.text)}</span>
                 </button>
               </li>
             `,

@@ -2,6 +2,7 @@
 import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { change } from "scm/shell/api.js";
+import { prose } from "scm/shell/prose.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { clock } from "scm/shared/format.js";
 import { verdicts } from "scm/pages/signals/store.js";
@@ -27,7 +28,7 @@ export function Monitor({ told }) {
   return html`
     <div class="monitor" data-state=${state} role="status">
       <i></i>
-      <span><b>${words[state]}</b>${monitor?.detail ? html` <small>${monitor.detail}</small>` : ""}</span>
+      <span><b>${words[state]}</b>${monitor?.detail ? html` <small>${prose(monitor.detail)}</small>` : ""}</span>
       <button class="small" onClick=${() => (open.value = "said")}>History</button>
       ${state === "fault" &&
       html`<button class="small danger" onClick=${() => (open.value = "reset")}>Reset…</button>`}
@@ -52,7 +53,7 @@ function Said() {
             <li key=${one.t_ns}>
               <time>${clock(one.t_ns)}</time>
               <b>${one.fault ? one.fault.replaceAll("_", " ") : "no fault"}</b>
-              <small>${one.detail}</small>
+              <small>${prose(one.detail)}</small>
             </li>
           `,
         )}

@@ -2,6 +2,7 @@
 import { useEffect } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { go, route } from "scm/shell/router.js";
+import { prose } from "scm/shell/prose.js";
 import { city, signals, useTopics } from "scm/shell/store.js";
 import { Diagram } from "scm/pages/signals/diagram.js";
 import { Heads } from "scm/pages/signals/heads.js";
@@ -100,7 +101,7 @@ function Bar({ told, names }) {
       ${now?.pending &&
       html`<span class="pending" role="status">${toCome(now.pending, told.mode)}</span>`}
       ${now?.failure && html`<span class="failure" role="alert">${now.failure}</span>`}
-      ${trouble.value && html`<span class="failure" role="status">${trouble.value}</span>`}
+      ${trouble.value && html`<span class="failure" role="status">${prose(trouble.value)}</span>`}
       <${Monitor} told=${told} />
     </section>
   `;

@@ -2,6 +2,7 @@
 import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { change, notify } from "scm/shell/api.js";
+import { prose } from "scm/shell/prose.js";
 import { changeOf, cycleOf, goingOn, PlanStrip, splitOf } from "scm/pages/signals/plan_strip.js";
 import { junction, plans, read, readPlans, site } from "scm/pages/signals/store.js";
 import { plain, secs } from "scm/pages/signals/words.js";
@@ -295,7 +296,7 @@ function Verdict({ faults, found }) {
     return html`<p class="verdict" role="status">Nothing is wrong at sight. The search has to prove it before it can be saved.</p>`;
   }
   const state = { proven: "good", failed: "bad", running: "busy" }[found.state];
-  return html`<p class="verdict" data-state=${state} role="status">${found.words}</p>`;
+  return html`<p class="verdict" data-state=${state} role="status">${prose(found.words)}</p>`;
 }
 
 function proofWords(proof) {

@@ -2,6 +2,7 @@
 import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { change, notify } from "scm/shell/api.js";
+import { prose } from "scm/shell/prose.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { clock, span } from "scm/shared/format.js";
 import { events } from "scm/shell/store.js";
@@ -196,7 +197,7 @@ function Lately({ junction }) {
         (event) => html`
           <li key=${event.seq} data-severity=${event.severity}>
             <time>${clock(event.t_ns)}</time>
-            <span>${event.text.replace(`junction ${junction}`, "").replace(/^:? /, "")}</span>
+            <span>${prose(event.text.replace(`junction ${junction}`, "").replace(/^:? /, ""))}</span>
           </li>
         `,
       )}
