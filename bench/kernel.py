@@ -73,7 +73,7 @@ def kernel_rate(cars: int, *, threads: int = 1, plain: bool = False) -> Rate:
     fleet = fleet_of(cars)
     fleet.threads = threads
     if plain:
-        fleet._kernel = compile_kernel("nigel", fleet.car.terms, plain=True)  # noqa: SLF001
+        fleet._kernel = compile_kernel(fleet.car.terms, plain=True)  # noqa: SLF001
     return rate(lambda: fleet.advance(STEPS * 1e-3), cars * STEPS)
 
 

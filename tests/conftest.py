@@ -2,10 +2,12 @@
 
 import gc
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from threadpoolctl import threadpool_limits
 
 ROOT = Path(__file__).parent.parent
 SHARED = ROOT.parent / "shared"
@@ -51,9 +53,16 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 
 def pytest_collection_finish() -> None:
-    """Keep thousands of collected tests out of every later collection of garbage."""
+    """Keep thousands of collected tests out of every later collection of garbage.
+
+    Libraries calculate on one thread, as searches and the Eye let them: for small matrices a second
+    one only waits, and takes a core for that.
+    """
     gc.collect()
     gc.freeze()
+    threadpool_limits(1)
+    if "cv2" in sys.modules:
+        sys.modules["cv2"].setNumThreads(1)
 
 
 @pytest.fixture(scope="session")

@@ -133,10 +133,8 @@ def create_app(
     problem.install(app)
     openapi.install(app)
     _add_layers(app, desk, clock)
-    api = APIRouter(prefix="/api/v1")
     for noun in (*desk.of_the_city(), *desk.live(), *desk.of_the_server()):
-        api.include_router(noun, responses=problem.RESPONSES)
-    app.include_router(api)
+        app.include_router(noun, prefix="/api/v1", responses=problem.RESPONSES)
     for noun in (health.router(desk.city), ngsi.router(desk.city), metrics.router(desk.metrics)):
         app.include_router(noun, responses=problem.RESPONSES)
     _add_pages(app)

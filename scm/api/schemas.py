@@ -9,6 +9,7 @@ A record's docstring becomes its description and the lines below `Attributes:` t
 what they leave out comes from `scm.api.words`, by the field's name.
 """
 
+from functools import cache
 from typing import Any
 
 import msgspec
@@ -16,6 +17,8 @@ import msgspec
 from scm.api.paging import Page
 
 Responses = dict[int | str, dict[str, Any]]
+
+_schema = cache(msgspec.json.schema)  # shared by all routes: nobody may change it
 
 _CURSOR = {
     "Link": {
@@ -33,7 +36,7 @@ def answer(kind: Any, status: int = 200, about: str = "What was asked for.") -> 
         status: Of the answer: 200, 201 or 202.
         about: What it is, in a sentence.
     """
-    content = {"application/json": {"schema": msgspec.json.schema(kind)}}
+    content = {"application/json": {"schema": _schema(kind)}}
     return {status: {"description": about, "content": content}}
 
 

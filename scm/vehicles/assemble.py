@@ -221,13 +221,15 @@ def write_program(terms: Sequence[Term]) -> Program:
     return program
 
 
-def write_page(car_name: str, terms: Sequence[Term], *, plain: bool = False) -> str:
+def write_page(terms: Sequence[Term], *, plain: bool = False) -> str:
     """Return the text of a car's kernel; `plain` goes car by car instead of tile by tile.
+
+    It names no car: those with the same effects share one compiled kernel.
 
     Raises:
         TermError: when the terms do not fit together; all problems in one message.
     """
-    title = f"Kernel of the car {car_name!r}: {len(terms)} effects on 14 degrees of freedom."
+    title = f"Kernel of a car: {len(terms)} effects on 14 degrees of freedom."
     program, slots = write_program(terms), slots_of(terms)
     columns = [column.variable for column in columns_of(terms)]
     if plain:

@@ -105,7 +105,7 @@ class Fleet:
         self.columns = columns_of(car.terms)
         self._slots = slots_of(car.terms)
         self._signal_slots = slots_of_signals(self._slots)
-        self._kernel = compile_kernel(car.name, car.terms)
+        self._kernel = compile_kernel(car.terms)
         padded = -(-capacity // LANES) * LANES
         height = max(offset + width for offset, width in self._slots.values())
         self._block: Floats = aligned((height, padded))

@@ -29,15 +29,15 @@ _MACHINE = "".join(inspect.getsource(module) for module in (jit, lanes))
 _COMPILED: dict[tuple[Hashable, ...], tuple[Any, tuple[Term, ...]]] = {}
 
 
-def compile_kernel(car_name: str, terms: Sequence[Term], *, plain: bool = False) -> Any:
+def compile_kernel(terms: Sequence[Term], *, plain: bool = False) -> Any:
     """Return a module with the compiled kernel of a list of terms: `advance` and `rollout`.
 
     It comes from the cache where nothing has changed. `plain` gives the reference that goes car by
     car, `advance` only.
     """
-    key = (car_name, plain, jit.cache_folder(), *map(id, terms))
+    key = (plain, jit.cache_folder(), *map(id, terms))
     if key not in _COMPILED:
-        _COMPILED[key] = _compile(write_page(car_name, terms, plain=plain)), tuple(terms)
+        _COMPILED[key] = _compile(write_page(terms, plain=plain)), tuple(terms)
     return _COMPILED[key][0]
 
 

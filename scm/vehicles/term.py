@@ -7,6 +7,7 @@ or a parameter of the 14-degree-of-freedom skeleton. A law knows no arrays and n
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 
 from scm.errors import TermError
 from scm.vehicles import effect_text
@@ -19,6 +20,7 @@ __all__ = ["Law", "Per", "Term", "flat", "reads"]
 Law = Callable[..., float]
 
 
+@cache
 def reads(law: Law) -> tuple[str, ...]:
     """Return the argument names of a law, in order."""
     return tuple(inspect.signature(plain(law)).parameters)

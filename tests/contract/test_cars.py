@@ -67,7 +67,7 @@ def test_the_text_of_a_car_names_every_effect_and_parameter(name):
 @pytest.mark.parametrize("name", car_names())
 def test_the_kernel_page_says_every_law_of_the_car(name):
     car = load_car(name)
-    page = write_page(car.name, car.terms)
+    page = write_page(car.terms)
     compile(page, name, "exec")
     for term in car.terms:
         named = term.sets or term.name

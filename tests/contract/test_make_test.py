@@ -7,7 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import pytest
+from threadpoolctl import threadpool_info
 
 NOTE = """
 import os
@@ -69,3 +71,10 @@ def test_a_process_that_dies_ends_the_run_with_the_name_of_its_test(root: Path, 
     done = made(root, tree)
     assert done.returncode == 1
     assert "crashed while running 'tests/test_abort.py::test_aborts'" in done.stdout
+
+
+def test_libraries_calculate_on_one_thread() -> None:
+    pools = threadpool_info()
+    assert pools
+    assert {pool["num_threads"] for pool in pools} == {1}
+    assert cv2.getNumThreads() == 1

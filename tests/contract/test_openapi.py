@@ -12,10 +12,14 @@ SUCCESS = ("200", "201", "202", "204", "206")
 REFERENCE = "#/components/schemas/"
 
 
-@pytest.fixture(scope="module")
-def document():
+def described_anew():
     app = create_app(CityView(), lambda _request, _timeout_s: None, load_map("driving_school"))
     return app.openapi()
+
+
+@pytest.fixture(scope="module")
+def document():
+    return described_anew()
 
 
 def operations_of(document):
@@ -48,6 +52,10 @@ def test_every_operation_says_what_it_does_and_whose_noun_it_is(document):
         if not (operation.get("summary") and len(operation.get("tags", ())) == 1)
     ]
     assert not wrong, said(wrong)
+
+
+def test_every_application_of_a_process_describes_itself_alike(document):
+    assert described_anew() == document
 
 
 def test_every_operation_has_an_answer_with_a_schema(document):

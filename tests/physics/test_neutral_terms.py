@@ -79,11 +79,11 @@ def test_nigel_with_every_neutral_effect_it_lacks_drives_as_before_bit_for_bit()
 
 def test_a_car_carries_no_trace_of_an_effect_that_it_does_not_list():
     nigel = load_car("nigel")
-    page = write_page("nigel", nigel.terms)
+    page = write_page(nigel.terms)
     own = {term.name for term in flat(nigel.terms)}
     others = [term for term in flat(all_terms().values()) if term.name not in own]
     assert [term.name for term in others if term.name in page] == []
     assert "fade_strength" not in page
-    fading = write_page("nigel", nigel.with_terms(["motor_fade"]).terms)
+    fading = write_page(nigel.with_terms(["motor_fade"]).terms)
     assert "motor_fade" in fading
     assert "fade_strength" in fading

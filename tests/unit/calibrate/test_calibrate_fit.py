@@ -37,6 +37,13 @@ def found(recorded):
     return fit(load_car("nigel"), *recorded.arrays())
 
 
+@pytest.fixture(scope="module")
+def exact():
+    """What is found through an Eye without noise."""
+    part, _ = calibrated(replace(Hidden(), position_std=1e-6, yaw_std=1e-6))
+    return fit(load_car("nigel"), *part.recorded.arrays()).numbers
+
+
 def test_each_hidden_number_is_found_near_and_inside_a_few_deviations(found):
     for key, truth in Hidden().numbers.items():
         one = found.numbers[key]
@@ -51,19 +58,14 @@ def test_what_is_left_over_is_the_noise_of_the_eye(found):
     assert found.yaw_rms_rad == pytest.approx(0.005, rel=0.1)
 
 
-def test_an_eye_without_noise_leaves_no_error():
-    hidden = replace(Hidden(), position_std=1e-6, yaw_std=1e-6)
-    part, _ = calibrated(hidden)
-    exact = fit(load_car("nigel"), *part.recorded.arrays())
-    for key, truth in hidden.numbers.items():
-        assert abs(exact.numbers[key].value - truth) < 0.05 * NEAR[key], key
+def test_an_eye_without_noise_leaves_no_error(exact):
+    for key, truth in Hidden().numbers.items():
+        assert abs(exact[key].value - truth) < 0.05 * NEAR[key], key
 
 
-def test_no_drive_is_surer_than_a_firmware_that_rounds_and_the_eyes_metre_allow():
+def test_no_drive_is_surer_than_a_firmware_that_rounds_and_the_eyes_metre_allow(exact):
     """An exact drive leaves nothing over, and yet a servo of whole degrees may have steered it."""
-    hidden = replace(Hidden(), position_std=1e-6, yaw_std=1e-6)
-    part, _ = calibrated(hidden)
-    exact = fit(load_car("nigel"), *part.recorded.arrays()).numbers
+    hidden = Hidden()
     assert 3e-4 < exact["steering.trim_rad"].std < 3e-3
     assert exact["steering.gain"].std > 0.002 * hidden.gain
     assert 0.002 * hidden.drive < exact["drive.gain"].std < 0.004 * hidden.drive

@@ -22,8 +22,11 @@ def drives():
 @cache
 def under_one_tilted_camera():
     """Only the first car's search found the tilt."""
-    cars = {name: searched(tilted(drive, TILT, 0.0)) for name, drive in drives().items()}
-    cars["a"] = searched(tilted(drives()["a"], TILT, 0.0), camera_tilt=(0.02, 0.0))
+    found = {"a": {"camera_tilt": (0.02, 0.0)}}
+    cars = {
+        name: searched(tilted(drive, TILT, 0.0), **found.get(name, {}))
+        for name, drive in drives().items()
+    }
     return cars, *compared(cars, lambda _: None)
 
 
@@ -52,8 +55,8 @@ def test_a_car_that_found_nothing_gets_what_all_share_at_the_shared_value():
 
 
 def test_a_wrong_tag_is_the_car_s_own():
-    cars = {name: searched(drive) for name, drive in drives().items()}
-    cars["b"] = searched(tagged(drives()["b"], TAG_M, 0.0), pose_point=(0.02, 0.0))
+    wrong = searched(tagged(drives()["b"], TAG_M, 0.0), pose_point=(0.02, 0.0))
+    cars = {"a": searched(drives()["a"]), "b": wrong, "c": searched(drives()["c"])}
     (point,), taken = compared(cars, lambda _: None)
     assert not point.shared
     assert [one.sight for one in point.cars] == [Sight.OTHERWISE, Sight.SEES, Sight.OTHERWISE]

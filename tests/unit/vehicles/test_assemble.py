@@ -3,12 +3,14 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
 from scm.errors import RunError, TermError
 from scm.vehicles.assemble import setters_of, write_page
-from scm.vehicles.car import STANDARD_TERMS, all_terms
+from scm.vehicles.car import STANDARD_TERMS, all_terms, load_car
+from scm.vehicles.fleet import Fleet
 from scm.vehicles.kernel_file import compile_kernel
 from scm.vehicles.param import Param
 from scm.vehicles.signals import SIGNALS, Per, Role
@@ -76,24 +78,24 @@ def test_effects_that_wait_for_each_other_are_named():
         return steer_angle
 
     with pytest.raises(TermError, match=r"wait for each other: .*steer_target.*"):
-        write_page("loop", [*STANDARD, of(compliance, sets="steer_target")])
+        write_page([*STANDARD, of(compliance, sets="steer_target")])
 
 
 def test_an_unset_signal_passes_on_the_one_before():
-    page = write_page("nigel", STANDARD)
+    page = write_page(STANDARD)
     assert "motor_dc_u = throttle_command * battery * (1.0 / motor_dc_battery_nominal)" in page
-    lagged = write_page("nigel", [*STANDARD, all_terms()["drive_lag"]])
+    lagged = write_page([*STANDARD, all_terms()["drive_lag"]])
     assert "motor_throttle = throttle\n" in lagged
 
 
 def test_a_term_left_out_leaves_no_trace():
-    page = write_page("nigel", [term for term in STANDARD if term.name != "yaw_drag"])
+    page = write_page([term for term in STANDARD if term.name != "yaw_drag"])
     assert "yaw_drag" not in page
 
 
 def test_the_order_of_the_list_does_not_change_the_order_of_sums():
     def sums(terms):
-        lines = [line.strip() for line in write_page("nigel", terms).splitlines()]
+        lines = [line.strip() for line in write_page(terms).splitlines()]
         totals = {name for name, signal in SIGNALS.items() if signal.role is Role.SUM}
         return [line for line in lines if line.split(" = ")[0] in totals and " + " in line]
 
@@ -102,7 +104,7 @@ def test_the_order_of_the_list_does_not_change_the_order_of_sums():
 
 
 def test_terms_that_share_a_bare_parameter_name_keep_their_own_numbers():
-    page = write_page("nigel", STANDARD)
+    page = write_page(STANDARD)
     assert "\nTYRE_LATERAL_SLIP_EXTREMUM = " in page
     assert "\nTYRE_LONGITUDINAL_SLIP_EXTREMUM = " in page
     assert page.count("LOW_SPEED = ") == 1
@@ -115,7 +117,7 @@ def test_a_law_that_is_not_straight_line_text_is_refused_with_what_may_stand_the
         return 0.0
 
     with pytest.raises(TermError, match=r"\.py:\d+: law jumpy: expected straight.*'if vx > 0.0:'"):
-        write_page("jumpy", [*STANDARD, of(jumpy, adds="force_x")])
+        write_page([*STANDARD, of(jumpy, adds="force_x")])
 
 
 @pytest.mark.parametrize("line", ["vx and vy", "0.0 < vx < 1.0", "vx ** 2.0", "(vx, vy)[0]"])
@@ -125,11 +127,11 @@ def test_a_law_may_not_use_what_a_lane_cannot(line, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     odd = importlib.import_module(name).odd
     with pytest.raises(TermError, match=r":2: law odd: expected straight-line text"):
-        write_page("odd", [*STANDARD, of(odd, adds="force_x")])
+        write_page([*STANDARD, of(odd, adds="force_x")])
 
 
 def test_what_holds_still_during_a_call_is_worked_out_once():
-    page = write_page("nigel", STANDARD)
+    page = write_page(STANDARD)
     once, _, substep = page.partition("def effects_on_the_body")
     assert "per_tyre_lateral_slip_extremum = 1.0 / tyre_lateral_slip_extremum" in once
     assert "/ tyre_lateral_slip_extremum" not in substep
@@ -146,12 +148,14 @@ def test_a_term_of_somebody_else_joins_by_its_argument_names(tmp_path, monkeypat
 
     strength = Param("strength", 0.0, "N", "body.wind_n", (-5.0, 5.0), "from the right")
     term = of(side_wind.side_wind, adds="force_y", params=(strength,))
-    page = write_page("windy", [*STANDARD, term])
+    page = write_page([*STANDARD, term])
     assert re.search(r"= .*contact_y.*side_wind_strength", page)
 
 
-def test_the_same_terms_give_the_same_kernel_object():
-    assert compile_kernel("nigel", STANDARD) is compile_kernel("nigel", STANDARD)
+def test_cars_of_the_same_effects_share_one_kernel():
+    nigel = load_car("nigel")
+    other = replace(nigel, name="other", terms=tuple(nigel.terms))
+    assert Fleet(other, 1)._kernel is Fleet(nigel, 1)._kernel
 
 
 @pytest.mark.slow
@@ -185,4 +189,4 @@ def test_a_cache_folder_that_cannot_be_written_is_refused_with_the_way_out(tmp_p
     monkeypatch.setenv("SCM_CACHE_DIR", str(blocked / "cache"))
     few = [term for term in STANDARD if term.name not in {"aero_drag", "viscous_drag", "yaw_drag"}]
     with pytest.raises(RunError, match="set SCM_CACHE_DIR"):
-        compile_kernel("nigel", few)
+        compile_kernel(few)

@@ -48,7 +48,7 @@ def test_a_name_with_two_lines_is_never_taken_for_a_number() -> None:
 
 def test_only_front_wheels_of_a_car_take_a_root_for_their_angle() -> None:
     car = load_car("nigel")
-    page = write_page(car.name, car.terms)
+    page = write_page(car.terms)
     front, rear = (
         page.index("effects_on_each_front_wheel"),
         page.index("effects_on_each_rear_wheel"),

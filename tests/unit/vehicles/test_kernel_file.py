@@ -1,6 +1,7 @@
 """The kept kernels: made of the code that is loaded, and made anew where they are damaged."""
 
 import os
+import shutil
 import subprocess
 import sys
 
@@ -21,7 +22,7 @@ if len(sys.argv) > 2:
     Path(sys.argv[1], "calm.py").write_text(sys.argv[2])
 names = ("suspension_spring", "tyre_contact")
 terms = [*(all_terms()[name] for name in names), Term(calm.calm, per=Per.BODY, adds="force_x")]
-print(compile_kernel("small", terms).__name__)
+print(compile_kernel(terms).__name__)
 """
 CURVE = "from scm.vehicles.jit import law\n\n\n@law\ndef curve(vx):\n    return {slope} * vx\n"
 LAW = (
@@ -30,46 +31,53 @@ LAW = (
 )
 
 
-@pytest.fixture
-def kernel_of(tmp_path):
+def compiled(folder, *arguments):
     """Compile a small car in a process of its own; return the generated module's name."""
-
-    def run(*arguments):
-        done = subprocess.run(
-            [sys.executable, "-B", "-c", SMALL, str(tmp_path), *arguments],
-            env={**os.environ, "SCM_CACHE_DIR": str(tmp_path / "cache")},
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    (tmp_path / "curve.py").write_text(CURVE.format(slope=2.0), encoding="utf-8")
-    (tmp_path / "calm.py").write_text(LAW.format(sign="-"), encoding="utf-8")
-    return run
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", SMALL, str(folder), *arguments],
+        env={**os.environ, "SCM_CACHE_DIR": str(folder / "cache")},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
-def test_damaged_files_are_made_anew(tmp_path, kernel_of):
-    kernel = kernel_of()
+@pytest.fixture(scope="module")
+def first(tmp_path_factory):
+    """A folder where the small car was compiled once, and its kernel's name."""
+    folder = tmp_path_factory.mktemp("first")
+    (folder / "curve.py").write_text(CURVE.format(slope=2.0), encoding="utf-8")
+    (folder / "calm.py").write_text(LAW.format(sign="-"), encoding="utf-8")
+    return folder, compiled(folder)
+
+
+@pytest.fixture
+def kernel(first, tmp_path):
+    """The name of a kernel that lies in the cache."""
+    folder, name = first
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    return name
+
+
+def test_damaged_files_are_made_anew(tmp_path, kernel):
     for ending in ("nbi", "nbc", "py"):
         (path,) = (tmp_path / "cache").rglob(f"*.{ending}")
         whole = path.read_bytes()
         path.write_bytes(whole[: len(whole) // 2])
-        assert kernel_of() == kernel
+        assert compiled(tmp_path) == kernel
         assert len(path.read_bytes()) == len(whole), ending
 
 
-def test_a_change_in_a_file_that_a_law_calls_makes_another_kernel(tmp_path, kernel_of):
-    kernel = kernel_of()
+def test_a_change_in_a_file_that_a_law_calls_makes_another_kernel(tmp_path, kernel):
     (tmp_path / "curve.py").write_text(CURVE.format(slope=3.0), encoding="utf-8")
-    assert kernel_of() != kernel
+    assert compiled(tmp_path) != kernel
 
 
-def test_a_file_edited_while_a_process_runs_does_not_name_its_kernel(tmp_path, kernel_of):
-    kernel = kernel_of()
+def test_a_file_edited_while_a_process_runs_does_not_name_its_kernel(tmp_path, kernel):
     changed = LAW.format(sign="2.0 * ")
-    assert kernel_of(changed) == kernel  # it had loaded the old law before the edit
+    assert compiled(tmp_path, changed) == kernel  # it had loaded the old law before the edit
     assert (tmp_path / "calm.py").read_text(encoding="utf-8") == changed
-    assert kernel_of() != kernel
+    assert compiled(tmp_path) != kernel

@@ -28,7 +28,7 @@ def states(fleet):
 
 def test_tiles_and_the_loop_over_cars_agree_but_for_fused_rounding():
     tiles, cars = driving(21), driving(21)
-    cars._kernel = compile_kernel("nigel", cars.car.terms, plain=True)
+    cars._kernel = compile_kernel(cars.car.terms, plain=True)
     for fleet in (tiles, cars):
         for _ in range(20):
             fleet.advance(0.05)
