@@ -30,6 +30,7 @@ BLOCK = 64 * 1024
 _PREFIX = r"scm/@v\d+/[^/]+/"
 M = TypeVar("M", bound=Message)
 Wanted = Callable[[str], bool]
+Row = tuple[object, ...]
 
 
 def _key(form: str) -> Wanted:
@@ -336,18 +337,25 @@ def _facts(car: SnapshotVehicle) -> CarFacts:
     return CarFacts(vehicle=car.vehicle, kind=car.kind, car=car.car, owner=car.owner)
 
 
-def csv_of(index: RunIndex, vehicle: str = "") -> Iterator[bytes]:
+def csv_of(
+    index: RunIndex, vehicle: str = "", from_s: float = 0.0, to_s: float | None = None
+) -> Iterator[bytes]:
     """Yield a recording as CSV, in blocks: a car's own reports, or all cars as the world saw them.
 
     Args:
         index: Of the recording.
         vehicle: The car; empty: all of them, a row a car and snapshot.
+        from_s: Of the first row, since the recording's begin.
+        to_s: Of the last one; None: to the end.
     """
+    end_ns = index.end_ns if to_s is None else index.begin_ns + round(to_s * NS_PER_S)
+    span = index.begin_ns + round(from_s * NS_PER_S), end_ns
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(("t_s", "vehicle", *(_OF_CAR if vehicle else _OF_ALL)))
     damage: list[str] = []
-    for row in _car_rows(index, vehicle, damage) if vehicle else _all_rows(index, damage):
+    of_each = _car_rows(index, vehicle, span, damage) if vehicle else _all_rows(index, span, damage)
+    for row in of_each:
         rows.writerow(row)
         if text.tell() > BLOCK:
             yield text.getvalue().encode()
@@ -368,17 +376,19 @@ _OF_CAR = (
 )
 
 
-def _car_rows(index: RunIndex, vehicle: str, damage: list[str]) -> Iterator[tuple[object, ...]]:
+def _car_rows(
+    index: RunIndex, vehicle: str, span: tuple[int, int], damage: list[str]
+) -> Iterator[Row]:
     key = _key(f"v/{re.escape(vehicle)}/state")
-    for one in index.read(0, index.end_ns, key, damage):
+    for one in index.read(*span, key, damage):
         state = read(one, VehicleState)
         if state is not None:
             t_s = round((one.t_ns - index.begin_ns) / NS_PER_S, 6)
             yield (t_s, vehicle, *(getattr(state, name) for name in _OF_CAR))
 
 
-def _all_rows(index: RunIndex, damage: list[str]) -> Iterator[tuple[object, ...]]:
-    for one in index.read(0, index.end_ns, SNAPSHOT, damage):
+def _all_rows(index: RunIndex, span: tuple[int, int], damage: list[str]) -> Iterator[Row]:
+    for one in index.read(*span, SNAPSHOT, damage):
         snapshot = read(one, WorldSnapshot)
         for car in snapshot.vehicles if snapshot is not None else ():
             t_s = round((one.t_ns - index.begin_ns) / NS_PER_S, 6)

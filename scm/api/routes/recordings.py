@@ -166,12 +166,24 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
         responses=answer_file("text/csv"),
         response_class=Response,
     )
-    def as_csv(name: Name, vehicle: Vehicle = "") -> Response:
+    def as_csv(
+        name: Name,
+        vehicle: Vehicle = "",
+        from_s: Seconds = 0.0,
+        to_s: Annotated[
+            float | None,
+            Query(ge=0.0, le=1e7, description="to when; without: to the end", examples=[60.0]),
+        ] = None,
+    ) -> Response:
         index = shelf.index(name)
+        if to_s is not None and to_s < from_s:
+            detail = f"to_s: got {to_s:g}, expected from_s ({from_s:g}) or later"
+            raise RefusedError(Refused(code="invalid", detail=detail))
         if vehicle and vehicle not in cars_of(index):
             raise not_found(f"car of {name}", vehicle)
         file = f"{name}{f'-{vehicle}' if vehicle else ''}.csv"
-        return StreamingResponse(replay.csv_of(index, vehicle), 200, _named(file), "text/csv")
+        table = replay.csv_of(index, vehicle, from_s, to_s)
+        return StreamingResponse(table, 200, _named(file), "text/csv")
 
 
 def _add_moments(routes: APIRouter, shelf: RecordingsShelf) -> None:

@@ -38,15 +38,20 @@ class RecordingsNoun:
         """
         return self._connection.pieces(f"/api/v1/recordings/{part(name)}/foxglove.mcap")
 
-    def as_csv(self, name: str, *, vehicle: str = "") -> bytes:
+    def as_csv(
+        self, name: str, *, vehicle: str = "", from_s: float = 0.0, to_s: float | None = None
+    ) -> bytes:
         """Its cars as CSV.
 
         Args:
             name: a recording: its file without .mcap
             vehicle: a car's own reports; empty: all cars as the world saw them
+            from_s: seconds since the recording began
+            to_s: to when; without: to the end
         """
         return self._connection.fetch(
-            f"/api/v1/recordings/{part(name)}/csv", query={"vehicle": vehicle}
+            f"/api/v1/recordings/{part(name)}/csv",
+            query={"vehicle": vehicle, "from_s": from_s, "to_s": to_s},
         )
 
     def summary(self, name: str) -> Summary:
