@@ -107,6 +107,20 @@ class RecordingsNoun:
             f"/api/v1/recordings/{part(name)}/eye/{part(camera)}.jpg", query={"t_s": t_s}
         )
 
+    def car_picture(self, name: str, vehicle: str, camera: str, *, t_s: float = 0.0) -> bytes:
+        """What a car's own camera saw, at a time.
+
+        Args:
+            name: a recording: its file without .mcap
+            vehicle: a name on the bus
+            camera: one of its cameras
+            t_s: seconds since the recording began
+        """
+        return self._connection.fetch(
+            f"/api/v1/recordings/{part(name)}/vehicles/{part(vehicle)}/camera/{part(camera)}.jpg",
+            query={"t_s": t_s},
+        )
+
     def map_svg(self, name: str) -> bytes:
         """The map it was driven on.
 

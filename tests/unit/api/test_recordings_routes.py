@@ -128,7 +128,7 @@ def test_boxes_are_told_at_the_begin_and_when_they_move(ask, folder):
 def test_the_eyes_picture_of_a_time_is_the_newest_by_then(ask, client, folder):
     write_run(folder / "run.mcap")  # pictured at 3 s
     assert ask("/run/summary")["eye_cameras"] == ["overhead"]
-    told = [{"t_s": 3.0, "camera": "overhead"}]
+    told = [{"t_s": 3.0, "vehicle": "", "camera": "overhead"}]
     assert ask("/run/frames?from_s=0&to_s=2.9")["pictures"] == []
     assert ask("/run/frames?from_s=2&to_s=4")["pictures"] == told
     assert ask("/run/frames?from_s=4&to_s=5")["pictures"] == told
@@ -140,6 +140,37 @@ def test_the_eyes_picture_of_a_time_is_the_newest_by_then(ask, client, folder):
     early = ask("/run/eye/overhead.jpg?t_s=2.9", status=404)
     assert early["detail"] == "run: camera 'overhead' has no picture of 2.9 s or before"
     ask("/run/eye/elsewhere.jpg?t_s=4", status=404)
+
+
+def test_pictures_of_a_cars_own_camera_are_told_and_given_as_the_eyes_are(ask, client, folder):
+    write_run(folder / "run.mcap", of_n1={2.0: b"\xff\xd8 two", 4.0: b"\xff\xd8 four"})
+    summary = ask("/run/summary")
+    assert summary["car_cameras"] == [{"vehicle": "n1", "camera": "front"}]
+    assert summary["eye_cameras"] == ["overhead"]
+    told = [
+        (one["t_s"], one["vehicle"]) for one in ask("/run/frames?from_s=2.5&to_s=5")["pictures"]
+    ]
+    assert told == [(2.0, "n1"), (3.0, ""), (4.0, "n1")]
+    at = "/run/vehicles/n1/camera/front.jpg"
+    for t_s, jpeg in ((2.0, b"two"), (3.9, b"two"), (4.0, b"four"), (5.0, b"four")):
+        answer = client("GET", f"/api/v1/recordings{at}?t_s={t_s}")
+        assert answer.content == b"\xff\xd8 " + jpeg
+        assert answer.headers["content-type"] == "image/jpeg"
+        assert answer.headers["x-time-ns"] == str(BEGIN_NS)
+    early = ask(f"{at}?t_s=1.9", status=404)
+    assert early["detail"] == "run: n1's camera 'front' has no picture of 1.9 s or before"
+    ask("/run/vehicles/n10/camera/front.jpg?t_s=5", status=404)
+    ask("/run/vehicles/n1/camera/rear.jpg?t_s=5", status=404)
+    ask("/run/eye/front.jpg?t_s=5", status=404)
+
+
+def test_pictures_count_as_rows_of_an_answer(ask, folder, monkeypatch):
+    from scm.api import replay
+
+    monkeypatch.setattr(replay, "MOST_ROWS", 30)
+    write_run(folder / "run.mcap", of_n1={tick / 20: b"" for tick in range(100)})
+    found = ask("/run/frames?from_s=0&to_s=5&hz=20")
+    assert (len(found["frames"]), len(found["pictures"]), found["to_s"]) == (10, 10, 0.5)
 
 
 def test_too_much_at_once_is_cut_and_says_so(ask, folder, monkeypatch):

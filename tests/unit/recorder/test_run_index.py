@@ -77,7 +77,7 @@ def test_a_chunk_whose_list_of_messages_is_damaged_is_left_out_and_told(tmp_path
         (first + 8, b"\xff" * 8),  # a message far behind the chunk
         (first + 8, b"\x01" + bytes(7)),  # one in the midst of another
         (first - 4, b"\x07\x00\x00\x00"),  # a list of half an entry
-        (first - 4, b"\xff\xff\xff\xff"),  # one longer than the file
+        (first, (BEGIN_NS + NS_PER_S).to_bytes(8, "little")),  # one of another time
     ):
         path.write_bytes(whole[:at] + wrong + whole[at + len(wrong) :])
         damage = []
