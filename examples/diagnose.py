@@ -19,11 +19,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recording", help="on the city's shelf; without .mcap")
     parser.add_argument("--url", default="http://127.0.0.1:8000", help="of its dashboard")
-    parser.add_argument("--key", default="", help="API key, where the city asks for one")
     parser.add_argument("--vehicle", default="n1", help="which car (%(default)s)")
     parser.add_argument("--budget-s", type=float, default=60.0, help="time for it (%(default)s)")
     arguments = parser.parse_args()
-    with Client(arguments.url, arguments.key) as city:
+    with Client(arguments.url) as city:
         work = city.mismatch.search(
             recording=arguments.recording, vehicle=arguments.vehicle, budget_s=arguments.budget_s
         )

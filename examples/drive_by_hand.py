@@ -14,12 +14,11 @@ from scm.client import Client
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--url", default="http://127.0.0.1:8000", help="of its dashboard")
-    parser.add_argument("--key", default="", help="API key, where the city asks for one")
     parser.add_argument("--vehicle", default="", help="which car (the first)")
     parser.add_argument("--reason", default="", help="takes it from whoever holds it")
     parser.add_argument("--seconds", type=float, default=3.0, help="how long (%(default)s)")
     arguments = parser.parse_args()
-    with Client(arguments.url, arguments.key) as city:
+    with Client(arguments.url) as city:
         vehicle = arguments.vehicle or city.vehicles.all_vehicles().vehicles[0].vehicle
         places, fastest_mps = [], 0.0
         with city.wheel(vehicle, arguments.reason) as wheel:

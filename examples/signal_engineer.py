@@ -26,11 +26,10 @@ def runs(city: Client, junction: str, plan: str, seconds: float) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--url", default="http://127.0.0.1:8000", help="of its dashboard")
-    parser.add_argument("--key", default="", help="API key of an engineer, where one is needed")
     parser.add_argument("--more-s", type=float, default=4.0, help="more green (%(default)s)")
     parser.add_argument("--seconds", type=float, default=30.0, help="how long (%(default)s)")
     arguments = parser.parse_args()
-    with Client(arguments.url, arguments.key) as city:
+    with Client(arguments.url) as city:
         row = city.signals.all_signals().signals[0]
         junction, before = row.junction, row.plan or row.plans[0]
         old = city.signals.one_plan(junction, before)

@@ -14,10 +14,9 @@ from scm.client.stream import states
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--url", default="http://127.0.0.1:8000", help="of its dashboard")
-    parser.add_argument("--key", default="", help="API key, where the city asks for one")
     parser.add_argument("--seconds", type=float, default=5.0, help="how long to watch")
     arguments = parser.parse_args()
-    with Client(arguments.url, arguments.key) as client:
+    with Client(arguments.url) as client:
         (city,) = client.cities.all_cities().cities
         print(f"{city.title}: {city.vehicles} cars, {city.junctions} junctions")
         ends_s = monotonic() + arguments.seconds

@@ -48,8 +48,8 @@ class Part(Protocol):
     """A steppable part of the city.
 
     One that also sets `hears_raw = True` gets every message of the city, unread, as `RawSample`;
-    `hears_raw_too`, a list of classes, adds those that come only to who names them. Without
-    `hears_raw` it gets these classes alone.
+    `hears_raw_too`, a list of `Hears`, adds those that come only to who names them. Without
+    `hears_raw` it gets these alone.
 
     One that also has `learn_wishes(is_wanted)` is given an `IsWanted` before its first step: what
     is costly to make need not be made for nobody.

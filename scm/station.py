@@ -66,8 +66,8 @@ class Station:
         raw = RawMailbox(RAW_DEPTH)
         if getattr(self._part, "hears_raw", False):
             self._bus.subscribe_raw(raw)
-        for kind in getattr(self._part, "hears_raw_too", ()):
-            self._bus.subscribe_raw(raw, kind)
+        for hears in getattr(self._part, "hears_raw_too", ()):
+            self._bus.subscribe_raw(raw, hears.kind, hears.where)
         self._boxes.append(raw)
 
     def _follow(self) -> None:

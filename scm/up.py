@@ -21,6 +21,7 @@ from scm.traffic.demand_table import load_demand
 from scm.v2x.access import SCRIPT, Guard, guard_of, is_loopback, own_stations
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.key import check_name
 from scm.v2x.messages.presence import Presence
 from scm.v2x.router import DEFAULT_ENDPOINT, Router, free_endpoint
 
@@ -45,6 +46,9 @@ class Wanted:
         port: Of the dashboard; 0 takes a free one.
         listen: Endpoint of the router; one that ends in `:0` takes a free one.
         record_dir: Where the recording goes; made when missing.
+        cameras_hz: How many pictures of the cars' own cameras are recorded a second, of each; 0:
+            none, and the cameras run only while somebody looks.
+        cameras_of: The cars whose cameras these are; empty: all.
         seed: Of all randomness.
         fleet: Fleet file of those who may enter; None: everybody on this machine.
         state: Store of what must outlive a part's process, and this city when it is named; None: a
@@ -63,6 +67,8 @@ class Wanted:
     port: int = 8000
     listen: str = DEFAULT_ENDPOINT
     record_dir: Path = Path("runs")
+    cameras_hz: float = 0.0
+    cameras_of: tuple[str, ...] = ()
     seed: int = 0
     fleet: Path | None = None
     state: str | None = None
@@ -147,6 +153,12 @@ def _check_counts(wanted: Wanted) -> None:
         if got < 0:
             msg = f"{what}: got {got} cars, expected 0 or more"
             raise RunError(msg)
+    hz, cars = wanted.cameras_hz, wanted.cameras_of
+    if not 0.0 <= hz < float("inf") or (cars and not hz):
+        msg = f"cameras_hz: got {hz}, expected 0 or more, and more than 0 with --cameras-of"
+        raise RunError(msg)
+    for name in cars:
+        check_name(name, "cameras_of")
 
 
 def _make_folder(folder: Path) -> None:
@@ -188,7 +200,9 @@ def _parts(plan: _Plan) -> list[Job]:
         first = plan.recording
         out = first.with_stem(f"{plan.wanted.city}-{_stamp()}") if first.exists() else first
         sparse = ["--sparse"] if plan.wanted.hosted > MOST_RECORDED else []
-        return scm("record", "--out", str(out), *sparse)
+        of = (word for name in plan.wanted.cameras_of for word in ("--cameras-of", name))
+        cameras = ("--cameras-hz", str(plan.wanted.cameras_hz), *of)
+        return scm("record", "--out", str(out), *sparse, *cameras)
 
     def part(name: str, what: str, *more: str) -> Job:
         return Job(name, "part", what, lambda: scm(name, *more))

@@ -197,7 +197,7 @@ class _Desk:
             audit.router(self.store),
             operations.router(self.work),
             recordings.router(city),
-            scenarios.router(city, self.work),
+            scenarios.router(city, self.work, self.keys),
             eye_calibration.router(city, self.work),
             eye_in_force.router(city),
             mismatch.router(city, self.jobs),

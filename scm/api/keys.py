@@ -17,6 +17,7 @@ from scm.errors import AccessError, StoreError
 from scm.store.repository import Repository
 
 SECRET_BYTES = 32
+MOST_OWNER = 64  # characters
 _PREFIX = "api/"
 _KEY = re.compile(r"scm_([0-9a-f]{8})_([A-Za-z0-9_-]{43})")
 _PERSON = b"scm api key"
@@ -46,6 +47,7 @@ class KeyRing:
 
     def __init__(self, store: Repository) -> None:
         self._store = store
+        self._lent: dict[str, tuple[KeyRecord, str]] = {}
 
     def add(self, owner: str, role: str, now_s: int) -> str:
         """Make a key; return it, for it is never shown again.
@@ -53,17 +55,36 @@ class KeyRing:
         Raises:
             AccessError: when there is no such role, or nobody is named.
         """
-        if not owner.strip() or len(owner) > 64:
-            msg = f"owner: got {owner!r}, expected 1 to 64 characters"
+        if not owner.strip() or len(owner) > MOST_OWNER:
+            msg = f"owner: got {owner!r}, expected 1 to {MOST_OWNER} characters"
             raise AccessError(msg)
-        key_id, secret = secrets.token_hex(4), secrets.token_urlsafe(SECRET_BYTES)
-        salt = secrets.token_bytes(hashlib.blake2b.SALT_SIZE)
-        record = KeyRecord(
-            key_id=key_id, owner=owner, role=check_role(role), made_s=now_s, salt=salt.hex(),
-            digest=_digest(secret, salt),
-        )  # fmt: skip
-        self._store.put("credentials", _PREFIX + key_id, msgspec.json.encode(record))
-        return f"scm_{key_id}_{secret}"
+        key, record = _made(owner, check_role(role), now_s)
+        self._store.put("credentials", _PREFIX + record.key_id, msgspec.json.encode(record))
+        return key
+
+    def lend(self, key: str, doing: str) -> str:
+        """Make a key for a program that works for somebody: it may do what they may.
+
+        It is kept nowhere, and ends with this process, with theirs, or when it is taken back.
+
+        Args:
+            key: Theirs.
+            doing: What the program is, in a word: its deeds are signed by owner and this.
+
+        Raises:
+            AccessError: when their key is nobody's any more.
+        """
+        lender = self.find(key)
+        if lender is None:
+            msg = f"{doing}: the key of who asked for it has ended"
+            raise AccessError(msg)
+        lent, record = _made(f"{lender.owner}: {doing}"[:MOST_OWNER], lender.role, lender.made_s)
+        self._lent[record.key_id] = record, lender.key_id
+        return lent
+
+    def take_back(self, lent: str) -> None:
+        """End a key that was lent."""
+        self._lent.pop(public_part(lent), None)
 
     def records(self) -> Iterator[KeyRecord]:
         """Return what is kept of all keys, by id."""
@@ -89,18 +110,41 @@ class KeyRing:
         match = _KEY.fullmatch(key)
         if match is None:
             return None
-        body = self._store.get("credentials", _PREFIX + match[1])
-        if body is None:
+        record = self._record(match[1])
+        if record is None:
             return None
-        record = _read(match[1], body)
         given = _digest(match[2], bytes.fromhex(record.salt))
         return record if hmac.compare_digest(given, record.digest) else None
+
+    def _record(self, key_id: str) -> KeyRecord | None:
+        """Return what is kept of a key; None: it has ended, or the one that it was lent for."""
+        lent = self._lent.get(key_id)
+        if lent is not None:
+            record, lender = lent
+            return record if self._record(lender) is not None else None
+        body = self._store.get("credentials", _PREFIX + key_id)
+        return None if body is None else _read(key_id, body)
 
 
 def public_part(key: str) -> str:
     """Return what tells a key from others and is no secret; empty: it is no key."""
     match = _KEY.fullmatch(key)
     return match[1] if match is not None else ""
+
+
+def _made(owner: str, role: Role, made_s: int) -> tuple[str, KeyRecord]:
+    """Return a new key, and what is to be kept of it."""
+    key_id, secret = secrets.token_hex(4), secrets.token_urlsafe(SECRET_BYTES)
+    salt = secrets.token_bytes(hashlib.blake2b.SALT_SIZE)
+    record = KeyRecord(
+        key_id=key_id,
+        owner=owner,
+        role=role,
+        made_s=made_s,
+        salt=salt.hex(),
+        digest=_digest(secret, salt),
+    )
+    return f"scm_{key_id}_{secret}", record
 
 
 def _digest(secret: str, salt: bytes) -> str:

@@ -17,6 +17,7 @@ from scm.maps.model import CityMap
 from scm.recorder.mcap_file import Recorded
 from scm.recorder.run_index import RunIndex
 from scm.v2x.message import Message
+from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.spat import Spat
@@ -30,6 +31,7 @@ BLOCK = 64 * 1024
 _PREFIX = r"scm/@v\d+/[^/]+/"
 M = TypeVar("M", bound=Message)
 Wanted = Callable[[str], bool]
+Row = tuple[object, ...]
 
 
 def _key(form: str) -> Wanted:
@@ -39,8 +41,9 @@ def _key(form: str) -> Wanted:
 
 SNAPSHOT, SPAT, EVENT = _key("world/snapshot"), _key("tl/[^/]+/spat"), _key("event/[^/]+/[^/]+")
 DEFINITION = _key("world/def")
-EYE = _key("eye/[^/]+/frame")
-_DRAWN = _key("(?:world/snapshot|tl/[^/]+/spat|eye/[^/]+/frame)")
+EYE, CAR_CAMERA = _key("eye/[^/]+/frame"), _key("v/[^/]+/@camera/[^/]+")
+_PICTURE = _key("(?:eye/[^/]+/frame|v/[^/]+/@camera/[^/]+)")
+_DRAWN = _key("(?:world/snapshot|tl/[^/]+/spat|eye/[^/]+/frame|v/[^/]+/@camera/[^/]+)")
 
 
 class CarAt(msgspec.Struct, kw_only=True, frozen=True, array_like=True):
@@ -97,9 +100,17 @@ class SignalChange(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class PictureAt(msgspec.Struct, kw_only=True, frozen=True):
-    """From when on a picture of an overhead camera is the newest one."""
+    """From when on a picture of a camera is the newest one; `vehicle` empty: an overhead one."""
 
     t_s: float
+    vehicle: str
+    camera: str
+
+
+class CarCamera(msgspec.Struct, kw_only=True, frozen=True):
+    """A car's own camera: `front` or `rear`."""
+
+    vehicle: str
     camera: str
 
 
@@ -110,7 +121,8 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
         to_s: How far it goes: less than was asked where that would be too much for one answer.
         cars: Whom the frames' numbers mean.
         signals: Changes, the colours at `from_s` first; a group is `junction/group`.
-        pictures: The Eye's, of each camera the one that is newest at `from_s` first.
+        pictures: The Eye's and the cars' own, of each camera the one that is newest at `from_s`
+            first.
         damaged: What of the stretch cannot be read, in words.
     """
 
@@ -192,16 +204,18 @@ class _Frames:
 
     def pictures_before(self, begin_ns: int) -> None:
         """Note what each camera had pictured last when the stretch begins."""
-        for key in [key for key in self._index.topics.values() if EYE(key)]:
+        for key in [key for key in self._index.topics.values() if _PICTURE(key)]:
             found = self._index.newest(begin_ns - 1, key.__eq__)
             if found is not None:
                 self._picture(found)
 
     def take(self, one: Recorded) -> bool:
         """Take a message; return False when the answer is full."""
-        if EYE(one.key):
-            self._picture(one)
-            return True
+        if _PICTURE(one.key):
+            is_full = self._is_full(1)
+            if not is_full:
+                self._picture(one)
+            return not is_full
         if SPAT(one.key):
             spat = read(one, Spat)
             if spat is not None:
@@ -212,8 +226,7 @@ class _Frames:
         snapshot = read(one, WorldSnapshot)
         if snapshot is None:
             return True
-        self._rows += len(snapshot.vehicles)
-        if self._rows > MOST_ROWS and self.frames:
+        if self._is_full(len(snapshot.vehicles)):
             return False
         # Counted from when it was due, so that 20 Hz that jitter make 10 Hz and not 7.
         late = one.t_ns - self._due_ns >= self._period_ns
@@ -223,6 +236,10 @@ class _Frames:
         cars = tuple(self._car(car) for car in snapshot.vehicles)
         self.frames.append(Frame(t_s=self.seconds(one.t_ns), cars=cars, boxes=boxes))
         return True
+
+    def _is_full(self, rows: int) -> bool:
+        self._rows += rows
+        return self._rows > MOST_ROWS and bool(self.frames)
 
     def _car(self, car: SnapshotVehicle) -> CarAt:
         facts = _facts(car)
@@ -244,7 +261,8 @@ class _Frames:
     def _picture(self, one: Recorded) -> None:
         # Rounded up: what is asked for at this time is this picture, not the one before.
         t_s = math.ceil((one.t_ns - self._index.begin_ns) / NS_PER_MS) / 1000
-        self.pictures.append(PictureAt(t_s=t_s, camera=_camera_of(one.key)))
+        vehicle, camera = _camera_of(one.key)
+        self.pictures.append(PictureAt(t_s=t_s, vehicle=vehicle, camera=camera))
 
     def _lights(self, t_ns: int, spat: Spat) -> None:
         for group in spat.groups:
@@ -285,25 +303,43 @@ def events_of(index: RunIndex) -> tuple[RecordedEvent, ...]:
 
 def eye_cameras(index: RunIndex) -> tuple[str, ...]:
     """Return the overhead cameras of which a recording has pictures."""
-    return tuple(sorted(_camera_of(key) for key in index.topics.values() if EYE(key)))
+    return tuple(sorted(_camera_of(key)[1] for key in index.topics.values() if EYE(key)))
 
 
-def picture_at(index: RunIndex, camera: str, t_s: float) -> tuple[int, bytes] | None:
+def car_cameras(index: RunIndex) -> tuple[CarCamera, ...]:
+    """Return the cars' own cameras of which a recording has pictures."""
+    found = (_camera_of(key) for key in index.topics.values() if CAR_CAMERA(key))
+    return tuple(CarCamera(vehicle=vehicle, camera=camera) for vehicle, camera in found)
+
+
+def picture_at(
+    index: RunIndex, camera: str, t_s: float, vehicle: str = ""
+) -> tuple[int, bytes] | None:
     """Return the newest picture of a camera at a time: its exposure [ns] and the JPEG file.
 
     No more of the file is unpacked than the piece that holds it.
+
+    Args:
+        index: Of the recording.
+        camera: An overhead one, or one of the car's.
+        t_s: Since the recording's begin.
+        vehicle: Whose camera it is; empty: an overhead one.
 
     Raises:
         RecordingError: when the file cannot be opened any more.
     """
     before_ns = index.begin_ns + round(t_s * NS_PER_S)
-    found = index.newest(before_ns, _key(f"eye/{re.escape(camera)}/frame"))
-    frame = read(found, EyeFrame) if found is not None else None
+    own = f"v/{re.escape(vehicle)}/@camera/{re.escape(camera)}"
+    found = index.newest(before_ns, _key(own if vehicle else f"eye/{re.escape(camera)}/frame"))
+    kind: type[CameraFrame | EyeFrame] = CameraFrame if vehicle else EyeFrame
+    frame = read(found, kind) if found is not None else None
     return (frame.t_ns, frame.payload) if frame is not None else None
 
 
-def _camera_of(key: str) -> str:
-    return key.split("/")[-2]
+def _camera_of(key: str) -> tuple[str, str]:
+    """Return whose camera a picture's key tells, empty for an overhead one, and which."""
+    *_, vehicle, camera, last = key.split("/")
+    return (vehicle, last) if camera == "@camera" else ("", camera)
 
 
 def map_of(index: RunIndex) -> CityMap | None:
@@ -336,18 +372,25 @@ def _facts(car: SnapshotVehicle) -> CarFacts:
     return CarFacts(vehicle=car.vehicle, kind=car.kind, car=car.car, owner=car.owner)
 
 
-def csv_of(index: RunIndex, vehicle: str = "") -> Iterator[bytes]:
+def csv_of(
+    index: RunIndex, vehicle: str = "", from_s: float = 0.0, to_s: float | None = None
+) -> Iterator[bytes]:
     """Yield a recording as CSV, in blocks: a car's own reports, or all cars as the world saw them.
 
     Args:
         index: Of the recording.
         vehicle: The car; empty: all of them, a row a car and snapshot.
+        from_s: Of the first row, since the recording's begin.
+        to_s: Of the last one; None: to the end.
     """
+    end_ns = index.end_ns if to_s is None else index.begin_ns + round(to_s * NS_PER_S)
+    span = index.begin_ns + round(from_s * NS_PER_S), end_ns
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(("t_s", "vehicle", *(_OF_CAR if vehicle else _OF_ALL)))
     damage: list[str] = []
-    for row in _car_rows(index, vehicle, damage) if vehicle else _all_rows(index, damage):
+    of_each = _car_rows(index, vehicle, span, damage) if vehicle else _all_rows(index, span, damage)
+    for row in of_each:
         rows.writerow(row)
         if text.tell() > BLOCK:
             yield text.getvalue().encode()
@@ -368,17 +411,19 @@ _OF_CAR = (
 )
 
 
-def _car_rows(index: RunIndex, vehicle: str, damage: list[str]) -> Iterator[tuple[object, ...]]:
+def _car_rows(
+    index: RunIndex, vehicle: str, span: tuple[int, int], damage: list[str]
+) -> Iterator[Row]:
     key = _key(f"v/{re.escape(vehicle)}/state")
-    for one in index.read(0, index.end_ns, key, damage):
+    for one in index.read(*span, key, damage):
         state = read(one, VehicleState)
         if state is not None:
             t_s = round((one.t_ns - index.begin_ns) / NS_PER_S, 6)
             yield (t_s, vehicle, *(getattr(state, name) for name in _OF_CAR))
 
 
-def _all_rows(index: RunIndex, damage: list[str]) -> Iterator[tuple[object, ...]]:
-    for one in index.read(0, index.end_ns, SNAPSHOT, damage):
+def _all_rows(index: RunIndex, span: tuple[int, int], damage: list[str]) -> Iterator[Row]:
+    for one in index.read(*span, SNAPSHOT, damage):
         snapshot = read(one, WorldSnapshot)
         for car in snapshot.vehicles if snapshot is not None else ():
             t_s = round((one.t_ns - index.begin_ns) / NS_PER_S, 6)

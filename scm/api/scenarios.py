@@ -2,7 +2,9 @@
 
 A script is a program with all rights of the server: who may write one may do anything there. It
 hears where the city is in `SCM_CONNECT` and by `{connect}` among its arguments, and who it is
-there in `SCM_CREDENTIALS`, which `scm.fleet.open_city` heeds.
+there in `SCM_CREDENTIALS`, which `scm.fleet.open_city` heeds. Where the web interface asks for
+keys it is lent one while it runs, in the file that `SCM_API_KEY_FILE` names, which `scm.client`
+heeds: with it a script may do what who runs it may.
 """
 
 import os
@@ -12,14 +14,17 @@ import subprocess
 import sys
 import threading
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import IO
 
 import msgspec
 
 import scm
 from scm.api.city import not_found
+from scm.api.keys import KeyRing
 from scm.api.operations import Cancelled, Operation, Operations, Teller
 from scm.api.problem import RefusedError
 from scm.errors import ScmError
@@ -167,17 +172,28 @@ class ScenarioRuns:
     """Scripts that run or ran: each an operation, with what it printed."""
 
     def __init__(
-        self, shelf: ScenarioShelf, work: Operations, connect: str, credentials: Path | None
+        self,
+        shelf: ScenarioShelf,
+        work: Operations,
+        connect: str,
+        credentials: Path | None,
+        keys: KeyRing | None,
     ) -> None:
-        self._shelf, self._work, self._connect = shelf, work, connect
+        self._shelf, self._work, self._connect, self._keys = shelf, work, connect, keys
         self._told = {"SCM_CONNECT": connect, "PYTHONUNBUFFERED": "1"}
         if credentials is not None:
             self._told["SCM_CREDENTIALS"] = str(credentials.absolute())
         self._lock = threading.Lock()
         self._printed: OrderedDict[str, _Printed] = OrderedDict()
 
-    def start(self, name: str, arguments: Sequence[str], *, owner: str) -> Operation:
+    def start(self, name: str, arguments: Sequence[str], *, owner: str, key: str = "") -> Operation:
         """Run a script.
+
+        Args:
+            name: Of the script.
+            arguments: Of its command line.
+            owner: Who asked for it.
+            key: Their API key, on behalf of which the script is lent one; empty: the city has none.
 
         Raises:
             RefusedError: when there is none of that name, or too many wait.
@@ -188,7 +204,8 @@ class ScenarioRuns:
             filled = [one.replace(_CONNECT, self._connect) for one in arguments]
 
             def work(tell: Teller) -> str:
-                return self._run(path, filled, printed, tell)
+                with self._lent(key, name) as told:
+                    return self._run(path, filled, printed, tell, told)
 
             row = self._work.start(KIND, name, work, owner=owner)
             printed.run = row.id
@@ -209,7 +226,29 @@ class ScenarioRuns:
             raise not_found("run of a scenario", run)
         return printed.after(after)
 
-    def _run(self, path: Path, arguments: list[str], printed: "_Printed", tell: Teller) -> str:
+    @contextmanager
+    def _lent(self, key: str, name: str) -> Iterator[dict[str, str]]:
+        """Lend a script an API key while it runs; yield what tells it where that is."""
+        if self._keys is None:
+            yield {}
+            return
+        lent = self._keys.lend(key, name)
+        try:
+            with NamedTemporaryFile("w", prefix="scm-key-") as file:  # only its owner reads it
+                file.write(lent)
+                file.flush()
+                yield {"SCM_API_KEY_FILE": file.name}
+        finally:
+            self._keys.take_back(lent)
+
+    def _run(
+        self,
+        path: Path,
+        arguments: list[str],
+        printed: "_Printed",
+        tell: Teller,
+        told: Mapping[str, str],
+    ) -> str:
         try:
             process = subprocess.Popen(
                 [sys.executable, "-c", _LAUNCH, str(path), *arguments],
@@ -218,7 +257,7 @@ class ScenarioRuns:
                 stderr=subprocess.STDOUT,
                 text=True,
                 errors="replace",
-                env={**os.environ, **self._told},
+                env={**os.environ, **self._told, **told},
                 start_new_session=True,
             )
         except OSError as cause:

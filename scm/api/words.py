@@ -25,6 +25,7 @@ WORDS: dict[str, tuple[str, object]] = {
     "camera": ("Name of a camera.", "ceiling"),
     "cameras": ("Cameras.", ["front_camera"]),
     "car": ("Name of its car file.", "nigel"),
+    "car_cameras": ("Cars' own cameras.", [{"vehicle": "n1", "camera": "front"}]),
     "cars": ("Cars, or names of them.", ["n1", "n2"]),
     "centre_px": ("Middle of the tag in the raw picture: column, row [px].", [320.4, 240.1]),
     "check": ("Name of a check.", "speed_jump"),

@@ -42,7 +42,7 @@ class Client:
 
     Args:
         url: Where its dashboard is: `http://127.0.0.1:8000`.
-        key: API key, where the city asks for one.
+        key: API key, where the city asks for one; empty: of the file in `SCM_API_KEY_FILE`.
     """
 
     def __init__(self, url: str = "http://127.0.0.1:8000", key: str = "") -> None:

@@ -17,6 +17,7 @@ from websockets.exceptions import InvalidHandshake, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from scm.client.key import key_of_environment
 from scm.client.stream import Lines, LiveEvent, events_of
 from scm.errors import LinkError, MessageError, ScmError
 
@@ -58,7 +59,7 @@ class Connection:
 
     Args:
         url: Where its dashboard is: `http://127.0.0.1:8000`.
-        key: API key, where the city asks for one.
+        key: API key, where the city asks for one; empty: of the file in `SCM_API_KEY_FILE`.
         timeout_s: For one answer.
         transport: Another way to the server than the network, for tests.
 
@@ -75,7 +76,8 @@ class Connection:
         timeout_s: float = 10.0,
         transport: httpx.BaseTransport | None = None,
     ) -> None:
-        headers = {"Authorization": f"Bearer {key}"} if key else {}
+        given = key or key_of_environment()
+        headers = {"Authorization": f"Bearer {given}"} if given else {}
         self._http = httpx.Client(
             base_url=url, headers=headers, timeout=timeout_s, transport=transport
         )

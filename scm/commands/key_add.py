@@ -1,10 +1,12 @@
 """`scm key add`: an API key for a person or a program."""
 
 import argparse
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from scm.command import Command
 from scm.errors import AccessError
@@ -53,6 +55,13 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         choices=("viewer", "operator", "engineer", "admin"),
         help="each may do what those before it may, and more",
     )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="write the key into a new file that you alone can read, and do not show it: "
+        "`SCM_API_KEY_FILE` tells programs of it",
+    )
     keys_argument(parser)
 
 
@@ -63,12 +72,34 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import NS_PER_S, WallClock
     from scm.store.open import open_store
 
-    with closing(open_store(arguments.keys)) as store:
+    with _output(arguments.out) as out, closing(open_store(arguments.keys)) as store:
         now_s = WallClock().now_ns() // NS_PER_S
         key = KeyRing(store).add(arguments.owner, arguments.role, now_s)
-    print(f"{arguments.role} key of {arguments.owner}, shown this once:")
-    print(key)
+        if arguments.out is None:
+            print(f"{arguments.role} key of {arguments.owner}, shown this once:")
+        print(key, file=out)
+    if arguments.out is not None:
+        print(f"{arguments.role} key of {arguments.owner} in {arguments.out}: the only copy")
     return 0
+
+
+@contextmanager
+def _output(path: Path | None) -> Iterator[TextIO]:
+    """Open where a key goes: the screen, or a new file that its owner alone can read.
+
+    Raises:
+        AccessError: when there is such a file already, or none can be made.
+    """
+    if path is None:
+        yield sys.stdout
+        return
+    try:
+        made = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except OSError as cause:
+        msg = f"{path}: cannot be written: {cause.strerror}"
+        raise AccessError(msg) from cause
+    with os.fdopen(made, "w") as out:
+        yield out
 
 
 COMMAND = Command(

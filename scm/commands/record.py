@@ -8,6 +8,7 @@ from scm.command import Command, part_arguments, run_part
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
+    camera_arguments(parser)
     parser.add_argument(
         "--out", type=Path, required=True, metavar="FILE", help="the .mcap to write"
     )
@@ -20,17 +21,28 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "all else is always kept",
     )
     parser.add_argument(
+        "--sparse",
+        action="store_true",
+        help="leave out each car's own states, sensors and radio frames: snapshots tell of all",
+    )
+
+
+def camera_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add which of the cars' own cameras are recorded, and how often."""
+    parser.add_argument(
         "--cameras-hz",
         type=float,
         default=0.0,
         metavar="HZ",
-        help="above 0: run all cameras of all cars, and keep so many pictures of each a second "
+        help="above 0: run the cars' own cameras, and keep so many pictures of each a second "
         "(%(default)s)",
     )
     parser.add_argument(
-        "--sparse",
-        action="store_true",
-        help="leave out each car's own states, sensors and radio frames: snapshots tell of all",
+        "--cameras-of",
+        action="append",
+        default=[],
+        metavar="CAR",
+        help="the cameras of this car alone; may be given again; without: of all cars",
     )
 
 
@@ -43,6 +55,7 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.city,
         arguments.frames_hz,
         arguments.cameras_hz,
+        arguments.cameras_of,
         sparse=arguments.sparse,
     )
     try:

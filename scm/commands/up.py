@@ -3,8 +3,13 @@
 import argparse
 from dataclasses import fields
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scm.command import Command
+from scm.commands.record import camera_arguments
+
+if TYPE_CHECKING:
+    from scm.up import Wanted
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,6 +30,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--record-dir", type=Path, default=Path("runs"), help="recordings (%(default)s)"
     )
+    camera_arguments(parser)
     parser.add_argument("--seed", type=int, default=0, help="of all randomness (%(default)s)")
     parser.add_argument(
         "--fleet",
@@ -55,11 +61,19 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ros2", action="store_true", help="let ROS 2 nodes see the city")
 
 
-def _run(arguments: argparse.Namespace) -> int:
-    from scm.up import Wanted, run_city
+def wanted_of(arguments: argparse.Namespace) -> "Wanted":
+    """Return the city that is asked for."""
+    from scm.up import Wanted
 
-    settings = {**vars(arguments), "map_name": arguments.map, "radio": tuple(arguments.radio)}
-    return run_city(Wanted(**{field.name: settings[field.name] for field in fields(Wanted)}))
+    settings = {**vars(arguments), "map_name": arguments.map}
+    settings |= {name: tuple(settings[name]) for name in ("radio", "cameras_of")}
+    return Wanted(**{field.name: settings[field.name] for field in fields(Wanted)})
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.up import run_city
+
+    return run_city(wanted_of(arguments))
 
 
 COMMAND = Command(

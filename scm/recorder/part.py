@@ -9,6 +9,7 @@ from scm.part import Hears, Serves
 from scm.recorder.mcap_file import MESSAGES, RunFile
 from scm.registry import load, names
 from scm.v2x.exchange import Incoming, Outgoing, RawSample
+from scm.v2x.key import check_name
 from scm.v2x.message import Delivery, Message
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
@@ -41,8 +42,8 @@ class RecorderPart:
 
     The Eye's pictures alone would be nearly all of the file (some 30 MB a minute at 5 Hz), so of
     each of its cameras at most `frames_hz` a second are kept; 0 keeps none. The cars' own cameras
-    picture only what somebody asks for: `cameras_hz` above 0 makes all of them run, and keeps so
-    many of each.
+    picture only what somebody asks for: `cameras_hz` above 0 makes them run, all of them or those
+    of the cars in `cameras_of`, and keeps so many of each.
 
     In a large city the same would be true of what each car says: a `sparse` recording leaves out
     the cars' own states, sensors and radio frames, and keys that are not ours, so that the city
@@ -61,17 +62,21 @@ class RecorderPart:
         city: str = "city",
         frames_hz: float = FRAMES_HZ,
         cameras_hz: float = 0.0,
+        cameras_of: Sequence[str] = (),
         *,
         sparse: bool = False,
     ) -> None:
+        if cameras_of and not cameras_hz:
+            msg = f"cameras_hz: got {cameras_hz}, expected more than 0 with --cameras-of"
+            raise RecordingError(msg)
         self._period_ns = {
             EyeFrame: _period_ns("frames_hz", frames_hz),
             CameraFrame: _period_ns("cameras_hz", cameras_hz),
         }
         self.hears_raw = not sparse
         self.hears_raw_too = (
-            *(_without_cars() if sparse else ()),
-            *((CameraFrame,) if cameras_hz else ()),
+            *(map(Hears, _without_cars()) if sparse else ()),
+            *(_cameras(cameras_of) if cameras_hz else ()),
         )
         self.file = RunFile(path, city)
         self._frame_due_ns: dict[str, int] = {}
@@ -123,6 +128,17 @@ def _without_cars() -> tuple[type[Message], ...]:
         and kind.DELIVERY not in (Delivery.RPC, Delivery.PRESENCE)
         and kind not in OF_EACH_CAR
     )
+
+
+def _cameras(cars: Sequence[str]) -> tuple[Hears, ...]:
+    """Return the wish for pictures of some cars' own cameras; of all where none is named.
+
+    Raises:
+        MessageError: when one is no car's name.
+    """
+    for name in cars:
+        check_name(name, "cameras_of")
+    return tuple(Hears(CameraFrame, {"vehicle": name}) for name in cars) or (Hears(CameraFrame),)
 
 
 def _period_ns(name: str, rate_hz: float) -> int | None:

@@ -5,7 +5,7 @@ is walked from record to record without unpacking them, and only what is new sin
 """
 
 import struct
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -22,7 +22,8 @@ CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, DATA_END = 0x04, 0x05, 0x06, 0x07, 0x0F
 MOST_UNPACKED = 256 * 2**20  # of one chunk: a file that claims more is damaged or hostile
 _RECORD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")
-_MESSAGE = struct.Struct("<HIQQ")
+_MESSAGE = struct.Struct("<BQHIQQ")  # behind its record's head
+_LIST, _ENTRY = struct.Struct("<HI"), struct.Struct("<QQ")
 _U16, _U32 = struct.Struct("<H"), struct.Struct("<I")
 
 
@@ -32,16 +33,17 @@ class Chunk(NamedTuple):
     Attributes:
         start: Of its content in the file, behind the record's head.
         length: Of that content [bytes].
+        channels: Where in the file the list of each one's messages begins, likewise.
     """
 
     begin_ns: int
     end_ns: int
     start: int
     length: int
-    channels: frozenset[int]
+    channels: Mapping[int, int]
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class RunIndex:
     """What a run's file holds, and where.
 
@@ -50,24 +52,24 @@ class RunIndex:
         whole: Whether the file has its end; else its writer is at work, or was killed.
         topics: The bus key of each channel.
         read_to: How far a file without its end makes sense [bytes].
+        begin_ns, end_ns: When the first and the last message was heard; 0 in an empty run.
     """
 
     path: Path
     size: int
     whole: bool
-    chunks: list[Chunk] = field(default_factory=list)
-    topics: dict[int, str] = field(default_factory=dict)
+    chunks: tuple[Chunk, ...] = ()
+    topics: Mapping[int, str] = field(default_factory=dict)
     read_to: int = 0
+    begin_ns: int = field(init=False)
+    end_ns: int = field(init=False)
 
-    @property
-    def begin_ns(self) -> int:
-        """When the first message was heard; 0 in an empty run."""
-        return min((chunk.begin_ns for chunk in self.chunks), default=0)
-
-    @property
-    def end_ns(self) -> int:
-        """When the last message was heard; 0 in an empty run."""
-        return max((chunk.end_ns for chunk in self.chunks), default=0)
+    def __post_init__(self) -> None:
+        """Find its begin and its end once: they are asked for with each row of a table."""
+        begin_ns = min((chunk.begin_ns for chunk in self.chunks), default=0)
+        end_ns = max((chunk.end_ns for chunk in self.chunks), default=0)
+        object.__setattr__(self, "begin_ns", begin_ns)
+        object.__setattr__(self, "end_ns", end_ns)
 
     def read(
         self,
@@ -85,12 +87,13 @@ class RunIndex:
         """
         for chunk, keys, stream in self._holding(begin_ns, end_ns, wanted, self.chunks):
             try:
-                content = _unpacked(stream, self.path, chunk)
+                places = _places(stream, self.path, chunk, keys, begin_ns, end_ns)
+                found = _messages(stream, self.path, chunk, keys, places)
             except RecordingError as error:
                 if damage is not None:
                     damage.append(str(error))
                 continue
-            yield from _messages(content, keys, begin_ns, end_ns)
+            yield from found
 
     def newest(self, before_ns: int, wanted: Callable[[str], bool]) -> Recorded | None:
         """Return the last message of some keys up to a time, None where there is none.
@@ -101,12 +104,13 @@ class RunIndex:
         backwards = self._holding(0, before_ns, wanted, reversed(self.chunks))
         for chunk, keys, stream in backwards:
             try:
-                content = _unpacked(stream, self.path, chunk)
+                places = _places(stream, self.path, chunk, keys, 0, before_ns)
+                last = sorted(places, key=_heard_ns)[-1:]
+                found = _messages(stream, self.path, chunk, keys, last)
             except RecordingError:
                 continue
-            found = max(_messages(content, keys, 0, before_ns), key=_heard_ns, default=None)
-            if found is not None:
-                return found
+            if found:
+                return found[0]
         return None
 
     def _holding(
@@ -117,7 +121,7 @@ class RunIndex:
         with _opened(self.path) as stream:
             for chunk in chunks:
                 is_then = chunk.end_ns >= begin_ns and chunk.begin_ns <= end_ns
-                if is_then and not chunk.channels.isdisjoint(keys):
+                if is_then and not chunk.channels.keys().isdisjoint(keys):
                     yield chunk, keys, stream
 
 
@@ -166,11 +170,11 @@ def _summary(stream: BinaryIO, path: Path, size: int) -> RunIndex | None:
         return None
     if summary is None:
         return None
-    chunks = [
+    chunks = tuple(
         _chunk_of(one)
         for one in sorted(summary.chunk_indexes, key=lambda one: one.chunk_start_offset)
         if 0 <= one.chunk_start_offset < size
-    ]
+    )
     topics = {number: channel.topic for number, channel in summary.channels.items()}
     return RunIndex(path, size, whole=True, chunks=chunks, topics=topics, read_to=size)
 
@@ -181,15 +185,13 @@ def _chunk_of(index: ChunkIndex) -> Chunk:
         index.message_end_time,
         index.chunk_start_offset + _RECORD.size,
         index.chunk_length - _RECORD.size,
-        frozenset(index.message_index_offsets),
+        {number: at + _RECORD.size for number, at in index.message_index_offsets.items()},
     )
 
 
 def _walk(stream: BinaryIO, index: RunIndex, size: int) -> RunIndex:
     """Go on through a file without an end: chunks count when the file has them entirely."""
-    found = RunIndex(
-        index.path, size, whole=False, chunks=list(index.chunks), topics=dict(index.topics)
-    )
+    chunks, topics = list(index.chunks), dict(index.topics)
     at = index.read_to or len(MAGIC)
     while at + _RECORD.size <= size:
         stream.seek(at)
@@ -199,16 +201,15 @@ def _walk(stream: BinaryIO, index: RunIndex, size: int) -> RunIndex:
             break
         if kind == CHUNK and length >= _CHUNK.size:
             begin_ns, end_ns, *_ = _CHUNK.unpack(stream.read(_CHUNK.size))
-            found.chunks.append(Chunk(begin_ns, end_ns, inside, length, frozenset()))
-        elif kind == MESSAGE_INDEX and found.chunks and length >= _U16.size:
+            chunks.append(Chunk(begin_ns, end_ns, inside, length, {}))
+        elif kind == MESSAGE_INDEX and chunks and length >= _U16.size:
             (number,) = _U16.unpack(stream.read(_U16.size))
-            last = found.chunks[-1]
-            found.chunks[-1] = last._replace(channels=last.channels | {number})
-            if number not in found.topics:
-                found.topics |= _channels_in(stream, index.path, last)
+            last = chunks[-1]
+            chunks[-1] = last._replace(channels={**last.channels, number: inside})
+            if number not in topics:
+                topics |= _channels_in(stream, index.path, last)
         at = after
-    found.read_to = at
-    return found
+    return RunIndex(index.path, size, whole=False, chunks=tuple(chunks), topics=topics, read_to=at)
 
 
 def _channels_in(stream: BinaryIO, path: Path, chunk: Chunk) -> dict[int, str]:
@@ -232,19 +233,56 @@ def _channel(record: bytes) -> tuple[int, str]:
     return number, record[8 : 8 + length].decode("utf-8", "replace")
 
 
+def _places(
+    stream: BinaryIO, path: Path, chunk: Chunk, keys: Mapping[int, str], begin_ns: int, end_ns: int
+) -> list[tuple[int, int]]:
+    """Return where in a chunk, unpacked, messages lie and when they were heard, in their order.
+
+    Raises:
+        RecordingError: when the lists of its messages are damaged.
+    """
+    found: list[tuple[int, int]] = []
+    for number in chunk.channels.keys() & keys.keys():
+        try:
+            stream.seek(chunk.channels[number])
+            _, size = _LIST.unpack(stream.read(_LIST.size))
+            rows = _ENTRY.iter_unpack(stream.read(min(size, MOST_UNPACKED)))
+        except (struct.error, OverflowError, OSError) as cause:
+            raise _damaged(path, chunk, cause) from cause
+        found += [(at, t_ns) for t_ns, at in rows if begin_ns <= t_ns <= end_ns]
+    return sorted(found)
+
+
 def _messages(
-    content: bytes, keys: dict[int, str], begin_ns: int, end_ns: int
-) -> Iterator[Recorded]:
-    for kind, start, end in _records(content):
-        if kind != MESSAGE or end - start < _MESSAGE.size:
-            continue
-        number, _, t_ns, _ = _MESSAGE.unpack_from(content, start)
-        if number in keys and begin_ns <= t_ns <= end_ns:
-            yield Recorded(t_ns, keys[number], content[start + _MESSAGE.size : end])
+    stream: BinaryIO,
+    path: Path,
+    chunk: Chunk,
+    keys: Mapping[int, str],
+    places: list[tuple[int, int]],
+) -> list[Recorded]:
+    """Return messages of a chunk; it is not even read where none are wanted.
+
+    Raises:
+        RecordingError: when it is damaged, or packed in a way that the recorder does not use.
+    """
+    if not places:
+        return []
+    content = _unpacked(stream, path, chunk)
+    found = []
+    try:
+        for start, t_ns in places:
+            kind, length, number, _, heard_ns, _ = _MESSAGE.unpack_from(content, start)
+            end = start + _RECORD.size + length
+            if kind != MESSAGE or heard_ns != t_ns or end > len(content):
+                raise _damaged(path, chunk, "its list of messages is not of its messages")
+            found.append(Recorded(t_ns, keys[number], content[start + _MESSAGE.size : end]))
+    except (struct.error, OverflowError, KeyError) as cause:
+        raise _damaged(path, chunk, cause) from cause
+    return found
 
 
-def _heard_ns(one: Recorded) -> int:
-    return one.t_ns
+def _heard_ns(place: tuple[int, int]) -> int:
+    return place[1]
 
 
 def _records(content: bytes) -> Iterator[tuple[int, int, int]]:
@@ -277,5 +315,8 @@ def _unpacked(stream: BinaryIO, path: Path, chunk: Chunk) -> bytes:
             raise RecordingError(msg)
         return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
     except UNREADABLE as cause:
-        msg = f"{path}: the piece at byte {chunk.start} is damaged ({cause})"
-        raise RecordingError(msg) from cause
+        raise _damaged(path, chunk, cause) from cause
+
+
+def _damaged(path: Path, chunk: Chunk, why: object) -> RecordingError:
+    return RecordingError(f"{path}: the piece at byte {chunk.start} is damaged ({why})")

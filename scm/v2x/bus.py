@@ -54,11 +54,16 @@ class Bus(Protocol):
         """
         ...
 
-    def subscribe_raw(self, mailbox: RawMailbox, kind: type[Message] | None = None) -> None:
+    def subscribe_raw(
+        self,
+        mailbox: RawMailbox,
+        kind: type[Message] | None = None,
+        where: Mapping[str, str] | None = None,
+    ) -> None:
         """Bring everything that is published in the city into a mailbox, unread.
 
         Messages whose key has a verbatim chunk (`@camera`) come only to those who name their
-        class: `kind` asks for one class alone.
+        class: `kind` asks for one class alone, `where` for some of it.
         """
         ...
 

@@ -260,7 +260,12 @@ class MemoryBus:
         wish = _Wish(self, selector(self.city, kind, where), deliver, mailbox, keeps)
         self._network.add_wish(wish)
 
-    def subscribe_raw(self, mailbox: RawMailbox, kind: type[Message] | None = None) -> None:
+    def subscribe_raw(
+        self,
+        mailbox: RawMailbox,
+        kind: type[Message] | None = None,
+        where: Mapping[str, str] | None = None,
+    ) -> None:
         """Bring everything that is published, or one class of it, into a mailbox, unread."""
         self._check_open()
 
@@ -268,7 +273,9 @@ class MemoryBus:
             if not _is_presence(sample.key):
                 mailbox.put(sample)
 
-        expression = everything(self.city) if kind is None else selector(self.city, kind, {})
+        expression = (
+            everything(self.city) if kind is None else selector(self.city, kind, where or {})
+        )
         self._network.add_wish(_Wish(self, expression, deliver, mailbox, keeps=True))
 
     def unsubscribe(self, mailbox: Mailbox) -> None:

@@ -191,7 +191,12 @@ class ZenohBus:
             return None
         return Incoming(Presence(**names, alive=alive), t_ns)
 
-    def subscribe_raw(self, mailbox: RawMailbox, kind: type[Message] | None = None) -> None:
+    def subscribe_raw(
+        self,
+        mailbox: RawMailbox,
+        kind: type[Message] | None = None,
+        where: Mapping[str, str] | None = None,
+    ) -> None:
         """Bring everything that is published, or one class of it, into a mailbox, unread."""
         self._check_open()
 
@@ -199,7 +204,9 @@ class ZenohBus:
             mailbox.put(RawSample(key, body, attachment, t_ns))
 
         callback = self._direct(self._noting(on_sample))
-        expression = everything(self.city) if kind is None else selector(self.city, kind, {})
+        expression = (
+            everything(self.city) if kind is None else selector(self.city, kind, where or {})
+        )
         if kind is not None and kind.DELIVERY is not Delivery.EVENT:
             self._declare(self._session.declare_subscriber(expression, callback))
             return

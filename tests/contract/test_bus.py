@@ -494,6 +494,14 @@ def test_everything_is_not_what_must_be_asked_for_by_name(city):
     assert everything.drain() == []
 
 
+def test_what_must_be_asked_for_by_name_may_be_that_of_one_vehicle(city):
+    sender, recorder = city.bus("a"), city.bus("b")
+    asked = RawMailbox(8)
+    recorder.subscribe_raw(asked, CameraFrame, {"vehicle": "n1"})
+    settles(city, lambda: sender.is_wanted(CameraFrame, {"vehicle": "n1", "camera": "rear"}))
+    assert not sender.is_wanted(CameraFrame, {"vehicle": "n2"})
+
+
 def test_after_unsubscribing_nothing_more_arrives(city):
     sender, hearer = city.bus("a"), city.bus("b")
     ended, going = Mailbox(8), Mailbox(8)

@@ -46,11 +46,14 @@ def test_who_has_no_credentials_stays_outside(running: CityProcess) -> None:
 
 
 SCRIPT = """
-import os
+import os, sys
+from scm.client import Client
 from scm.fleet import open_city
 
 with open_city(connect=os.environ["SCM_CONNECT"]) as city:
     print(city.spawn("nigel", name="guest").name)
+with Client(sys.argv[1]) as web:
+    print(web.session.session().owner)
 """
 
 
@@ -60,8 +63,8 @@ def test_scripts_enter_as_an_operator_and_people_drive_by_their_keys(running: Ci
     with Client(running.url, admin) as ann:
         ann.scenarios.write("visit", text=SCRIPT, if_none_match="*")
     with Client(running.url, ring.add("ben", "operator", 1)) as ben:
-        run = ben.wait(ben.scenarios.run("visit"), timeout_s=60.0)
-        assert ben.scenarios.lines(run.id).lines == ("guest",)
+        run = ben.wait(ben.scenarios.run("visit", arguments=(running.url,)), timeout_s=60.0)
+        assert ben.scenarios.lines(run.id).lines == ("guest", "ben: visit")
         with ben.wheel("n1") as wheel:
             while wheel.drive(0.4, 0.0).why != "driving":
                 pass

@@ -8,10 +8,13 @@ from pathlib import Path
 import pytest
 
 from scm.__main__ import main, parse
+from scm.api.keys import KeyRing
+from scm.client.key import key_of_environment
 from scm.command import Command
 from scm.commands import show
 from scm.errors import MapError
 from scm.registry import load, names
+from scm.store.open import open_store
 
 
 @pytest.fixture
@@ -83,6 +86,24 @@ def test_keys_that_are_not_there_are_not_made_by_looking(
     assert main(["key", *words, "--keys", f"sqlite:{keys}"]) == 2
     assert "there is no such file" in capsys.readouterr().err
     assert not keys.exists()
+
+
+def test_a_key_can_be_made_for_a_program_without_being_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, store = tmp_path / "anna.key", f"sqlite:{tmp_path}/keys.db"
+    command = ["key", "add", "anna", "--role", "viewer", "--keys", store, "--out", str(file)]
+    assert main(command) == 0
+    assert file.stat().st_mode & 0o777 == 0o600
+    monkeypatch.setenv("SCM_API_KEY_FILE", str(file))
+    key = key_of_environment()
+    assert key not in capsys.readouterr().out
+    found = KeyRing(open_store(store)).find(key)
+    assert found is not None
+    assert found.owner == "anna"
+    assert main(command) == 2
+    assert "anna.key: cannot be written: File exists" in capsys.readouterr().err
+    assert len(list(KeyRing(open_store(store)).records())) == 1
 
 
 def test_a_folder_is_no_recording_to_mend(

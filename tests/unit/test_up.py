@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from scm.__main__ import parse
+from scm.commands.up import wanted_of
 from scm.errors import MapError, RunError, ScmError
 from scm.up import Wanted, _parts, _settled, run_city
 from scm.v2x.router import Router, free_endpoint
@@ -62,10 +64,23 @@ def test_the_radio_goes_to_the_world_and_to_no_other_part(tmp_path):
     assert [name for name, command in told.items() if "--radio" in command] == ["world"]
 
 
+def test_the_recorder_is_told_of_which_cars_it_keeps_pictures(tmp_path):
+    words = ["up", "--port", "0", "--listen", "tcp/127.0.0.1:0", "--record-dir", str(tmp_path)]
+    words += ["--cameras-hz", "2", "--cameras-of", "n1", "--cameras-of", "n3"]
+    wanted = wanted_of(parse(words))
+    (record,) = (job for job in _parts(_settled(wanted)) if job.name == "record")
+    given = parse(record.command()[3:])
+    assert (given.cameras_hz, given.cameras_of) == (2.0, ["n1", "n3"])
+    assert (Wanted(map_name="x").cameras_hz, Wanted(map_name="x").cameras_of) == (0.0, ())
+
+
 @pytest.mark.parametrize(
     ("facts", "said"),
     [
         ({"hosted": -1}, "hosted: got -1"),
+        ({"cameras_hz": float("nan")}, "cameras_hz: got nan"),
+        ({"cameras_of": ("n1",)}, "cameras_hz: got 0.0, .* with --cameras-of"),
+        ({"cameras_hz": 1.0, "cameras_of": ("n1/*",)}, "cameras_of: got 'n1/"),
         ({"agents": -1}, "agents: got -1"),
         ({"port": 70000}, "no such port"),
         ({"state": "nonsense"}, "expected sqlite:PATH"),

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api import replay
 from scm.api.city import City, IdempotencyKey, json_response, not_found
+from scm.api.city import Name as BusName
 from scm.api.etag import Matching, tagged
 from scm.api.paging import Cursor, Limit, Page, page_of, page_response
 from scm.api.priority import stand_back
@@ -64,6 +65,7 @@ Vehicle = Annotated[
 
 
 Camera = Annotated[str, Path(pattern=NAME, description="an overhead camera", examples=["overhead"])]
+CarCamera = Annotated[str, Path(pattern=NAME, description="one of its cameras", examples=["front"])]
 
 
 class NotesBody(BaseModel):
@@ -85,6 +87,7 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
         map_title: Of the map that was driven on; empty: it does not tell.
         first_frame_s: When the world first told where cars are: it may have begun later.
         eye_cameras: The overhead cameras of which it has pictures.
+        car_cameras: The cars' own, likewise.
     """
 
     recording: RecordingRow
@@ -94,6 +97,7 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
     boxes: tuple[Box, ...]
     first_frame_s: float
     eye_cameras: tuple[str, ...]
+    car_cameras: tuple[replay.CarCamera, ...]
 
 
 def router(city: City) -> APIRouter:
@@ -166,12 +170,24 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
         responses=answer_file("text/csv"),
         response_class=Response,
     )
-    def as_csv(name: Name, vehicle: Vehicle = "") -> Response:
+    def as_csv(
+        name: Name,
+        vehicle: Vehicle = "",
+        from_s: Seconds = 0.0,
+        to_s: Annotated[
+            float | None,
+            Query(ge=0.0, le=1e7, description="to when; without: to the end", examples=[60.0]),
+        ] = None,
+    ) -> Response:
         index = shelf.index(name)
+        if to_s is not None and to_s < from_s:
+            detail = f"to_s: got {to_s:g}, expected from_s ({from_s:g}) or later"
+            raise RefusedError(Refused(code="invalid", detail=detail))
         if vehicle and vehicle not in cars_of(index):
             raise not_found(f"car of {name}", vehicle)
         file = f"{name}{f'-{vehicle}' if vehicle else ''}.csv"
-        return StreamingResponse(replay.csv_of(index, vehicle), 200, _named(file), "text/csv")
+        table = replay.csv_of(index, vehicle, from_s, to_s)
+        return StreamingResponse(table, 200, _named(file), "text/csv")
 
 
 def _add_moments(routes: APIRouter, shelf: RecordingsShelf) -> None:
@@ -192,6 +208,7 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf) -> None:
                 boxes=city_map.boxes if city_map else (),
                 first_frame_s=replay.first_frame_s(index),
                 eye_cameras=replay.eye_cameras(index),
+                car_cameras=_car_cameras(index),
             )
         )
 
@@ -232,13 +249,18 @@ def _add_pictures(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None
         response_class=Response,
     )
     def picture(name: Name, camera: Camera, t_s: Seconds = 0.0) -> Response:
-        found = replay.picture_at(_readable(shelf, name), camera, t_s)
-        if found is None:
-            detail = f"{name}: camera {camera!r} has no picture of {t_s:g} s or before"
-            raise RefusedError(Refused(code="not_found", detail=detail))
-        t_ns, jpeg = found
-        headers = {"Cache-Control": PICTURE_KEPT, "X-Time-Ns": str(t_ns)}
-        return Response(jpeg, 200, headers, "image/jpeg")
+        return _picture(name, _readable(shelf, name), camera, t_s)
+
+    @routes.get(
+        "/{name}/vehicles/{vehicle}/camera/{camera}.jpg",
+        summary="What a car's own camera saw, at a time",
+        responses=answer_file("image/jpeg", "The newest picture then; `X-Time-Ns`: its exposure."),
+        response_class=Response,
+    )
+    def car_picture(
+        name: Name, vehicle: BusName, camera: CarCamera, t_s: Seconds = 0.0
+    ) -> Response:
+        return _picture(name, _readable(shelf, name), camera, t_s, vehicle)
 
     @routes.get(
         "/{name}/map.svg",
@@ -297,8 +319,25 @@ def _readable(shelf: RecordingsShelf, name: str) -> RunIndex:
     return index
 
 
+def _picture(name: str, index: RunIndex, camera: str, t_s: float, vehicle: str = "") -> Response:
+    """Return a picture that is in a recording, or say that it has none."""
+    found = replay.picture_at(index, camera, t_s, vehicle)
+    if found is None:
+        whose = f"{vehicle}'s camera" if vehicle else "camera"
+        detail = f"{name}: {whose} {camera!r} has no picture of {t_s:g} s or before"
+        raise RefusedError(Refused(code="not_found", detail=detail))
+    t_ns, jpeg = found
+    headers = {"Cache-Control": PICTURE_KEPT, "X-Time-Ns": str(t_ns)}
+    return Response(jpeg, 200, headers, "image/jpeg")
+
+
 def _cars(index: RunIndex) -> tuple[replay.CarFacts, ...]:
     return tuple(sorted(replay.cars_in(index), key=lambda car: natural(car.vehicle)))
+
+
+def _car_cameras(index: RunIndex) -> tuple[replay.CarCamera, ...]:
+    found = replay.car_cameras(index)
+    return tuple(sorted(found, key=lambda one: (natural(one.vehicle), one.camera)))
 
 
 def _named(file: str) -> dict[str, str]:

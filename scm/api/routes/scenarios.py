@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, json_response, not_found
 from scm.api.etag import Matching, tagged
+from scm.api.keys import KeyRing
 from scm.api.operations import Operation, Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import ADMIN, OPERATOR, VIEWER
@@ -47,11 +48,11 @@ class RunBody(BaseModel):
     )
 
 
-def router(city: City, work: Operations) -> APIRouter:
+def router(city: City, work: Operations, keys: KeyRing | None) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/scenarios", tags=["scenarios"], dependencies=[VIEWER])
     shelf = ScenarioShelf(city.shelves.scenarios)
-    runs = ScenarioRuns(shelf, work, city.link.connect, city.link.script_credentials)
+    runs = ScenarioRuns(shelf, work, city.link.connect, city.link.script_credentials, keys)
     _add_scripts(routes, shelf)
 
     @routes.post(
@@ -64,7 +65,8 @@ def router(city: City, work: Operations) -> APIRouter:
     def run(request: Request, name: Name, body: RunBody, key: IdempotencyKey = "") -> Response:
         del key  # the same key gets the same operation
         owner = str(request.scope["scm_owner"])
-        return accepted(runs.start(name, body.arguments, owner=owner))
+        own = str(request.scope["scm_key"])
+        return accepted(runs.start(name, body.arguments, owner=owner, key=own))
 
     @routes.get("/runs/{run}/lines", summary="What a run printed", responses=answer(Lines))
     def lines(

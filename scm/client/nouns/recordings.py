@@ -38,15 +38,20 @@ class RecordingsNoun:
         """
         return self._connection.pieces(f"/api/v1/recordings/{part(name)}/foxglove.mcap")
 
-    def as_csv(self, name: str, *, vehicle: str = "") -> bytes:
+    def as_csv(
+        self, name: str, *, vehicle: str = "", from_s: float = 0.0, to_s: float | None = None
+    ) -> bytes:
         """Its cars as CSV.
 
         Args:
             name: a recording: its file without .mcap
             vehicle: a car's own reports; empty: all cars as the world saw them
+            from_s: seconds since the recording began
+            to_s: to when; without: to the end
         """
         return self._connection.fetch(
-            f"/api/v1/recordings/{part(name)}/csv", query={"vehicle": vehicle}
+            f"/api/v1/recordings/{part(name)}/csv",
+            query={"vehicle": vehicle, "from_s": from_s, "to_s": to_s},
         )
 
     def summary(self, name: str) -> Summary:
@@ -100,6 +105,20 @@ class RecordingsNoun:
         """
         return self._connection.fetch(
             f"/api/v1/recordings/{part(name)}/eye/{part(camera)}.jpg", query={"t_s": t_s}
+        )
+
+    def car_picture(self, name: str, vehicle: str, camera: str, *, t_s: float = 0.0) -> bytes:
+        """What a car's own camera saw, at a time.
+
+        Args:
+            name: a recording: its file without .mcap
+            vehicle: a name on the bus
+            camera: one of its cameras
+            t_s: seconds since the recording began
+        """
+        return self._connection.fetch(
+            f"/api/v1/recordings/{part(name)}/vehicles/{part(vehicle)}/camera/{part(camera)}.jpg",
+            query={"t_s": t_s},
         )
 
     def map_svg(self, name: str) -> bytes:

@@ -53,6 +53,18 @@ class CarFacts(msgspec.Struct, kw_only=True, frozen=True):
     owner: str
 
 
+class CarCamera(msgspec.Struct, kw_only=True, frozen=True):
+    """A car's own camera: `front` or `rear`.
+
+    Attributes:
+        vehicle: Name of a car.
+        camera: Name of a camera.
+    """
+
+    vehicle: str
+    camera: str
+
+
 class Summary(msgspec.Struct, kw_only=True, frozen=True):
     """What is known of a recording before any of it is shown.
 
@@ -64,6 +76,7 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
         boxes: Boxes that cars can push.
         first_frame_s: When the world first told where cars are: it may have begun later.
         eye_cameras: The overhead cameras of which it has pictures.
+        car_cameras: The cars' own, likewise.
     """
 
     recording: RecordingRow
@@ -73,6 +86,7 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
     boxes: tuple[Box, ...]
     first_frame_s: float
     eye_cameras: tuple[str, ...]
+    car_cameras: tuple[CarCamera, ...]
 
 
 class Frame(msgspec.Struct, kw_only=True, frozen=True):
@@ -105,14 +119,16 @@ class SignalChange(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class PictureAt(msgspec.Struct, kw_only=True, frozen=True):
-    """From when on a picture of an overhead camera is the newest one.
+    """From when on a picture of a camera is the newest one; `vehicle` empty: an overhead one.
 
     Attributes:
         t_s: Since the begin of the recording [s].
+        vehicle: Name of a car.
         camera: Name of a camera.
     """
 
     t_s: float
+    vehicle: str
     camera: str
 
 
@@ -126,7 +142,8 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
         cars: Whom the frames' numbers mean.
         frames: Moments, in order of time.
         signals: Changes, the colours at `from_s` first; a group is `junction/group`.
-        pictures: The Eye's, of each camera the one that is newest at `from_s` first.
+        pictures: The Eye's and the cars' own, of each camera the one that is newest at `from_s`
+            first.
         damaged: What of the stretch cannot be read, in words.
     """
 

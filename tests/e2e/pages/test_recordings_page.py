@@ -2,6 +2,8 @@
 
 import shutil
 
+import cv2
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 
@@ -10,6 +12,7 @@ from scm.recorder.run_index import read_index
 from tests.e2e.city_process import wait_for
 from tests.e2e.pages.conftest import SIZES, THEMES
 from tests.e2e.pages.visiting import judge, photograph
+from tests.unit.recorder.short_run import write_run
 
 NAME = "morning_drive"
 AT = f"/recordings/{NAME}"
@@ -119,6 +122,41 @@ def test_the_picture_is_the_newest_that_the_eye_had_by_then(visit, running, driv
     page.wait_for_selector(".seen:not(.large)")
     page.locator("input[type=range]").fill("0")
     page.wait_for_selector("text=No picture was recorded by then")
+
+
+def jpeg(width_px):
+    return cv2.imencode(".jpg", np.full((width_px * 9 // 16, width_px, 3), 90, np.uint8))[
+        1
+    ].tobytes()
+
+
+def test_a_cars_own_camera_is_shown_where_it_was_recorded(visit, running):
+    path = running.folder / "with_cameras.mcap"
+    write_run(path, picture=jpeg(640), of_n1={2.0: jpeg(160), 4.0: jpeg(320)})
+    visited = visit("/recordings/with_cameras?t=4.5")
+    page = visited.page
+
+    def shown(width_px, hint):
+        wide = f"document.querySelector('.seen[data-at] img')?.naturalWidth === {width_px}"
+        page.wait_for_function(f"() => {wide}")
+        page.wait_for_selector(f".eye-then .hint >> text=Recorded at {hint}")
+
+    try:
+        shown(640, "0:03")
+        page.select_option(".eye-then select", label="n1, front")
+        shown(320, "0:04")
+        judge(visited)
+        page.locator("input[type=range]").fill("3.9")
+        shown(160, "0:02")
+        page.select_option(".eye-then select", label="overhead")
+        shown(640, "0:03")
+        page.click('tr[data-car="n1"] button')
+        shown(160, "0:02")
+        page.locator("input[type=range]").fill("1")
+        page.wait_for_selector("text=No picture was recorded by then")
+        assert visited.complaints == []
+    finally:
+        path.unlink()
 
 
 def test_it_plays_pauses_steps_and_jumps_by_mouse_and_keyboard(visit, drive, last_s):

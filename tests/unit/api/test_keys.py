@@ -56,6 +56,31 @@ def test_a_revoked_key_is_nobody_s_in_any_process(tmp_path):
     assert list(here.records()) == []
 
 
+def test_a_lent_key_is_good_while_its_lender_s_is_and_until_it_is_taken_back(ring):
+    key = ring.add("anna", "engineer", 1)
+    lent = ring.lend(key, "watch_city")
+    found = ring.find(lent)
+    assert (found.owner, found.role) == ("anna: watch_city", "engineer")
+    assert ring.find(lent[:-1] + ("a" if lent[-1] != "a" else "b")) is None
+    ring.take_back(lent)
+    assert ring.find(lent) is None
+    assert ring.find(key) is not None
+    again = ring.lend(ring.lend(key, "outer"), "inner")
+    assert ring.find(again).owner == "anna: outer: inner"
+    ring.revoke(key.split("_")[1])
+    assert ring.find(again) is None
+    with pytest.raises(AccessError, match="later: the key of who asked for it has ended"):
+        ring.lend(key, "later")
+
+
+def test_a_lent_key_is_kept_nowhere(ring, store):
+    key = ring.add("a" * 64, "viewer", 1)
+    lent = ring.lend(key, "watch_city")
+    assert len(ring.find(lent).owner) == 64
+    assert [one.owner for one in ring.records()] == ["a" * 64]
+    assert KeyRing(store).find(lent) is None
+
+
 def test_a_role_that_does_not_exist_and_an_id_nobody_has_are_refused(ring):
     with pytest.raises(AccessError, match=r"role: got 'operater'.*did you mean 'operator'"):
         ring.add("anna", "operater", 1)

@@ -7,17 +7,22 @@ import os
 import threading
 import time
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import httpx
 import pytest
 
+from scm.__main__ import main
 from scm.api.app import create_app
 from scm.api.problem import RefusedError
 from scm.api.ranged import BLOCK
 from scm.api.recordings_shelf import RecordingsShelf
+from scm.api.replay import csv_of
 from scm.api.routes.recordings import _converted
 from scm.api.shelves import shelves_in
+from scm.recorder import run_index
+from scm.recorder.run_index import read_index
 from tests.unit.recorder.short_run import BEGIN_NS, PICTURE, write_run
 
 
@@ -123,7 +128,7 @@ def test_boxes_are_told_at_the_begin_and_when_they_move(ask, folder):
 def test_the_eyes_picture_of_a_time_is_the_newest_by_then(ask, client, folder):
     write_run(folder / "run.mcap")  # pictured at 3 s
     assert ask("/run/summary")["eye_cameras"] == ["overhead"]
-    told = [{"t_s": 3.0, "camera": "overhead"}]
+    told = [{"t_s": 3.0, "vehicle": "", "camera": "overhead"}]
     assert ask("/run/frames?from_s=0&to_s=2.9")["pictures"] == []
     assert ask("/run/frames?from_s=2&to_s=4")["pictures"] == told
     assert ask("/run/frames?from_s=4&to_s=5")["pictures"] == told
@@ -135,6 +140,37 @@ def test_the_eyes_picture_of_a_time_is_the_newest_by_then(ask, client, folder):
     early = ask("/run/eye/overhead.jpg?t_s=2.9", status=404)
     assert early["detail"] == "run: camera 'overhead' has no picture of 2.9 s or before"
     ask("/run/eye/elsewhere.jpg?t_s=4", status=404)
+
+
+def test_pictures_of_a_cars_own_camera_are_told_and_given_as_the_eyes_are(ask, client, folder):
+    write_run(folder / "run.mcap", of_n1={2.0: b"\xff\xd8 two", 4.0: b"\xff\xd8 four"})
+    summary = ask("/run/summary")
+    assert summary["car_cameras"] == [{"vehicle": "n1", "camera": "front"}]
+    assert summary["eye_cameras"] == ["overhead"]
+    told = [
+        (one["t_s"], one["vehicle"]) for one in ask("/run/frames?from_s=2.5&to_s=5")["pictures"]
+    ]
+    assert told == [(2.0, "n1"), (3.0, ""), (4.0, "n1")]
+    at = "/run/vehicles/n1/camera/front.jpg"
+    for t_s, jpeg in ((2.0, b"two"), (3.9, b"two"), (4.0, b"four"), (5.0, b"four")):
+        answer = client("GET", f"/api/v1/recordings{at}?t_s={t_s}")
+        assert answer.content == b"\xff\xd8 " + jpeg
+        assert answer.headers["content-type"] == "image/jpeg"
+        assert answer.headers["x-time-ns"] == str(BEGIN_NS)
+    early = ask(f"{at}?t_s=1.9", status=404)
+    assert early["detail"] == "run: n1's camera 'front' has no picture of 1.9 s or before"
+    ask("/run/vehicles/n10/camera/front.jpg?t_s=5", status=404)
+    ask("/run/vehicles/n1/camera/rear.jpg?t_s=5", status=404)
+    ask("/run/eye/front.jpg?t_s=5", status=404)
+
+
+def test_pictures_count_as_rows_of_an_answer(ask, folder, monkeypatch):
+    from scm.api import replay
+
+    monkeypatch.setattr(replay, "MOST_ROWS", 30)
+    write_run(folder / "run.mcap", of_n1={tick / 20: b"" for tick in range(100)})
+    found = ask("/run/frames?from_s=0&to_s=5&hz=20")
+    assert (len(found["frames"]), len(found["pictures"]), found["to_s"]) == (10, 10, 0.5)
 
 
 def test_too_much_at_once_is_cut_and_says_so(ask, folder, monkeypatch):
@@ -173,6 +209,54 @@ def test_csv_has_a_row_for_each_report(client, ask, folder):
     everybody = client("GET", "/api/v1/recordings/run/csv").text
     assert len(everybody.splitlines()) == 1 + 2 * 101
     ask("/run/csv?vehicle=n2", status=404)
+
+
+def test_csv_of_a_span_has_its_rows_and_unpacks_no_more(client, ask, folder, monkeypatch):
+    index = read_index(write_run(folder / "run.mcap"))
+    unpacked, real = [], run_index._unpacked
+    monkeypatch.setattr(
+        run_index, "_unpacked", lambda *given: unpacked.append(given) or real(*given)
+    )
+    for vehicle, cars in (("n10", 1), ("", 2)):
+        span = f"csv?vehicle={vehicle}&from_s=2.1&to_s=2.2"
+        told = client("GET", f"/api/v1/recordings/run/{span}").text
+        rows = list(csv.DictReader(io.StringIO(told)))
+        assert [row["t_s"] for row in rows[::cars]] == ["2.1", "2.15", "2.2"]
+    assert 2 <= len(unpacked) <= 4 < len(index.chunks)
+    late = client("GET", "/api/v1/recordings/run/csv?from_s=4.9").text
+    assert len(late.splitlines()) == 1 + 2 * 3
+    assert ask("/run/csv?from_s=3&to_s=2", status=422)["code"] == "invalid"
+
+
+def test_csv_is_written_on_the_command_line_too(client, folder, tmp_path, capsysbinary):
+    path = str(write_run(folder / "run.mcap"))
+    told = client("GET", "/api/v1/recordings/run/csv?vehicle=n1&from_s=1&to_s=2").content
+    words = ["export", "csv", path, "--vehicle", "n1", "--from-s", "1", "--to-s", "2"]
+    assert main(words) == 0
+    assert capsysbinary.readouterr().out == told
+    out = tmp_path / "n1.csv"
+    assert main([*words, "--out", str(out)]) == 0
+    assert out.read_bytes() == told
+    assert main([*words, "--out", str(out)]) == 2
+    assert b"n1.csv: cannot be written: File exists" in capsysbinary.readouterr().err
+    assert main(["export", "csv", path, "--vehicle", "n2"]) == 2
+    assert b"expected one of n1, n10" in capsysbinary.readouterr().err
+    assert main(["export", "csv", path, "--from-s", "nan"]) == 2
+    assert b"span: got nan" in capsysbinary.readouterr().err
+
+
+def test_a_table_looks_through_the_list_of_chunks_once_and_not_with_each_row(tmp_path):
+    index = read_index(write_run(tmp_path / "run.mcap"))
+    looked = []
+
+    class Watched(tuple):
+        def __iter__(self):
+            looked.append(None)
+            return super().__iter__()
+
+    watched = replace(index, chunks=Watched(index.chunks))
+    assert len(b"".join(csv_of(watched)).splitlines()) == 1 + 2 * 101
+    assert len(looked) <= 3
 
 
 def test_the_file_comes_whole_or_in_ranges(client, folder):

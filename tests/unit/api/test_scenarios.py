@@ -7,9 +7,21 @@ import pytest
 
 from scm.api.app import create_app
 from scm.api.city import Link
+from scm.api.keys import KeyRing
 from scm.api.shelves import shelves_in
+from scm.store.memory import MemoryStore
 
 OVER = ("done", "failed", "cancelled")
+
+
+def until_over(look, done=lambda row: row["state"] in OVER):
+    """Return an operation's row once it is as wished."""
+    for _ in range(600):
+        row = look()
+        if done(row):
+            return row
+        time.sleep(0.05)
+    raise AssertionError(row)
 
 
 @pytest.fixture
@@ -50,13 +62,8 @@ def run(client):
 
 @pytest.fixture
 def operation(client):
-    def wait(run, done=lambda row: row["state"] in OVER):
-        for _ in range(600):
-            row = client("GET", f"/api/v1/operations/{run}").json()
-            if done(row):
-                return row
-            time.sleep(0.05)
-        raise AssertionError(row)
+    def wait(run, *done):
+        return until_over(lambda: client("GET", f"/api/v1/operations/{run}").json(), *done)
 
     return wait
 
@@ -111,6 +118,40 @@ def test_a_run_is_told_who_it_is_in_a_city_that_asks(client, keep, run, operatio
     number = run("who")
     assert operation(number)["state"] == "done"
     assert lines_of(client, number) == ["/c/script.toml"]
+
+
+ASK_WHO = """
+import os, stat
+from pathlib import Path
+told = Path(os.environ["SCM_API_KEY_FILE"])
+print(told, stat.filemode(told.stat().st_mode), told.read_text())
+"""
+
+
+def test_a_script_is_lent_a_key_while_it_runs_where_the_interface_asks_for_one(
+    view, fake_city, city_map, tmp_path, client_of
+):
+    ring = KeyRing(MemoryStore())
+    app = create_app(
+        view, fake_city.ask, city_map, shelves=shelves_in(tmp_path), link=Link(), keys=ring
+    )
+    client, key = client_of(app), ring.add("anna", "admin", 1)
+    headers = {"Authorization": f"Bearer {key}"}
+    held = []
+    lend, ring.lend = ring.lend, lambda *given: held.append(lend(*given)) or held[-1]
+
+    def ask(method, path, **options):
+        given = {**headers, **options.pop("headers", {})}
+        return client(method, f"/api/v1{path}", headers=given, **options)
+
+    ask("PUT", "/scenarios/who", json={"text": ASK_WHO}, headers={"If-None-Match": "*"})
+    run = ask("POST", "/scenarios/who/runs", json={}).json()["id"]
+    until_over(lambda: ask("GET", f"/operations/{run}").json())
+    (line,) = ask("GET", f"/scenarios/runs/{run}/lines").json()["lines"]
+    file, mode, lent = line.split()
+    assert (mode, [lent]) == ("-rw-------", held)
+    assert not Path(file).exists()
+    assert ring.find(lent) is None
 
 
 def test_the_same_key_runs_a_script_once(keep, run):

@@ -98,14 +98,19 @@ def test_rendering_ends_with_the_last_subscriber(city, spy):
     assert again.drain()
 
 
-@pytest.mark.parametrize(("cameras_hz", "kept"), [(0.0, 0), (5.0, 4 * 6)])
-def test_a_recorder_makes_cameras_run_only_when_told_to(city, spy, tmp_path, cameras_hz, kept):
-    recorder = RecorderPart(tmp_path / "run.mcap", "city", cameras_hz=cameras_hz)
+@pytest.mark.parametrize(
+    ("cameras_hz", "cars", "kept"), [(0.0, (), 0), (5.0, (), 4 * 6), (5.0, ("n1",), 2 * 6)]
+)
+def test_a_recorder_makes_cameras_run_only_when_told_to(
+    city, spy, tmp_path, cameras_hz, cars, kept
+):
+    recorder = RecorderPart(tmp_path / "run.mcap", "city", 1.0, cameras_hz, cars)
     city.add(recorder)
     city.run_for(1.3)
     city.remove(recorder)
     pictures = [one for one in read_run(tmp_path / "run.mcap") if "@camera" in one.key]
     assert abs(len(pictures) - kept) <= kept // 4
+    assert not cars or {one.key.split("/")[4] for one in pictures} == set(cars)
     assert (spy.read > 0) is (cameras_hz > 0)
 
 

@@ -9,7 +9,7 @@ import pytest
 from scm.client import connection
 from scm.client.connection import Connection, ProblemError, part
 from scm.client.stream import events_of, parse, states
-from scm.errors import LinkError, MessageError
+from scm.errors import AccessError, LinkError, MessageError
 
 
 class Row(msgspec.Struct):
@@ -61,6 +61,30 @@ def test_an_answer_is_typed_and_what_is_new_in_it_is_left_out(served):
     assert str(asked[0].url) == "http://city/v?a=1"
     assert asked[0].headers["authorization"] == "Bearer scm_1_x"
     assert "idempotency-key" not in asked[0].headers
+
+
+def test_a_key_comes_from_a_file_that_only_its_owner_reads(served, tmp_path, monkeypatch):
+    file = tmp_path / "anna.key"
+    monkeypatch.setenv("SCM_API_KEY_FILE", str(file))
+    with pytest.raises(AccessError, match=r"anna\.key: No such file"):
+        served(row())
+    file.write_text("scm_1_file\n")
+    file.chmod(0o640)
+    with pytest.raises(AccessError, match=r"got -rw-r-----, .*chmod 600"):
+        served(row())
+    file.chmod(0o600)
+    for given, sent in (("", "scm_1_file"), ("scm_2_said", "scm_2_said")):
+        own, asked = served(row(), key=given)
+        own.ask("GET", "/v", Row)
+        assert asked[0].headers["authorization"] == f"Bearer {sent}"
+    for wrong, why in ((b"\n", "got nothing"), (b"\xff", "no ASCII")):
+        file.write_bytes(wrong)
+        with pytest.raises(AccessError, match=why):
+            served(row())
+    monkeypatch.delenv("SCM_API_KEY_FILE")
+    own, asked = served(row())
+    own.ask("GET", "/v", Row)
+    assert "authorization" not in asked[0].headers
 
 
 def test_an_answer_of_another_kind_says_where_and_what_was_expected(served):

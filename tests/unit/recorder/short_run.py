@@ -23,10 +23,13 @@ PICTURE = b"\xff\xd8 a picture \xff\xd9"
 RANGES_M = (1.0, 2.0, float("inf"), 0.5)  # ahead, left, a miss behind, right
 
 
-def write_run(path, seconds=5.0, *, finish=True, leaves_s=float("inf")):
+def write_run(
+    path, seconds=5.0, *, finish=True, leaves_s=float("inf"), picture=PICTURE, of_n1=None
+):
     """Write the run, a chunk each quarter of a second; without `finish` as a kill leaves it.
 
-    From `leaves_s` on the world tells of n10 no more.
+    From `leaves_s` on the world tells of n10 no more. `of_n1` holds pictures of its front camera by
+    their times [s].
     """
     file = RunFile(path, "city")
     file.write(_sample(0.0, "world/def", _definition()))
@@ -40,8 +43,11 @@ def write_run(path, seconds=5.0, *, finish=True, leaves_s=float("inf")):
             file.write(_sample(at_s, "tl/crossing/spat", _spat(at_s)))
         if tick == 3 * HZ:
             file.write(_sample(at_s, "event/warning/world", _event("warning", "n1 hit a wall")))
-            file.write(_picture(at_s))
+            file.write(_picture(at_s, "eye/overhead/frame", picture, camera="overhead"))
             file.write(_scan(at_s))
+        if of_n1 and at_s in of_n1:
+            key = "v/n1/@camera/front"
+            file.write(_picture(at_s, key, of_n1[at_s], vehicle="n1", camera="front"))
         if tick % 5 == 0:
             file.flush()
     file.flush()
@@ -57,10 +63,10 @@ def _sample(at_s, key, message):
     return RawSample(prefix("city") + key, msgspec.json.encode(message), None, t_ns)
 
 
-def _picture(at_s):
-    head = {"camera": "overhead", "t_ns": BEGIN_NS, "width_px": 4, "height_px": 3}
-    key = prefix("city") + "eye/overhead/frame"
-    return RawSample(key, PICTURE, msgspec.json.encode(head), BEGIN_NS + round(at_s * NS_PER_S))
+def _picture(at_s, key, jpeg, **whose):
+    head = {**whose, "t_ns": BEGIN_NS, "width_px": 4, "height_px": 3}
+    t_ns = BEGIN_NS + round(at_s * NS_PER_S)
+    return RawSample(prefix("city") + key, jpeg, msgspec.json.encode(head), t_ns)
 
 
 def _scan(at_s):

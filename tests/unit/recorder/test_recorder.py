@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from scm.errors import RecordingError
+from scm.errors import MessageError, RecordingError
 from scm.lockstep import Lockstep
 from scm.recorder.mcap_file import RunFile, read_run
 from scm.recorder.part import RecorderPart
@@ -173,6 +173,14 @@ def test_pictures_are_thinned_out_and_all_else_is_kept(
     assert keys.count("part/eye/status") == 50
     assert keys.count("eye/north/frame") == pytest.approx(kept, abs=1)
     assert keys.count("eye/south/frame") == pytest.approx(kept, abs=1)
+
+
+def test_cars_whose_cameras_are_meant_need_names_and_a_rate(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"cameras_hz: got 0\.0"):
+        RecorderPart(tmp_path / "run.mcap", cameras_of=["n1"])
+    with pytest.raises(MessageError, match=r"cameras_of: got 'n1/\*'"):
+        RecorderPart(tmp_path / "run.mcap", cameras_hz=1.0, cameras_of=["n1/*"])
+    assert not (tmp_path / "run.mcap").exists()
 
 
 @pytest.mark.parametrize("frames_hz", [-1.0, float("nan"), float("inf")])

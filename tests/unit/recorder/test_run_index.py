@@ -49,6 +49,43 @@ def test_a_seek_unpacks_only_the_chunks_that_it_shows(tmp_path, monkeypatch):
     assert 1 <= len(unpacked) <= 2 < len(index.chunks)
 
 
+@pytest.mark.parametrize("finish", [True, False], ids=["complete", "cut off"])
+def test_a_chunk_is_not_unpacked_where_its_messages_of_a_key_are_of_another_time(
+    tmp_path, monkeypatch, finish
+):
+    index = read_index(write_run(tmp_path / "run.mcap", finish=finish))
+    unpacked, real = [], run_index._unpacked
+    monkeypatch.setattr(
+        run_index, "_unpacked", lambda *given: unpacked.append(given) or real(*given)
+    )
+    begin_ns, end_ns = (BEGIN_NS + round(at * NS_PER_S) for at in (2.8, 2.95))
+    warned = "event/warning/world"  # at 3 s, in the chunk of 2.8 to 3.0 s
+    (holding,) = (one for one in index.chunks if one.begin_ns <= end_ns <= one.end_ns)
+    assert any(index.topics[number].endswith(warned) for number in holding.channels)
+    assert list(index.read(begin_ns, end_ns, lambda key: key.endswith(warned))) == []
+    assert unpacked == []
+
+
+def test_a_chunk_whose_list_of_messages_is_damaged_is_left_out_and_told(tmp_path):
+    path = write_run(tmp_path / "run.mcap")
+    whole = path.read_bytes()
+    index = read_index(path)
+    chunk = index.chunks[8]
+    number = next(number for number, key in index.topics.items() if is_snapshot(key))
+    first = chunk.channels[number] + 6  # behind its channel and its length
+    for at, wrong in (
+        (first + 8, b"\xff" * 8),  # a message far behind the chunk
+        (first + 8, b"\x01" + bytes(7)),  # one in the midst of another
+        (first - 4, b"\x07\x00\x00\x00"),  # a list of half an entry
+        (first, (BEGIN_NS + NS_PER_S).to_bytes(8, "little")),  # one of another time
+    ):
+        path.write_bytes(whole[:at] + wrong + whole[at + len(wrong) :])
+        damage = []
+        found = list(read_index(path).read(0, index.end_ns, is_snapshot, damage))
+        assert 90 <= len(found) < 101, wrong
+        assert f"byte {chunk.start} is damaged" in damage[0]
+
+
 def test_a_file_that_grew_is_read_on_from_where_it_ended(tmp_path):
     whole = write_run(tmp_path / "whole.mcap", finish=False).read_bytes()
     path = tmp_path / "run.mcap"

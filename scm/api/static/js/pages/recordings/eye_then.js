@@ -1,40 +1,55 @@
-/** What the Eye saw at the moment that is shown: the newest picture that was recorded by then. */
+/** What cameras saw at the moment that is shown: the newest picture that was recorded by then. */
 import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { minutes } from "scm/pages/recordings/words.js";
 
 const OLD_S = 2; // one a second is recorded; a busy machine makes fewer
 
-export function EyeThen({ player, cameras }) {
-  const [camera, setCamera] = useState(cameras[0]);
+/** @param {{ eye: string[], own: {vehicle, camera}[], chosen: string | null }} own: the cars' cameras */
+export function EyeThen({ player, eye, own, chosen }) {
+  const cameras = [...eye.map((camera) => ({ vehicle: "", camera })), ...own];
+  const [shown, setShown] = useState(0);
+  useEffect(() => {
+    const at = cameras.findIndex((one) => one.vehicle === chosen);
+    if (at >= 0) setShown(at);
+  }, [chosen]);
+  const one = cameras[shown];
   return html`
-    <section class="panel eye-then" aria-label="Eye at this moment">
+    <section class="panel eye-then" aria-label="Pictures at this moment">
       <div class="panel-head">
-        <h2>Eye</h2>
+        <h2>${own.length ? "Cameras" : "Eye"}</h2>
         ${cameras.length > 1 &&
         html`
-          <select aria-label="Overhead camera" value=${camera} onChange=${(event) => setCamera(event.target.value)}>
-            ${cameras.map((name) => html`<option value=${name}>${name}</option>`)}
+          <select aria-label="Camera" value=${shown} onChange=${(event) => setShown(Number(event.target.value))}>
+            ${cameras.map((each, number) => html`<option value=${number}>${named(each)}</option>`)}
           </select>
         `}
       </div>
-      <${Picture} key=${camera} player=${player} camera=${camera} />
+      <${Picture} key=${named(one)} player=${player} one=${one} />
     </section>
   `;
 }
 
-function Picture({ player, camera }) {
+function named({ vehicle, camera }) {
+  return vehicle ? `${vehicle}, ${camera}` : camera;
+}
+
+function address(recording, { vehicle, camera }) {
+  const of = vehicle ? `vehicles/${encodeURIComponent(vehicle)}/camera` : "eye";
+  return `/api/v1/recordings/${encodeURIComponent(recording)}/${of}/${encodeURIComponent(camera)}.jpg`;
+}
+
+function Picture({ player, one }) {
   const [asked_s, setAsked] = useState(null);
   const [came, setCame] = useState({ t_s: null, good: false });
   const [large, setLarge] = useState(false);
   const at_s = player.at.value;
-  const wanted = player.came.value >= 0 ? player.pictureOf(camera) : null;
+  const wanted = player.came.value >= 0 ? player.pictureOf(one) : null;
   useEffect(() => {
     // One at a time: at eight times the pace the one after next would else stop each on its way.
     if (wanted && wanted.t_s !== asked_s && came.t_s === asked_s) setAsked(wanted.t_s);
   });
   if (!wanted && player.has(player.t_s)) return html`<p class="empty">No picture was recorded by then.</p>`;
-  const source = `/api/v1/recordings/${encodeURIComponent(player.name)}/eye/${encodeURIComponent(camera)}.jpg`;
   const age_s = Math.max(0, at_s - came.t_s);
   return html`
     <button
@@ -48,8 +63,8 @@ function Picture({ player, camera }) {
     >
       ${asked_s !== null &&
       html`<img
-        src="${source}?t_s=${asked_s}"
-        alt="What camera ${camera} saw, not live"
+        src="${address(player.name, one)}?t_s=${asked_s}"
+        alt="What camera ${named(one)} saw, not live"
         onLoad=${() => setCame({ t_s: asked_s, good: true })}
         onError=${() => setCame({ t_s: asked_s, good: false })}
       />`}

@@ -184,9 +184,10 @@ export class Player {
   }
 
   /** The newest picture of a camera by this moment: `{t_s}`; null: there is none, or it is on its way. */
-  pictureOf(camera) {
+  pictureOf({ vehicle, camera }) {
     const told = this.stretchAt(this.t_s)?.pictures ?? [];
-    return told.findLast((picture) => picture.camera === camera && picture.t_s <= this.t_s + 0.05) ?? null;
+    const isOf = (picture) => picture.vehicle === vehicle && picture.camera === camera;
+    return told.findLast((picture) => isOf(picture) && picture.t_s <= this.t_s + 0.05) ?? null;
   }
 
   /** Where each car came from: `{vehicle: [[x, y], ...]}` of the last seconds. */

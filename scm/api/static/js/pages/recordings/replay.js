@@ -89,7 +89,7 @@ function Played({ player, summary, events, more, onChanged }) {
   const [chosen, setChosen] = useState(null);
   const { recording } = summary;
   const close = () => (asking.value = null);
-  const cars = summary.cars;
+  const { cars, eye_cameras: eye, car_cameras: own } = summary;
   return html`
     <div class="replay">
       <${Banner} recording=${recording} map=${summary.map_title} />
@@ -99,7 +99,7 @@ function Played({ player, summary, events, more, onChanged }) {
         <${Timeline} player=${player} events=${events} begin_ns=${recording.begin_ns} />
       </section>
       <${Cars} player=${player} chosen=${chosen} onChoose=${setChosen} />
-      ${summary.eye_cameras.length > 0 && html`<${EyeThen} player=${player} cameras=${summary.eye_cameras} />`}
+      ${eye.length + own.length > 0 && html`<${EyeThen} player=${player} eye=${eye} own=${own} chosen=${chosen} />`}
       <${Events} player=${player} events=${events} more=${more} />
       ${asking.value === "take" && html`<${TakeHomeDialog} recording=${recording} cars=${cars} onClose=${close} />`}
       ${asking.value === "mismatch" &&

@@ -1,0 +1,53 @@
+"""`scm export csv`: the cars of a run as a table."""
+
+import argparse
+
+from scm.command import Command
+from scm.commands.export_foxglove import export_arguments, write_blocks
+
+LONGEST_S = 1e7  # four months
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    export_arguments(parser)
+    parser.add_argument(
+        "--vehicle",
+        default="",
+        metavar="NAME",
+        help="a car's own reports; without: all cars as the world saw them",
+    )
+    parser.add_argument(
+        "--from-s", type=float, default=0.0, metavar="S", help="since the run began (%(default)s)"
+    )
+    parser.add_argument(
+        "--to-s", type=float, default=LONGEST_S, metavar="S", help="likewise; without: to the end"
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.api.recordings_shelf import cars_of
+    from scm.api.replay import csv_of
+    from scm.errors import RecordingError
+    from scm.recorder.run_index import read_index
+
+    from_s, to_s = arguments.from_s, arguments.to_s
+    if not 0.0 <= from_s <= to_s <= LONGEST_S:
+        msg = (
+            f"span: got {from_s:g} to {to_s:g} s, expected 0 or more, and the end behind the begin"
+        )
+        raise RecordingError(msg)
+    index = read_index(arguments.recording)
+    vehicle, known = arguments.vehicle, cars_of(index)
+    if vehicle and vehicle not in known:
+        msg = f"{arguments.recording}: got vehicle {vehicle!r}, expected one of {', '.join(known)}"
+        raise RecordingError(msg)
+    write_blocks(csv_of(index, vehicle, from_s, to_s), arguments.out)
+    return 0
+
+
+COMMAND = Command(
+    help="Write the cars of a run of the city as CSV, in SI units.",
+    example="scm export csv runs/today.mcap --vehicle n1 --from-s 60 --out n1.csv",
+    arguments=_arguments,
+    run=_run,
+)
