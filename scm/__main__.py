@@ -17,8 +17,11 @@ from scm.errors import ScmError
 INTERRUPTED = 130  # what a shell reports for a command ended by Ctrl-C
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """Return the parser of the whole command line."""
+def build_parser(only: str | None = None) -> argparse.ArgumentParser:
+    """Return the parser of the whole command line, or of `only` one command's.
+
+    To import all commands is half of what a small one takes, and a city starts a dozen of them.
+    """
     from scm.command import Command
     from scm.registry import load, names
 
@@ -33,7 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
         help="debug, info, warning, error (%(default)s); debug also shows where a failure happened",
     )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name in names("scm.commands"):
+    for name in names("scm.commands") if only is None else [only]:
         command = load("scm.commands", name, "COMMAND", Command)
         sub = commands.add_parser(
             name.replace("_", " "),
@@ -49,11 +52,12 @@ def build_parser() -> argparse.ArgumentParser:
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """Return what the words after `scm` ask for."""
-    parser = build_parser()
+    joined = _joined(argv)
+    parser = build_parser(_asked(joined))
     seconds = _seconds(argv)
     if seconds:
         parser.error(f"expected a second word, as in `scm {argv[0]} {seconds[0]}`: {seconds}")
-    return parser.parse_args(_joined(argv))
+    return parser.parse_args(joined)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -86,6 +90,15 @@ def _joined(argv: Sequence[str]) -> list[str]:
         if first in known:
             break
     return list(argv)
+
+
+def _asked(joined: Sequence[str]) -> str | None:
+    """Return the name of the command that is meant; None: it takes all of them to say."""
+    from scm.registry import names
+
+    at = 2 if joined[:1] == ["--log"] else 0
+    name = joined[at].replace(" ", "_") if len(joined) > at else ""
+    return name if name in names("scm.commands") else None
 
 
 def _seconds(argv: Sequence[str]) -> list[str]:

@@ -25,9 +25,16 @@ PARTS = {"world", "traffic", "monitor", "eye", "camera", "api", "record"}
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
-    """One city for all tests that leave it as they found it."""
+    """One city for all tests: each leaves it as it found it, and the last one ends it."""
     with city(tmp_path_factory.mktemp("runs")) as process:
         yield process
+
+
+@pytest.fixture(scope="module")
+def begun(running: CityProcess) -> dict[str, Any]:
+    """Where the six cars were at first; red lights let some of them begin much later."""
+    wait_for(lambda: len(cars_of(running)) == 6, 20.0, "six cars are on the map")
+    return cars_of(running)
 
 
 def cars_of(running: CityProcess) -> dict[str, Any]:
@@ -43,11 +50,10 @@ def alive_stations(running: CityProcess) -> set[str]:
     return {row["name"] for row in running.get("/stations")["stations"] if row["alive"]}
 
 
-def test_every_part_and_six_cars_come_up(running: CityProcess) -> None:
+def test_every_part_and_six_cars_come_up(running: CityProcess, begun: dict[str, Any]) -> None:
     expected = PARTS | {"n5", "n6"}
     wait_for(lambda: alive_stations(running) >= expected, 20.0, f"{expected} are all there")
-    wait_for(lambda: len(cars_of(running)) == 6, 20.0, "six cars are on the map")
-    kinds = sorted(row["kind"] for row in cars_of(running).values())
+    kinds = sorted(row["kind"] for row in begun.values())
     assert kinds == ["hosted"] * 4 + ["remote"] * 2
 
 
@@ -57,20 +63,6 @@ def test_it_prints_a_line_for_every_part_and_what_to_try_next(running: CityProce
         assert any(name in line.split() for line in running.lines), name
     for hint in ("vehicle-agent join", "examples/", "Ctrl-C"):
         assert hint in text
-
-
-def test_the_cars_drive(running: CityProcess) -> None:
-    wait_for(lambda: len(cars_of(running)) == 6, 20.0, "six cars are on the map")
-    before = cars_of(running)
-
-    def moved() -> bool:
-        now = cars_of(running)
-        return all(
-            abs(now[name]["x_m"] - row["x_m"]) + abs(now[name]["y_m"] - row["y_m"]) > 0.3
-            for name, row in before.items()
-        )
-
-    wait_for(moved, 60.0, "all six cars have moved 0.3 m")
 
 
 def test_the_signals_change_and_tell_when(running: CityProcess) -> None:
@@ -129,6 +121,17 @@ def test_a_city_pictures_what_is_watched_and_nothing_else(running: CityProcess) 
         wait_for(lambda: "1 camera," in detail_of_camera(running), 10.0, "one camera is pictured")
     wait_for(idle, 10.0, "rendering ends with the film")
     assert running.get("/vehicles/n1/camera") == {"cameras": ["front", "rear"], "watched": []}
+
+
+def test_the_cars_drive(running: CityProcess, begun: dict[str, Any]) -> None:
+    def moved() -> bool:
+        now = cars_of(running)
+        return all(
+            abs(now[name]["x_m"] - row["x_m"]) + abs(now[name]["y_m"] - row["y_m"]) > 0.3
+            for name, row in begun.items()
+        )
+
+    wait_for(moved, 60.0, "all six cars have moved 0.3 m")
 
 
 def test_a_car_plays_a_written_drive_is_recorded_and_goes_back_to_its_driver(
@@ -194,15 +197,15 @@ def test_a_part_that_dies_is_started_again(running: CityProcess) -> None:
     wait_for(lambda: session_of_eye() not in (None, before), 20.0, "another eye is there")
 
 
-def test_ctrl_c_ends_everything_within_two_seconds_and_leaves_a_recording(tmp_path: Path) -> None:
-    with city(tmp_path, "--agents", "1", "--hosted", "1") as process:
-        wait_for(lambda: len(cars_of(process)) == 2, 40.0, "two cars are on the map")
-        children = process.descendants()
-        assert len(children) >= 7
-        assert process.stop() < 2.0
-        assert process.process.returncode == 0
-        assert not [pid for pid in children if Path(f"/proc/{pid}").exists()]
-    (recording,) = tmp_path.glob("*.mcap")
+def test_ctrl_c_ends_everything_within_two_seconds_and_leaves_a_recording(
+    running: CityProcess,
+) -> None:
+    children = running.descendants()
+    assert len(children) >= 7
+    assert running.stop() < 2.0
+    assert running.process.returncode == 0
+    assert not [pid for pid in children if Path(f"/proc/{pid}").exists()]
+    (recording,) = running.folder.glob("*.mcap")
     keys = {message.key.partition("@v1/city/")[2] for message in read_run(recording)}
     assert {"world/snapshot", "world/def", "tl/crossing/spat", "tl/crossing/mon"} <= keys
 

@@ -1,4 +1,8 @@
-"""`scm up --fleet`: only who has credentials enters the city, and a plan outlives its process."""
+"""`scm up --fleet`: only who has credentials enters the city, and what people set outlives parts.
+
+What only a person may release, and the plan that was asked for, stay as they are when the process
+that keeps them dies.
+"""
 
 import os
 import signal
@@ -40,9 +44,74 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
         yield process
 
 
+@pytest.fixture(scope="module")
+def other(running: CityProcess) -> str:
+    """Ask for another plan: its time comes with the next cycle, while the first tests run."""
+    plan = {"brisk": "calm", "calm": "brisk"}[signals(running)["plan"]]
+    body = {"plan": plan, "by": "ann"}
+    running.web.put("/signals/crossing/plan", json=body).raise_for_status()
+    return plan
+
+
+def cars_of(running: CityProcess) -> dict[str, Any]:
+    return {row["vehicle"]: row for row in running.get("/vehicles")["vehicles"]}
+
+
+def signals(running: CityProcess) -> dict[str, Any]:
+    return dict(running.get("/signals/crossing"))
+
+
+def reset(running: CityProcess, reason: str) -> None:
+    """Reset the monitor as a person, and wait until the plan runs again."""
+    body = {"by": "ann", "reason": reason}
+    running.web.post("/signals/crossing/monitor/reset", json=body).raise_for_status()
+    wait_for(lambda: signals(running)["mode"] == "plan", 20.0, "signals run again")
+
+
+@pytest.mark.usefixtures("other")
 def test_who_has_no_credentials_stays_outside(running: CityProcess) -> None:
     with pytest.raises(LinkError):
         ZenohBus("city", "n8", running.endpoint, connect_timeout_s=1.0)
+
+
+def tick(running: CityProcess) -> int:
+    return int(running.get("/vehicles")["tick"])
+
+
+def fault(running: CityProcess) -> str | None:
+    monitor = signals(running)["monitor"]
+    return None if monitor is None else monitor["fault"]
+
+
+def detail(running: CityProcess) -> str:
+    return str(signals(running)["monitor"]["detail"])
+
+
+def press(running: CityProcess, *, engaged: bool) -> None:
+    running.web.put("/stop", json={"engaged": engaged, "by": "ann"}).raise_for_status()
+
+
+def test_cars_still_stand_when_the_world_dies_under_the_stop(running: CityProcess) -> None:
+    wait_for(lambda: tick(running) > 300, 20.0, "6 s of the first world")
+    press(running, engaged=True)
+    running.kill("world")
+    wait_for(lambda: 100 < tick(running) < 300, 20.0, "2 s of a new world")
+    rows = wait_for(lambda: r if len(r := cars_of(running)) == 2 else None, 20.0, "both are back")
+    assert {row["mode"] for row in rows.values()} == {"stop"}
+    assert max(abs(row["speed_mps"]) for row in rows.values()) < 0.01
+    press(running, engaged=False)
+
+
+def test_a_fault_is_still_there_when_the_monitor_dies_and_ends_by_reset(
+    running: CityProcess,
+) -> None:
+    with running.frozen("traffic"):  # a restart may be too quick for the monitor to miss it
+        wait_for(lambda: fault(running) == "stale", 20.0, "the monitor saw the signals fall silent")
+    running.kill("monitor")
+    wait_for(lambda: "again" in detail(running), 20.0, "the new monitor has spoken")
+    assert fault(running) == "stale"
+    assert signals(running)["mode"] == "flash"
+    reset(running, "traffic was frozen")
 
 
 SCRIPT = """
@@ -72,19 +141,13 @@ def test_scripts_enter_as_an_operator_and_people_drive_by_their_keys(running: Ci
         assert wheel.over.code == "given_back"
 
 
-def test_the_plan_asked_for_is_still_in_force_when_traffic_dies(running: CityProcess) -> None:
-    def signals() -> dict[str, Any]:
-        return dict(running.get("/signals/crossing"))
-
-    other = {"brisk": "calm", "calm": "brisk"}[signals()["plan"]]
-    body = {"plan": other, "by": "ann"}
-    running.web.put("/signals/crossing/plan", json=body).raise_for_status()
-    wait_for(lambda: signals()["plan"] == other, 60.0, "the other plan runs")
+def test_the_plan_asked_for_is_still_in_force_when_traffic_dies(
+    running: CityProcess, other: str
+) -> None:
+    wait_for(lambda: signals(running)["plan"] == other, 60.0, "the other plan runs")
     with running.frozen("traffic"):  # so that the monitor surely sees it fall silent
-        wait_for(lambda: signals()["monitor"]["fault"] == "stale", 5.0, "the monitor has seen it")
+        wait_for(lambda: fault(running) == "stale", 20.0, "the monitor has seen it")
         os.kill(running.pid("traffic"), signal.SIGKILL)
-    wait_for(lambda: signals()["mode"] == "flash", 20.0, "the new one flashes")
-    body = {"by": "ann", "reason": "traffic was killed"}
-    running.web.post("/signals/crossing/monitor/reset", json=body).raise_for_status()
-    wait_for(lambda: signals()["mode"] == "plan", 20.0, "the new one runs a plan")
-    assert signals()["plan"] == other
+    wait_for(lambda: signals(running)["mode"] == "flash", 20.0, "the new one flashes")
+    reset(running, "traffic was killed")
+    assert signals(running)["plan"] == other

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -20,6 +20,10 @@ from tests.e2e.city_process import CityProcess, city, wait_for
 
 README = Path(__file__).parents[2] / "README.md"
 REST = README.parent / "docs/rest.md"
+
+
+LOCKSTEP = ".venv/bin/python examples/travel_times.py"  # has a test of its own, below
+IN_CITY = ("make ", "tcp/", "http://", "--live")  # by one of them a command is about a city
 
 
 def commands(page: Path = README) -> list[str]:
@@ -49,12 +53,32 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def workplace(tmp_path: Path, root: Path, recorded: Path) -> Path:
     """A folder that looks like the project's, so that commands leave nothing behind in it."""
+    return furnished(tmp_path, root, recorded)
+
+
+def furnished(folder: Path, root: Path, recorded: Path) -> Path:
+    """Return a folder, with what the README's commands expect to be in it."""
     for name in ("examples", "recordings", "maps", "Makefile", "pyproject.toml"):
-        (tmp_path / name).symlink_to(root / name)
-    (tmp_path / ".venv").symlink_to(sys.prefix)
-    (tmp_path / "runs").mkdir()
-    shutil.copy(recorded, tmp_path / "runs")
-    return tmp_path
+        (folder / name).symlink_to(root / name)
+    (folder / ".venv").symlink_to(sys.prefix)
+    (folder / "runs").mkdir()
+    shutil.copy(recorded, folder / "runs")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def at_work(
+    running: CityProcess, root: Path, recorded: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[list["Future[subprocess.CompletedProcess[str]]"]]:
+    """Set the client's examples to work beside each other, and beside what needs no city.
+
+    One waits for a cycle's end, one for a search.
+    """
+    folder = furnished(tmp_path_factory.mktemp("at_work"), root, recorded)
+    shutil.copy(recorded, running.folder)
+    shell = [here(command, running, root) for command in commands(REST)]
+    with ThreadPoolExecutor(len(shell)) as pool:
+        yield [pool.submit(run, command, folder) for command in shell]
 
 
 def here(command: str, running: CityProcess, root: Path) -> str:
@@ -67,17 +91,30 @@ def here(command: str, running: CityProcess, root: Path) -> str:
     return f"{command} --connect {running.endpoint} {shorter}" if live else command
 
 
-@pytest.mark.parametrize("command", commands())
-def test_readme_command_works(
+def is_in_city(command: str) -> bool:
+    """Whether a command of the README is about a running city."""
+    return any(sign in command for sign in IN_CITY)
+
+
+@pytest.mark.parametrize("command", list(filter(is_in_city, commands())))
+def test_readme_command_works_in_a_city(
     command: str, running: CityProcess, workplace: Path, root: Path
 ) -> None:
-    if "../shared" in command and not (root.parent / "shared").is_dir():
-        pytest.skip("../shared is not here: it holds other people's data")
     if command.startswith("make "):  # a city without an end, or this very test: the recipe is there
         assert run(command.replace("make", "make -n", 1), root).returncode == 0
         return
     check: Callable[[str, CityProcess, Path], None] = joins if " join " in command else ends_well
     check(here(command, running, root), running, workplace)
+
+
+@pytest.mark.usefixtures("at_work")
+@pytest.mark.parametrize("command", [c for c in commands() if c != LOCKSTEP and not is_in_city(c)])
+def test_readme_command_works(
+    command: str, running: CityProcess, workplace: Path, root: Path
+) -> None:
+    if "../shared" in command and not (root.parent / "shared").is_dir():
+        pytest.skip("../shared is not here: it holds other people's data")
+    ends_well(here(command, running, root), running, workplace)
 
 
 def ends_well(command: str, running: CityProcess, workplace: Path) -> None:
@@ -112,13 +149,9 @@ def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_client_s_examples_work_beside_each_other(
-    running: CityProcess, workplace: Path, root: Path, recorded: Path
+    running: CityProcess, at_work: list["Future[subprocess.CompletedProcess[str]]"]
 ) -> None:
-    """One waits for a cycle's end, one for a search: together they take no longer than one."""
-    shutil.copy(recorded, running.folder)
-    shell = [here(command, running, root) for command in commands(REST)]
-    with ThreadPoolExecutor(len(shell)) as pool:
-        wheel, signals, diagnosis = pool.map(lambda command: run(command, workplace), shell)
+    wheel, signals, diagnosis = (example.result() for example in at_work)
     for done in (wheel, signals, diagnosis):
         assert done.returncode == 0, f"{done.args}\n{done.stdout}\n{done.stderr}"
     came = re.search(r"n1 came (\d+\.\d+) m by hand", wheel.stdout)
@@ -146,9 +179,11 @@ def test_the_readme_is_short_and_its_links_lead_somewhere(root: Path) -> None:
 
 
 def test_the_lockstep_example_is_faster_than_real_time(workplace: Path) -> None:
+    assert LOCKSTEP in commands()
     began = time.monotonic()
-    done = run(".venv/bin/python examples/travel_times.py", workplace)
+    done = run(LOCKSTEP, workplace)
     elapsed = time.monotonic() - began
+    assert done.returncode == 0, done.stdout + done.stderr
     found = re.search(r"(\d+) s of city", done.stdout)
     assert found, done.stdout + done.stderr
     assert float(found.group(1)) > elapsed

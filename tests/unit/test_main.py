@@ -151,3 +151,29 @@ def test_a_reader_that_leaves_early_is_no_error(root: Path) -> None:
     )
     assert done.stderr == b""
     assert done.returncode == 0
+
+
+LOADED = """
+import sys
+from scm.__main__ import parse
+parse(["--log", "info", "monitor"])
+print(*(name for name in sys.modules if name.startswith("scm.commands.")))
+"""
+
+
+def test_to_run_a_command_loads_no_other() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED], check=True, capture_output=True, text=True
+    )
+    assert done.stdout.split() == ["scm.commands.monitor"]
+
+
+@pytest.mark.parametrize("words", [["monitr"], ["foo", "monitor"]])
+def test_a_command_that_is_none_is_told_all_that_are(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        parse(words)
+    said = capsys.readouterr().err
+    assert f"invalid choice: '{words[0]}'" in said
+    assert "'world'" in said

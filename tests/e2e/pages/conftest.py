@@ -15,10 +15,12 @@ import pytest
 from tests.e2e.city_process import CityProcess, city, wait_for
 from tests.e2e.pages.visiting import SIZES, Visit, judge, photograph
 
+HERE = Path(__file__).parent
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 ARGUMENTS = [
     "--no-sandbox",
     "--disable-gpu",
+    "--in-process-gpu",  # it paints in software: a process of its own would only be told all twice
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
@@ -28,12 +30,17 @@ THEMES = ("light", "dark")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip the pages where no browser is; CI has to have one."""
+    """Look at the recordings early, while the city's is short; skip where no browser is.
+
+    CI has to have one.
+    """
+    early = ("test_events_page.py", "test_recordings_page.py")
+    items.sort(key=lambda item: item.path.parent != HERE or item.path.name not in early)
     if Path(CHROMIUM).exists() or "CI" in os.environ:
         return
     reason = f"no browser: {CHROMIUM} is missing (apt-get install chromium)"
     for item in items:
-        if Path(__file__).parent in item.path.parents:
+        if HERE in item.path.parents:
             item.add_marker(pytest.mark.skip(reason=reason))
 
 
@@ -68,26 +75,40 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
+@pytest.fixture(scope="package")
+def windows() -> list[Any]:
+    """Windows that stand empty: a new one costs the browser a second, all scripts read anew."""
+    return []
+
+
 @pytest.fixture
-def visit(browser: Any, running: CityProcess) -> Iterator[Callable[..., Visit]]:
+def visit(
+    browser: Any, windows: list[Any], running: CityProcess, request: pytest.FixtureRequest
+) -> Iterator[Callable[..., Visit]]:
     """Open an address of the dashboard in a window of its own, and wait until it is live."""
-    contexts = []
+    opened, failed = [], request.session.testsfailed
 
     def open_at(path: str, size: str = "wide", theme: str = "light", script: str = "") -> Visit:
+        """Visit `path`; a `script` that runs before the page's own takes a new window."""
+        page = windows.pop() if windows and not script else browser.new_context().new_page()
         width, height = SIZES[size]
-        context = browser.new_context(
-            viewport={"width": width, "height": height}, color_scheme=theme
-        )
-        contexts.append(context)
-        context.add_init_script(script)
-        visited = Visit(context.new_page())
-        visited.page.goto(running.url + path)
-        visited.page.wait_for_selector('.link-state[data-link="live"]')
+        page.set_viewport_size({"width": width, "height": height})
+        page.emulate_media(color_scheme=theme)
+        if script:
+            page.add_init_script(script)
+        visited = Visit(page)
+        opened.append((visited, not script))
+        page.goto(running.url + path)
+        page.wait_for_selector('.link-state[data-link="live"]')
         return visited
 
     yield open_at
-    for context in contexts:
-        context.close()
+    for visited, is_plain in opened:
+        if is_plain and request.session.testsfailed == failed and not visited.page.is_closed():
+            visited.forget()
+            windows.append(visited.page)
+        else:
+            visited.page.context.close()
 
 
 @pytest.fixture

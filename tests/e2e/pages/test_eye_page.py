@@ -113,7 +113,7 @@ def drawn(camera, folder):
     rays = np.concatenate((ideal.reshape((*rows.shape, 2)), np.ones((*rows.shape, 1))), axis=-1)
     paths = []
     places = [(-0.3, -0.15), (0.3, -0.15), (0.0, 0.0), (-0.3, 0.15), (0.3, 0.15), (0.0, -0.12)]
-    for i, (across, down) in enumerate([*places, *places]):
+    for i, (across, down) in enumerate(places):
         far = 2.4 if i % 2 else 1.9
         middle = np.array([across, down, 1.0]) * far
         turn = 0.6 * np.array([np.cos(2.4 * i), np.sin(2.4 * i), 0.2])

@@ -20,8 +20,8 @@ class Visit:
         self.hosts: set[str] = set()
         page.set_default_timeout(PATIENCE_MS)
         page.on("console", self._on_console)
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("request", lambda request: self.hosts.add(urlsplit(request.url).netloc))
+        page.on("pageerror", self._on_error)
+        page.on("request", self._on_request)
 
     def wait(self, expression: str, argument: Any = None) -> None:
         """Wait until JavaScript on the page is true."""
@@ -37,9 +37,24 @@ class Visit:
         msg = f"not within {PATIENCE_MS / 1000:g} s: {what}"
         raise AssertionError(msg)
 
+    def forget(self) -> None:
+        """Leave an empty window that knows nothing of this visit."""
+        self.page.evaluate("() => { localStorage.clear(); sessionStorage.clear(); }")
+        self.page.goto("about:blank")
+        self.page.mouse.move(0, 0)
+        self.page.remove_listener("console", self._on_console)
+        self.page.remove_listener("pageerror", self._on_error)
+        self.page.remove_listener("request", self._on_request)
+
     def _on_console(self, message: Any) -> None:
         if message.type in ("error", "warning"):
             self.complaints.append(message.text)
+
+    def _on_error(self, error: Any) -> None:
+        self.complaints.append(str(error))
+
+    def _on_request(self, request: Any) -> None:
+        self.hosts.add(urlsplit(request.url).netloc)
 
 
 def judge(visited: Visit, within: str | None = None) -> None:
