@@ -51,7 +51,7 @@ def run(client):
 @pytest.fixture
 def operation(client):
     def wait(run, done=lambda row: row["state"] in OVER):
-        for _ in range(600):
+        for _ in range(2400):
             row = client("GET", f"/api/v1/operations/{run}").json()
             if done(row):
                 return row
