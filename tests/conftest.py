@@ -3,15 +3,23 @@
 import gc
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
 ROOT = Path(__file__).parent.parent
 SHARED = ROOT.parent / "shared"
 STANDS_BACK = 10  # as `nice` counts
+
+# How long an example takes says nothing on a machine that others use as well.
+settings.register_profile(
+    "busy_machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("busy_machine")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -63,6 +71,14 @@ def pytest_collection_finish() -> None:
     threadpool_limits(1)
     if "cv2" in sys.modules:
         sys.modules["cv2"].setNumThreads(1)
+
+
+@pytest.fixture(scope="module")
+def lasting_links() -> Iterator[None]:
+    """Let links between stations of this process outlast a stall, which holds up both ends."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("scm.v2x.zenoh_config.LEASE_MS", 60_000)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ CHANNELS = (
     "wheel_speed.rr", "encoder.left", "encoder.right", "imu.accel_x", "imu.accel_y",
     "imu.accel_z", "imu.gyro_x", "imu.gyro_z", "battery.voltage", "motor.current",
 )  # fmt: skip
-DRAWS = settings(max_examples=50, deadline=None, derandomize=True)
+DRAWS = settings(max_examples=50, derandomize=True)
 
 
 def recording(seed=0):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Union, get_args, get_origin
 
 import msgspec
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scm.registry import names
@@ -155,7 +155,7 @@ def structs(kind):
 
 
 @every_class
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25)
 @given(data=st.data())
 def test_what_is_written_is_read_back_equal(kind, data):
     message = data.draw(structs(kind))
@@ -163,7 +163,7 @@ def test_what_is_written_is_read_back_equal(kind, data):
 
 
 @every_sent
-@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=10)
 @given(data=st.data())
 def test_its_key_is_built_parsed_and_selected(kind, data):
     message = data.draw(structs(kind))
@@ -174,7 +174,7 @@ def test_its_key_is_built_parsed_and_selected(kind, data):
 
 
 @every_class
-@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=5)
 @given(data=st.data())
 def test_bytes_from_before_a_field_was_added_still_decode(kind, data):
     message = data.draw(structs(kind))
@@ -191,7 +191,7 @@ def test_bytes_from_before_a_field_was_added_still_decode(kind, data):
 
 
 @every_class
-@settings(max_examples=3, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=3)
 @given(data=st.data())
 def test_bytes_with_a_field_from_the_future_decode(kind, data):
     message = data.draw(structs(kind))

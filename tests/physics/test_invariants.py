@@ -13,7 +13,7 @@ from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.layout import columns_of
 
-FEW = settings(max_examples=20, deadline=None, derandomize=True)
+FEW = settings(max_examples=20, derandomize=True)
 HOLDING = ("tyre_relaxation", "tyre_windup")
 DRAGS = {
     "body.drag_linear_ns_m": (0.0, 5.0),

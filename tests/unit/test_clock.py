@@ -32,7 +32,7 @@ def test_a_step_of_the_systems_time_does_not_move_a_wall_clock(monkeypatch):
     clock = WallClock()
     before_ns = clock.now_ns()
     monkeypatch.setattr("time.time_ns", lambda: 0)
-    assert 0 <= clock.now_ns() - before_ns < NS_PER_S
+    assert 0 <= clock.now_ns() - before_ns < 3600 * NS_PER_S  # it would be decades
 
 
 def test_a_wall_clock_waits_until_its_time():
@@ -47,7 +47,7 @@ def test_a_wall_clock_is_woken_early():
     wake.set()
     began_ns = clock.now_ns()
     assert clock.wait_until(began_ns + 60 * NS_PER_S, wake) is True
-    assert clock.now_ns() - began_ns < 10 * NS_PER_S
+    assert clock.now_ns() - began_ns < 30 * NS_PER_S
 
 
 def test_a_time_that_has_passed_is_not_waited_for():

@@ -22,7 +22,7 @@ def until_it_died(crew, said, *, up):
     crew.look()
     if up:
         crew.heard(Presence(role="part", station="x", session="1", alive=True))
-    crew.members["x"].process.wait(timeout=10.0)
+    crew.members["x"].process.wait(timeout=60.0)
     crew.look()
     return said[-1]
 

@@ -206,7 +206,7 @@ class ExactlyOnce(RuleBasedStateMachine):
 
 
 TestExactlyOnce = ExactlyOnce.TestCase
-TestExactlyOnce.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
+TestExactlyOnce.settings = settings(max_examples=60, stateful_step_count=30)
 
 
 def request(request_id="r1"):

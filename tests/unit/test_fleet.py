@@ -19,6 +19,8 @@ from scm.v2x.messages.trip import Trip
 from scm.v2x.router import Router, free_endpoint
 from scm.world.part import WorldPart
 
+pytestmark = pytest.mark.usefixtures("lasting_links")
+
 
 @pytest.fixture(scope="module")
 def city() -> Iterator[City]:
@@ -81,12 +83,13 @@ def test_a_city_that_does_not_run_is_told_within_seconds() -> None:
     endpoint = free_endpoint()
     with pytest.raises(LinkError, match="is `scm up` running"), open_city(connect=endpoint):
         pytest.fail("there is no city to open")
-    assert WallClock().now_ns() - began_ns < 7e9
+    assert WallClock().now_ns() - began_ns < 30e9
 
 
 @pytest.fixture
-def live() -> Iterator[Router]:
+def live(monkeypatch: pytest.MonkeyPatch) -> Iterator[Router]:
     """A router with a world that runs."""
+    monkeypatch.setattr("scm.fleet.ASK_S", 120.0)
     world = WorldPart(load_map("driving_school"))
     stop = threading.Event()
     with Router(free_endpoint()) as router, ZenohBus("city", "world", router.listen) as bus:
@@ -145,18 +148,20 @@ def test_a_live_script_loses_no_arrival_among_other_cars_reports(live: Router) -
         journeys = [city.spawn(name=name).drive("east_loop") for name in ("a", "b")]
         others, heard = Mailbox(10_000), 0
         bus.subscribe(Trip, {"vehicle": "other"}, others)
+        other = trip("other", "other-1")
+        assert link.run_until(lambda: n.publish(other) or bool(others.take()), 60.0)
         for journey in journeys:
             n.publish(trip(journey.vehicle, journey.trip_id, arrived_ns=3_000_000_000))
         for _ in range(1200):
-            n.publish(trip("other", "other-1"))
+            n.publish(other)
 
         def all_heard() -> bool:
             nonlocal heard
             heard += len(others.take())
             return heard >= 1200
 
-        assert link.run_until(all_heard, 20.0)
-        city.wait(journeys, timeout_s=1.0)
+        assert link.run_until(all_heard, 60.0)
+        city.wait(journeys, timeout_s=20.0)
         assert [journey.travel_time_s for journey in journeys] == [2.0, 2.0]
         city.leave()
 

@@ -32,7 +32,7 @@ class FakeCity:
     def wait_for(self, count):
         """Wait until so much was asked: a server may ask after its client has gone."""
         with self._news:
-            assert self._news.wait_for(lambda: len(self.asked) >= count, 5.0)
+            assert self._news.wait_for(lambda: len(self.asked) >= count, 20.0)
 
     def ask(self, request, timeout_s):
         assert timeout_s > 0.0

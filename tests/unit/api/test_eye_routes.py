@@ -306,7 +306,7 @@ BOARD = {"columns": 9, "rows": 6, "square_m": 0.03}
 class TestMeasuring:
     def wait(self, client, accepted):
         assert accepted.status_code == 202, accepted.text
-        for _ in range(1200):
+        for _ in range(2400):
             row = client("GET", accepted.headers["location"]).json()
             if row["state"] not in ("waiting", "running"):
                 return row

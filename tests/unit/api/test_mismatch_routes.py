@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import time
 import zipfile
 
 import pytest
@@ -72,10 +73,11 @@ def with_drive(folder):
 def wait_for(call, answer):
     assert answer.status_code == 202, answer.text
     address = answer.headers["Location"]
-    for _ in range(400):
+    for _ in range(2400):
         row = call("GET", address).json()
         if row["state"] not in ("waiting", "running"):
             return row
+        time.sleep(0.05)
     raise AssertionError(row)
 
 

@@ -16,7 +16,7 @@ OVER = ("done", "failed", "cancelled")
 
 def until_over(look, done=lambda row: row["state"] in OVER):
     """Return an operation's row once it is as wished."""
-    for _ in range(600):
+    for _ in range(2400):
         row = look()
         if done(row):
             return row

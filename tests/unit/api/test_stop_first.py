@@ -27,7 +27,7 @@ def silent():
             if isinstance(request, StopRequest):
                 return CityStop(t_ns=1, engaged=request.engaged)
             self.waiting.release()
-            self.leave.wait(20.0)
+            self.leave.wait(120.0)
             return Refused(code="timeout", detail="no answer")
 
     return Silent()
@@ -44,7 +44,7 @@ def test_the_stop_does_not_wait_for_a_thread(view, city_map, silent):
                 for _ in range(THREADS):
                     await asyncio.to_thread(silent.waiting.acquire)
                 return await asyncio.wait_for(
-                    client.put("/api/v1/stop", json={"engaged": True}), 10.0
+                    client.put("/api/v1/stop", json={"engaged": True}), 30.0
                 )
             finally:
                 silent.leave.set()

@@ -153,7 +153,7 @@ def test_closing_ends_every_page(stream):
         waiting = asyncio.ensure_future(anext(page, "end"))
         await asyncio.sleep(0)
         stream.close()
-        assert await asyncio.wait_for(waiting, 1.0) == "end"
+        assert await asyncio.wait_for(waiting, 20.0) == "end"
         assert stream.pages == 0
 
     asyncio.run(scenario())
@@ -182,7 +182,7 @@ def test_a_frame_that_fails_does_not_end_the_stream(stream, view, caplog, monkey
 
         picture = view.picture
         monkeypatch.setattr(view, "picture", fail_once)
-        await asyncio.wait_for(stream.run(), 2.0)
+        await asyncio.wait_for(stream.run(), 20.0)
         assert len(calls) == 2
 
     asyncio.run(scenario())

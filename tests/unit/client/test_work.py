@@ -31,7 +31,7 @@ def waiting(monkeypatch):
     """Wait for work that passes through states."""
     monkeypatch.setattr(module, "LOOK_S", 0.001)
 
-    def wait(*states, hear=None, timeout_s=5.0):
+    def wait(*states, hear=None, timeout_s=60.0):
         told = [msgspec.structs.replace(BEGUN, **state) for state in states]
 
         def handle(request):

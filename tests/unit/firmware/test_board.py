@@ -377,7 +377,7 @@ def test_lamps_follow_the_host_and_the_drive_command(board):
     assert len(apart_ms) >= 3
 
 
-def wait_for(what, done, seconds=20.0):
+def wait_for(what, done, seconds=60.0):
     """Poll until `done` gives something; fail with `what` at the deadline."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:

@@ -66,7 +66,7 @@ def made(tool: str, *arguments: str, out: Path) -> Path:
     if not program.is_file():
         pytest.skip(f"{tool} is not installed: pip install eclipse-sumo")
     call = [str(program), *arguments, "--output-file", str(out)]
-    done = subprocess.run(call, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(call, capture_output=True, text=True, check=False, timeout=200)
     assert done.returncode == 0, done.stderr
     return out
 

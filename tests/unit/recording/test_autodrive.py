@@ -250,7 +250,7 @@ def drive(n: int, speed: float, turn: float) -> CarTrack:
     )
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(n=st.integers(5, 60), speed=st.floats(0, 2), turn=st.floats(-2, 2), rate_hz=st.floats(5, 60))
 def test_there_and_back_keeps_poses_and_commands(
     tmp_path_factory: pytest.TempPathFactory, n: int, speed: float, turn: float, rate_hz: float

@@ -15,13 +15,15 @@ from scm.v2x.router import free_endpoint
 STRING = "std_msgs/String"
 KEY = "3/talk/std_msgs::msg::dds_::String_/" + types.hash_of(STRING)
 
+pytestmark = pytest.mark.usefixtures("lasting_links")
+
 
 def text(data):
     return types.ros(STRING, data=data)
 
 
 def soon(condition):
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 20.0
     while not condition():
         assert time.monotonic() < deadline
         time.sleep(0.01)

@@ -20,13 +20,16 @@ from scm.v2x.router import Router, free_endpoint
 
 CLOCK = WallClock()
 NEVER = threading.Event()
+PATIENCE_S = 30.0
+
+pytestmark = pytest.mark.usefixtures("lasting_links")
 
 
-def until(condition, timeout_s=10.0, also=lambda: None):
+def until(condition, also=lambda: None):
     began_ns = CLOCK.now_ns()
     while not condition():
         also()
-        assert seconds(CLOCK.now_ns() - began_ns) < timeout_s
+        assert seconds(CLOCK.now_ns() - began_ns) < PATIENCE_S
         NEVER.wait(0.01)
 
 
@@ -63,7 +66,7 @@ def test_a_station_waits_for_a_router_that_comes_later(endpoint):
     opened = []
 
     def come_in():
-        with ZenohBus("city", "n1", endpoint, connect_timeout_s=10.0) as bus:
+        with ZenohBus("city", "n1", endpoint, connect_timeout_s=PATIENCE_S) as bus:
             opened.append(bus.connected)
 
     early = threading.Thread(target=come_in)
@@ -71,7 +74,7 @@ def test_a_station_waits_for_a_router_that_comes_later(endpoint):
     NEVER.wait(0.3)
     assert opened == []
     with Router(endpoint):
-        early.join(10.0)
+        early.join(PATIENCE_S)
     assert opened == [True]
 
 
@@ -104,6 +107,7 @@ def test_when_the_router_goes_everybody_is_told_and_streams_are_dropped(endpoint
             until(lambda: bool(mailbox.drain()), also=lambda: bus.publish(spat()))
             router.__exit__(None, None, None)
             until(lambda: not bus.connected and not listener.connected)
+            mailbox.drain()  # what was still on its way
             bus.publish(spat(1))
             with Router(endpoint):
                 until(lambda: bus.connected and listener.connected)
@@ -213,5 +217,5 @@ def test_closing_under_fire_does_not_hang(router):
                 listener.subscribe(Presence, {}, mailbox)
                 until(lambda box=mailbox: bool(box.drain()))
         firing.set()
-        gunner.join(5.0)
+        gunner.join(PATIENCE_S)
     assert not gunner.is_alive()

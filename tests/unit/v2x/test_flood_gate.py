@@ -5,7 +5,7 @@ import threading
 import pytest
 import zenoh
 
-from scm.clock import NS_PER_S, WallClock
+from scm.clock import NS_PER_S, WallClock, seconds
 from scm.v2x import zenoh_config
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
@@ -19,9 +19,11 @@ from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.router import Router, free_endpoint
 from scm.v2x.zenoh_config import LARGEST_BYTES
 
-ENDPOINT = free_endpoint()
 KEY = "scm/@v1/city/v/n1/@camera/front"
-NEVER = threading.Event()
+CLOCK, NEVER = WallClock(), threading.Event()
+PATIENCE_S = 30.0
+
+pytestmark = pytest.mark.usefixtures("lasting_links")
 
 
 def test_a_loud_key_is_cut_at_its_limit_and_others_are_not():
@@ -58,21 +60,25 @@ def test_few_huge_messages_are_a_flood_too():
 
 
 @pytest.fixture
-def buses():
+def endpoint():
+    return free_endpoint()
+
+
+@pytest.fixture
+def buses(endpoint):
     with (
-        Router(ENDPOINT),
-        ZenohBus("city", "ears", ENDPOINT) as ears,
-        ZenohBus("city", "mouth", ENDPOINT) as mouth,
+        Router(endpoint),
+        ZenohBus("city", "ears", endpoint) as ears,
+        ZenohBus("city", "mouth", endpoint) as mouth,
     ):
         yield ears, mouth
 
 
 def wait_for(condition):
-    clock, never = WallClock(), threading.Event()
-    end_ns = clock.now_ns() + 10 * NS_PER_S
+    end_ns = CLOCK.now_ns() + round(PATIENCE_S * NS_PER_S)
     while not condition():
-        assert clock.now_ns() < end_ns
-        never.wait(0.005)
+        assert CLOCK.now_ns() < end_ns
+        NEVER.wait(0.005)
 
 
 def status(station, number=0):
@@ -96,8 +102,10 @@ def test_a_reader_of_a_flooded_key_still_hears_the_others(buses):
     wait_for(lambda: mouth.publish(status("quiet")) or look())
     wait_for(lambda: say_both() or ears.rejected > 0)
     del heard[:]
+    began_ns = CLOCK.now_ns()
     wait_for(lambda: say_both() or "quiet" in look())
-    assert heard.count("loud") <= 2 * MESSAGES_A_SECOND
+    took_s = seconds(CLOCK.now_ns() - began_ns)
+    assert heard.count("loud") <= (2 + took_s) * MESSAGES_A_SECOND
 
 
 def test_a_flood_of_requests_is_cut_and_a_second_later_one_is_answered(buses):
@@ -128,7 +136,7 @@ def frame(size):
     )
 
 
-def test_a_message_beyond_all_measure_reaches_nobody_and_the_city_goes_on(buses):
+def test_a_message_beyond_all_measure_reaches_nobody_and_the_city_goes_on(buses, endpoint):
     ears, mouth = buses
     statuses, frames = Mailbox(100), Mailbox(100)
     ears.subscribe(PartStatus, {}, statuses)
@@ -138,7 +146,7 @@ def test_a_message_beyond_all_measure_reaches_nobody_and_the_city_goes_on(buses)
         mouth.publish(frame(size))
 
     wait_for(lambda: show(1_000_000) or frames.drain())
-    with zenoh.open(zenoh.Config.from_json5(zenoh_config.client(ENDPOINT, 5.0))) as huge:
+    with zenoh.open(zenoh.Config.from_json5(zenoh_config.client(endpoint, PATIENCE_S))) as huge:
         body, header = encode(frame(LARGEST_BYTES + 1_000_000))
         blocks = zenoh.CongestionControl.BLOCK
         huge.put(KEY, body, attachment=header, congestion_control=blocks)

@@ -7,9 +7,10 @@ import pytest
 from scm.errors import StoreError
 from scm.store.audit import AuditLog, Deed
 from scm.store.memory import MemoryStore
+from scm.v2x import keeping
 from scm.v2x.keeping import Batch, Keeper, KeeperBehind
 
-PATIENCE_S = 10.0
+PATIENCE_S = 20.0
 
 
 class Sick(MemoryStore):
@@ -56,14 +57,20 @@ def store():
     return Sick()
 
 
+def looks():
+    """Yield while there is patience, with a pause after each look."""
+    for _ in range(round(PATIENCE_S / 0.01)):
+        yield
+        threading.Event().wait(0.01)
+
+
 def safe(keeper, count):
     """Return what is safe, as soon as that are `count` batches."""
-    found, never = [], threading.Event()
-    for _ in range(round(PATIENCE_S / 0.01)):
+    found = []
+    for _ in looks():
         found += keeper.written()
         if len(found) >= count:
             return found
-        never.wait(0.01)
     raise AssertionError(f"only {len(found)} of {count} are safe")
 
 
@@ -82,11 +89,10 @@ def test_while_the_store_fails_nothing_is_safe_and_why_is_told(kind, store):
     keeper = kind(store, "world", "s1")
     store.sickness = "before"
     keeper.write(batch(1))
-    for _ in range(300):
+    for _ in looks():
         assert keeper.written() == []
         if keeper.stuck:
             break
-        threading.Event().wait(0.01)
     assert keeper.stuck == "world cannot store its state now: the disk is full"
     store.sickness = ""
     assert len(safe(keeper, 1)) == 1
@@ -98,11 +104,10 @@ def test_a_commit_of_which_nobody_knows_whether_it_happened_is_not_done_twice(ki
     keeper = kind(store, "world", "s1")
     store.sickness = "after"
     keeper.write(batch(1))
-    for _ in range(300):
+    for _ in looks():
         keeper.written()
         if keeper.stuck:
             break
-        threading.Event().wait(0.01)
     store.sickness = ""
     keeper.write(batch(2))
     safe(keeper, 2)
@@ -110,7 +115,8 @@ def test_a_commit_of_which_nobody_knows_whether_it_happened_is_not_done_twice(ki
     keeper.close()
 
 
-def test_what_waits_is_stored_before_the_end(kind, store):
+def test_what_waits_is_stored_before_the_end(kind, store, monkeypatch):
+    monkeypatch.setattr(keeping, "CLOSE_S", PATIENCE_S)
     keeper = kind(store, "world", "s1")
     keeper.write(batch(1))
     keeper.close()

@@ -170,7 +170,7 @@ def test_an_authority_that_did_not_sign_itself_is_refused():
         Verifier(forged)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.binary(max_size=400), st.integers(0, 60))
 def test_noise_is_refused_in_words(noise, kept):
     data = Signer(TICKET).sign(PAYLOAD, CAM, NOW)[:kept] + noise

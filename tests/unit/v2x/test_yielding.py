@@ -10,7 +10,10 @@ import pytest
 from scm.v2x.router import Router, free_endpoint
 from scm.v2x.yielding import yielding
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="scheduling classes are Linux's")
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="scheduling classes are Linux's"),
+    pytest.mark.usefixtures("lasting_links"),
+]
 
 
 def class_in_a_new_thread() -> int:
@@ -61,5 +64,5 @@ def test_the_threads_of_a_process_first_bus_yield_and_its_owner_does_not() -> No
     endpoint = free_endpoint()
     with Router(endpoint):
         fresh = [sys.executable, "-c", FRESH.format(endpoint=endpoint)]
-        said = subprocess.run(fresh, capture_output=True, text=True, check=True, timeout=30)
+        said = subprocess.run(fresh, capture_output=True, text=True, check=True, timeout=120)
     assert said.stdout.split() == ["True", "True"]

@@ -251,5 +251,5 @@ class GuardMachine(RuleBasedStateMachine):
             self.lost_epoch = self.highest
 
 
-GuardMachine.TestCase.settings = settings(max_examples=60, stateful_step_count=40, deadline=None)
+GuardMachine.TestCase.settings = settings(max_examples=60, stateful_step_count=40)
 test_whatever_arrives_the_guard_keeps_its_promises = GuardMachine.TestCase

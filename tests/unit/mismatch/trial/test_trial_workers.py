@@ -14,7 +14,7 @@ import pytest
 from scm.parent_watch import with_parent
 
 SCRIPT = Path(__file__).with_name("sleeping_trial.py")
-START_S, END_S = 60.0, 5.0
+START_S, END_S = 120.0, 30.0
 
 
 def until(condition, timeout_s, what):
