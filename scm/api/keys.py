@@ -42,10 +42,15 @@ class KeyRecord(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class KeyRing:
-    """The keys of one city in a store; changes count at once, in every process that reads it."""
+    """The keys of one city in a store; changes count at once, in every process that reads it.
+
+    Attributes:
+        ended: Ids of keys that were ended through this ring.
+    """
 
     def __init__(self, store: Repository) -> None:
         self._store = store
+        self.ended: set[str] = set()
 
     def add(self, owner: str, role: str, now_s: int) -> str:
         """Make a key; return it, for it is never shown again.
@@ -82,19 +87,22 @@ class KeyRing:
             msg = f"key: got {key_id!r}, expected the id of one: `scm key list` names them"
             raise AccessError(msg)
         self._store.delete("credentials", _PREFIX + key_id)
+        self.ended.add(key_id)
         return _read(key_id, body)
 
-    def find(self, key: str) -> KeyRecord | None:
-        """Return whose key this is; None: nobody's."""
-        match = _KEY.fullmatch(key)
-        if match is None:
-            return None
-        body = self._store.get("credentials", _PREFIX + match[1])
-        if body is None:
-            return None
-        record = _read(match[1], body)
-        given = _digest(match[2], bytes.fromhex(record.salt))
-        return record if hmac.compare_digest(given, record.digest) else None
+    def record(self, key_id: str) -> KeyRecord | None:
+        """Return what is kept of the key of an id; None: there is none."""
+        body = self._store.get("credentials", _PREFIX + key_id)
+        return None if body is None else _read(key_id, body)
+
+
+def whose(key: str, record: KeyRecord) -> KeyRecord | None:
+    """Return the record of the key's id if the key's secret is the one it was made with."""
+    match = _KEY.fullmatch(key)
+    if match is None or match[1] != record.key_id:
+        return None
+    given = _digest(match[2], bytes.fromhex(record.salt))
+    return record if hmac.compare_digest(given, record.digest) else None
 
 
 def public_part(key: str) -> str:
