@@ -19,6 +19,7 @@ from scm.api.city import Ask, City, Link
 from scm.api.gate import Gate, content_policy
 from scm.api.idempotency import Idempotent
 from scm.api.keys import KeyRing
+from scm.api.known_keys import KnownKeys
 from scm.api.limits import Limited
 from scm.api.metrics import Measured, Metrics
 from scm.api.mismatch_jobs import MismatchJobs
@@ -149,6 +150,7 @@ class _Desk:
     ) -> None:
         self.city = city
         self.keys = keys
+        self.known = None if keys is None else KnownKeys(keys, clock)
         self.store = store
         self.seen = Acknowledgements(store, clock)
         self.work = Operations(clock)
@@ -186,7 +188,7 @@ class _Desk:
             scan.router(city, stream),
             vehicle_frames.router(self.frames),
             close_up.router(city, stream),
-            drive.router(city, stream, self.keys),
+            drive.router(city, stream, self.known),
         )
 
     def of_the_server(self) -> tuple[APIRouter, ...]:
@@ -221,7 +223,7 @@ def _add_layers(app: FastAPI, desk: _Desk, clock: WallClock) -> None:
     app.add_middleware(Idempotent, clock=clock)  # what is added later sees a request earlier
     app.add_middleware(Limited, clock=clock)
     app.add_middleware(Audited, store=desk.store, clock=clock)
-    app.add_middleware(Gate, keys=desk.keys, policy=policy)
+    app.add_middleware(Gate, keys=desk.known, policy=policy)
     app.add_middleware(Measured, metrics=desk.metrics, clock=clock)
     app.add_middleware(Traced)
 

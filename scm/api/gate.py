@@ -12,6 +12,7 @@ an address, which is logged: they offer it as the subprotocol `scm.key.<key>`, w
 
 import base64
 import hashlib
+import logging
 import math
 import re
 from http import HTTPStatus
@@ -23,9 +24,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from scm.api.brake import REFILL_PER_S, Brake
 from scm.api.keys import KeyRing
+from scm.api.known_keys import Known, KnownKeys
 from scm.api.problem import problem
 from scm.clock import WallClock
-from scm.errors import RunError
+from scm.errors import RunError, StoreError
+from scm.log import event
 from scm.v2x.access import is_loopback
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
@@ -33,11 +36,13 @@ COOKIE = "scm_key"
 KEY_PROTOCOL = "scm.key."
 GUARDED = ("/api/", "/ngsi-ld/", "/metrics")
 OPEN = frozenset({"/api/v1/openapi.json"})
+STOP = "/api/v1/stop"
 RETRY_S = str(math.ceil(1.0 / REFILL_PER_S))
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _INLINE_SCRIPT = re.compile(r"<script(?![^>]*\bsrc=)[^>]*>(.*?)</script>", re.DOTALL)
 
 _Refusal = tuple[int, str, str]
+_log = logging.getLogger(__name__)
 
 
 def check_bind(host: str, keys: KeyRing | None) -> None:
@@ -71,11 +76,12 @@ def content_policy(page: str) -> str:
 class Gate:
     """ASGI middleware: host, origin and key on the way in, security headers on the way out.
 
-    A route finds in the scope whose request it is: `scm_role`, `scm_owner`, `scm_key`.
+    A route finds in the scope whose request it is: `scm_role`, `scm_owner`, `scm_key`; the stop
+    also whether the store of keys said so just now: `scm_is_sure`.
     """
 
     def __init__(
-        self, app: ASGIApp, *, keys: KeyRing | None, policy: str, brake: Brake | None = None
+        self, app: ASGIApp, *, keys: KnownKeys | None, policy: str, brake: Brake | None = None
     ) -> None:
         self._app = app
         self._keys = keys
@@ -100,7 +106,7 @@ class Gate:
 
         headers = Headers(scope=scope)
         is_safe = scope["type"] == "http" and scope["method"] in _SAFE_METHODS
-        refusal = self._refusal(headers, is_safe=is_safe) or self._admit(
+        refusal = self._refusal(headers, is_safe=is_safe) or await self._admit(
             scope, headers, is_safe=is_safe
         )
         if refusal is None:
@@ -126,7 +132,7 @@ class Gate:
             return HTTPStatus.FORBIDDEN, "origin", detail
         return None
 
-    def _admit(self, scope: Scope, headers: Headers, *, is_safe: bool) -> _Refusal | None:
+    async def _admit(self, scope: Scope, headers: Headers, *, is_safe: bool) -> _Refusal | None:
         """Note whose request it is, or refuse it."""
         if self._keys is None:
             scope.update(scm_role="admin", scm_owner="this machine", scm_key="")
@@ -139,14 +145,25 @@ class Gate:
         if key and self._brake.wait_s(address, key) > 0.0:
             detail = f"this key was wrong too often from {address}; wait a little"
             return HTTPStatus.TOO_MANY_REQUESTS, "too_many", detail
-        record = self._keys.find(key)
+        try:
+            known = await self._known(self._keys, key, path)
+        except StoreError as failure:
+            event(_log, "keys_not_read", level=logging.ERROR, reason=repr(str(failure)))
+            detail = "the store of API keys cannot be read now"
+            return HTTPStatus.SERVICE_UNAVAILABLE, "offline", detail
+        record = known.record
         if record is None:
             if key:
                 self._brake.note_wrong(address, key)
             detail = "this needs an API key: send `Authorization: Bearer <key>`"
             return HTTPStatus.UNAUTHORIZED, "unauthorised", detail
         scope.update(scm_role=record.role, scm_owner=record.owner, scm_key=key)
+        scope["scm_is_sure"] = known.is_sure
         return None
+
+    @staticmethod
+    async def _known(keys: KnownKeys, key: str, path: str) -> Known:
+        return await keys.find_for_stop(key) if path == STOP else Known(await keys.find(key))
 
 
 def _is_embedded_elsewhere(headers: Headers) -> bool:

@@ -48,6 +48,7 @@ class KeyRing:
     def __init__(self, store: Repository) -> None:
         self._store = store
         self._lent: dict[str, tuple[KeyRecord, str]] = {}
+        self._ended: set[str] = set()
 
     def add(self, owner: str, role: str, now_s: int) -> str:
         """Make a key; return it, for it is never shown again.
@@ -74,7 +75,8 @@ class KeyRing:
         Raises:
             AccessError: when their key is nobody's any more.
         """
-        lender = self.find(key)
+        kept = self.record(public_part(key))
+        lender = None if kept is None else whose(key, kept)
         if lender is None:
             msg = f"{doing}: the key of who asked for it has ended"
             raise AccessError(msg)
@@ -85,6 +87,7 @@ class KeyRing:
     def take_back(self, lent: str) -> None:
         """End a key that was lent."""
         self._lent.pop(public_part(lent), None)
+        self._ended.add(public_part(lent))
 
     def records(self) -> Iterator[KeyRecord]:
         """Return what is kept of all keys, by id."""
@@ -103,27 +106,34 @@ class KeyRing:
             msg = f"key: got {key_id!r}, expected the id of one: `scm key list` names them"
             raise AccessError(msg)
         self._store.delete("credentials", _PREFIX + key_id)
+        self._ended.add(key_id)
         return _read(key_id, body)
 
-    def find(self, key: str) -> KeyRecord | None:
-        """Return whose key this is; None: nobody's."""
-        match = _KEY.fullmatch(key)
-        if match is None:
-            return None
-        record = self._record(match[1])
-        if record is None:
-            return None
-        given = _digest(match[2], bytes.fromhex(record.salt))
-        return record if hmac.compare_digest(given, record.digest) else None
+    def has_ended(self, key_id: str) -> bool:
+        """Say, without asking the store, whether a key or one it was lent for was ended here."""
+        while key_id not in self._ended:
+            if key_id not in self._lent:
+                return False
+            key_id = self._lent[key_id][1]
+        return True
 
-    def _record(self, key_id: str) -> KeyRecord | None:
-        """Return what is kept of a key; None: it has ended, or the one that it was lent for."""
+    def record(self, key_id: str) -> KeyRecord | None:
+        """Return what is kept of the key of an id; None: it has ended, or its lender's has."""
         lent = self._lent.get(key_id)
         if lent is not None:
             record, lender = lent
-            return record if self._record(lender) is not None else None
+            return record if self.record(lender) is not None else None
         body = self._store.get("credentials", _PREFIX + key_id)
         return None if body is None else _read(key_id, body)
+
+
+def whose(key: str, record: KeyRecord) -> KeyRecord | None:
+    """Return the record of the key's id if the key's secret is the one it was made with."""
+    match = _KEY.fullmatch(key)
+    if match is None or match[1] != record.key_id:
+        return None
+    given = _digest(match[2], bytes.fromhex(record.salt))
+    return record if hmac.compare_digest(given, record.digest) else None
 
 
 def public_part(key: str) -> str:

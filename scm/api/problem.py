@@ -60,6 +60,7 @@ class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
         status: Of the answer.
         code: A short word for programs.
         detail: What is wrong, where, what was expected, in a sentence.
+        asked: Where a part of the city did not answer: the request and its key on the bus.
         instance: What was asked.
         trace_id: Names this request in the log of the server (W3C trace context).
         errors: Each wrong field: `where` it stands, and what was `expected` there.
@@ -70,6 +71,7 @@ class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     status: Annotated[int, Meta(examples=[404])]
     code: Annotated[str, Meta(examples=["not_found"])]
     detail: Annotated[str, Meta(examples=["there is no vehicle named 'n9'"])] = ""
+    asked: Annotated[str, Meta(examples=["StopRequest on scm/@v1/lab/world/stop_request"])] = ""
     instance: Annotated[str, Meta(examples=["/api/v1/vehicles/n9"])] = ""
     trace_id: Annotated[str, Meta(examples=["4bf92f3577b34da6a3ce929d0e0e4736"])] = ""
     errors: Annotated[
@@ -101,6 +103,7 @@ def problem(
     code: str,
     detail: str,
     *,
+    asked: str = "",
     instance: str = "",
     errors: tuple[dict[str, str], ...] = (),
 ) -> Response:
@@ -111,6 +114,7 @@ def problem(
         status=status,
         code=code,
         detail=detail,
+        asked=asked,
         instance=instance,
         trace_id=trace_id(),
         errors=errors,
@@ -135,9 +139,10 @@ def install(app: FastAPI) -> None:
 
 async def _on_refused(request: Request, error: Exception) -> Response:
     assert isinstance(error, RefusedError)  # noqa: S101  the type it was registered for
-    code = error.refused.code
-    status = STATUS_OF_CODE.get(code, 409)
-    return problem(status, code, error.refused.detail, instance=request.url.path)
+    refused = error.refused
+    status = STATUS_OF_CODE.get(refused.code, 409)
+    at = request.url.path
+    return problem(status, refused.code, refused.detail, asked=refused.asked, instance=at)
 
 
 async def _on_invalid(request: Request, error: Exception) -> Response:

@@ -11,7 +11,7 @@ city-wide stop holds in the guard as well, so no packet passes it.
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
@@ -28,7 +28,7 @@ from scm.api.wheel import (
 )
 from scm.api.wire import Wire
 from scm.clock import NS_PER_S, Clock, seconds
-from scm.errors import LinkError
+from scm.errors import LinkError, StoreError
 from scm.log import event
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.city_event import CityEvent
@@ -101,7 +101,8 @@ class Seat:
         vehicle: The car.
         owner: The name of the lease: of nobody else's connection.
         is_closed: Tells when the server ends.
-        may_drive: Tells whether the person's key is still good; asked whenever the lease is kept.
+        may_drive: Tells whether the person's key is still good; asked whenever the lease is kept,
+            which it is not where that raises a StoreError.
     """
 
     def __init__(
@@ -114,7 +115,7 @@ class Seat:
         owner: str,
         *,
         is_closed: Callable[[], bool],
-        may_drive: Callable[[], bool],
+        may_drive: Callable[[], Awaitable[bool]],
     ) -> None:
         self._city, self._wire, self._clock, self._socket = city, wire, clock, socket
         self._vehicle, self._owner = vehicle, owner
@@ -232,7 +233,12 @@ class Seat:
         await self._send(told)
 
     async def _renew(self, request: LeaseRequest) -> None:
-        if not self._may_drive():
+        try:
+            may_drive = await self._may_drive()
+        except StoreError as silent:  # the next try may know; else the lease runs out
+            event(_log, "keys_not_read", level=logging.ERROR, reason=repr(str(silent)))
+            return
+        if not may_drive:
             self._over = self._over or Over(code="ended", detail="your API key has ended")
             self._news.set()
             return

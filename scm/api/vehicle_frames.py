@@ -15,8 +15,8 @@ States begin with uint32 generation, uint32 count, float64 world time [s], float
 snapshot [ms], float32 real-time factor; then come `count` float32 of each of x [m], y [m], yaw
 [rad], speed [m/s], steering [rad], age [ms], driven [m] and length of the trip [m] (NaN: no trip,
 infinity: without end), column after column, and `count` uint32 of flags: bit 0 alive, bits 1 to 5
-mode, bits 6 to 10 what it waits for (0 nothing), bits 11 to 31 lights, each a number in its list
-of names. Row i is vehicle i of the names with the same generation.
+mode, or `stuck`, bits 6 to 10 what it waits for (0 nothing), bits 11 to 31 lights, each a number in
+its list of names. Row i is vehicle i of the names with the same generation.
 
 A viewer that is slow gets the newest states, never a backlog.
 """
@@ -187,7 +187,7 @@ class VehicleFrames:
         lights = sum(1 << number for number in {self._lights.number(name) for name in car.lights})
         return (
             int(car.alive)
-            | self._modes.number(car.mode) << 1
+            | self._modes.number(car.mode if car.stuck is None else "stuck") << 1
             | self._waits.number(waits) << 6
             | lights << 11
         )

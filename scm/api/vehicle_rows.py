@@ -36,6 +36,8 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
         command_age_ms: How old the newest command of its leaseholder is, since it reached the car,
             the snapshot's age included; None: nobody else drives it, or none came yet.
         throttle: As the car reports it; None: it reports nothing.
+        stuck: It was told to drive for seconds and stays: what it most likely pushes against, names
+            of cars, `wall`, boxes; empty: nothing that is known. None: it is not stuck.
         eye: What the Eye's newest pose differs from the truth; None: not seen lately.
     """
 
@@ -60,6 +62,7 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
     alive: bool
     lights: tuple[str, ...]
     throttle: float | None
+    stuck: tuple[str, ...] | None
     trip: TripRow | None
     eye: Residual | None
 
@@ -130,6 +133,7 @@ def _row(
         alive=car.alive,
         lights=car.lights,
         throttle=None if car.throttle is None else round(car.throttle, 3),
+        stuck=car.stuck,
         trip=trip,
         eye=eye,
     )

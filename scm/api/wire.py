@@ -5,9 +5,10 @@ from typing import Protocol
 
 from scm.api.trace import traced
 from scm.v2x.ask import ask
-from scm.v2x.bus import Bus
+from scm.v2x.bus import Bus, no_answer
 from scm.v2x.exchange import Call, Incoming
-from scm.v2x.message import Message, Refused, Request
+from scm.v2x.key import key_of
+from scm.v2x.message import Message, Request
 
 SLACK_S = 0.5
 
@@ -58,5 +59,4 @@ class BusWire:
         self._bus.call(Call(request, timeout_s), take)
         if replied.wait(timeout_s + SLACK_S):
             return replies[0].message
-        what = type(request).__name__
-        return Refused(code="timeout", detail=f"{what}: no answer within {timeout_s:g} s")
+        return no_answer(Call(request, timeout_s), key_of(self._bus.city, request))

@@ -204,6 +204,7 @@ WORDS: dict[str, tuple[str, object]] = {
     "status": ("How it is.", "ok"),
     "steering_rad": ("Angle of the front wheels, + = left [rad].", 0.12),
     "step_ms": ("Its slowest step of the last second [ms].", 1.4),
+    "stuck": ("What it pushes against in vain; null: it is not stuck.", ["wall"]),
     "suspect": ("Name of the station.", "n5"),
     "t_ns": ("When it was true, by the clock of who tells it [ns].", 120_000_000_000),
     "t_s": ("Since the begin of the recording [s].", 12.5),

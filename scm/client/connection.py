@@ -38,6 +38,7 @@ class Problem(msgspec.Struct, kw_only=True, frozen=True):
     title: str = ""
     code: str = ""
     detail: str = ""
+    asked: str = ""
     trace_id: str = ""
     errors: tuple[dict[str, str], ...] = ()
 

@@ -12,8 +12,9 @@ import uuid
 import msgspec
 
 from scm.clock import Clock, WallClock, nanoseconds
-from scm.v2x.bus import Bus
+from scm.v2x.bus import Bus, no_answer
 from scm.v2x.exchange import Call, Incoming
+from scm.v2x.key import key_of
 from scm.v2x.message import Message, Refused, Request
 
 TRY_S = 1.0
@@ -85,9 +86,10 @@ class Asking:
             return last
         detail = (
             f"{last.detail}; asked {self.tries} times in {self._deadline_s:g} s. It may have been "
-            f"done: ask again with request_id {self.request.request_id!r} to learn it"
+            "done all the same"
         )
-        return Refused(code=last.code, detail=detail)
+        again = f"ask again with request_id {self.request.request_id!r} to learn whether it was"
+        return Refused(code=last.code, detail=detail, asked=f"{last.asked}; {again}".lstrip("; "))
 
 
 def ask(
@@ -125,5 +127,4 @@ def _try(bus: Bus, call: Call) -> Message:
     bus.call(call, take)
     if replied.wait(call.timeout_s + 0.5):
         return replies[0].message
-    what = type(call.request).__name__
-    return Refused(code="timeout", detail=f"{what}: no answer within {call.timeout_s:g} s")
+    return no_answer(call, key_of(bus.city, call.request))

@@ -133,7 +133,14 @@ def check_reply(answer: Answer) -> None:
 
 def no_server(request: Request, key: str) -> Refused:
     """Return the refusal of a request that nobody serves."""
-    return Refused(code="offline", detail=f"{type(request).__name__}: nobody serves {key}")
+    detail = f"{request.server} is not running, or cannot be reached"
+    return Refused(code="offline", detail=detail, asked=_asked(request, key))
+
+
+def no_link(request: Request, key: str) -> Refused:
+    """Return the refusal of a request that cannot even leave."""
+    detail = "the city cannot be reached: there is no connection to its router"
+    return Refused(code="offline", detail=detail, asked=_asked(request, key))
 
 
 def more_telling(before: Refused | None, now: Refused) -> Refused:
@@ -143,5 +150,9 @@ def more_telling(before: Refused | None, now: Refused) -> Refused:
 
 def no_answer(call: Call, key: str) -> Refused:
     """Return the refusal of a call that was not answered in time."""
-    kind = type(call.request).__name__
-    return Refused(code="timeout", detail=f"{kind}: no answer on {key} within {call.timeout_s} s")
+    detail = f"{call.request.server} did not answer within {call.timeout_s:g} s"
+    return Refused(code="timeout", detail=detail, asked=_asked(call.request, key))
+
+
+def _asked(request: Request, key: str) -> str:
+    return f"{type(request).__name__} on {key}"

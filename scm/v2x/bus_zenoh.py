@@ -21,7 +21,7 @@ from scm.clock import Clock, WallClock
 from scm.errors import LinkError, MessageError
 from scm.log import event
 from scm.v2x import zenoh_config
-from scm.v2x.bus import check_reply, more_telling, no_answer, no_server
+from scm.v2x.bus import check_reply, more_telling, no_answer, no_link, no_server
 from scm.v2x.credentials import Credentials
 from scm.v2x.exchange import Answer, Call, Incoming, RawSample
 from scm.v2x.flood_gate import FloodGate
@@ -278,7 +278,7 @@ class ZenohBus:
         key = key_of(self.city, call.request)
         asked = _Asked(call, on_reply, key, self._clock)
         if not self._connected:
-            asked.settle(Refused(code="offline", detail=f"{self.station}: no link to the city"))
+            asked.settle(no_link(call.request, key))
             return
         body, attachment = encode(call.request)
         self._session.get(

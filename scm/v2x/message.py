@@ -52,15 +52,23 @@ class Request(Message, kw_only=True, frozen=True):
         request_id: Same id, same effect, once: a retry gets the stored answer. Empty: not retried.
         trace_id: W3C trace id of what led to it, a click perhaps; whoever does it notes that. It
             makes no difference to what is asked. Empty: nobody traces it.
+        SERVER: Who answers it, for people; `{field}` words are fields of the message.
         HAS_EFFECT: Whether it changes anything: what does not is in no audit log.
     """
 
     DELIVERY: ClassVar[Delivery] = Delivery.RPC
     REPLY: ClassVar[type[Message]] = Message
+    SERVER: ClassVar[str] = "the part that does this"
     HAS_EFFECT: ClassVar[bool] = True
 
     request_id: str = ""
     trace_id: str = ""
+
+    @property
+    def server(self) -> str:
+        """Who answers it, for people."""
+        fields = {name: getattr(self, name) for name in self.__struct_fields__}
+        return self.SERVER.format_map(fields)
 
 
 class Refused(Message, kw_only=True, frozen=True):
@@ -68,7 +76,8 @@ class Refused(Message, kw_only=True, frozen=True):
 
     Attributes:
         code: A short machine word: `timeout`, `not_found`, `owned`, `invalid`, `offline`.
-        detail: One sentence: what, where, got, expected.
+        detail: One sentence for a person: what, where, got, expected.
+        asked: Where nobody answered: the request and its key on the bus, for engineers.
     """
 
     KEY: ClassVar[str] = "refused"
@@ -76,6 +85,7 @@ class Refused(Message, kw_only=True, frozen=True):
 
     code: str
     detail: str
+    asked: str = ""
 
 
 M = TypeVar("M", bound=Message)

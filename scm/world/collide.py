@@ -27,6 +27,7 @@ def collide(world: World, t_ns: int) -> None:
         return
     touches = world.contacts.step(slots, motion)
     if len(touches.pairs):
+        world.stuck.feel(t_ns, slots, touches.pairs)
         _tell(world, slots, touches, t_ns)
 
 
@@ -41,6 +42,16 @@ def everybody(world: World, t_ns: int) -> tuple[Ints, Floats]:
     if not slots:
         return np.empty(0, np.int64), np.empty((0, 6))
     return np.concatenate(slots), np.concatenate(motion)
+
+
+def touched_lately(world: World, slot: int, now_ns: int) -> tuple[str, ...]:
+    """Return what a car touched in the last moment: cars, `wall`, boxes."""
+    found: set[str] = set()
+    for slots, pairs in world.stuck.touches(now_ns):
+        against = _Against(world, slots, pairs)
+        for row in np.flatnonzero(slots == slot).tolist():
+            found |= against.of(row)
+    return tuple(sorted(found - {""}))  # a car that left since has no name
 
 
 def _tell(world: World, slots: Ints, touches: Touches, t_ns: int) -> None:

@@ -100,6 +100,8 @@ def _drive(world: World, now_ns: int, *, stop: bool) -> None:
     crowd.decide(now_ns, slots.x, slots.y, slots.yaw, slots.speed, driven, stop=stop)
     np.copyto(slots.throttle, crowd.throttle, where=driven)
     np.copyto(slots.steering, crowd.steering, where=driven)
+    if world.stuck.against:
+        slots.throttle[driven & world.stuck.rests(now_ns - world.pace.lost_ns)] = 0.0
     world.errands.look(now_ns)
     np.copyto(slots.arrived, crowd.arrived & driven)
     slots.mode[driven] = STOP if stop else DRIVE

@@ -116,7 +116,7 @@ def snapshot(world: World, now_ns: int) -> WorldSnapshot:
         tick=world.tick,
         vehicles=(
             *_hosted_in_snapshot(world, now_ns),
-            *(_remote_in_snapshot(car, now_ns) for car in world.remote.values()),
+            *(_remote_in_snapshot(world, car, now_ns) for car in world.remote.values()),
         ),
         boxes=world.contacts.boxes.in_snapshot(),
         real_time_factor=world.pace.real_time_factor,
@@ -156,10 +156,11 @@ def _hosted_in_snapshot(world: World, now_ns: int) -> Iterator[SnapshotVehicle]:
             command_age_ms=car.command_age_ms(now_ns),
             mode=MODES[mode],
             lights=lamps(car.switches, throttle, speed, now_ns, **lit),
+            stuck=world.stuck.against.get(car.slot),
         )
 
 
-def _remote_in_snapshot(car: RemoteCar, now_ns: int) -> SnapshotVehicle:
+def _remote_in_snapshot(world: World, car: RemoteCar, now_ns: int) -> SnapshotVehicle:
     state, age_ms = car.state, car.age_ns(now_ns) / NS_PER_MS
     x, y, yaw = car.pose
     return SnapshotVehicle(
@@ -183,6 +184,7 @@ def _remote_in_snapshot(car: RemoteCar, now_ns: int) -> SnapshotVehicle:
         age_ms=age_ms,
         alive=car.alive,
         lights=() if state is None else state.lights,
+        stuck=world.stuck.against.get(car.slot),
     )
 
 

@@ -1,10 +1,13 @@
-"""Watching over cars: who vanishes, whose lease or battery runs out, who leaves all ranges."""
+"""Watching over cars: who vanishes, whose lease or battery runs out, who is stuck or frozen."""
 
 import math
+
+import numpy as np
 
 from scm.clock import NS_PER_S, seconds
 from scm.vehicles.fleet import VehicleStatus
 from scm.world import lease as rules
+from scm.world.collide import WALL, touched_lately
 from scm.world.remote import GONE_NS, STALE_NS, RemoteCar
 from scm.world.world import World
 
@@ -27,6 +30,8 @@ def watch(world: World, now_ns: int) -> None:
             world.say("error", name, status.sentence, now_ns, hosted.name)
     if world.every["battery"].is_due(now_ns):
         _watch_batteries(world, now_ns)
+    if world.every["stuck"].is_due(now_ns):
+        _watch_stuck(world, now_ns)
 
 
 def _watch_batteries(world: World, now_ns: int) -> None:
@@ -37,6 +42,24 @@ def _watch_batteries(world: World, now_ns: int) -> None:
     for name in world.batteries.news(charges):
         text = f"the battery of {name} is low: {100.0 * (charges[name] or 0.0):.0f} % left"
         world.say("warning", "battery_low", text, now_ns, name)
+
+
+def _watch_stuck(world: World, now_ns: int) -> None:
+    slots, stuck = world.slots, world.stuck
+    throttle = np.where(slots.hosted & ~slots.diverged, slots.throttle, 0.0)
+    for car in world.remote.values():
+        if car.alive and car.state is not None:
+            throttle[car.slot] = car.state.throttle
+    new, free = stuck.look(throttle, slots.x, slots.y, now_ns - world.pace.lost_ns)
+    for slot in new.tolist():
+        name, against = slots.names[slot], touched_lately(world, slot, now_ns)
+        stuck.against[slot] = against
+        others = ", ".join("a wall" if other == WALL else other for other in against)
+        pushes = f"pushes against {others}" if against else "is told to drive, touches nothing"
+        world.say("warning", "stuck", f"{name} is stuck: it {pushes} and stays", now_ns, name)
+    for slot in free.tolist():
+        name = slots.names[slot]
+        world.say("info", "stuck", f"{name} is free again", now_ns, name)
 
 
 def lose(world: World, car: RemoteCar, why: str, now_ns: int, *, dead: bool) -> None:

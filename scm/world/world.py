@@ -49,6 +49,7 @@ from scm.world.radio import Radio, RadioCounts, Receivers, roadside_places
 from scm.world.remote import RemoteCar
 from scm.world.seeds import generator, number
 from scm.world.slots import Numbers, Slots
+from scm.world.stuck import Stuck
 from scm.world.wishes import Wishes
 
 NAME = "world"
@@ -57,7 +58,14 @@ SENSORS = "scm.vehicles.sensors"
 SCANNER = "lidar"
 DEFAULT_CAR = "nigel"
 EYE = "eye"
-RATES_HZ = {"snapshot": 20.0, "second": 1.0, "radio": 1.0, "denm": 10.0, "battery": 1.0}
+RATES_HZ = {
+    "snapshot": 20.0,
+    "second": 1.0,
+    "radio": 1.0,
+    "denm": 10.0,
+    "battery": 1.0,
+    "stuck": 5.0,
+}
 
 AnyCar = HostedCar | RemoteCar
 
@@ -96,6 +104,7 @@ class World:
         last_hit_ns: When a car's contact was last told.
         dangers: What is known of warnings on the air.
         batteries: Which of them were told to be low.
+        stuck: Which cars push in vain.
         highest_epoch: Of any car that left: a newcomer's is higher, whatever its name.
     """
 
@@ -152,6 +161,7 @@ class World:
         self.last_hit_ns: dict[str, int] = {}
         self.dangers = Dangers()
         self.batteries = Batteries()
+        self.stuck = Stuck(capacity)
         self._tags = Numbers(city_map.first_vehicle_tag_id, never=city_map.tag.tag_id)
         self._unnamed = 0
         self._came = 0
@@ -372,6 +382,7 @@ class World:
         self.errands.forget(slot)
         self.crowd.leave(slot)
         self.cams.forget(slot)
+        self.stuck.forget(slot)
         for bank in self.banks.values():
             bank.unfit(slot)
         for values in self.readings.values():

@@ -401,7 +401,9 @@ def test_a_request_that_nobody_serves_is_refused_as_offline(city):
     city.bus("api").call(Call(plan()), replies.put)
     (reply,) = gather(city, replies, 1)
     assert reply.message.code == "offline"
-    assert "PlanRequest" in reply.message.detail
+    expected = "the signal controller of junction x1 is not running, or cannot be reached"
+    assert reply.message.detail == expected
+    assert reply.message.asked == "PlanRequest on scm/@v1/test/tl/x1/req"
 
 
 def test_a_request_that_is_not_answered_in_time_is_refused_as_timeout(city, asking):
@@ -411,6 +413,9 @@ def test_a_request_that_is_not_answered_in_time_is_refused_as_timeout(city, aski
     (reply,) = gather(city, asking.replies, 1)
     assert isinstance(reply.message, Refused)
     assert reply.message.code == "timeout"
+    expected = "the signal controller of junction x1 did not answer within 0.3 s"
+    assert reply.message.detail == expected
+    assert reply.message.asked == "PlanRequest on scm/@v1/test/tl/x1/req"
 
 
 def test_an_answer_after_the_timeout_is_ignored(city, asking):

@@ -206,6 +206,18 @@ def test_the_file_is_named_after_its_class(name):
     assert kind.__name__ == "".join(word.capitalize() for word in name.split("_"))
 
 
+@pytest.mark.parametrize("kind", [kind for kind in SENT if issubclass(kind, Request)])
+@settings(max_examples=3)
+@given(data=st.data())
+def test_a_request_says_who_answers_it(kind, data):
+    message = data.draw(structs(kind))
+    assert kind.SERVER != Request.SERVER
+    assert message.server.startswith("the ")
+    named = [name for name in variables(kind) if name in kind.SERVER]
+    assert all(str(getattr(message, name)) in message.server for name in named)
+    assert "{" not in message.server
+
+
 def numeric_fields(kind):
     """Yield (path, name) of every field that holds numbers, those of inner structs included."""
     for field in msgspec.structs.fields(kind):

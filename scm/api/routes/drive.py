@@ -8,7 +8,7 @@ import secrets
 from fastapi import APIRouter, WebSocket
 
 from scm.api.city import City, Name
-from scm.api.keys import KeyRing
+from scm.api.known_keys import KnownKeys
 from scm.api.problem import RefusedError
 from scm.api.roles import OPERATOR
 from scm.api.stream import Stream
@@ -17,7 +17,7 @@ from scm.clock import WallClock
 from scm.v2x.message import Refused
 
 
-def router(city: City, stream: Stream, keys: KeyRing | None) -> APIRouter:
+def router(city: City, stream: Stream, keys: KnownKeys | None) -> APIRouter:
     """Return the route."""
     routes = APIRouter(prefix="/vehicles", tags=["vehicles"], dependencies=[OPERATOR])
 
@@ -32,6 +32,10 @@ def router(city: City, stream: Stream, keys: KeyRing | None) -> APIRouter:
         await socket.accept(subprotocol=PROTOCOL)
         owner = f"{socket.scope['scm_owner']} #{secrets.token_hex(2)}"
         key = str(socket.scope["scm_key"])
+
+        async def may_drive() -> bool:
+            return keys is None or await keys.find(key) is not None
+
         await Seat(
             city,
             city.wire,
@@ -40,7 +44,7 @@ def router(city: City, stream: Stream, keys: KeyRing | None) -> APIRouter:
             name,
             owner,
             is_closed=lambda: stream.is_closed,
-            may_drive=lambda: keys is None or keys.find(key) is not None,
+            may_drive=may_drive,
         ).run()
 
     return routes

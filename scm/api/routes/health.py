@@ -1,5 +1,6 @@
 """Health: is the server up, and can it do its work."""
 
+import logging
 import shutil
 from collections.abc import Iterator
 from dataclasses import fields
@@ -12,9 +13,11 @@ from scm.api.city import City, json_response
 from scm.api.problem import problem
 from scm.api.schemas import answer
 from scm.clock import seconds
+from scm.log import event
 
 READY_S = 2.0
 LEAST_FREE_BYTES = 200 * 2**20
+_log = logging.getLogger(__name__)
 
 
 class Alive(msgspec.Struct, kw_only=True, frozen=True):
@@ -59,6 +62,7 @@ class Ready(msgspec.Struct, kw_only=True, frozen=True):
 def router(city: City) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(tags=["health"])
+    disk = _Disk(city)
 
     @routes.get("/healthz", summary="The server answers", responses=answer(Alive))
     async def healthz() -> Response:
@@ -70,7 +74,7 @@ def router(city: City) -> APIRouter:
         responses=answer(Ready),
     )
     def readyz() -> Response:
-        checks = (_router(city), _world(city), _disk(city))
+        checks = (_router(city), _world(city), disk.check())
         wrong = [f"{check.name}: {check.detail}" for check in checks if not check.good]
         if wrong:
             return problem(503, "not_ready", "; ".join(wrong))
@@ -103,18 +107,37 @@ def _age_s(city: City) -> float | None:
     return seconds(city.now_ns() - picture.snapshot.arrived_ns)
 
 
-def _disk(city: City) -> Check:
-    free = {folder: shutil.disk_usage(folder).free for folder in _folders(city)}
-    if not free:
-        return Check(name="disk", good=True, detail="there are no shelves")
-    folder, least = min(free.items(), key=lambda found: found[1])
-    detail = f"{folder} has {least // 2**20} MiB free, expected {LEAST_FREE_BYTES // 2**20} or more"
-    return Check(name="disk", good=least >= LEAST_FREE_BYTES, detail=detail)
+class _Disk:
+    """The room on the shelves. Anybody may ask: where they lie only the log tells, once."""
+
+    def __init__(self, city: City) -> None:
+        self._city = city
+        self._is_good = True
+
+    def check(self) -> Check:
+        """Look at the shelf with the least room."""
+        free = [
+            (shutil.disk_usage(folder).free, shelf, folder)
+            for shelf, folder in _folders(self._city)
+        ]
+        if not free:
+            return Check(name="disk", good=True, detail="there are no shelves")
+        least, shelf, folder = min(free, key=lambda found: found[0])
+        was_good, self._is_good = self._is_good, least >= LEAST_FREE_BYTES
+        if was_good and not self._is_good:
+            mib = least // 2**20
+            event(_log, "disk_short", level=logging.WARNING, shelf=shelf, at=folder, free_mib=mib)
+        detail = (
+            f"where {shelf} are kept {least // 2**20} MiB are free, "
+            f"expected {LEAST_FREE_BYTES // 2**20} or more"
+        )
+        return Check(name="disk", good=self._is_good, detail=detail)
 
 
-def _folders(city: City) -> Iterator[Path]:
-    """Yield the shelves that are there, or what they will be made in."""
+def _folders(city: City) -> Iterator[tuple[str, Path]]:
+    """Yield the shelves by kind, each with its folder or what that will be made in."""
     for shelf in fields(city.shelves):
         folder: Path | None = getattr(city.shelves, shelf.name)
         if folder is not None:
-            yield next(found for found in (folder, *folder.absolute().parents) if found.exists())
+            parents = (folder, *folder.absolute().parents)
+            yield shelf.name, next(found for found in parents if found.exists())

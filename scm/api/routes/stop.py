@@ -7,13 +7,15 @@ import asyncio
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, json_response
 from scm.api.picture import Picture
+from scm.api.problem import RefusedError
 from scm.api.roles import OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer
+from scm.v2x.message import Refused
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.stop_request import StopRequest
 
@@ -53,7 +55,12 @@ def router(city: City) -> APIRouter:
         dependencies=[OPERATOR],
         responses=answer(CityStop),
     )
-    async def set_stop(body: StopBody, signer: Signer, key: IdempotencyKey = "") -> Response:
+    async def set_stop(
+        asked: Request, body: StopBody, signer: Signer, key: IdempotencyKey = ""
+    ) -> Response:
+        if not (body.engaged or asked.scope.get("scm_is_sure", True)):
+            detail = "the store of API keys cannot be read now: it must know your key for that"
+            raise RefusedError(Refused(code="offline", detail=detail))
         by, reason = signer(body.by), body.reason
         request = StopRequest(request_id=key, engaged=body.engaged, by=by, reason=reason)
         loop = asyncio.get_running_loop()

@@ -57,6 +57,8 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
         alive: Whether it is there; false: it left or died.
         lights: Lamps that burn.
         throttle: As the car reports it; None: it reports nothing.
+        stuck: It was told to drive for seconds and stays: what it most likely pushes against,
+            names of cars, `wall`, boxes; empty: nothing that is known. None: it is not stuck.
         trip: The way it is on; null: none.
         eye: What the Eye's newest pose differs from the truth; None: not seen lately.
     """
@@ -82,6 +84,7 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
     alive: bool
     lights: tuple[str, ...]
     throttle: float | None
+    stuck: tuple[str, ...] | None
     trip: TripRow | None
     eye: Residual | None
 

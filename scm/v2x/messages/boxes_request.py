@@ -18,6 +18,7 @@ class BoxesRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "world/boxes"
     REPLY: ClassVar[type[Message]] = BoxesReply
+    SERVER: ClassVar[str] = "the world"
 
     by: str = ""
 

@@ -55,6 +55,7 @@ class CalibrationRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "eye/{camera}/req"
     REPLY: ClassVar[type[Message]] = CalibrationReply
+    SERVER: ClassVar[str] = "the Eye at camera {camera}"
 
     camera: str
     verb: Literal["use", "back"] = "use"

@@ -22,6 +22,7 @@ class EchoRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "v/{vehicle}/cmd/echo"
     REPLY: ClassVar[type[Message]] = EchoReply
+    SERVER: ClassVar[str] = "the program that drives {vehicle}"
     HAS_EFFECT: ClassVar[bool] = False
 
     vehicle: str

@@ -40,6 +40,7 @@ class JoinRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "v/{vehicle}/join"
     REPLY: ClassVar[type[Message]] = JoinReply
+    SERVER: ClassVar[str] = "the world"
 
     vehicle: str
     session: str

@@ -33,6 +33,7 @@ class LeaseRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "v/{vehicle}/lease"
     REPLY: ClassVar[type[Message]] = LeaseReply
+    SERVER: ClassVar[str] = "the world"
 
     vehicle: str
     owner: str

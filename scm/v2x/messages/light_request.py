@@ -23,6 +23,7 @@ class LightRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "v/{vehicle}/cmd/lights"
     REPLY: ClassVar[type[Message]] = LightReply
+    SERVER: ClassVar[str] = "the program that drives {vehicle}"
 
     vehicle: str
     headlights: Literal["off", "low", "high"] | None = None

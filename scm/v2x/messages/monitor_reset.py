@@ -11,6 +11,7 @@ class MonitorReset(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "tl/{junction}/mon/reset"
     REPLY: ClassVar[type[Message]] = MonitorStatus
+    SERVER: ClassVar[str] = "the monitor of junction {junction}"
 
     junction: str
     by: str

@@ -50,6 +50,7 @@ class PlanRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "tl/{junction}/req"
     REPLY: ClassVar[type[Message]] = PlanReply
+    SERVER: ClassVar[str] = "the signal controller of junction {junction}"
 
     junction: str
     plan: str

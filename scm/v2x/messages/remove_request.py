@@ -22,6 +22,7 @@ class RemoveRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "v/{vehicle}/remove"
     REPLY: ClassVar[type[Message]] = RemoveReply
+    SERVER: ClassVar[str] = "the world"
 
     vehicle: str
     reason: str = ""

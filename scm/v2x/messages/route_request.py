@@ -32,6 +32,7 @@ class RouteRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "v/{vehicle}/cmd/route"
     REPLY: ClassVar[type[Message]] = RouteReply
+    SERVER: ClassVar[str] = "the program that drives {vehicle}"
 
     vehicle: str
     via: tuple[str, ...] = ()

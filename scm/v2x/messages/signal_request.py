@@ -57,6 +57,7 @@ class SignalRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "tl/{junction}/wish"
     REPLY: ClassVar[type[Message]] = SignalReply
+    SERVER: ClassVar[str] = "the signal controller of junction {junction}"
 
     junction: str
     verb: Verb

@@ -28,6 +28,7 @@ class SpawnRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "world/spawn"
     REPLY: ClassVar[type[Message]] = SpawnReply
+    SERVER: ClassVar[str] = "the world"
 
     vehicle: str = ""
     car: str = "nigel"

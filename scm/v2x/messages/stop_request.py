@@ -11,6 +11,7 @@ class StopRequest(Request, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "world/stop_request"
     REPLY: ClassVar[type[Message]] = CityStop
+    SERVER: ClassVar[str] = "the world"
 
     engaged: bool
     by: str

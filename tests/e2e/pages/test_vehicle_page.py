@@ -61,13 +61,16 @@ def drives_by_itself(running, name=CAR):
 
 
 class Tired:
-    """A real car's agent, as far as the city sees: it stands, and its battery is nearly empty."""
+    """A real car's agent, as far as the city sees: it stands, and its battery is nearly empty.
+
+    With a throttle it wants to drive.
+    """
 
     name, role, period_ns, hears = TIRED, "v", 50 * NS_PER_MS, ()
     serves = (Serves(EchoRequest, {"vehicle": TIRED}),)
 
-    def __init__(self, session):
-        self.session, self.seq = session, 0
+    def __init__(self, session, throttle):
+        self.session, self.throttle, self.seq = session, throttle, 0
 
     def step(self, now_ns, inbox):
         self.seq += 1
@@ -84,7 +87,8 @@ class Tired:
         state = VehicleState(
             vehicle=TIRED, t_ns=now_ns, seq=self.seq, x_m=self.place.x_m, y_m=self.place.y_m,
             yaw_rad=self.place.yaw_rad, speed_mps=0.0, yaw_rate_radps=0.0, steering_rad=0.0,
-            throttle=0.0, source="eye", mode="idle", battery_v=11.08, battery_charge=0.1249,
+            throttle=self.throttle, source="eye", mode="idle", battery_v=11.08,
+            battery_charge=0.1249,
         )  # fmt: skip
         report = MisbehaviourReport(
             suspect=TIRED, suspect_id=9, t_ns=now_ns, since_ns=now_ns, score=6.0, observations=(),
@@ -97,10 +101,11 @@ class Tired:
 
 
 @contextmanager
-def tired(running):
+def tired(running, throttle=0.0):
     """Have a car in the city whose battery is low, and that was reported once."""
     bus, stop = ZenohBus("city", TIRED, running.endpoint), threading.Event()
-    thread = threading.Thread(target=run, args=(Tired(bus.session), bus, WallClock(), stop))
+    agent = Tired(bus.session, throttle)
+    thread = threading.Thread(target=run, args=(agent, bus, WallClock(), stop))
     thread.start()
     try:
         yield
@@ -174,6 +179,22 @@ def test_a_low_battery_is_told_by_sign_and_word_and_once_in_the_events(visit, ru
         photograph(visited, "battery_narrow_dark")
         events = running.get(f"/events?vehicle={TIRED}&name=battery_low")["items"]
         assert [event["text"] for event in events] == [f"the battery of {TIRED} is low: 12 % left"]
+
+
+def test_a_car_that_pushes_in_vain_is_stuck_in_table_page_and_events(visit, running):
+    with tired(running, throttle=0.4):
+        visited = visit("/vehicles")
+        page = visited.page
+        page.wait_for_selector(f'tr[data-car={TIRED}] .mode[data-mode="stuck"] >> text=stuck')
+        photograph(visited, "stuck_table")
+        page.click(f"tr[data-car={TIRED}] a")
+        page.wait_for_selector('.who .mode[data-mode="stuck"]')
+        told = page.wait_for_selector('[data-fact="stuck"]').inner_text()
+        assert told.startswith(("told to drive and stays", "pushes against"))  # others may hit it
+        judge(visited)
+        photograph(visited, "stuck")
+        (event,) = running.get(f"/events?vehicle={TIRED}&name=stuck")["items"]
+        assert event["text"].startswith(f"{TIRED} is stuck: it ")
 
 
 def test_a_car_is_found_by_typing_and_opened_by_the_keyboard(visit):

@@ -79,8 +79,24 @@ class TestReady:
             == "world: the newest snapshot is 3.0 s old, expected at most 2.0 s"
         )
 
-    def test_a_full_disk_is_told_with_its_folder(self, ready, heard, monkeypatch, tmp_path):
+    @pytest.fixture
+    def full(self, monkeypatch):
         usage = namedtuple("usage", "total used free")
         monkeypatch.setattr(shutil, "disk_usage", lambda _folder: usage(10, 10, 2**20))
-        detail = ready().json()["detail"]
-        assert detail == f"disk: {tmp_path} has 1 MiB free, expected 200 or more"
+
+    def test_a_full_disk_is_told_by_the_kind_of_shelf_and_never_by_its_folder(
+        self, ready, heard, full, tmp_path
+    ):
+        answer = ready()
+        expected = "disk: where recordings are kept 1 MiB are free, expected 200 or more"
+        assert answer.json()["detail"] == expected
+        assert str(tmp_path) not in answer.text
+
+    def test_the_folder_of_a_full_shelf_stands_in_the_log_once(
+        self, view, fake_city, city_map, client_of, heard, full, tmp_path, caplog
+    ):
+        shelves = shelves_in(tmp_path / "runs")
+        ask = client_of(create_app(view, fake_city.ask, city_map, shelves=shelves))
+        assert [ask("GET", "/readyz").status_code for _ in range(3)] == [503] * 3
+        told = [line for line in caplog.messages if line.startswith("disk_short")]
+        assert told == [f"disk_short shelf=recordings at={tmp_path} free_mib=1"]

@@ -8,6 +8,7 @@ from scm.api.app import create_app
 from scm.api.brake import Brake
 from scm.api.gate import Gate, check_bind, content_policy, is_loopback
 from scm.api.keys import KeyRing
+from scm.api.known_keys import KnownKeys
 from scm.api.roles import ROLES
 from scm.clock import NS_PER_S, StepClock
 from scm.errors import RunError
@@ -189,7 +190,7 @@ class TestWithKeys:
         clock = StepClock()
         fake_city.answers[StopRequest] = CityStop(t_ns=1, engaged=True)
         inner = create_app(view, fake_city.ask, city_map, keys=ring)
-        gate = Gate(inner, keys=ring, policy="", brake=Brake(clock))
+        gate = Gate(inner, keys=KnownKeys(ring, clock), policy="", brake=Brake(clock))
         key, other = key_of("operator"), key_of("viewer")
         guess = bearer(key[:-4] + "AAAA")
         codes = [call_from(gate, "10.0.0.9", guess).status_code for _ in range(12)]

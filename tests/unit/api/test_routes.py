@@ -1,7 +1,12 @@
 import msgspec
 import pytest
 
+from scm.api.app import create_app
+from scm.api.wire import BusWire
+from scm.clock import StepClock
 from scm.maps.model import CityMap
+from scm.v2x.bus import Mailbox
+from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
@@ -120,6 +125,31 @@ class TestRefusals:
         fake_city.answers[RemoveRequest] = Refused(code=code, detail="because")
         body = is_problem(client("DELETE", f"{API}/vehicles/n5"), status, code)
         assert body["detail"] == "because"
+
+    @pytest.fixture
+    def network(self):
+        return MemoryNetwork(StepClock())
+
+    @pytest.fixture
+    def remove(self, network, view, city_map, client_of):
+        """Take a car off the map over a real bus; an answer has no time to come."""
+        wire = BusWire(network.bus("lab", "api"))
+
+        def ask(request, _timeout_s):
+            return wire.ask_once(request, 0.05)
+
+        return lambda: client_of(create_app(view, ask, city_map))("DELETE", f"{API}/vehicles/n5")
+
+    def test_who_is_not_there_is_told_to_people_and_the_key_to_engineers(self, remove):
+        body = is_problem(remove(), 503, "offline")
+        assert body["detail"] == "the world is not running, or cannot be reached"
+        assert body["asked"] == "RemoveRequest on scm/@v1/lab/v/n5/remove"
+
+    def test_who_does_not_answer_is_told_to_people_and_the_key_to_engineers(self, remove, network):
+        network.bus("lab", "world").serve(RemoveRequest, {}, Mailbox(10))
+        body = is_problem(remove(), 504, "timeout")
+        assert body["detail"] == "the world did not answer within 0.05 s"
+        assert body["asked"] == "RemoveRequest on scm/@v1/lab/v/n5/remove"
 
     def test_a_reply_of_the_wrong_kind_is_a_problem(self, client, fake_city):
         fake_city.answers[RemoveRequest] = CityStop(t_ns=0, engaged=False)

@@ -47,6 +47,13 @@ class TestCars:
         (car,) = vehicles_topic(view.picture()).vehicles
         assert (car.battery_v, car.battery_charge, car.command_age_ms) == (11.46, 0.4568, 120.0)
 
+    @pytest.mark.parametrize("against", [None, (), ("n2", "wall")])
+    def test_what_a_stuck_car_pushes_against_comes_with_it(self, view, hear, snapshot, against):
+        told, replace = snapshot(n1=(0.0, 0.0, 0.0)), msgspec.structs.replace
+        hear(1.0, replace(told, vehicles=(replace(told.vehicles[0], stuck=against),)))
+        (car,) = vehicles_topic(view.picture()).vehicles
+        assert car.stuck == against
+
     def test_a_trip_is_shown_until_it_has_not_been_told_for_ten_seconds(self, view, hear, snapshot):
         trip = Trip(
             vehicle="n1",

@@ -84,6 +84,19 @@ def test_a_route_without_end_is_endless_and_one_that_ended_is_no_trip(frames, he
     assert waits == ["signal", ""]
 
 
+def test_a_car_that_is_stuck_tells_that_as_its_mode(frames, hear, snapshot):
+    async def scenario():
+        told = snapshot(1.0, n1=(0, 0, 0), n2=(1, 0, 0))
+        stuck, other = told.vehicles
+        stuck = msgspec.structs.replace(stuck, stuck=())
+        hear(1.0, msgspec.structs.replace(told, vehicles=(stuck, other)))
+        return read(await anext(frames.listen()))
+
+    names, generation, _, flags, _ = asyncio.run(scenario())
+    modes = [names[generation]["modes"][flag >> 1 & 31] for flag in flags]
+    assert modes == ["stuck", "drive"]
+
+
 def test_names_are_told_again_only_when_they_changed(frames, hear, snapshot):
     async def scenario():
         hear(1.0, snapshot(1.0, n1=(0, 0, 0)))

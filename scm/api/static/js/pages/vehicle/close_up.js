@@ -5,6 +5,7 @@ import { world } from "scm/shell/store.js";
 import { byName, fixed } from "scm/shared/format.js";
 import { batteryState, batteryWord, BatterySign } from "scm/pages/vehicle/battery.js";
 import { CameraPanel } from "scm/pages/vehicle/camera_panel.js";
+import { modeOf, stuckBy } from "scm/pages/vehicle/condition.js";
 import { FactsPanel } from "scm/pages/vehicle/facts_panel.js";
 import { LidarPanel } from "scm/pages/vehicle/lidar_panel.js";
 import { LightsPanel } from "scm/pages/vehicle/lights_panel.js";
@@ -12,7 +13,7 @@ import { PlotsPanel } from "scm/pages/vehicle/plots_panel.js";
 import { WheelPanel } from "scm/pages/vehicle/wheel_panel.js";
 
 export function CloseUp({ car }) {
-  const mode = car.alive ? car.mode : "lost";
+  const mode = modeOf(car);
   return html`
     <header class="who">
       <a href="/vehicles">All vehicles</a>
@@ -27,7 +28,7 @@ export function CloseUp({ car }) {
       </label>
       <span class="kind" data-kind=${car.kind}>${car.kind}</span>
       <span>${car.car}, tag ${car.tag_id}</span>
-      <span class="mode" data-mode=${mode}>${mode}</span>
+      <span class="mode" data-mode=${mode} title=${stuckBy(car)}>${mode}</span>
       ${batteryWord(car) && html`<span class="charge" data-battery=${batteryState(car)}><${BatterySign} car=${car} /> battery ${batteryWord(car)}</span>`}
       <span class="speed"><b>${fixed(car.speed_mps, 2)}</b> m/s</span>
     </header>

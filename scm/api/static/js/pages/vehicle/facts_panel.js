@@ -3,6 +3,7 @@ import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { age, fixed, span, UNKNOWN } from "scm/shared/format.js";
 import { Battery } from "scm/pages/vehicle/battery.js";
+import { stuckBy } from "scm/pages/vehicle/condition.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
 import { doubtOf, misbehaviour, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
 
@@ -20,6 +21,7 @@ export function FactsPanel({ car }) {
       <div class="panel-head"><h2>State</h2></div>
       <dl>
         <dt>Pose</dt><dd>${fixed(x, 2)}, ${fixed(y, 2)} m, ${fixed(yaw * DEGREES, 0, "°")}</dd>
+        ${stuckBy(car) && html`<dt>Stuck</dt><dd data-fact="stuck" class="bad">${stuckBy(car)}</dd>`}
         <dt>Throttle</dt><dd>${fixed(car.throttle, 2)}</dd>
         <dt>Steering</dt><dd>${fixed(car.steering_rad * DEGREES, 1, "°")} <small>${side(car.steering_rad)}</small></dd>
         <dt>Battery</dt><dd data-fact="battery"><${Battery} car=${car} /></dd>

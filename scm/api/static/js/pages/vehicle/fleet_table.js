@@ -4,6 +4,7 @@ import { html } from "scm/shared/html.js";
 import { age, byName, fixed, UNKNOWN } from "scm/shared/format.js";
 import { world } from "scm/shell/store.js";
 import { batteryState, batteryWord, BatterySign, percent } from "scm/pages/vehicle/battery.js";
+import { modeOf, stuckBy } from "scm/pages/vehicle/condition.js";
 import { doubtOf, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
 
@@ -18,7 +19,7 @@ export function FleetTable() {
   const text = wanted.value.text.toLowerCase();
   const shown = all
     .filter((car) => wanted.value.kind === "all" || car.kind === wanted.value.kind)
-    .filter((car) => [car.vehicle, car.owner, car.car, car.mode].some((word) => word.toLowerCase().includes(text)))
+    .filter((car) => [car.vehicle, car.owner, car.car, modeOf(car)].some((word) => word.toLowerCase().includes(text)))
     .toSorted((a, b) => byName(a.vehicle, b.vehicle));
   const set = (change) => (wanted.value = { ...wanted.value, ...change });
   return html`
@@ -60,13 +61,13 @@ export function FleetTable() {
 }
 
 function Row({ car }) {
-  const mode = car.alive ? car.mode : "lost";
+  const mode = modeOf(car);
   const doubt = doubtOf(car.vehicle);
   return html`
     <tr data-car=${car.vehicle} data-alive=${car.alive}>
       <td><a class="to" href="/vehicles/${car.vehicle}">${car.vehicle}</a></td>
       <td>
-        <span class="mode" data-mode=${mode}>${mode}</span>
+        <span class="mode" data-mode=${mode} title=${stuckBy(car)}>${mode}</span>
         ${batteryWord(car) && html` <span class="charge narrow" data-battery=${batteryState(car)}><${BatterySign} car=${car} />${batteryWord(car)}</span>`}
       </td>
       <td><span class="kind" data-kind=${car.kind}>${car.kind}</span></td>

@@ -1,0 +1,85 @@
+"""Cars that push in vain: told to drive for seconds, and their rear axle stays where it is.
+
+    throttle of LEAST_THROTTLE or more, either way, for PATIENCE_NS
+    and the rear axle within NEAR_M of where that began             stuck
+    the rear axle farther than that, whoever moved it              free again
+
+Who waits in a queue or at a line is told no throttle, and never stuck. At the least throttle a
+Nigel drives twice as far as NEAR_M in that time. What it most likely pushes against is what it
+touched last. A driver of the world's lets go of a stuck car, and tries again once in a while.
+"""
+
+from collections import deque
+
+import numpy as np
+
+from scm.arrays import Bools, Floats, Ints
+from scm.clock import NS_PER_MS, NS_PER_S
+
+LEAST_THROTTLE = 0.05
+PATIENCE_NS = 4 * NS_PER_S
+NEAR_M = 0.03
+PAUSE_NS = 6 * NS_PER_S
+TRY_NS = 2 * NS_PER_S
+TOUCH_NS = 500 * NS_PER_MS
+
+
+class Stuck:
+    """Which cars of a world are stuck, by slot.
+
+    Attributes:
+        against: What those that are stuck push against, as far as is known: cars, walls, boxes.
+    """
+
+    def __init__(self, capacity: int) -> None:
+        self.against: dict[int, tuple[str, ...]] = {}
+        self._x, self._y = np.full((2, capacity), np.inf)
+        self._since_ns = np.zeros(capacity, np.int64)
+        self._stuck = np.zeros(capacity, np.bool_)
+        self._touches: deque[tuple[int, Ints, Ints]] = deque()
+
+    def feel(self, t_ns: int, slots: Ints, pairs: Ints) -> None:
+        """Remember for a moment who touched whom, as `Touches` tells it: rows of `slots`."""
+        self._touches.append((t_ns, slots, pairs))
+        while self._touches[0][0] < t_ns - TOUCH_NS:
+            self._touches.popleft()
+
+    def touches(self, now_ns: int) -> list[tuple[Ints, Ints]]:
+        """Return the slots and pairs of the contact steps of the last moment."""
+        return [(s, pairs) for t_ns, s, pairs in self._touches if t_ns >= now_ns - TOUCH_NS]
+
+    def look(self, throttle: Floats, x: Floats, y: Floats, t_ns: int) -> tuple[Ints, Ints]:
+        """Return the slots that are stuck, and those that are free again, since the last time.
+
+        Args:
+            throttle: (capacity,) what each car is told, -1 to 1; 0 where there is none.
+            x: (capacity,) of the rear axles [m]; likewise `y`.
+            y: See `x`.
+            t_ns: The present time without what was lost: nobody moved then [ns].
+        """
+        moved = np.hypot(x - self._x, y - self._y) > NEAR_M
+        idle = ~self._stuck & (np.abs(throttle) < LEAST_THROTTLE)
+        free = np.flatnonzero(self._stuck & moved)
+        begin = moved | idle
+        self._x[begin], self._y[begin], self._since_ns[begin] = x[begin], y[begin], t_ns
+        self._stuck[free] = False
+        pushes = ~begin & ~self._stuck
+        new = np.flatnonzero(pushes & (t_ns - self._since_ns >= PATIENCE_NS))
+        self._stuck[new] = True
+        self._since_ns[new] = t_ns
+        for slot in free.tolist():
+            del self.against[slot]
+        self.against.update(dict.fromkeys(new.tolist(), ()))
+        return new, free
+
+    def rests(self, t_ns: int) -> Bools:
+        """Return by slot which stuck cars their drivers do not try to free now; time as above."""
+        at_ns = (t_ns - self._since_ns) % (PAUSE_NS + TRY_NS)
+        rests: Bools = self._stuck & (at_ns < PAUSE_NS)
+        return rests
+
+    def forget(self, slot: int) -> None:
+        """Forget a car that leaves."""
+        self._stuck[slot] = False
+        self._x[slot] = self._y[slot] = np.inf
+        self.against.pop(slot, None)
