@@ -131,6 +131,25 @@ def test_a_search_cut_anywhere_ends_with_what_was_whole_before(trimmed, share):
     assert names(budget.unasked) == (["further_effects"] if best.effects else ["effects"])
 
 
+def test_what_an_attempt_changed_is_put_back_where_it_is_given_up():
+    search, budget = a_search(driven(seconds=6.0))
+    fitted, noise = search.fitter.null(), search.model.noise
+    kept = replace(fitted)
+
+    def half_done():
+        search.model.believe(replace(noise, speed=2.0 * noise.speed))
+        search.steps.append("half a round")
+        fitted.z, fitted.q = fitted.z + 1.0, 0.0
+        budget.left = 0
+        search.model([{}])
+
+    assert search.within(Question.LAWS, half_done, fitted) is None
+    assert search.model.noise == noise
+    assert search.steps == []
+    assert fitted.q == kept.q
+    assert fitted.z is kept.z
+
+
 @pytest.fixture
 def lawful(monkeypatch):
     """A search without a fit yet, and a law that is better than whatever it finds."""
