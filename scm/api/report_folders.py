@@ -22,6 +22,7 @@ FILES = {
 }
 _FIELDS, _DRAWN, _JOB, _CARS = "report.json", "drawn.json", "job.json", "cars.json"
 _DRIVE, _TOLD = re.compile(r"next_drive(_\d{1,2})?"), re.compile(r"told_\d{1,4}")
+BUDGET_S = 1800.0  # as `scm mismatch` has it
 MOST_SHOWN_BYTES = 16 * 2**20
 
 
@@ -33,7 +34,7 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
         source: The same in words.
         vehicle: Which car of the recordings; empty: all.
         car: The car file's name; empty: the recording's own.
-        budget_s: Time allowed for the search.
+        budget_s: Time allowed for the search; what is not found in it is not looked for.
         from_s: Part of the recording, seconds since its first row; None: its start.
         to_s: None: its end.
         asked_ns: When.
@@ -44,7 +45,7 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     source: str
     vehicle: str = ""
     car: str = ""
-    budget_s: float = 120.0
+    budget_s: float = BUDGET_S
     from_s: float | None = None
     to_s: float | None = None
     asked_ns: int = 0
@@ -65,6 +66,7 @@ class ReportRow(msgspec.Struct, kw_only=True, frozen=True):
         before_m: Position error of free runs on unseen parts with the car as given; None: unknown.
         after_m: The same with what was found.
         runtime_s: Of the search.
+        cut_short: Whether time ran out before all was asked.
     """
 
     name: str
@@ -77,6 +79,7 @@ class ReportRow(msgspec.Struct, kw_only=True, frozen=True):
     before_m: float | None = None
     after_m: float | None = None
     runtime_s: float = 0.0
+    cut_short: bool = False
 
 
 class Together(msgspec.Struct, kw_only=True, frozen=True):
@@ -111,6 +114,7 @@ class _Report(msgspec.Struct):
     verdict: str
     runtime_s: float = 0.0
     fit: _Fit | None = None
+    unasked: tuple[Any, ...] = ()
 
 
 class _Title(msgspec.Struct):
@@ -231,6 +235,7 @@ class ReportFolders:
             before_m=confirm.before.get("position_m"),
             after_m=confirm.after.get("position_m"),
             runtime_s=report.runtime_s,
+            cut_short=bool(report.unasked),
         )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scm.command import Command
+from scm.mismatch.budget import DEFAULT_S
 
 if TYPE_CHECKING:
     from scm.mismatch.progress import Progress
@@ -37,7 +38,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--to-s", type=float, metavar="S", help="leave out what is after, since the first row"
     )
     parser.add_argument(
-        "--budget-s", type=float, default=120.0, help="time for the search [s] (%(default)g)"
+        "--budget-s",
+        type=float,
+        default=DEFAULT_S,
+        help="time for each car; the report says what is left unasked then [s] (%(default)g)",
     )
 
 

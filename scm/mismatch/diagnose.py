@@ -4,13 +4,15 @@ import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from scm.clock import Clock, WallClock, seconds
+from scm.clock import Clock, WallClock
 from scm.errors import RecordingError
+from scm.mismatch.budget import DEFAULT_S, Budget, Question
 from scm.mismatch.curves import curve
 from scm.mismatch.doubt.corrected import corrected
 from scm.mismatch.doubt.doubt import doubt
@@ -26,6 +28,7 @@ from scm.mismatch.findings import (
     Diagnosis,
     Effect,
     Fit,
+    Unasked,
     Undecided,
     Verdict,
 )
@@ -36,7 +39,7 @@ from scm.mismatch.laws.curves import law_curves
 from scm.mismatch.laws.decide import Lawful, is_law
 from scm.mismatch.laws.seek import Sought, with_laws
 from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.listed import candidates, placed, shown_by, terms_needed
+from scm.mismatch.listed import Candidate, candidates, placed, shown_by, terms_needed
 from scm.mismatch.locate import locate
 from scm.mismatch.parts import Parts, split
 from scm.mismatch.patch import patched
@@ -54,7 +57,7 @@ from scm.vehicles.car import Car, load_car
 POSE = ("position_m", "yaw_rad")
 POSE_X, SHORTEST_S = "pose.x", 20.0  # of several recordings together, where each is short
 OF_SHORT = ("no_verdict", "too_short")
-USUAL_S = 90.0  # of a recording
+TAIL = 1.0  # what follows a search takes as long as its first fit
 STRAYS = 3.0  # times what noise alone makes of a free run's error; 70 healthy drives: 2.3 at most
 Tell = Callable[[str], None]
 
@@ -68,6 +71,7 @@ class Searched:
         car: As given.
         rough: Whether the car was judged by strides.
         held, sought: What a law was held against; None where none was looked for.
+        unasked: Questions that there was no time for.
     """
 
     recordings: Sequence[Recording]
@@ -81,6 +85,7 @@ class Searched:
     tried: tuple[Tried, ...]
     held: Standing | None
     sought: Sought | None
+    unasked: tuple[Unasked, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +117,7 @@ def diagnose(
     *,
     vehicle: str | None = None,
     span_s: tuple[float | None, float | None] = (None, None),
-    budget_s: float = 120.0,
+    budget_s: float = DEFAULT_S,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
 ) -> Found:
@@ -124,10 +129,9 @@ def diagnose(
         data: Folder of the recordings' tables; None: beside each description.
         vehicle: Of recordings of several cars the name of the one; None: they are of one.
         span_s: Part of each recording, seconds since its first row; None: its end.
-        budget_s: After so long no further effect is looked for; of recordings longer than 90 s
-            together, after as many times longer.
+        budget_s: What is not found in time to be told after so long, is not looked for.
         tell: Is told what is being tried.
-        clock: For the time it took.
+        clock: For the time it takes.
 
     Raises:
         ScmError: when a recording or the car file cannot be read.
@@ -147,7 +151,7 @@ def diagnose_car(
     recordings: Sequence[Recording],
     car: Car,
     *,
-    budget_s: float = 120.0,
+    budget_s: float = DEFAULT_S,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
 ) -> Found:
@@ -156,18 +160,14 @@ def diagnose_car(
     Raises:
         ScmError: when a recording cannot be used as such a car's.
     """
-    clock = clock or WallClock()
-    began_ns = clock.now_ns()
+    budget = Budget(budget_s, clock or WallClock())
     tell("doubting the data")
     usable, problems = _doubted(recordings, car)
     if not usable:
-        return _nothing(recordings, car, problems, seconds(clock.now_ns() - began_ns))
-    paid_s = budget_s * max(1.0, _length_s(usable) / USUAL_S)
+        return _nothing(recordings, car, problems, budget.spent_s())
     with threadpool_limits(1):  # two threads drive already: more for small matrices only wait
-        found = _searched(usable, car, tell, lambda: seconds(clock.now_ns() - began_ns) > paid_s)
-    diagnosis = replace(
-        found.diagnosis, data=problems, runtime_s=seconds(clock.now_ns() - began_ns)
-    )
+        found = _searched(usable, car, tell, budget)
+    diagnosis = replace(found.diagnosis, data=problems, runtime_s=budget.spent_s())
     return replace(found, diagnosis=diagnosis)
 
 
@@ -303,38 +303,49 @@ def _title(recording: Recording) -> str:
     return path.parent.name if path.name == "recording.yaml" else path.stem
 
 
-def _searched(
-    recordings: Sequence[Recording], car: Car, tell: Tell, is_over: Callable[[], bool]
-) -> Found:
+def _searched(recordings: Sequence[Recording], car: Car, tell: Tell, budget: Budget) -> Found:
     big = car.with_terms(terms_needed(car))
     drives = [Drive(recording, big) for recording in recordings]
     model: Likelihood = with_laws(Likelihood(drives, big))
     parts = split(model)
     library = placed(shown_by(candidates(big), drives), drives)
-    search = Search(model, parts.fit.weight + parts.choose.weight, library, tell)
-    far, unseen = is_far(search), parts.confirm.weight
-    held, sought = None, None
+    search = Search(model, parts.fit.weight + parts.choose.weight, library, tell, budget=budget)
+    begun_s, held, sought = budget.spent_s(), None, None
+    far, unseen = is_far(search), parts.confirm.weight  # the car's own numbers are fitted here
+    budget.keep(TAIL * (budget.spent_s() - begun_s))
     laws = Lawful(search, unseen, tell)
     if far:  # maybe for one large effect, which the re-tuned car takes for disturbances
         search.settles, search.explained = SETTLES_FAR, lambda _: strays(model)
     else:
         search.explained = laws.explains_all
-    best = search.run(lambda: is_over() or (far and bool(search.steps) and strays(search.model)))
+    best = search.run(lambda: far and bool(search.steps) and strays(search.model))
     rough = far and strays(model)
     if not rough:
         held, tried = standing(search, best, unseen=bool(unseen.any())), tried_of(search)
         best, sought = laws.decide(best)
         rough = strays(model)
     if rough:
-        model, parts, search = roughly(drives, big, library, tell)
-        best, sought = search.run(is_over), None
-        held, tried = None, tried_of(search)
+        many = search.within(Question.STRIDES, partial(_by_strides, search, big, library))
+        held, sought, rough = None, None, many is not None
+        model, parts, search = many or (model, parts, search)
+        best = search.run() if rough else search.retuned
+        tried = tried_of(search)
     tell("judging on what the fit did not see")
     best = search.confirmed(best, parts.confirm.weight)
     searched = Searched(
-        recordings, drives, car, model, parts, search, best, rough, tried, held, sought
-    )
+        recordings, drives, car, model, parts, search, best, rough, tried, held, sought,
+        budget.unasked,
+    )  # fmt: skip
     return told(searched, tell)
+
+
+def _by_strides(
+    search: Search, car: Car, library: Sequence[Candidate]
+) -> tuple[Likelihood, Parts, Search]:
+    """Return what `roughly` does, the car's own numbers fitted."""
+    many = roughly(search.model.drives, car, library, search.tell, search.budget)
+    many[2].retuned  # noqa: B018 it is fitted when first asked for
+    return many
 
 
 def told(searched: Searched, tell: Tell) -> Found:
@@ -365,7 +376,7 @@ def told(searched: Searched, tell: Tell) -> Found:
     if verdict is Verdict.MISMATCH and not effects and fit and free_runs:
         located = strayed(free_runs, fit)
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
-                          fit=fit, runtime_s=0.0)  # fmt: skip
+                          fit=fit, runtime_s=0.0, unasked=searched.unasked)  # fmt: skip
     evidence = Evidence(
         vehicle=car.name, recordings=_titles(searched.recordings), residuals=residuals,
         free_runs=free_runs, ordinary=ordinary_of(model, best, car), tried=searched.tried,

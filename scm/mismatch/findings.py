@@ -160,8 +160,22 @@ class DataProblem:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Unasked:
+    """A question that there was no time for.
+
+    Attributes:
+        name: Short and fixed: `effects`, `further_effects`, `calm`, `laws`, `beside_law`,
+            `strides`.
+        said: One sentence: what was not sought, and why.
+    """
+
+    name: str
+    said: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
-    """All that was found; `report.json` holds these fields, and `data` beside them."""
+    """All that was found, and what was not asked; `report.json` holds these fields."""
 
     verdict: Verdict
     located: tuple[Located, ...]
@@ -170,3 +184,4 @@ class Diagnosis:
     fit: Fit | None
     runtime_s: float
     data: tuple[DataProblem, ...] = field(default=())
+    unasked: tuple[Unasked, ...] = field(default=())

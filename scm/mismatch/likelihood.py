@@ -1,7 +1,7 @@
 """How well a car with given numbers explains recordings: weighed residuals of many sets at once."""
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,6 +101,8 @@ class Likelihood:
         ordinary: The car's own uncertain numbers, in the order of every `z`.
         t: Times of all innovations, (events,).
         settled: 0 while the start still matters and where poses are missing for long, else 1.
+        asked: Is called before sets are driven and between, on all threads; what it raises ends
+            that, and leaves nothing behind.
     """
 
     def __init__(self, drives: Sequence[Drive], car: Car, tiles: Tiles | None = None) -> None:
@@ -113,6 +115,7 @@ class Likelihood:
         self.whiteners = [Whitener(drive, usual_noise(drives)) for drive in drives]
         self.believe(usual_noise(drives))
         self.runs = 0
+        self.asked: Callable[[], None] = lambda: None
 
     def unit(self, key: str) -> str:
         """Return the unit of one of the car's numbers."""
@@ -140,6 +143,7 @@ class Likelihood:
 
     def residuals(self, sets: Sequence[Numbers]) -> tuple[list[list[Floats]], Bools]:
         """Return residuals of every drive's streams, and which sets stayed physical."""
+        self.asked()
         self.runs += len(sets)
         found = [self._left(i, sets) for i in range(len(self.drives))]
         return [left for left, _ in found], np.all([ok for _, ok in found], axis=0)
@@ -159,6 +163,7 @@ class Likelihood:
         streams, driven = np.split(left, cuts[:-1]), [sets[column] for column in new]
 
         def take(motions: Motions, which: Sequence[int]) -> None:
+            self.asked()
             mine = [new[k] for k in which]
             residuals = self._predictions[i].residuals(motions, [driven[k] for k in which])
             for stream, residual in zip(streams, residuals, strict=True):

@@ -127,7 +127,8 @@ class Rollouts:
 
         Args:
             sets: Numbers by key.
-            use: Is called on all threads, with motions and which sets they are of.
+            use: Is called on all threads, with motions and which sets they are of. What it raises
+                is raised here, once no thread drives any more.
         """
         moving = [self._moving(numbers) for numbers in sets]
         places = {one: k for k, one in enumerate(dict.fromkeys(moving))}
@@ -144,7 +145,11 @@ class Rollouts:
             return found
 
         others = pool(THREADS).map(share, [k for k in range(1, THREADS) if shares[k]])
-        return [*share(0), *(one for other in others for one in other)]
+        try:
+            mine = share(0)
+        finally:  # whatever `use` raised, the fleets are free again
+            rest = [one for other in others for one in other]
+        return [*mine, *rest]
 
     def _moving(self, numbers: Numbers) -> tuple[tuple[str, float], ...]:
         """Return the numbers that a car's motion depends on."""

@@ -8,10 +8,12 @@ pays beside those before it, until what the others make needless is taken back.
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from scm.arrays import Floats
+from scm.mismatch.budget import Budget
 from scm.mismatch.drive import Drive, is_led
 from scm.mismatch.findings import Equation
 from scm.mismatch.fit import Fitted
@@ -19,7 +21,7 @@ from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate, Knob
 from scm.mismatch.noise import usual_noise
 from scm.mismatch.parts import Parts, split
-from scm.mismatch.search import FALSE_ALARMS, Search, Step
+from scm.mismatch.search import FALSE_ALARMS, Search, Step, sought
 from scm.mismatch.strides import Striding, learn_sizes, told_anew
 from scm.vehicles.car import Car
 
@@ -59,7 +61,7 @@ def doublings(model: Likelihood) -> float:
 
 
 def roughly(
-    drives: Sequence[Drive], car: Car, library: Sequence[Candidate], tell: Tell
+    drives: Sequence[Drive], car: Car, library: Sequence[Candidate], tell: Tell, budget: Budget
 ) -> tuple[Likelihood, Parts, "RoughSearch"]:
     """Return a model that judges by strides, its parts, and the search that goes with it.
 
@@ -75,7 +77,7 @@ def roughly(
     model = Striding(drives, car)
     parts = split(model)
     seen = parts.fit.weight + parts.choose.weight
-    return model, parts, RoughSearch(model, seen, (*library, *extras), tell)
+    return model, parts, RoughSearch(model, seen, (*library, *extras), tell, budget)
 
 
 class RoughSearch(Search):
@@ -87,9 +89,10 @@ class RoughSearch(Search):
     holds, amplifies, keeps = 0.0, False, True
 
     def __init__(
-        self, model: Likelihood, part: Floats, library: Sequence[Candidate], tell: Tell
-    ) -> None:
-        super().__init__(model, part, library, tell, learn_sizes)
+        self, model: Likelihood, part: Floats, library: Sequence[Candidate], tell: Tell,
+        budget: Budget | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(model, part, library, tell, learn_sizes, budget)
 
     def price(self, effects: Sequence[Candidate]) -> float:
         """Return what effects must gain: `ln n` a number, for strides hold more than noise."""
@@ -102,16 +105,20 @@ class RoughSearch(Search):
         """Return the model that explains the recordings best, see `Search.run`."""
         best = self.retuned
         while len(best.effects) < MOST_EFFECTS and not is_over():
-            steps = self._at_once(self._compared(self.extend(best)))
-            if not steps:
+            more = self.within(sought(best), partial(self._more, best))
+            if more is None or set(more.names) <= set(best.names):
                 break
-            self.steps += steps
-            more = self._joined(best, [step.rivals[0] for step in steps])
-            settled = self._usually(self.prune(self.settle(more)), best.names)
-            if set(settled.names) <= set(best.names):
-                break
-            best = settled
+            best = more
         return best
+
+    def _more(self, best: Fitted) -> Fitted:
+        """Return the model after one round more; the same where no effect pays."""
+        steps = self._at_once(self._compared(self.extend(best)))
+        if not steps:
+            return best
+        self.steps += steps
+        more = self._joined(best, [step.rivals[0] for step in steps])
+        return self._usually(self.prune(self.settle(more)), best.names)
 
     def _usually(self, best: Fitted, known: Collection[str]) -> Fitted:
         """Return the model with usual effects in place of a new rare one, where these explain more.
@@ -130,8 +137,10 @@ class RoughSearch(Search):
             base = self._without_each(best)[best.effects.index(rare)]
             self.tell(f"looking for usual effects in place of {rare.name}")
             self.listed = tuple(c for c in listed if not c.rare)
-            steps = self._at_once(self._compared(self.extend(base)))
-            self.listed = listed
+            try:
+                steps = self._at_once(self._compared(self.extend(base)))
+            finally:
+                self.listed = listed
             if steps:
                 usual = self._joined(base, [step.rivals[0] for step in steps])
                 usual = self.prune(self.settle(usual))

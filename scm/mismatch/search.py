@@ -6,23 +6,25 @@ chi-squared with as many degrees of freedom as it has numbers exceeds so seldom.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from dataclasses import dataclass, fields, replace
+from functools import cache, cached_property, partial
 from statistics import NormalDist
+from typing import TypeVar
 
 import numpy as np
 
 from scm.arrays import Bools, Floats
+from scm.mismatch.budget import Budget, Question
 from scm.mismatch.findings import Equation
 from scm.mismatch.fit import FARTHEST, OF_OWN, SPOTS, Fitted, Fitter
 from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate
 from scm.mismatch.noise import Noise, calmed
+from scm.mismatch.starts import best_of_each, from_each, next_starts, preferred
 
 MOST_EFFECTS = 4
 REFITTED, AFRESH, AGAIN = 16, 10, 6
-AFRESH_GAIN = 60.0
 TO_THE_END = 5, 8  # rounds of a fit that others are held against, of all starts and of the near
 DEEPER = 5.0
 CHANCES = 3
@@ -43,6 +45,7 @@ TWINS: Mapping[str, str] = {
 """Effects that a level floor cannot tell apart: one of them undoes the other."""
 Tell = Callable[[str], None]
 Learn = Callable[[Likelihood, Sequence[Sequence[Floats]], int], Noise]
+_Answer = TypeVar("_Answer")
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,9 +106,11 @@ class Search:
         library: Sequence[Candidate],
         tell: Tell,
         learn: Learn = learn_noise,
+        budget: Budget | None = None,
     ) -> None:
         self.model, self.listed, self.tell = model, tuple(library), tell
-        self._learn = learn
+        self._learn, self.budget = learn, budget or Budget()
+        model.asked = self.budget.check
         self.fitter = Fitter(model, part)
         self.events = int(part.sum())
         self.steps: list[Step] = []
@@ -122,26 +127,57 @@ class Search:
     def run(self, is_over: Callable[[], bool] = lambda: False) -> Fitted:
         """Return the model that explains the recordings best without inventing anything.
 
+        What the budget ends in the midst of is given up: the model is the one before.
+
         Args:
             is_over: Says when no further effect is to be looked for.
         """
         best = self.retuned
         while len(best.effects) < MOST_EFFECTS and not is_over():
-            noise, step = self.model.noise, self.extend(best)
-            self.steps.append(step)
-            before = best = step.base
+            noise, found = self.model.noise, self.within(sought(best), partial(self._round, best))
+            if found is None:
+                break
+            before, margin, best = found
             if not before.effects:
                 self.retuned = before
-            margin = self._margin(step)
-            if margin >= 0.0:
-                best = self.prune(self.settle(step.rivals[0]))
-            if margin < DOUBTFUL and (margin >= 0.0 or not before.effects) and self.explained(best):
+            doubtful = margin < DOUBTFUL and (margin >= 0.0 or not before.effects)
+            if doubtful and self.within(Question.LAWS, partial(self.explained, best)):
                 break
             if not before.effects and margin < DOUBTFUL:
-                best = self._calmly(best, noise)
+                calm = self.within(Question.CALM, partial(self._calmly, best, noise))
+                best = calm or best
             if len(best.effects) == len(before.effects):
                 break
         return best
+
+    def within(
+        self, question: Question, work: Callable[[], _Answer], *renewed: Fitted
+    ) -> _Answer | None:
+        """Return what work finds; None where the budget ends before, then all is as it was.
+
+        Args:
+            question: That is left then.
+            work: What the model believes of noise, and `steps`, are put back after it.
+            renewed: Fits that it renews in place.
+        """
+        noise, steps, kept = self.model.noise, list(self.steps), [replace(f) for f in renewed]
+        found = self.budget.attempt(question, work)
+        if found is None:
+            self.model.believe(noise)
+            self.steps = steps
+            for fitted, was in zip(renewed, kept, strict=True):
+                for one in fields(was):
+                    setattr(fitted, one.name, getattr(was, one.name))
+        return found
+
+    def _round(self, best: Fitted) -> tuple[Fitted, float, Fitted]:
+        """Return the model before a round, its best effect's margin, and the model after it."""
+        step = self.extend(best)
+        self.steps.append(step)
+        margin = self._margin(step)  # settling renews the rival
+        if margin < 0.0:
+            return step.base, margin, step.base
+        return step.base, margin, self.prune(self.settle(step.rivals[0]))
 
     def _margin(self, step: Step) -> float:
         """Return by how much the best effect of a round gains more than its price."""
@@ -218,7 +254,7 @@ class Search:
 
         Valleys are long, and some are dead ends: a comparison is fair only between the deepest.
         """
-        groups = [_from_each(fitted, starts) for fitted, starts in every]
+        groups = [from_each(fitted, starts) for fitted, starts in every]
         begun = [f for group in groups for f in group]
         self.fitter.refine(begun, rounds=TO_THE_END[0], fresh=True)
         near = list[list[Fitted]]()
@@ -258,19 +294,19 @@ class Search:
         every = [
             self.fitter.begin(start, trials, amplified=self.amplifies) for start in (base, nominal)
         ]
-        begun = [_best_of_each(fits, SPOTS if self.amplifies else 1) for fits in every]
+        begun = [best_of_each(fits, SPOTS if self.amplifies else 1) for fits in every]
 
         def cost(fitted: Fitted) -> float:
             return self.criterion(fitted) - self._drifted(fitted.effects[-1], base)
 
         near, far = (sorted(fits, key=cost)[:REFITTED] for fits in begun)
-        near += [f for one in near[:AGAIN] for f in _next_starts(one, every[0])]
+        near += [f for one in near[:AGAIN] for f in next_starts(one, every[0])]
         self.tell("refitting " + ", ".join(f.names[-1] for f in near[:4]) + " ...")
         del every, begun  # they hold innovations of every start
         near, far = (
             self._lighter(self.fitter.refine(fits, rounds=4)) for fits in (near, far[:AFRESH])
         )
-        ranked = _preferred(near, far)
+        ranked = preferred(near, far)
         for f in ranked:
             self._not_worse(f, base)
         ranked = sorted(ranked, key=cost)
@@ -427,44 +463,6 @@ class Search:
         return self._to_the_end(start, [start.z, *others])
 
 
-def _from_each(fitted: Fitted, starts: Sequence[Floats]) -> list[Fitted]:
-    """Return copies of a hypothesis, each at other values of the car's own numbers."""
-    unlike = {np.round(z, 3).tobytes(): z for z in starts}
-    return [
-        replace(fitted, z=z.copy(), values=fitted.values.copy(), done=False)
-        for z in unlike.values()
-    ]
-
-
-def _preferred(near: Sequence[Fitted], far: Sequence[Fitted]) -> list[Fitted]:
-    """Return, of each last effect, the fit that went far only where re-tuning really hid it."""
-    best = {id(fitted.effects[-1]): fitted for fitted in sorted(near, key=lambda f: -f.q)}
-    for fitted in far:
-        other = best.setdefault(id(fitted.effects[-1]), fitted)
-        if fitted.q < other.q - AFRESH_GAIN:
-            best[id(fitted.effects[-1])] = fitted
-    return list(best.values())
-
-
-def _next_starts(best: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
-    """Return the best fit of the same one number begun quite elsewhere: valleys may be two."""
-    effect, at = best.effects[-1], best.values[-1]
-    if len(effect.knobs) != 1:
-        return []
-    knob = effect.knobs[0]
-    size = abs(at - knob.neutral)
-    far = [
-        f for f in fits
-        if f.effects[-1] is effect and np.isfinite(f.q) and abs(f.values[-1] - at) > 0.5 * size
-    ]  # fmt: skip
-    return sorted(far, key=lambda f: f.q)[:1]
-
-
-def _best_of_each(fits: Sequence[Fitted], spots: int) -> list[Fitted]:
-    """Return the best fit of each last effect, of one that has a place the best at some spots."""
-    best = dict[int, list[Fitted]]()
-    for fitted in sorted(fits, key=lambda f: f.q):
-        same = best.setdefault(id(fitted.effects[-1]), [])
-        if len(same) < (spots if fitted.effects[-1].is_placed else 1):
-            same.append(fitted)
-    return [fitted for same in best.values() for fitted in same]
+def sought(best: Fitted) -> Question:
+    """Return what a round beside a model asks."""
+    return Question.FURTHER if best.effects else Question.EFFECTS

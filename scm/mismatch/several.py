@@ -7,6 +7,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock, seconds
+from scm.mismatch.budget import DEFAULT_S
 from scm.mismatch.diagnose import Found, diagnose_car, told, write
 from scm.mismatch.explain import said
 from scm.mismatch.findings import Effect, Undecided, Verdict
@@ -71,7 +72,7 @@ def cars_of(
 def diagnose_one(
     recordings: Sequence[Recording],
     *,
-    budget_s: float = 120.0,
+    budget_s: float = DEFAULT_S,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
 ) -> Found:
@@ -87,7 +88,7 @@ def diagnose_one(
 def diagnose_several(
     cars: Mapping[str, Sequence[Recording]],
     *,
-    budget_s: float = 120.0,
+    budget_s: float = DEFAULT_S,
     tell: Tell = lambda _: None,
     turn: Turn = lambda *_: None,
     clock: Clock | None = None,

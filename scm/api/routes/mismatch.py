@@ -17,7 +17,7 @@ from scm.api.mismatch_jobs import MismatchJobs
 from scm.api.operations import Operation, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
-from scm.api.report_folders import FILES, NAME, Job, ReportRow, Together
+from scm.api.report_folders import BUDGET_S, FILES, NAME, Job, ReportRow, Together
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
 from scm.api.schemas import answer, answer_file, answer_nothing, answer_page
 from scm.v2x.message import Refused
@@ -64,8 +64,8 @@ class JobBody(BaseModel):
         examples=["nigel"],
     )  # fmt: skip
     budget_s: float = Field(
-        120.0, ge=5.0, le=1800.0, description="no further effect is looked for after it [s]",
-        examples=[120.0],
+        BUDGET_S, ge=5.0, le=4 * BUDGET_S, examples=[120.0],
+        description="what is not found in time to be told after it is not looked for [s]",
     )  # fmt: skip
     from_s: float | None = Field(
         None,

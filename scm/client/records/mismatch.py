@@ -52,6 +52,7 @@ class ReportRow(msgspec.Struct, kw_only=True, frozen=True):
         before_m: Position error of free runs on unseen parts with the car as given; None: unknown.
         after_m: The same with what was found.
         runtime_s: Of the search.
+        cut_short: Whether time ran out before all was asked.
     """
 
     name: str
@@ -64,6 +65,7 @@ class ReportRow(msgspec.Struct, kw_only=True, frozen=True):
     before_m: float | None = None
     after_m: float | None = None
     runtime_s: float = 0.0
+    cut_short: bool = False
 
 
 class PageReportRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -86,7 +88,7 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
         source: The same in words.
         vehicle: Which car of the recordings; empty: all.
         car: The car file's name; empty: the recording's own.
-        budget_s: Time allowed for the search.
+        budget_s: Time allowed for the search; what is not found in it is not looked for.
         from_s: Part of the recording, seconds since its first row; None: its start.
         to_s: None: its end.
         asked_ns: When.
@@ -97,7 +99,7 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     source: str
     vehicle: str = ""
     car: str = ""
-    budget_s: float = 120.0
+    budget_s: float = 1800.0
     from_s: float | None = None
     to_s: float | None = None
     asked_ns: int = 0

@@ -6,10 +6,12 @@ better hypothesis by its price and a margin, and explain a part that no fit has 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from scm.arrays import Floats
+from scm.mismatch.budget import Question
 from scm.mismatch.fit import Fitted, Fitter
 from scm.mismatch.laws.law import Law
 from scm.mismatch.laws.seek import Sought, criterion, seek
@@ -94,27 +96,37 @@ class Lawful:
     def decide(self, best: Fitted) -> tuple[Fitted, Sought | None]:
         """Return the better of a listed model and a law, with known effects beside it, settled.
 
+        Where the budget ends before one could be held against the other, it is the listed model.
+
         Args:
             best: The listed model, or the car with its own numbers refitted.
         """
         search = self._search
-        model = search.model
-        if not isinstance(model, Sensing):
+        if not isinstance(search.model, Sensing):
             return best, None
-        found = self._won or self._best(best)
+        if self._won and self._won.law:
+            search.model.believe(self._won.law.noise)
+            return self._won.law.fitted, self._won.sought
+        decided = search.within(Question.LAWS, partial(self._decided, best), best)
+        if decided is None:
+            return best, None
+        better, law, sought = decided
+        return (better if law is None else _with_known(search, law, self._unseen)), sought
+
+    def _decided(self, best: Fitted) -> tuple[Fitted, _Settled | None, Sought | None]:
+        """Return the better model alone, and as what it was settled and sought if it is a law."""
+        search = self._search
+        found = self._best(best)
         law = found.law
         if law is None:
-            return best, None
-        if self._won:
-            model.believe(law.noise)
-            return law.fitted, found.sought
+            return best, None, None
         best = search.settle(best)  # as often as a law will be
         listed = _settled(search, best, self._unseen)
         if law.cost > listed.cost - MARGIN or self._worse(law, listed):
-            model.believe(listed.noise)
-            return best, None
-        model.believe(law.noise)
-        return _with_known(search, law, self._unseen), found.sought
+            search.model.believe(listed.noise)
+            return best, None, None
+        search.model.believe(law.noise)
+        return law.fitted, law, found.sought
 
     def _best(self, listed: Fitted) -> _Best:
         """Return the best law beside the car without effects, sought under a calm belief.
@@ -156,15 +168,23 @@ def _near(search: Search, best: Fitted, laws: Sequence[Fitted]) -> list[Fitted]:
 def _with_known(search: Search, law: _Settled, unseen: Floats) -> Fitted:
     """Return a law with the listed effects that it leaves to be found."""
     for _ in range(MOST_BESIDE):
-        step = search.extend(law.fitted)
-        if not step.rivals or _price(search, step.rivals[0]) > _price(search, law.fitted):
-            break
-        more = _settled(search, search.settle(step.rivals[0]), unseen)
-        if more.cost > law.cost:
-            search.model.believe(law.noise)
+        more = search.within(Question.BESIDE, partial(_with_one, search, law, unseen))
+        if more is None or more is law:
             break
         law = more
     return law.fitted
+
+
+def _with_one(search: Search, law: _Settled, unseen: Floats) -> _Settled:
+    """Return a law with the best listed effect beside it; the same where none pays."""
+    step = search.extend(law.fitted)
+    if not step.rivals or _price(search, step.rivals[0]) > _price(search, law.fitted):
+        return law
+    more = _settled(search, search.settle(step.rivals[0]), unseen)
+    if more.cost > law.cost:
+        search.model.believe(law.noise)
+        return law
+    return more
 
 
 def _bare(search: Search, best: Fitted) -> Fitted:

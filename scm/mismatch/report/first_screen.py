@@ -59,7 +59,9 @@ def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
 def cards_of(diagnosis: Diagnosis, evidence: Evidence) -> list[Card]:
     """Return what is to be known at first sight: effects, questions, problems of the recording."""
     cards = [*_effect_cards(diagnosis), *_undecided_cards(diagnosis), *_located_card(diagnosis)]
-    if diagnosis.verdict is Verdict.NONE and can_judge(diagnosis):
+    if diagnosis.unasked:
+        cards.append(_unasked_card(diagnosis))
+    elif diagnosis.verdict is Verdict.NONE and can_judge(diagnosis):
         cards.append(_checked_card(evidence))
     if diagnosis.verdict is Verdict.MISMATCH and not diagnosis.effects:
         cards.append(_no_name_card(evidence))
@@ -201,6 +203,16 @@ def _then(question: Undecided, folder: str) -> str:
         f"They differ by {apart:.1f} standard deviations; {_ENOUGH_STDS:g} are enough to be sure. "
         f"The drive's files lie in `{folder}` beside this page, for `scm play`."
     )
+
+
+def _unasked_card(diagnosis: Diagnosis) -> Card:
+    """Say what there was no time for, and that more time would help."""
+    rows = [
+        ("What", "\n".join(question.said for question in diagnosis.unasked)),
+        ("What to do", "Search again with more time, `--budget-s`. What is reported above was "
+                       "looked for, and fitted, to the end."),
+    ]  # fmt: skip
+    return Card("question", "Left unasked", "Time ran out", rows)
 
 
 def _checked_card(evidence: Evidence) -> Card:

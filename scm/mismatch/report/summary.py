@@ -39,6 +39,8 @@ def _lines(diagnosis: Diagnosis, out: Path, retuned_m: float | None) -> Iterator
     for question in diagnosis.undecided:
         yield f"  undecided: {' or '.join(map(title_of, question.between))}"
         yield f"    drive this: {question.drive_this}"
+    for left in diagnosis.unasked:
+        yield f"  left unasked: {left.said}"
     yield from _problems(diagnosis.data)
     yield from _better(diagnosis, retuned_m)
     yield f"  {out / PAGE}  ({diagnosis.runtime_s:.0f} s)"

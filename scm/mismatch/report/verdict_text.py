@@ -15,13 +15,22 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
         return "The car file does not fit this recording: another car was driven."
     if not can_judge(diagnosis):
         return "This recording does not allow a verdict on the car."
-    if diagnosis.verdict is Verdict.NONE:
-        return "Nothing beyond noise: the simulator drives as the car does."
     if diagnosis.verdict is Verdict.UNDECIDED:
         return _undecided_sentence(diagnosis)
-    if not diagnosis.effects:
-        return "Simulator and recording differ, and no cause could be named."
-    return _mismatch_sentence(diagnosis.effects)
+    if diagnosis.effects:
+        return _mismatch_sentence(diagnosis.effects)
+    return _nothing_named(diagnosis)
+
+
+def _nothing_named(diagnosis: Diagnosis) -> str:
+    """Say that no effect was found, and whether there was time to look for all."""
+    if diagnosis.verdict is Verdict.NONE and diagnosis.unasked:
+        return "Nothing beyond noise was found, but time ran out before all was asked."
+    if diagnosis.verdict is Verdict.NONE:
+        return "Nothing beyond noise: the simulator drives as the car does."
+    if diagnosis.unasked:
+        return "Simulator and recording differ, and time ran out before a cause was found."
+    return "Simulator and recording differ, and no cause could be named."
 
 
 def _mismatch_sentence(effects: Sequence[Effect]) -> str:

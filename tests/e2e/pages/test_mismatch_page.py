@@ -17,7 +17,12 @@ from tests.e2e.pages.visiting import judge
 from tests.unit.mismatch import made_up_findings as made_up
 
 SEARCH_S = 240.0  # on a busy machine
-REPORTS = {"two-effects": "pair", "undecided": "undecided", "healthy": "none"}
+REPORTS = {
+    "two-effects": "pair",
+    "undecided": "undecided",
+    "healthy": "none",
+    "hurried": "cut_short",
+}
 COMMANDS = "t_s,throttle,steering\n0,0,0\n0.2,0.02,0\n40,0,0\n"
 WAY = "t_s,x_m,y_m,yaw_rad\n0,0,0,0\n40,0.01,0,0\n"
 TABLE = "recording: 1\nvehicle: nigel\ntables:\n  - file: a.csv\n    time: {column: t, unit: s}\n"
@@ -82,6 +87,17 @@ def test_the_list_finds_a_report_and_opens_it(look, shelf, searching):
     page.click(".reports .cards a")
     page.wait_for_selector(".head .sentence >> text=Nothing beyond noise")
     assert page.url.endswith("/mismatch/healthy")
+
+
+def test_a_report_that_time_cut_short_says_what_it_left_and_gives_no_clean_bill(visit, shelf):
+    visited = visit("/mismatch/hurried")
+    page = visited.page
+    page.wait_for_selector(".card >> text=What it does not hold was not sought to the end")
+    assert "Time ran out" in page.inner_text(".head .verdict")
+    assert page.get_attribute(".head", "data-verdict") == "undecided"
+    judge(visited)
+    page.goto(page.url.replace("/hurried", ""))
+    page.wait_for_selector("li[data-verdict=undecided] a[href$='/hurried'] >> text=Time ran out")
 
 
 def test_cars_of_one_search_tell_what_they_share_and_lead_to_each_other(visit, shelf):

@@ -236,7 +236,7 @@ def test_a_mismatch_job_is_asked_for_the_car_and_the_span_that_are_shown(visit, 
         "recording": NAME,
         "vehicle": "n2",
         "car": "nigel",
-        "budget_s": 120,
+        "budget_s": 1800,
         "from_s": None,
         "to_s": last_s,
     }

@@ -104,6 +104,15 @@ def test_reports_are_listed_with_what_they_found(call, shelves):
     assert row["before_m"] > row["after_m"] > 0.0
 
 
+def test_a_search_that_time_cut_short_is_listed_as_such(call, shelves):
+    for case in ("none", "cut_short"):
+        put(shelves, case.replace("_", "-"), case)
+    rows = call("GET", f"{API}/reports").json()["items"]
+    assert {row["name"]: row["cut_short"] for row in rows} == {"none": False, "cut-short": True}
+    report = call("GET", f"{API}/reports/cut-short").json()["report"]
+    assert [question["name"] for question in report["unasked"]] == ["effects", "laws"]
+
+
 def test_the_newest_report_comes_first_and_pages_go_on(call, shelves):
     for age, name in enumerate(("new", "middle", "old")):
         at = 1_700_000_000 - age

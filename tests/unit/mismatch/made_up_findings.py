@@ -18,6 +18,7 @@ from scm.mismatch.findings import (
     PartErrors,
     Place,
     Rival,
+    Unasked,
     Undecided,
     Verdict,
 )
@@ -378,6 +379,17 @@ def none():
     return diagnosis(fit=calm), shown, nigel, nigel
 
 
+def cut_short():
+    """Nothing was found in too short a time."""
+    found, *others = none()
+    late = "was not sought to the end: the budget of 60 s ended."
+    unasked = (
+        Unasked(name="effects", said=f"What the library holds {late}"),
+        Unasked(name="laws", said=f"What it does not hold {late}"),
+    )
+    return replace(found, unasked=unasked), *others
+
+
 def undecided():
     nigel = load_car("nigel")
     question = Undecided(
@@ -461,6 +473,7 @@ CASES = {
     "one_effect": one_effect,
     "pair": pair,
     "none": none,
+    "cut_short": cut_short,
     "undecided": undecided,
     "unlisted_law": unlisted_law,
     "bad_data": bad_data,

@@ -1,5 +1,6 @@
 """What a likelihood remembers of sets that were driven, and how much memory it works in."""
 
+import threading
 import tracemalloc
 from dataclasses import replace
 
@@ -7,10 +8,11 @@ import numpy as np
 import pytest
 
 from scm.mismatch import likelihood
+from scm.mismatch.budget import OutOfTimeError
 from scm.mismatch.drive import Drive
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.noise import usual_noise
-from scm.mismatch.rollouts import Tiles
+from scm.mismatch.rollouts import ROWS, Rollouts, Tiles
 from scm.mismatch.whiten import Whitener
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
@@ -98,3 +100,37 @@ def test_a_belief_beyond_what_numbers_can_hold_has_no_size_and_raises_no_warning
     wild = replace(usual, speed=2.0**49 * usual.speed)
     assert np.isfinite(Whitener(drive, usual).log_size).all()
     assert not np.isfinite(Whitener(drive, wild).log_size).all()
+
+
+def test_sets_whose_driving_is_given_up_leave_nothing_behind(model):
+    many = trims(*range(2 * ROWS))
+    asked = []
+
+    def give_up():
+        asked.append(1)
+        if len(asked) == 2:  # the first tile was driven
+            raise OutOfTimeError
+
+    expected = left(model, 1, 2)
+    model.asked = give_up
+    with pytest.raises(OutOfTimeError):
+        model(many)
+    model.asked = lambda: None
+    np.testing.assert_array_equal(left(model, 1, 2), expected)
+
+
+def test_what_one_thread_raises_waits_until_the_others_are_done(drive, tiles):
+    raised, returned, done = threading.Event(), threading.Event(), []
+
+    def use(_motions, which):
+        if 0 in which:  # the calling thread's first tile
+            raised.set()
+            raise OutOfTimeError
+        assert raised.wait(60.0)
+        returned.wait(0.5)  # long enough for who would not wait
+        done.append(which)
+
+    with pytest.raises(OutOfTimeError):
+        Rollouts(drive, big_nigel(), tiles).each(trims(*range(2 * ROWS)), use)
+    assert len(done) == 1
+    returned.set()

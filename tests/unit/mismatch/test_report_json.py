@@ -9,7 +9,7 @@ from scm.mismatch.findings import Estimate
 from scm.mismatch.report.as_json import json_text, report_fields
 from tests.unit.mismatch import made_up_findings as made_up
 
-TOP = {"verdict", "located", "effects", "undecided", "fit", "runtime_s", "data"}
+TOP = {"verdict", "located", "effects", "undecided", "fit", "runtime_s", "data", "unasked"}
 LOCATED = {"equation", "channels", "depends_on", "when_s", "where", "share_of_error"}
 EFFECT = {"name", "listed", "equation", "depends_on", "parameters", "probability", "said", "law",
           "rivals"}  # fmt: skip
@@ -43,6 +43,12 @@ def test_what_stands_inside_has_exactly_the_fixed_fields():
 def test_an_open_question_has_exactly_the_fixed_fields():
     (question,) = read(made_up.undecided()[0])["undecided"]
     assert set(question) == {"between", "drive_this", "expected_separation"}
+
+
+def test_a_question_left_has_exactly_its_fields():
+    first, second = read(made_up.cut_short()[0])["unasked"]
+    assert first.keys() == second.keys() == {"name", "said"}
+    assert (first["name"], second["name"]) == ("effects", "laws")
 
 
 def test_words_of_the_verdict_are_text():

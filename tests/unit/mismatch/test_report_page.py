@@ -10,6 +10,7 @@ import pytest
 from scm.mismatch.evidence import Evidence, Residual
 from scm.mismatch.findings import DataProblem, Effect, Equation, Located, Verdict
 from scm.mismatch.report.summary import summary
+from scm.mismatch.report.verdict_text import verdict_sentence
 from scm.mismatch.report.write import write_report
 from scm.vehicles.car import load_car
 from tests.unit.mismatch import made_up_findings as made_up
@@ -155,7 +156,8 @@ def test_an_hour_of_driving_stays_below_one_and_a_half_megabytes(tmp_path):
 VERDICTS = {
     "one_effect": "The simulator leaves out throttle lag.",
     "pair": "The simulator leaves out throttle lag and surface patch.",
-    "none": "Nothing beyond noise",
+    "none": "Nothing beyond noise: the simulator drives as the car does.",
+    "cut_short": "Nothing beyond noise was found, but time ran out before all was asked.",
     "undecided": "Motor gain or payload: this recording cannot tell which.",
     "unlisted_law": "leaves out drive force against heading, an effect outside its library.",
     "bad_data": "This recording does not allow a verdict on the car.",
@@ -171,6 +173,24 @@ def test_the_page_opens_with_the_verdict_in_plain_words(tmp_path, name, sentence
 @pytest.mark.parametrize(("name", "sentence"), VERDICTS.items())
 def test_the_command_line_says_the_same_verdict(tmp_path, name, sentence):
     assert sentence in summary(made_up.CASES[name]()[0], tmp_path)
+
+
+def test_page_and_command_line_say_what_there_was_no_time_for(tmp_path):
+    case = made_up.cut_short()
+    page, lines = written(tmp_path, case), summary(case[0], tmp_path).splitlines()
+    for question in case[0].unasked:
+        assert question.said.partition(":")[0] in page
+        assert f"  left unasked: {question.said}" in lines
+    assert "What was checked" not in page
+    assert "Time ran out" in page
+    assert "Time ran out" not in written(tmp_path, made_up.none())
+
+
+def test_a_difference_that_was_not_explained_in_time_may_have_a_cause():
+    found = replace(made_up.cut_short()[0], verdict=Verdict.MISMATCH)
+    assert verdict_sentence(found) == (
+        "Simulator and recording differ, and time ran out before a cause was found."
+    )
 
 
 def test_a_fault_of_measuring_is_not_blamed_on_the_simulator(tmp_path):

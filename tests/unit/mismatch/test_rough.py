@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from scm.mismatch.budget import Budget
 from scm.mismatch.fit import Fitted
 from scm.mismatch.rough import RoughSearch
 from scm.mismatch.search import Step
@@ -25,7 +26,7 @@ class Scripted(RoughSearch):
         names = ("grade", "steer_trim", "pose_heading")
         self.listed, self.costs = tuple(candidate(name) for name in names), costs
         self.model = SimpleNamespace(noise="at first", believe=self.believe)
-        self.steps, self.tell = [], lambda _: None
+        self.steps, self.tell, self.budget = [], lambda _: None, Budget()
 
     def believe(self, noise):
         self.model.noise = noise

@@ -19,10 +19,10 @@ from scm.mismatch.search import (
     WRITTEN,
     Search,
     Step,
-    _next_starts,
     exceeded,
     price,
 )
+from scm.mismatch.starts import next_starts
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
 
@@ -229,4 +229,4 @@ def test_an_effect_of_two_valleys_is_begun_in_both():
     ]  # fmt: skip
     effect = begun[0].effects[0]
     begun = [replace(f, effects=(effect,)) for f in begun]
-    assert [f.values[0] for f in _next_starts(begun[0], begun)] == [0.1]
+    assert [f.values[0] for f in next_starts(begun[0], begun)] == [0.1]

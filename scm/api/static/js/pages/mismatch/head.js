@@ -4,7 +4,7 @@ import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { change } from "scm/shell/api.js";
 import { go } from "scm/shell/router.js";
-import { alike, VERDICTS } from "scm/pages/mismatch/words.js";
+import { alike, verdictOf, VERDICTS } from "scm/pages/mismatch/words.js";
 
 const FILES = {
   "report.html": "Page to keep or print",
@@ -15,16 +15,16 @@ const FILES = {
 
 export function Head({ report }) {
   const { row, drawn, job } = report;
-  const kind = drawn.can_judge ? row.verdict : "unreadable";
-  const verdict = VERDICTS[kind];
+  const unable = { kind: "unreadable", sign: VERDICTS.unreadable.sign, word: "No verdict" };
+  const verdict = drawn.can_judge ? verdictOf(row) : unable;
   const from = job?.from_s !== null || job?.to_s !== null;
   const part = job && from ? `, ${job.from_s ?? 0} s to ${job.to_s ?? "its end"}` : "";
   return html`
-    <section class="panel head" data-verdict=${kind} aria-label="Verdict">
+    <section class="panel head" data-verdict=${verdict.kind} aria-label="Verdict">
       <p class="trail"><a href="/mismatch">Mismatch</a> / ${row.name}</p>
       <div class="two">
         <div>
-          <p class="verdict"><i aria-hidden="true">${verdict.sign}</i>${drawn.can_judge ? verdict.word : "No verdict"}</p>
+          <p class="verdict"><i aria-hidden="true">${verdict.sign}</i>${verdict.word}</p>
           <h2 class="sentence">${drawn.said}</h2>
           ${drawn.named && html`<p>${drawn.named}</p>`}
           ${drawn.better && html`<p>${drawn.better}</p>`}

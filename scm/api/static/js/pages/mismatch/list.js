@@ -4,7 +4,7 @@ import { html } from "scm/shared/html.js";
 import { useFetched } from "scm/pages/mismatch/fetched.js";
 import { isActive, Jobs, useJobs } from "scm/pages/mismatch/jobs.js";
 import { StartForm } from "scm/pages/mismatch/start_form.js";
-import { length, VERDICTS } from "scm/pages/mismatch/words.js";
+import { length, verdictOf } from "scm/pages/mismatch/words.js";
 
 export function List() {
   const reports = useFetched("/mismatch/reports?limit=200");
@@ -64,9 +64,9 @@ function Nothing() {
 }
 
 function Row({ row }) {
-  const verdict = VERDICTS[row.verdict] ?? VERDICTS.unreadable;
+  const verdict = verdictOf(row);
   return html`
-    <li data-verdict=${row.verdict}>
+    <li data-verdict=${verdict.kind}>
       <a href="/mismatch/${row.name}">
         <span class="verdict"><i aria-hidden="true">${verdict.sign}</i>${verdict.word}</span>
         <b>${row.said || row.name}</b>

@@ -98,8 +98,9 @@ function Which({ cars }) {
         Time for it
         <select name="budget_s">
           <option value="30">half a minute</option>
-          <option value="120" selected>two minutes</option>
+          <option value="120">two minutes</option>
           <option value="600">ten minutes</option>
+          <option value="1800" selected>as it needs, half an hour at most</option>
         </select>
       </label>
     </div>

@@ -8,6 +8,13 @@ export const VERDICTS = {
   unreadable: { word: "Unreadable", sign: "✕" },
 };
 
+/** How a report's verdict is shown: nothing found in too short a time is no clean bill. */
+export function verdictOf(row) {
+  if (row.verdict === "none" && row.cut_short) return { kind: "undecided", word: "Time ran out", sign: "?" };
+  const kind = row.verdict in VERDICTS ? row.verdict : "unreadable";
+  return { kind, ...VERDICTS[kind] };
+}
+
 /** Parts of the model that an effect belongs to, as chips. */
 export const PARTS = {
   drive: "Drive",

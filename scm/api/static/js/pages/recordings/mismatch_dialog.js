@@ -6,7 +6,7 @@ import { change } from "scm/shell/api.js";
 import { go } from "scm/shell/router.js";
 import { minutes } from "scm/pages/recordings/words.js";
 
-const BUDGETS_S = [60, 120, 300, 600];
+const BUDGETS_S = [60, 120, 300, 600, 1800];
 
 export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
   const first = cars.find((car) => car.vehicle === chosen) ?? cars[0];
@@ -71,7 +71,7 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
         <label>
           Search for at most
           <select name="budget">
-            ${BUDGETS_S.map((s) => html`<option value=${s} selected=${s === 120}>${minutes(s)} min</option>`)}
+            ${BUDGETS_S.map((s) => html`<option value=${s} selected=${s === BUDGETS_S.at(-1)}>${minutes(s)} min</option>`)}
           </select>
         </label>
         <div class="actions">
