@@ -163,7 +163,9 @@ class Attacker:
 def _as(copy: Cam, name: str, frame: Frame) -> Cam:
     if isinstance(copy, CamTx):
         return CamTx(station=name, t_ns=frame.t_ns, body=frame.body)
-    return CamRx(receiver=copy.receiver, station=name, t_ns=frame.t_ns, body=frame.body)
+    return CamRx(
+        receiver=copy.receiver, station=name, t_ns=frame.t_ns, body=frame.body, lost_ns=copy.lost_ns
+    )  # fmt: skip
 
 
 def _nobody(line: str) -> None:

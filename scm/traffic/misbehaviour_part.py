@@ -65,7 +65,13 @@ class MisbehaviourPart:
             if isinstance(message, EyeTrack):
                 detector.see(message)
             elif isinstance(message, CamRx):
-                found = detector.hear(message.station, message.receiver, message.t_ns, message.body)
+                found = detector.hear(
+                    message.station,
+                    message.receiver,
+                    message.t_ns,
+                    message.body,
+                    message.lost_ns,
+                )
                 if found is not None and found.is_reported:
                     outbox += self._tell(found, now_ns)
         if now_ns >= self._due_ns:

@@ -20,6 +20,7 @@ from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import Car
 from scm.world.hull import cog_motion
 from scm.world.lease import Lease
+from scm.world.pace import LONGEST_TICK_NS
 
 FARTHEST_M = 10_000.0
 FASTEST = 100.0
@@ -35,6 +36,18 @@ def is_plausible(state: VehicleState) -> bool:
     where = (state.x_m, state.y_m)
     speeds = (state.yaw_rad, state.speed_mps, state.lateral_speed_mps, state.yaw_rate_radps)
     return all(abs(v) <= FARTHEST_M for v in where) and all(abs(v) <= FASTEST for v in speeds)
+
+
+def missed_between(before: VehicleState, now: VehicleState) -> int:
+    """Return the time between two reports that their car cannot have been moved in [ns].
+
+    A simulated car moves by `LONGEST_TICK_NS` a step at most, and reports at each step. A real one
+    drives on while its computer sleeps.
+    """
+    if now.source != "simulated":
+        return 0
+    driven_ns = (now.seq - before.seq) * LONGEST_TICK_NS
+    return min(max(0, now.t_ns - before.t_ns - driven_ns), GONE_NS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +77,7 @@ class RemoteCar:
         heard_ns: When that came, on the world's clock.
         lost_ns: Since when its agent is known to be gone or silent; None while it is there.
         dead: Whether the session ended: its reports count only when it is there again.
+        missed_ns: Time that its agent let pass without moving it, by the times of its reports.
     """
 
     name: str
@@ -79,6 +93,7 @@ class RemoteCar:
     state: VehicleState | None = None
     lost_ns: int | None = None
     dead: bool = False
+    missed_ns: int = 0
     _echo: deque[Echo] = field(default_factory=deque)
     _told: int = 0
     _dv: Floats = field(default_factory=lambda: np.zeros(3))
@@ -109,6 +124,8 @@ class RemoteCar:
         """Take a report; return whether it was newer than the last one."""
         if self.dead or (self.state is not None and state.seq <= self.state.seq):
             return False
+        if self.state is not None:
+            self.missed_ns += missed_between(self.state, state)
         self.state, self.heard_ns, self.lost_ns = state, now_ns, None
         self.pose = Pose2(state.x_m, state.y_m, state.yaw_rad)
         while self._echo and self._echo[0].number <= state.contacts:

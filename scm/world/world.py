@@ -201,6 +201,11 @@ class World:
             return 0.5 * (left + right), 0.5 * (low + high)
         return self.roadside.get(station)
 
+    def lost_ns(self, station: str) -> int:
+        """Return the time that passed without a station's car being moved, since it came [ns]."""
+        car = self.remote.get(station)
+        return self.pace.lost_ns if car is None else car.missed_ns
+
     def locate(self) -> None:
         """Note where all cars are and how they move."""
         slots, placed = self.slots, self.placed

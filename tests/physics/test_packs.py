@@ -89,6 +89,18 @@ def test_an_empty_pack_ends_at_its_cut_off_and_nothing_more_is_drawn():
     assert packs.charge[0] == 0.001
 
 
+def test_each_car_of_a_fleet_drains_its_own_pack_by_its_own_throttle():
+    fleet = Fleet(load_car("nigel"), 3)
+    packs = Packs(fleet)
+    rows = np.array([fleet.add(HERE) for _ in range(3)])
+    for row in rows:
+        packs.renew(row)
+    fleet.throttle[rows] = (0.0, 1.0, 1.0)
+    packs.drain(rows[:2], 600.0)
+    idle, driven_hard, left_out = 1.0 - packs.charge[rows]
+    assert 0.0 == left_out < idle < 0.2 * driven_hard
+
+
 def test_motors_that_feel_their_battery_count_the_same_charge():
     fleet, packs = driven(terms=("battery_charge", "battery_curve", "battery_resistance"))
     for step in range(300):

@@ -14,6 +14,8 @@ class CamRx(Message, kw_only=True, frozen=True, omit_defaults=True):
         station: Who sent it.
         t_ns: When it was sent.
         signed: The sender's signature, see `CamTx`.
+        lost_ns: How much time, since the sender came, has passed without its car being moved: the
+            computer that simulates it was too slow. By the world, which no sender can bid.
     """
 
     KEY: ClassVar[str] = "v2x/rx/{receiver}/{station}/cam"
@@ -24,6 +26,7 @@ class CamRx(Message, kw_only=True, frozen=True, omit_defaults=True):
     t_ns: int
     body: CamBody
     signed: str = ""
+    lost_ns: int = 0
 
 
 MESSAGE = CamRx

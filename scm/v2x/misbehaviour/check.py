@@ -18,6 +18,9 @@ from scm.v2x.misbehaviour.kalman import Kalman
 from scm.v2x.misbehaviour.limits import Limits
 
 CHECKS = "scm.v2x.misbehaviour.checks"
+LOOKED_S, SETTLES_S = 0.2, 1.0
+CONFIRMED = 0.05
+"""From this plausibility on, the Eye speaks for a place."""
 Class = Literal["beacon", "static", "security", "position", "speed", "longAcc"]
 """The classes of observations of ETSI TS 103 759."""
 
@@ -67,12 +70,15 @@ class Case:
         now: The claim to be judged.
         before: The station's claim before it; None: its first.
         dt_s: Between these two, by what they say; 0 for the first.
+        driven_s: Of that, how long the car drove: all of it, unless its computer was too slow.
+        since_lost_s: Since time passed last without the car being moved; inf: it never did.
         gap_s: Between their arrivals.
         kalman: The station's filter, which has taken `now`.
         neighbours: Newest claims of stations around it that are not older than a second or so.
         strayed: The station's way beside its speeds, which has taken `now`.
         standings: By station number.
         track: The Eye's track of this very car, fresh; None: it has none.
+        unseen_s: From when a camera last saw that car to the claim, either way.
         nearest_track_m: From the claimed rear axle to any fresh track; inf: there is none near.
         eye_sees: Whether the Eye works and overlooks the place.
         since_start_s: How long we have listened.
@@ -87,18 +93,29 @@ class Case:
     ground: Ground
     before: Claim | None = None
     dt_s: float = 0.0
+    driven_s: float = 0.0
+    since_lost_s: float = float("inf")
     gap_s: float = 0.0
     kalman: Kalman = field(default_factory=Kalman)
     neighbours: tuple[Claim, ...] = ()
     strayed: Strayed = field(default_factory=Strayed)
     standings: dict[int, Standing] = field(default_factory=dict)
     track: EyeTrack | None = None
+    unseen_s: float = 0.0
     nearest_track_m: float = float("inf")
     eye_sees: bool = False
     since_start_s: float = 0.0
     idle: int = 0
     is_own_number: bool = True
     touches: Callable[[], bool] = lambda: False
+
+    @property
+    def eye_may_deny(self) -> bool:
+        """Return whether the Eye knows better than the car; an old look may still speak for it.
+
+        The Eye carries a track on from its last look, and needs some more to see that a car stood.
+        """
+        return self.unseen_s <= LOOKED_S and self.since_lost_s >= SETTLES_S
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ class Claim(msgspec.Struct, frozen=True, gc=False):
         receiver: Who heard it.
         sent_ns: When it left its antenna.
         t_ns: When it says that it was true.
+        lost_ns: Of the time until then, what passed without the car being moved, see `CamRx`.
         x_m, y_m: The middle of the front bumper, map frame.
         speed_mps: Negative in reverse.
         own_m, own_mps, own_rad: Standard deviations of position, speed and yaw.
@@ -35,6 +36,7 @@ class Claim(msgspec.Struct, frozen=True, gc=False):
     receiver: str
     sent_ns: int
     t_ns: int
+    lost_ns: int
     x_m: float
     y_m: float
     yaw_rad: float | None
@@ -65,7 +67,7 @@ class Claim(msgspec.Struct, frozen=True, gc=False):
 
 
 def claim_of(
-    station: str, receiver: str, sent_ns: int, body: CamBody, limits: Limits
+    station: str, receiver: str, sent_ns: int, body: CamBody, limits: Limits, lost_ns: int = 0
 ) -> Claim:  # fmt: skip
     """Return what a CAM claims."""
     told = read_cam(body)
@@ -79,6 +81,7 @@ def claim_of(
         receiver,
         sent_ns,
         generated_ns(body, sent_ns),
+        lost_ns,
         told.x_m,
         told.y_m,
         told.yaw_rad,

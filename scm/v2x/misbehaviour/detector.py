@@ -8,11 +8,11 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
-from scm.clock import NS_PER_S
+from scm.clock import NS_PER_S, nanoseconds
 from scm.v2x.etsi import CamBody
 from scm.v2x.etsi_convert import station_id
 from scm.v2x.messages.eye_track import EyeTrack
-from scm.v2x.misbehaviour.check import Case, Check, Standing, Strayed, load_checks
+from scm.v2x.misbehaviour.check import CONFIRMED, Case, Check, Standing, Strayed, load_checks
 from scm.v2x.misbehaviour.claim import Claim, claim_of
 from scm.v2x.misbehaviour.fusion import FREE, Memory
 from scm.v2x.misbehaviour.ground import Ground
@@ -22,14 +22,17 @@ from scm.v2x.misbehaviour.limits import REAPPEARS_S, Limits
 FRESH_NS = NS_PER_S // 3
 EYE_WORKS_NS = NS_PER_S // 2
 FORGET_NS = 60 * NS_PER_S
+SILENT_NS = 2 * NS_PER_S
+"""Who heard nobody for so long was away himself, and begins to listen anew."""
 NEIGHBOUR_M = 0.5
-CONFIRMED = 0.05
 TOUCH_M = 0.03
 BAD_FLAGS = frozenset({"tentative", "duplicate", "disagree", "wrong_id", "jumped"})
 MOST_STATIONS = 10_000
 """More station numbers than any city has: a flood of new ones must not fill the memory."""
 ORDINARY = 10.0**-FREE
 IDLE_S, UNMOVED = 0.9, 0.5
+OLDEST_S = 60.0
+LEAST_S = 0.001
 MOVED_M, MOVED_MPS, MOVED_RAD = 4.0 / 14.0, 0.5 / 14.0, math.radians(4.0)
 
 
@@ -48,7 +51,7 @@ class Detector:
     Attributes:
         memories: By station number.
         heard: Claims judged so far.
-        eye_ns: Of the newest track; None: no Eye was ever heard.
+        eye_ns: When a camera last saw any car; None: no Eye was ever heard.
     """
 
     def __init__(
@@ -68,21 +71,30 @@ class Detector:
         self.eye_ns: int | None = None
         self._standings: dict[int, Standing] = {}
         self._began_ns: int | None = None
+        self._heard_ns = 0
 
     def see(self, track: EyeTrack) -> None:
         """Take a track of the Eye."""
         self._tracks[self._number(track.vehicle)] = track
-        self.eye_ns = track.t_ns
+        seen, before = seen_ns(track), self.eye_ns
+        # Nobody saw anything after this was told: what came from the future is forgotten again.
+        self.eye_ns = seen if before is None or before > track.t_ns else max(seen, before)
 
-    def hear(self, station: str, receiver: str, sent_ns: int, body: CamBody) -> Judged | None:
-        """Judge a CAM; None: it was heard before, through another receiver."""
+    def hear(
+        self, station: str, receiver: str, sent_ns: int, body: CamBody, lost_ns: int = 0
+    ) -> Judged | None:
+        """Judge a CAM; None: it was heard before, through another receiver.
+
+        `lost_ns` is that of `CamRx`: time in which the car was not moved.
+        """
         memory = self._memory(body.station_id, station, sent_ns)
         newest = memory.newest
         if newest is not None and sent_ns <= newest.sent_ns:
             return None
-        if self._began_ns is None:
+        if self._began_ns is None or sent_ns - self._heard_ns > SILENT_NS:
             self._began_ns = sent_ns
-        claim = claim_of(station, receiver, sent_ns, body, self._limits)
+        self._heard_ns = sent_ns
+        claim = claim_of(station, receiver, sent_ns, body, self._limits, lost_ns)
         case = self._case(claim, memory)
         doubts = self._ask(case)
         due = memory.add(claim, case.gap_s, doubts)
@@ -143,8 +155,12 @@ class Detector:
         if gap_s > REAPPEARS_S:
             before = None
         dt_s = 0.0 if before is None else (claim.t_ns - before.t_ns) * 1e-9
+        driven_s = dt_s
+        if before is not None and claim.lost_ns > before.lost_ns:
+            driven_s = _driven_s(claim, before, self._limits.front_share)
+            memory.late_ns = claim.t_ns
         memory.idle = _idle(claim, before, gap_s, memory.idle)
-        self._filter(claim, memory, before, dt_s)
+        self._filter(claim, memory, before, driven_s)
         track = self._fresh(claim)
         eye_sees = self._eye_sees(claim)
         neighbours = self._around(claim)
@@ -154,12 +170,15 @@ class Detector:
             ground=self._ground,
             before=before,
             dt_s=dt_s,
+            driven_s=driven_s,
+            since_lost_s=_since_s(claim.t_ns, memory.late_ns),
             gap_s=gap_s,
             kalman=memory.kalman,
             neighbours=neighbours,
             strayed=memory.strayed,
             standings=self._standings,
             track=track,
+            unseen_s=0.0 if track is None else abs(claim.t_ns - seen_ns(track)) * 1e-9,
             nearest_track_m=self._nearest_m(claim) if eye_sees and track is None else math.inf,
             eye_sees=eye_sees,
             since_start_s=(claim.sent_ns - (self._began_ns or claim.sent_ns)) * 1e-9,
@@ -168,24 +187,24 @@ class Detector:
             touches=partial(self._touches, claim, neighbours),
         )
 
-    def _filter(self, claim: Claim, memory: Memory, before: Claim | None, dt_s: float) -> None:
+    def _filter(self, claim: Claim, memory: Memory, before: Claim | None, driven_s: float) -> None:
         x, y = claim.rear(self._limits.front_share)
         yaw, speed = claim.yaw_rad or 0.0, claim.speed_mps or 0.0
         vx, vy = speed * math.cos(yaw), speed * math.sin(yaw)
         kalman = memory.kalman
-        if before is None or dt_s <= 0.0:
-            kalman.begin(claim.t_ns, x, y, vx, vy)
+        if before is None or driven_s <= 0.0:
+            kalman.begin(x, y, vx, vy)
             memory.strayed = Strayed()
         else:
-            kalman.take(claim.t_ns, x, y, vx, vy, claim.own_m, claim.own_mps)
-            memory.strayed.add(claim, before, dt_s, self._limits.front_share)
+            kalman.take(driven_s, x, y, vx, vy, claim.own_m, claim.own_mps)
+            memory.strayed.add(claim, before, driven_s, self._limits.front_share)
 
     def _fresh(self, claim: Claim) -> EyeTrack | None:
         track = self._tracks.get(claim.who)
         return track if track is not None and _is_fresh(track, claim.t_ns) else None
 
     def _eye_sees(self, claim: Claim) -> bool:
-        if self.eye_ns is None or abs(claim.sent_ns - self.eye_ns) > EYE_WORKS_NS:
+        if self.eye_ns is None or abs(claim.t_ns - self.eye_ns) > FRESH_NS:
             return False
         return self._ground.sees(*claim.middle)
 
@@ -248,6 +267,31 @@ class Detector:
 
 def _cell(x: float, y: float) -> tuple[int, int]:
     return math.floor(x / NEIGHBOUR_M), math.floor(y / NEIGHBOUR_M)
+
+
+def seen_ns(track: EyeTrack) -> int:
+    """Return when a camera last saw a track's car: what is told for later is only carried on."""
+    age_s = track.age_s if 0.0 <= track.age_s < OLDEST_S else OLDEST_S
+    return track.t_ns - nanoseconds(age_s)
+
+
+def _driven_s(claim: Claim, before: Claim, front_share: float) -> float:
+    """Return the time that a car drove between two claims, where some of it was lost [s].
+
+    How much is known from above only. So what makes the way that of the speeds counts, as far as
+    what may have been lost excuses it.
+    """
+    dt_s = (claim.t_ns - before.t_ns) * 1e-9
+    lost_s = (claim.lost_ns - before.lost_ns) * 1e-9
+    (x1, y1), (x0, y0) = claim.rear(front_share), before.rear(front_share)
+    way_m = math.hypot(x1 - x0, y1 - y0)
+    speed_mps = abs((claim.speed_mps or 0.0) + (before.speed_mps or 0.0)) / 2.0
+    needed_s = way_m / speed_mps if speed_mps > 0.0 else dt_s
+    return min(dt_s, max(LEAST_S, dt_s - lost_s, needed_s))
+
+
+def _since_s(now_ns: int, then_ns: int | None) -> float:
+    return math.inf if then_ns is None else (now_ns - then_ns) * 1e-9
 
 
 def _is_fresh(track: EyeTrack, t_ns: int) -> bool:

@@ -44,6 +44,7 @@ class Memory:
         station: Its name on the bus.
         newest: Its last claim.
         first_ns: Since when it is known.
+        late_ns: When it last told of a time in which it was not moved; None: never.
         idle: Its claims in a row that came fast though nothing had changed.
         score: What is held against it.
         since_ns: Since when it is suspected; None: it is not.
@@ -54,8 +55,8 @@ class Memory:
     """
 
     __slots__ = (
-        "evidence", "first_ns", "idle", "is_news", "kalman", "newest", "noted", "score", "since_ns",
-        "station", "strayed", "told_ns", "worst",
+        "evidence", "first_ns", "idle", "is_news", "kalman", "late_ns", "newest", "noted", "score",
+        "since_ns", "station", "strayed", "told_ns", "worst",
     )  # fmt: skip
 
     def __init__(self, station: str, first_ns: int) -> None:
@@ -64,6 +65,7 @@ class Memory:
         self.strayed = Strayed()
         self.newest: Claim | None = None
         self.kalman = Kalman()
+        self.late_ns: int | None = None
         self.idle = 0
         self.score = 0.0
         self.worst = ""

@@ -22,28 +22,26 @@ class Kalman:
     """
 
     __slots__ = (
-        "_a", "_b", "_c", "_t_ns", "_vx", "_vy", "_x", "_y",
+        "_a", "_b", "_c", "_vx", "_vy", "_x", "_y",
         "is_warm", "moved_m", "moved_mps", "position_std", "velocity_std",
     )  # fmt: skip
 
     def __init__(self) -> None:
-        self._t_ns = 0
         self._x = self._y = self._vx = self._vy = 0.0
         self._a = self._b = self._c = 0.0
         self.is_warm = False
         self.moved_m = self.moved_mps = 0.0
         self.position_std = self.velocity_std = 1.0
 
-    def begin(self, t_ns: int, x: float, y: float, vx: float, vy: float) -> None:
+    def begin(self, x: float, y: float, vx: float, vy: float) -> None:
         """Start anew at a claim."""
-        self._t_ns, self._x, self._y, self._vx, self._vy = t_ns, x, y, vx, vy
+        self._x, self._y, self._vx, self._vy = x, y, vx, vy
         self._a, self._b, self._c, self.is_warm = 1e-4, 0.0, 1e-4, False
 
     def take(
-        self, t_ns: int, x: float, y: float, vx: float, vy: float, own_m: float, own_mps: float
+        self, dt: float, x: float, y: float, vx: float, vy: float, own_m: float, own_mps: float
     ) -> None:
-        """Forecast to a claim, note how far it lies off, and take it in."""
-        dt = (t_ns - self._t_ns) * 1e-9
+        """Forecast to a claim dt seconds on, note how far it lies off, and take it in."""
         q = ACCEL_PSD * dt
         a = self._a + dt * (2.0 * self._b + dt * self._c) + q * dt * dt / 3.0
         b = self._b + dt * self._c + q * dt / 2.0
@@ -66,4 +64,3 @@ class Kalman:
         self._a = (1.0 - k11) * a - k12 * b
         self._b = (1.0 - k11) * b - k12 * c
         self._c = c - k21 * b - k22 * c
-        self._t_ns = t_ns

@@ -20,6 +20,8 @@ class Limits:
     Attributes:
         speed_mps: Greatest speed.
         accel_mps2: Greatest gain of speed over a tenth of a second; `decel_mps2` likewise of loss.
+        start_mps2: Gain of speed over a tenth of a second at full throttle; `stop_mps2` likewise
+            of loss at none, which brakes: a driver does neither, a guard does.
         interval_s: Least time between two CAMs.
         own_m: Standard deviation of a position whose CAM does not tell it; likewise the others.
         most_own_m: What a CAM may claim at most: who knows himself worse is judged by this.
@@ -29,6 +31,8 @@ class Limits:
     speed_mps: float = 0.267
     accel_mps2: float = 0.9
     decel_mps2: float = 1.5
+    start_mps2: float = 2.3
+    stop_mps2: float = 2.7
     interval_s: float = 0.1
     own_m: float = 0.008
     own_mps: float = 0.008

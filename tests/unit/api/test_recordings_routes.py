@@ -4,13 +4,11 @@ import asyncio
 import csv
 import io
 import os
-import threading
 import time
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import httpx
 import pytest
 
 from scm.__main__ import main
@@ -319,27 +317,6 @@ def test_a_recording_can_be_deleted_but_not_while_it_is_written(ask, folder):
     ask("/run", status=204, method="DELETE")
     assert list(folder.iterdir()) == []
     ask("/run", status=404)
-
-
-def test_of_two_who_edit_the_same_notes_one_is_obeyed(client, folder, monkeypatch):
-    write_run(folder / "run.mcap")
-    at = "http://127.0.0.1/api/v1/recordings/run/notes"
-    seen = {"If-Match": client("GET", at).headers["etag"]}
-    both, write = threading.Barrier(2), Path.write_bytes
-
-    def write_together(path, body):
-        with suppress(threading.BrokenBarrierError):
-            both.wait(0.5)
-        return write(path, body)
-
-    monkeypatch.setattr(Path, "write_bytes", write_together)
-
-    async def at_once():
-        async with httpx.AsyncClient(transport=httpx.ASGITransport(client.app)) as editors:
-            own = [editors.put(at, json={"title": name}, headers=seen) for name in ("a", "b")]
-            return [answer.status_code for answer in await asyncio.gather(*own)]
-
-    assert sorted(asyncio.run(at_once())) == [200, 412]
 
 
 def test_an_export_holds_its_turn_until_its_reader_goes_away(folder):

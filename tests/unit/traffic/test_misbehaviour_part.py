@@ -1,9 +1,11 @@
 """The misbehaviour part in a city on a stepped clock, with cars that lie and cars that do not."""
 
 import itertools
+import random
 
 import pytest
 
+from scm.clock import NS_PER_S, nanoseconds, seconds
 from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.part import Hears
@@ -24,6 +26,27 @@ CARS = (("n1", "nigel"), ("n2", "nigel"), ("n3", "nigel"))
 KINDS = (MisbehaviourReport, MisbehaviourScores, CityEvent, CamTx)
 
 
+class Starved:
+    """A part whose process now and then sleeps for a while; what it hears meanwhile waits."""
+
+    def __init__(self, part, seed=1):
+        self._part, self._rng, self._inbox = part, random.Random(f"{seed} {part.name}"), []
+        self._sleeps_ns, self._wakes_ns = START_NS + 4 * NS_PER_S, 0
+
+    def __getattr__(self, name):
+        return getattr(self._part, name)
+
+    def step(self, now_ns, inbox):
+        self._inbox += inbox
+        if now_ns >= self._sleeps_ns:
+            self._wakes_ns = now_ns + nanoseconds(self._rng.expovariate(1.0 / 0.4))
+            self._sleeps_ns = self._wakes_ns + nanoseconds(self._rng.expovariate(1.0 / 0.6))
+        if now_ns < self._wakes_ns:
+            return []
+        inbox, self._inbox = self._inbox, []
+        return self._part.step(now_ns, inbox)
+
+
 def run(attacks, span_s=25.0, *more, **options):
     """Return reports, the last scores, events and CAMs of a city in which some lie."""
     world = Attacker(WorldPart(MAP, 1, hosted=CARS), attacks, MAP, **options)
@@ -34,6 +57,18 @@ def run(attacks, span_s=25.0, *more, **options):
             [item.message for item in box.drain()] for box in boxes
         )  # fmt: skip
     return reports, scores[-1], [e for e in events if e.name == "misbehaviour"], cams
+
+
+def run_starved(attacks):
+    """Return who is reported in a starved city, how much time it lost, and the last scores."""
+    hosted, agent = WorldPart(MAP, 1, hosted=CARS), AgentPart("n4")
+    world = Attacker(hosted, attacks, MAP)
+    parts = [Starved(one) for one in (world, TrafficPart(MAP), agent, MisbehaviourPart(MAP))]
+    with Lockstep(parts, start_ns=START_NS) as city:
+        reports = city.hear(Hears(MisbehaviourReport))
+        city.run_for(40.0)
+        suspects = {item.message.suspect for item in reports.drain()}
+    return suspects, seconds(hosted.world.pace.lost_ns), parts[-1].detector.memories.values()
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +117,19 @@ def test_an_honest_city_is_left_in_peace():
     reports, scores, events, _ = run({})
     assert reports == events == []
     assert len(scores.stations) == 3
+
+
+def test_in_a_city_that_is_too_slow_nobody_honest_is_suspected():
+    suspects, lost_s, memories = run_starved({})
+    assert lost_s > 5.0
+    assert suspects == set()
+    assert {memory.station for memory in memories} == {"n1", "n2", "n3", "n4"}
+
+
+def test_in_a_city_that_is_too_slow_a_liar_is_still_found():
+    suspects, _, memories = run_starved({"n2": "zero_speed"})
+    assert suspects == {"n2"}
+    assert all(memory.newest.lost_ns > 0 for memory in memories), "also of who lies"
 
 
 def test_ghosts_under_the_attackers_key_are_known_by_their_numbers():

@@ -10,6 +10,7 @@ from scm.maps.route import Roads
 from scm.v2x.messages.route_request import RouteRequest
 from scm.vehicles.driver import CarLimits, RouteView
 from scm.vehicles.drivers.alone import OWN
+from scm.vehicles.drivers.errands import Errands
 from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.signal_view import SignalView
 
@@ -116,9 +117,39 @@ def test_a_trip_tells_what_is_left_of_it_so_that_it_can_go_on(trips, roads, view
     assert [(t.via, t.speed_mps) for t in trips.reports(0)] == [((), 0.2)]
 
 
+def test_a_lane_whose_end_is_reached_is_passed(trips, start):
+    reply = trips.begin(RouteRequest(vehicle="n7", via=("west_loop",)), start, 0)
+    trips.driver.crowd.done_m[OWN] = reply.length_m
+    assert [trip.via for trip in trips.reports(0)] == [()]
+
+
+def test_spread_reports_keep_to_their_own_turn(trips, start):
+    errands = Errands(trips.driver.crowd, spread=True)
+    errands.circulate(OWN, "n7", start, 0)
+    times = [t for t in range(130, 2000, 10) if errands.reports(t * NS_PER_MS)]
+    assert times == [130, 500, 1000, 1500]
+
+
+def test_another_car_in_its_place_counts_its_trips_anew(trips, start):
+    errands = Errands(trips.driver.crowd)
+    for vehicle in ("n7", "n7", "n8"):
+        errands.circulate(OWN, vehicle, start, 0)
+    assert [trip.trip_id for trip in errands.reports(0)] == ["n8-1"]
+
+
+def test_the_last_word_on_a_trip_is_said_once(trips, start):
+    errands = Errands(trips.driver.crowd)
+    errands.circulate(OWN, "n7", start, 0)
+    errands.end(OWN, 0)
+    errands.end(OWN, 0)
+    assert len(errands.reports(0)) == 1
+
+
 @pytest.mark.parametrize("then", ["stop", "circulate"])
 def test_the_arrival_is_told_once_at_once(trips, view, roads, start, then):
-    request = RouteRequest(vehicle="n7", via=("east_loop",), request_id="r1", then=then)
+    request = RouteRequest(
+        vehicle="n7", via=("east_loop",), request_id="r1", then=then, speed_mps=0.1
+    )
     trips.begin(request, start, 0)
     trips.decide(view(start))
     trips.reports(0)
@@ -128,6 +159,7 @@ def test_the_arrival_is_told_once_at_once(trips, view, roads, start, then):
     told = trips.reports(40 * NS_PER_MS)
     ends = [trip for trip in told if trip.arrived_ns is not None]
     assert [trip.trip_id for trip in ends] == ["r1"]
+    assert {trip.speed_mps for trip in told} == {0.1}
     assert ends[0].done_m == pytest.approx(lane.length_m - 0.5, abs=0.02)
     assert [trip.trip_id for trip in told if trip.arrived_ns is None] == (
         ["n7-3"] if then == "circulate" else []

@@ -14,8 +14,10 @@ from scm.maps.load import load_map
 from scm.maps.model import RadioChannel
 from scm.maps.radio import with_radio
 from scm.maps.radio_check import radio_problems
+from scm.v2x.etsi_convert import cam_of
 from scm.v2x.etsi_events import ACCIDENT, DenmSender, Event
 from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.cpm_tx import CpmTx
 from scm.v2x.messages.denm_tx import DenmTx
@@ -26,6 +28,7 @@ from scm.v2x.messages.ssem_tx import SsemTx
 from scm.vehicles.drivers.channel import channel_of, has_arrived
 from scm.world.air import OF_ROADSIDE, RECEIVED, transmit
 from scm.world.busy import Busy
+from scm.world.remote import missed_between
 from scm.world.world import World
 
 MAP = load_map("driving_school")
@@ -42,7 +45,7 @@ class Air:
 
     def remote(self, name, x, y):
         pose = SimpleNamespace(x=x, y=y)
-        self.world.remote[name] = SimpleNamespace(name=name, pose=pose, slot=0)
+        self.world.remote[name] = SimpleNamespace(name=name, pose=pose, slot=0, missed_ns=0)
 
     def send(self, kind, station, now_ns=0):
         self.world.outbox = []
@@ -101,6 +104,55 @@ def test_the_radio_tells_once_a_second_what_became_of_frames(make_city):
     assert [one.t_ns // NS_PER_S for one in told] == [0, 1, 2, 3]
     heard = [out for out in city.heard(CamRx) if out.t_ns < told[-1].t_ns]
     assert sum(one.delivered for one in told) == len(heard) >= 2
+
+
+def test_the_cams_of_a_car_tell_how_much_time_passed_without_it(make_city):
+    city = make_city(hosted=(("n1", "nigel"),))
+    city.run_for(2.0)
+    city.now += 480 * NS_PER_MS
+    late_ns = city.now
+    city.run_for(2.0)
+    told = {out.t_ns: out.lost_ns for out in city.heard(CamRx)}
+    before, after = (
+        {lost for at, lost in told.items() if at < late_ns},
+        {lost for at, lost in told.items() if at >= late_ns},
+    )
+    assert before == {0}
+    assert after == {400 * NS_PER_MS}
+
+
+def test_the_cams_of_an_agents_car_tell_how_long_its_reports_were_too_late(make_city):
+    city = make_city()
+    city.join("n7")
+    for seq in range(1, 6):
+        city.run(1, city.report(seq=seq))
+    city.run_for(0.5)
+    city.run(1, city.report(seq=6))
+    body = cam_of(city.report(seq=6), length_m=0.3, width_m=0.175, front_m=0.23)
+    city.run(1, CamTx(station="n7", t_ns=city.now, body=body))
+    (heard,) = city.heard(CamRx)
+    assert heard.lost_ns == 420 * NS_PER_MS
+
+
+@pytest.mark.parametrize(
+    ("after_ms", "steps", "changes", "missed_ms"),
+    [
+        (20, 1, {}, 0),
+        (100, 1, {}, 0),
+        (400, 1, {}, 300),
+        (400, 4, {}, 0),
+        (-50, 1, {}, 0),
+        (10_000, 1, {}, 3_000),
+        (400, 1, {"source": "odometry"}, 0),
+    ],
+)
+def test_a_car_misses_what_its_reports_leave_out_unless_they_were_lost(
+    make_city, after_ms, steps, changes, missed_ms
+):
+    first = msgspec.structs.replace(make_city().report(seq=5), t_ns=NS_PER_S)
+    now_ns = NS_PER_S + after_ms * NS_PER_MS
+    second = msgspec.structs.replace(first, seq=5 + steps, t_ns=now_ns, **changes)
+    assert missed_between(first, second) == missed_ms * NS_PER_MS
 
 
 def test_the_channel_is_as_busy_as_the_frames_in_range_make_it():

@@ -158,3 +158,12 @@ def test_late_ticks_and_lost_time_are_shown(make_city):
     snapshot = city.heard(WorldSnapshot)[-1]
     assert snapshot.late_ticks == 1
     assert snapshot.real_time_factor < 0.7
+
+
+def test_cars_tell_of_their_trips_in_turns(make_city):
+    city = make_city(hosted=(("n1", "nigel"), ("n2", "nigel")))
+    city.run_for(3.0)
+    for name, turn_ms in (("n1", 0), ("n2", 309)):
+        told = [trip.t_ns // NS_PER_MS for trip in city.heard(Trip) if trip.vehicle == name]
+        assert len(told) >= 6
+        assert all(0 <= (t_ms - turn_ms) % 500 < 20 for t_ms in told[2:])

@@ -4,7 +4,7 @@
 
 Holds for claims that follow within NEAR_S of each other: later, anything may have come between.
 Acceleration is told of an instant, so it tells little: alone it needs many claims. While another
-car touches, an instant tells nothing at all.
+car touches, an instant tells nothing at all, nor just after time passed without the car moving.
 """
 
 import math
@@ -19,7 +19,7 @@ SHARE = 0.5
 
 def _judge(case: Case) -> float | None:
     now, before, dt = case.now, case.before, case.dt_s
-    if before is None or not 0.0 < dt <= NEAR_S:
+    if before is None or not 0.0 < dt <= NEAR_S or case.since_lost_s <= NEAR_S:
         return None
     if now.speed_mps is None or before.speed_mps is None:
         return None

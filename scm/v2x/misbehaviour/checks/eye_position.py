@@ -1,11 +1,13 @@
 """Witness to the place: the claimed rear axle is where the Eye sees this car's tag.
 
 p = place(|claim - track|, sigma of both), the track brought to the claim's time by its speed
+
+An Eye that may not deny (`Case.eye_may_deny`) can still confirm.
 """
 
 import math
 
-from scm.v2x.misbehaviour.check import Case, Check
+from scm.v2x.misbehaviour.check import CONFIRMED, Case, Check
 from scm.v2x.misbehaviour.likely import of_place
 
 TOLERANCE_M = 0.03
@@ -28,7 +30,8 @@ def _judge(case: Case) -> float | None:
     own = now.own_m + front * math.sqrt(track.covariance[2][2])
     eye = math.sqrt(max(track.covariance[0][0], track.covariance[1][1]))
     tolerance = TOLERANCE_M + LATE_S * abs(track.speed_mps)
-    return of_place(away, tolerance, math.hypot(own, eye))
+    p = of_place(away, tolerance, math.hypot(own, eye))
+    return p if case.eye_may_deny or p >= CONFIRMED else None
 
 
 CHECK = Check(_judge, "position")

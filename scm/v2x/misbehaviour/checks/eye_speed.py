@@ -1,6 +1,8 @@
 """Witness to the speed: the claimed speed is what the Eye measures of this car's tag.
 
 p = erfc of |v - v_eye| beyond the tolerance, sigma of both
+
+Holds while the Eye looks, see `Case.eye_may_deny`.
 """
 
 import math
@@ -13,7 +15,7 @@ TOLERANCE_MPS = 0.035
 
 def _judge(case: Case) -> float | None:
     track, now = case.track, case.now
-    if track is None or now.speed_mps is None:
+    if track is None or now.speed_mps is None or not case.eye_may_deny:
         return None
     sigma = math.hypot(now.own_mps, math.sqrt(track.covariance[3][3]))
     return of_number(now.speed_mps - track.speed_mps, TOLERANCE_MPS, sigma)

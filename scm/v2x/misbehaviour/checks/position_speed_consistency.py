@@ -23,7 +23,7 @@ MEAN_MPS, SIGMA_MPS = 0.02, 0.006
 
 
 def _judge(case: Case) -> float | None:
-    now, before, dt = case.now, case.before, case.dt_s
+    now, before, dt = case.now, case.before, case.driven_s
     if before is None or dt <= 0.0 or now.speed_mps is None or before.speed_mps is None:
         return None
     spread = abs(now.speed_mps - before.speed_mps)

@@ -13,7 +13,7 @@ TOLERANCE_M = 0.01
 
 
 def _judge(case: Case) -> float | None:
-    now, before, dt = case.now, case.before, case.dt_s
+    now, before, dt = case.now, case.before, case.driven_s
     if before is None or dt <= 0.0 or now.speed_mps is None or before.speed_mps is None:
         return None
     share, limits = case.limits.front_share, case.limits

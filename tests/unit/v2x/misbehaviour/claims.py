@@ -2,7 +2,7 @@
 
 import math
 
-from scm.clock import NS_PER_S
+from scm.clock import NS_PER_S, nanoseconds
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.v2x.etsi_convert import cam_of
@@ -55,13 +55,14 @@ def body(told, length_m=0.3):
     return cam_of(told, length_m=length_m, width_m=0.175, front_m=FRONT_M)
 
 
-def hear(judge, told, station=None, receiver=RSU, sent_ns=None, **options):
+def hear(judge, told, station=None, receiver=RSU, sent_ns=None, lost_s=0.0, **options):
     """Let a detector hear the CAM of a state."""
     sent = told.t_ns if sent_ns is None else sent_ns
-    return judge.hear(station or told.vehicle, receiver, sent, body(told, **options))
+    lost_ns = nanoseconds(lost_s)
+    return judge.hear(station or told.vehicle, receiver, sent, body(told, **options), lost_ns)
 
 
-def track(told, vehicle=None, stale=False, std=0.003):
+def track(told, vehicle=None, stale=False, std=0.003, age_s=0.0):
     """Return what the Eye tells of a car that is in a state."""
     row = (std, std, 0.01, 0.01, 0.01, 0.1)
     covariance = tuple(tuple(s * s if i == j else 0.0 for j in range(6)) for i, s in enumerate(row))
@@ -76,6 +77,6 @@ def track(told, vehicle=None, stale=False, std=0.003):
         lateral_speed_mps=0.0,
         yaw_rate_radps=0.0,
         covariance=covariance,
-        age_s=0.0,
+        age_s=age_s,
         stale=stale,
     )

@@ -135,13 +135,22 @@ def test_two_cars_behind_each_other_do_not_overlap():
 def test_a_car_that_appears_amid_the_roads_is_odd_unless_cars_come_in_there():
     check = CHECKS["sudden_appearance"]
     judge = detector(check)
-    hear(judge, state(0.0, 0.3))
+    for k in range(6):
+        hear(judge, state(1.0 * k, 0.3, v=0.0))
     x, y = judge._ground.spawns[0]
     pose = state(5.0, 0.0, name="n2")
     there = msgspec.structs.replace(pose, x_m=x, y_m=y)
     assert hear(judge, there).doubts == []
     far = msgspec.structs.replace(pose, vehicle="n3", x_m=40.0, y_m=40.0)
     assert hear(judge, far).doubts
+
+
+def test_who_heard_nobody_for_seconds_cannot_say_who_has_suddenly_appeared():
+    judge = detector(CHECKS["sudden_appearance"])
+    for k in range(6):
+        hear(judge, state(1.0 * k, 0.3, v=0.0))
+    far = msgspec.structs.replace(state(8.0, 0.0, name="n3"), x_m=40.0, y_m=40.0)
+    assert hear(judge, far).doubts == []
 
 
 def test_who_uses_another_number_than_its_own_is_found_by_its_key():
