@@ -5,9 +5,7 @@ import csv
 import io
 import os
 import time
-from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
