@@ -122,7 +122,7 @@ def _settled(wanted: Wanted) -> _Plan:
         msg = f"{got}, expected 127.0.0.1, or a store of `scm key add`"
         raise RunError(msg)
     city_map = with_radio(load_map(wanted.map_name), wanted.radio)
-    _check_counts(wanted)
+    _check_counts(wanted, len(city_map.spawns))
     if wanted.demand is not None:
         DemandPart(city_map, load_demand(wanted.demand))
     for url in (wanted.state, wanted.keys):
@@ -148,11 +148,15 @@ def _settled(wanted: Wanted) -> _Plan:
     )
 
 
-def _check_counts(wanted: Wanted) -> None:
-    for what, got in (("hosted", wanted.hosted), ("agents", wanted.agents)):
-        if got < 0:
-            msg = f"{what}: got {got} cars, expected 0 or more"
-            raise RunError(msg)
+def _check_counts(wanted: Wanted, places: int) -> None:
+    """Check how many of each are wanted; `places` are the map's, to put hosted cars."""
+    if not 0 <= wanted.hosted <= places:
+        got = f"hosted: got {wanted.hosted} cars"
+        msg = f"{got}, expected 0 to {places}: so many places has map {wanted.map_name!r}"
+        raise RunError(msg)
+    if wanted.agents < 0:
+        msg = f"agents: got {wanted.agents} cars, expected 0 or more"
+        raise RunError(msg)
     hz, cars = wanted.cameras_hz, wanted.cameras_of
     if not 0.0 <= hz < float("inf") or (cars and not hz):
         msg = f"cameras_hz: got {hz}, expected 0 or more, and more than 0 with --cameras-of"

@@ -78,6 +78,7 @@ def test_the_recorder_is_told_of_which_cars_it_keeps_pictures(tmp_path):
     ("facts", "said"),
     [
         ({"hosted": -1}, "hosted: got -1"),
+        ({"hosted": 11}, "hosted: got 11 cars, expected 0 to 10: so many places has map"),
         ({"cameras_hz": float("nan")}, "cameras_hz: got nan"),
         ({"cameras_of": ("n1",)}, "cameras_hz: got 0.0, .* with --cameras-of"),
         ({"cameras_hz": 1.0, "cameras_of": ("n1/*",)}, "cameras_of: got 'n1/"),

@@ -53,7 +53,7 @@ class Errands:
         self._crowd = crowd
         self._spread = spread
         self._errands: dict[int, _Errand] = {}
-        self._due_ns = np.full(crowd.capacity, -_SOON, np.int64)
+        self._due_ns = np.zeros(crowd.capacity, np.int64)
         self._under_way = np.zeros(crowd.capacity, np.bool_)
         self._unsent: list[Trip] = []
 
@@ -99,9 +99,6 @@ class Errands:
     def _halt(self, slot: int) -> None:
         self._crowd.halt(slot)
         self._under_way[slot] = False
-        errand = self._errands.get(slot)
-        if errand is not None:
-            errand.length_m = None
 
     def forget(self, slot: int) -> None:
         """Forget that a car was ever sent; its slot is free for another one."""
@@ -114,8 +111,7 @@ class Errands:
             errand = self._errands[slot]
             self._unsent.append(self._report(slot, now_ns, arrived_ns=now_ns))
             self._under_way[slot] = False
-            self._due_ns[slot] = -_SOON
-            if errand.then == "circulate" and errand.passes:
+            if errand.then == "circulate":
                 route = self._crowd.go_on(slot)
                 after = self._note(slot, errand.vehicle, route, None, now_ns, "")
                 after.speed_mps = errand.speed_mps
