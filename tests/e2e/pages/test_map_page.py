@@ -4,6 +4,7 @@ import pytest
 
 SCENE = "/static/js/pages/map/scene.js"
 FLEET = "/static/js/pages/map/fleet.js"
+SELECTION = "/static/js/shared/selection.js"
 SCALE = ".scale"
 
 
@@ -208,6 +209,25 @@ def test_a_car_is_added_and_taken_off_again(visit, running):
     assert "guest" not in names
     # Between its leaving and the page's hearing of it, its path may have been asked for.
     assert [said for said in visited.complaints if "404" not in said] == []
+
+
+def test_cars_that_leave_while_another_is_chosen_do_no_harm(visit):
+    visited = visit("/map")
+    visited.page.wait_for_selector('tr[data-car="n6"]')
+    visited.page.evaluate(
+        f"""async () => {{
+            const {{ fleet }} = await import('{FLEET}');
+            const {{ selected }} = await import('{SELECTION}');
+            selected.value = "n6";
+            await Promise.resolve();  // the table is made anew, and not yet scrolled
+            const vehicles = fleet.vehicles.slice(0, 1);
+            Object.assign(fleet, {{ generation: -1, vehicles, count: 0 }});
+            document.querySelector('.cars .scroll').dispatchEvent(
+                new KeyboardEvent('keydown', {{ key: 'ArrowUp', bubbles: true }}));
+            await new Promise((done) => setTimeout(done, 500));
+        }}"""
+    )
+    assert visited.complaints == []
 
 
 def test_signals_have_letter_and_time_and_lead_to_their_junction(visit):

@@ -88,7 +88,7 @@ function Rows({ rows: all }) {
       list.removeEventListener("scroll", look);
     };
   }, []);
-  useEffect(() => reveal(box.current, rows.findIndex((row) => fleet.vehicles[row].vehicle === selected.value)), [selected.value]);
+  useEffect(() => reveal(box.current, placeOfChosen(rows)), [selected.value]);
   const first = Math.max(0, Math.min(rows.length, Math.floor(scrolled.value / ROW_PX)) - SPARE_ROWS);
   const last = Math.min(rows.length, first + Math.ceil(room.value / ROW_PX) + 2 * SPARE_ROWS);
   return html`
@@ -156,9 +156,14 @@ function step(event, rows) {
   const way = { ArrowUp: -1, ArrowDown: 1 }[event.key];
   if (!way || !rows.length) return;
   event.preventDefault();
-  const here = rows.findIndex((row) => fleet.vehicles[row].vehicle === selected.value);
+  const here = placeOfChosen(rows);
   const next = here < 0 ? (way > 0 ? 0 : rows.length - 1) : Math.min(rows.length - 1, Math.max(0, here + way));
-  selected.value = fleet.vehicles[rows[next]].vehicle;
+  selected.value = fleet.vehicles[rows[next]]?.vehicle ?? selected.value;
+}
+
+/** Where the chosen car is among rows that were shown a moment ago: cars may have left since. */
+function placeOfChosen(rows) {
+  return rows.findIndex((row) => fleet.vehicles[row]?.vehicle === selected.value);
 }
 
 /** Scroll a row into sight, below the head of the table. */
