@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from scm.__main__ import main, parse
-from scm.api.keys import KeyRing
+from scm.api.keys import KeyRing, public_part, whose
 from scm.client.key import key_of_environment
 from scm.command import Command
 from scm.commands import show
@@ -98,7 +98,9 @@ def test_a_key_can_be_made_for_a_program_without_being_shown(
     monkeypatch.setenv("SCM_API_KEY_FILE", str(file))
     key = key_of_environment()
     assert key not in capsys.readouterr().out
-    found = KeyRing(open_store(store)).find(key)
+    kept = KeyRing(open_store(store)).record(public_part(key))
+    assert kept is not None
+    found = whose(key, kept)
     assert found is not None
     assert found.owner == "anna"
     assert main(command) == 2

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scm.mismatch.budget import Budget
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.noise import usual_noise
 from scm.mismatch.parts import split
@@ -84,7 +85,7 @@ def test_two_effects_are_found_in_one_round():
     drive = driven(tuple(truth.items()))
     names = ("steer_trim", "drive_gain", "grade", "gyro_bias", "steer_gain")
     library = [candidate(name) for name in names]
-    _, _, search = roughly([drive], big_nigel(), library, lambda _: None)
+    _, _, search = roughly([drive], big_nigel(), library, lambda _: None, Budget())
     found = search.run()
     assert set(found.names) == {"steer_trim", "drive_gain"}
     assert len(search.steps) >= 2

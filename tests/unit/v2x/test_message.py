@@ -23,7 +23,7 @@ def scan():
 
 def test_a_message_is_plain_json():
     body, attachment = encode(Refused(code="owned", detail="by n2"))
-    assert body == b'{"code":"owned","detail":"by n2"}'
+    assert body == b'{"code":"owned","detail":"by n2","asked":""}'
     assert attachment is None
 
 
