@@ -56,6 +56,21 @@ def events_of(response):
             fields = {}
 
 
+def test_small_answers_do_not_wait_for_what_the_other_side_acknowledges(app, monkeypatch):
+    found, made = [], _Impatient.connection_made
+
+    def note(self, transport):
+        made(self, transport)
+        taken = transport.get_extra_info("socket")
+        found.append(taken.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+
+    monkeypatch.setattr(_Impatient, "connection_made", note)
+    with served(app) as (url, _, _):
+        assert httpx.get(f"{url}/api/v1/stop", timeout=PATIENCE_S).status_code == 200
+    assert found
+    assert all(found)
+
+
 def test_a_page_over_a_real_socket_gets_a_snapshot_and_then_deltas(app, hear, snapshot):
     with served(app) as (url, _, _), listening(url) as response:
         assert response.headers["content-type"].startswith("text/event-stream")
