@@ -5,7 +5,8 @@
     paint   200 cars: first paint of the map page, and the slowest answer to a click or a key
             (event timing: from the touch to the next picture)
     frames  1000 cars: frames a second that the map draws, by its own count
-    api     100 cars: 200 requests a second at even beats, from when each was due to its last byte
+    api     100 cars: 200 requests a second at even beats, from when each was due to its last byte,
+            after each path was asked once, for a process looks some things up but once
     sse     100 cars: processor time of the server for 50 viewers, of JSON and of the binary stream
 
 Nothing else should run on the machine; the load is printed with each number, and what a virtual
@@ -195,6 +196,9 @@ async def ask_evenly(port: int) -> list[float]:
         took_ms.append(1000.0 * (time.perf_counter() - due))
         free.put_nowait((reader, writer))
 
+    for path in PATHS:
+        await ask(0.0, path)
+    took_ms.clear()
     began, tasks = time.perf_counter(), list[asyncio.Task[None]]()
     for number in range(round(API_RATE * SPAN_S)):
         due = began + number / API_RATE
