@@ -18,11 +18,13 @@ class Hears:
     """A wish to receive: a message class, and values for the variable parts of its key.
 
     A key part left out of `where` matches everything: `Hears(VehicleState)` hears every vehicle,
-    `Hears(VehicleState, {"vehicle": "n7"})` hears one.
+    `Hears(VehicleState, {"vehicle": "n7"})` hears one. With `once`, of copies that differ in the
+    first variable part of their key alone (who received them), only the first is brought.
     """
 
     kind: type[Message]
     where: dict[str, str] = field(default_factory=dict)
+    once: bool = False
 
 
 @dataclass(frozen=True, slots=True)

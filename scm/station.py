@@ -85,12 +85,12 @@ class Station:
                 self._ears.remove(ear)
                 self._boxes.remove(box)
         for hears in wished:
-            box = self._mailbox(hears.kind.DELIVERY)
+            box = self._mailbox(hears.kind.DELIVERY, once=hears.once)
             self._bus.subscribe(hears.kind, hears.where, box)
             self._ears.append((hears, box))
 
-    def _mailbox(self, delivery: Delivery) -> Mailbox:
-        box = Mailbox(DEPTH[delivery])
+    def _mailbox(self, delivery: Delivery, *, once: bool = False) -> Mailbox:
+        box = Mailbox(DEPTH[delivery], once=once)
         self._boxes.append(box)
         return box
 

@@ -50,7 +50,7 @@ class MisbehaviourPart:
         """Take the map; `sees` says what the Eye overlooks, the map's cameras if it is None."""
         self.name = NAME
         units = [roadside_station(junction.name) for junction in city_map.junctions]
-        at_units = (Hears(CamRx, {"receiver": unit}) for unit in units)
+        at_units = (Hears(CamRx, {"receiver": unit}, once=True) for unit in units)
         self.hears: Sequence[Hears] = (*at_units, Hears(EyeTrack))
         limits = Limits(speed_mps=facts_of(CAR).speed_mps)
         self.detector = Detector(Ground(city_map, sees), limits)

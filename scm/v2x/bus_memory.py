@@ -252,9 +252,11 @@ class MemoryBus:
         """Bring messages of a class into a mailbox until the bus is closed."""
         self._check_open()
 
+        read = self._reader.read_once if mailbox.once else self._reader.read
+
         def deliver(sample: RawSample) -> None:
             facts = (sample.key, sample.body, sample.attachment, sample.t_ns)
-            mailbox.put_later(partial(self._reader.read, kind, *facts))
+            mailbox.put_later(partial(read, kind, *facts))
 
         keeps = kind.DELIVERY in (Delivery.EVENT, Delivery.PRESENCE)
         wish = _Wish(self, selector(self.city, kind, where), deliver, mailbox, keeps)

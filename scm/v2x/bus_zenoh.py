@@ -25,7 +25,7 @@ from scm.v2x.bus import check_reply, more_telling, no_answer, no_link, no_server
 from scm.v2x.credentials import Credentials
 from scm.v2x.exchange import Answer, Call, Incoming, RawSample
 from scm.v2x.flood_gate import FloodGate
-from scm.v2x.key import check_name, everything, key_of, parse, selector
+from scm.v2x.key import check_name, everything, key_of, names_of, parse, selector
 from scm.v2x.mailbox import Mailbox, RawMailbox
 from scm.v2x.message import Delivery, Message, Refused, Request, decode, encode, is_bulk
 from scm.v2x.messages.presence import Presence
@@ -79,7 +79,7 @@ class ZenohBus:
         self._reader = Reader(self._clock, None if self._air is None else self._air.check)
         self._lock = threading.Lock()
         self._closed = False
-        self._publishers: dict[str, _Publisher] = {}
+        self._publishers: dict[tuple[type[Message], tuple[str, ...]], _Publisher] = {}
         self._declared: list[Any] = []
         self._subscribers: list[tuple[Mailbox, Any]] = []
         self._wishes: dict[str, zenoh.Publisher] = {}
@@ -111,17 +111,22 @@ class ZenohBus:
         self._check_open()
         if self._air is not None:
             message = self._air.signed(message, self._clock.now_ns())
-        kind = type(message)
-        if self._connected or kind.DELIVERY is Delivery.EVENT:
-            key = key_of(self.city, message)
+        if self._connected or message.DELIVERY is Delivery.EVENT:
+            publisher = self._publisher(message)
             body, attachment = encode(message)
-            self._publisher(kind, key).put(body, attachment=attachment)
+            publisher.put(body, attachment=attachment)
 
-    def _publisher(self, kind: type[Message], key: str) -> _Publisher:
+    def _publisher(self, message: Message) -> _Publisher:
+        kind, names = type(message), names_of(message)
+        publisher = self._publishers.get((kind, names))
+        if publisher is not None:
+            return publisher
+        key = key_of(self.city, message)
         with self._lock:
-            publisher = self._publishers.get(key)
+            publisher = self._publishers.get((kind, names))
             if publisher is None:
-                publisher = self._publishers[key] = _declare_publisher(self._session, kind, key)
+                publisher = _declare_publisher(self._session, kind, key)
+                self._publishers[kind, names] = publisher
                 self._declared.append(publisher)
             return publisher
 
@@ -133,8 +138,10 @@ class ZenohBus:
             self._watch_presence(expression, mailbox)
             return
 
+        read = self._reader.read_once if mailbox.once else self._reader.read
+
         def on_sample(key: str, body: bytes, attachment: bytes | None, t_ns: int) -> None:
-            mailbox.put_later(partial(self._reader.read, kind, key, body, attachment, t_ns))
+            mailbox.put_later(partial(read, kind, key, body, attachment, t_ns))
 
         callback = self._direct(self._noting(on_sample))
         if kind.DELIVERY is Delivery.EVENT:

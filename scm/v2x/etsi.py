@@ -78,42 +78,42 @@ TIME_CONFIDENCES = (21, 36, 47, 56, 62, 68, 73, 77, 81, 85, 88, 91, 94, 96, 98, 
 _TimeMark = Annotated[int, Meta(ge=0, le=TIME_MARK_UNKNOWN)]
 
 
-class VehicleLength(msgspec.Struct, kw_only=True, frozen=True):
+class VehicleLength(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """0.1 m, 1023 unknown; confidence: 0 no trailer, 4 unknown."""
 
     value: Annotated[int, Meta(ge=1, le=1023)]
     confidence: Annotated[int, Meta(ge=0, le=4)] = 0
 
 
-class Acceleration(msgspec.Struct, kw_only=True, frozen=True):
+class Acceleration(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """0.1 m/s^2, 161 unknown; confidence 0.1 m/s^2, 102 unknown."""
 
     value: Annotated[int, Meta(ge=-160, le=161)] = 161
     confidence: Annotated[int, Meta(ge=0, le=102)] = 102
 
 
-class Curvature(msgspec.Struct, kw_only=True, frozen=True):
+class Curvature(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """1e-4 1/m, + = left, 1023 unknown; confidence: a class, 7 unknown."""
 
     value: Annotated[int, Meta(ge=-1023, le=1023)] = 1023
     confidence: Annotated[int, Meta(ge=0, le=7)] = 7
 
 
-class YawRate(msgspec.Struct, kw_only=True, frozen=True):
+class YawRate(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """0.01 degree/s, + = left, 32767 unknown; confidence: a class, 8 unknown."""
 
     value: Annotated[int, Meta(ge=-32_766, le=32_767)] = 32767
     confidence: Annotated[int, Meta(ge=0, le=8)] = 8
 
 
-class BasicContainer(msgspec.Struct, kw_only=True, frozen=True):
+class BasicContainer(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """Who and where: the middle of the front bumper."""
 
     station_type: Byte = PASSENGER_CAR
     reference_position: ReferencePosition
 
 
-class VehicleHighFrequency(msgspec.Struct, kw_only=True, frozen=True):
+class VehicleHighFrequency(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """How a car moves.
 
     Attributes:
@@ -133,13 +133,13 @@ class VehicleHighFrequency(msgspec.Struct, kw_only=True, frozen=True):
     yaw_rate: YawRate = YawRate()
 
 
-class HighFrequencyContainer(msgspec.Struct, kw_only=True, frozen=True):
+class HighFrequencyContainer(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """The standard's choice between a vehicle's and a roadside unit's; the vehicle's."""
 
     basic_vehicle_container_high_frequency: VehicleHighFrequency
 
 
-class ExteriorLights(msgspec.Struct, kw_only=True, frozen=True):
+class ExteriorLights(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """Which lights are switched on, in the order of the standard's bits."""
 
     low_beam_headlights_on: bool = False
@@ -152,7 +152,7 @@ class ExteriorLights(msgspec.Struct, kw_only=True, frozen=True):
     parking_lights_on: bool = False
 
 
-class VehicleLowFrequency(msgspec.Struct, kw_only=True, frozen=True):
+class VehicleLowFrequency(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """What changes slowly; path_history: newest point first, each from the one before it."""
 
     vehicle_role: Annotated[int, Meta(ge=0, le=15)] = 0
@@ -160,7 +160,7 @@ class VehicleLowFrequency(msgspec.Struct, kw_only=True, frozen=True):
     path_history: Annotated[tuple[PathPoint, ...], Meta(max_length=MOST_PATH_POINTS)] = ()
 
 
-class LowFrequencyContainer(msgspec.Struct, kw_only=True, frozen=True):
+class LowFrequencyContainer(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """The standard's choice, of which there is one so far."""
 
     basic_vehicle_container_low_frequency: VehicleLowFrequency

@@ -32,7 +32,7 @@ Delta = Annotated[int, Meta(ge=-131_071, le=131_072)]
 Name = Annotated[str, Meta(min_length=1, max_length=63)]
 
 
-class Ellipse(msgspec.Struct, kw_only=True, frozen=True):
+class Ellipse(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """How sure a position is: 0.01 m, 4095 unknown; 0.1 degree, 3601 unknown."""
 
     semi_major: Annotated[int, Meta(ge=0, le=4095)] = NO_ELLIPSE
@@ -40,14 +40,14 @@ class Ellipse(msgspec.Struct, kw_only=True, frozen=True):
     semi_major_orientation: HeadingValue = NO_ANGLE
 
 
-class Altitude(msgspec.Struct, kw_only=True, frozen=True):
+class Altitude(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """0.01 m, 800001 unknown; confidence: a class, 15 unknown."""
 
     value: Annotated[int, Meta(ge=-100_000, le=800_001)] = NO_ALTITUDE
     confidence: Annotated[int, Meta(ge=0, le=15)] = NO_ALTITUDE_CONFIDENCE
 
 
-class ReferencePosition(msgspec.Struct, kw_only=True, frozen=True):
+class ReferencePosition(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """1e-7 degree of the enlarged city."""
 
     latitude: Latitude
@@ -56,21 +56,21 @@ class ReferencePosition(msgspec.Struct, kw_only=True, frozen=True):
     altitude: Altitude = Altitude()
 
 
-class Heading(msgspec.Struct, kw_only=True, frozen=True):
+class Heading(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """0.1 degree clockwise from north, map +y, 3601 unknown; confidence likewise, 127 unknown."""
 
     value: HeadingValue
     confidence: Confidence = NO_CONFIDENCE
 
 
-class Speed(msgspec.Struct, kw_only=True, frozen=True):
+class Speed(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """0.01 m/s, 16383 unknown; confidence 0.01 m/s, 127 unknown."""
 
     value: Annotated[int, Meta(ge=0, le=16_383)]
     confidence: Confidence = NO_CONFIDENCE
 
 
-class DeltaPosition(msgspec.Struct, kw_only=True, frozen=True):
+class DeltaPosition(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """From a reference: 1e-7 degree, 131072 unknown; 0.01 m up, 12800 unknown."""
 
     delta_latitude: Delta

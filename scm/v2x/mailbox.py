@@ -63,6 +63,8 @@ class Mailbox(Queue[Incoming]):
         wake: Set whenever one is added.
         keep: Which ones are wanted; others take no room. All are then made as they arrive, on the
             bus's thread.
+        once: Of copies that differ in the first variable part of their key alone, a frame of the
+            air and its receivers, only the first is read.
     """
 
     def __init__(
@@ -70,9 +72,12 @@ class Mailbox(Queue[Incoming]):
         depth: int,
         wake: threading.Event | None = None,
         keep: Callable[[Incoming], bool] | None = None,
+        *,
+        once: bool = False,
     ) -> None:
         super().__init__(depth, wake)
         self._keep = keep
+        self.once = once
 
     def put_later(self, make: Callable[[], Incoming | None]) -> None:
         """Add an item to be made when it is taken, or made now if not all are wanted."""

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from scm.clock import NS_PER_S, Clock
 from scm.errors import MessageError, ScmError
 from scm.log import event
+from scm.v2x.copies import Copies, content_of
 from scm.v2x.exchange import Incoming
 from scm.v2x.key import agrees
 from scm.v2x.message import Message, decode
@@ -34,6 +35,7 @@ class Reader:
         self._clock = clock
         self._check = check
         self._quiet_until_ns: int | None = None
+        self._copies = Copies()
         self.rejected = 0
 
     def read(
@@ -55,6 +57,21 @@ class Reader:
                 self.reject(key, str(cause))
                 return None
         return Incoming(message, t_ns)
+
+    def read_once(
+        self, kind: type[Message], key: str, body: bytes, attachment: bytes | None, t_ns: int
+    ) -> Incoming | None:
+        """Return what arrived; None also for a copy of what was read before.
+
+        What had to be dropped leaves no trace: it can keep nothing from being heard.
+        """
+        content = content_of(kind, key, body)
+        if content is not None and self._copies.has(content):
+            return None
+        incoming = self.read(kind, key, body, attachment, t_ns)
+        if incoming is not None and content is not None:
+            self._copies.add(content)
+        return incoming
 
     def reject(self, key: str, reason: str) -> None:
         """Count something that could not be read."""

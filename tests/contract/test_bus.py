@@ -11,8 +11,10 @@ from scm.errors import LinkError, MessageError
 from scm.v2x.bus import Mailbox, RawMailbox
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.etsi_convert import cam_of
 from scm.v2x.exchange import Answer, Call
 from scm.v2x.message import Refused, decode
+from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
@@ -21,6 +23,7 @@ from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.router import Router, free_endpoint
 
 PATIENCE_S = 30.0
@@ -107,6 +110,15 @@ def trip(vehicle="n1", done_m=0.0):
 
 def spat(junction="x1", seq=0):
     return Spat(junction=junction, t_ns=1, seq=seq, mode="plan", plan="calm", groups=())
+
+
+def cam(receiver, t_ns):
+    state = VehicleState(
+        vehicle="n1", t_ns=t_ns, seq=1, x_m=1.0, y_m=2.0, yaw_rad=0.0, speed_mps=0.5,
+        yaw_rate_radps=0.0, steering_rad=0.0, throttle=0.1, source="simulated",
+    )  # fmt: skip
+    body = cam_of(state, length_m=0.5, width_m=0.2, front_m=0.4)
+    return CamRx(receiver=receiver, station="n1", t_ns=t_ns, body=body)
 
 
 def news(name, source="world"):
@@ -209,6 +221,24 @@ def test_a_full_mailbox_drops_the_oldest_and_counts(city):
         gather(city, fence, 1)
     settles(city, lambda: small.dropped - dropped == 7)
     assert [i.message.seq for i in small.drain()] == [7, 8, 9]
+
+
+def test_of_a_frame_that_many_receive_a_mailbox_may_want_one_copy(city):
+    world, ear = city.bus("world"), city.bus("ear")
+    once = Mailbox(1000, once=True)
+    ear.subscribe(CamRx, {}, once)
+    gather(city, once, 1, also=lambda: world.publish(cam("rsu-a", 0)))
+    for receiver in ("rsu-a", "rsu-b", "rsu-c"):
+        world.publish(cam(receiver, 1))
+    world.publish(cam("rsu-c", 2))
+    heard = []
+
+    def look():
+        heard.extend(item.message.t_ns for item in once.drain())
+        return 2 in heard
+
+    settles(city, look)
+    assert [t_ns for t_ns in heard if t_ns > 0] == [1, 2]
 
 
 def test_a_station_hears_itself_when_it_asks_to(city):

@@ -10,7 +10,7 @@ import msgspec
 from scm.v2x.message import Message
 
 
-class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True):
+class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """One car; pose of the rear axle's centre, map frame.
 
     Attributes:

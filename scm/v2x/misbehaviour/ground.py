@@ -55,7 +55,9 @@ class Ground:
             for x, y, yaw in rows.tolist():
                 row = (x, y, wrap_angle(yaw), lane.width_m / 2.0)
                 self._buckets[_cell(x, y, BUCKET_M)].append(row)
-        self._areas = [area.points for area in city_map.areas]
+        self._half_m = max((lane.width_m / 2.0 for lane in city_map.lanes), default=0.0)
+        self._near: dict[tuple[int, int, int], list[Row]] = {}
+        self._areas = [(_frame(area.points), area.points) for area in city_map.areas]
         self._known: dict[tuple[int, int], tuple[float, tuple[float, ...]]] = {}
         views = [_view(camera) for camera in city_map.cameras]
         self.sees: Sees = sees or (lambda x, y: any(view(x, y) for view in views))
@@ -70,12 +72,9 @@ class Ground:
 
     def road_near(self, x: float, y: float) -> Row | None:
         """Return the nearest point of a lane's middle: x, y [m], yaw [rad], half the width [m]."""
-        i, j = _cell(x, y, BUCKET_M)
-        steps = range(-2, 3)
-        rows = (
-            row for di in steps for dj in steps for row in self._buckets.get((i + di, j + dj), ())
+        return min(
+            self._rows(x, y, 2), key=lambda row: math.hypot(x - row[0], y - row[1]), default=None
         )
-        return min(rows, key=lambda row: math.hypot(x - row[0], y - row[1]), default=None)
 
     def _at(self, x: float, y: float) -> tuple[float, tuple[float, ...]]:
         cell = _cell(x, y, CELL_M)
@@ -86,18 +85,30 @@ class Ground:
         return known
 
     def _ask(self, x: float, y: float) -> tuple[float, tuple[float, ...]]:
-        if any(inside(x, y, area) for area in self._areas):
-            return 0.0, ()
-        i, j = _cell(x, y, BUCKET_M)
-        steps = range(-2, 3)
-        rows = [
-            row for di in steps for dj in steps for row in self._buckets.get((i + di, j + dj), ())
-        ]
-        beside = [(math.hypot(x - row[0], y - row[1]) - row[3], row[2]) for row in rows]
-        away = min((off for off, _ in beside), default=FAR_M)
-        near = max(away, 0.0) + ALONGSIDE_M
+        for (x0, y0, x1, y1), area in self._areas:
+            if x0 <= x <= x1 and y0 <= y <= y1 and inside(x, y, area):
+                return 0.0, ()
+        for buckets in (1, 2):
+            rows = self._rows(x, y, buckets)
+            beside = [(math.hypot(x - row[0], y - row[1]) - row[3], row[2]) for row in rows]
+            away = min((off for off, _ in beside), default=FAR_M)
+            near = max(away, 0.0) + ALONGSIDE_M
+            if near < buckets * BUCKET_M - self._half_m:
+                break  # all other lanes are farther
         ways = tuple(dict.fromkeys(round(yaw, 1) for off, yaw in beside if off <= near))
         return min(FAR_M, max(0.0, away)), ways
+
+    def _rows(self, x: float, y: float, buckets: int) -> list[Row]:
+        """Return the points of lanes in a point's bucket and so many around it each way."""
+        i, j = _cell(x, y, BUCKET_M)
+        rows = self._near.get((i, j, buckets))
+        if rows is None:
+            steps = range(-buckets, buckets + 1)
+            cells = ((i + di, j + dj) for di in steps for dj in steps)
+            rows = [row for cell in cells for row in self._buckets.get(cell, ())]
+            if rows:
+                self._near[i, j, buckets] = rows
+        return rows
 
 
 def inside(x: float, y: float, polygon: tuple[Point, ...]) -> bool:
@@ -109,6 +120,12 @@ def inside(x: float, y: float, polygon: tuple[Point, ...]) -> bool:
             odd = not odd
         x0, y0 = x1, y1
     return odd
+
+
+def _frame(polygon: tuple[Point, ...]) -> tuple[float, float, float, float]:
+    """Return the least and the greatest x and y of a polygon [m]: x0, y0, x1, y1."""
+    xs, ys = zip(*polygon, strict=True)
+    return min(xs), min(ys), max(xs), max(ys)
 
 
 def _cell(x: float, y: float, size: float) -> tuple[int, int]:

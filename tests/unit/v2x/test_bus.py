@@ -4,15 +4,25 @@ import logging
 import threading
 
 from scm.clock import NS_PER_S, StepClock
+from scm.errors import MessageError
 from scm.v2x.bus import Mailbox, RawMailbox
+from scm.v2x.bus_memory import MemoryNetwork
+from scm.v2x.copies import KEPT
+from scm.v2x.etsi_convert import cam_of
 from scm.v2x.exchange import Incoming, RawSample
 from scm.v2x.mailbox import drain_all
-from scm.v2x.message import Refused, encode
+from scm.v2x.message import Refused, decode, encode
+from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.reader import Reader
 
 KEY = "scm/@v1/city/part/world/status"
+A_STATE = VehicleState(
+    vehicle="n1", t_ns=1, seq=1, x_m=1.0, y_m=2.0, yaw_rad=0.0, speed_mps=0.5, yaw_rate_radps=0.0,
+    steering_rad=0.0, throttle=0.1, source="simulated",
+)  # fmt: skip
 
 
 def item(n):
@@ -108,3 +118,59 @@ def test_a_message_that_claims_to_be_from_somebody_else_is_dropped():
     assert reader.read(PartStatus, KEY, honest, None, 5).t_ns == 5
     assert reader.read(PartStatus, KEY, forged, None, 5) is None
     assert reader.rejected == 1
+
+
+def heard_by(receiver, key_of=None, **facts):
+    """Return what a reader takes: the CAM of one car, as it reaches a receiver."""
+    cam = cam_of(A_STATE, length_m=0.5, width_m=0.2, front_m=0.4)
+    said = CamRx(**{"receiver": receiver, "station": "n1", "t_ns": 1, "body": cam} | facts)
+    return CamRx, f"scm/@v1/city/v2x/rx/{key_of or receiver}/n1/cam", encode(said)[0], None, 5
+
+
+def test_of_copies_the_first_alone_is_read():
+    reader = Reader(StepClock())
+    assert reader.read_once(*heard_by("a")).message.receiver == "a"
+    assert reader.read_once(*heard_by("b")) is None
+    assert reader.read(*heard_by("b")).message.receiver == "b"
+    assert reader.read_once(*heard_by("b", t_ns=2)).message.t_ns == 2
+    assert reader.read_once(*heard_by("b", signed="another")).message.signed == "another"
+    assert reader.rejected == 0
+
+
+def test_a_copy_that_lies_about_its_receiver_is_rejected_as_ever():
+    reader = Reader(StepClock())
+    assert reader.read_once(*heard_by("a")) is not None
+    assert reader.read_once(*heard_by("a", key_of="b")) is None
+    assert reader.rejected == 1
+
+
+def test_what_is_not_believed_keeps_no_copy_from_being_read():
+    def check(message, t_ns):
+        if message.receiver == "a":
+            msg = "not signed"
+            raise MessageError(msg)
+
+    reader = Reader(StepClock(), check)
+    assert reader.read_once(*heard_by("a")) is None
+    assert reader.read_once(*heard_by("b")).message.receiver == "b"
+
+
+def test_old_copies_are_forgotten():
+    reader = Reader(StepClock())
+    for t_ns in range(2 * KEPT + 1):
+        assert reader.read_once(*heard_by("a", t_ns=t_ns)) is not None
+    assert reader.read_once(*heard_by("b", t_ns=2 * KEPT)) is None
+    assert reader.read_once(*heard_by("b", t_ns=0)) is not None
+
+
+def test_a_part_hears_a_frame_once_if_it_wishes():
+    network = MemoryNetwork(StepClock())
+    with network.bus("city", "world") as world, network.bus("city", "ear") as ear:
+        once, every = Mailbox(10, once=True), Mailbox(10)
+        for box in (once, every):
+            ear.subscribe(CamRx, {}, box)
+        for receiver in "abc":
+            kind, _, body, _, _ = heard_by(receiver)
+            world.publish(decode(kind, body))
+        assert [item.message.receiver for item in once.drain()] == ["a"]
+        assert [item.message.receiver for item in every.drain()] == ["a", "b", "c"]

@@ -1,18 +1,45 @@
 """Messages as bytes: JSON for everything, raw payloads beside a JSON header."""
 
+import gc
 import math
+from typing import Any
 
+import msgspec
 import pytest
 
 from scm.errors import MessageError
 from scm.v2x.etsi_convert import cam_of
-from scm.v2x.message import Refused, decode, encode
+from scm.v2x.message import Message, Refused, decode, encode
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.spawn_request import SpawnReply
 from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.vehicle_state import VehicleState
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
+
+A_TRIP = {
+    "vehicle": "n1", "trip_id": "t", "t_ns": 0, "route": (), "done_m": 0.0, "length_m": None,
+    "started_ns": 0,
+}  # fmt: skip
+
+
+class Lamp(msgspec.Struct, kw_only=True, frozen=True):
+    number: int
+
+
+class LightsOfMany(Message, kw_only=True, frozen=True):
+    lights: tuple[dict[str, int], ...] = ()
+    either: Lamp | str = ""
+    pair: tuple[str, int] = ("", 0)
+    anything: Any = None
+
+
+def seen(tag_id):
+    return SnapshotVehicle(
+        vehicle="n1", kind="hosted", car="nigel", tag_id=tag_id, x_m=0.0, y_m=0.0, yaw_rad=0.0,
+        speed_mps=0.0, steering_rad=0.0,
+    )  # fmt: skip
 
 
 def scan():
@@ -37,6 +64,15 @@ def test_a_payload_is_the_body_and_the_rest_is_the_attachment():
     assert decode(LidarScan, body, attachment) == scan()
 
 
+def test_the_collector_of_cycles_does_not_walk_over_messages():
+    lit = tuple(sorted(["tail", "left"]))  # a constant would not be tracked
+    assert gc.is_tracked(lit)
+    told = msgspec.structs.replace(state(), lights=lit)
+    body = cam_of(told, length_m=0.5, width_m=0.2, front_m=0.4)
+    for one in (told, msgspec.structs.replace(seen(1), lights=lit), body, body.motion):
+        assert not gc.is_tracked(one)
+
+
 def test_unknown_fields_are_ignored():
     body = b'{"t_ns":1,"engaged":true,"colour":"red"}'
     assert decode(CityStop, body) == CityStop(t_ns=1, engaged=True)
@@ -58,6 +94,27 @@ def test_unknown_fields_are_ignored():
 def test_bytes_that_are_no_such_message_are_refused_with_class_and_field(body, said):
     with pytest.raises(MessageError, match=said):
         decode(CityStop, body)
+
+
+def with_a_number(of):
+    return of(10**20), of(2**63 - 1)
+
+
+@pytest.mark.parametrize(
+    ("bad", "good"),
+    [
+        with_a_number(lambda n: Trip(**A_TRIP | {"arrived_ns": n})),
+        with_a_number(lambda n: WorldSnapshot(t_ns=0, tick=1, vehicles=(seen(1), seen(n)))),
+        with_a_number(lambda n: LightsOfMany(lights=({"a": n},))),
+        with_a_number(lambda n: LightsOfMany(either=Lamp(number=n))),
+        with_a_number(lambda n: LightsOfMany(pair=("left", n))),
+        with_a_number(lambda n: LightsOfMany(anything=[{"deep": n}])),
+    ],
+)
+def test_long_integers_are_refused_wherever_they_stand(bad, good):
+    with pytest.raises(MessageError, match=f"{type(bad).__name__}: .*64 bits"):
+        decode(type(bad), encode(bad)[0])
+    assert decode(type(good), encode(good)[0]) == good
 
 
 def test_long_digits_are_fine_where_they_are_no_integers():

@@ -2,9 +2,12 @@
 
 import math
 
+import numpy as np
 from numpy.testing import assert_allclose
 
-from scm.v2x.misbehaviour.ground import CELL_M, Ground, inside
+from scm.geometry import wrap_angle
+from scm.maps.route import Roads
+from scm.v2x.misbehaviour.ground import ALONGSIDE_M, CELL_M, FAR_M, STEP, Ground, inside
 from tests.unit.v2x.misbehaviour.claims import LANE, MAP, ground
 
 
@@ -39,3 +42,28 @@ def test_the_eye_overlooks_what_the_cameras_of_the_map_see():
     known = Ground(MAP)
     assert known.sees(1.384, 0.655)
     assert not known.sees(30.0, 0.0)
+
+
+def test_what_is_near_is_found_as_if_all_lanes_were_looked_at():
+    known, roads = ground(), Roads(MAP)
+    rows = [
+        (x, y, wrap_angle(yaw), lane.width_m / 2.0)
+        for lane in roads.lanes.values()
+        for x, y, yaw in np.column_stack([lane.points, lane.yaw])[::STEP].tolist()
+    ]
+    paved = 0
+    for i in range(-30, 120, 3):
+        for j in range(-30, 120, 3):
+            x, y = (i + 0.5) * CELL_M, (j + 0.5) * CELL_M
+            off, ways = known.off_road_m(x, y), known.ways_at(x, y)
+            if any(inside(x, y, area.points) for area in MAP.areas):
+                paved += 1
+                assert (off, ways) == (0.0, ())
+                continue
+            beside = [(math.hypot(x - row[0], y - row[1]) - row[3], row[2]) for row in rows]
+            away = min(beside)[0]
+            near = max(away, 0.0) + ALONGSIDE_M
+            assert off == min(FAR_M, max(0.0, away))
+            if away < FAR_M - 0.25:  # farther off not all lanes are asked
+                assert set(ways) == {round(yaw, 1) for beyond, yaw in beside if beyond <= near}
+    assert paved > 10

@@ -1,0 +1,102 @@
+"""Which messages hold an integer of more than 64 bits.
+
+A float, an array, another language could not hold it. Only fields that their class leaves open are
+looked at: four numbers of a car's state, where a search of its text reads all of 570 bytes.
+"""
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import msgspec
+from msgspec import inspect
+
+_LARGEST = 2**63 - 1
+_WITHOUT = (
+    inspect.BoolType,
+    inspect.BytesType,
+    inspect.FloatType,
+    inspect.LiteralType,
+    inspect.NoneType,
+    inspect.StrType,
+)
+
+Check = Callable[[Any], bool]
+
+
+def are_short(message: msgspec.Struct) -> bool:
+    """Return whether all integers of a message have at most 64 bits."""
+    check = _check_of(type(message))
+    return check is None or check(message)
+
+
+@lru_cache(maxsize=256)
+def _check_of(kind: type[msgspec.Struct]) -> Check | None:
+    return _check(inspect.type_info(kind))
+
+
+def _check(info: inspect.Type) -> Check | None:
+    """Return what to ask of values of a type; None: they can hold no long integer."""
+    match info:
+        case inspect.IntType():
+            return None if _is_bounded(info) else _is_short
+        case inspect.StructType():
+            return _of_struct(info)
+        case inspect.VarTupleType() | inspect.ListType():
+            return _of_each(_check(info.item_type))
+        case inspect.TupleType():
+            return None if all(_check(one) is None for one in info.item_types) else _of_any
+        case inspect.UnionType():
+            return None if all(_check(one) is None for one in info.types) else _of_union(info)
+    return None if isinstance(info, _WITHOUT) else _of_any
+
+
+def _is_bounded(info: inspect.IntType) -> bool:
+    return (info.ge, info.gt) != (None, None) and (info.le, info.lt) != (None, None)
+
+
+def _is_short(value: int) -> bool:
+    return -_LARGEST - 1 <= value <= _LARGEST
+
+
+def _of_struct(info: inspect.StructType) -> Check | None:
+    asked = [(field.name, _check(field.type)) for field in info.fields]
+    checks = [(name, check) for name, check in asked if check is not None]
+
+    def check_fields(value: object) -> bool:
+        for name, check in checks:  # noqa: SIM110  a third of the time of `all`
+            if not check(getattr(value, name)):
+                return False
+        return True
+
+    return check_fields if checks else None
+
+
+def _of_each(check: Check | None) -> Check | None:
+    return None if check is None else lambda values: all(map(check, values))
+
+
+def _of_union(info: inspect.UnionType) -> Check:
+    """Return a check that looks at structs and integers; anything else is gone through whole."""
+    checks: dict[type, Check | None] = {int: _is_short, type(None): None, float: None, str: None}
+    for one in info.types:
+        if isinstance(one, inspect.StructType):
+            checks[one.cls] = _check(one)
+
+    def check_one(value: object) -> bool:
+        check = checks.get(type(value), _of_any)
+        return check is None or check(value)
+
+    return check_one
+
+
+def _of_any(value: object) -> bool:
+    return _are_short(msgspec.to_builtins(value))
+
+
+def _are_short(value: object) -> bool:
+    if isinstance(value, dict):
+        return all(map(_are_short, value.values()))
+    if isinstance(value, list | tuple):
+        return all(map(_are_short, value))
+    return not isinstance(value, int) or _is_short(value)
