@@ -52,6 +52,13 @@ class Polyline:
             wrap_angle(self._yaw[i] + t * (self._yaw[i + 1] - self._yaw[i])),
         )
 
+    def yaw_at(self, s: float) -> float:
+        """Return the direction of the curve [rad], that of `at`."""
+        s = self._inside(s)
+        i = self._index(s)
+        t = (s - self._s[i]) / (self._s[i + 1] - self._s[i])
+        return wrap_angle(self._yaw[i] + t * (self._yaw[i + 1] - self._yaw[i]))
+
     def curvature_at(self, s: float) -> float:
         """Return the curvature [1/m], + = turns left."""
         return self._curvature[self._index(self._inside(s))]
@@ -78,9 +85,13 @@ class Polyline:
 
     def _descend(self, x: float, y: float, i: int) -> tuple[float, float]:
         """Walk over the stretches, from number `i` on, to the one whose normal meets the point."""
+        xs, ys = self._x, self._y
         laps_m, before = 0.0, 0
         for _ in range(self._last + 2):
-            along, lateral, step_m = self._on_stretch(x, y, i)
+            x0, y0 = xs[i], ys[i]
+            dx, dy, px, py = xs[i + 1] - x0, ys[i + 1] - y0, x - x0, y - y0
+            step_m = math.hypot(dx, dy)
+            along = (px * dx + py * dy) / step_m
             way = -1 if along < 0.0 else 1 if along > step_m else 0
             if way in (0, -before):  # in a bend a point may lie between two normals
                 break
@@ -92,14 +103,8 @@ class Polyline:
                 laps_m += way * self.length_m
                 following %= self._last + 1
             i = following
+        lateral = (dx * py - dy * px) / step_m
         return self._s[i] + min(max(along, 0.0), step_m) + laps_m, lateral
-
-    def _on_stretch(self, x: float, y: float, i: int) -> tuple[float, float, float]:
-        """Return the point's place along and beside one stretch, and the stretch's length [m]."""
-        dx, dy = self._x[i + 1] - self._x[i], self._y[i + 1] - self._y[i]
-        px, py = x - self._x[i], y - self._y[i]
-        step_m = math.hypot(dx, dy)
-        return (px * dx + py * dy) / step_m, (dx * py - dy * px) / step_m, step_m
 
     def _inside(self, s: float) -> float:
         """Return the same place as a distance from 0 to the length."""

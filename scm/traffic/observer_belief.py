@@ -71,9 +71,10 @@ class Beliefs:
 
 
 def _can_be(belief: Belief) -> bool:
-    lengths = (belief.x, belief.y, belief.std_m)
     return (
-        all(abs(length) <= FARTHEST_M for length in lengths)
+        abs(belief.x) <= FARTHEST_M
+        and abs(belief.y) <= FARTHEST_M
+        and belief.std_m <= FARTHEST_M
         and max(abs(belief.speed), belief.std_mps) <= FASTEST_MPS
         and abs(belief.yaw) <= MOST_RAD
     )

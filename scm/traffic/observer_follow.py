@@ -66,7 +66,7 @@ class Follower:
         # beyond an end `project` answers the end itself, give or take the last digit
         if not END_M < s < lane.length_m - END_M or abs(lateral) > NEAR_M:
             return None
-        if abs(wrap_angle(lane.at(s).yaw - belief.yaw)) > SAME_WAY_RAD:
+        if abs(wrap_angle(lane.yaw_at(s) - belief.yaw)) > SAME_WAY_RAD:
             return None
         return Followed(OnLane(known.place.lane, s, lateral), known.before)
 

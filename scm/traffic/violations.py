@@ -99,6 +99,7 @@ class Judge:
     def __init__(self, roads: Roads, lines: Mapping[str, Lines]) -> None:
         self._roads, self._lines = roads, lines
         self._cars: dict[str, _Car] = {}
+        self._limits: dict[str, list[tuple[float, float]]] = {}
         self._contacts: dict[frozenset[str], int] = {}
         self._told = 0
         self.signals = SignalMemory()
@@ -107,9 +108,15 @@ class Judge:
         """Forget a car that is gone."""
         self._cars.pop(vehicle, None)
 
+    def _car(self, vehicle: str) -> _Car:
+        car = self._cars.get(vehicle)
+        if car is None:
+            car = self._cars[vehicle] = _Car()
+        return car
+
     def see(self, belief: Belief, followed: Followed | None) -> list[Violation]:
         """Judge where a car is now."""
-        car = self._cars.setdefault(belief.vehicle, _Car())
+        car = self._car(belief.vehicle)
         if car.track and belief.t_ns <= car.track[-1].t_ns:
             return []
         span_s = seconds(belief.t_ns - car.track[-1].t_ns) if car.track else 0.0
@@ -133,7 +140,7 @@ class Judge:
         return found
 
     def _collision(self, contact: Contact, other: str) -> Violation:
-        car = self._cars.setdefault(contact.vehicle, _Car())
+        car = self._car(contact.vehicle)
         blow_mps = math.hypot(contact.dvx_mps, contact.dvy_mps)
         last = car.track[-1] if car.track else None
         self._told += 1
@@ -260,7 +267,10 @@ class Judge:
         return self._tell("speed", car, belief, text, over / max(belief.std_mps, 1e-6))
 
     def _limit(self, followed: Followed) -> float:
-        limits = self._roads.limits_on(followed.place.lane)
+        lane = followed.place.lane
+        limits = self._limits.get(lane)
+        if limits is None:
+            limits = self._limits[lane] = self._roads.limits_on(lane)
         return next(limit for at, limit in reversed(limits) if at <= max(followed.place.s, 0.0))
 
     def _direction(

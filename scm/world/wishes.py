@@ -6,30 +6,41 @@ from scm.part import IsWanted
 from scm.v2x.message import Message
 
 ASK_EVERY_TICKS = 50
+ASK_FOR_ANY_EVERY_TICKS = 5
 NOBODY = "_"
 
 
 class Wishes:
-    """Asks the bus, for single stations only once a second; without a bus everything is wanted."""
+    """Asks the bus, ten times a second for whole classes and once for single stations.
+
+    Without a bus everything is wanted.
+    """
 
     def __init__(self) -> None:
         self._is_wanted: IsWanted | None = None
         self._tick = 0
         self._asked: dict[tuple[type[Message], str], bool] = {}
+        self._any: dict[type[Message], bool] = {}
 
     def learn(self, is_wanted: IsWanted) -> None:
         """Take the bus's word from now on."""
         self._is_wanted = is_wanted
+        self._any.clear()
 
     def begin_tick(self) -> None:
-        """Let a tick pass: answers about single stations grow old."""
+        """Let a tick pass: answers grow old."""
         self._tick += 1
+        if self._tick % ASK_FOR_ANY_EVERY_TICKS == 0:
+            self._any.clear()
         if self._tick % ASK_EVERY_TICKS == 0:
             self._asked.clear()
 
     def any(self, kind: type[Message]) -> bool:
         """Return whether anybody hears any message of a class."""
-        return self._is_wanted is None or self._is_wanted(kind, {})
+        known = self._any.get(kind)
+        if known is None:
+            known = self._any[kind] = self._is_wanted is None or self._is_wanted(kind, {})
+        return known
 
     def all(self, kind: type[Message], key: str) -> bool:
         """Return whether somebody hears a class whatever the key part: even that of nobody."""

@@ -88,6 +88,12 @@ def test_a_line_may_pass_the_same_piece_twice():
     assert line.length_m == pytest.approx(3.0)
 
 
+def test_the_direction_alone_is_that_of_the_pose():
+    line = sample(Pose2(1.0, 2.0, 3.0), [Segment(radius_m=0.5, angle_rad=2.0)])
+    for s in np.linspace(-0.5, 1.5, 41):
+        assert line.yaw_at(s) == line.at(s).yaw
+
+
 def test_yaw_is_continuous_over_a_join():
     line = ring()
     assert np.abs(np.diff(line.yaw)).max() < 0.03

@@ -2,7 +2,7 @@
 
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_state import VehicleState
-from scm.world.wishes import ASK_EVERY_TICKS, Wishes
+from scm.world.wishes import ASK_EVERY_TICKS, ASK_FOR_ANY_EVERY_TICKS, Wishes
 
 
 class Subscribers:
@@ -51,3 +51,24 @@ def test_a_new_listener_is_noticed_within_a_second():
     for _ in range(ASK_EVERY_TICKS):
         wishes.begin_tick()
     assert wishes.of(LidarScan, "vehicle", ["n1", "n2"]) == [False, True]
+
+
+def test_for_whole_classes_the_bus_is_asked_ten_times_a_second():
+    subscribers = Subscribers()
+    wishes = wishes_with(subscribers)
+    assert not wishes.any(VehicleState)
+    subscribers.wanted["VehicleState"] = {"n1"}
+    assert not wishes.any(VehicleState)
+    assert subscribers.asked == 1
+    for _ in range(ASK_FOR_ANY_EVERY_TICKS):
+        wishes.begin_tick()
+    assert wishes.any(VehicleState)
+    assert wishes.any(VehicleState)
+    assert subscribers.asked == 2
+
+
+def test_who_learns_of_a_bus_late_asks_it():
+    wishes = Wishes()
+    assert wishes.any(VehicleState)
+    wishes.learn(Subscribers())
+    assert not wishes.any(VehicleState)
