@@ -4,18 +4,15 @@ import asyncio
 import uuid
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
-from pathlib import Path
+from http import HTTPStatus
 
 from fastapi import APIRouter, FastAPI
-from fastapi.responses import FileResponse
-from starlette.responses import Response
-from starlette.staticfiles import StaticFiles
-from starlette.types import Scope
 
 from scm.api import openapi, problem
 from scm.api.acknowledgements import Acknowledgements
 from scm.api.audit_trail import Audited
 from scm.api.city import Ask, City, Link
+from scm.api.dashboard import INDEX, Dashboard, astray
 from scm.api.gate import Gate, content_policy
 from scm.api.idempotency import Idempotent
 from scm.api.keys import KeyRing
@@ -69,22 +66,8 @@ from scm.maps.model import CityMap
 from scm.store.memory import MemoryStore
 from scm.store.repository import Repository
 
-STATIC_DIR = Path(__file__).parent / "static"
 LARGEST_BODY = 2**20
 """Bytes of a request's body; a route that takes files says how much it takes."""
-PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
-"""First part of the address of each page of the dashboard; what follows is the page's own."""
-
-_REVALIDATE = {"Cache-Control": "no-cache"}
-
-
-class _Files(StaticFiles):
-    """Static files with an ETag that the browser asks about each time: no stale page, no reload."""
-
-    async def get_response(self, path: str, scope: Scope) -> Response:
-        response = await super().get_response(path, scope)
-        response.headers.update(_REVALIDATE)
-        return response
 
 
 def create_app(
@@ -138,7 +121,6 @@ def create_app(
         app.include_router(noun, prefix="/api/v1", responses=problem.RESPONSES)
     for noun in (health.router(desk.city), ngsi.router(desk.city), metrics.router(desk.metrics)):
         app.include_router(noun, responses=problem.RESPONSES)
-    _add_pages(app)
     return app
 
 
@@ -219,28 +201,12 @@ class _Desk:
 
 
 def _add_layers(app: FastAPI, desk: _Desk, clock: WallClock) -> None:
-    policy = content_policy((STATIC_DIR / "index.html").read_text("utf-8"))
+    policy = content_policy(INDEX.read_text("utf-8"))
     app.add_middleware(Idempotent, clock=clock)  # what is added later sees a request earlier
     app.add_middleware(Limited, clock=clock)
     app.add_middleware(Audited, store=desk.store, clock=clock)
+    app.add_middleware(Dashboard)
     app.add_middleware(Gate, keys=desk.known, policy=policy)
     app.add_middleware(Measured, metrics=desk.metrics, clock=clock)
     app.add_middleware(Traced)
-
-
-def _add_pages(app: FastAPI) -> None:
-    def dashboard() -> FileResponse:
-        return FileResponse(STATIC_DIR / "index.html", headers=_REVALIDATE)
-
-    for path in (
-        "/",
-        *(f"/{page}" for page in PAGES),
-        *(f"/{page}/{{rest:path}}" for page in PAGES),
-    ):
-        app.get(path, include_in_schema=False)(dashboard)
-
-    @app.get("/docs", include_in_schema=False)
-    def docs() -> FileResponse:
-        return FileResponse(STATIC_DIR / "docs.html", headers=_REVALIDATE)
-
-    app.mount("/static", _Files(directory=STATIC_DIR), name="static")
+    app.add_exception_handler(HTTPStatus.NOT_FOUND, astray)

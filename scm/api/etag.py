@@ -21,7 +21,7 @@ def etag_of(body: bytes) -> str:
 def tagged(request: Request, body: object, status: int = 200) -> Response:
     """Return a resource that can be edited as JSON with its ETag; 304 to a reader who has it."""
     tag = etag_of(encode(body))
-    if request.method in _READS and _names(request.headers.get("if-none-match", ""), tag):
+    if request.method in _READS and names_tag(request.headers.get("if-none-match", ""), tag):
         return Response(status_code=304, headers={"ETag": tag, "Cache-Control": "no-cache"})
     return json_response(body, status, {"ETag": tag, "Cache-Control": "no-cache"})
 
@@ -53,7 +53,7 @@ class Condition(NamedTuple):
         tag = etag_of(encode(body))
         if self.if_match is None:
             raise _stale("If-None-Match", str(self.if_none_match), f"{tag}: it exists")
-        if not _names(self.if_match, tag):
+        if not names_tag(self.if_match, tag):
             raise _stale("If-Match", self.if_match, tag)
 
 
@@ -78,7 +78,8 @@ Matching = Annotated[Condition, Depends(_condition)]
 """What a route that changes what can be edited takes, and checks against the present state."""
 
 
-def _names(header: str, tag: str) -> bool:
+def names_tag(header: str, tag: str) -> bool:
+    """Return whether an `If-Match` or `If-None-Match` names an ETag."""
     named = [part.strip() for part in header.split(",")]
     return named == ["*"] or tag in named
 

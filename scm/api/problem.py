@@ -131,7 +131,7 @@ def install(app: FastAPI) -> None:
     """Make every error of the application a problem."""
     app.add_exception_handler(RefusedError, _on_refused)
     app.add_exception_handler(RequestValidationError, _on_invalid)
-    app.add_exception_handler(HTTPException, _on_http)
+    app.add_exception_handler(HTTPException, on_http)
     app.add_exception_handler(OSError, _on_disk)
     app.add_exception_handler(StoreError, _on_store)
     app.add_exception_handler(Exception, _on_bug)
@@ -148,14 +148,18 @@ async def _on_refused(request: Request, error: Exception) -> Response:
 async def _on_invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)  # noqa: S101  the type it was registered for
     errors = tuple(
-        {"where": ".".join(str(step) for step in found["loc"]), "expected": str(found["msg"])}
+        {
+            "where": ".".join(str(step) for step in found["loc"]),
+            "expected": str(found["msg"]).removeprefix("Value error, "),
+        }
         for found in error.errors()
     )
     detail = "; ".join(f"{item['where']}: {item['expected']}" for item in errors)
     return problem(422, "invalid", detail, instance=request.url.path, errors=errors)
 
 
-async def _on_http(request: Request, error: Exception) -> Response:
+async def on_http(request: Request, error: Exception) -> Response:
+    """Return the problem for what the framework refuses: a path, a method, too large a body."""
     assert isinstance(error, HTTPException)  # noqa: S101  the type it was registered for
     code, detail = _CODE_OF_STATUS.get(error.status_code, "http"), str(error.detail)
     if code == "too_large":

@@ -21,11 +21,46 @@ def test_every_page_opens_from_the_bar_without_a_reload(visit):
     assert visited.complaints == []
 
 
+def test_the_bar_answers_before_the_page_is_drawn(visit):
+    page = visit("/map").page
+    page.wait_for_selector("main.at-map canvas")
+    seen = page.evaluate("""async () => {
+        document.querySelector('nav a[href="/events"]').click();
+        await new Promise(requestAnimationFrame);
+        const here = document.querySelector("nav [aria-current]").textContent.trim();
+        return [here, document.querySelector("main").className];
+    }""")
+    assert seen == ["Events", "at-map"]
+    page.wait_for_selector("main.at-events > *")
+    assert "/events" in page.url
+
+
+def test_who_turns_back_at_once_stays(visit):
+    page = visit("/map").page
+    page.wait_for_selector("main.at-map canvas")
+    seen = page.evaluate("""async () => {
+        const pages = new Set();
+        const main = document.querySelector("main");
+        const note = new MutationObserver(() => pages.add(main.className));
+        note.observe(main, { attributes: true });
+        for (const name of ["events", "map"]) {
+            document.querySelector(`nav a[href="/${name}"]`).click();
+        }
+        for (let frame = 0; frame < 5; frame++) await new Promise(requestAnimationFrame);
+        return [[...pages], document.querySelector("nav [aria-current]").textContent.trim()];
+    }""")
+    assert seen == [[], "Map"]
+
+
 def test_an_address_that_is_no_page_says_so(visit):
     page = visit("/map").page
     page.evaluate("() => history.pushState(null, '', '/nowhere')")
     page.evaluate("() => dispatchEvent(new PopStateEvent('popstate'))")
     page.wait_for_selector("main.at-nowhere a[href='/map']")
+    assert visit("/typo").page.inner_text("main").startswith("There is no such page.")
+    visited = visit("/vehicles/%ZZ")  # no character has that number
+    visited.page.wait_for_selector("main >> text=No vehicle named %ZZ is in the city")
+    assert visited.complaints == []
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -39,6 +74,62 @@ def test_the_red_stop_is_on_every_page(visit, name):
     page.set_viewport_size({"width": 360, "height": 740})
     stop, light = (page.locator(one).bounding_box() for one in ("#city-stop", ".link-state"))
     assert stop["y"] < light["y"] + light["height"], "the red button fell into another line"
+
+
+def test_the_frame_stands_before_any_script_runs(browser, running):
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(f"{running.url}/map")
+    assert page.locator("nav a[aria-current=page]").inner_text() == "Map"
+    assert page.locator("section.panel, details.panel").count() == 4
+    assert page.locator(".city-stop").is_disabled()
+    wide = "() => [document.documentElement.scrollWidth, window.innerWidth]"
+    content, window = page.evaluate(wide)
+    assert content <= window
+    context.close()
+
+
+def test_no_module_of_the_first_page_is_found_late(visit):
+    page = visit("/map").page
+    page.wait_for_selector("main.at-map canvas")
+    late = """() => {
+        const links = [...document.querySelectorAll("link[rel=modulepreload]")];
+        const named = new Set(links.map((link) => link.href));
+        const got = performance.getEntriesByType("resource").map((one) => one.name);
+        return got.filter((name) => /\\.m?js$/.test(name) && !named.has(name));
+    }"""
+    assert page.evaluate(late) == []
+
+
+def test_the_red_stop_works_though_the_page_does_not_come(browser, running):
+    page = browser.new_context().new_page()
+    held = []
+
+    def hold(route):
+        held.append(route)
+
+    page.route("**/pages/map/page.js", hold)
+    page.goto(f"{running.url}/map")
+    page.click("#city-stop")
+    page.wait_for_selector("dialog[open]")
+    page.keyboard.press("Escape")
+    page.wait_for_selector("dialog", state="detached")
+    for route in held:
+        route.continue_()
+    page.wait_for_selector("main.at-map canvas")
+    page.context.close()
+
+
+def test_the_colours_that_the_person_chose_are_there_before_the_modules(browser, running):
+    page = browser.new_context(color_scheme="light").new_page()
+    page.route("**/js/app.js", lambda route: route.abort())
+    page.goto(f"{running.url}/map")
+    ground = "() => getComputedStyle(document.body).backgroundColor"
+    light = page.evaluate(ground)
+    page.evaluate("() => localStorage.setItem('scm-theme', 'dark')")
+    page.reload()
+    assert page.evaluate(ground) != light
+    page.context.close()
 
 
 def test_the_red_stop_stops_the_city_by_keyboard_and_lets_it_go(visit, running):

@@ -158,6 +158,21 @@ class TestRefusals:
     def test_a_path_that_does_not_exist_is_a_problem(self, client):
         is_problem(client("GET", f"{API}/nothing"), 404, "not_found")
 
+    def test_a_person_who_mistyped_an_address_sees_the_dashboard_and_programs_a_problem(
+        self, client
+    ):
+        person = {"Accept": "text/html,*/*;q=0.8"}
+        shown = client("GET", "/typo", headers=person)
+        assert (shown.status_code, shown.headers["content-type"]) == (
+            404,
+            "text/html; charset=utf-8",
+        )
+        assert "js/app.js" in shown.text
+        is_problem(client("GET", "/typo"), 404, "not_found")
+        is_problem(client("POST", "/typo", headers=person), 404, "not_found")
+        for path in (f"{API}/nothing", "/static/nothing.js"):
+            is_problem(client("GET", path, headers=person), 404, "not_found")
+
     def test_a_method_that_is_not_offered_is_a_problem(self, client):
         is_problem(client("PATCH", f"{API}/vehicles"), 405, "method_not_allowed")
 

@@ -3,25 +3,52 @@ import { computed, signal } from "@preact/signals";
 
 const here = signal(location.pathname + location.search);
 
+/** The address that was asked for; the page at it is drawn after the bar has shown that it was heard. */
+const asked = signal(here.value);
+
+/** Name of the page that the bar points to. */
+export const heading = computed(() => pageAt(asked.value));
+
 /** `{page, rest, query}`: `/vehicles/n1?tab=plots` is page `vehicles`, rest `n1`. */
 export const route = computed(() => {
   const url = new URL(here.value, location.origin);
-  const [page, ...rest] = url.pathname.split("/").filter(Boolean);
+  const [, ...rest] = url.pathname.split("/").filter(Boolean);
   return {
-    page: page ?? "map",
-    rest: rest.map(decodeURIComponent).join("/"),
+    page: pageAt(here.value),
+    rest: rest.map(decoded).join("/"),
     query: Object.fromEntries(url.searchParams),
   };
 });
 
-/** Show another address; `replace`: without a step for the browser's back. */
-export function go(path, { replace = false } = {}) {
-  if (path === here.value) return;
-  history[replace ? "replaceState" : "pushState"](null, "", path);
-  here.value = path;
+/** A part of an address in letters; one that was mistyped stays as it is. */
+function decoded(part) {
+  try {
+    return decodeURIComponent(part);
+  } catch {
+    return part;
+  }
 }
 
-window.addEventListener("popstate", () => (here.value = location.pathname + location.search));
+/** Show another address; `replace`: without a step for the browser's back. */
+export function go(path, { replace = false } = {}) {
+  if (path === asked.value) return;
+  history[replace ? "replaceState" : "pushState"](null, "", path);
+  follow(path);
+}
+
+window.addEventListener("popstate", () => follow(location.pathname + location.search));
+
+function pageAt(path) {
+  return new URL(path, location.origin).pathname.split("/").filter(Boolean)[0] ?? "map";
+}
+
+/** Another page takes a while to draw: first the picture that answers the touch, then it. */
+function follow(path) {
+  asked.value = path;
+  const arrive = () => (here.value = asked.value);
+  if (pageAt(path) === pageAt(here.value) || document.hidden) arrive();
+  else requestAnimationFrame(() => setTimeout(arrive));
+}
 
 document.addEventListener("click", (event) => {
   const link = event.target.closest?.("a[href]");

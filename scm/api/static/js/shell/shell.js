@@ -3,16 +3,24 @@ import { signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { PAGES } from "scm/pages/index.js";
-import { KeyDialog, Notices } from "scm/shell/notices.js";
-import { route } from "scm/shell/router.js";
+import { KeyDialog } from "scm/shell/key_dialog.js";
+import { Notices } from "scm/shell/notices.js";
+import { heading, route } from "scm/shell/router.js";
 import { Banners, TitleBar } from "scm/shell/title_bar.js";
 import { city, link } from "scm/shell/store.js";
 
 /** Pages that were loaded: name to component, or to the error that kept it from loading. */
 const loaded = signal(new Map());
 
-async function load(page) {
-  if (loaded.value.has(page.name)) return;
+/** A page by its name; undefined: there is none. */
+const pageOf = (name) => PAGES.find((one) => one.name === name);
+
+/** The page of the address; undefined: there is none. */
+export const pageHere = () => pageOf(route.value.page);
+
+/** Load a page, once; one that cannot be loaded says so in its place. */
+export async function load(page) {
+  if (!page || loaded.value.has(page.name)) return;
   let found;
   try {
     const [module] = await Promise.all([page.load(), style(page.name)]);
@@ -23,12 +31,14 @@ async function load(page) {
   loaded.value = new Map(loaded.value).set(page.name, found);
 }
 
-/** A page's style sheet, before the page is drawn. */
+/** A page's style sheet, before the page is drawn; the first page's came with the document. */
 function style(name) {
+  const href = `/static/css/pages/${name}.css`;
+  if (document.querySelector(`link[href="${href}"]`)?.sheet) return undefined;
   return new Promise((resolve, reject) => {
     const sheet = document.createElement("link");
     sheet.rel = "stylesheet";
-    sheet.href = `/static/css/pages/${name}.css`;
+    sheet.href = href;
     sheet.onload = resolve;
     sheet.onerror = () => reject(new Error(`its style sheet ${sheet.href} did not load`));
     document.head.append(sheet);
@@ -36,10 +46,11 @@ function style(name) {
 }
 
 export function Shell() {
-  const page = PAGES.find((one) => one.name === route.value.page);
+  const page = pageHere();
   const main = useRef(null);
   const first = useRef(true);
-  useEffect(() => void (page && load(page)), [page]);
+  const next = pageOf(heading.value);
+  useEffect(() => void load(next), [next]);
   useEffect(() => {
     document.title = [page?.title, city.value?.title ?? "Smart City Manager"].filter(Boolean).join(" · ");
   }, [page, city.value]);
@@ -51,7 +62,7 @@ export function Shell() {
   return html`
     <div class="page" data-link=${link.value}>
       <a class="skip" href="#main">Skip to the page</a>
-      <${TitleBar} pages=${PAGES} here=${page?.name} />
+      <${TitleBar} pages=${PAGES} here=${next?.name} />
       <${Banners} />
       <main id="main" class="at-${page?.name ?? "nowhere"}" tabindex="-1" ref=${main}>
         <${Body} page=${page} />
