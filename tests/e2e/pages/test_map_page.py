@@ -1,6 +1,10 @@
 """The map page as people use it: mouse, keyboard and table, and what it does to the real city."""
 
+import itertools
+
 import pytest
+
+from tests.e2e.pages.visiting import LOOKS, in_both_themes
 
 SCENE = "/static/js/pages/map/scene.js"
 FLEET = "/static/js/pages/map/fleet.js"
@@ -47,14 +51,14 @@ def ages_of(page):
     return page.locator(".cars tbody .age").all_inner_texts()
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("size", ["wide", "narrow"])
+@pytest.mark.parametrize(("size", "theme"), LOOKS)
 def test_the_map_looks_right(look, size, theme):
     visited = look(
         "/map?vehicle=n1", "map", size, theme, ready='.chosen-car dd:text-matches("m/s")'
     )
-    is_drawn(visited.page, (76, 141, 240), 100)  # hosted cars' blue
-    is_drawn(visited.page, (90, 209, 255), 100)  # the way ahead of the chosen car
+    for _ in in_both_themes(visited, theme):
+        is_drawn(visited.page, (76, 141, 240), 100)  # hosted cars' blue
+        is_drawn(visited.page, (90, 209, 255), 100)  # the way ahead of the chosen car
 
 
 def test_the_binary_stream_tells_what_rest_tells(visit, running):
@@ -248,3 +252,47 @@ def test_frames_go_on_while_nothing_is_touched(visit):
     visited = visit("/map")
     before = visited.page.evaluate(f"async () => (await import('{SCENE}')).drawn.frames")
     visited.wait(f"async (before) => (await import('{SCENE}')).drawn.frames > before + 5", before)
+
+
+SMALL_CAR = """async ([px_per_m, ratio, yaw, alive, x, y]) => {
+    const { drawSprites } = await import('/static/js/pages/map/sprites.js');
+    const sheet = new OffscreenCanvas(120 * ratio, 120 * ratio);
+    const paper = sheet.getContext('2d');
+    const [x_px, y_px] = [(x_m) => 60 + px_per_m * x_m, (y_m) => 60 - px_per_m * y_m];
+    const view = { scale: px_per_m, x: x_px, y: y_px };
+    const fleet = { vehicles: [{ car: 'nigel', kind: 'hosted' }], flags: [alive] };
+    drawSprites(paper, view, ratio, fleet, { x: [x], y: [y], yaw: [yaw] }, [0]);
+    const { data } = paper.getImageData(0, 0, sheet.width, sheet.height);
+    const [c, s] = [Math.cos(yaw), Math.sin(yaw)];
+    const [along, across] = [[], []];
+    let blue = 0;
+    for (let i = 0; i < sheet.width * sheet.height; i++) {
+        if (data[4 * i + 3] < 128) continue;
+        const dx = ((i % sheet.width) + 0.5) / ratio - 60 - px_per_m * x;
+        const dy = 60 - (Math.floor(i / sheet.width) + 0.5) / ratio - px_per_m * y;
+        along.push(dx * c + dy * s);
+        across.push(dy * c - dx * s);
+        blue += data[4 * i + 2] > data[4 * i] + 40;
+    }
+    const mean = (list) => list.reduce((sum, far) => sum + far, 0) / list.length;
+    return {
+        rear: Math.min(...along), front: Math.max(...along),
+        centre: mean(along), aside: mean(across), blue: blue / along.length,
+    };
+}"""
+
+
+def test_small_cars_are_drawn_where_they_are_and_point_where_they_drive(visit):
+    page = visit("/map").page
+    places = ((0.0, 0.0, 0.0), (0.117, 0.033, 2.0), (-0.041, 0.096, -1.1), (0.0213, 0.05, 3.6))
+    for ratio, px_per_m in itertools.product((1, 2), (20.0, 60.0, 70.0, 160.0)):
+        for x_m, y_m, yaw_rad in places:
+            car = page.evaluate(SMALL_CAR, [px_per_m, ratio, yaw_rad, 1, x_m, y_m])
+            middle, length = (car["front"] + car["rear"]) / 2, car["front"] - car["rear"]
+            assert middle == pytest.approx(0.08 * px_per_m, abs=0.8)
+            assert car["aside"] == pytest.approx(0.0, abs=0.4)
+            assert length == pytest.approx(max(13.0, 0.30 * px_per_m), rel=0.1, abs=1.5)
+            assert car["blue"] > 0.35
+            assert length > 24 or car["centre"] < middle - 0.5, "the pointed end is ahead"
+        lost = page.evaluate(SMALL_CAR, [px_per_m, ratio, 0.0, 0, 0.0, 0.0])
+        assert lost["blue"] < 0.05, "a lost car is grey"

@@ -1,5 +1,6 @@
 /** Residuals on the floor: an arrow from each measured place, many times as long as the error. */
 import { useEffect, useRef, useState } from "preact/hooks";
+import { readBox } from "scm/shared/drawing.js";
 import { html } from "scm/shared/html.js";
 import { colours } from "scm/shell/theme.js";
 
@@ -12,7 +13,7 @@ export function ResidualFloor({ samples }) {
   const canvas = useRef(null);
   const [box, setBox] = useState(null);
   const gain = gainOf(samples);
-  useEffect(() => void readBox().then(setBox, () => {}), []);
+  useEffect(() => void readBox(ROADS).then(setBox, () => {}), []);
   useEffect(() => {
     if (!box) return undefined;
     const repaint = () => draw(canvas.current, box, samples, gain);
@@ -43,15 +44,6 @@ function gainOf(samples) {
   const far = samples.map((one) => Math.hypot(one.x_mm, one.y_mm)).toSorted((a, b) => a - b);
   const long_m = (far[Math.ceil(0.95 * far.length) - 1] ?? 1) / 1000;
   return STEPS.findLast((step) => step * long_m <= LONGEST_M) ?? 1;
-}
-
-/** The drawing's frame: map metres, x right; its y counts down, so the map's y is -y. */
-async function readBox() {
-  const response = await fetch(ROADS);
-  const drawing = new DOMParser().parseFromString(await response.text(), "image/svg+xml");
-  const numbers = drawing.documentElement.getAttribute("viewBox").split(/[\s,]+/).map(Number);
-  const [left, top, width, height] = numbers;
-  return { left, top, width, height };
 }
 
 function draw(canvas, box, samples, gain) {

@@ -1,4 +1,5 @@
 /** The roads: the server's drawing, kept as a picture of what is on the screen and a rim around it. */
+import { readBox } from "scm/shared/drawing.js";
 
 const RIM = 0.3; // of the screen, on every side
 const REST_MS = 140; // after the last zoom, before all is drawn sharply again
@@ -6,16 +7,10 @@ const DARK = "brightness(0.72) saturate(0.85)";
 
 /** Read the drawing, and the box that it shows: map metres, x right; its y counts down. */
 export async function readGround(address) {
-  const response = await fetch(address);
-  const drawing = new DOMParser().parseFromString(await response.text(), "image/svg+xml");
-  const [left, top, width, height] = drawing.documentElement
-    .getAttribute("viewBox")
-    .split(/[\s,]+/)
-    .map(Number);
   const image = new Image();
   image.src = address;
-  await image.decode();
-  return { image, box: { left, top, width, height } };
+  const [box] = await Promise.all([readBox(address), image.decode()]);
+  return { image, box };
 }
 
 export class Ground {
@@ -37,7 +32,9 @@ export class Ground {
     } else if (!this.#covers(view)) this.#paint(view, ratio, dark);
     const { left, top, scale, width, height } = this.held;
     const grown = view.scale / scale;
-    paper.drawImage(this.canvas, view.x(left), view.y(top), width * grown, height * grown);
+    const [x, y] = [view.x(left), view.y(top)];
+    if (grown !== 1) paper.drawImage(this.canvas, x, y, width * grown, height * grown);
+    else paper.drawImage(this.canvas, whole(x, ratio), whole(y, ratio), this.canvas.width / ratio, this.canvas.height / ratio);
   }
 
   #covers(view) {
@@ -71,3 +68,6 @@ export class Ground {
     this.held = { left, top, scale: view.scale, ratio, dark, width, height };
   }
 }
+
+/** The nearest whole device pixel: a copy to there needs no pixel between two to be made up. */
+const whole = (px, ratio) => Math.round(px * ratio) / ratio;

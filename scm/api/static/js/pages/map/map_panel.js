@@ -25,12 +25,23 @@ const sight = computed(() => {
   return link.value === "live" && quiet ? "stale" : link.value;
 });
 
+/** Of the ground, read once: a map stays as it is while its city runs. */
+let reading = null;
+
+function groundOnce() {
+  reading ??= readGround(ROADS).catch((error) => {
+    reading = null; // who comes back asks anew
+    throw error;
+  });
+  return reading;
+}
+
 export function MapPanel() {
   const canvas = useRef(null);
   const sheet = useRef(null);
   const [ground, setGround] = useState(null);
   const [view, setView] = useState(null);
-  useEffect(() => void readGround(ROADS).then(setGround, setGround), []);
+  useEffect(() => void groundOnce().then(setGround, setGround), []);
   useEffect(() => {
     if (!ground?.box) return undefined;
     const seen = new Viewport(ground.box);

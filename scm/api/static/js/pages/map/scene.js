@@ -36,6 +36,8 @@ export class Scene {
     this.trails = new Trails();
     this.heat = new Heat(ground.box);
     this.due = -Infinity;
+    this.size = [canvas.clientWidth, canvas.clientHeight];
+    this.backdrop = null; // its colour, and of which theme
   }
 
   /** Draw at most 33 times a second, and never for more than half of the time; returns what ends it. */
@@ -51,7 +53,14 @@ export class Scene {
       this.due = time + Math.max(FRAME_MS - 2, 1.6 * drawn.took_ms);
     };
     request = requestAnimationFrame(frame);
-    return () => cancelAnimationFrame(request);
+    // To ask the canvas in each frame would have the whole page laid out for it.
+    const { canvas } = this;
+    const sizes = new ResizeObserver(() => (this.size = [canvas.clientWidth, canvas.clientHeight]));
+    sizes.observe(canvas);
+    return () => {
+      cancelAnimationFrame(request);
+      sizes.disconnect();
+    };
   }
 
   draw(now) {
@@ -92,13 +101,16 @@ export class Scene {
 
   #prepare() {
     const { canvas, paper, view } = this;
-    const { clientWidth: width, clientHeight: height } = canvas;
+    const [width, height] = this.size;
     this.ratio = window.devicePixelRatio || 1;
     const [wide, high] = [Math.round(width * this.ratio), Math.round(height * this.ratio)];
     if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
     view.resize(width, height);
     paper.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
-    paper.fillStyle = getComputedStyle(canvas).backgroundColor;
+    if (this.backdrop?.theme !== colours.peek()) {
+      this.backdrop = { theme: colours.peek(), colour: getComputedStyle(canvas).backgroundColor };
+    }
+    paper.fillStyle = this.backdrop.colour;
     paper.fillRect(0, 0, width, height);
   }
 

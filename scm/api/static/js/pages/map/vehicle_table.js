@@ -1,5 +1,5 @@
 /** The cars as a table: search, filter by kind, sort by any column; only the rows in sight are made. */
-import { computed, signal } from "@preact/signals";
+import { computed, signal, useComputed } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { age, fixed } from "scm/shared/format.js";
@@ -97,9 +97,10 @@ function Rows({ rows: all }) {
         <thead><tr>${COLUMNS.map((column) => html`<${Head} key=${column.name} column=${column} />`)}</tr></thead>
         <tbody>
           ${first > 0 && html`<tr class="spacer" key="above" style=${{ height: `${first * ROW_PX}px` }}></tr>`}
-          ${rows.slice(first, last).map(
-            (row, i) => html`<${Car} key=${fleet.vehicles[row].vehicle} row=${row} number=${first + i} />`,
-          )}
+          ${rows.slice(first, last).map((row, i) => {
+            const { vehicle } = fleet.vehicles[row];
+            return html`<${Car} key=${vehicle} vehicle=${vehicle} row=${row} number=${first + i} />`;
+          })}
           ${last < rows.length && html`<tr class="spacer" key="below" style=${{ height: `${(rows.length - last) * ROW_PX}px` }}></tr>`}
         </tbody>
       </table>
@@ -122,11 +123,12 @@ function Head({ column }) {
   `;
 }
 
-function Car({ row, number }) {
+function Car({ vehicle, row, number }) {
   fleetBeat.value; // its properties stay the same while what `fleet` tells of it moves
+  const isChosen = useComputed(() => selected.value === vehicle); // a choice draws two rows anew, not all
   if (row >= fleet.count) return null; // it left a moment ago
-  const { vehicle, kind: sort, owner } = fleet.vehicles[row];
-  const chosen = selected.value === vehicle;
+  const { kind: sort, owner } = fleet.vehicles[row];
+  const chosen = isChosen.value;
   const mode = modeOf(row);
   const old_ms = ageOf(row);
   const choose = () => (selected.value = chosen ? null : vehicle);
