@@ -7,7 +7,8 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
 from typing import Annotated, TypeVar
 
 import msgspec
@@ -52,6 +53,8 @@ class CarAt(msgspec.Struct, kw_only=True, frozen=True, array_like=True):
     Attributes:
         car: Number of its entry in `cars`.
         lights: Names of those that are on.
+        stuck: It was told to drive and stayed: what it most likely pushed against, names of cars,
+            `wall`, boxes; empty: nothing that is known. None: it was not stuck.
     """
 
     car: int
@@ -63,6 +66,7 @@ class CarAt(msgspec.Struct, kw_only=True, frozen=True, array_like=True):
     mode: str
     alive: bool
     lights: tuple[str, ...]
+    stuck: tuple[str, ...] | None
 
 
 class CarFacts(msgspec.Struct, kw_only=True, frozen=True):
@@ -74,7 +78,9 @@ class CarFacts(msgspec.Struct, kw_only=True, frozen=True):
     owner: str
 
 
-_CARS_AT = msgspec.Meta(examples=[[[0, 1.384, 0.655, -0.785, 0.21, 0.12, "drive", True, ["low"]]]])
+_CARS_AT = msgspec.Meta(
+    examples=[[[0, 1.384, 0.655, -0.785, 0.21, 0.12, "drive", True, ["low"], None]]]
+)
 
 
 class Frame(msgspec.Struct, kw_only=True, frozen=True):
@@ -82,7 +88,8 @@ class Frame(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         cars: A row each: its number in `cars` of the stretch, x [m], y [m], yaw [rad], speed
-            [m/s], steering angle [rad], mode, whether it is alive, lights that are on.
+            [m/s], steering angle [rad], mode, whether it is alive, lights that are on, what it
+            is stuck against (null: it is not stuck).
         boxes: None: as in the frame before.
     """
 
@@ -256,6 +263,7 @@ class _Frames:
             mode=car.mode,
             alive=car.alive,
             lights=car.lights,
+            stuck=car.stuck,
         )
 
     def _picture(self, one: Recorded) -> None:
@@ -374,22 +382,43 @@ def _facts(car: SnapshotVehicle) -> CarFacts:
 
 def csv_of(
     index: RunIndex, vehicle: str = "", from_s: float = 0.0, to_s: float | None = None
-) -> Iterator[bytes]:
-    """Yield a recording as CSV, in blocks: a car's own reports, or all cars as the world saw them.
+) -> Iterator[bytes] | None:
+    """Return a recording as CSV, in blocks: a car's own reports, or all cars as the world saw them.
+
+    None where it has no row then: a header alone would look like a table. `no_rows` says so.
 
     Args:
         index: Of the recording.
         vehicle: The car; empty: all of them, a row a car and snapshot.
         from_s: Of the first row, since the recording's begin.
         to_s: Of the last one; None: to the end.
+
+    Raises:
+        RecordingError: when the file cannot be opened any more.
     """
     end_ns = index.end_ns if to_s is None else index.begin_ns + round(to_s * NS_PER_S)
     span = index.begin_ns + round(from_s * NS_PER_S), end_ns
-    text = io.StringIO()
-    rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(("t_s", "vehicle", *(_OF_CAR if vehicle else _OF_ALL)))
     damage: list[str] = []
     of_each = _car_rows(index, vehicle, span, damage) if vehicle else _all_rows(index, span, damage)
+    first = next(of_each, None)
+    if first is None and not damage:
+        return None
+    head = ("t_s", "vehicle", *(_OF_CAR if vehicle else _OF_ALL))
+    return _blocks(chain((head,) if first is None else (head, first), of_each), damage)
+
+
+def no_rows(index: RunIndex, vehicle: str, from_s: float, to_s: float | None) -> str:
+    """Say that a recording has nothing of a car, or of any, in a span, and how long it is."""
+    whose = vehicle or "any car"
+    span = f"from {from_s:g} s on" if to_s is None else f"from {from_s:g} s to {to_s:g} s"
+    length_s = (index.end_ns - index.begin_ns) / NS_PER_S
+    return f"no row of {whose} {span}; the recording is {length_s:.1f} s long"
+
+
+def _blocks(of_each: Iterable[Row], damage: list[str]) -> Iterator[bytes]:
+    """Yield rows as text, and at its end what was left out."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
     for row in of_each:
         rows.writerow(row)
         if text.tell() > BLOCK:

@@ -19,29 +19,31 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--from-s", type=float, default=0.0, metavar="S", help="since the run began (%(default)s)"
     )
-    parser.add_argument(
-        "--to-s", type=float, default=LONGEST_S, metavar="S", help="likewise; without: to the end"
-    )
+    parser.add_argument("--to-s", type=float, metavar="S", help="likewise; without: to the end")
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.api.recordings_shelf import cars_of
-    from scm.api.replay import csv_of
+    from scm.api.replay import csv_of, no_rows
     from scm.errors import RecordingError
     from scm.recorder.run_index import read_index
 
     from_s, to_s = arguments.from_s, arguments.to_s
-    if not 0.0 <= from_s <= to_s <= LONGEST_S:
-        msg = (
-            f"span: got {from_s:g} to {to_s:g} s, expected 0 or more, and the end behind the begin"
-        )
+    end_s = LONGEST_S if to_s is None else to_s
+    if not 0.0 <= from_s <= end_s <= LONGEST_S:
+        got = f"{from_s:g} to {end_s:g} s"
+        msg = f"span: got {got}, expected 0 or more, and the end behind the begin"
         raise RecordingError(msg)
     index = read_index(arguments.recording)
     vehicle, known = arguments.vehicle, cars_of(index)
     if vehicle and vehicle not in known:
         msg = f"{arguments.recording}: got vehicle {vehicle!r}, expected one of {', '.join(known)}"
         raise RecordingError(msg)
-    write_blocks(csv_of(index, vehicle, from_s, to_s), arguments.out)
+    table = csv_of(index, vehicle, from_s, to_s)
+    if table is None:
+        msg = f"{arguments.recording}: {no_rows(index, vehicle, from_s, to_s)}"
+        raise RecordingError(msg)
+    write_blocks(table, arguments.out)
     return 0
 
 

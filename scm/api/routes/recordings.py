@@ -187,6 +187,9 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
             raise not_found(f"car of {name}", vehicle)
         file = f"{name}{f'-{vehicle}' if vehicle else ''}.csv"
         table = replay.csv_of(index, vehicle, from_s, to_s)
+        if table is None:
+            detail = f"{name}: {replay.no_rows(index, vehicle, from_s, to_s)}"
+            raise RefusedError(Refused(code="not_found", detail=detail))
         return StreamingResponse(table, 200, _named(file), "text/csv")
 
 

@@ -95,12 +95,27 @@ class Frame(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         t_s: Since the begin of the recording [s].
         cars: A row each: its number in `cars` of the stretch, x [m], y [m], yaw [rad], speed
-            [m/s], steering angle [rad], mode, whether it is alive, lights that are on.
+            [m/s], steering angle [rad], mode, whether it is alive, lights that are on, what it is
+            stuck against (null: it is not stuck).
         boxes: None: as in the frame before.
     """
 
     t_s: float
-    cars: tuple[tuple[int, float, float, float, float, float, str, bool, tuple[str, ...]], ...]
+    cars: tuple[
+        tuple[
+            int,
+            float,
+            float,
+            float,
+            float,
+            float,
+            str,
+            bool,
+            tuple[str, ...],
+            tuple[str, ...] | None,
+        ],
+        ...,
+    ]
     boxes: tuple[SnapshotBox, ...] | None
 
 

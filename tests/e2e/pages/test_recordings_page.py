@@ -1,5 +1,6 @@
 """The recordings page: a drive of the real city seen again, taken home, noted, deleted; scripts."""
 
+import csv
 import shutil
 
 import cv2
@@ -10,15 +11,21 @@ from mcap.reader import make_reader
 from scm.recorder.recover import recover
 from scm.recorder.run_index import read_index
 from tests.e2e.city_process import wait_for
-from tests.e2e.pages.conftest import SIZES, THEMES
-from tests.e2e.pages.visiting import judge, photograph
-from tests.unit.recorder.short_run import write_run
+from tests.e2e.pages.visiting import LOOKS, SIZES, THEMES, in_each_look, judge, photograph
+from tests.unit.recorder.short_run import STUCK_S, write_run
 
 NAME = "morning_drive"
 AT = f"/recordings/{NAME}"
 DRIVEN_S = 12.0
 READY = '.sheet[data-shown="cars"]'
 ALL_SHOWN = "() => document.querySelectorAll('.cars tbody tr').length === 6"
+IN_REACH = """words => {
+  const button = [...document.querySelectorAll("dialog[open] .notice")]
+    .find((notice) => notice.textContent.includes(words))
+    ?.querySelector("button");
+  const box = button?.getBoundingClientRect();
+  return box && document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2) === button;
+}"""
 SCRIPT = '"""Say a word."""\nimport time\nprint("a word", flush=True)\ntime.sleep(60)\n'
 
 
@@ -60,8 +67,7 @@ def last_s(drive):
     return round(drive["recording"]["length_s"] - 3.0, 1)
 
 
-@pytest.mark.parametrize("size", ["wide", "narrow"])
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(("size", "theme"), LOOKS)
 def test_a_replay_is_calm_accessible_and_fits(look, last_s, size, theme):
     visited = look(f"{AT}?t={last_s}", "recordings", size, theme, ready=READY)
     visited.wait(ALL_SHOWN)
@@ -159,6 +165,19 @@ def test_a_cars_own_camera_is_shown_where_it_was_recorded(visit, running):
         path.unlink()
 
 
+def test_a_car_that_was_stuck_is_called_so_as_on_the_live_pages(visit, running):
+    path = running.folder / "with_a_stuck_car.mcap"
+    write_run(path, picture=jpeg(64))
+    try:
+        page = visit(f"/recordings/with_a_stuck_car?t={STUCK_S + 0.5}").page
+        page.wait_for_selector('tr[data-car="n1"] .mode[title="pushes against n10"] >> text=stuck')
+        assert page.inner_text('tr[data-car="n10"] .mode') == "drive"
+        page.locator("input[type=range]").fill(f"{STUCK_S - 0.5}")
+        page.wait_for_selector('tr[data-car="n1"] .mode >> text=drive')
+    finally:
+        path.unlink()
+
+
 def test_it_plays_pauses_steps_and_jumps_by_mouse_and_keyboard(visit, drive, last_s):
     visited = visit(f"{AT}?t={last_s}")
     page = visited.page
@@ -210,7 +229,7 @@ def test_files_to_take_home_hold_what_was_recorded(visit, drive, tmp_path):
     assert read_index(tmp_path / "run.mcap").whole
     page.select_option("dialog select", "n2")
     with page.expect_download() as waiting:
-        page.click("text=n2.csv")
+        page.click("dialog button >> text=n2.csv")
     waiting.value.save_as(tmp_path / "n2.csv")
     assert len((tmp_path / "n2.csv").read_text().splitlines()) > 20 * DRIVEN_S
     with page.expect_download() as waiting:
@@ -220,6 +239,42 @@ def test_files_to_take_home_hold_what_was_recorded(visit, drive, tmp_path):
         summary = make_reader(stream).get_summary()
     topics = {channel.topic for channel in summary.channels.values()}
     assert {"/tf", "/cars", "/map", "/signals", "/n1/state"} <= topics
+
+
+def test_a_table_of_a_span_is_taken_home_and_what_is_wrong_with_it_is_said(
+    visit, drive, last_s, tmp_path
+):
+    visited = visit(f"{AT}?t={last_s}")
+    page = visited.page
+    page.wait_for_function(ALL_SHOWN)
+    page.click("text=Download")
+    page.select_option("dialog select", "n2")
+    page.focus("dialog input[name=start]")
+    page.keyboard.type(f"{last_s - 1.5:.1f}")
+    page.click("dialog .with-button button >> nth=1")
+    with page.expect_download() as waiting:
+        page.keyboard.press("Shift+Tab")
+        page.keyboard.press("Enter")  # in the field: the form is sent
+    assert waiting.value.suggested_filename == f"{NAME}-n2.csv"
+    waiting.value.save_as(tmp_path / "n2.csv")
+    with (tmp_path / "n2.csv").open() as stream:
+        times_s = [float(row["t_s"]) for row in csv.DictReader(stream)]
+    assert last_s - 1.5 <= times_s[0] < times_s[-1] <= last_s
+
+    page.fill("dialog input[name=stop]", "0.5")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("input[name=stop]:focus:invalid")
+    told = page.evaluate("document.querySelector('[name=stop]').validationMessage")
+    assert told == f"It has to end after {last_s - 1.5:g} s, where it begins."
+    page.fill("dialog input[name=start]", "0")
+    page.fill("dialog input[name=stop]", "0.000001")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("dialog [role=alert] >> text=no row of n2 from 0 s to 1e-06 s")
+    assert len(visited.complaints) == 1  # the browser's own, of the answer 404
+    visited.complaints.clear()
+    for size, theme in in_each_look(visited):
+        judge(visited)
+        photograph(visited, f"recordings_download_{size}_{theme}")
 
 
 def test_a_mismatch_job_is_asked_for_the_car_and_the_span_that_are_shown(visit, drive, last_s):
@@ -243,6 +298,17 @@ def test_a_mismatch_job_is_asked_for_the_car_and_the_span_that_are_shown(visit, 
     identity = asked.value.response().json().get("id")
     if identity:
         page.request.delete(page.url.split("/recordings")[0] + f"/api/v1/operations/{identity}")
+
+
+def test_a_refusal_is_said_within_the_dialog_that_asked(visit, drive):
+    visited = visit(AT)
+    page = visited.page
+    page.click("text=Mismatch job")
+    page.fill("dialog input[name=car]", "no_such_car")
+    page.keyboard.press("Enter")
+    visited.wait(IN_REACH, "there is no car file named 'no_such_car'")
+    assert len(visited.complaints) == 1  # the browser's own, of the answer 404
+    assert page.locator("dialog[open]").count() == 1
 
 
 def test_a_name_and_notes_stay_and_a_deleted_recording_goes(visit, running, drive):

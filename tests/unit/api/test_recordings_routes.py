@@ -19,7 +19,7 @@ from scm.api.routes.recordings import _converted
 from scm.api.shelves import shelves_in
 from scm.recorder import run_index
 from scm.recorder.run_index import read_index
-from tests.unit.recorder.short_run import BEGIN_NS, PICTURE, write_run
+from tests.unit.recorder.short_run import BEGIN_NS, PICTURE, STUCK_S, write_run
 
 
 @pytest.fixture
@@ -119,6 +119,15 @@ def test_frames_tell_where_cars_were_and_what_signals_showed(ask, folder):
     assert shown == [(1.0, "red"), (2.0, "green")]
     between = ask("/run/frames?from_s=1.05&to_s=1.08")["signals"]  # none was told of meanwhile
     assert [(one["t_s"], one["colour"]) for one in between] == [(1.05, "red")]
+
+
+def test_frames_tell_who_is_stuck_and_against_what(ask, folder):
+    write_run(folder / "run.mcap")
+    frames = ask(f"/run/frames?from_s={STUCK_S - 0.1}&to_s={STUCK_S}")["frames"]
+    assert [[car[-1] for car in frame["cars"]] for frame in frames] == [
+        [None, None],
+        [["n10"], None],
+    ]
 
 
 def test_boxes_are_told_at_the_begin_and_when_they_move(ask, folder):
@@ -246,6 +255,39 @@ def test_csv_is_written_on_the_command_line_too(client, folder, tmp_path, capsys
     assert b"expected one of n1, n10" in capsysbinary.readouterr().err
     assert main(["export", "csv", path, "--from-s", "nan"]) == 2
     assert b"span: got nan" in capsysbinary.readouterr().err
+
+
+def test_a_span_without_a_row_is_told_and_is_no_table(ask, folder, tmp_path, capsys):
+    path = str(write_run(folder / "run.mcap", leaves_s=2.0))
+    late = ask("/run/csv?from_s=60", status=404)
+    words = "no row of any car from 60 s on; the recording is 5.0 s long"
+    assert (late["code"], late["detail"]) == ("not_found", f"run: {words}")
+    between = "no row of n10 from 1.01 s to 1.04 s; the recording is 5.0 s long"
+    gap = ask("/run/csv?vehicle=n10&from_s=1.01&to_s=1.04", status=404)
+    assert gap["detail"] == f"run: {between}"
+
+    out = tmp_path / "late.csv"
+    assert main(["export", "csv", path, "--from-s", "60", "--out", str(out)]) == 2
+    told = capsys.readouterr()
+    assert (told.out, told.err.count("\n")) == ("", 1)
+    assert f"{path}: {words}" in told.err
+    assert not out.exists()
+    span = ["--vehicle", "n10", "--from-s", "1.01", "--to-s", "1.04"]
+    assert main(["export", "csv", path, *span]) == 2
+    assert between in capsys.readouterr().err
+
+
+def test_a_span_of_which_nothing_can_be_read_tells_what_was_left_out(client, folder):
+    path = write_run(folder / "run.mcap")
+    content = bytearray(path.read_bytes())
+    then_ns = BEGIN_NS + 1_050_000_000
+    chunk = next(one for one in read_index(path).chunks if one.end_ns >= then_ns)
+    content[chunk.start + 60 : chunk.start + chunk.length] = bytes(chunk.length - 60)
+    path.write_bytes(content)
+    told = client("GET", "/api/v1/recordings/run/csv?from_s=1.03&to_s=1.07").text
+    head, left_out = told.splitlines()
+    assert head.startswith("t_s,vehicle,")
+    assert left_out.startswith("# left out: ")
 
 
 def test_a_table_looks_through_the_list_of_chunks_once_and_not_with_each_row(tmp_path):

@@ -18,6 +18,7 @@ from scm.v2x.messages.world_snapshot import SnapshotBox, SnapshotVehicle, WorldS
 BEGIN_NS = 1_700_000_000 * NS_PER_S
 HZ = 20
 GREEN_S = 2.0
+STUCK_S = 4.0  # from when on n1 is stuck against n10
 YAW_RAD = 0.5
 PICTURE = b"\xff\xd8 a picture \xff\xd9"
 RANGES_M = (1.0, 2.0, float("inf"), 0.5)  # ahead, left, a miss behind, right
@@ -115,6 +116,7 @@ def _snapshot(at_s, tick, leaves_s):
             yaw_rad=YAW_RAD,
             speed_mps=1.0,
             steering_rad=0.1,
+            stuck=("n10",) if name == "n1" and at_s >= STUCK_S else None,
         )
         for number, (name, x_m) in enumerate((("n1", at_s), ("n10", -at_s)))
         if name == "n1" or at_s < leaves_s

@@ -4,6 +4,7 @@ import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { change } from "scm/shell/api.js";
 import { go } from "scm/shell/router.js";
+import { seconds, SpanFields, WHOLE } from "scm/pages/recordings/span_fields.js";
 import { minutes } from "scm/pages/recordings/words.js";
 
 const BUDGETS_S = [60, 120, 300, 600, 1800];
@@ -12,12 +13,11 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
   const first = cars.find((car) => car.vehicle === chosen) ?? cars[0];
   const [vehicle, setVehicle] = useState(first?.vehicle ?? "");
   const [car, setCar] = useState(first?.car ?? "nigel");
-  const [span, setSpan] = useState({ start: "", stop: "" });
+  const [span, setSpan] = useState(WHOLE);
   const choose = (name) => {
     setVehicle(name);
     setCar(cars.find((one) => one.vehicle === name)?.car ?? car);
   };
-  const here = (end) => () => setSpan({ ...span, [end]: player.t_s.toFixed(1) });
   const submit = async (event) => {
     event.preventDefault();
     const body = {
@@ -25,8 +25,7 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
       vehicle,
       car,
       budget_s: Number(event.target.elements.budget.value),
-      from_s: span.start === "" ? null : Number(span.start),
-      to_s: span.stop === "" ? null : Number(span.stop),
+      ...seconds(span),
     };
     const done = () => `The search for ${vehicle} has begun.`;
     if (await change("POST", "/mismatch/jobs", body, done)) {
@@ -34,24 +33,6 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
       go("/mismatch");
     }
   };
-  const time = (end, title, empty) => html`
-    <label>
-      ${title}
-      <span class="with-button">
-        <input
-          name=${end}
-          type="number"
-          min="0"
-          max=${Math.ceil(recording.length_s)}
-          step="0.1"
-          placeholder=${empty}
-          value=${span[end]}
-          onInput=${(event) => setSpan({ ...span, [end]: event.target.value })}
-        />
-        <button type="button" onClick=${here(end)} title="The moment that is shown">${minutes(player.t_s, true)}</button>
-      </span>
-    </label>
-  `;
   return html`
     <${Dialog} title="Start a mismatch job" onClose=${onClose}>
       <p class="hint">Drives the car's file with the recorded commands, and searches for what the two differ in.</p>
@@ -67,7 +48,7 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
           Car file
           <input name="car" required pattern="[a-z0-9_\\-]+" maxlength="64" value=${car} onInput=${(event) => setCar(event.target.value)} />
         </label>
-        ${time("start", "From [s]", "begin")} ${time("stop", "To [s]", "end")}
+        <${SpanFields} recording=${recording} player=${player} span=${span} onChange=${setSpan} />
         <label>
           Search for at most
           <select name="budget">

@@ -233,8 +233,8 @@ const JUMP_M = 0.5;
 
 /** A car between two frames, by the names of the live one. */
 function between(facts, start, end, share) {
-  const [, x_m, y_m, yaw_rad, speed_mps, steering_rad, mode, alive, lights] = start;
-  const car = { ...facts, x_m, y_m, yaw_rad, speed_mps, steering_rad, mode, alive, lights };
+  const [, x_m, y_m, yaw_rad, speed_mps, steering_rad, mode, alive, lights, stuck] = start;
+  const car = { ...facts, x_m, y_m, yaw_rad, speed_mps, steering_rad, mode, alive, lights, stuck };
   if (!end || Math.hypot(end[1] - x_m, end[2] - y_m) > JUMP_M) return car;
   const turn = Math.atan2(Math.sin(end[3] - yaw_rad), Math.cos(end[3] - yaw_rad));
   return {

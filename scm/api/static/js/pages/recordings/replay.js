@@ -1,6 +1,7 @@
 /** One recording again: the map at a moment, the slider, who was there, what happened, and what to do with it. */
 import { signal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
+import { modeOf, stuckBy } from "scm/shared/condition.js";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
 import { EyeThen } from "scm/pages/recordings/eye_then.js";
@@ -101,7 +102,7 @@ function Played({ player, summary, events, more, onChanged }) {
       <${Cars} player=${player} chosen=${chosen} onChoose=${setChosen} />
       ${eye.length + own.length > 0 && html`<${EyeThen} player=${player} eye=${eye} own=${own} chosen=${chosen} />`}
       <${Events} player=${player} events=${events} more=${more} />
-      ${asking.value === "take" && html`<${TakeHomeDialog} recording=${recording} cars=${cars} onClose=${close} />`}
+      ${asking.value === "take" && html`<${TakeHomeDialog} recording=${recording} cars=${cars} player=${player} onClose=${close} />`}
       ${asking.value === "mismatch" &&
       html`<${MismatchDialog} recording=${recording} cars=${cars} player=${player} chosen=${chosen} onClose=${close} />`}
       ${asking.value === "notes" && html`<${NotesDialog} recording=${recording} onClose=${close} onChanged=${onChanged} />`}
@@ -177,14 +178,14 @@ function absent(state, player) {
 
 function Car({ car, chosen, onChoose }) {
   const is = chosen === car.vehicle;
-  const mode = car.alive ? car.mode : "lost";
+  const mode = modeOf(car);
   return html`
     <tr data-car=${car.vehicle} class=${is ? "chosen" : ""}>
       <td>
         <button class="name" aria-pressed=${is} onClick=${() => onChoose(is ? null : car.vehicle)}>${car.vehicle}</button>
       </td>
       <td><span class="kind" data-kind=${car.kind}>${car.kind}</span></td>
-      <td><span class="mode" data-mode=${mode}>${mode}</span></td>
+      <td><span class="mode" data-mode=${mode} title=${stuckBy(car)}>${mode}</span></td>
       <td class="number">${fixed(car.speed_mps, 2)} <small>m/s</small></td>
     </tr>
   `;

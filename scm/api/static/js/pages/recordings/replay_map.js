@@ -3,6 +3,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { drawBoxes } from "scm/shared/box_shape.js";
 import { drawCar, footprint } from "scm/shared/car_shape.js";
+import { readBox } from "scm/shared/drawing.js";
 import { drawLight } from "scm/shared/light_shape.js";
 
 const TRAIL_S = 6;
@@ -39,14 +40,6 @@ export function ReplayMap({ player, summary, chosen, onChoose }) {
       <p class="stamp" aria-hidden="true">Not live</p>
     </div>
   `;
-}
-
-/** The picture's frame: map metres, x right; its y counts down, so the map's y is -y. */
-async function readBox(roads) {
-  const response = await fetch(roads);
-  const drawing = new DOMParser().parseFromString(await response.text(), "image/svg+xml");
-  const [left, top, width, height] = drawing.documentElement.getAttribute("viewBox").split(/[\s,]+/).map(Number);
-  return { left, top, width, height };
 }
 
 function viewOf(box, width, height) {

@@ -2,12 +2,11 @@
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
+import { seconds, SpanFields, WHOLE } from "scm/pages/recordings/span_fields.js";
 import { size } from "scm/pages/recordings/words.js";
 
-export function TakeHomeDialog({ recording, cars, onClose }) {
-  const [vehicle, setVehicle] = useState("");
+export function TakeHomeDialog({ recording, cars, player, onClose }) {
   const at = `/api/v1/recordings/${encodeURIComponent(recording.name)}`;
-  const csv = `${at}/csv${vehicle && `?vehicle=${encodeURIComponent(vehicle)}`}`;
   return html`
     <${Dialog} title="Download" onClose=${onClose}>
       <dl class="files">
@@ -18,13 +17,7 @@ export function TakeHomeDialog({ recording, cars, onClose }) {
         </div>
         <div>
           <dt>Its cars as a table <small>CSV, SI units</small></dt>
-          <dd>
-            <select aria-label="Cars in the table" value=${vehicle} onChange=${(event) => setVehicle(event.target.value)}>
-              <option value="">all cars, as the world saw them</option>
-              ${cars.map((car) => html`<option value=${car.vehicle}>${car.vehicle}: its own reports</option>`)}
-            </select>
-          </dd>
-          <dd><a class="file" href=${csv} download>${vehicle || "all cars"}.csv</a></dd>
+          <dd><${CarsAsTable} at=${at} recording=${recording} cars=${cars} player=${player} /></dd>
         </div>
         <div>
           <dt>For Foxglove <small>MCAP with Foxglove's own schemas</small></dt>
@@ -41,4 +34,43 @@ export function TakeHomeDialog({ recording, cars, onClose }) {
       <div class="actions"><button onClick=${onClose}>Close</button></div>
     <//>
   `;
+}
+
+/** A table of one car or of all, of all the time or of a span. */
+function CarsAsTable({ at, recording, cars, player }) {
+  const [vehicle, setVehicle] = useState("");
+  const [span, setSpan] = useState(WHOLE);
+  const [trouble, setTrouble] = useState("");
+  const submit = async (event) => {
+    event.preventDefault();
+    const asked = Object.entries({ vehicle: vehicle || null, ...seconds(span) });
+    const query = new URLSearchParams(asked.filter(([, value]) => value !== null));
+    setTrouble(await downloaded(`${at}/csv?${query}`));
+  };
+  return html`
+    <form class="fields two-by-two" onSubmit=${submit} onInput=${() => setTrouble("")}>
+      <select aria-label="Cars in the table" value=${vehicle} onChange=${(event) => setVehicle(event.target.value)}>
+        <option value="">all cars, as the world saw them</option>
+        ${cars.map((car) => html`<option value=${car.vehicle}>${car.vehicle}: its own reports</option>`)}
+      </select>
+      <${SpanFields} recording=${recording} player=${player} span=${span} onChange=${setSpan} />
+      ${trouble && html`<p class="trouble" role="alert">${trouble}</p>`}
+      <button>${vehicle || "all cars"}.csv</button>
+    </form>
+  `;
+}
+
+/** Let the browser download a file, once the server begins to send it; else return why not. */
+async function downloaded(path) {
+  const asking = new AbortController();
+  try {
+    const answer = await fetch(path, { signal: asking.signal });
+    if (!answer.ok) return (await answer.json()).detail;
+  } catch (error) {
+    return `The server does not answer: ${error.message}`;
+  }
+  asking.abort();
+  const link = Object.assign(document.createElement("a"), { href: path, download: "" });
+  link.click();
+  return "";
 }

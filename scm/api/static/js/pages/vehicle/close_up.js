@@ -1,11 +1,11 @@
 /** One vehicle: what it sees, what it is told and how it answers, who drives it, and a wheel to take. */
+import { modeOf, stuckBy } from "scm/shared/condition.js";
 import { html } from "scm/shared/html.js";
 import { go } from "scm/shell/router.js";
 import { world } from "scm/shell/store.js";
 import { byName, fixed } from "scm/shared/format.js";
 import { batteryState, batteryWord, BatterySign } from "scm/pages/vehicle/battery.js";
 import { CameraPanel } from "scm/pages/vehicle/camera_panel.js";
-import { modeOf, stuckBy } from "scm/pages/vehicle/condition.js";
 import { FactsPanel } from "scm/pages/vehicle/facts_panel.js";
 import { LidarPanel } from "scm/pages/vehicle/lidar_panel.js";
 import { LightsPanel } from "scm/pages/vehicle/lights_panel.js";

@@ -1,9 +1,9 @@
 /** What is known of a car: where it is, who drives it, how far away it is, and whether to believe it. */
 import { useEffect, useState } from "preact/hooks";
+import { stuckBy } from "scm/shared/condition.js";
 import { html } from "scm/shared/html.js";
 import { age, fixed, span, UNKNOWN } from "scm/shared/format.js";
 import { Battery } from "scm/pages/vehicle/battery.js";
-import { stuckBy } from "scm/pages/vehicle/condition.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
 import { doubtOf, misbehaviour, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
 

@@ -1,10 +1,10 @@
 /** All vehicles in one table: who drives them, how they are, and whether to believe them. */
 import { signal } from "@preact/signals";
+import { modeOf, stuckBy } from "scm/shared/condition.js";
 import { html } from "scm/shared/html.js";
 import { age, byName, fixed, UNKNOWN } from "scm/shared/format.js";
 import { world } from "scm/shell/store.js";
 import { batteryState, batteryWord, BatterySign, percent } from "scm/pages/vehicle/battery.js";
-import { modeOf, stuckBy } from "scm/pages/vehicle/condition.js";
 import { doubtOf, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
 
