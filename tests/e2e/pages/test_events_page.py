@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.e2e.pages.visiting import judge, photograph
+from tests.e2e.pages.visiting import LOOKS, in_both_themes, judge, photograph
 
 ROWS = ".at-events .entries > li"
 
@@ -17,15 +17,15 @@ def stop_and_go(running, reason):
     return answer.headers["trace-id"]
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("size", ["wide", "narrow"])
+@pytest.mark.parametrize(("size", "theme"), LOOKS)
 def test_the_log_is_readable_at_every_size_and_in_both_colours(look, running, size, theme):
     stop_and_go(running, "a hand on the floor")
     visited = look("/events", "events", size, theme, ready=f"{ROWS} >> text=a hand on the floor")
     visited.page.click('.at-events .tabs a[href="/events/audit"]')
     visited.page.wait_for_selector(".at-events [data-deed]")
-    judge(visited)
-    photograph(visited, f"audit_{size}_{theme}")
+    for shown in in_both_themes(visited, theme):
+        judge(visited)
+        photograph(visited, f"audit_{size}_{shown}")
 
 
 def test_a_person_finds_follows_acknowledges_and_takes_back(visit, running):
@@ -98,11 +98,25 @@ def test_the_audit_names_who_did_what_and_its_chain_is_whole(visit, running):
     page.locator(f"{deed} .name").first.click()
     assert "for the audit" in page.inner_text(".at-events .whole pre")
     page.click(".at-events .whole .trace button")
-    page.wait_for_selector(".at-events [data-deed]:has-text('PUT /stop')")
+    page.wait_for_selector(f"{deed} .answer >> text=/200 in/")  # one row has the facts of both
+    rows = page.locator(".at-events [data-deed]")
+    assert rows.count() == 1
+    assert rows.locator(".by").inner_text() == "ada this machine"
+    assert rows.locator(".station").inner_text() == "world, api"
+    told = [json.loads(text) for text in page.locator(".at-events .whole pre").all_inner_texts()]
+    assert [entry["kind"] for entry in told] == ["StopRequest", "PUT /api/v1/stop"]
+    numbers = [str(entry["number"]) for entry in told]
+    assert rows.locator(".number").inner_text() == ", ".join(numbers)
     deeds = running.get(f"/audit?text={trace}")["items"]
     assert [(deed["station"], deed["trace_id"]) for deed in deeds] == [
         ("api", trace),
         ("world", trace),
     ], "a click, and what the world did for it"
+    page.select_option("select[aria-label='Done by']", "api")  # its own entries alone
+    page.wait_for_selector(".at-events [data-deed]:has-text('PUT /stop')")
+    page.select_option("select[aria-label='Done by']", "")
+    refused = running.web.put("/stop", json={"engaged": "perhaps"})
+    page.fill("input[aria-label='Find in deeds']", refused.headers["trace-id"])
+    page.wait_for_selector(".at-events [data-deed]:has-text('PUT /stop') .warn >> text=422 in")
     page.click("text=Check the chain")
     page.wait_for_selector(".chain >> text=whole:")

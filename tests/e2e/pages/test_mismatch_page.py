@@ -13,7 +13,7 @@ from scm.mismatch.report.write import write_report
 from scm.play import play, write_recording
 from scm.world.part import WorldPart
 from tests.e2e.city_process import wait_for
-from tests.e2e.pages.visiting import judge
+from tests.e2e.pages.visiting import LOOKS, judge
 from tests.unit.mismatch import made_up_findings as made_up
 
 SEARCH_S = 240.0  # on a busy machine
@@ -73,8 +73,7 @@ def searching(running, shelf, tmp_path_factory):
     return answer.json()["id"]
 
 
-@pytest.mark.parametrize("size", ["wide", "narrow"])
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(("size", "theme"), LOOKS)
 def test_the_report_can_be_looked_at(look, shelf, size, theme):
     look("/mismatch/two-effects", "mismatch", size, theme, ready=".runs svg path.curve.after")
 

@@ -236,6 +236,12 @@ def test_a_search_that_cannot_be_is_refused(call, shelves, ran, body, status):
     assert ran.started == []
 
 
+def test_a_span_that_ends_before_it_begins_is_refused_in_the_models_own_words(call):
+    body = {"recording": "city-1", "from_s": 5, "to_s": 4}
+    told = call("POST", f"{API}/jobs", json=body).json()
+    assert told["detail"] == "body: to_s: got 4, expected more than from_s, 5"
+
+
 def test_a_drive_is_shown_and_sent_to_a_car_on_the_citys_floor(call, shelves, ran, city_map):
     with_drive(put(shelves, "monday", "undecided"))
     (part,) = call("GET", f"{API}/reports/monday/drives/next_drive").json()["parts"]

@@ -1,8 +1,7 @@
-/** What the page has to say or ask: short notices, and the question for the API key. */
+/** What the page has to say: short notices. A dialog that is open shows them, for all behind it is dim and out of reach. */
 import { html } from "scm/shared/html.js";
-import { dismiss, keyWanted, notices } from "scm/shell/api.js";
+import { dismiss, notices } from "scm/shell/api.js";
 import { prose } from "scm/shell/prose.js";
-import { Dialog } from "scm/shared/dialog.js";
 
 export function Notices() {
   return html`
@@ -16,26 +15,5 @@ export function Notices() {
         `,
       )}
     </div>
-  `;
-}
-
-export function KeyDialog() {
-  const answer = keyWanted.value;
-  if (!answer) return null;
-  const submit = (event) => {
-    event.preventDefault();
-    answer(event.target.elements.key.value.trim());
-  };
-  return html`
-    <${Dialog} title="API key" onClose=${() => answer("")}>
-      <p>This city asks for an API key. It is kept for this tab.</p>
-      <form onSubmit=${submit}>
-        <input name="key" type="password" autocomplete="off" required aria-label="API key" />
-        <div class="actions">
-          <button type="button" onClick=${() => answer("")}>Cancel</button>
-          <button class="primary">Use key</button>
-        </div>
-      </form>
-    <//>
   `;
 }

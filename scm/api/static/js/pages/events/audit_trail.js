@@ -2,7 +2,7 @@
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { moment } from "scm/shared/format.js";
-import { said } from "scm/pages/events/deeds.js";
+import { folded, said } from "scm/pages/events/deeds.js";
 import { Export } from "scm/pages/events/event_log.js";
 import { useRested, useRows } from "scm/pages/events/rows.js";
 
@@ -37,7 +37,11 @@ export function AuditTrail() {
             <th>Done by</th><th>Answer</th>
           </tr>
         </thead>
-        <tbody>${list.rows.map((row) => html`<${Deed} key=${row.number} row=${row} onTrace=${setText} />`)}</tbody>
+        <tbody>
+          ${folded(list.rows).map(
+            ({ row, call }) => html`<${Deed} key=${row.number} row=${row} call=${call} onTrace=${setText} />`,
+          )}
+        </tbody>
       </table>
       ${!list.rows.length &&
       html`<p class="empty">${list.loading ? "Reading the audit." : "Nobody changed anything that fits."}</p>`}
@@ -47,20 +51,22 @@ export function AuditTrail() {
   `;
 }
 
-function Deed({ row, onTrace }) {
+function Deed({ row, call, onTrace }) {
   const [whole, setWhole] = useState(false);
   const { ended, bad } = outcome(row);
+  const by = row.by || row.request.by || row.request.vehicle || "";
+  const entries = call ? [row, call] : [row];
   return html`
     <tr data-deed=${row.number}>
-      <td class="number">${row.number}</td>
+      <td class="number">${entries.map(({ number }) => number).join(", ")}</td>
       <td class="when"><time>${moment(row.t_ns)}</time></td>
       <td class="what">
         <button class="name" aria-expanded=${whole} onClick=${() => setWhole(!whole)}>${said(row)}</button>
         ${row.request.reason && html` <small>${row.request.reason}</small>`}
       </td>
-      <td class="by">${row.by || row.request.by || row.request.vehicle || ""}</td>
-      <td class="station">${row.station}</td>
-      <td class="answer ${bad ? "warn" : ""}">${ended}</td>
+      <td class="by">${by}${call && call.by !== by && html` <small>${call.by}</small>`}</td>
+      <td class="station">${entries.map(({ station }) => station).join(", ")}</td>
+      <td class="answer ${bad ? "warn" : ""}">${ended}${call && html` <small>${outcome(call).ended}</small>`}</td>
     </tr>
     ${whole &&
     html`
@@ -69,11 +75,15 @@ function Deed({ row, onTrace }) {
           ${row.trace_id &&
           html`<p class="trace">Trace <code>${row.trace_id}</code>
             <button class="small" onClick=${() => onTrace(row.trace_id)}>All that this led to</button></p>`}
-          <pre tabindex="0">${JSON.stringify({ kind: row.kind, request: row.request, reply: row.reply, request_id: row.request_id }, null, 2)}</pre>
+          ${entries.map((entry) => html`<pre tabindex="0">${inFull(entry)}</pre>`)}
         </td>
       </tr>
     `}
   `;
+}
+
+function inFull({ number, station, kind, request, reply, request_id }) {
+  return JSON.stringify({ number, station, kind, request, reply, request_id }, null, 2);
 }
 
 /** How a deed ended, in a word or two. */

@@ -94,7 +94,7 @@ function Which({ cars }) {
       </label>
       <label>From [s] <input name="from_s" type="number" min="0" step="any" placeholder="start" /></label>
       <label>To [s] <input name="to_s" type="number" min="0" step="any" placeholder="end" /></label>
-      <label>
+      <label class="long">
         Time for it
         <select name="budget_s">
           <option value="30">half a minute</option>
