@@ -2,8 +2,8 @@
 
 `python -m bench dashboard [--only paint|frames|api|sse] ...`; each starts `scm up` on a grid city:
 
-    paint   200 cars: first paint of the map page, and the slowest answer to a click or a key
-            (event timing: from the touch to the next picture)
+    paint   200 cars: first paint of the map page, its first drawn car, and the slowest answer to a
+            click or a key (event timing: from the touch to the next picture)
     frames  1000 cars: frames a second that the map draws, by its own count
     api     100 cars: 200 requests a second at even beats, from when each was due to its last byte,
             after each path was asked once, for a process looks some things up but once
@@ -48,7 +48,22 @@ new PerformanceObserver((list) => {
         if (entry.interactionId) window.touches.push([entry.name, entry.duration]);
     }
 }).observe({ type: "event", durationThreshold: 16, buffered: true });
+window.opened = {};
+addEventListener("click", ({ target, timeStamp }) => {
+    const name = target.closest("nav a")?.pathname.slice(1);
+    const look = () => {
+        if (!document.querySelector(`main.at-${name} > *`)) requestAnimationFrame(look);
+        else window.opened[name] = Math.round(performance.now() - timeStamp);
+    };
+    if (name) requestAnimationFrame(look);
+});
 """
+
+FIRST_CAR = """async (scene) => {
+    const { drawn } = await import(scene);
+    while (!drawn.cars) await new Promise(requestAnimationFrame);
+    return performance.now();
+}"""
 
 
 def main() -> None:
@@ -121,8 +136,10 @@ def paint() -> None:
                 "() => performance.getEntriesByName('first-contentful-paint')[0].startTime"
             )
             say(f"first contentful paint, {PAINT_CARS} cars", painted, BAR_PAINT_MS, "ms")
+            drawn = page.evaluate(FIRST_CAR, SCENE)
+            print(f"    the first car is drawn after {drawn:.0f} ms")
             touch(page)
-            touches = page.evaluate("() => window.touches")
+            touches, opened = page.evaluate("() => [window.touches, window.opened]")
     slowest: dict[str, float] = {}
     for name, took_ms in touches:
         slowest[name] = max(slowest.get(name, 0.0), took_ms)
@@ -130,6 +147,7 @@ def paint() -> None:
     half = statistics.median(took for _, took in touches) if touches else 16.0
     say(f"slowest touch to next picture, {PAINT_CARS} cars", worst, BAR_TOUCH_MS, "ms")
     print(f"    {len(touches)} of 16 ms and more, half under {half:.0f} ms; {slowest}")
+    print(f"    pages are there after [ms]: {opened}")
 
 
 def touch(page: Any) -> None:
