@@ -1,9 +1,11 @@
 """What all tests share: where other people's data lies, and marks that come from the folder."""
 
 import gc
+import importlib
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
 ROOT = Path(__file__).parent.parent
+TESTS = ROOT / "tests"
 SHARED = ROOT.parent / "shared"
 STANDS_BACK = 10  # as `nice` counts
 
@@ -34,6 +37,24 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_xdist_auto_num_workers() -> int:
     """Start a process more than there are cores: the one with the cities mostly waits."""
     return len(os.sched_getaffinity(0)) + 1
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session: pytest.Session) -> None:
+    """Let each process begin to load the tests at another place, and find the rest compiled.
+
+    Pytest rewrites the assertions of every test file, which takes longer than to load it; in one
+    order all would do the same work at the same time. What fails here fails again when collected.
+    """
+    told = getattr(session.config, "workerinput", None)
+    if told is None or sys.dont_write_bytecode or session.config.args != ["tests"]:
+        return
+    files = sorted(TESTS.rglob("test_*.py"))
+    begin = len(files) * int(told["workerid"].removeprefix("gw")) // told["workercount"]
+    for path in (*files[begin:], *files[:begin]):
+        if not (path.parent / "__init__.py").exists():  # pytest names what is in one otherwise
+            with suppress(Exception, pytest.skip.Exception):
+                importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -18,10 +18,17 @@ from pathlib import Path
 import pytest
 
 
+def note(what):
+    with (Path(__file__).parents[{up}] / what).open("a") as file:
+        file.write(f"{{Path(__file__).stem}} {{os.environ['PYTEST_XDIST_WORKER']}}\\n")
+
+
 @pytest.mark.parametrize("number", range(4))
 def test_is_run(number):
-    with (Path(__file__).parents[{up}] / "ran").open("a") as file:
-        file.write(f"{{Path(__file__).stem}} {{os.environ['PYTEST_XDIST_WORKER']}}\\n")
+    note("ran")
+
+
+note("loaded")
 """
 ABORT = "import os\n\n\ndef test_aborts():\n    os.abort()\n"
 
@@ -46,6 +53,7 @@ def made(root: Path, tree: Path) -> subprocess.CompletedProcess[str]:
     options = shlex.split(found[1].replace("-n auto", "-n 2"))
     command = [sys.executable, "-m", "pytest", *options]
     plugins = {
+        "PYTHONDONTWRITEBYTECODE": "",
         "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
         "PYTEST_PLUGINS": "xdist.plugin,pytest_timeout",
     }
@@ -64,6 +72,18 @@ def test_a_file_stays_in_one_process_and_all_cities_in_another(root: Path, tree:
     assert len(cities) == 1
     for name in ("test_tests_1", "test_tests_2"):
         assert len({worker for told, worker in ran if told == name}) == 1
+
+
+def test_no_two_processes_begin_to_load_at_the_same_file(root: Path, tree: Path) -> None:
+    done = made(root, tree)
+    assert done.returncode == 0, done.stdout + done.stderr
+    loaded: dict[str, list[str]] = {}
+    for line in (tree / "loaded").read_text().splitlines():
+        name, worker = line.split()
+        loaded.setdefault(worker, []).append(name)
+    first, second = (loaded[worker] for worker in ("gw0", "gw1"))
+    assert first == ["test_e2e_1", "test_e2e_2", "test_tests_1", "test_tests_2"]
+    assert second == [*first[2:], *first[:2]]
 
 
 def test_a_process_that_dies_ends_the_run_with_the_name_of_its_test(root: Path, tree: Path) -> None:

@@ -34,8 +34,8 @@ def wait_for(condition: Callable[[], Any], timeout_s: float, what: str) -> Any:
 class CityProcess:
     """`scm up` on free ports."""
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
-        command = [sys.executable, "-m", "scm", "up", "driving_school", "--port", "0"]
+    def __init__(self, folder: Path, *arguments: str, city_map: str = "driving_school") -> None:
+        command = [sys.executable, "-m", "scm", "up", city_map, "--port", "0"]
         command += ["--listen", "tcp/127.0.0.1:0", "--record-dir", str(folder), *arguments]
         self.folder = folder
         self.lines: list[str] = []
@@ -125,9 +125,9 @@ class CityProcess:
 
 
 @contextmanager
-def city(folder: Path, *arguments: str) -> Iterator[CityProcess]:
-    """Run a city for a test."""
-    process = CityProcess(folder, *arguments)
+def city(folder: Path, *arguments: str, city_map: str = "driving_school") -> Iterator[CityProcess]:
+    """Run a city for a test, of a map's name or file."""
+    process = CityProcess(folder, *arguments, city_map=city_map)
     try:
         yield process
     finally:

@@ -9,14 +9,14 @@ import pytest
 
 from scm.eye.camera import camera_model
 from scm.maps.load import load_map
+from tests.e2e.pages.visiting import LOOKS
 
 NUMBERS = ".eye-numbers tbody tr >> nth=1"
 MEASURING_MS = 200_000  # a program of its own that counts: seconds, unless others count too
 COLUMNS, ROWS, SQUARE_M, CELL_PX = 9, 6, 0.1, 40
 
 
-@pytest.mark.parametrize("size", ["wide", "narrow"])
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(("size", "theme"), LOOKS)
 def test_the_page_shows_picture_tags_and_residuals(look, size, theme):
     page = look("/eye", "eye", size, theme, ready=NUMBERS).page
     page.wait_for_selector("canvas.picture[data-frame]")

@@ -57,6 +57,67 @@ def test_each_junction_is_chosen_and_its_rings_and_barriers_are_drawn(visit):
     assert page.input_value("#junction") == "market"
 
 
+COMING = """async ([turns, told]) => {
+  const { comingOf } = await import("scm/pages/signals/diagram_paint.js");
+  const greens = comingOf({ turns }, { fresh: true, mode: "plan", ...told }, { now: 100 });
+  return greens.map(({ group, start, end }) => [group, start, end]);
+}"""
+DRAWN = """() => {
+  const canvas = document.querySelector(".diagram canvas");
+  const ratio = canvas.width / canvas.clientWidth;
+  const [rings, phases] = [22 + 2 * 36, 22 + 2 * 56 + 12].map((px) => Math.round(ratio * px));
+  const now = Math.round(ratio * (116 + 0.7 * (canvas.clientWidth - 120)));
+  const paper = canvas.getContext("2d");
+  const greenish = (top, height) => {
+    const { data } = paper.getImageData(now + 4, top, canvas.width - now - 4, height);
+    let found = 0;
+    for (let i = 0; i < data.length; i += 4) {
+      found += data[i + 1] > data[i] + 20 && data[i + 1] > data[i + 2] + 20;
+    }
+    return found;
+  };
+  return [greenish(0, rings), greenish(phases, canvas.height - phases)];  // rows of 36 to 56 px
+}"""
+
+
+def turn(groups, start_s, end_s):
+    end_ns = None if end_s is None else end_s * 1e9
+    return {"groups": groups, "start_ns": start_s * 1e9, "end_ns": end_ns}
+
+
+def test_greens_to_come_are_drawn_and_their_barriers_told(visit):
+    visited = visit("/signals/market")
+    page = visited.page
+    page.wait_for_selector('.head[data-group="east_left"]')
+    visited.wait(
+        f"() => /Barriers shown:.* in \\d+ s/.test(document.querySelector('{RINGS}').textContent)"
+    )
+    crossed = page.text_content(RINGS).partition("Barriers shown: ")[2]
+    assert min(int(s) for s in re.findall(r"in (\d+) s", crossed)) <= 27  # that much is shown
+    visited.until(lambda: min(page.evaluate(DRAWN)) > 200, "in the rows of rings and of phases")
+
+
+def test_a_green_to_come_is_one_through_turns_that_follow_each_other(visit):
+    page = visit("/signals/market").page
+    lit = {"groups": [{"group": "south", "colour": "green"}, {"group": "east", "colour": "red"}]}
+    turns = [
+        turn(["south"], 90, 110),
+        turn(["east", "west"], 113, 120),
+        turn(["east", "left"], 120, 130),
+        turn(["south"], 133, None),
+    ]
+    assert page.evaluate(COMING, [turns, lit]) == [
+        ["south", 100, 110],  # it is green: from now on
+        ["east", 113, 130],
+        ["west", 113, 120],
+        ["left", 120, 130],
+        ["south", 133, None],
+    ]
+    assert page.evaluate(COMING, [[turn(["east"], 80, 99)], lit]) == []  # is over
+    assert page.evaluate(COMING, [turns, {**lit, "mode": "flash"}]) == []
+    assert page.evaluate(COMING, [turns, {**lit, "fresh": False}]) == []
+
+
 def test_a_stage_of_two_rings_is_edited_and_a_plan_keeps_its_offset(visit, running):
     visited = visit("/signals/market")
     page = visited.page

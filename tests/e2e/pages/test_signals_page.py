@@ -3,8 +3,7 @@
 import pytest
 
 from tests.e2e.city_process import wait_for
-from tests.e2e.pages.conftest import THEMES
-from tests.e2e.pages.visiting import SIZES, in_each_look, judge, photograph
+from tests.e2e.pages.visiting import LOOKS, in_each_look, judge, photograph
 
 pytestmark = pytest.mark.e2e
 
@@ -12,8 +11,7 @@ AT = "/signals/crossing"
 READY = '.choices [data-plan="calm"]'
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("theme", THEMES)
+@pytest.mark.parametrize(("size", "theme"), LOOKS)
 def test_it_looks_as_it_should(look, size, theme):
     visited = look("/signals", "signals", size, theme, READY)
     assert visited.page.locator(".head").count() == 2
@@ -164,6 +162,10 @@ def test_flash_is_shown_at_once_with_its_letter_and_ended_with_a_reason(visit, r
         assert set(page.locator('.lamps i[data-lit="true"]').all_inner_texts()) == {"F"}
         assert "until somebody ends it" in page.inner_text(".runs")
         assert page.locator(".head >> text=stop, look, go in turn").count() == 2
+        for width in (1920, 1440, 390):  # no words run under the buttons beside them
+            page.set_viewport_size({"width": width, "height": 900})
+            for line in page.locator(".head p").all():
+                assert line.evaluate("line => line.scrollWidth <= line.clientWidth")
     finally:
         answer("End flash…", "done")
         wait_for(lambda: running.get("/signals/crossing")["mode"] != "flash", 20.0, "it goes on")

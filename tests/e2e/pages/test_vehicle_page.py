@@ -16,7 +16,7 @@ from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 from tests.e2e.city_process import wait_for
-from tests.e2e.pages.visiting import judge, photograph
+from tests.e2e.pages.visiting import LOOKS, judge, photograph
 
 CAR, AGENT, TIRED = "n1", "n5", "n9"
 PADS = """
@@ -124,15 +124,13 @@ def looks_right(visited, name):
         judge(visited, ".wheel")  # a page that is silent for 5 s gives the car back
 
 
-@pytest.mark.parametrize("size", ["wide", "narrow"])
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(("size", "theme"), LOOKS)
 def test_the_table_of_all_vehicles_looks_right(look, size, theme):
     page = look("/vehicles", "vehicles", size, theme, ready="tr[data-car]").page
     assert page.locator("tr[data-car]").count() == 6
 
 
-@pytest.mark.parametrize("size", ["wide", "narrow"])
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(("size", "theme"), LOOKS)
 def test_one_vehicle_looks_right(visit, look, size, theme):
     ready = '.film[data-seen="true"]'
     visited = look(f"/vehicles/{CAR}", "vehicle", size, theme, ready=ready)

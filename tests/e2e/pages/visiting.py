@@ -7,6 +7,9 @@ from typing import Any
 from urllib.parse import urlsplit
 
 SIZES = {"wide": (1440, 900), "narrow": (390, 844)}
+THEMES = ("light", "dark")
+LOOKS = tuple(zip(SIZES, THEMES, strict=True))
+"""The sizes and themes in which a page is opened; it is shown in the other theme after."""
 PATIENCE_MS = 30_000
 SERIOUS = {"serious", "critical"}
 
@@ -89,9 +92,22 @@ def in_each_look(visited: Visit) -> Iterator[tuple[str, str]]:
     for size, theme in (("narrow", "dark"), ("wide", "light")):
         width, height = SIZES[size]
         visited.page.set_viewport_size({"width": width, "height": height})
-        visited.page.emulate_media(color_scheme=theme)
-        visited.wait("theme => document.documentElement.dataset.theme === theme", theme)
+        _show_in(visited, theme)
         yield size, theme
+
+
+def in_both_themes(visited: Visit, first: str) -> Iterator[str]:
+    """Show an open page in the theme in which it is, and in the other; it stays in the first."""
+    other = THEMES[1 - THEMES.index(first)]
+    for theme in (first, other):
+        _show_in(visited, theme)
+        yield theme
+    _show_in(visited, first)
+
+
+def _show_in(visited: Visit, theme: str) -> None:
+    visited.page.emulate_media(color_scheme=theme)
+    visited.wait("theme => document.documentElement.dataset.theme === theme", theme)
 
 
 def photograph(visited: Visit, name: str) -> None:

@@ -2,9 +2,11 @@
 
 import asyncio
 import threading
+from functools import lru_cache
 
 import httpx
 import pytest
+from fastapi.dependencies import utils
 
 from scm.api.acknowledgements import Acknowledgements
 from scm.api.app import create_app
@@ -56,6 +58,19 @@ class Client:
                 return await client.request(method, path, **options)
 
         return asyncio.run(call())
+
+
+@pytest.fixture(scope="package", autouse=True)
+def parameters_read_once():
+    """Let FastAPI find out once what a parameter is: hundreds of applications have the same."""
+    found = lru_cache(maxsize=1024, typed=True)(utils.analyze_param)
+
+    def analyze(*, path_param_names, **parameter):
+        return found(path_param_names=frozenset(path_param_names), **parameter)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(utils, "analyze_param", analyze)
+        yield
 
 
 @pytest.fixture(scope="session")

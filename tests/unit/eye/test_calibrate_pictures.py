@@ -64,21 +64,28 @@ def rays_of(camera, fine):
         ideal = cv2.fisheye.undistortPoints(flat, model.matrix, bent, criteria=few)
     else:
         ideal = cv2.undistortPoints(flat, model.matrix, model.distortion, None, None, None, few)
-    ideal = ideal.reshape(pixels.shape)
-    return np.concatenate((ideal, np.ones((rows, columns, 1))), axis=-1)
+    rays = np.concatenate((ideal.reshape(-1, 2), np.ones((rows * columns, 1))), axis=-1)
+    return rays.astype(np.float32)
 
 
 def picture(kind, camera, turn, middle, rng):
     """Return a grey frame (height, width) of a board whose middle is there in the camera's axes."""
     page, scale = page_of(kind)
     fine = 2
-    rays = rays_of(camera, fine)
     rotation = cv2.Rodrigues(np.array(turn, dtype=float))[0]
-    reach = (rotation[:, 2] @ middle) / (rays @ rotation[:, 2])
-    flat = (rays * reach[..., None] - middle) @ rotation[:, :2] * scale
-    at = flat + np.array(page.shape[::-1]) / 2.0 - 0.5
-    at = np.where(reach[..., None] > 0.0, at, -1e4).astype(np.float32)
-    seen = cv2.remap(page, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderValue=120)
+    right, up, out = (rays_of(camera, fine) @ rotation.astype(np.float32)).T
+    begin = (middle @ rotation).astype(np.float32)
+    ahead = begin[2] * out > 0.0
+    reach = np.divide(begin[2], out, out=np.zeros_like(out), where=ahead)
+    half = np.array(page.shape[::-1], dtype=np.float32) / 2.0 - 0.5
+    shape = camera.height_px * fine, camera.width_px * fine
+    at = [
+        np.where(ahead, (along * reach - begin[i]) * np.float32(scale) + half[i], -1e4)
+        .astype(np.float32)
+        .reshape(shape)
+        for i, along in enumerate((right, up))
+    ]
+    seen = cv2.remap(page, *at, cv2.INTER_LINEAR, borderValue=120)
     small = cv2.resize(seen, None, fx=1 / fine, fy=1 / fine, interpolation=cv2.INTER_AREA)
     return np.clip(small + rng.normal(0.0, 2.0, small.shape), 0, 255).astype(np.uint8)
 

@@ -239,3 +239,44 @@ def test_a_car_that_differs_in_many_ways_keeps_its_first_fit_where_strides_come_
     assert names(found.diagnosis.unasked) == ["effects", "strides"]
     assert not found.searched.rough
     assert found.best.z.tolist() == no_time.best.z.tolist()
+
+
+def test_where_strides_come_too_late_only_they_are_told_as_left(monkeypatch):
+    clock, runs = StepClock(), []
+    really_run = Search.run
+
+    def run(search, *is_over):
+        runs.append(search)
+        return search.retuned if len(runs) == 1 else really_run(search, *is_over)
+
+    def too_late(search, *_):
+        clock.set_ns(nanoseconds(61.0))
+        search.budget.check()
+
+    monkeypatch.setattr(Search, "run", run)
+    monkeypatch.setattr(diagnose, "_by_strides", too_late)
+    monkeypatch.setattr(diagnose, "is_far", lambda search: bool(search.retuned))
+    monkeypatch.setattr(diagnose, "strays", lambda _: True)
+    found = diagnose_car([made_drive(seconds=12.0)], nigel(), budget_s=60.0, clock=clock)
+    assert names(found.diagnosis.unasked) == ["strides"]
+
+
+def test_as_long_as_the_first_fit_took_is_kept_for_what_follows_a_search(monkeypatch):
+    clock, seen = StepClock(), []
+
+    def fitted(search):
+        clock.set_ns(nanoseconds(20.0))
+        return bool(search.retuned)
+
+    def run(search, *_):
+        for at_s in (39.0, 41.0):
+            clock.set_ns(nanoseconds(at_s))
+            seen.append(search.budget.is_over())
+        return search.retuned
+
+    monkeypatch.setattr(diagnose, "is_far", fitted)
+    monkeypatch.setattr(diagnose, "strays", lambda _: True)
+    monkeypatch.setattr(diagnose, "_by_strides", lambda search, *_: search.budget.check())
+    monkeypatch.setattr(Search, "run", run)
+    diagnose_car([made_drive(seconds=12.0)], nigel(), budget_s=60.0, clock=clock)
+    assert seen[:2] == [False, True]
