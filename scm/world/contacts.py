@@ -150,6 +150,7 @@ class _Ring:
         self._boxes = boxes.boxes
         self.known: dict[int, Hull] = {}
         self._bodies: dict[int, pymunk.Body] = {}
+        self._brakes: dict[int, tuple[pymunk.Constraint, ...]] = {}
         self._left: dict[int, int] = {}
         self._order: Ints = np.empty(0, np.int64)
         self._ids: Ints = np.empty(0, np.int64)
@@ -219,26 +220,28 @@ class _Ring:
         self._left = left
         for key, (x, y, yaw) in new.items():
             if key not in self._bodies:
-                self._bodies[key] = self._made(key)
+                self._make(key)
             body = self._bodies[key]
             body.position, body.angle = (x, y), yaw
-            self._space.add(body, *body.shapes, *body.constraints)
+            self._space.add(body, *body.shapes, *self._brakes.get(key, ()))
         old = [key for key, steps in left.items() if steps <= 0]
         if old:
             self._leave(old)
         elif new:
             self._reorder()
 
-    def _made(self, key: int) -> pymunk.Body:
+    def _make(self, key: int) -> None:
         if key < len(self._boxes):
-            return box_body(self._boxes[key], self._space.static_body, STEP_S / INSTANT)
-        return car_body(self.known[key])
+            made = box_body(self._boxes[key], self._space.static_body, STEP_S / INSTANT)
+            self._bodies[key], self._brakes[key] = made
+        else:
+            self._bodies[key] = car_body(self.known[key])
 
     def _leave(self, keys: list[int]) -> None:
         for key in keys:
             del self._left[key]
             body = self._bodies[key]
-            self._space.remove(body, *body.shapes, *body.constraints)
+            self._space.remove(body, *body.shapes, *self._brakes.get(key, ()))
         self._reorder()
 
     def _reorder(self) -> None:

@@ -51,8 +51,13 @@ def car_body(hull: Hull) -> pymunk.Body:
     return body
 
 
-def box_body(box: Box, static: pymunk.Body, scale: float) -> pymunk.Body:
-    """Return a box that slides, with its shapes and its brakes on the floor.
+def box_body(
+    box: Box, static: pymunk.Body, scale: float
+) -> tuple[pymunk.Body, tuple[pymunk.Constraint, ...]]:
+    """Return a box that slides, with its shapes, and its brakes on the floor.
+
+    Whoever takes the brakes must hold them: a body knows its constraints weakly, so a collector
+    of cycles that ran while they are in no space would leave a box that slides for ever.
 
     Args:
         box: A movable one.
@@ -68,9 +73,10 @@ def box_body(box: Box, static: pymunk.Body, scale: float) -> pymunk.Body:
     turns = pymunk.GearJoint(static, body, 0.0, 1.0)
     slides.max_force = scale * box.friction * mass_of(box) * GRAVITY
     turns.max_force = slides.max_force * arm_of(box)
-    for brake in (slides, turns):
+    brakes = slides, turns
+    for brake in brakes:
         brake.max_bias = 0.0  # a brake forgets where the box once was
-    return body
+    return body, brakes
 
 
 def _shape(

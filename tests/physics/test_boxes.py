@@ -1,12 +1,14 @@
 """Boxes that cars push: momentum, friction that holds and stops, walls behind them, and energy."""
 
+import gc
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from scm.maps.model import Box, CityMap, Floor, MapTag, Wall
 from scm.world.boxes import Boxes, arm_of, inertia_of
-from scm.world.contacts import STEP_S, Contacts
+from scm.world.contacts import KEPT_STEPS, STEP_S, Contacts
 from scm.world.solids import Hull
 
 HULL = Hull(2.4, 0.0229, -0.14, 0.16, -0.0875, 0.0875, restitution=0.3, friction=0.5)
@@ -73,6 +75,25 @@ def test_a_box_that_was_hit_slides_as_far_as_coulomb_lets_it(friction):
     # The first step of sliding is free of friction: it acts on the velocity after it.
     assert slid == pytest.approx(start**2 / (2 * friction * GRAVITY), abs=start * STEP_S)
     assert_array_equal(scene.contacts.boxes.motion[0, 3:], 0.0)
+
+
+def test_a_box_that_left_the_solver_is_braked_when_it_is_hit_again():
+    wall = Wall(points=((-6.0, -2.0), (-6.0, 2.0)), thickness_m=0.02)
+    friction, apart, at_the_wall = 0.6, [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [-6.0] + 5 * [0.0]
+    scene = Scene(city(box(friction=friction), walls=(wall,)), apart, at_the_wall)
+    (moved,) = scene.contacts.boxes.motion
+    for _ in range(2):
+        begun = moved[0]
+        scene.motion[:] = [begun - 0.261, 0.0, 0.0, 0.6, 0.0, 0.0], at_the_wall
+        scene.step()
+        start = moved[3]
+        assert start > 0.3
+        for _ in range(KEPT_STEPS + 100):  # at last the wall's car alone is in the solver
+            scene.motion[:] = apart, at_the_wall
+            scene.step()
+        expected = start**2 / (2 * friction * GRAVITY)
+        assert moved[0] - begun == pytest.approx(expected, abs=2 * start * STEP_S)
+        gc.collect()
 
 
 def test_a_box_turns_and_comes_to_rest():
