@@ -13,10 +13,11 @@ import pytest
 from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
+from scm.api.priority import NICER, stand_back
+
 ROOT = Path(__file__).parent.parent
 TESTS = ROOT / "tests"
 SHARED = ROOT.parent / "shared"
-STANDS_BACK = 10  # as `nice` counts
 
 # How long an example takes says nothing on a machine that others use as well.
 settings.register_profile(
@@ -59,9 +60,16 @@ def pytest_collection(session: pytest.Session) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Stand back behind the cities of another process, which are bound to real time."""
-    if "PYTEST_XDIST_WORKER" in os.environ and "e2e" not in item.path.parts:
-        os.setpriority(os.PRIO_PROCESS, 0, STANDS_BACK)
+    """Stand back behind the cities of another process, which are bound to real time.
+
+    As far as a search does that a city starts: it would wait for all other tests to end otherwise.
+    In a session of its own, for the kernel may weigh sessions, and processes only within one.
+    """
+    is_worker = "PYTEST_XDIST_WORKER" in os.environ
+    if is_worker and "e2e" not in item.path.parts and os.getpriority(os.PRIO_PROCESS, 0) < NICER:
+        with suppress(OSError):
+            os.setsid()
+        stand_back(os.getpid())
 
 
 @pytest.hookimpl(optionalhook=True)
