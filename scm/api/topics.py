@@ -22,6 +22,7 @@ EVENTS = "events"
 """The one topic that is no state: its entries come one by one, and never twice."""
 
 ACKNOWLEDGED_SHOWN = 500
+LOST_S = 2.0
 STANDS_MPS = 0.02  # slower than that is how a real car that stands is measured
 
 
@@ -37,6 +38,7 @@ class Pulse(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         moving: How many of its vehicles move: after a stop, those that do not stand yet.
+        silent_signals: Junctions whose controller was heard once, and not for `LOST_S`, by name.
     """
 
     t_ns: int | None
@@ -45,12 +47,19 @@ class Pulse(msgspec.Struct, kw_only=True, frozen=True):
     late_ticks: int
     vehicles: int
     moving: int
+    silent_signals: tuple[str, ...]
 
 
 def pulse_of(picture: Picture) -> Pulse:
-    """Return the world's time, tick and count of vehicles."""
+    """Return the world's time, tick and count of vehicles, and whose signals are silent."""
+    silent = tuple(
+        sorted(name for name, spat in picture.spats.items() if spat.age_s(picture.now_ns) > LOST_S)
+    )
     if picture.snapshot is None:
-        return Pulse(t_ns=None, tick=None, real_time_factor=0.0, late_ticks=0, vehicles=0, moving=0)
+        return Pulse(
+            t_ns=None, tick=None, real_time_factor=0.0, late_ticks=0, vehicles=0, moving=0,
+            silent_signals=silent,
+        )  # fmt: skip
     told = picture.snapshot.message
     return Pulse(
         t_ns=told.t_ns,
@@ -59,6 +68,7 @@ def pulse_of(picture: Picture) -> Pulse:
         late_ticks=told.late_ticks,
         vehicles=len(told.vehicles),
         moving=sum(abs(car.speed_mps) > STANDS_MPS for car in told.vehicles),
+        silent_signals=silent,
     )
 
 

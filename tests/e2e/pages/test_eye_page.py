@@ -126,3 +126,17 @@ def drawn(camera, folder):
         paths.append(folder / f"{i:02}.png")
         cv2.imwrite(str(paths[-1]), cv2.GaussianBlur(noisy, (0, 0), 0.7))
     return paths
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("/eye?camera=nowhere", "There is no camera called nowhere."),
+        ("/eye/nowhere", "There is no such page of the Eye."),
+    ],
+)
+def test_an_address_that_leads_to_no_camera_is_answered_in_words(visit, address, words):
+    page = visit(address).page
+    page.wait_for_selector(f".empty >> text={words}")
+    page.click(".empty a")
+    page.wait_for_selector(".at-eye select")

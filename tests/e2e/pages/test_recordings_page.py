@@ -1,6 +1,7 @@
 """The recordings page: a drive of the real city seen again, taken home, noted, deleted; scripts."""
 
 import csv
+import os
 import shutil
 
 import cv2
@@ -78,15 +79,22 @@ def test_a_replay_is_calm_accessible_and_fits(look, last_s, size, theme):
 def test_the_list_tells_what_is_written_and_opens_a_replay_that_leaves_no_trace(
     visit, running, drive
 ):
-    bad = running.folder / "bad.mcap"
+    bad, half = running.folder / "bad.mcap", running.folder / "half.mcap"
     bad.write_bytes(b"no recording")
+    whole = (running.folder / f"{NAME}.mcap").read_bytes()
+    half.write_bytes(whole[: len(whole) // 2])
+    os.utime(half, (0.0, 0.0))  # nobody writes to it any more
     visited = visit("/recordings", "narrow", "dark")
     page = visited.page
     try:
         page.wait_for_selector('tr[data-state="unreadable"] >> text=an MCAP file begins otherwise')
+        why = page.locator('tr[data-state="cut off"] .why')
+        assert "`" not in why.inner_text()
+        assert why.locator("code").inner_text() == "scm recover half.mcap"
         judge_everywhere(visited, "recordings_list")
     finally:
         bad.unlink()
+        half.unlink()
     assert page.locator('tr[data-state="being written"]').count() == 1
     page.click(f'tr[data-recording="{NAME}"] a')
     page.wait_for_selector(".not-live")

@@ -196,6 +196,18 @@ def test_a_silent_world_greys_the_page_then_says_so_and_comes_back_by_itself(vis
     assert [one for one in visited.complaints if "status of 50" not in one] == []
 
 
+def test_signals_that_are_silent_are_said_to_be_and_come_back_by_themselves(visit, running):
+    visited = visit("/signals/crossing")
+    page = visited.page
+    with running.frozen("traffic"):
+        page.wait_for_selector(".banner.lost >> text=The signals of crossing are silent")
+        page.wait_for_selector("text=its controller is silent")
+        judge(visited)
+        photograph(visited, "signals_silent")
+    page.wait_for_selector(".banner.lost", state="detached")
+    page.wait_for_selector("text=its controller is silent", state="detached")
+
+
 def test_a_server_that_comes_back_is_heard_again(visit, running):
     page = visit("/map").page
     running.kill("api")

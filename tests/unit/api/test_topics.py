@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from scm.api.city import City
@@ -32,6 +33,17 @@ def test_the_pulse_is_unknown_until_the_world_is_heard(view, hear, snapshot):
     beats = pulse_of(view.picture())
     assert (beats.t_ns, beats.tick, beats.vehicles) == (1_000_000_000, 7, 2)
     assert (still.moving, beats.moving) == (0, 2)
+
+
+def test_the_pulse_names_signals_that_were_heard_and_are_silent(view, hear, spat):
+    other = msgspec.structs.replace(spat(), junction="station")
+    hear(1.0, spat(), other)
+    hear(2.9)
+    assert pulse_of(view.picture()).silent_signals == ()
+    hear(3.1, other)
+    assert pulse_of(view.picture()).silent_signals == ("crossing",)
+    hear(3.2, spat())
+    assert pulse_of(view.picture()).silent_signals == ()
 
 
 def test_a_topic_follows_the_picture(city, seen, hear, snapshot):

@@ -1,4 +1,5 @@
 /** What the page has to say: short notices. A dialog that is open shows them, for all behind it is dim and out of reach. */
+import { coded } from "scm/shared/coded.js";
 import { html } from "scm/shared/html.js";
 import { dismiss, notices } from "scm/shell/api.js";
 import { prose } from "scm/shell/prose.js";
@@ -9,7 +10,7 @@ export function Notices() {
       ${notices.value.map(
         ({ id, kind, text }) => html`
           <div key=${id} class="notice ${kind}">
-            <span>${prose(text)}</span>
+            <span>${coded(prose(text))}</span>
             <button class="plain" aria-label="Dismiss" onClick=${() => dismiss(id)}>✕</button>
           </div>
         `,

@@ -4,7 +4,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { change } from "scm/shell/api.js";
 import { Dialog } from "scm/shared/dialog.js";
-import { clock, fixed, span, UNKNOWN } from "scm/shared/format.js";
+import { clock, fixed, spaced, span, UNKNOWN } from "scm/shared/format.js";
 import { city, isConnected, link, pulse, quiet_s, stop } from "scm/shell/store.js";
 import { nextTheme, theme } from "scm/shell/theme.js";
 
@@ -140,6 +140,12 @@ export function Banners() {
           ? "Nothing has been heard yet."
           : `What you see is ${span(quiet_s.value)} old.`}
       </span>
+    </div>`}
+    ${link.value === "live" &&
+    pulse.value.silent_signals.length > 0 &&
+    html`<div class="banner lost" role="alert">
+      <b>The signals of ${pulse.value.silent_signals.map(spaced).join(", ")} are silent</b>
+      <span>What they show is not known here. Lights that nobody runs flash red by themselves.</span>
     </div>`}
   `;
 }

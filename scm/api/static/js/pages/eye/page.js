@@ -18,16 +18,31 @@ export function Page() {
       </section>
     `;
   }
-  const camera = list.find((one) => one.camera === route.value.query.camera) ?? list[0];
+  const { query, rest } = route.value;
+  const camera = query.camera ? list.find((one) => one.camera === query.camera) : list[0];
+  if (!camera || !["", "calibrate"].includes(rest)) return html`<${Astray} list=${list} />`;
   return html`
     <${Bar} list=${list} camera=${camera} />
-    ${route.value.rest === "calibrate"
+    ${rest === "calibrate"
       ? html`<${Wizard} key=${camera.camera} camera=${camera} />`
       : html`
           <${Picture} key=${camera.camera} camera=${camera} />
           <${TagTable} camera=${camera} />
           <${Residuals} key=${`${camera.camera} residuals`} camera=${camera} />
         `}
+  `;
+}
+
+/** What an address is answered that leads to no camera. */
+function Astray({ list }) {
+  const asked = route.value.query.camera;
+  return html`
+    <section class="panel" aria-label="Eye">
+      <p class="empty">
+        ${asked ? `There is no camera called ${asked}.` : "There is no such page of the Eye."} Cameras of the city:
+        ${list.map(({ camera }) => html` <a key=${camera} href=${`/eye?camera=${camera}`}>${camera}</a>`)}
+      </p>
+    </section>
   `;
 }
 

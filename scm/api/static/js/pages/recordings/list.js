@@ -1,4 +1,5 @@
 /** The list: what was recorded, the newest first. */
+import { coded } from "scm/shared/coded.js";
 import { html } from "scm/shared/html.js";
 import { Halves } from "scm/pages/recordings/halves.js";
 import { useReading } from "scm/pages/recordings/reading.js";
@@ -60,7 +61,7 @@ function Row({ row }) {
         <a href=${path}>${row.title || row.name}</a>
         ${row.title && html`<small>${row.name}</small>`}
         <small class="slim">${row.begin_ns && `${began} · `}${counted(row.cars)} · ${size(row.size_bytes)}</small>
-        ${row.trouble && html`<small class="why">${row.trouble}</small>`}
+        ${row.trouble && html`<small class="why">${coded(row.trouble)}</small>`}
         ${row.notes && html`<small class="note">${row.notes}</small>`}
       </td>
       <td class="wide">${began}</td>

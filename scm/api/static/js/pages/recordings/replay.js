@@ -2,6 +2,7 @@
 import { signal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { modeOf, stuckBy } from "scm/shared/condition.js";
+import { coded } from "scm/shared/coded.js";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
 import { EyeThen } from "scm/pages/recordings/eye_then.js";
@@ -80,7 +81,7 @@ function Unreadable({ name, why }) {
   return html`
     <section class="panel" role="alert">
       <h2>${name} cannot be shown</h2>
-      <p>${why}</p>
+      <p>${coded(why)}</p>
       <p><a href="/recordings">All recordings</a></p>
     </section>
   `;
