@@ -73,7 +73,23 @@ def test_a_replay_is_calm_accessible_and_fits(look, last_s, size, theme):
     visited = look(f"{AT}?t={last_s}", "recordings", size, theme, ready=READY)
     visited.wait(ALL_SHOWN)
     assert visited.page.locator(".not-live").inner_text().upper().startswith("NOT LIVE")
-    assert visited.page.title().startswith("NOT LIVE")
+    assert visited.page.title() == f"NOT LIVE · {NAME}"
+
+
+def test_the_title_says_not_live_however_late_the_city_is_told(visit, running, drive):
+    page = visit("/recordings").page
+    late = []
+    page.route("**/api/v1/map", lambda asked: late.append(asked))  # noqa: PLW0108  routes take functions of Python
+    page.goto(running.url + AT)
+    page.wait_for_selector(".not-live")
+    assert late
+    page.unroute("**/api/v1/map")  # lets them go on
+    page.wait_for_selector("h1 >> text=Driving School")
+    page.wait_for_timeout(100)  # two effects that write the title would run one after the other
+    assert page.title() == f"NOT LIVE · {NAME}"
+    page.click("nav a:has-text('Recordings')")
+    page.wait_for_selector("tbody tr")
+    assert page.title() == "Recordings · Driving School"
 
 
 def test_the_list_tells_what_is_written_and_opens_a_replay_that_leaves_no_trace(
@@ -285,7 +301,9 @@ def test_a_table_of_a_span_is_taken_home_and_what_is_wrong_with_it_is_said(
         photograph(visited, f"recordings_download_{size}_{theme}")
 
 
-def test_a_mismatch_job_is_asked_for_the_car_and_the_span_that_are_shown(visit, drive, last_s):
+def test_a_mismatch_job_is_asked_for_the_car_and_the_span_that_are_shown(
+    visit, running, drive, last_s
+):
     visited = visit(f"{AT}?t={last_s}")
     page = visited.page
     page.wait_for_function(ALL_SHOWN)
@@ -303,9 +321,9 @@ def test_a_mismatch_job_is_asked_for_the_car_and_the_span_that_are_shown(visit, 
         "from_s": None,
         "to_s": last_s,
     }
-    identity = asked.value.response().json().get("id")
-    if identity:
-        page.request.delete(page.url.split("/recordings")[0] + f"/api/v1/operations/{identity}")
+    started = f"/operations/{asked.value.response().json()['id']}"
+    running.web.delete(started).raise_for_status()  # half an hour's work for those who come next
+    visited.until(lambda: running.get(started)["state"] == "cancelled", "it is called off")
 
 
 def test_a_refusal_is_said_within_the_dialog_that_asked(visit, drive):
