@@ -7,7 +7,7 @@ import { KeyDialog } from "scm/shell/key_dialog.js";
 import { Notices } from "scm/shell/notices.js";
 import { heading, route } from "scm/shell/router.js";
 import { Banners, TitleBar } from "scm/shell/title_bar.js";
-import { city, link } from "scm/shell/store.js";
+import { city, link, windowTitle } from "scm/shell/store.js";
 
 /** Pages that were loaded: name to component, or to the error that kept it from loading. */
 const loaded = signal(new Map());
@@ -51,9 +51,9 @@ export function Shell() {
   const first = useRef(true);
   const next = pageOf(heading.value);
   useEffect(() => void load(next), [next]);
-  useEffect(() => {
-    document.title = [page?.title, city.value?.title ?? "Smart City Manager"].filter(Boolean).join(" · ");
-  }, [page, city.value]);
+  const usual = [page?.title, city.value?.title ?? "Smart City Manager"].filter(Boolean).join(" · ");
+  const title = windowTitle.value || usual;
+  useEffect(() => void (document.title = title), [title]);
   useEffect(() => {
     // A new page begins at its top, also for who listens to it; the first one takes nobody's focus.
     if (!first.current) main.current?.focus();

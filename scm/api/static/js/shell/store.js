@@ -26,6 +26,9 @@ export const events = signal([]);
 /** The map as data; null until it was read. */
 export const city = signal(null);
 
+/** What the window is called while a page shows something of its own; empty: the page and the city. */
+export const windowTitle = signal("");
+
 /** This page's clock [ms], ten times a second: what counts down reads it. */
 export const now = signal(performance.now());
 

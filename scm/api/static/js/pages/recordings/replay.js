@@ -16,7 +16,7 @@ import { Timeline } from "scm/pages/recordings/timeline.js";
 import { minutes, moment, size } from "scm/pages/recordings/words.js";
 import { route } from "scm/shell/router.js";
 import { prose } from "scm/shell/prose.js";
-import { city } from "scm/shell/store.js";
+import { windowTitle } from "scm/shell/store.js";
 
 const EVENTS = 500;
 
@@ -59,10 +59,9 @@ export function Replay({ name }) {
 /** The window's title says that it is no live city, as long as this is shown. */
 function useTitle(title) {
   useEffect(() => {
-    const before = document.title;
-    document.title = `NOT LIVE · ${title}`;
-    return () => (document.title = before);
-  }, [title, city.value]);
+    windowTitle.value = `NOT LIVE · ${title}`;
+    return () => (windowTitle.value = "");
+  }, [title]);
 }
 
 function address(name) {
