@@ -79,7 +79,7 @@ def test_a_replay_is_calm_accessible_and_fits(look, last_s, size, theme):
 def test_the_title_says_not_live_however_late_the_city_is_told(visit, running, drive):
     page = visit("/recordings").page
     late = []
-    page.route("**/api/v1/map", lambda asked: late.append(asked))  # noqa: PLW0108  routes take functions of Python
+    page.route("**/api/v1/map", lambda asked: late.append(asked))  # noqa: PLW0108
     page.goto(running.url + AT)
     page.wait_for_selector(".not-live")
     assert late
