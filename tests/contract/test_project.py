@@ -36,6 +36,7 @@ def test_format_is_clean(root: Path) -> None:
     check(root, "ruff", "format", "--check", *TREES)
 
 
+@pytest.mark.timeout(900)  # it stands back like all tests, and takes most of a core for a minute
 def test_types_are_clean(root: Path) -> None:
     check(root, "mypy")
 
