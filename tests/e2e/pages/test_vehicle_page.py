@@ -244,7 +244,32 @@ def test_a_hidden_or_blurred_page_lets_go_though_the_key_is_held(visit, running)
     visited.page.wait_for_selector('.now[data-why="released"]')
     visited.until(lambda: abs(speed(running)) < 0.01, "it stands")
     visited.page.keyboard.up("w")
+    for let_go in (by_a_shortcut, by_a_menu, by_a_field):
+        visited.page.keyboard.down("w")
+        visited.page.wait_for_selector('.now[data-why="driving"]')
+        let_go(visited.page)
+        visited.page.wait_for_selector('.now[data-why="released"]')
+        visited.page.keyboard.up("w")
+        visited.page.keyboard.press("Escape")
     give_back(visited, running)
+
+
+def by_a_shortcut(page):
+    """Let the key go while Control is held: the browser may keep that to itself."""
+    page.keyboard.down("Control")
+    page.keyboard.up("w")
+    page.keyboard.up("Control")
+
+
+def by_a_menu(page):
+    """Open a context menu, which is told what becomes of the key."""
+    page.dispatch_event("main", "contextmenu")
+
+
+def by_a_field(page):
+    """Write a reason for a stop."""
+    page.click("#city-stop")
+    page.focus("dialog input")
 
 
 def test_a_gamepad_drives_only_while_its_trigger_is_pulled(visit, running):

@@ -20,20 +20,30 @@ export function hands(onLetGo) {
     held.clear();
     onLetGo();
   };
-  const onKey = (event) => {
+  const onDown = (event) => {
     const what = KEYS[event.code];
-    if (!what || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.type === "keydown" && event.target.closest?.(TYPED_INTO)) return;
-    event.preventDefault();
-    if (event.type === "keydown") held.add(what);
-    else held.delete(what);
-    if (!held.size) onLetGo();
+    // A shortcut keeps to itself that its keys were let go.
+    if (event.ctrlKey || event.metaKey || event.altKey) held.size && letGo();
+    else if (what && !event.target.closest?.(TYPED_INTO)) {
+      event.preventDefault();
+      held.add(what);
+    }
   };
+  const onUp = (event) => {
+    if (held.delete(KEYS[event.code]) && !held.size) onLetGo();
+  };
+  const onFocus = (event) => held.size && event.target.closest?.(TYPED_INTO) && letGo();
+  const onMenu = (event) => !event.defaultPrevented && letGo(); // and so does a menu
   const onHidden = () => document.hidden && letGo();
-  window.addEventListener("keydown", onKey);
-  window.addEventListener("keyup", onKey);
-  window.addEventListener("blur", letGo);
-  document.addEventListener("visibilitychange", onHidden);
+  const heard = [
+    [window, "keydown", onDown],
+    [window, "keyup", onUp],
+    [window, "blur", letGo],
+    [window, "contextmenu", onMenu],
+    [document, "focusin", onFocus],
+    [document, "visibilitychange", onHidden],
+  ];
+  for (const [where, name, take] of heard) where.addEventListener(name, take);
   return {
     /** A pad on the screen is pressed, or let go. */
     pad(what, down) {
@@ -47,6 +57,7 @@ export function hands(onLetGo) {
       const now = performance.now();
       const passed = Math.min(0.1, (now - last) / 1000);
       last = now;
+      if (!document.hasFocus()) held.clear();
       const stick = pull();
       if (stick) Object.assign(wish, stick, { throttle: most * stick.throttle });
       else byKeys(wish, held, most, passed);
@@ -54,10 +65,7 @@ export function hands(onLetGo) {
     },
     end() {
       held.clear();
-      window.removeEventListener("keydown", onKey);
-      window.removeEventListener("keyup", onKey);
-      window.removeEventListener("blur", letGo);
-      document.removeEventListener("visibilitychange", onHidden);
+      for (const [where, name, take] of heard) where.removeEventListener(name, take);
     },
   };
 }
