@@ -52,6 +52,8 @@ FRAME_DEPTH = 4
 TAGS_DEPTH = 8
 FORGET_NS = 60 * NS_PER_S
 VIOLATIONS_DEPTH = 500
+STOP_TOLD_NS = 3 * NS_PER_S  # of a world that speaks: it repeats an engaged stop each second
+LONGEST_GAP_NS = 200 * NS_PER_MS  # between two snapshots; more is silence, not speech
 MOST_REPORTED = 500
 
 
@@ -70,6 +72,7 @@ class CityView:
         self._snapshot: Held[WorldSnapshot] | None = None
         self._definition: WorldDefinition | None = None
         self._stop: CityStop | None = None
+        self._stop_untold_ns = 0
         self._truth: deque[WorldSnapshot] = deque(maxlen=TRUTH_DEPTH)
         self._spats: dict[str, Held[Spat]] = {}
         self._monitors: dict[str, Held[MonitorStatus]] = {}
@@ -312,6 +315,11 @@ class CityView:
             self._camera_frames[which] = Held(frame, t_ns)
 
     def _take_snapshot(self, snapshot: WorldSnapshot, t_ns: int) -> None:
+        if self._snapshot is not None:
+            passed_ns = t_ns - self._snapshot.arrived_ns
+            self._stop_untold_ns += max(0, min(passed_ns, LONGEST_GAP_NS))
+        if self._stop_untold_ns > STOP_TOLD_NS:
+            self._stop = None  # its release was missed: an engaged stop is repeated
         self._snapshot = Held(snapshot, t_ns)
         if self._truth and snapshot.t_ns < self._truth[-1].t_ns:
             self._truth.clear()  # the world was restarted: its time went back
@@ -329,7 +337,7 @@ class CityView:
         self._signal_history.take_monitor(status)
 
     def _take_stop(self, stop: CityStop, _t_ns: int) -> None:
-        self._stop = stop
+        self._stop, self._stop_untold_ns = stop, 0
 
     def _take_counts(self, counts: TrafficCounts, t_ns: int) -> None:
         self._traffic = Held(counts, t_ns)

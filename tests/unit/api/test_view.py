@@ -56,6 +56,20 @@ def test_a_picture_does_not_change_when_more_is_heard(view, hear, spat):
     assert set(view.picture().spats) == {"crossing"}
 
 
+def test_a_stop_whose_release_was_missed_ends_when_the_world_repeats_it_no_more(
+    view, hear, snapshot
+):
+    hear(0.0, snapshot(), CityStop(t_ns=1, engaged=True))
+    hear(9.0, snapshot())  # a world that was silent may repeat it soon
+    for frame in range(100):
+        told = (CityStop(t_ns=1, engaged=True),) if frame % 20 == 0 else ()
+        hear(10.0 + 0.05 * frame, snapshot(), *told)
+        assert view.picture().stop.engaged
+    for frame in range(70):
+        hear(15.0 + 0.05 * frame, snapshot())
+    assert view.picture().stop is None
+
+
 def test_definition_and_stop_are_kept(view, hear, city_map):
     hear(1.0, WorldDefinition(t_ns=1, seed=7, map=city_map))
     hear(1.1, CityStop(t_ns=1, engaged=True, by="me"))
