@@ -208,11 +208,78 @@ def test_signals_that_are_silent_are_said_to_be_and_come_back_by_themselves(visi
     page.wait_for_selector("text=its controller is silent", state="detached")
 
 
-def test_a_server_that_comes_back_is_heard_again(visit, running):
+def test_a_server_that_comes_back_is_heard_again_and_another_city_s_read_anew(visit, running):
     page = visit("/map").page
+    page.evaluate("() => { window.sameDocument = true }")
+
+    def rename(route):
+        told = running.get("/map")
+        route.fulfill(json=told | {"title": "Another town"})
+
+    page.route("**/api/v1/map", rename)
     running.kill("api")
+    page.wait_for_selector("h1 >> text=Another town")
     page.wait_for_selector('.page[data-link="live"]')
     page.wait_for_function("() => !document.querySelector('.banner.lost')")
+    assert not page.evaluate("() => window.sameDocument")
+    page.unroute("**/api/v1/map")
+
+
+def test_the_red_stop_works_though_all_connections_of_the_browser_are_taken(visit, running):
+    visited = visit("/map")
+    page = visited.page
+    page.wait_for_selector("tr[data-car]")
+    page.evaluate("""async () => {
+        const open = (one) => new Promise((done) => (one.onopen = done));
+        window.taken = [1, 2, 3, 4].map(() => new EventSource("/api/v1/stream?topics=pulse"));
+        await Promise.all(window.taken.map(open));
+    }""")
+    try:
+        page.click("#city-stop")
+        page.keyboard.press("Enter")
+        visited.until(lambda: running.get("/stop")["engaged"], "the city is stopped")
+        page.wait_for_selector(".banner.stopped")
+    finally:
+        page.evaluate("() => window.taken.forEach((one) => one.close())")
+        running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
+    page.wait_for_selector(".banner.stopped", state="detached")
+
+
+def test_a_page_that_nobody_looks_at_leaves_its_connections_to_others(visit):
+    visited = visit("/map")
+    page = visited.page
+    page.wait_for_selector("tr[data-car]")
+    ended = []
+    page.on("requestfailed", lambda request: ended.append(request.url.rpartition("/")[2]))
+    hide = """(hidden) => {
+        Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+        document.dispatchEvent(new Event("visibilitychange"));
+    }"""
+    page.evaluate(hide, True)
+    visited.until(lambda: len(ended) == 2, "both streams end")
+    assert sorted(name.partition("?")[0] for name in ended) == ["stream", "vehicles.bin"]
+    page.evaluate(hide, False)
+    page.wait_for_selector('.page[data-link="live"]')
+    page.wait_for_selector('.sheet[data-link="live"]')
+
+
+def test_a_key_is_asked_for_once_though_two_want_it(visit):
+    visited = visit("/events")
+    visited.page.evaluate("""() => {
+        let isOpen = false;
+        const own = window.fetch;
+        window.fetch = async (address, options) => {
+            if (address !== "/api/v1/session") return own(address, options);
+            isOpen ||= options?.headers?.Authorization === "Bearer sesame";
+            return new Response("{}", { status: isOpen ? 200 : 401 });
+        };
+        import("/static/js/shell/api.js")
+            .then(({ enter }) => Promise.all([enter(), enter()]))
+            .then((entered) => (window.entered = entered));
+    }""")
+    visited.page.fill("dialog input[name=key]", "sesame")
+    visited.page.keyboard.press("Enter")
+    visited.wait("() => window.entered?.every(Boolean)")
 
 
 def test_the_colours_follow_the_choice_of_the_person(visit):

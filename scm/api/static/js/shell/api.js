@@ -2,6 +2,7 @@
 import { signal } from "@preact/signals";
 
 const KEY = "scm-api-key";
+const REFUSALS = [401, 403, 429]; // of a key; what else goes wrong is not its fault
 
 /** Resolver of the open question for an API key; null while nobody asks. */
 export const keyWanted = signal(null);
@@ -25,12 +26,13 @@ export function dismiss(id) {
 /**
  * Ask the city for a change and tell the person how it went.
  * @param headers more of them, such as `If-Match`.
+ * @param patience_ms how long to wait for the answer; none: as long as it takes.
  * @returns the reply, or null when it was refused.
  */
-export async function change(method, path, body, done, headers = {}) {
+export async function change(method, path, body, done, headers = {}, patience_ms = null) {
   try {
     const id = crypto.randomUUID?.() ?? String(Math.random());
-    const reply = await send(method, path, body, { ...headers, "Idempotency-Key": id });
+    const reply = await send(method, path, body, { ...headers, "Idempotency-Key": id }, patience_ms);
     if (done) notify("info", done(reply));
     return reply;
   } catch (error) {
@@ -39,7 +41,7 @@ export async function change(method, path, body, done, headers = {}) {
   }
 }
 
-async function send(method, path, body, own) {
+async function send(method, path, body, own, patience_ms) {
   const headers = { ...own };
   const key = sessionStorage.getItem(KEY);
   if (key) headers.Authorization = `Bearer ${key}`;
@@ -49,32 +51,50 @@ async function send(method, path, body, own) {
     method,
     headers,
     body: body === undefined || isFile ? body : JSON.stringify(body),
-  });
+    signal: patience_ms && AbortSignal.timeout(patience_ms),
+  }).catch(unreached);
   const reply = await response.json().catch(() => ({}));
   if (response.ok) return reply;
-  if (response.status === 401 && (await askForKey())) return send(method, path, body, own);
+  if (response.status === 401 && (await askForKey())) return send(method, path, body, own, patience_ms);
   throw new Error(reply.detail || reply.title || `${method} ${path}: ${response.status}`);
+}
+
+/** What the browser says of it is for programmers. */
+function unreached({ name }) {
+  throw new Error(name === "TimeoutError" ? "The city did not answer in time." : "The city cannot be reached.");
 }
 
 /**
  * Make sure that this page may read: ask for a key as long as the city wants one.
  * @returns whether it may; false when the person gives none.
  */
-export async function enter() {
+export function enter() {
+  entering ??= knock().finally(() => (entering = null));
+  return entering;
+}
+
+/** Whoever finds the door closed waits for the one answer: every stream does when a key ends. */
+let entering = null;
+
+async function knock() {
   while ((await fetch("/api/v1/session")).status === 401) {
     const key = sessionStorage.getItem(KEY);
     if (!key && !(await askForKey())) return false;
     const headers = { Authorization: `Bearer ${sessionStorage.getItem(KEY)}` };
     const reply = await fetch("/api/v1/session", { method: "PUT", headers });
-    if (!reply.ok) sessionStorage.removeItem(KEY);
-    if (reply.status === 429) await new Promise((resolve) => setTimeout(resolve, 5000));
+    if (REFUSALS.includes(reply.status)) sessionStorage.removeItem(KEY);
+    if (!reply.ok && reply.status !== 401) await new Promise((resolve) => setTimeout(resolve, 5000));
   }
   return true;
 }
 
-async function askForKey() {
-  const key = await new Promise((resolve) => (keyWanted.value = resolve));
-  keyWanted.value = null;
-  if (key) sessionStorage.setItem(KEY, key);
-  return Boolean(key);
+let asking = null;
+
+function askForKey() {
+  asking ??= new Promise((resolve) => (keyWanted.value = resolve)).then((key) => {
+    asking = keyWanted.value = null;
+    if (key) sessionStorage.setItem(KEY, key);
+    return Boolean(key);
+  });
+  return asking;
 }

@@ -4,13 +4,17 @@
  * A page names the topics that it shows with `useTopics`; the stream carries those that anybody shows,
  * and the two of the shell. `topic(name)` is a signal of a topic's newest body, null until it was heard.
  */
-import { batch, computed, signal } from "@preact/signals";
+import { batch, computed, signal, useComputed } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { enter } from "scm/shell/api.js";
+import { hear, renew } from "scm/shell/streams.js";
 
 const EVENTS_KEPT = 200;
 const STALE_MS = 500;
 const LOST_MS = 2000;
+const SILENT_MS = 2500; // a server that lives says so each second
+const DEAD_MS = 5000; // a line that says nothing for so long is asked for anew
+const AGAIN_MS = 2000;
 const SHELL = ["pulse", "stop"];
 const GATHER_MS = 20; // pages come and go together: one new stream, not one each
 
@@ -63,13 +67,17 @@ export const cameras = computed(() => topic("eye").value ?? []);
 export const stations = computed(() => topic("stations").value ?? []);
 
 const connected = signal(false);
+const heardAt = signal(-Infinity);
 const tickAt = signal(-Infinity);
+
+/** When somebody began to look: nothing is heard while nobody does. */
+const seenAt = signal(-Infinity);
 
 /** `connecting`, `live`, `stale` (nothing new for 0.5 s) or `lost` (for 2 s). */
 export const link = computed(() => {
   if (tickAt.value === -Infinity) return "connecting";
   const quiet = now.value - tickAt.value;
-  if (quiet > LOST_MS) return "lost";
+  if (quiet > LOST_MS && now.value - seenAt.value > STALE_MS) return "lost";
   return quiet > STALE_MS ? "stale" : "live";
 });
 
@@ -77,7 +85,16 @@ export const link = computed(() => {
 export const quiet_s = computed(() => Math.max(0, (now.value - tickAt.value) / 1000));
 
 /** Whether this page hears the server, whatever the world does. */
-export const isConnected = computed(() => connected.value);
+export const isConnected = computed(() => connected.value && now.value - heardAt.value < SILENT_MS);
+
+/** Whether what came at a time of this page's clock [ms] is old. */
+export const isOld = (at) => now.value - at > STALE_MS;
+
+/** The same of a signal, for a component that is drawn anew when that changes. */
+export const useOld = (at) => useComputed(() => isOld(at.value)).value;
+
+/** How old what the world told last is, once that is too old to pass as news [ms]; else 0. */
+export const since_ms = computed(() => (link.value === "live" ? 0 : 1000 * quiet_s.value));
 
 /** How many components show each topic. */
 const shown = new Map();
@@ -94,7 +111,7 @@ export function useTopics(...names) {
   }, [names.join()]);
 }
 
-let source = null;
+let ending = null;
 let heard = "";
 let gathering = null;
 let entered = false;
@@ -119,6 +136,7 @@ function noteTick(tick, at) {
 }
 
 function takeVehicles(body, at) {
+  if (body.tick === null && live.topic) return; // a server that has just begun: what was heard is the newest
   if (body.tick !== null && body.t_ns !== live.t_ns) {
     live.t_ns = body.t_ns;
     live.at = at;
@@ -177,52 +195,72 @@ function take(topics) {
 let run = null;
 
 function listen() {
-  source?.close();
+  ending?.();
   heard = wanted();
-  const own = new EventSource(`/api/v1/stream?topics=${heard}`);
-  source = own;
-  own.onopen = () => (connected.value = true);
-  own.onerror = () => {
-    if (source !== own) return;
-    connected.value = false;
-    // Refused for good, as with a key that has ended: a stream that only broke tries again itself.
-    if (own.readyState === EventSource.CLOSED) again();
-  };
-  own.addEventListener("snapshot", (message) => {
-    const topics = JSON.parse(message.data);
-    // After a restart of the server its events are numbered from one again.
-    if (run !== null && topics.run !== run) events.value = [];
-    run = topics.run;
+  lineAt = performance.now();
+  const noted = (take) => (topics) => {
+    lineAt = heardAt.value = performance.now();
     take(topics);
-  });
-  own.addEventListener("delta", (message) => take(JSON.parse(message.data)));
+  };
+  ending = hear(
+    `/api/v1/stream?topics=${heard}`,
+    { snapshot: noted(takeSnapshot), delta: noted(take), beat: noted(() => {}) },
+    (state) => (connected.value = state === "open"),
+  );
 }
 
-window.addEventListener("pagehide", () => source?.close());
-window.addEventListener("pageshow", (event) => event.persisted && entered && listen());
+function takeSnapshot(topics) {
+  // After a restart of the server its events are numbered from one again, and its city may be another.
+  if (run !== null && topics.run !== run) {
+    events.value = [];
+    readCity();
+  }
+  run = topics.run;
+  take(topics);
+}
+
+/** When the line was asked for, or last said something. */
+let lineAt = -Infinity;
+
+function keepLine() {
+  if (document.hidden || !entered) lineAt = performance.now();
+  if (performance.now() - lineAt < DEAD_MS) return;
+  lineAt = performance.now();
+  renew();
+}
 
 function keepTime() {
   let beats = 0;
+  const look = () => batch(() => (seenAt.value = now.value = performance.now()));
+  document.addEventListener("visibilitychange", look);
   setInterval(() => {
     batch(() => {
       now.value = performance.now();
       if (beats++ % 2 === 0 && live.topic) world.value = live.topic;
     });
+    keepLine();
   }, 100);
 }
 
-async function again() {
-  const may = await enter().catch(() => null);
-  if (may) listen();
-  else if (may === null) setTimeout(again, 2000);
+/** Read the map; a page of another city's begins anew. */
+async function readCity() {
+  for (;;) {
+    const reply = await fetch("/api/v1/map").catch(() => null);
+    const told = reply?.ok ? await reply.text().catch(() => "") : "";
+    if (told && mapText && told !== mapText) location.reload();
+    if (told && !mapText) city.value = JSON.parse((mapText = told));
+    if (told) return;
+    await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
+  }
 }
 
-/** Begin: read the map once, then listen for ever. */
+let mapText = "";
+
+/** Begin: listen for ever, and read the map. */
 export async function start() {
   keepTime();
   if (!(await enter().catch(() => true))) return;
   entered = true;
   listen();
-  const response = await fetch("/api/v1/map");
-  city.value = await response.json();
+  await readCity();
 }

@@ -6,6 +6,7 @@ import { change } from "scm/shell/api.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { clock, fixed, spaced, span, UNKNOWN } from "scm/shared/format.js";
 import { city, isConnected, link, pulse, quiet_s, stop } from "scm/shell/store.js";
+import { makeRoom } from "scm/shell/streams.js";
 import { nextTheme, theme } from "scm/shell/theme.js";
 
 /** What is asked: whether the stop was engaged when the question came up; null: nothing. */
@@ -13,6 +14,10 @@ const asking = signal(null);
 
 /** Whether a stop was asked for and nobody said that it is engaged. */
 const unconfirmed = signal(false);
+
+const ROOM_MS = 300;
+const DOUBT_MS = 2500; // the city asks the world for 2 s
+const PATIENCE_MS = 5000;
 
 const LINK_WORDS = { connecting: "Connecting", live: "Live", stale: "Stale", lost: "No data" };
 
@@ -91,11 +96,7 @@ function StopDialog({ engaged }) {
     event.preventDefault();
     const reason = event.target.elements.reason.value;
     close();
-    const body = { engaged: !engaged, by: "dashboard", reason };
-    const reply = await change("PUT", "/stop", body, (told) =>
-      told.engaged ? "All cars are told to stop." : "The stop is released.",
-    );
-    unconfirmed.value = !engaged && reply === null;
+    await tell({ engaged: !engaged, by: "dashboard", reason });
   };
   // Enter must stop the city: the button has the focus, not the reason.
   const verb = engaged ? "Let all cars drive again" : "Stop all cars";
@@ -115,6 +116,18 @@ function StopDialog({ engaged }) {
       </form>
     <//>
   `;
+}
+
+/** Whatever else the browser waits for, this goes first; an answer that does not come is as good as none. */
+async function tell(body) {
+  const waits = [
+    setTimeout(makeRoom, ROOM_MS),
+    setTimeout(() => (unconfirmed.value = body.engaged), DOUBT_MS),
+  ];
+  const done = ({ engaged }) => (engaged ? "All cars are told to stop." : "The stop is released.");
+  const reply = await change("PUT", "/stop", body, done, {}, PATIENCE_MS);
+  waits.forEach(clearTimeout);
+  unconfirmed.value = body.engaged && reply === null;
 }
 
 export function Banners() {

@@ -1,13 +1,14 @@
 /** What the chosen car sees and means to do: its LIDAR's scans and its way ahead, heard while they are shown. */
 import { effect } from "@preact/signals";
 import { selected } from "scm/shared/selection.js";
+import { hear } from "scm/shell/streams.js";
 import { fleet } from "scm/pages/map/fleet.js";
 import { layers } from "scm/pages/map/layers.js";
 
 const PATH_MS = 700;
 
 /** The newest of each; null: none. `scan` and `path` are bodies of the REST resources of these names. */
-export const closeUp = { scan: null, path: null };
+export const closeUp = { scan: null, scanAt: -Infinity, path: null };
 
 /** Begin to hear what the layers ask for; returns what ends it. */
 export function hearCloseUp() {
@@ -23,10 +24,10 @@ export function hearCloseUp() {
 }
 
 function hearScans(vehicle) {
-  const source = new EventSource(`/api/v1/vehicles/${vehicle}/scan/stream`);
-  source.addEventListener("scan", (message) => (closeUp.scan = JSON.parse(message.data)));
+  const take = (scan) => Object.assign(closeUp, { scan, scanAt: performance.now() });
+  const end = hear(`/api/v1/vehicles/${vehicle}/scan/stream`, { scan: take });
   return () => {
-    source.close();
+    end();
     closeUp.scan = null;
   };
 }

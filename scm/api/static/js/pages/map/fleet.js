@@ -8,6 +8,7 @@ import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { byName } from "scm/shared/format.js";
 import { enter } from "scm/shell/api.js";
+import { whileSeen } from "scm/shell/streams.js";
 
 const ADDRESS = "/api/v1/vehicles.bin";
 const VERSION = 1;
@@ -42,15 +43,7 @@ export const fleetBeat = signal(0);
 
 /** Hear the stream for as long as the component is on the page and somebody looks at it. */
 export function useFleet() {
-  useEffect(() => {
-    const follow = () => (document.hidden ? end() : begin());
-    follow();
-    document.addEventListener("visibilitychange", follow);
-    return () => {
-      document.removeEventListener("visibilitychange", follow);
-      end();
-    };
-  }, []);
+  useEffect(() => whileSeen(begin), []);
 }
 
 /** One car as an object; null: there is none of that name. */
@@ -86,27 +79,21 @@ export function ageOf(row) {
   return fleet.age[row] + fleet.snapshot_age_ms + Math.max(0, performance.now() - fleet.at);
 }
 
-let aborting = null;
-let beating = null;
-
 function begin() {
-  if (aborting) return;
-  aborting = new AbortController();
-  beating = setInterval(() => (fleetBeat.value += 1), BEAT_MS);
+  const aborting = new AbortController();
+  const beating = setInterval(() => (fleetBeat.value += 1), BEAT_MS);
   listen(aborting.signal);
-}
-
-function end() {
-  aborting?.abort();
-  clearInterval(beating);
-  aborting = beating = null;
+  return () => {
+    aborting.abort();
+    clearInterval(beating);
+  };
 }
 
 async function listen(ended) {
   while (!ended.aborted) {
     try {
       const response = await fetch(ADDRESS, { signal: ended });
-      if (response.status === 401) await enter();
+      if (response.status === 401 && !(await enter())) return;
       if (response.ok) await readAll(response.body.getReader());
     } catch (error) {
       if (ended.aborted) return;
