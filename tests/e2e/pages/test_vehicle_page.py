@@ -272,6 +272,31 @@ def by_a_field(page):
     page.focus("dialog input")
 
 
+GREY = """() => [...document.querySelectorAll("main .moves")].map(
+    (one) => getComputedStyle(one).filter.includes("grayscale(1)"))"""
+
+
+def test_what_moves_is_grey_while_nobody_tells_it_and_comes_back_by_itself(visit, running):
+    visited = visit(f"/vehicles/{CAR}")
+    page = visited.page
+    page.evaluate("() => { window.sameDocument = true }")
+    page.wait_for_selector('.film[data-seen="true"]')
+    page.wait_for_selector(".lidar canvas")
+    told = page.locator(".facts dd:has-text('ago')")
+    with running.frozen("world"):
+        visited.wait(f"() => (({GREY})()).every(Boolean)")
+        assert page.locator("main .moves").count() == 6
+        visited.until(lambda: " s" in told.inner_text(), "its age goes on")
+        page.wait_for_selector(".film .late:has-text('old')")
+        photograph(visited, "vehicle_silent")
+    fresh = f"() => !({GREY})().some(Boolean)"
+    visited.wait(fresh)
+    running.kill("api")
+    page.wait_for_selector(".film .late")
+    visited.wait(fresh)
+    assert page.evaluate("() => window.sameDocument")
+
+
 def test_a_gamepad_drives_only_while_its_trigger_is_pulled(visit, running):
     visited = visit(f"/vehicles/{CAR}", script=PADS)
     take(visited, running)

@@ -36,7 +36,7 @@ export function ChosenCard() {
 
 function Facts({ car }) {
   return html`
-    <dl>
+    <dl class="moves">
       <div><dt>Speed</dt><dd>${fixed(car.speed_mps, 2, " m/s")}</dd></div>
       <div><dt>Heading</dt><dd>${fixed(DEGREES * car.yaw_rad, 0, "°")}</dd></div>
       <div><dt>Place</dt><dd>${fixed(car.x_m, 2)}, ${fixed(car.y_m, 2, " m")}</dd></div>

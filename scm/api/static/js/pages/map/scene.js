@@ -22,6 +22,7 @@ const MOST_NAMES = 60; // more would hide the cars
 const EDGE_PX = 40;
 const PICK_PX = 22;
 const RING_PX = 14;
+const SCAN_SHOWN_MS = 1000;
 
 /** How many frames were drawn, and how long the last took: for measurements. */
 export const drawn = { frames: 0, cars: 0, took_ms: 0 };
@@ -79,7 +80,7 @@ export class Scene {
       this.trails.draw(paper, view, this.ratio, now, fleet);
     }
     drawBoxes(paper, view, boxes.peek(), city.peek()?.boxes ?? []);
-    this.#drawChosenBelow(on);
+    this.#drawChosenBelow(on, now);
     this.#drawCars(on);
     // Signals last: no car's name may hide a colour.
     this.#drawSignals(on, now);
@@ -126,12 +127,13 @@ export class Scene {
     return { ...carAt(row), x_m: glide.x[row], y_m: glide.y[row], yaw_rad: glide.yaw[row] };
   }
 
-  #drawChosenBelow(on) {
+  #drawChosenBelow(on, now) {
     const row = fleet.rows.get(selected.peek());
     if (row === undefined || row >= fleet.count) return;
     const car = this.#carAt(row);
-    const { scan, path } = closeUp;
-    if (on.lidar && scan?.vehicle === car.vehicle) drawScan(this.paper, this.view, scan, car);
+    const { scan, scanAt, path } = closeUp;
+    const seen = now - scanAt < SCAN_SHOWN_MS;
+    if (on.lidar && seen && scan?.vehicle === car.vehicle) drawScan(this.paper, this.view, scan, car);
     if (on.path && path?.vehicle === car.vehicle) drawPath(this.paper, this.view, path, car);
   }
 

@@ -5,19 +5,27 @@ import { LETTERS } from "scm/shared/light_shape.js";
 import { now, signals, signalsAt } from "scm/shell/store.js";
 import { timeToChange } from "scm/pages/map/signal_times.js";
 
+const KNOWN_S = 1.5; // as on the map
 const WORDS = { red: "red", yellow: "yellow", green: "green", flashing_red: "flashing red", dark: "dark" };
 
 export function SignalsShort() {
   const passed_s = Math.max(0, (now.value - signalsAt.value) / 1000);
+  const told = passed_s < KNOWN_S ? signals.value : signals.value.map(unknown);
   return html`
     <section class="panel signals-short" aria-label="Signals">
       <div class="panel-head"><h2>Signals <small>${signals.value.length || ""}</small></h2></div>
-      <div class="scroll" tabindex="0" role="region" aria-label="Signals by junction">
-        ${signals.value.map((junction) => html`<${Junction} key=${junction.junction} junction=${junction} passed_s=${passed_s} />`)}
-        ${!signals.value.length && html`<p class="empty">This city has no signals.</p>`}
+      <div class="scroll moves" tabindex="0" role="region" aria-label="Signals by junction">
+        ${told.map((junction) => html`<${Junction} key=${junction.junction} junction=${junction} passed_s=${passed_s} />`)}
+        ${signals.value.length === 0 && signalsAt.value > 0 && html`<p class="empty">This city has no signals.</p>`}
       </div>
     </section>
   `;
+}
+
+/** A junction of which nothing is told any more. */
+function unknown(junction) {
+  const groups = junction.groups.map(({ group }) => ({ group, colour: null, min_s: null }));
+  return { ...junction, fresh: false, groups };
 }
 
 function Junction({ junction, passed_s }) {

@@ -16,7 +16,7 @@ export function StationsPanel() {
       <summary>
         <h2>Stations <small>${alive} here${lost ? html`, <span class="warn">${lost} lost</span>` : ""}</small></h2>
       </summary>
-      <div class="scroll" tabindex="0" role="region" aria-label="List of stations">
+      <div class="scroll moves" tabindex="0" role="region" aria-label="List of stations">
         <ul>
           ${stations.value.map((row) => html`<${Station} key=${row.role + row.name + row.session} row=${row} />`)}
         </ul>

@@ -92,7 +92,7 @@ function Rows({ rows: all }) {
   const first = Math.max(0, Math.min(rows.length, Math.floor(scrolled.value / ROW_PX)) - SPARE_ROWS);
   const last = Math.min(rows.length, first + Math.ceil(room.value / ROW_PX) + 2 * SPARE_ROWS);
   return html`
-    <div class="scroll" tabindex="0" role="region" aria-label="Table of vehicles" ref=${box} onKeyDown=${(event) => step(event, rows)}>
+    <div class="scroll moves" tabindex="0" role="region" aria-label="Table of vehicles" ref=${box} onKeyDown=${(event) => step(event, rows)}>
       <table aria-rowcount=${rows.length + 1}>
         <thead><tr>${COLUMNS.map((column) => html`<${Head} key=${column.name} column=${column} />`)}</tr></thead>
         <tbody>

@@ -1,7 +1,10 @@
 /** What a car's cameras see. A film runs only while it is shown. */
-import { signal } from "@preact/signals";
+import { signal, useSignal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
+import { span } from "scm/shared/format.js";
+import { isOld, now } from "scm/shell/store.js";
+import { watch } from "scm/pages/vehicle/film.js";
 
 const camera = signal("front");
 
@@ -27,24 +30,21 @@ export function CameraPanel({ car }) {
   `;
 }
 
-/** A film of JPEG pictures. Its request lives as long as the picture is on the screen, no longer. */
+/** The newest picture; grey when no newer one came, and then how old it is. */
 function Film({ src, label }) {
-  const image = useRef(null);
-  const [seen, setSeen] = useState(false);
+  const canvas = useRef(null);
+  const drawnAt = useSignal(null);
   const [large, setLarge] = useState(false);
   useEffect(() => {
-    const follow = () => {
-      if (document.hidden) image.current.removeAttribute("src");
-      else image.current.src = src;
+    const draw = (picture) => {
+      Object.assign(canvas.current, { width: picture.width, height: picture.height });
+      canvas.current.getContext("2d").drawImage(picture, 0, 0);
+      drawnAt.value = performance.now();
     };
-    const element = image.current;
-    follow();
-    document.addEventListener("visibilitychange", follow);
-    return () => {
-      document.removeEventListener("visibilitychange", follow);
-      element.removeAttribute("src"); // ends the request: a picture out of the page would go on
-    };
+    return watch(src, draw);
   }, [src]);
+  const seen = drawnAt.value !== null;
+  const late = seen && isOld(drawnAt.value);
   return html`
     <button
       class="film ${large ? "large" : ""}"
@@ -54,8 +54,9 @@ function Film({ src, label }) {
       onClick=${() => setLarge(!large)}
       onKeyDown=${(event) => event.key === "Escape" && setLarge(false)}
     >
-      <img ref=${image} alt=${label} onLoad=${() => setSeen(true)} onError=${() => setSeen(false)} />
+      <canvas ref=${canvas} class="moves" data-stale=${late} role="img" aria-label=${label}></canvas>
       ${!seen && html`<span class="empty">Waiting for a picture.</span>`}
+      ${late && html`<span class="late">${span((now.value - drawnAt.value) / 1000)} old</span>`}
     </button>
   `;
 }

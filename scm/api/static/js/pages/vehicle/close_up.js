@@ -12,10 +12,12 @@ import { LightsPanel } from "scm/pages/vehicle/lights_panel.js";
 import { PlotsPanel } from "scm/pages/vehicle/plots_panel.js";
 import { WheelPanel } from "scm/pages/vehicle/wheel_panel.js";
 
+const STALE_MS = 500;
+
 export function CloseUp({ car }) {
   const mode = modeOf(car);
   return html`
-    <header class="who">
+    <header class="who moves" data-stale=${car.age_ms > STALE_MS}>
       <a href="/vehicles">All vehicles</a>
       <label>
         <span class="hidden">Vehicle</span>

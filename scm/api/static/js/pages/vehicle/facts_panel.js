@@ -3,6 +3,7 @@ import { useEffect, useState } from "preact/hooks";
 import { stuckBy } from "scm/shared/condition.js";
 import { html } from "scm/shared/html.js";
 import { age, fixed, span, UNKNOWN } from "scm/shared/format.js";
+import { since_ms } from "scm/shell/store.js";
 import { Battery } from "scm/pages/vehicle/battery.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
 import { doubtOf, misbehaviour, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
@@ -16,10 +17,11 @@ export function FactsPanel({ car }) {
   useMisbehaviour();
   const link = useLink(car.vehicle);
   const { x_m: x, y_m: y, yaw_rad: yaw } = car;
+  const age_ms = car.age_ms + since_ms.value;
   return html`
     <section class="panel facts" aria-label="State">
       <div class="panel-head"><h2>State</h2></div>
-      <dl>
+      <dl class="moves" data-stale=${age_ms > STALE_MS}>
         <dt>Pose</dt><dd>${fixed(x, 2)}, ${fixed(y, 2)} m, ${fixed(yaw * DEGREES, 0, "°")}</dd>
         ${stuckBy(car) && html`<dt>Stuck</dt><dd data-fact="stuck" class="bad">${stuckBy(car)}</dd>`}
         <dt>Throttle</dt><dd>${fixed(car.throttle, 2)}</dd>
@@ -30,7 +32,7 @@ export function FactsPanel({ car }) {
         <dt>Lease</dt><dd>${isAtHome(car) ? "at home" : `ends in ${span(car.lease_left_ms / 1000)}`}</dd>
         <dt>Epoch</dt><dd>${car.epoch}</dd>
         <dt>Command age</dt><dd data-fact="command" class=${car.command_age_ms > LATE_MS ? "warn" : ""}>${commandOf(car)}</dd>
-        <dt>Last report</dt><dd class=${car.age_ms > STALE_MS ? "warn" : ""}>${age(car.age_ms)} <small>ago</small></dd>
+        <dt>Last report</dt><dd class=${age_ms > STALE_MS ? "warn" : ""}>${age(age_ms)} <small>ago</small></dd>
         <dt>Round trip</dt><dd data-fact="link" title=${link?.title ?? ""}>${link?.text ?? UNKNOWN}</dd>
         <dt>Eye sees it off by</dt><dd>${eyeOf(car.eye)}</dd>
         <dt>Misbehaviour</dt><dd class=${doubtOf(car.vehicle).suspected ? "bad" : ""}>${doubtText(car.vehicle)}</dd>

@@ -3,7 +3,7 @@ import { signal } from "@preact/signals";
 import { modeOf, stuckBy } from "scm/shared/condition.js";
 import { html } from "scm/shared/html.js";
 import { age, byName, fixed, UNKNOWN } from "scm/shared/format.js";
-import { world } from "scm/shell/store.js";
+import { since_ms, world } from "scm/shell/store.js";
 import { batteryState, batteryWord, BatterySign, percent } from "scm/pages/vehicle/battery.js";
 import { doubtOf, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
@@ -43,7 +43,7 @@ export function FleetTable() {
           </div>
         </div>
       </div>
-      <div class="scroll" tabindex="0" role="region" aria-label="Table of vehicles">
+      <div class="scroll moves" tabindex="0" role="region" aria-label="Table of vehicles">
         <table>
           <thead>
             <tr>
@@ -63,6 +63,7 @@ export function FleetTable() {
 function Row({ car }) {
   const mode = modeOf(car);
   const doubt = doubtOf(car.vehicle);
+  const age_ms = car.age_ms + since_ms.value;
   return html`
     <tr data-car=${car.vehicle} data-alive=${car.alive}>
       <td><a class="to" href="/vehicles/${car.vehicle}">${car.vehicle}</a></td>
@@ -79,7 +80,7 @@ function Row({ car }) {
         ${batteryWord(car)} <${BatterySign} car=${car} /> ${percent(car) || fixed(car.battery_v, 1, " V")}
       </td>
       <td class="number wide ${doubt.suspected ? "bad" : ""}">${doubt.suspected ? "suspected" : doubt.score === null ? UNKNOWN : fixed(doubt.score, 1)}</td>
-      <td class="number ${car.age_ms > STALE_MS ? "warn" : ""}">${age(car.age_ms)}</td>
+      <td class="number ${age_ms > STALE_MS ? "warn" : ""}">${age(age_ms)}</td>
     </tr>
   `;
 }

@@ -1,8 +1,11 @@
 /** What a car's LIDAR sees, from above: the car looks up, rings every half metre. Heard while it is shown. */
+import { useSignal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
 import { footprint } from "scm/shared/car_shape.js";
+import { isConnected, useOld } from "scm/shell/store.js";
+import { hear } from "scm/shell/streams.js";
 import { colours } from "scm/shell/theme.js";
 
 const REACHES_M = [1, 2, 4, 8];
@@ -12,17 +15,17 @@ export function LidarPanel({ car }) {
   const [reach, setReach] = useState(2);
   const [state, setState] = useState({ words: "Waiting for a scan." });
   const scan = useRef(null);
+  const heardAt = useSignal(-Infinity);
+  const late = useOld(heardAt);
   useEffect(() => {
-    const source = new EventSource(`/api/v1/vehicles/${car.vehicle}/scan/stream`);
-    source.addEventListener("scan", (message) => {
-      scan.current = JSON.parse(message.data);
-      const hits = scan.current.ranges_m.filter((range) => range !== null);
-      setState({ beams: scan.current.ranges_m.length, nearest: hits.length ? Math.min(...hits) : null });
-    });
-    source.onerror = () => {
-      if (source.readyState === EventSource.CLOSED) setState({ words: "This car has no LIDAR." });
+    const take = (told) => {
+      scan.current = told;
+      heardAt.value = performance.now();
+      const hits = told.ranges_m.filter((range) => range !== null);
+      setState({ beams: told.ranges_m.length, nearest: hits.length ? Math.min(...hits) : null });
     };
-    return () => source.close();
+    const onState = (state) => state === "refused" && isConnected.peek() && setState({ words: "This car has no LIDAR." });
+    return hear(`/api/v1/vehicles/${car.vehicle}/scan/stream`, { scan: take }, onState);
   }, [car.vehicle]);
   useEffect(() => {
     if (scan.current && canvas.current) draw(canvas.current, scan.current, car.car, reach);
@@ -39,7 +42,7 @@ export function LidarPanel({ car }) {
       </div>
       ${state.words
         ? html`<p class="empty">${state.words}</p>`
-        : html`<canvas ref=${canvas} role="img" aria-label="Scan from above: ${state.beams} beams, the nearest thing at ${fixed(state.nearest, 2)} m"></canvas>`}
+        : html`<canvas ref=${canvas} class="moves" data-stale=${late} role="img" aria-label="Scan from above: ${state.beams} beams, the nearest thing at ${fixed(state.nearest, 2)} m"></canvas>`}
     </section>
   `;
 }

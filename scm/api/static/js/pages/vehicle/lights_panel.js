@@ -18,7 +18,7 @@ export function LightsPanel({ car }) {
       <div class="panel-head"><h2>Lights ${locked && html`<small>set by who drives it</small>`}</h2></div>
       <${Switch} name="Headlights" choices=${HEADLIGHTS} now=${headlights} locked=${locked} onPick=${(mode) => set({ headlights: mode })} />
       <${Switch} name="Indicators" choices=${INDICATORS} now=${indicatorsOf(car)} locked=${locked} onPick=${(mode) => set({ indicators: mode })} />
-      <div class="automatic" aria-label="Automatic lamps">
+      <div class="automatic moves" aria-label="Automatic lamps">
         ${AUTOMATIC.map(
           (lamp) => html`<span data-lamp=${lamp} data-on=${car.lights.includes(lamp)}><i></i>${lamp}</span>`,
         )}

@@ -3,8 +3,9 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
+import { useOld } from "scm/shell/store.js";
 import { colours } from "scm/shell/theme.js";
-import { fresh, reportsNow, SHOWN_S, useReports } from "scm/pages/vehicle/reports.js";
+import { fresh, reportedAt, reportsNow, SHOWN_S, useReports } from "scm/pages/vehicle/reports.js";
 
 const DRAW_MS = 100;
 const HEIGHT = 152;
@@ -32,6 +33,7 @@ const PLOTS = [
 
 export function PlotsPanel({ car }) {
   useReports(car.vehicle);
+  const late = useOld(reportedAt);
   const [paused, setPaused] = useState(false);
   return html`
     <section class="panel plots" aria-label="Command and response">
@@ -39,7 +41,9 @@ export function PlotsPanel({ car }) {
         <h2>Command and response <small>last ${SHOWN_S} s</small></h2>
         <button class="small" aria-pressed=${paused} onClick=${() => setPaused(!paused)}>${paused ? "Go on" : "Pause"}</button>
       </div>
-      ${PLOTS.map((plot) => html`<${Plot} key=${plot.title} plot=${plot} paused=${paused} />`)}
+      <div class="moves" data-stale=${late}>
+        ${PLOTS.map((plot) => html`<${Plot} key=${plot.title} plot=${plot} paused=${paused} />`)}
+      </div>
     </section>
   `;
 }

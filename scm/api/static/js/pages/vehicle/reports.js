@@ -1,8 +1,10 @@
 /** The last half minute of all that a car reports, in columns; heard while somebody shows it. */
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
+import { hear } from "scm/shell/streams.js";
 
 export const SHOWN_S = 30;
+const GAP_S = 0.5;
 const DEGREES = 180 / Math.PI;
 
 /** Columns of `Sample` in their order, angles in degrees; `t` counts from the newest report backwards. */
@@ -10,6 +12,9 @@ const NAMES = ["t", "throttle", "steering", "speed", "angle", "yawRate", "accel"
 
 /** Counts up with every frame that came. */
 export const fresh = signal(0);
+
+/** When the newest came, on this page's clock [ms]. */
+export const reportedAt = signal(-Infinity);
 
 let columns = empty();
 
@@ -27,13 +32,14 @@ export function useReports(vehicle) {
   useEffect(() => {
     columns = empty();
     fresh.value += 1;
-    const source = new EventSource(`/api/v1/vehicles/${vehicle}/reports`);
-    source.addEventListener("reports", (message) => {
-      for (const row of JSON.parse(message.data).samples) take(row);
-      forget();
-      fresh.value += 1;
+    return hear(`/api/v1/vehicles/${vehicle}/reports`, {
+      reports({ samples }) {
+        samples.forEach(take);
+        forget();
+        fresh.value += 1;
+        reportedAt.value = performance.now();
+      },
     });
-    return () => source.close();
   }, [vehicle]);
 }
 
@@ -43,6 +49,7 @@ function take([t, throttle, steering, speed, angle, yawRate, accel]) {
     if (last - t < 1) return; // late
     columns = empty(); // the car's clock began anew
   }
+  if (t - last > GAP_S) NAMES.forEach((name) => columns[name].push(name === "t" ? last : null)); // no line over a gap
   const row = [t, throttle, steering, speed, angle * DEGREES, yawRate * DEGREES, accel];
   NAMES.forEach((name, i) => columns[name].push(row[i]));
 }

@@ -1,0 +1,82 @@
+/** A film as the server sends it: JPEG pictures, one behind the other. Only the newest is shown, and its end is noticed. */
+import { enter } from "scm/shell/api.js";
+import { whileSeen } from "scm/shell/streams.js";
+
+const AGAIN_MS = 1000;
+const HEAD_END = "\r\n\r\n";
+const LENGTH = /^content-length: *(\d+)/im;
+
+const letters = new TextDecoder("latin1");
+
+/**
+ * Take every picture of a film, decoded, while somebody looks; it is asked for again when it ends.
+ * @param take is lent a picture for as long as it draws it.
+ * @returns what ends it.
+ */
+export function watch(address, take) {
+  return whileSeen(() => {
+    const ending = new AbortController();
+    follow(address, newestOnly(take, ending.signal), ending.signal);
+    return () => ending.abort();
+  });
+}
+
+async function follow(address, show, ended) {
+  while (!ended.aborted) {
+    try {
+      const response = await fetch(address, { signal: ended });
+      if (response.status === 401 && !(await enter())) return;
+      if (response.ok) await readAll(response.body.getReader(), show);
+    } catch {
+      if (ended.aborted) return;
+    }
+    await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
+  }
+}
+
+async function readAll(reader, show) {
+  let kept = new Uint8Array();
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) return;
+    const bytes = new Uint8Array(kept.length + value.length);
+    bytes.set(kept);
+    bytes.set(value, kept.length);
+    kept = bytes.slice(cut(bytes, show));
+  }
+}
+
+/** Show the newest whole picture in what came; returns where what is left begins. */
+function cut(bytes, show) {
+  let at = 0;
+  let newest = null;
+  for (;;) {
+    const head = letters.decode(bytes.subarray(at, at + 400)).split(HEAD_END)[0];
+    const begin = at + head.length + HEAD_END.length;
+    const end = begin + Number(LENGTH.exec(head)?.[1]);
+    if (!(end <= bytes.length)) break; // of the head or of the picture some is still to come
+    newest = bytes.subarray(begin, end);
+    at = end;
+  }
+  if (newest) show(new Blob([newest], { type: "image/jpeg" }));
+  return at;
+}
+
+/** Decode one picture at a time: of those that came meanwhile the newest. */
+function newestOnly(take, ended) {
+  let waiting = null;
+  let isBusy = false;
+  return async (jpeg) => {
+    waiting = jpeg;
+    if (isBusy) return;
+    isBusy = true;
+    while (waiting) {
+      const next = waiting;
+      waiting = null;
+      const picture = await createImageBitmap(next).catch(() => null);
+      if (picture && !ended.aborted) take(picture);
+      picture?.close();
+    }
+    isBusy = false;
+  };
+}
