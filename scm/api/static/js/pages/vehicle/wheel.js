@@ -1,10 +1,13 @@
 /** A connection to a car's wheel: taken, driven 25 times a second, given back. */
 import { signal } from "@preact/signals";
+import { isConnected } from "scm/shell/store.js";
 import { hands } from "scm/pages/vehicle/hands.js";
 
 const PROTOCOL = "scm.drive.v1";
 const KEY = "scm-api-key";
 const EVERY_MS = 40;
+const UNHEARD_MS = 1000;
+const GONE_MS = 5000; // the city gives the car back as soon
 
 /**
  * How it stands: `state` is `free`, `asking`, `held` or `over`; `told` is the car's answer to the newest
@@ -12,6 +15,13 @@ const EVERY_MS = 40;
  */
 const FREE = { state: "free", vehicle: null, owner: "", told: null, round_ms: null, over: null };
 export const wheel = signal(FREE);
+
+const UNHEARD = { why: "unheard", throttle: 0, steering: 0 };
+const ENDS = {
+  closed: "The city does not let this page drive: it needs the key of an operator.",
+  unreachable: "The city did not answer.",
+  cut: "The connection was lost; the car stops by itself and goes back.",
+};
 
 /** The greatest throttle that a key asks for. */
 export const most = signal(0.4);
@@ -23,6 +33,7 @@ let socket = null;
 let hand = null;
 let timer = null;
 let seq = 0;
+let heardAt = 0;
 
 /** Ask for a car; with a reason it is taken from whoever has it. */
 export function take(vehicle, reason = "") {
@@ -34,6 +45,8 @@ export function take(vehicle, reason = "") {
     key ? [PROTOCOL, `scm.key.${key}`] : [PROTOCOL],
   );
   socket = own;
+  heardAt = performance.now();
+  timer = setInterval(notice, EVERY_MS);
   own.onopen = () => own.send(JSON.stringify({ type: "take", reason }));
   own.onmessage = (message) => socket === own && hear(JSON.parse(message.data));
   own.onclose = () => socket === own && ended();
@@ -59,6 +72,7 @@ export function pad(what, down) {
 }
 
 function hear(word) {
+  heardAt = performance.now();
   if (word.type === "taken") {
     wheel.value = { ...wheel.value, state: "held", owner: word.owner };
     startHands();
@@ -71,21 +85,33 @@ function hear(word) {
   }
 }
 
-function ended() {
+/** A dead line says nothing, not even that it is dead. */
+function notice() {
+  const quiet = performance.now() - heardAt;
+  const { state, told } = wheel.value;
+  if (quiet > GONE_MS) {
+    socket?.close();
+    ended("unreachable");
+  } else if (quiet > UNHEARD_MS && state === "held" && told?.why !== "unheard") {
+    wheel.value = { ...wheel.value, told: UNHEARD, round_ms: null };
+  }
+}
+
+/** It is over without a word; `why`: as far as that is known. */
+function ended(why = isConnected.value ? "closed" : "unreachable") {
   socket = null;
   stopHands();
-  if (wheel.value.state === "over") return;
-  const asked = wheel.value.state === "asking";
-  const detail = asked
-    ? "The city does not let this page drive: it needs the key of an operator."
-    : "The connection was lost; the car stops by itself and goes back.";
-  wheel.value = { ...wheel.value, state: "over", over: { code: asked ? "closed" : "cut", detail } };
+  const { state } = wheel.value;
+  if (state === "over") return;
+  const code = state === "held" ? "cut" : why;
+  wheel.value = { ...wheel.value, state: "over", over: { code, detail: ENDS[code] } };
 }
 
 function startHands() {
   seq = 0;
   hand = hands(send);
-  timer = setInterval(send, EVERY_MS);
+  clearInterval(timer);
+  timer = setInterval(() => (send(), notice()), EVERY_MS);
 }
 
 function stopHands() {

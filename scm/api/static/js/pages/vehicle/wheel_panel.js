@@ -16,6 +16,7 @@ const WHY = {
   driving: "You drive",
   released: "No hand on the wheel: it stands",
   silent: "This page is silent: it stands",
+  unheard: "The city does not answer: the car stops by itself",
 };
 
 export function WheelPanel({ car }) {
