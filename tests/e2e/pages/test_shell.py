@@ -7,6 +7,11 @@ from tests.e2e.pages.visiting import judge, photograph
 PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
 
 
+def release(running):
+    """Let the city drive again."""
+    running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
+
+
 def test_every_page_opens_from_the_bar_without_a_reload(visit):
     visited = visit("/")
     page = visited.page
@@ -110,10 +115,12 @@ def test_the_red_stop_works_though_the_page_does_not_come(browser, running):
 
     page.route("**/pages/map/page.js", hold)
     page.goto(f"{running.url}/map")
-    page.click("#city-stop")
-    page.wait_for_selector("dialog[open]")
-    page.keyboard.press("Escape")
-    page.wait_for_selector("dialog", state="detached")
+    try:
+        page.click("#city-stop")
+        page.wait_for_selector(".banner.stopped")
+    finally:
+        release(running)
+    page.wait_for_selector(".banner.stopped", state="detached")
     for route in held:
         route.continue_()
     page.wait_for_selector("main.at-map canvas")
@@ -132,47 +139,56 @@ def test_the_colours_that_the_person_chose_are_there_before_the_modules(browser,
     page.context.close()
 
 
-def test_the_red_stop_stops_the_city_by_keyboard_and_lets_it_go(visit, running):
+def test_one_press_stops_the_city_and_only_a_yes_lets_it_go(visit, running):
     visited = visit("/events")
     page = visited.page
     page.focus("#city-stop")
-    page.keyboard.press("Enter")
-    page.fill("dialog input[name=reason]", "a hand on the floor")
-    page.keyboard.press("Enter")
-    page.wait_for_selector(".banner.stopped >> text=a hand on the floor")
     try:
+        page.keyboard.press("Enter")
+        page.wait_for_selector(".banner.stopped >> text=by dashboard")
         assert running.get("/stop")["engaged"]
+        page.click("text=Say why…")
+        page.fill("dialog input[name=reason]", "a hand on the floor")
+        page.keyboard.press("Enter")
+        page.wait_for_selector(".banner.stopped >> text=a hand on the floor")
         judge(visited)
-    finally:
         page.click("#city-stop")
-        page.wait_for_selector("dialog .primary")
-        page.keyboard.press("Enter")
+        page.click("dialog >> text=Let all cars drive again")
         visited.until(lambda: not running.get("/stop")["engaged"], "the stop is released")
+    finally:
+        release(running)
     page.wait_for_selector(".banner.stopped", state="detached")
 
 
-def test_enter_stops_the_city_though_somebody_was_faster(visit, running):
-    visited = visit("/map")
-    page = visited.page
-    page.click("#city-stop")
-    page.wait_for_selector("dialog[open]")
+def test_who_hits_the_red_button_again_and_again_does_not_release_it(visit, running):
+    page = visit("/map").page
+    page.focus("#city-stop")
     try:
-        running.web.put("/stop", json={"engaged": True, "by": "somebody"}).raise_for_status()
-        page.wait_for_selector(".banner.stopped")
         page.keyboard.press("Enter")
-        page.wait_for_selector("text=All cars are told to stop.")
+        page.wait_for_selector(".banner.stopped")
+        for _ in range(4):
+            page.keyboard.press("Enter")
+            page.wait_for_timeout(20)
+        page.keyboard.press("Escape")
+        page.wait_for_selector("dialog", state="detached")
         assert running.get("/stop")["engaged"]
     finally:
-        running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
+        release(running)
     page.wait_for_selector(".banner.stopped", state="detached")
 
 
-def test_escape_leaves_the_question_and_the_city_alone(visit, running):
+def test_a_reason_that_comes_after_the_release_stops_nobody_again(visit, running):
     page = visit("/map").page
-    page.click("#city-stop")
-    page.wait_for_selector("dialog[open]")
-    page.keyboard.press("Escape")
-    page.wait_for_selector("dialog", state="detached")
+    try:
+        page.click("#city-stop")
+        page.click("text=Say why…")
+        page.wait_for_selector("dialog[open]")
+    finally:
+        release(running)
+    page.wait_for_selector(".banner.stopped", state="detached")
+    page.fill("dialog input[name=reason]", "too late")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("text=The stop was released meanwhile")
     assert not running.get("/stop")["engaged"]
 
 
@@ -183,8 +199,6 @@ def test_a_silent_world_greys_the_page_then_says_so_and_comes_back_by_itself(vis
         page.wait_for_selector('.page[data-link="stale"]')
         page.wait_for_selector('.page[data-link="lost"] .banner.lost')
         page.click("#city-stop")
-        page.wait_for_selector("dialog[open]")
-        page.keyboard.press("Enter")
         page.wait_for_selector(".banner.lost >> text=The stop is not confirmed")
         photograph(visited, "stop_not_confirmed")
     try:
@@ -192,7 +206,7 @@ def test_a_silent_world_greys_the_page_then_says_so_and_comes_back_by_itself(vis
         page.wait_for_selector(".banner.stopped >> text=all cars stand")
         page.wait_for_selector(".banner.lost", state="detached")
     finally:
-        running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
+        release(running)
     assert [one for one in visited.complaints if "status of 50" not in one] == []
 
 
@@ -236,12 +250,11 @@ def test_the_red_stop_works_though_all_connections_of_the_browser_are_taken(visi
     }""")
     try:
         page.click("#city-stop")
-        page.keyboard.press("Enter")
         visited.until(lambda: running.get("/stop")["engaged"], "the city is stopped")
         page.wait_for_selector(".banner.stopped")
     finally:
         page.evaluate("() => window.taken.forEach((one) => one.close())")
-        running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
+        release(running)
     page.wait_for_selector(".banner.stopped", state="detached")
 
 

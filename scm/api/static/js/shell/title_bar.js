@@ -2,14 +2,14 @@
 import { signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { html } from "scm/shared/html.js";
-import { change } from "scm/shell/api.js";
+import { change, notify } from "scm/shell/api.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { clock, fixed, spaced, span, UNKNOWN } from "scm/shared/format.js";
 import { city, isConnected, link, pulse, quiet_s, stop } from "scm/shell/store.js";
 import { makeRoom } from "scm/shell/streams.js";
 import { nextTheme, theme } from "scm/shell/theme.js";
 
-/** What is asked: whether the stop was engaged when the question came up; null: nothing. */
+/** What is asked about the stop: `release`, `reason`; null: nothing. */
 const asking = signal(null);
 
 /** Whether a stop was asked for and nobody said that it is engaged. */
@@ -73,45 +73,57 @@ function ThemeButton() {
   `;
 }
 
+/** One press stops, as of every emergency stop; only to let cars drive again is asked first. */
 function StopButton() {
   const engaged = stop.value.engaged;
-  const label = engaged ? "Release stop" : "City stop";
+  const press = () => (engaged ? (asking.value = "release") : tell({ engaged: true, by: "dashboard", reason: "" }));
   return html`
-    <button
-      id="city-stop"
-      class="city-stop"
-      aria-pressed=${engaged}
-      onClick=${() => (asking.value = { engaged })}
-    >
-      ${label}
+    <button id="city-stop" class="city-stop" aria-pressed=${engaged} onClick=${press}>
+      ${engaged ? "Release stop" : "City stop"}
     </button>
-    ${asking.value && html`<${StopDialog} engaged=${asking.value.engaged} />`}
+    ${asking.value === "release" && html`<${ReleaseDialog} />`}
+    ${asking.value === "reason" && html`<${ReasonDialog} />`}
   `;
 }
 
-/** The question stays what it was though somebody else stops the city meanwhile: Enter must not release it. */
-function StopDialog({ engaged }) {
-  const close = () => (asking.value = null);
-  const submit = async (event) => {
+const closeDialog = () => (asking.value = null);
+
+/** Who hits the red button again and again must not release it: Enter means no here. */
+function ReleaseDialog() {
+  const submit = (event) => {
     event.preventDefault();
-    const reason = event.target.elements.reason.value;
-    close();
-    await tell({ engaged: !engaged, by: "dashboard", reason });
+    closeDialog();
+    tell({ engaged: false, by: "dashboard", reason: event.target.elements.reason.value });
   };
-  // Enter must stop the city: the button has the focus, not the reason.
-  const verb = engaged ? "Let all cars drive again" : "Stop all cars";
   return html`
-    <${Dialog} title=${engaged ? "Release the city stop?" : "Stop the whole city?"} onClose=${close}>
-      <p>
-        ${engaged
-          ? "Every car goes on with what it was doing. Look at the map first."
-          : "Every car brakes and stands, whoever drives it, until the stop is released."}
-      </p>
+    <${Dialog} title="Release the city stop?" onClose=${closeDialog}>
+      <p>Every car goes on with what it was doing. Look at the map first.</p>
       <form onSubmit=${submit}>
         <input name="reason" maxlength="200" placeholder="Reason (optional)" aria-label="Reason" />
         <div class="actions">
-          <button type="button" onClick=${close}>Cancel</button>
-          <button class=${engaged ? "primary" : "danger"} data-first>${verb}</button>
+          <button type="button" data-first onClick=${closeDialog}>Cancel</button>
+          <button class="primary">Let all cars drive again</button>
+        </div>
+      </form>
+    <//>
+  `;
+}
+
+/** Why the city was stopped: for the log, and for whoever finds it standing. */
+function ReasonDialog() {
+  const submit = (event) => {
+    event.preventDefault();
+    closeDialog();
+    if (stop.value.engaged) tell({ engaged: true, by: "dashboard", reason: event.target.elements.reason.value });
+    else notify("error", "The stop was released meanwhile: the reason was not noted.");
+  };
+  return html`
+    <${Dialog} title="Why was the city stopped?" onClose=${closeDialog}>
+      <form onSubmit=${submit}>
+        <input name="reason" maxlength="200" required placeholder="Reason" aria-label="Reason" data-first />
+        <div class="actions">
+          <button type="button" onClick=${closeDialog}>Cancel</button>
+          <button class="primary">Note it</button>
         </div>
       </form>
     <//>
@@ -138,6 +150,7 @@ export function Banners() {
     html`<div class="banner stopped" role="alert">
       <b>City stopped</b>
       <span>${[by && `by ${by}`, reason, obeyed()].filter(Boolean).join(" · ")}</span>
+      ${!reason && html`<button onClick=${() => (asking.value = "reason")}>Say why…</button>`}
     </div>`}
     ${unconfirmed.value &&
     !engaged &&
