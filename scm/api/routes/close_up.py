@@ -2,9 +2,11 @@
 
 import asyncio
 from collections.abc import AsyncIterator
+from contextlib import nullcontext
+from typing import Annotated
 
 import msgspec
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
 from fastapi.responses import StreamingResponse
 
 from scm.api.city import City, Name, json_response, not_found
@@ -12,6 +14,8 @@ from scm.api.close_up import Sample, sample_of
 from scm.api.encoding import encode
 from scm.api.problem import RefusedError
 from scm.api.roles import VIEWER
+from scm.api.routes.scan import Turns
+from scm.api.scan_watch import scanner_of
 from scm.api.schemas import answer, answer_file
 from scm.api.stream import Stream
 from scm.clock import NS_PER_MS, WallClock
@@ -64,10 +68,19 @@ def router(city: City, stream: Stream) -> APIRouter:
         responses=answer_file("text/event-stream"),
         response_class=Response,
     )
-    async def reports(name: Name) -> Response:
-        _find(city, name)
+    async def reports(
+        name: Name,
+        scan: Annotated[
+            bool,
+            Query(
+                description="each turn of its LIDAR too, as `scan`; null: it has none",
+                examples=[True],
+            ),
+        ] = False,
+    ) -> Response:
+        scanner = scanner_of(_find(city, name).car)
         return StreamingResponse(
-            _reports(city, stream, name),
+            _reports(city, stream, name, Turns(city, name, scanner) if scan else None),
             media_type="text/event-stream",
             headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
         )
@@ -83,10 +96,13 @@ def router(city: City, stream: Stream) -> APIRouter:
     return routes
 
 
-async def _reports(city: City, stream: Stream, name: str) -> AsyncIterator[bytes]:
+async def _reports(
+    city: City, stream: Stream, name: str, turns: Turns | None
+) -> AsyncIterator[bytes]:
     """Yield what a car reports until the page goes away or the server ends."""
     number = quiet = 0
-    with city.view.watching_closely(name):
+    scans = nullcontext() if turns is None else city.view.watching_scan(name)
+    with city.view.watching_closely(name), scans:
         yield b"retry: 1000\n\n"
         while not stream.is_closed:
             number, states = city.view.reports_after(name, number)
@@ -101,6 +117,8 @@ async def _reports(city: City, stream: Stream, name: str) -> AsyncIterator[bytes
                 yield b"event: reports\ndata: " + encode(frame) + b"\n\n"
             elif quiet % SILENT_PERIODS == 0:
                 yield b": silent\n\n"
+            if turns is not None and (turn := turns.news()):
+                yield turn
             await asyncio.sleep(PERIOD_S)
 
 

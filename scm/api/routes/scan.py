@@ -56,18 +56,35 @@ async def _turns(
     city: City, stream: Stream, name: str, scanner: tuple[float, float]
 ) -> AsyncIterator[bytes]:
     """Yield every new scan until the page goes away or the server ends."""
-    shown_ns, silent = None, 0
+    turns, silent = Turns(city, name, scanner), 0
     with city.view.watching_scan(name):
         yield b"retry: 1000\n\n"
         while not stream.is_closed:
-            row = _newest(city, name, scanner)
-            silent += 1
-            if row is not None and row.t_ns != shown_ns:
-                shown_ns, silent = row.t_ns, 0
-                yield b"event: scan\ndata: " + encode(row) + b"\n\n"
-            elif silent % BEAT_LOOKS == 0:
-                yield b": silent\n\n"
+            news = turns.news()
+            silent = 0 if news else silent + 1
+            if news or silent % BEAT_LOOKS == 0:
+                yield news or b": silent\n\n"
             await asyncio.sleep(LOOK_S)
+
+
+class Turns:
+    """A watched car's turns as server-sent events, each once; for a car without a LIDAR null."""
+
+    def __init__(self, city: City, name: str, scanner: tuple[float, float] | None) -> None:
+        self._city, self._name, self._scanner = city, name, scanner
+        self._shown_ns: int | None = None
+        self._is_told = False
+
+    def news(self) -> bytes:
+        """Return the newest turn as an event; empty: it was told."""
+        row = None if self._scanner is None else _newest(self._city, self._name, self._scanner)
+        if self._scanner is None and not self._is_told:
+            self._is_told = True
+        elif row is None or row.t_ns == self._shown_ns:
+            return b""
+        else:
+            self._shown_ns = row.t_ns
+        return b"event: scan\ndata: " + encode(row) + b"\n\n"
 
 
 def _newest(city: City, name: str, scanner: tuple[float, float]) -> ScanRow | None:

@@ -131,13 +131,16 @@ class VehiclesNoun:
         """
         return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/path", PathRow)
 
-    def reports(self, name: str) -> Iterator[LiveEvent]:
+    def reports(self, name: str, *, scan: bool = False) -> Iterator[LiveEvent]:
         """All that a car reports, as server-sent events `reports`.
 
         Args:
             name: a name on the bus
+            scan: each turn of its LIDAR too, as `scan`; null: it has none
         """
-        return self._connection.events(f"/api/v1/vehicles/{part(name)}/reports")
+        return self._connection.events(
+            f"/api/v1/vehicles/{part(name)}/reports", query={"scan": scan}
+        )
 
     def link(self, name: str) -> LinkRow:
         """How long the way to a car and back is now.

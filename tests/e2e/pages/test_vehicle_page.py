@@ -319,6 +319,21 @@ def test_what_moves_is_grey_while_nobody_tells_it_and_comes_back_by_itself(visit
     assert page.evaluate("() => window.sameDocument")
 
 
+def test_two_windows_share_connections_and_leave_one_for_what_is_done(visit, running):
+    visited = visit(f"/vehicles/{CAR}")
+    visited.page.wait_for_selector('.film[data-seen="true"]')
+    second = visited.page.context.new_page()
+    second.goto(f"{running.url}/vehicles/n2")
+    windows, full = (visited.page, second), ".film >> text=Other windows"
+    visited.until(lambda: sum(one.locator(full).count() for one in windows) == 1, "one film waits")
+    for mode, is_lit in (("low", True), ("off", False)):
+        second.click(f'[aria-label="Headlights {mode}"]')
+        visited.until(lambda lit=is_lit: ("head_low" in row(running, "n2")["lights"]) is lit, mode)
+    second.close()
+    visited.page.wait_for_selector('.film .moves[data-stale="false"]')
+    assert visited.complaints == []
+
+
 def test_a_gamepad_drives_only_while_its_trigger_is_pulled(visit, running):
     visited = visit(f"/vehicles/{CAR}", script=PADS)
     take(visited, running)

@@ -1,9 +1,18 @@
 """What a car reports of itself, heard while somebody looks, and told as rows."""
 
+import asyncio
+import json
+
+import numpy as np
 import pytest
 
+from scm.api.city import City
 from scm.api.close_up import DEPTH, sample_of
+from scm.api.routes.close_up import _reports
+from scm.api.routes.scan import Turns
+from scm.api.stream import Stream
 from scm.part import Hears
+from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_state import VehicleState
 
 
@@ -52,6 +61,32 @@ def test_a_row_holds_command_and_response_in_the_documented_order(report):
     assert (row.t_s, row.throttle, row.steering, row.speed_mps) == (0.1, 0.9, 0.2, 0.25)
     assert (row.steering_rad, row.yaw_rate_radps, row.accel_mps2) == (0.05, 0.1, 0.5)
     assert sample_of(report(steering=None)).steering is None
+
+
+def test_scans_come_with_the_reports_for_who_asks_and_null_where_there_is_no_lidar(
+    view, hear, snapshot, fake_city, city_map, seen, report
+):
+    city = City(view, fake_city.ask, city_map)
+    stream = Stream(city, "run", seen)
+    scan = LidarScan(
+        vehicle="n1", t_ns=10**9, beams=2, range_min_m=0.1, range_max_m=4.0, bearing_first_rad=0.0,
+        payload=np.array([1.0, 2.0], "<f4").tobytes(),
+    )  # fmt: skip
+
+    async def heard(scanner):
+        told = _reports(city, stream, "n1", Turns(city, "n1", scanner))
+        await anext(told)
+        hear(1.1, report(1), scan)
+        both = [await anext(told), await anext(told)]
+        await told.aclose()
+        return both
+
+    hear(1.0, snapshot(1.0, n1=(0.0, 0.0, 0.0)))
+    reports, turn = asyncio.run(heard((0.1, 0.0)))
+    assert reports.startswith(b"event: reports")
+    assert json.loads(turn.split(b"data: ")[1])["ranges_m"] == [1.0, 2.0]
+    assert asyncio.run(heard(None))[1] == b"event: scan\ndata: null\n\n"
+    assert not any(wish.kind is LidarScan for wish in view.hears)
 
 
 def test_a_car_that_is_not_there_has_no_reports(client):

@@ -7,7 +7,7 @@
 import { batch, computed, signal, useComputed } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { enter } from "scm/shell/api.js";
-import { hear, renew } from "scm/shell/streams.js";
+import { hear, RANKS, renew } from "scm/shell/streams.js";
 
 const EVENTS_KEPT = 200;
 const STALE_MS = 500;
@@ -205,7 +205,8 @@ function listen() {
   ending = hear(
     `/api/v1/stream?topics=${heard}`,
     { snapshot: noted(takeSnapshot), delta: noted(take), beat: noted(() => {}) },
-    (state) => (connected.value = state === "open"),
+    RANKS.city,
+    (isOpen) => (connected.value = isOpen),
   );
 }
 
@@ -217,16 +218,19 @@ function takeSnapshot(topics) {
   }
   run = topics.run;
   take(topics);
+  if (wasDead) renew();
+  wasDead = false;
 }
 
 /** When the line was asked for, or last said something. */
 let lineAt = -Infinity;
+let wasDead = false;
 
 function keepLine() {
   if (document.hidden || !entered) lineAt = performance.now();
   if (performance.now() - lineAt < DEAD_MS) return;
-  lineAt = performance.now();
-  renew();
+  wasDead = true;
+  listen();
 }
 
 function keepTime() {

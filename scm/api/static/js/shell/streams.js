@@ -1,57 +1,77 @@
 /**
- * What stays open to the server. A browser grants six connections to it, to all its tabs together: they are
- * given up while nobody looks, and for a moment when the red button waits for one.
+ * What stays open to the server. A browser grants six connections to it, to all its windows together. Five of them are
+ * shared out, what matters most first, so that one is left for what is asked and done; who is hidden has none.
  */
+import { signal } from "@preact/signals";
 import { enter } from "scm/shell/api.js";
 
+/** What a stream is for, what matters most first. */
+export const RANKS = { city: 0, car: 1, view: 2 };
+
+const MOST = 5;
 const ROOM_MS = 1000;
 const AGAIN_MS = 2000;
+const WORD_MS = 2000; // between two words of a window to the others
+const GONE_MS = 5000; // after its last word
 
-/** Of every stream, what looks again whether it may be open. */
-const all = new Set();
-const tabs = new BroadcastChannel("scm-room");
+/** Whether something of this window has to wait for what others have open. */
+export const isCrowded = signal(false);
+
+/** Whether all of it has to. */
+export const isShutOut = signal(false);
+
+/** This window's streams, in the order of their ranks: `{rank, look}`. */
+let all = [];
 let roomUntil = -Infinity;
 let isGone = false;
 
-/** Have something open for as long as somebody looks: `begin` returns what ends it. Returns what ends all of it. */
-export function whileSeen(begin) {
+/** The other windows' wishes, by the number that each drew: `{number, isFirst, ranks, at}`. */
+const others = new Map();
+const windows = new BroadcastChannel("scm-streams");
+const number = Math.random();
+
+/**
+ * Have something open for as long as somebody looks and there is room: `begin` returns what ends it.
+ * @param rank one of `RANKS`.
+ * @returns what ends all of it.
+ */
+export function whileSeen(begin, rank) {
   let end = null;
-  const look = () => {
-    const may = !isGone && !document.hidden && performance.now() >= roomUntil;
+  const look = (may) => {
     if (may && !end) end = begin();
     else if (!may && end) end = void end();
   };
-  all.add(look);
-  look();
+  const own = { rank, look };
+  all = [...all, own].sort((a, b) => a.rank - b.rank);
+  tell();
   return () => {
-    all.delete(look);
+    all = all.filter((one) => one !== own);
     end?.();
+    tell();
   };
 }
 
 /**
  * Hear server-sent events while somebody looks: `heard` names them, and what takes each one's body.
- * @param onState is told whether the server is there, and `refused` where it wants to tell nothing: it is asked again.
+ * @param onOpen is told whether the server tells it now.
  * @returns what ends it.
  */
-export function hear(address, heard, onState = () => {}) {
+export function hear(address, heard, rank, onOpen = () => {}) {
   let isShut = false;
   return whileSeen(() => {
     let source = null;
     let timer = null;
     const open = () => {
       if (isShut) return; // the person gave no key
-
       source = new EventSource(address);
       for (const [name, take] of Object.entries(heard)) {
         source.addEventListener(name, (message) => take(JSON.parse(message.data)));
       }
-      source.onopen = () => onState("open");
+      source.onopen = () => onOpen(true);
       source.onerror = () => {
+        onOpen(false);
         // Refused, as with a key that has ended: a stream that only broke tries again itself.
-        const refused = source.readyState === EventSource.CLOSED;
-        onState(refused ? "refused" : "broken");
-        if (refused) timer = setTimeout(again, AGAIN_MS);
+        if (source.readyState === EventSource.CLOSED) timer = setTimeout(again, AGAIN_MS);
       };
     };
     const again = async () => {
@@ -65,29 +85,64 @@ export function hear(address, heard, onState = () => {}) {
       timer = null;
       source?.close();
     };
-  });
+  }, rank);
 }
 
-/** Every tab ends its streams for a moment, this one too. */
+/** Every window ends its streams for a moment, this one too. */
 export function makeRoom() {
-  tabs.postMessage("room");
+  windows.postMessage("room");
   pause(ROOM_MS);
 }
 
-/** Ask for all streams anew: a line that is dead does not say so. */
-export const renew = () => pause(0);
+/** Ask for all but the city's stream anew: a line that was dead did not say so. */
+export function renew() {
+  for (const { rank, look } of all) if (rank > RANKS.city) look(false);
+  lookAll();
+}
 
 function pause(ms) {
-  roomUntil = performance.now() + ms + 1;
+  roomUntil = performance.now() + ms;
   lookAll();
-  setTimeout(lookAll, ms + 2);
+  setTimeout(lookAll, ms + 1);
+}
+
+const isAway = () => isGone || document.hidden;
+
+/** Say what this window wishes for, and see what that changes here. */
+function tell() {
+  const ranks = isAway() ? [] : all.map(({ rank }) => rank);
+  windows.postMessage({ number, isFirst: document.hasFocus(), ranks });
+  lookAll();
 }
 
 function lookAll() {
-  for (const look of all) look();
+  const now = performance.now();
+  for (const [one, { at }] of others) if (now - at > GONE_MS) others.delete(one);
+  const granted = isAway() || now < roomUntil ? 0 : share();
+  all.forEach(({ look }, i) => look(i < granted));
+  isCrowded.value = !isAway() && now >= roomUntil && granted < all.length;
+  isShutOut.value = isCrowded.value && granted === 0;
 }
 
-tabs.onmessage = () => pause(ROOM_MS);
-document.addEventListener("visibilitychange", lookAll);
-window.addEventListener("pagehide", () => lookAll((isGone = true)));
-window.addEventListener("pageshow", () => lookAll((isGone = false)));
+/** How many of its streams this window may have open; all windows come to the same. */
+function share() {
+  const own = { number, isFirst: document.hasFocus(), ranks: all.map(({ rank }) => rank) };
+  const wishes = [own, ...others.values()].flatMap((one) => one.ranks.map((rank) => ({ rank, one })));
+  wishes.sort((a, b) => a.rank - b.rank || b.one.isFirst - a.one.isFirst || a.one.number - b.one.number);
+  return wishes.slice(0, MOST).filter(({ one }) => one === own).length;
+}
+
+windows.onmessage = ({ data }) => {
+  if (data === "room") pause(ROOM_MS);
+  else {
+    const isNew = !others.has(data.number);
+    others.set(data.number, { ...data, at: performance.now() });
+    if (isNew && all.length) tell();
+    else lookAll();
+  }
+};
+setInterval(() => !isAway() && tell(), WORD_MS);
+document.addEventListener("visibilitychange", tell);
+for (const name of ["focus", "blur"]) window.addEventListener(name, tell);
+window.addEventListener("pagehide", () => tell((isGone = true)));
+window.addEventListener("pageshow", () => tell((isGone = false)));

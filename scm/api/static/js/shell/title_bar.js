@@ -6,7 +6,7 @@ import { change, notify } from "scm/shell/api.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { clock, fixed, spaced, span, UNKNOWN } from "scm/shared/format.js";
 import { city, isConnected, link, pulse, quiet_s, stop } from "scm/shell/store.js";
-import { makeRoom } from "scm/shell/streams.js";
+import { isShutOut, makeRoom } from "scm/shell/streams.js";
 import { nextTheme, theme } from "scm/shell/theme.js";
 
 /** What is asked about the stop: `release`, `reason`; null: nothing. */
@@ -160,11 +160,12 @@ export function Banners() {
     </div>`}
     ${lost &&
     html`<div class="banner lost" role="alert">
-      <b>${isConnected.value ? "The world is silent" : "No connection to the server"}</b>
+      <b>${isConnected.value ? "The world is silent" : isShutOut.value ? "Too many windows" : "No connection to the server"}</b>
       <span>
         ${pulse.value.t_ns === null
           ? "Nothing has been heard yet."
           : `What you see is ${span(quiet_s.value)} old.`}
+        ${isShutOut.value ? " Other windows of this browser hold all connections that it grants: close one." : ""}
       </span>
     </div>`}
     ${link.value === "live" &&

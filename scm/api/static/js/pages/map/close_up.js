@@ -1,7 +1,7 @@
 /** What the chosen car sees and means to do: its LIDAR's scans and its way ahead, heard while they are shown. */
 import { effect } from "@preact/signals";
 import { selected } from "scm/shared/selection.js";
-import { hear } from "scm/shell/streams.js";
+import { hear, RANKS } from "scm/shell/streams.js";
 import { fleet } from "scm/pages/map/fleet.js";
 import { layers } from "scm/pages/map/layers.js";
 
@@ -25,7 +25,7 @@ export function hearCloseUp() {
 
 function hearScans(vehicle) {
   const take = (scan) => Object.assign(closeUp, { scan, scanAt: performance.now() });
-  const end = hear(`/api/v1/vehicles/${vehicle}/scan/stream`, { scan: take });
+  const end = hear(`/api/v1/vehicles/${vehicle}/scan/stream`, { scan: take }, RANKS.view);
   return () => {
     end();
     closeUp.scan = null;

@@ -8,7 +8,7 @@ import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { byName } from "scm/shared/format.js";
 import { enter } from "scm/shell/api.js";
-import { whileSeen } from "scm/shell/streams.js";
+import { RANKS, whileSeen } from "scm/shell/streams.js";
 
 const ADDRESS = "/api/v1/vehicles.bin";
 const VERSION = 1;
@@ -43,7 +43,7 @@ export const fleetBeat = signal(0);
 
 /** Hear the stream for as long as the component is on the page and somebody looks at it. */
 export function useFleet() {
-  useEffect(() => whileSeen(begin), []);
+  useEffect(() => whileSeen(begin, RANKS.car), []);
 }
 
 /** One car as an object; null: there is none of that name. */

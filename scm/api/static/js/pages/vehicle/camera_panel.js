@@ -4,7 +4,10 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { span } from "scm/shared/format.js";
 import { isOld, now } from "scm/shell/store.js";
+import { isCrowded } from "scm/shell/streams.js";
 import { watch } from "scm/pages/vehicle/film.js";
+
+const CROWDED = "Other windows of this browser are open, and it grants no more connections.";
 
 const camera = signal("front");
 
@@ -55,7 +58,8 @@ function Film({ src, label }) {
       onKeyDown=${(event) => event.key === "Escape" && setLarge(false)}
     >
       <canvas ref=${canvas} class="moves" data-stale=${late} role="img" aria-label=${label}></canvas>
-      ${!seen && html`<span class="empty">Waiting for a picture.</span>`}
+      ${!seen && html`<span class="empty">${isCrowded.value ? CROWDED : "Waiting for a picture."}</span>`}
+      ${late && isCrowded.value && html`<span class="empty">${CROWDED}</span>`}
       ${late && html`<span class="late">${span((now.value - drawnAt.value) / 1000)} old</span>`}
     </button>
   `;

@@ -10,11 +10,13 @@ import { FactsPanel } from "scm/pages/vehicle/facts_panel.js";
 import { LidarPanel } from "scm/pages/vehicle/lidar_panel.js";
 import { LightsPanel } from "scm/pages/vehicle/lights_panel.js";
 import { PlotsPanel } from "scm/pages/vehicle/plots_panel.js";
+import { useReports } from "scm/pages/vehicle/reports.js";
 import { WheelPanel } from "scm/pages/vehicle/wheel_panel.js";
 
 const STALE_MS = 500;
 
 export function CloseUp({ car }) {
+  useReports(car.vehicle);
   const mode = modeOf(car);
   return html`
     <header class="who moves" data-stale=${car.age_ms > STALE_MS}>
@@ -36,7 +38,7 @@ export function CloseUp({ car }) {
     </header>
     <${CameraPanel} car=${car} />
     <${LidarPanel} car=${car} />
-    <${PlotsPanel} car=${car} />
+    <${PlotsPanel} />
     <div class="side">
       <${WheelPanel} car=${car} />
       <${FactsPanel} car=${car} />

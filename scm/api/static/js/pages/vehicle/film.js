@@ -1,6 +1,6 @@
 /** A film as the server sends it: JPEG pictures, one behind the other. Only the newest is shown, and its end is noticed. */
 import { enter } from "scm/shell/api.js";
-import { whileSeen } from "scm/shell/streams.js";
+import { RANKS, whileSeen } from "scm/shell/streams.js";
 
 const AGAIN_MS = 1000;
 const HEAD_END = "\r\n\r\n";
@@ -18,7 +18,7 @@ export function watch(address, take) {
     const ending = new AbortController();
     follow(address, newestOnly(take, ending.signal), ending.signal);
     return () => ending.abort();
-  });
+  }, RANKS.view);
 }
 
 async function follow(address, show, ended) {

@@ -1,48 +1,37 @@
 /** What a car's LIDAR sees, from above: the car looks up, rings every half metre. Heard while it is shown. */
-import { useSignal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
 import { footprint } from "scm/shared/car_shape.js";
-import { isConnected, useOld } from "scm/shell/store.js";
-import { hear } from "scm/shell/streams.js";
+import { useOld } from "scm/shell/store.js";
 import { colours } from "scm/shell/theme.js";
+import { scan, scannedAt } from "scm/pages/vehicle/reports.js";
 
 const REACHES_M = [1, 2, 4, 8];
 
 export function LidarPanel({ car }) {
   const canvas = useRef(null);
   const [reach, setReach] = useState(2);
-  const [state, setState] = useState({ words: "Waiting for a scan." });
-  const scan = useRef(null);
-  const heardAt = useSignal(-Infinity);
-  const late = useOld(heardAt);
+  const late = useOld(scannedAt);
+  const told = scan.value;
   useEffect(() => {
-    const take = (told) => {
-      scan.current = told;
-      heardAt.value = performance.now();
-      const hits = told.ranges_m.filter((range) => range !== null);
-      setState({ beams: told.ranges_m.length, nearest: hits.length ? Math.min(...hits) : null });
-    };
-    const onState = (state) => state === "refused" && isConnected.peek() && setState({ words: "This car has no LIDAR." });
-    return hear(`/api/v1/vehicles/${car.vehicle}/scan/stream`, { scan: take }, onState);
-  }, [car.vehicle]);
-  useEffect(() => {
-    if (scan.current && canvas.current) draw(canvas.current, scan.current, car.car, reach);
-  }, [state, reach, colours.value]);
+    if (told && canvas.current) draw(canvas.current, told, car.car, reach);
+  }, [told, reach, colours.value]);
+  const beams = told ? told.ranges_m.length : 0;
+  const nearest = told ? told.ranges_m.reduce((least, range) => (range === null ? least : Math.min(least ?? range, range)), null) : null;
   return html`
     <section class="panel lidar" aria-label="LIDAR">
       <div class="panel-head">
-        <h2>LIDAR ${state.beams && html`<small>nearest ${fixed(state.nearest, 2, " m")}</small>`}</h2>
+        <h2>LIDAR ${told && html`<small>nearest ${fixed(nearest, 2, " m")}</small>`}</h2>
         <div class="choices" role="group" aria-label="Reach">
           ${REACHES_M.map(
             (metres) => html`<button class="small" aria-pressed=${reach === metres} onClick=${() => setReach(metres)}>${metres} m</button>`,
           )}
         </div>
       </div>
-      ${state.words
-        ? html`<p class="empty">${state.words}</p>`
-        : html`<canvas ref=${canvas} class="moves" data-stale=${late} role="img" aria-label="Scan from above: ${state.beams} beams, the nearest thing at ${fixed(state.nearest, 2)} m"></canvas>`}
+      ${!told
+        ? html`<p class="empty">${told === false ? "This car has no LIDAR." : "Waiting for a scan."}</p>`
+        : html`<canvas ref=${canvas} class="moves" data-stale=${late} role="img" aria-label="Scan from above: ${beams} beams, the nearest thing at ${fixed(nearest, 2)} m"></canvas>`}
     </section>
   `;
 }

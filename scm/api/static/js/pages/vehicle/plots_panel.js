@@ -5,7 +5,7 @@ import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
 import { useOld } from "scm/shell/store.js";
 import { colours } from "scm/shell/theme.js";
-import { fresh, reportedAt, reportsNow, SHOWN_S, useReports } from "scm/pages/vehicle/reports.js";
+import { fresh, reportedAt, reportsNow, SHOWN_S } from "scm/pages/vehicle/reports.js";
 
 const DRAW_MS = 100;
 const HEIGHT = 152;
@@ -31,8 +31,7 @@ const PLOTS = [
   },
 ];
 
-export function PlotsPanel({ car }) {
-  useReports(car.vehicle);
+export function PlotsPanel() {
   const late = useOld(reportedAt);
   const [paused, setPaused] = useState(false);
   return html`

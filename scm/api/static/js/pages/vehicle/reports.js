@@ -1,7 +1,7 @@
-/** The last half minute of all that a car reports, in columns; heard while somebody shows it. */
+/** The last half minute of all that a car reports, in columns, and its newest scan; heard while somebody shows it. */
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-import { hear } from "scm/shell/streams.js";
+import { hear, RANKS } from "scm/shell/streams.js";
 
 export const SHOWN_S = 30;
 const GAP_S = 0.5;
@@ -13,8 +13,12 @@ const NAMES = ["t", "throttle", "steering", "speed", "angle", "yawRate", "accel"
 /** Counts up with every frame that came. */
 export const fresh = signal(0);
 
-/** When the newest came, on this page's clock [ms]. */
+/** When the newest came, on this page's clock [ms]; likewise of `scan`. */
 export const reportedAt = signal(-Infinity);
+export const scannedAt = signal(-Infinity);
+
+/** The newest turn of its LIDAR: a `ScanRow`; null: none came yet, false: it has no LIDAR. */
+export const scan = signal(null);
 
 let columns = empty();
 
@@ -32,14 +36,19 @@ export function useReports(vehicle) {
   useEffect(() => {
     columns = empty();
     fresh.value += 1;
-    return hear(`/api/v1/vehicles/${vehicle}/reports`, {
+    scan.value = null;
+    return hear(`/api/v1/vehicles/${vehicle}/reports?scan=true`, {
+      scan(told) {
+        scan.value = told ?? false;
+        scannedAt.value = performance.now();
+      },
       reports({ samples }) {
         samples.forEach(take);
         forget();
         fresh.value += 1;
         reportedAt.value = performance.now();
       },
-    });
+    }, RANKS.car);
   }, [vehicle]);
 }
 
