@@ -12,7 +12,6 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from msgspec import Meta
 from starlette.exceptions import HTTPException
-from starlette.middleware.body_limit import MAX_BODY_SIZE_SCOPE_KEY
 
 from scm.api.trace import trace_id
 from scm.errors import StoreError
@@ -161,10 +160,10 @@ async def _on_invalid(request: Request, error: Exception) -> Response:
 async def on_http(request: Request, error: Exception) -> Response:
     """Return the problem for what the framework refuses: a path, a method, too large a body."""
     assert isinstance(error, HTTPException)  # noqa: S101  the type it was registered for
-    code, detail = _CODE_OF_STATUS.get(error.status_code, "http"), str(error.detail)
-    if code == "too_large":
-        detail = f"body: expected at most {request.scope[MAX_BODY_SIZE_SCOPE_KEY]} bytes, got more"
-    return problem(error.status_code, code, detail, instance=request.url.path)
+    code = _CODE_OF_STATUS.get(error.status_code, "http")
+    response = problem(error.status_code, code, str(error.detail), instance=request.url.path)
+    response.headers.update(error.headers or {})
+    return response
 
 
 async def _on_disk(request: Request, error: Exception) -> Response:
