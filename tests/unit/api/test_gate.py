@@ -80,6 +80,8 @@ class TestWithoutKey:
             {"Origin": "http://evil.example"},
             {"Origin": "null"},
             {"Origin": "http://127.0.0.1:9999"},
+            {"Origin": "http://[::1"},
+            {"Origin": ""},
             {"Sec-Fetch-Site": "cross-site"},
         ],
     )
