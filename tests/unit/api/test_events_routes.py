@@ -3,6 +3,8 @@
 import csv
 import io
 import json
+import threading
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
 
 import msgspec
@@ -140,6 +142,29 @@ class TestAcknowledging:
         seen.add(ids, "ada")
         assert list(seen.rows()) == ids[3:]
         assert len(list(store.items("seen"))) == KEPT
+
+    def test_who_looks_does_not_wait_for_a_slow_store(self, store, monkeypatch):
+        seen = Acknowledgements(store, StepClock(7))
+        seen.add(["a" * 16], "ada")
+        begun, may_end = threading.Event(), threading.Event()
+        put = store.put
+
+        def put_slowly(*asked):
+            begun.set()
+            assert may_end.wait(60.0)
+            put(*asked)
+
+        monkeypatch.setattr(store, "put", put_slowly)
+        with ThreadPoolExecutor(2) as threads:
+            adding = threads.submit(seen.add, ["b" * 16], "bob")
+            assert begun.wait(60.0)
+            looking = threads.submit(seen.newest, 5)
+            done, _ = wait([looking], 20.0)
+            may_end.set()
+            assert done
+            assert [row.by for row in looking.result()] == ["ada"]
+            adding.result(60.0)
+        assert [row.by for row in seen.newest(5)] == ["ada", "bob"]
 
     def test_a_broken_record_is_named(self, store):
         store.put("seen", "event/x", b"{}")
