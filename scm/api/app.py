@@ -207,9 +207,9 @@ class _Desk:
 def _add_layers(app: FastAPI, desk: _Desk, clock: WallClock) -> None:
     policy = content_policy(INDEX.read_text("utf-8"))
     app.add_middleware(Idempotent, clock=clock)  # what is added later sees a request earlier
-    app.add_middleware(Limited, clock=clock)
     app.add_middleware(Bounded, larger=FILES)
     app.add_middleware(Audited, store=desk.store, clock=clock)
+    app.add_middleware(Limited, clock=clock)  # what is asked too often fills no log
     app.add_middleware(Dashboard)
     app.add_middleware(Gate, keys=desk.known, policy=policy)
     app.add_middleware(Measured, metrics=desk.metrics, clock=clock)
