@@ -251,19 +251,20 @@ class TestAudit:
         assert len(call("GET", f"{API}/audit").json()["items"]) == 1
 
     def test_a_slow_store_keeps_no_other_work_waiting(self, store, monkeypatch):
-        begun, may_end = threading.Event(), threading.Event()
+        begun, may_end = asyncio.Event(), threading.Event()
+        loops = []
 
         def note_slowly(_log, _deed):
-            begun.set()
+            loops[0].call_soon_threadsafe(begun.set)
             assert may_end.wait(60.0)
 
         async def scenario():
+            loops.append(asyncio.get_running_loop())
             audited = Audited(Response("done"), store=store, clock=StepClock())
             transport = httpx.ASGITransport(audited)
             async with httpx.AsyncClient(transport=transport, base_url="http://city") as client:
                 changes = [asyncio.create_task(client.put("/x")) for _ in range(40)]
-                while not begun.is_set():
-                    await asyncio.sleep(0)
+                await begun.wait()
                 try:
                     return await asyncio.wait_for(asyncio.to_thread(lambda: "renewed"), 20.0)
                 finally:
