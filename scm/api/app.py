@@ -16,6 +16,7 @@ from scm.api.calibration_desk import LARGEST_PICTURE
 from scm.api.city import Ask, City, Link
 from scm.api.dashboard import INDEX, Dashboard, astray
 from scm.api.gate import Gate, content_policy
+from scm.api.head import Headed
 from scm.api.idempotency import Idempotent
 from scm.api.keys import KeyRing
 from scm.api.known_keys import KnownKeys
@@ -206,7 +207,8 @@ class _Desk:
 
 def _add_layers(app: FastAPI, desk: _Desk, clock: WallClock) -> None:
     policy = content_policy(INDEX.read_text("utf-8"))
-    app.add_middleware(Idempotent, clock=clock)  # what is added later sees a request earlier
+    app.add_middleware(Headed)  # what is added later sees a request earlier
+    app.add_middleware(Idempotent, clock=clock)
     app.add_middleware(Bounded, larger=FILES)
     app.add_middleware(Audited, store=desk.store, clock=clock)
     app.add_middleware(Limited, clock=clock)  # what is asked too often fills no log

@@ -107,7 +107,7 @@ class TestWithoutKey:
     def test_a_form_of_another_site_cannot_pass_as_json(self, client, fake_city):
         headers = {"Content-Type": "text/plain"}
         response = client("POST", "/api/v1/vehicles", content=b"{}", headers=headers)
-        assert response.status_code == 422
+        assert response.status_code == 415
         assert fake_city.asked == []
 
 
