@@ -163,7 +163,7 @@ async def _on_invalid(request: Request, error: Exception) -> Response:
 
 
 def _is_no_object(found: dict[str, Any]) -> bool:
-    return found["loc"] == ("body",) and found["type"] == "model_attributes_type"
+    return bool(found["loc"] == ("body",) and found["type"] == "model_attributes_type")
 
 
 def _told(found: dict[str, Any]) -> dict[str, str]:
