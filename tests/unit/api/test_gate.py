@@ -172,6 +172,18 @@ class TestWithKeys:
         assert client("DELETE", path, headers=bearer(admin)).status_code == 404
         assert client("GET", "/api/v1/vehicles", headers=bearer(other)).status_code == 401
 
+    @pytest.mark.parametrize("given", ["1", "k" * 128])
+    def test_two_callers_with_one_idempotency_key_ask_for_two_things(
+        self, keyed_app, client_of, key_of, fake_city, given
+    ):
+        once, client = {"Idempotency-Key": given}, client_of(keyed_app)
+        for key in (key_of("operator"), key_of("operator")):
+            for replayed in (None, "true"):
+                answer = put_stop(client, **bearer(key), **once)
+                assert answer.status_code == 200
+                assert answer.headers.get("idempotency-replayed") == replayed
+        assert len(fake_city.asked) == len({one.request_id for one in fake_city.asked}) == 2
+
     def test_a_page_reads_with_a_cookie_and_changes_with_its_key_alone(
         self, keyed_app, client_of, key_of, fake_city
     ):
