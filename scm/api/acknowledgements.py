@@ -33,30 +33,30 @@ class Acknowledgement(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Acknowledgements:
-    """All acknowledgements of a city; safe from any thread."""
+    """All acknowledgements of a city; safe from any thread.
+
+    Who looks never waits for the store: the live stream does so in the loop that serves all pages.
+    """
 
     def __init__(self, store: Repository, clock: Clock) -> None:
         self._store = store
         self._clock = clock
-        self._lock = threading.Lock()
-        self._rows: dict[str, Acknowledgement] = {}
+        self._changing = threading.Lock()
         kept = [_read(key, body) for key, body in store.items("seen") if key.startswith(_PREFIX)]
-        for row in sorted(kept, key=lambda row: row.at_ns):
-            self._rows[row.event] = row
+        kept.sort(key=lambda row: row.at_ns)
+        self._rows = {row.event: row for row in kept}  # replaced by a change, never changed
 
     def rows(self) -> dict[str, Acknowledgement]:
         """Return all of them by the event's id."""
-        with self._lock:
-            return dict(self._rows)
+        return dict(self._rows)
 
     def newest(self, most: int) -> tuple[Acknowledgement, ...]:
         """Return those that came last, oldest first."""
-        with self._lock:
-            return tuple(self._rows.values())[-most:]
+        return tuple(self._rows.values())[-most:]
 
     def add(self, events: Sequence[str], by: str, note: str = "") -> tuple[Acknowledgement, ...]:
         """Acknowledge events by their ids; one already acknowledged stays as it was."""
-        with self._lock:
+        with self._changing:
             now_ns = self._clock.now_ns()
             fresh = {
                 event: Acknowledgement(event=event, by=by, note=note, at_ns=now_ns)
@@ -77,11 +77,11 @@ class Acknowledgements:
 
     def take_back(self, event: str) -> Acknowledgement | None:
         """Take one back; return what it was, or None."""
-        with self._lock:
+        with self._changing:
             row = self._rows.get(event)
             if row is not None:
                 self._store.delete("seen", _PREFIX + event)
-                del self._rows[event]
+                self._rows = {name: one for name, one in self._rows.items() if name != event}
             return row
 
 

@@ -8,12 +8,15 @@ from http import HTTPStatus
 
 from fastapi import APIRouter, FastAPI
 
-from scm.api import openapi, problem
+from scm.api import openapi, problem, uploads
 from scm.api.acknowledgements import Acknowledgements
 from scm.api.audit_trail import Audited
+from scm.api.body_limit import Bounded
+from scm.api.calibration_desk import LARGEST_PICTURE
 from scm.api.city import Ask, City, Link
 from scm.api.dashboard import INDEX, Dashboard, astray
 from scm.api.gate import Gate, content_policy
+from scm.api.head import Headed
 from scm.api.idempotency import Idempotent
 from scm.api.keys import KeyRing
 from scm.api.known_keys import KnownKeys
@@ -66,8 +69,11 @@ from scm.maps.model import CityMap
 from scm.store.memory import MemoryStore
 from scm.store.repository import Repository
 
-LARGEST_BODY = 2**20
-"""Bytes of a request's body; a route that takes files says how much it takes."""
+FILES = {
+    r"/api/v1/mismatch/uploads": uploads.MOST_BYTES,
+    r"/api/v1/eye/cameras/[^/]+/views": LARGEST_PICTURE,
+}
+"""Addresses that take files: how many bytes of them."""
 
 
 def create_app(
@@ -108,7 +114,6 @@ def create_app(
         redoc_url=None,
         openapi_url="/api/v1/openapi.json",
         generate_unique_id_function=openapi.operation_id,
-        max_body_size=LARGEST_BODY,  # read whole before anybody asks whether the caller may
         lifespan=desk.lifespan,
     )
     app.state.stream = desk.stream
@@ -202,9 +207,11 @@ class _Desk:
 
 def _add_layers(app: FastAPI, desk: _Desk, clock: WallClock) -> None:
     policy = content_policy(INDEX.read_text("utf-8"))
-    app.add_middleware(Idempotent, clock=clock)  # what is added later sees a request earlier
-    app.add_middleware(Limited, clock=clock)
+    app.add_middleware(Headed)  # what is added later sees a request earlier
+    app.add_middleware(Idempotent, clock=clock)
+    app.add_middleware(Bounded, larger=FILES)
     app.add_middleware(Audited, store=desk.store, clock=clock)
+    app.add_middleware(Limited, clock=clock)  # what is asked too often fills no log
     app.add_middleware(Dashboard)
     app.add_middleware(Gate, keys=desk.known, policy=policy)
     app.add_middleware(Measured, metrics=desk.metrics, clock=clock)

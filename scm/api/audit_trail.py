@@ -8,6 +8,7 @@ refusal of a change too: who, from where, what, how it ended, how long it took.
 import asyncio
 import logging
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import msgspec
@@ -100,12 +101,16 @@ def newest_first(store: Repository) -> Iterator[AuditRow]:
 
 
 class Audited:
-    """ASGI middleware behind the gate: notes every change, whether it was done or refused."""
+    """ASGI middleware behind the gate: notes every change, whether it was done or refused.
+
+    It has a thread of its own: a store that is slow must not keep those waiting that renew leases.
+    """
 
     def __init__(self, app: ASGIApp, *, store: Repository, clock: Clock) -> None:
         self._app = app
         self._log = AuditLog(store)
         self._clock = clock
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="audit")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, and note it when it was to change something."""
@@ -131,7 +136,7 @@ class Audited:
             await self._app(scope, counted, send_noted)
         finally:
             deed = _deed(scope, status, sizes["received"], began_ns, self._clock.now_ns())
-            await asyncio.to_thread(self._note, deed)
+            await asyncio.get_running_loop().run_in_executor(self._thread, self._note, deed)
 
     def _note(self, deed: Deed) -> None:
         try:

@@ -25,7 +25,7 @@ from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from scm.api import problem
-from scm.api.etag import etag_of, names_tag
+from scm.api.etag import etag_of, has_tag
 
 STATIC_DIR = Path(__file__).parent / "static"
 INDEX = STATIC_DIR / "index.html"
@@ -98,7 +98,7 @@ class Dashboard:
         headers = Headers(scope=scope)
         packs = "gzip" in headers.get("accept-encoding", "")
         body = file.packed if packs else file.plain
-        is_known = names_tag(headers.get("if-none-match", ""), body.etag)
+        is_known = has_tag(headers.get("if-none-match", ""), body.etag)
         status = HTTPStatus.NOT_MODIFIED if is_known else HTTPStatus.OK
         await send(
             {"type": "http.response.start", "status": int(status), "headers": list(body.headers)}

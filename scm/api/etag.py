@@ -21,7 +21,7 @@ def etag_of(body: bytes) -> str:
 def tagged(request: Request, body: object, status: int = 200) -> Response:
     """Return a resource that can be edited as JSON with its ETag; 304 to a reader who has it."""
     tag = etag_of(encode(body))
-    if request.method in _READS and names_tag(request.headers.get("if-none-match", ""), tag):
+    if request.method in _READS and has_tag(request.headers.get("if-none-match", ""), tag):
         return Response(status_code=304, headers={"ETag": tag, "Cache-Control": "no-cache"})
     return json_response(body, status, {"ETag": tag, "Cache-Control": "no-cache"})
 
@@ -79,9 +79,14 @@ Matching = Annotated[Condition, Depends(_condition)]
 
 
 def names_tag(header: str, tag: str) -> bool:
-    """Return whether an `If-Match` or `If-None-Match` names an ETag."""
+    """Return whether an `If-Match` names an ETag: the very one, not a weak one."""
     named = [part.strip() for part in header.split(",")]
     return named == ["*"] or tag in named
+
+
+def has_tag(header: str, tag: str) -> bool:
+    """Return whether an `If-None-Match` names an ETag, though a proxy that packs made it weak."""
+    return names_tag(header.replace("W/", ""), tag)
 
 
 def _stale(header: str, got: str, have: str) -> RefusedError:

@@ -1,7 +1,8 @@
 """The last events of the city, numbered in order of arrival, so that a reader can page on.
 
 A number counts from the start of the server. What an event is called for good, whoever heard it
-and however often, is its `id`: a server that starts again hears the last ones again.
+and however often, is its `id`: a server that starts again hears the last ones again. One that is
+heard twice, for the bus came back or two asked for the same in one tick, is noted once.
 """
 
 import hashlib
@@ -75,14 +76,22 @@ class EventLog:
     """A bounded log: the oldest event is forgotten when it is full."""
 
     def __init__(self, depth: int = DEPTH) -> None:
-        self._events: deque[LoggedEvent] = deque(maxlen=depth)
+        self._depth = depth
+        self._events: deque[LoggedEvent] = deque()
+        self._ids: set[str] = set()
         self.newest_seq = 0
 
     def add(self, event: CityEvent) -> None:
-        """Append an event under the next number."""
+        """Append an event under the next number, unless it is here already."""
+        name = id_of(event)
+        if name in self._ids:
+            return
+        self._ids.add(name)
         self.newest_seq += 1
         facts = {name: getattr(event, name) for name in event.__struct_fields__}
-        self._events.append(LoggedEvent(seq=self.newest_seq, id=id_of(event), **facts))
+        self._events.append(LoggedEvent(seq=self.newest_seq, id=name, **facts))
+        if len(self._events) > self._depth:
+            self._ids.discard(self._events.popleft().id)
 
     def after(self, seq: int, limit: int) -> tuple[LoggedEvent, ...]:
         """Return up to `limit` events numbered above `seq`, oldest first."""

@@ -126,7 +126,7 @@ class Gate:
         if is_safe and not _is_embedded_elsewhere(headers):
             return None
         origin = headers.get("origin")
-        foreign = origin is not None and urlsplit(origin).netloc != host
+        foreign = origin is not None and _site_of(origin) != host
         if is_safe or foreign or headers.get("sec-fetch-site") == "cross-site":
             detail = f"Origin: got {origin!r}, expected this site ({host}) or none"
             return HTTPStatus.FORBIDDEN, "origin", detail
@@ -208,6 +208,14 @@ def _key_offered(scope: Scope) -> str:
 def _address(scope: Scope) -> str:
     client = scope.get("client")
     return str(client[0]) if client else ""
+
+
+def _site_of(origin: str) -> str:
+    """Return name and port of an Origin header; empty when it cannot be read."""
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:
+        return ""
 
 
 def _name_of(host: str) -> str:

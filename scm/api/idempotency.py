@@ -12,7 +12,7 @@ import hashlib
 from collections import OrderedDict
 from dataclasses import dataclass, field
 
-from starlette.datastructures import Headers
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -107,6 +107,7 @@ class Idempotent:
             await send(message)
 
         try:
+            _name_caller(scope, key)
             await self._app(scope, _again(body, receive), send_noted)
         finally:
             self._settle(mine, entry, answer)
@@ -133,6 +134,19 @@ def _key_of(scope: Scope) -> str:
         return ""
     key = Headers(scope=scope).get("idempotency-key", "")
     return key if len(key) <= LARGEST_KEY else ""
+
+
+def _name_caller(scope: Scope, key: str) -> None:
+    """Put the caller's name before a key, where callers have one.
+
+    The key goes on to the bus as the id of what is asked there, which knows of no callers: two who
+    count from 1 must not get one another's answers.
+    """
+    if scope.get("scm_key"):
+        own = f"{caller_of(scope)}.{key}"
+        if len(own) > LARGEST_KEY:
+            own = f"{caller_of(scope)}.{hashlib.sha256(key.encode()).hexdigest()}"
+        MutableHeaders(scope=scope)["Idempotency-Key"] = own
 
 
 def _as_known(known: _Entry, digest: bytes, key: str, scope: Scope) -> Response:

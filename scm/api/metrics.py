@@ -20,6 +20,7 @@ from scm.clock import Clock, seconds
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 BUCKETS_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 1.0, 2.5)
+METHODS = frozenset({"GET", "HEAD", "OPTIONS", "POST", "PUT", "PATCH", "DELETE"})
 _ENDLESS = "text/event-stream", "multipart/x-mixed-replace", "application/octet-stream"
 
 Labels = dict[tuple[str, ...], float]
@@ -77,10 +78,11 @@ class Measured:
             await self._app(scope, receive, send_noted)
         finally:
             route = _route_of(scope)
-            self._metrics.requests.labels(scope["method"], route, str(status)).inc()
+            method = scope["method"] if scope["method"] in METHODS else "other"
+            self._metrics.requests.labels(method, route, str(status)).inc()
             if not media.startswith(_ENDLESS):
                 took_s = seconds(self._clock.now_ns() - began_ns)
-                self._metrics.seconds.labels(scope["method"], route).observe(took_s)
+                self._metrics.seconds.labels(method, route).observe(took_s)
 
 
 def _route_of(scope: Scope) -> str:

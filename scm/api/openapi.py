@@ -15,6 +15,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
+from scm.api.roles import ROLES, SCHEME
 from scm.api.words import UNITS, WORDS
 from scm.errors import RunError
 
@@ -65,7 +66,15 @@ def described(document: Schema) -> Schema:
     for operation in operations(document):
         for parameter in operation.get("parameters", ()):
             _add_example(parameter["name"], parameter["schema"], schemas)
+        if "security" in operation:
+            operation["security"] = [_least_role(operation["security"])]
     return document
+
+
+def _least_role(given: list[Schema]) -> Schema:
+    """Return the highest of the roles that a noun and its route ask for: all of them have to be."""
+    named = {role for one in given for role in one[SCHEME]}
+    return {SCHEME: [max(named, key=ROLES.index)]}
 
 
 def operations(document: Schema) -> Iterator[Schema]:

@@ -6,6 +6,8 @@ RFC 8288 asks, in `Link`. A cursor is opaque to its reader: the key of the last 
 
 import base64
 import binascii
+import re
+from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Annotated, Generic, TypeVar
 from urllib.parse import urlencode
@@ -18,12 +20,13 @@ from scm.api.problem import RefusedError
 from scm.v2x.message import Refused
 
 MOST = 500
+_CURSOR = re.compile(r"k([1-9][0-9]{0,5})?:(.*)", re.DOTALL)
 
 Limit = Annotated[int, Query(ge=1, le=MOST, description="rows a page", examples=[100])]
 Cursor = Annotated[
     str,
     Query(
-        max_length=200,
+        max_length=6000,
         description="`next` of the page before; empty: the first page",
         examples=["czo0MQ"],
     ),
@@ -50,7 +53,8 @@ def page_of(
 
     Args:
         rows: All of them; those up to the cursor's are skipped.
-        key: What tells a row from all others and never changes; rows need not be sorted by it.
+        key: What tells a row from others and never changes; rows need not be sorted by it. Of rows
+            that have the same one the cursor counts which it is.
         limit: Rows a page.
         cursor: Of the page before.
 
@@ -59,22 +63,27 @@ def page_of(
     """
     wanted = _read(cursor) if cursor else None
     found: list[T] = []
+    alike = Counter[str]()
+    last = ""
     for row in rows:
+        if len(found) == limit:
+            return Page(items=tuple(found), next=cursor_at(last, alike[last]))
+        last = key(row)
+        alike[last] += 1
         if wanted is not None:
-            if key(row) == wanted:
+            if (last, alike[last]) == wanted:
                 wanted = None
             continue
-        if len(found) == limit:
-            return Page(items=tuple(found), next=cursor_at(key(found[-1])))
         found.append(row)
     if wanted is not None:
         raise _bad(cursor, "its row is gone: begin anew")
     return Page(items=tuple(found), next=None)
 
 
-def cursor_at(key: str) -> str:
-    """Return the cursor behind the row of that key."""
-    return base64.urlsafe_b64encode(f"k:{key}".encode()).decode().rstrip("=")
+def cursor_at(key: str, number: int = 1) -> str:
+    """Return the cursor behind the row of that key; of several, of the one of that number."""
+    which = f"k{number}" if number > 1 else "k"
+    return base64.urlsafe_b64encode(f"{which}:{key}".encode()).decode().rstrip("=")
 
 
 def page_response(request: Request, page: Page[T]) -> Response:
@@ -86,15 +95,16 @@ def page_response(request: Request, page: Page[T]) -> Response:
     return json_response(page, headers={"Link": link})
 
 
-def _read(cursor: str) -> str:
+def _read(cursor: str) -> tuple[str, int]:
     padded = cursor + "=" * (-len(cursor) % 4)
     try:
         text = base64.b64decode(padded, altchars=b"-_", validate=True).decode()
     except (binascii.Error, UnicodeDecodeError, ValueError):
         text = ""
-    if not text.startswith("k:"):
+    match = _CURSOR.fullmatch(text)
+    if match is None:
         raise _bad(cursor, "it is none of ours")
-    return text.removeprefix("k:")
+    return match[2], int(match[1] or 1)
 
 
 def _bad(cursor: str, why: str) -> RefusedError:

@@ -4,6 +4,8 @@ On top of the RFC's members every problem has a `code`, a short machine word.
 """
 
 import errno
+import re
+from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Annotated, Any
 
@@ -12,7 +14,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from msgspec import Meta
 from starlette.exceptions import HTTPException
-from starlette.middleware.body_limit import MAX_BODY_SIZE_SCOPE_KEY
+from starlette.routing import Match
 
 from scm.api.trace import trace_id
 from scm.errors import StoreError
@@ -32,11 +34,13 @@ STATUS_OF_CODE = {
 """HTTP status for the code of a `Refused`; any other code is a conflict with the city's state."""
 
 _CODE_OF_STATUS = {
+    400: "invalid",
     401: "unauthorised",
     403: "forbidden",
     404: "not_found",
     405: "method_not_allowed",
     413: "too_large",
+    415: "media_type",
     422: "invalid",
     429: "too_many",
     500: "internal",
@@ -48,7 +52,9 @@ DISK_TROUBLE = frozenset(
 )
 """What the server's disk says when nothing can be written, whoever asks."""
 
-_STATUSES = (400, 401, 403, 404, 409, 412, 413, 422, 428, 429, 500, 503, 504, 507)
+_JSON = re.compile(r"application/([\w.-]+\+)?json\s*(;|$)", re.IGNORECASE)
+_METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
+_STATUSES = (400, 401, 403, 404, 409, 412, 413, 415, 422, 428, 429, 500, 503, 504, 507)
 
 
 class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
@@ -147,24 +153,49 @@ async def _on_refused(request: Request, error: Exception) -> Response:
 
 async def _on_invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)  # noqa: S101  the type it was registered for
-    errors = tuple(
-        {
-            "where": ".".join(str(step) for step in found["loc"]),
-            "expected": str(found["msg"]).removeprefix("Value error, "),
-        }
-        for found in error.errors()
-    )
+    media = request.headers.get("content-type", "")
+    if any(map(_is_no_object, error.errors())) and not _JSON.match(media):
+        detail = f"Content-Type: got {media!r}, expected application/json"
+        return problem(415, "media_type", detail, instance=request.url.path)
+    errors = tuple(map(_told, error.errors()))
     detail = "; ".join(f"{item['where']}: {item['expected']}" for item in errors)
     return problem(422, "invalid", detail, instance=request.url.path, errors=errors)
+
+
+def _is_no_object(found: dict[str, Any]) -> bool:
+    return bool(found["loc"] == ("body",) and found["type"] == "model_attributes_type")
+
+
+def _told(found: dict[str, Any]) -> dict[str, str]:
+    """Return where something is wrong, and what was expected there."""
+    if found["type"] == "json_invalid":
+        why = f"JSON: {found['ctx']['error']} at character {found['loc'][1]}"
+        return {"where": "body", "expected": why}
+    expected = str(found["msg"]).removeprefix("Value error, ")
+    return {
+        "where": ".".join(str(step) for step in found["loc"]),
+        "expected": "a JSON object" if _is_no_object(found) else expected,
+    }
 
 
 async def on_http(request: Request, error: Exception) -> Response:
     """Return the problem for what the framework refuses: a path, a method, too large a body."""
     assert isinstance(error, HTTPException)  # noqa: S101  the type it was registered for
-    code, detail = _CODE_OF_STATUS.get(error.status_code, "http"), str(error.detail)
-    if code == "too_large":
-        detail = f"body: expected at most {request.scope[MAX_BODY_SIZE_SCOPE_KEY]} bytes, got more"
-    return problem(error.status_code, code, detail, instance=request.url.path)
+    code = _CODE_OF_STATUS.get(error.status_code, "http")
+    response = problem(error.status_code, code, str(error.detail), instance=request.url.path)
+    if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+        response.headers["Allow"] = ", ".join(_allowed(request))
+    return response
+
+
+def _allowed(request: Request) -> Iterator[str]:
+    """Yield the methods of an address: its route that refused one knows its own alone."""
+    for method in _METHODS:
+        asked = {**request.scope, "method": method}
+        if any(route.matches(asked)[0] is Match.FULL for route in request.app.routes):
+            yield method
+            if method == "GET":
+                yield "HEAD"
 
 
 async def _on_disk(request: Request, error: Exception) -> Response:

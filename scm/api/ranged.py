@@ -33,8 +33,6 @@ def send_file(request: Request, path: Path, media_type: str) -> Response:
     if _RANGE.fullmatch(asked):
         status = 206
         headers["Content-Range"] = f"bytes {start}-{end - 1}/{size}"
-    if request.method == "HEAD":
-        return Response(status_code=status, headers=headers, media_type=media_type)
     return StreamingResponse(_blocks(path, start, end), status, headers, media_type)
 
 

@@ -8,14 +8,19 @@ route names its least role.
 from collections.abc import Callable
 from typing import Annotated, Literal, get_args
 
-from fastapi import Depends
-from fastapi.params import Depends as Dependency
+from fastapi import Depends, Security
+from fastapi.openapi.models import HTTPBearer
+from fastapi.params import Security as Dependency
+from fastapi.security.base import SecurityBase
 from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 
 from scm.errors import AccessError, nearest
 
 Role = Literal["viewer", "operator", "engineer", "admin"]
+SCHEME = "key"
+"""What the description of the interface calls an API key."""
+
 ROLES: tuple[Role, ...] = get_args(Role)
 
 
@@ -32,8 +37,13 @@ def check_role(name: str) -> Role:
     raise AccessError(msg)
 
 
-class AtLeast:
+class AtLeast(SecurityBase):
     """A dependency of a route: the caller's role, from the gate, is this one or above."""
+
+    model = HTTPBearer(
+        description="An API key (`scm key add`), where the city asks for one; see docs/security.md."
+    )
+    scheme_name = SCHEME
 
     def __init__(self, role: Role) -> None:
         self.role = role
@@ -47,7 +57,7 @@ class AtLeast:
 
 
 def _at_least(role: Role) -> Dependency:
-    dependency: Dependency = Depends(AtLeast(role))
+    dependency: Dependency = Security(AtLeast(role), scopes=[role])
     return dependency
 
 

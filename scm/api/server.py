@@ -2,8 +2,11 @@
 
 import asyncio
 import contextlib
+import itertools
+import resource
 import socket
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterator
 
 import h11
@@ -17,6 +20,10 @@ from scm.errors import RunError
 _POLL_S = 0.05
 LONGEST_PACKET = 4096  # bytes; a drive packet has about a hundred
 PATIENCE_S = 10.0
+MOST_CONNECTIONS = 3000
+FILES, OWN_FILES = 4096, 256  # as many as we ask for; of these the store, the bus and recordings
+BACKLOG = 128
+_numbers = itertools.count()
 
 
 class _Server(uvicorn.Server):
@@ -28,24 +35,35 @@ class _Server(uvicorn.Server):
 
 
 class _Impatient(H11Protocol):
-    """HTTP of uvicorn, which waits for ever for a request's head; connections are not endless."""
+    """HTTP of uvicorn, which waits for ever for a request; and connections are not endless.
+
+    Whoever comes is let in, for it may be the red stop: where there are too many, the oldest of the
+    address that has most of them goes.
+    """
 
     patience_s = PATIENCE_S
+    most = MOST_CONNECTIONS
     _waits: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Wait for the first request."""
+        """Make room, and wait for the first request."""
         super().connection_made(transport)
+        self.number = next(_numbers)
+        if len(self.connections) > self.most:
+            self._make_room()
         self._wait()
 
     def data_received(self, data: bytes) -> None:
-        """Wait on while a head comes in pieces, and no longer when it is whole."""
+        """Wait on while a head comes in pieces; for each piece of a body anew."""
         super().data_received(data)
         if self.conn.their_state is h11.IDLE:
             self._wait()
-        elif self._waits is not None:
+            return
+        if self._waits is not None:
             self._waits.cancel()
             self._waits = None
+        if self.conn.their_state is h11.SEND_BODY:
+            self._wait()
 
     def _wait(self) -> None:
         if self._waits is None:
@@ -53,8 +71,30 @@ class _Impatient(H11Protocol):
 
     def _give_up(self) -> None:
         self._waits = None
-        if self.conn.their_state is h11.IDLE and not self.transport.is_closing():
+        if self.transport.is_closing():
+            return
+        state = self.conn.their_state
+        if state is h11.SEND_BODY and self.flow.read_paused:
+            self._wait()  # it is we who are slow
+        elif state in (h11.IDLE, h11.SEND_BODY):
             self.transport.close()
+
+    def _make_room(self) -> None:
+        """Cut one connection: not this one, nor one of somebody at a car's wheel."""
+        there = [
+            one
+            for one in self.connections
+            if isinstance(one, _Impatient) and one is not self and not one.transport.is_closing()
+        ]
+        if len(there) >= self.most:
+            ((address, _),) = Counter(one.address for one in there).most_common(1)
+            oldest = min((one for one in there if one.address == address), key=lambda o: o.number)
+            oldest.transport.abort()  # to close would wait for who does not read
+
+    @property
+    def address(self) -> str:
+        """Where it comes from."""
+        return self.client[0] if self.client else ""
 
 
 def serve(
@@ -79,9 +119,11 @@ def serve(
     """
     check_bind(host, app.state.keys)
     listener = _bind(host, port)
+    _Impatient.most = _most_connections()
     config = uvicorn.Config(
         app,
         http=_Impatient,
+        backlog=BACKLOG,
         proxy_headers=app.state.keys is not None,  # without keys only this machine calls
         ws="websockets-sansio",
         ws_max_size=LONGEST_PACKET,
@@ -93,6 +135,15 @@ def serve(
         server_header=False,
     )
     asyncio.run(_serve(_Server(config), app, listener, stop_event, on_ready))
+
+
+def _most_connections() -> int:
+    """Let this process have the files that it needs; return how many may be connections."""
+    most, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = FILES if hard == resource.RLIM_INFINITY else min(FILES, hard)
+    if most != resource.RLIM_INFINITY and most < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+    return min(MOST_CONNECTIONS, max(wanted - OWN_FILES, wanted // 2))
 
 
 async def _serve(

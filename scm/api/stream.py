@@ -2,7 +2,8 @@
 
 A page first gets a `snapshot` of its topics, then `delta`s with those that changed, each whole;
 events come one by one and never twice. What nobody hears is not made. A page too slow to take them
-gets a new snapshot instead of a backlog. Silence is broken by a `beat` once a second.
+gets a new snapshot instead of a backlog, with the events it has not had. Silence is broken by a
+`beat` once a second.
 
 An id is `<run>-<frame>-<event>`: a page that comes back with the last one it saw gets the events
 after that one; after a restart of the server the run differs, and it gets the last ones anew.
@@ -31,24 +32,29 @@ QUEUE_DEPTH = 20  # frames: one second
 
 
 class Listener:
-    """One page: frames on their way to it; when it cannot keep up they are all dropped."""
+    """One page: frames on their way to it; when it cannot keep up they are all dropped.
+
+    Attributes:
+        told_seq: Number of the newest event that it took; None: it took nothing yet.
+    """
 
     def __init__(self, topics: frozenset[str]) -> None:
         self.topics = topics
-        self._frames: deque[bytes] = deque()
+        self.told_seq: int | None = None
+        self._frames: deque[tuple[bytes, int]] = deque()
         self._wake = asyncio.Event()
         self.behind = False
         self.closed = False
 
-    def offer(self, frame: bytes) -> None:
-        """Queue a frame; a full queue is emptied and the page marked as behind."""
+    def offer(self, frame: bytes, event_seq: int) -> None:
+        """Queue a frame, which tells events up to a number; a full queue is emptied."""
         if self.behind:
             return
         if len(self._frames) >= QUEUE_DEPTH:
             self._frames.clear()
             self.behind = True
         else:
-            self._frames.append(frame)
+            self._frames.append((frame, event_seq))
         self._wake.set()
 
     def close(self) -> None:
@@ -61,7 +67,10 @@ class Listener:
         while not (self._frames or self.behind or self.closed):
             self._wake.clear()
             await self._wake.wait()
-        return None if self.behind or self.closed else self._frames.popleft()
+        if self.behind or self.closed:
+            return None
+        frame, self.told_seq = self._frames.popleft()
+        return frame
 
 
 class Stream:
@@ -122,7 +131,7 @@ class Stream:
                 frames[listener.topics] = self._frame_of(changed, listener.topics)
             frame = frames[listener.topics]
             if frame is not None:
-                listener.offer(frame)
+                listener.offer(frame, self._event_seq)
 
     async def listen(
         self, last_event_id: str = "", topics: Iterable[str] | None = None
@@ -133,19 +142,20 @@ class Stream:
             last_event_id: Of the last frame that the page saw; empty: none.
             topics: Those that it hears, of `self.topics`; None: all.
         """
+        if not self._listeners:
+            self._event_seq = self._city.view.picture().event_seq
         listener = Listener(frozenset(self.topics if topics is None else topics))
+        listener.told_seq = self._resume_seq(last_event_id)
         self._listeners.add(listener)
         try:
-            yield b"retry: 1000\n\n" + self._snapshot(
-                listener.topics, self._resume_seq(last_event_id)
-            )
+            yield b"retry: 1000\n\n" + self._snapshot(listener)
             while not (self._closed or listener.closed):
                 frame = await listener.take()
                 if frame is not None:
                     yield frame
                 elif listener.behind:
                     listener.behind = False
-                    yield self._snapshot(listener.topics, None)
+                    yield self._snapshot(listener)
         finally:
             self._listeners.discard(listener)
 
@@ -177,19 +187,22 @@ class Stream:
             changed[EVENTS] = msgspec.Raw(encode(events))
         return changed
 
-    def _snapshot(self, topics: frozenset[str], after_seq: int | None) -> bytes:
+    def _snapshot(self, listener: Listener) -> bytes:
+        """Return everything as it is; of events those that no delta told it, nor the next will."""
         picture = self._city.view.picture()
-        after_seq = max(after_seq or 0, picture.event_seq - EVENTS_SHOWN)
-        events = self._city.view.events_after(after_seq, EVENTS_SHOWN)
+        newest = self._event_seq
+        after_seq = min(max(listener.told_seq or 0, newest - EVENTS_SHOWN), newest)
+        events = self._city.view.events_after(after_seq, newest - after_seq)
+        listener.told_seq = newest
         body = {
             name: msgspec.Raw(encode(topic.make(picture)))
             for name, topic in self._topics.items()
-            if name in topics
+            if name in listener.topics
         }
-        if EVENTS in topics:
+        if EVENTS in listener.topics:
             body[EVENTS] = msgspec.Raw(encode(events))
         body["run"] = msgspec.Raw(encode(self._run_id))
-        return self._event("snapshot", body, events[-1].seq if events else after_seq)
+        return self._event("snapshot", body, newest)
 
     def _event(self, name: str, body: dict[str, msgspec.Raw], event_seq: int) -> bytes:
         head = f"id: {self._run_id}-{self._frame}-{event_seq}\nevent: {name}\ndata: "

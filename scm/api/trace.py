@@ -11,6 +11,7 @@ import re
 import secrets
 from contextvars import ContextVar
 from typing import TypeVar
+from urllib.parse import quote
 
 import msgspec
 from starlette.datastructures import Headers, MutableHeaders
@@ -70,5 +71,6 @@ class Traced:
 
 
 def _tell(scope: Scope, status: int, own: str) -> None:
-    facts = {"method": scope["method"], "path": scope["path"], "status": status, "trace_id": own}
+    path = quote(str(scope["path"]))  # which may hold lines, and would write them into the log
+    facts = {"method": scope["method"], "path": path, "status": status, "trace_id": own}
     event(_LOGGER, "request_failed", level=logging.WARNING, **facts)

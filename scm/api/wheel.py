@@ -28,7 +28,7 @@ Why = Literal["driving", "released", "silent"]
 class TakePacket(msgspec.Struct, kw_only=True, frozen=True, tag="take", forbid_unknown_fields=True):
     """The first word of a person; with a `reason` the car is taken from whoever has it."""
 
-    reason: str = ""
+    reason: Annotated[str, msgspec.Meta(max_length=500)] = ""
 
 
 class DrivePacket(

@@ -26,6 +26,7 @@ PAUSE_S = 0.25
 LONGEST_PAUSE_S = 5.0
 SILENT_S = 5.0
 AGAIN = frozenset({429, 502, 503, 504})
+CONFLICT = 409
 
 T = TypeVar("T")
 Values = Mapping[str, Any]
@@ -120,12 +121,7 @@ class Connection:
             MessageError: when the answer is not of that kind.
         """
         content = None if body is None else msgspec.json.encode(_given(body))
-        response = self._ask(method, path, query, headers, content, key)
-        try:
-            return msgspec.json.decode(response.content, type=kind)
-        except msgspec.MsgspecError as cause:
-            msg = f"{method} {path}: {cause}; expected {kind}: is the server another version?"
-            raise MessageError(msg) from cause
+        return _typed(self._ask(method, path, query, headers, content, key), kind)
 
     def tell(
         self,
@@ -163,18 +159,21 @@ class Connection:
         key: str | None = None,
     ) -> T:
         """Send bytes that are no JSON, and return the answer; raises as `ask`."""
-        response = self._ask(method, path, query, headers, content, key, "application/octet-stream")
-        return msgspec.json.decode(response.content, type=kind)
+        media = "application/octet-stream"
+        return _typed(self._ask(method, path, query, headers, content, key, media), kind)
 
     def pieces(
         self, path: str, *, query: Values | None = None, headers: Values | None = None
     ) -> Iterator[bytes]:
         """Yield what is long or endless as it comes; raises as `ask`."""
-        with self._http.stream(
-            "GET", path, params=_given(query), headers=_given(headers)
-        ) as response:
-            _check(response)
-            yield from response.iter_bytes()
+        try:
+            with self._http.stream(
+                "GET", path, params=_given(query), headers=_given(headers)
+            ) as response:
+                _check(response)
+                yield from response.iter_bytes()
+        except httpx.TransportError as cause:
+            raise _no_answer(cause) from cause
 
     def events(self, path: str, *, query: Values | None = None) -> Iterator[LiveEvent]:
         """Yield events for as long as they are asked for, through losses of the connection.
@@ -219,6 +218,8 @@ class Connection:
         with self._http.stream(
             "GET", path, params=_given(query), headers=headers, timeout=timeout
         ) as response:
+            if response.status_code in AGAIN:  # a server that starts again, behind another one
+                raise LinkError(str(_problem(response.status_code, response.read())))
             _check(response)
             yield from response.iter_lines()
 
@@ -256,7 +257,7 @@ class Connection:
             except LinkError:
                 self._pause(number)
                 continue
-            if response.status_code not in AGAIN:
+            if response.status_code not in AGAIN and not _is_under_way(response):
                 return response
             self._pause(number, response.headers.get("Retry-After", ""))
         return _reach(once)
@@ -284,6 +285,21 @@ def _reach(once: Callable[[], httpx.Response]) -> httpx.Response:
         raise _no_answer(cause) from cause
 
 
+def _typed(response: httpx.Response, kind: type[T]) -> T:
+    """Return the record that an answer holds."""
+    try:
+        return msgspec.json.decode(response.content, type=kind)
+    except msgspec.MsgspecError as cause:
+        asked = f"{response.request.method} {response.request.url.path}"
+        msg = f"{asked}: {cause}; expected {kind}: is the server another version?"
+        raise MessageError(msg) from cause
+
+
+def _is_under_way(response: httpx.Response) -> bool:
+    """Return whether the city is still at the same change, whose first answer was lost."""
+    return response.status_code == CONFLICT and _told(response.read()).code == "in_flight"
+
+
 def _no_answer(cause: Exception) -> LinkError:
     said = f"{type(cause).__name__}: {cause}"
     return LinkError(f"no answer from the city: {said}; is `scm up` running?")
@@ -296,8 +312,12 @@ def _check(response: httpx.Response) -> None:
 
 
 def _problem(status: int, body: bytes) -> ProblemError:
+    return ProblemError(_told(body, status))
+
+
+def _told(body: bytes, status: int = 0) -> Problem:
+    """Return the problem that an answer tells; one that was none of ours in its words."""
     try:
-        problem = msgspec.json.decode(body, type=Problem)
+        return msgspec.json.decode(body, type=Problem)
     except msgspec.MsgspecError:
-        problem = Problem(status=status, detail=body.decode(errors="replace")[:200])
-    return ProblemError(problem)
+        return Problem(status=status, detail=body.decode(errors="replace")[:200])

@@ -35,7 +35,8 @@ def events_of(connect: Callable[[str], Lines], pause: Callable[[int], bool]) -> 
     """Yield events, and connect again when they stop.
 
     Args:
-        connect: Returns the lines of a stream that goes on after an event, by its id.
+        connect: Returns the lines of a stream that goes on after an event, by its id; raises a
+            LinkError where it is worth trying again.
         pause: Waits before the next try, by its number; returns whether to give up.
 
     Raises:
@@ -50,6 +51,8 @@ def events_of(connect: Callable[[str], Lines], pause: Callable[[int], bool]) -> 
                 yield found
         except httpx.TransportError as cause:
             reason = f"{type(cause).__name__}: {cause}"
+        except LinkError as refusal:
+            reason = str(refusal)
         failed += 1
         if failed >= TRIES:
             msg = f"live stream: nothing came in {failed} tries: {reason}; is `scm up` running?"

@@ -83,6 +83,20 @@ def test_every_change_takes_an_idempotency_key_or_needs_none(document):
     assert without == set(WITHOUT_KEY), said(without ^ set(WITHOUT_KEY))
 
 
+def test_every_operation_names_the_role_that_its_key_needs(document):
+    scheme = document["components"]["securitySchemes"]["key"]
+    assert (scheme["type"], scheme["scheme"]) == ("http", "bearer")
+    needs = {where: one.get("security") for where, one in operations_of(document)}
+    assert {where for where, need in needs.items() if not need} == {"GET /healthz", "GET /readyz"}
+    for where, role in (
+        ("GET /api/v1/vehicles", "viewer"),
+        ("PUT /api/v1/stop", "operator"),
+        ("GET /api/v1/audit", "engineer"),
+        ("PUT /api/v1/scenarios/{name}", "admin"),
+    ):
+        assert needs[where] == [{"key": [role]}], where
+
+
 def test_every_list_bounds_its_page(document):
     wrong = [
         where

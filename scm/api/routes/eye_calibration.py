@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
-from scm.api.calibration_desk import LARGEST_PICTURE, CalibrationDesk, FloorTag
+from scm.api.calibration_desk import CalibrationDesk, FloorTag
 from scm.api.calibration_shelf import (
     LARGEST_TOML,
     CalibrationFile,
@@ -175,11 +175,10 @@ def _add_views(routes: APIRouter, city: City, there: Any) -> None:
         dependencies=[ENGINEER],
         responses=answer(View, 201),
         openapi_extra={"requestBody": {"required": False, "content": _PICTURES}},
-        max_body_size=LARGEST_PICTURE + 1,  # one more: then it is the route that says so
     )
     async def add_view(request: Request, name: Name, key: IdempotencyKey = "") -> Response:
         del key  # the same key gets the same answer, and no second picture
-        seen = await _sent(request) or _newest(city, name)
+        seen = await request.body() or _newest(city, name)
         path = await run_in_threadpool(there().add_view, name, seen)
         where = f"/api/v1/eye/cameras/{name}/views/{path.name}"
         return json_response(_view(path, {}), 201, {"Location": where})
@@ -215,16 +214,6 @@ def _add_views(routes: APIRouter, city: City, there: Any) -> None:
         del key  # once away it stays away
         there().view(name, view).unlink(missing_ok=True)
         return json_response(_views(there(), name))
-
-
-async def _sent(request: Request) -> bytes:
-    picture = bytearray()
-    async for chunk in request.stream():
-        picture += chunk
-        if len(picture) > LARGEST_PICTURE:
-            detail = f"picture: expected at most {LARGEST_PICTURE // 2**20} MiB, got more"
-            raise RefusedError(Refused(code="invalid", detail=detail))
-    return bytes(picture)
 
 
 def _add_measuring(routes: APIRouter, city: City, there: Any, work: Operations) -> None:

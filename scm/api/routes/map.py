@@ -1,11 +1,10 @@
 """The map: as data, and drawn."""
 
-import hashlib
-
 import msgspec
 from fastapi import APIRouter, Request, Response
 
 from scm.api.city import City
+from scm.api.etag import etag_of, has_tag
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer, answer_file
 from scm.maps.draw import draw_svg
@@ -41,8 +40,8 @@ def router(city: City) -> APIRouter:
 
 
 def _tagged(request: Request, body: bytes, media_type: str) -> Response:
-    etag = f'"{hashlib.sha256(body).hexdigest()[:16]}"'
+    etag = etag_of(body)
     headers = {"ETag": etag, "Cache-Control": "no-cache"}
-    if request.headers.get("if-none-match") == etag:
+    if has_tag(request.headers.get("if-none-match", ""), etag):
         return Response(status_code=304, headers=headers)
     return Response(body, headers=headers, media_type=media_type)

@@ -16,11 +16,9 @@ from scm.api.city import City, IdempotencyKey, json_response, not_found
 from scm.api.mismatch_jobs import MismatchJobs
 from scm.api.operations import Operation, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
-from scm.api.problem import RefusedError
 from scm.api.report_folders import BUDGET_S, FILES, NAME, Job, ReportRow, Together
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
 from scm.api.schemas import answer, answer_file, answer_nothing, answer_page
-from scm.v2x.message import Refused
 from scm.vehicles.car_files import car_files
 
 _CAR = r"^[a-z0-9_-]{0,32}$"
@@ -227,17 +225,12 @@ def _add_uploads(routes: APIRouter, jobs: MismatchJobs) -> None:
         dependencies=[OPERATOR],
         responses=answer(uploads.Upload, 201),
         openapi_extra={"requestBody": {"required": True, "content": _ZIP}},
-        max_body_size=uploads.MOST_BYTES + 1,  # one more: then it is the route that says so
     )
     async def upload(request: Request, name: Title = "", key: IdempotencyKey = "") -> Response:
         del key  # a second copy is a second upload; the oldest are forgotten
         shelf, cars = jobs.shelf(), tuple(sorted(car_files()))
         with TemporaryFile(dir=shelf) as body:  # of no name: gone with this request
             async for chunk in request.stream():
-                if body.tell() + len(chunk) > uploads.MOST_BYTES:
-                    most = uploads.MOST_BYTES // 2**20
-                    detail = f"upload: more than {most} MiB; send a part of the recording"
-                    raise RefusedError(Refused(code="invalid", detail=detail))
                 await run_in_threadpool(body.write, chunk)
             taken = await run_in_threadpool(uploads.take, shelf, body, name, cars)
         return json_response(taken, 201)

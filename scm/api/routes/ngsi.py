@@ -1,6 +1,8 @@
 """NGSI-LD, for reading: the city's entities as a context broker would give them."""
 
-from typing import Annotated, Any
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+from urllib.parse import urlencode
 
 import msgspec
 from fastapi import APIRouter, Path, Query, Request, Response
@@ -28,9 +30,10 @@ Attributes = Annotated[
     Meta(description="`id`, `type` and attributes of the entity's model", examples=[_EXAMPLE]),
 ]
 Short = Annotated[
-    str,
-    Query(max_length=32, description="`keyValues`: attributes are their values", examples=[""]),
+    Literal["", "normalized", "keyValues", "simplified"],
+    Query(description="`keyValues`, `simplified`: attributes are their values", examples=[""]),
 ]
+_HEEDED = frozenset({"type", "limit", "offset", "count", "options", "local"})
 
 
 def router(city: City) -> APIRouter:
@@ -60,11 +63,13 @@ def router(city: City) -> APIRouter:
         ] = False,
         options: Short = "",
     ) -> Response:
+        _check_heeded(request)
         wanted = _types(kind)
         found = [one for name in wanted for one in entities(city, name)]
         page = found[offset : offset + limit]
         headers = {"NGSILD-Results-Count": str(len(found))} if count else {}
-        return _response(request, [_shaped(one, options) for one in page], headers)
+        links = _neighbours(request, offset, limit, len(found))
+        return _response(request, [_shaped(one, options) for one in page], headers, links)
 
     @routes.get(
         "/entities/{entity}",
@@ -86,7 +91,7 @@ def router(city: City) -> APIRouter:
         kind = [*entity.split(":"), "", "", ""][2]
         for one in entities(city, kind) if kind in TYPES else ():
             if one["id"] == entity:
-                return _response(request, _shaped(one, options), {})
+                return _response(request, _shaped(one, options))
         raise not_found("entity", entity)
 
     return routes
@@ -106,13 +111,45 @@ def _types(kind: str) -> list[str]:
     return wanted
 
 
+def _check_heeded(request: Request) -> None:
+    """Refuse what would choose or shape entities and is not offered: to leave it out would lie."""
+    for name in request.query_params:
+        if name not in _HEEDED:
+            detail = f"{name}: there are no such queries; expected some of {sorted(_HEEDED)}"
+            raise RefusedError(Refused(code="invalid", detail=detail))
+
+
+def _neighbours(request: Request, offset: int, limit: int, count: int) -> list[str]:
+    """Return links to the pages after and before, as NGSI-LD (6.3.10) and RFC 8288 ask."""
+    there = {}
+    if limit and offset + limit < count:
+        there["next"] = offset + limit
+    if limit and offset:
+        there["prev"] = max(0, offset - limit)
+    links = []
+    for rel, to in there.items():
+        query = urlencode({**request.query_params, "offset": to, "limit": limit})
+        links.append(f'<{request.url.path}?{query}>; rel="{rel}"')
+    return links
+
+
 def _shaped(entity: Entity, options: str) -> Entity:
-    return key_values(entity) if options == "keyValues" else entity
+    return key_values(entity) if options in ("keyValues", "simplified") else entity
 
 
-def _response(request: Request, body: Entity | list[Entity], headers: dict[str, str]) -> Response:
+def _response(
+    request: Request,
+    body: Entity | list[Entity],
+    headers: dict[str, str] | None = None,
+    links: Sequence[str] = (),
+) -> Response:
     """Return entities with their context inside as JSON-LD, or named in `Link` as JSON."""
-    own = {"Cache-Control": "no-store", **headers}
+    own = {"Cache-Control": "no-store", **(headers or {})}
+    told = list(links)
+    if JSON_LD not in request.headers.get("accept", ""):
+        told.insert(0, f'<{CORE}>; rel="{_TYPE}"; type="{JSON_LD}"')
+    if told:
+        own["Link"] = ", ".join(told)
     if JSON_LD in request.headers.get("accept", ""):
         inside = (
             [{"@context": CONTEXT, **one} for one in body]
@@ -120,5 +157,4 @@ def _response(request: Request, body: Entity | list[Entity], headers: dict[str, 
             else {"@context": CONTEXT, **body}
         )
         return Response(encode(inside), headers=own, media_type=JSON_LD)
-    own["Link"] = f'<{CORE}>; rel="{_TYPE}"; type="{JSON_LD}"'
     return Response(encode(body), headers=own, media_type=JSON)

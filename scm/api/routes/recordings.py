@@ -142,7 +142,6 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
     """Add files to take home; before the routes whose names would match them too."""
     turns = asyncio.Semaphore(MOST_EXPORTS)
 
-    @routes.head("/{name}.mcap", include_in_schema=False)
     @routes.get(
         "/{name}.mcap",
         summary="The file as the recorder wrote it, or a range of it",

@@ -120,7 +120,11 @@ def _add_scripts(routes: APIRouter, shelf: ScenarioShelf) -> None:
         dependencies=[ADMIN],
         responses=answer_nothing(),
     )
-    def remove(name: Name, key: IdempotencyKey = "") -> Response:
+    def remove(name: Name, condition: Matching, key: IdempotencyKey = "") -> Response:
         del key  # what is gone stays gone
-        shelf.remove(name)
+        with shelf.editing:
+            before = shelf.find(name)
+            if before is not None and not before.shipped:
+                condition.check(before)
+            shelf.remove(name)
         return Response(status_code=204)

@@ -3,7 +3,7 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from typing import Any
+from typing import Any, Literal
 
 from scm.client.connection import Connection, part
 
@@ -21,7 +21,7 @@ class NgsiNoun:
         limit: int = 20,
         offset: int = 0,
         count: bool = False,
-        options: str = "",
+        options: Literal["", "normalized", "keyValues", "simplified"] = "",
     ) -> tuple[dict[str, Any], ...]:
         """NGSI-LD entities of the city.
 
@@ -30,7 +30,7 @@ class NgsiNoun:
             limit: at most
             offset: to skip
             count: tell how many there are in all
-            options: `keyValues`: attributes are their values
+            options: `keyValues`, `simplified`: attributes are their values
         """
         return self._connection.ask(
             "GET",
@@ -45,12 +45,14 @@ class NgsiNoun:
             },
         )
 
-    def one_entity(self, entity: str, *, options: str = "") -> dict[str, Any]:
+    def one_entity(
+        self, entity: str, *, options: Literal["", "normalized", "keyValues", "simplified"] = ""
+    ) -> dict[str, Any]:
         """One NGSI-LD entity.
 
         Args:
             entity: its urn
-            options: `keyValues`: attributes are their values
+            options: `keyValues`, `simplified`: attributes are their values
         """
         return self._connection.ask(
             "GET",

@@ -60,14 +60,28 @@ class ScenariosNoun:
             key=idempotency_key,
         )
 
-    def remove(self, name: str, *, idempotency_key: str = "") -> None:
+    def remove(
+        self,
+        name: str,
+        *,
+        if_match: str | None = None,
+        if_none_match: str | None = None,
+        idempotency_key: str = "",
+    ) -> None:
         """Delete a script.
 
         Args:
             name: a script without .py
+            if_match: ETag of the state that was edited; `*`: whichever there is
+            if_none_match: `*`: only where there is none yet
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        self._connection.tell("DELETE", f"/api/v1/scenarios/{part(name)}", key=idempotency_key)
+        self._connection.tell(
+            "DELETE",
+            f"/api/v1/scenarios/{part(name)}",
+            headers={"if-match": if_match, "if-none-match": if_none_match},
+            key=idempotency_key,
+        )
 
     def run(
         self, name: str, *, arguments: tuple[str, ...] | None = None, idempotency_key: str = ""

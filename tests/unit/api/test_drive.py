@@ -237,6 +237,15 @@ def test_a_car_in_other_hands_is_refused_in_words(connect, fake_city):
     assert ended.value.rcvd.code == NOT_YOURS
 
 
+def test_a_reason_as_long_as_a_book_is_refused(connect, fake_city):
+    with connect() as socket:
+        say(socket, {"type": "take", "reason": "r" * 501})
+        over = until(socket, "over")
+    assert over["code"] == "invalid"
+    assert "500" in over["detail"]
+    assert fake_city.asked == []
+
+
 def test_a_reason_takes_it_all_the_same(connect, fake_city):
     with connect() as socket:
         say(socket, {"type": "take", "reason": "it blocks the crossing"})

@@ -28,6 +28,8 @@ def test_an_answer_carries_its_tag_and_a_reader_who_has_it_gets_304():
     assert (whole.status_code, whole.headers["etag"], whole.body) == (200, TAG, encode(BODY))
     short = tagged(request(if_none_match=f"{OTHER}, {TAG}"), BODY)
     assert (short.status_code, short.headers["etag"], short.body) == (304, TAG, b"")
+    weak = tagged(request(if_none_match=f"W/{OTHER}, W/{TAG}"), BODY)  # as a proxy that packs says
+    assert weak.status_code == 304
     assert tagged(request(if_none_match=OTHER), BODY).status_code == 200
     assert tagged(request("PUT", if_none_match="*"), BODY).status_code == 200
 
@@ -54,6 +56,7 @@ def test_a_change_of_what_was_seen_passes(headers, body):
         ({"if_match": '"a*"'}, BODY, "precondition_failed"),
         ({"if_match": f"{OTHER}*"}, BODY, "precondition_failed"),
         ({"if_match": TAG}, None, "precondition_failed"),
+        ({"if_match": f"W/{TAG}"}, BODY, "precondition_failed"),
         ({"if_none_match": "*"}, BODY, "precondition_failed"),
     ],
 )

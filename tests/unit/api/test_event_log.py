@@ -30,3 +30,16 @@ def test_a_full_log_forgets_the_oldest_but_never_a_number():
 def test_an_event_keeps_what_it_said():
     (event,) = log_of(1).after(0, 1)
     assert (event.severity, event.source, event.text, event.vehicle) == ("info", "world", "1", None)
+
+
+def test_an_event_that_is_heard_again_is_noted_once_while_it_is_known():
+    log, told = (
+        EventLog(2),
+        [
+            CityEvent(severity="info", source="world", t_ns=number, name="told", text="same")
+            for number in (1, 1, 2, 1, 3, 1)
+        ],
+    )
+    for event in told:
+        log.add(event)
+    assert [(event.seq, event.t_ns) for event in log.newest_first()] == [(4, 1), (3, 3)]

@@ -1,16 +1,25 @@
 """Events filtered, acknowledged and exported; deeds noted, filtered and checked."""
 
+import asyncio
 import csv
 import io
 import json
+import threading
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
+from functools import partial
 
+import httpx
 import msgspec
 import pytest
+from starlette.responses import Response
 
+from scm.api import app as application
 from scm.api.acknowledgements import KEPT, Acknowledgements
 from scm.api.app import create_app
+from scm.api.audit_trail import Audited
 from scm.api.event_log import EventLog, id_of
+from scm.api.limits import Limited, Policy
 from scm.clock import StepClock
 from scm.errors import StoreError
 from scm.store.audit import AuditLog, Deed
@@ -141,6 +150,29 @@ class TestAcknowledging:
         assert list(seen.rows()) == ids[3:]
         assert len(list(store.items("seen"))) == KEPT
 
+    def test_who_looks_does_not_wait_for_a_slow_store(self, store, monkeypatch):
+        seen = Acknowledgements(store, StepClock(7))
+        seen.add(["a" * 16], "ada")
+        begun, may_end = threading.Event(), threading.Event()
+        put = store.put
+
+        def put_slowly(*asked):
+            begun.set()
+            assert may_end.wait(60.0)
+            put(*asked)
+
+        monkeypatch.setattr(store, "put", put_slowly)
+        with ThreadPoolExecutor(2) as threads:
+            adding = threads.submit(seen.add, ["b" * 16], "bob")
+            assert begun.wait(60.0)
+            looking = threads.submit(seen.newest, 5)
+            done, _ = wait([looking], 20.0)
+            may_end.set()
+            assert done
+            assert [row.by for row in looking.result()] == ["ada"]
+            adding.result(60.0)
+        assert [row.by for row in seen.newest(5)] == ["ada", "bob"]
+
     def test_a_broken_record_is_named(self, store):
         store.put("seen", "event/x", b"{}")
         with pytest.raises(StoreError, match="event/x"):
@@ -207,6 +239,40 @@ class TestAudit:
         broken = own_client("GET", f"{API}/audit/verdict").json()
         assert not broken["whole"]
         assert "entry 3" in broken["error"]
+
+    def test_who_asks_too_often_does_not_fill_the_log(
+        self, view, fake_city, city_map, store, client_of, monkeypatch
+    ):
+        once = Policy("changing", 1, 0.001)
+        monkeypatch.setattr(application, "Limited", partial(Limited, changing=once))
+        call = client_of(create_app(view, fake_city.ask, city_map, state=store))
+        codes = [call("POST", f"{API}/boxes/reset").status_code for _ in range(3)]
+        assert codes == [503, 429, 429]
+        assert len(call("GET", f"{API}/audit").json()["items"]) == 1
+
+    def test_a_slow_store_keeps_no_other_work_waiting(self, store, monkeypatch):
+        begun, may_end = asyncio.Event(), threading.Event()
+        loops = []
+
+        def note_slowly(_log, _deed):
+            loops[0].call_soon_threadsafe(begun.set)
+            assert may_end.wait(60.0)
+
+        async def scenario():
+            loops.append(asyncio.get_running_loop())
+            audited = Audited(Response("done"), store=store, clock=StepClock())
+            transport = httpx.ASGITransport(audited)
+            async with httpx.AsyncClient(transport=transport, base_url="http://city") as client:
+                changes = [asyncio.create_task(client.put("/x")) for _ in range(40)]
+                await begun.wait()
+                try:
+                    return await asyncio.wait_for(asyncio.to_thread(lambda: "renewed"), 20.0)
+                finally:
+                    may_end.set()
+                    await asyncio.gather(*changes)
+
+        monkeypatch.setattr(AuditLog, "note", note_slowly)
+        assert asyncio.run(scenario()) == "renewed"
 
     def test_a_store_that_fails_does_not_undo_the_change(
         self, own_client, fake_city, store, caplog

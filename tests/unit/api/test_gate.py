@@ -80,6 +80,8 @@ class TestWithoutKey:
             {"Origin": "http://evil.example"},
             {"Origin": "null"},
             {"Origin": "http://127.0.0.1:9999"},
+            {"Origin": "http://[::1"},
+            {"Origin": ""},
             {"Sec-Fetch-Site": "cross-site"},
         ],
     )
@@ -105,7 +107,7 @@ class TestWithoutKey:
     def test_a_form_of_another_site_cannot_pass_as_json(self, client, fake_city):
         headers = {"Content-Type": "text/plain"}
         response = client("POST", "/api/v1/vehicles", content=b"{}", headers=headers)
-        assert response.status_code == 422
+        assert response.status_code == 415
         assert fake_city.asked == []
 
 
@@ -169,6 +171,18 @@ class TestWithKeys:
         assert client("DELETE", path, headers=once).status_code == 200  # its answer was lost
         assert client("DELETE", path, headers=bearer(admin)).status_code == 404
         assert client("GET", "/api/v1/vehicles", headers=bearer(other)).status_code == 401
+
+    @pytest.mark.parametrize("given", ["1", "k" * 128])
+    def test_two_callers_with_one_idempotency_key_ask_for_two_things(
+        self, keyed_app, client_of, key_of, fake_city, given
+    ):
+        once, client = {"Idempotency-Key": given}, client_of(keyed_app)
+        for key in (key_of("operator"), key_of("operator")):
+            for replayed in (None, "true"):
+                answer = put_stop(client, **bearer(key), **once)
+                assert answer.status_code == 200
+                assert answer.headers.get("idempotency-replayed") == replayed
+        assert len(fake_city.asked) == len({one.request_id for one in fake_city.asked}) == 2
 
     def test_a_page_reads_with_a_cookie_and_changes_with_its_key_alone(
         self, keyed_app, client_of, key_of, fake_city

@@ -101,6 +101,13 @@ def test_requests_are_counted_by_route_not_by_address(read, client):
     assert told["scm_requests_total", "GET", "none", "404"] == 1.0
 
 
+def test_methods_that_nobody_knows_are_counted_as_one(read, client):
+    for number in range(3):
+        client(f"BREW{number}", "/api/v1/vehicles")
+    told = {key: value for key, value in read().items() if key[0] == "scm_requests_total"}
+    assert told == {("scm_requests_total", "other", "/api/v1/vehicles", "405"): 3.0}
+
+
 def test_an_endless_answer_is_counted_and_not_timed(view, fake_city, city_map, client_of):
     city = City(view, fake_city.ask, city_map, {}, Shelves(), Link())
     metrics = Metrics(city, Stream(city, "r", Acknowledgements(MemoryStore(), StepClock())))

@@ -67,6 +67,32 @@ def test_pages_are_cut_by_offset_and_counted_when_asked(client, city_of_two):
     assert client("GET", f"{WHERE}?type=Vehicle&limit=1&offset=5").json() == []
 
 
+def test_links_lead_through_all_pages_and_back(client, city_map):
+    path, seen = f"{WHERE}?type=RoadSegment&limit=3&options=keyValues", []
+    while path:
+        answer = client("GET", path)
+        seen += [one["name"] for one in answer.json()]
+        path = links_of(answer).get("next")
+    assert seen == [lane.name for lane in city_map.lanes]
+    before = links_of(answer)["prev"]
+    assert [one["name"] for one in client("GET", before).json()] == seen[-4:-1]
+    inside = client("GET", f"{WHERE}?type=RoadSegment&limit=3", headers=LD)
+    assert set(links_of(inside)) == {"next"}
+
+
+def links_of(answer):
+    return {name: link["url"] for name, link in answer.links.items()}
+
+
+@pytest.mark.parametrize(
+    "query", ["q=speed>1000", "id=urn:x", "attrs=speed", "georel=near", "options=concise"]
+)
+def test_a_query_that_is_not_offered_is_refused_and_not_left_out(client, city_of_two, query):
+    refused = client("GET", f"{WHERE}?type=Vehicle&{query}")
+    assert (refused.status_code, refused.json()["code"]) == (422, "invalid")
+    assert query.split("=")[0] in refused.json()["detail"]
+
+
 def test_the_context_is_inside_or_in_link_as_the_reader_wants(client, city_of_two):
     plain = client("GET", f"{WHERE}?type=Vehicle")
     assert "ngsi-ld-core-context" in plain.headers["link"]

@@ -173,13 +173,61 @@ class TestRefusals:
         for path in (f"{API}/nothing", "/static/nothing.js"):
             is_problem(client("GET", path, headers=person), 404, "not_found")
 
-    def test_a_method_that_is_not_offered_is_a_problem(self, client):
-        is_problem(client("PATCH", f"{API}/vehicles"), 405, "method_not_allowed")
+    @pytest.mark.parametrize(
+        ("path", "offered"),
+        [
+            ("/healthz", "GET, HEAD"),
+            (f"{API}/leases/n1", "GET, HEAD, POST, PUT, DELETE"),
+            (f"{API}/vehicles/n1/route", "POST"),
+            ("/ngsi-ld/v1/entities", "GET, HEAD"),
+        ],
+    )
+    def test_a_method_that_is_not_offered_is_a_problem_which_says_those_that_are(
+        self, client, path, offered
+    ):
+        refused = client("PATCH", path)
+        is_problem(refused, 405, "method_not_allowed")
+        assert refused.headers["allow"] == offered
+
+    @pytest.mark.parametrize("media", [None, "text/plain", "application/x-www-form-urlencoded"])
+    def test_a_body_that_is_not_called_json_is_refused_for_that(self, client, media):
+        headers = {"Content-Type": media} if media else {}
+        refused = client("PUT", f"{API}/stop", content=b'{"engaged": true}', headers=headers)
+        body = is_problem(refused, 415, "media_type")
+        assert body["detail"] == f"Content-Type: got {media or ''!r}, expected application/json"
+
+    @pytest.mark.parametrize(
+        ("content", "status", "said"),
+        [
+            (b'{"engaged": true,}', 422, "body: JSON: Expecting property name"),
+            (b"[]", 422, "body: a JSON object"),
+            (b"[" * 100_000, 400, "There was an error parsing the body"),
+        ],
+    )
+    def test_a_body_that_is_no_such_json_is_refused_in_words(self, client, content, status, said):
+        headers = {"Content-Type": "application/json"}
+        refused = client("PUT", f"{API}/stop", content=content, headers=headers)
+        assert is_problem(refused, status, "invalid")["detail"].startswith(said)
 
     def test_our_own_failure_is_a_problem_that_tells_no_secrets(self, client, fake_city):
         fake_city.answers = None  # asking it is a bug of ours now
         body = is_problem(client("DELETE", f"{API}/vehicles/n5"), 500, "internal")
         assert "NoneType" not in body["detail"]
+
+
+class TestHead:
+    def test_it_says_of_an_answer_what_the_answer_says_of_itself(self, client):
+        for path in ("/healthz", f"{API}/map", f"{API}/vehicles/n1", "/ngsi-ld/v1/entities"):
+            whole, head = client("GET", path), client("HEAD", path)
+            assert (head.status_code, head.content) == (whole.status_code, b"")
+            for name in ("content-length", "content-type"):
+                assert head.headers[name] == whole.headers[name]
+
+    @pytest.mark.parametrize("path", ["stream", "vehicles.bin"])
+    def test_what_is_endless_ends(self, client, path):
+        head = client("HEAD", f"{API}/{path}")
+        assert (head.status_code, head.content) == (200, b"")
+        assert client("GET", "/metrics").text.count("scm_stream_listeners 0.0") == 1
 
 
 class TestSignals:
@@ -278,8 +326,9 @@ class TestMap:
 
     def test_a_map_already_known_is_not_sent_again(self, client):
         etag = client("GET", f"{API}/map").headers["etag"]
-        again = client("GET", f"{API}/map", headers={"If-None-Match": etag})
-        assert (again.status_code, again.content) == (304, b"")
+        for known in (etag, f'"x", {etag}', f"W/{etag}"):
+            again = client("GET", f"{API}/map", headers={"If-None-Match": known})
+            assert (again.status_code, again.content) == (304, b"")
 
 
 class TestEye:

@@ -92,6 +92,15 @@ def test_a_script_is_changed_only_by_who_saw_it_last(client, keep):
     assert client("GET", "/api/v1/scenarios/mine").json()["text"] == "a = 2\n"
 
 
+def test_a_script_is_deleted_only_by_who_saw_it_last(client, keep):
+    old = keep("mine", "a = 1\n").headers["etag"]
+    new = keep("mine", "a = 2\n", **{"If-Match": old}).headers["etag"]
+    for headers, status in (({}, 428), ({"If-Match": old}, 412), ({"If-Match": new}, 204)):
+        gone = client("DELETE", "/api/v1/scenarios/mine", headers=headers)
+        assert gone.status_code == status
+    assert client("DELETE", "/api/v1/scenarios/mine").status_code == 404
+
+
 def test_what_is_no_python_is_refused_with_its_line(keep):
     answer = keep("mine", "a = 1\nb = (\n", status=422)
     assert answer.json()["detail"].startswith("mine.py, line 2: expected a Python script")

@@ -1,12 +1,13 @@
 import json
 import socket
 import threading
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from urllib.parse import urlsplit
 
 import httpx
 import pytest
 
+from scm.api import server
 from scm.api.app import create_app
 from scm.api.server import _Impatient, serve
 from scm.errors import RunError
@@ -127,6 +128,35 @@ def test_who_never_ends_a_request_s_head_is_let_go(app, monkeypatch, begun):
     ):
         idle.sendall(begun)
         assert idle.recv(100) == b""
+
+
+def test_a_body_that_does_not_come_is_not_waited_for(app, monkeypatch):
+    monkeypatch.setattr(_Impatient, "patience_s", 0.2)
+    head = b"PUT /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    with (
+        served(app) as (url, _, _),
+        socket.create_connection(address_of(url), PATIENCE_S) as idle,
+        suppress(ConnectionError),
+    ):
+        idle.sendall(head + b'Content-Length: 100\r\n\r\n{"engaged"')
+        assert idle.recv(100) == b""
+
+
+def test_however_many_hold_connections_the_next_one_is_heard(app, monkeypatch):
+    monkeypatch.setattr(server, "MOST_CONNECTIONS", 5)
+    listen = b"GET /api/v1/stream HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    with served(app) as (url, _, _), ExitStack() as held:
+        connections = []
+        for _ in range(12):
+            connection = socket.create_connection(address_of(url), PATIENCE_S)
+            connections.append(held.enter_context(connection))
+            connection.sendall(listen)
+            assert connection.recv(100).startswith(b"HTTP/1.1 200")
+        assert httpx.get(f"{url}/healthz", timeout=PATIENCE_S).status_code == 200
+        with suppress(ConnectionError):
+            while connections[0].recv(4096):
+                pass  # to its end: it was the oldest
+        assert connections[-1].recv(100)
 
 
 def test_who_asks_and_asks_again_is_not_let_go(app, monkeypatch):

@@ -74,6 +74,50 @@ def test_an_event_comes_once(stream, hear, event):
     asyncio.run(scenario())
 
 
+def test_an_event_that_came_just_before_a_page_did_is_told_it_once(stream, hear, event):
+    async def scenario():
+        await begin(stream)  # somebody hears already: the next frame tells all what is new
+        hear(1.0, event("one"))
+        page, (_, _, body) = await begin(stream)
+        told = [item["text"] for item in body["events"]]
+        stream.send_frame()
+        _, _, body = parsed(await anext(page))
+        assert told + [item["text"] for item in body.get("events", [])] == ["one"]
+
+    asyncio.run(scenario())
+
+
+def test_a_page_that_fell_behind_is_told_each_event_once_all_the_same(stream, hear, event):
+    async def scenario():
+        page, _ = await begin(stream)
+        texts = []
+        for number in range(3 * QUEUE_DEPTH):
+            hear(1.0 + number, event(str(number)))
+            stream.send_frame()
+            if number in (0, 1):  # as a page that keeps up
+                _, _, body = parsed(await anext(page))
+                texts += [item["text"] for item in body["events"]]
+        name, _, body = parsed(await anext(page))
+        assert name == "snapshot"
+        texts += [item["text"] for item in body["events"]]
+        assert texts == [str(number) for number in range(3 * QUEUE_DEPTH)]
+
+    asyncio.run(scenario())
+
+
+def test_an_id_from_beyond_the_end_skips_no_event_to_come(stream, hear, event):
+    async def scenario():
+        hear(1.0, event("old"))
+        page, (_, own_id, body) = await begin(stream, "run1-1-999999999999999999999999999")
+        assert (body["events"], own_id) == ([], "run1-0-1")
+        hear(1.1, event("new"))
+        stream.send_frame()
+        _, _, body = parsed(await anext(page))
+        assert [item["text"] for item in body["events"]] == ["new"]
+
+    asyncio.run(scenario())
+
+
 def test_all_pages_share_one_encoding(stream, hear, snapshot):
     async def scenario():
         first, _ = await begin(stream)
@@ -88,7 +132,8 @@ def test_all_pages_share_one_encoding(stream, hear, snapshot):
 def test_a_page_that_comes_back_gets_the_events_it_missed(stream, hear, event):
     async def scenario():
         hear(1.0, event("seen"))
-        _, (_, last_id, _) = await begin(stream)
+        page, (_, last_id, _) = await begin(stream)
+        await page.aclose()
         hear(1.1, event("missed"))
         _, (_, _, body) = await begin(stream, last_id)
         assert [item["text"] for item in body["events"]] == ["missed"]
@@ -99,7 +144,8 @@ def test_a_page_that_comes_back_gets_the_events_it_missed(stream, hear, event):
 def test_a_page_that_missed_too_many_events_gets_the_last_ones(stream, hear, event):
     async def scenario():
         hear(1.0, event("seen"))
-        _, (_, last_id, _) = await begin(stream)
+        page, (_, last_id, _) = await begin(stream)
+        await page.aclose()
         hear(1.1, *(event(str(number)) for number in range(EVENTS_SHOWN + 4)))
         _, (_, _, body) = await begin(stream, last_id)
         assert [item["seq"] for item in body["events"]] == list(range(6, EVENTS_SHOWN + 6))
@@ -193,8 +239,8 @@ def test_a_listener_behind_takes_no_more_until_it_was_told():
     async def scenario():
         listener = Listener(frozenset())
         for _ in range(QUEUE_DEPTH + 1):
-            listener.offer(b"x")
-        listener.offer(b"y")
+            listener.offer(b"x", 0)
+        listener.offer(b"y", 0)
         assert await listener.take() is None
         assert listener.behind
 

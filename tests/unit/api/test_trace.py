@@ -3,10 +3,11 @@
 import logging
 
 import pytest
+from starlette.responses import PlainTextResponse
 
 from scm.api.app import create_app
 from scm.api.audit_trail import newest_first
-from scm.api.trace import HEADER, trace_id, trace_id_of, traced
+from scm.api.trace import HEADER, Traced, trace_id, trace_id_of, traced
 from scm.clock import StepClock
 from scm.part import Serves
 from scm.station import Station
@@ -47,6 +48,13 @@ def test_problems_and_the_log_name_it(client, caplog):
         answer = client("GET", "/readyz", headers={"traceparent": PARENT})
     assert answer.json()["trace_id"] == GIVEN
     assert f"request_failed method=GET path=/readyz status=503 trace_id={GIVEN}" in caplog.text
+
+
+def test_a_path_writes_no_line_of_its_own_into_the_log(client_of, caplog):
+    app = Traced(PlainTextResponse("full", 507))
+    with caplog.at_level(logging.WARNING, "scm.api.trace"):
+        client_of(app)("PUT", "/api/v1/x%0Acity_stop%20by=ada")
+    assert "path=/api/v1/x%0Acity_stop%20by%3Dada status=507" in caplog.text
 
 
 def test_what_is_asked_of_the_city_carries_it(view, fake_city, city_map, client_of):

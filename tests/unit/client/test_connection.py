@@ -115,6 +115,12 @@ def test_a_lost_change_is_asked_again_under_the_same_key(served):
     assert json.loads(asked[0].content) == {"laps": 2}
 
 
+def test_a_change_that_is_still_under_way_is_waited_for(served):
+    own, asked = served(httpx.ReadTimeout("late"), problem(409, "in_flight"), row())
+    assert own.ask("POST", "/v", Row, body={}, key="") == Row("n1")
+    assert len({request.headers["idempotency-key"] for request in asked}) == 1
+
+
 def test_a_change_without_a_key_is_never_asked_twice(served):
     own, asked = served(httpx.ReadTimeout("late"), row())
     with pytest.raises(LinkError, match="ReadTimeout: late"):
@@ -139,6 +145,15 @@ def test_what_is_only_done_is_told_by_its_own_verb_and_under_a_key(served):
 def test_long_answers_come_in_pieces(served):
     own, _ = served(httpx.Response(200, content=b"abcdef"))
     assert b"".join(own.pieces("/film")) == b"abcdef"
+
+
+def test_whatever_way_an_answer_fails_the_error_is_one_of_ours(served):
+    own, _ = served(row(laps="many"))
+    with pytest.raises(MessageError, match=r"POST /v: .*int.*laps"):
+        own.send("POST", "/v", Row, b"zip")
+    own, _ = served(httpx.ReadError("gone"))
+    with pytest.raises(LinkError, match="ReadError: gone"):
+        list(own.pieces("/film"))
 
 
 def test_a_name_cannot_leave_its_place_in_the_path():
@@ -173,6 +188,15 @@ class TestStream:
 
         with pytest.raises(LinkError, match="nothing came in 8 tries: ConnectError: refused"):
             list(events_of(connect, lambda _number: False))
+
+    def test_a_server_that_is_not_there_yet_is_asked_again(self, served):
+        stream = httpx.Response(200, text="\n".join([*self.LINES, ""]))
+        own, asked = served(problem(502, ""), problem(503, "offline"), stream)
+        assert next(own.events("/stream")).name == "snapshot"
+        assert len(asked) == 3
+        own, _ = served(problem(401, "unauthorised"))
+        with pytest.raises(ProblemError, match="401"):
+            next(own.events("/stream"))
 
     def test_a_closed_connection_ends_the_stream(self):
         assert list(events_of(lambda _last_id: iter(()), lambda _number: True)) == []

@@ -123,7 +123,8 @@ function Script({ name, again, seen }) {
     again();
   };
   const remove = async () => {
-    if (!(await change("DELETE", `/scenarios/${name}`, undefined, () => `${name} is deleted.`))) return;
+    const gone = () => `${name} is deleted.`;
+    if (!(await change("DELETE", `/scenarios/${name}`, undefined, gone, { "If-Match": known.etag }))) return;
     again();
     go("/recordings/scenarios");
   };

@@ -1,0 +1,42 @@
+"""HEAD: what GET says of an answer, without the answer (RFC 9110, 9.3.2), of every address.
+
+What is long or endless is begun and ended again, as when its reader goes away.
+"""
+
+import asyncio
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+_FOUND = ("route", "path_params")
+
+
+class Headed:
+    """ASGI middleware, innermost: routes know GET alone."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Ask for the answer, and leave it out."""
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            await self._app(scope, receive, send)
+            return
+        asked = {**scope, "method": "GET"}
+        was_asked, is_over = False, asyncio.Event()
+
+        async def receive_once() -> Message:
+            nonlocal was_asked
+            if not was_asked:
+                was_asked = True
+                return await receive()
+            await is_over.wait()
+            return {"type": "http.disconnect"}
+
+        async def send_head(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                await send(message)
+                await send({"type": "http.response.body", "body": b""})
+                is_over.set()
+
+        await self._app(asked, receive_once, send_head)
+        scope.update({name: asked[name] for name in _FOUND if name in asked})

@@ -1,0 +1,51 @@
+"""A body that is too large is refused as a problem, whoever reads it, and files may be larger."""
+
+import pytest
+
+from scm.api.app import create_app
+from scm.api.body_limit import LARGEST_BODY
+from scm.api.keys import KeyRing
+from scm.api.shelves import shelves_in
+from scm.store.memory import MemoryStore
+
+STOP = "/api/v1/stop"
+UPLOADS = "/api/v1/mismatch/uploads"
+KEY = {"Idempotency-Key": "k1"}
+JSON = {"Content-Type": "application/json"}
+LARGE = b" " * (LARGEST_BODY + 1)
+
+
+async def in_pieces():
+    for _ in range(4):
+        yield LARGE[: LARGEST_BODY // 2]
+
+
+@pytest.mark.parametrize("content", [LARGE, in_pieces], ids=["announced", "in pieces"])
+@pytest.mark.parametrize("headers", [JSON, JSON | KEY], ids=["no key", "key"])
+def test_a_body_too_large_is_refused_like_anything_else(client, fake_city, headers, content):
+    given = content() if callable(content) else content
+    refused = client("PUT", STOP, content=given, headers=headers)
+    assert refused.headers["content-type"] == "application/problem+json"
+    assert (refused.status_code, refused.json()["code"]) == (413, "too_large")
+    assert "at most 1048576 bytes" in refused.json()["detail"]
+    assert "content-security-policy" in refused.headers
+    assert fake_city.asked == []
+
+
+def test_what_is_refused_anyway_is_so_for_its_own_reason(view, fake_city, city_map, client_of):
+    app = create_app(view, fake_city.ask, city_map, keys=KeyRing(MemoryStore()))
+    refused = client_of(app)("POST", UPLOADS, content=LARGE)
+    assert (refused.status_code, refused.json()["code"]) == (401, "unauthorised")
+
+
+@pytest.mark.parametrize("headers", [{}, KEY], ids=["no key", "key"])
+def test_a_file_may_be_larger_than_other_bodies(
+    view, fake_city, city_map, client_of, tmp_path, headers
+):
+    app = create_app(view, fake_city.ask, city_map, shelves=shelves_in(tmp_path))
+    read = client_of(app)("POST", UPLOADS, content=LARGE, headers=headers)
+    assert (read.status_code, read.json()["code"]) == (422, "invalid")
+    assert "zip" in read.json()["detail"]
+    seen = "/api/v1/eye/cameras/overhead/views"
+    read = client_of(app)("POST", seen, content=LARGE, headers=headers)
+    assert "JPEG or PNG" in read.json()["detail"]
