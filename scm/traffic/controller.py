@@ -197,6 +197,13 @@ class Controller:
             self._usual = FIXED
         self.failure = self._failed = ""
 
+    def end_flash(self) -> bool:
+        """Return whether to flash was usual; a timetable is then, for flash has to end."""
+        was_usual = self._policies[self._usual].is_flash
+        if was_usual:
+            self._usual = FIXED
+        return was_usual
+
     def ask_for_guest(self, table: Timetable, wave: Wave | None = None) -> None:
         """Wish for a plan that somebody made; it comes once every promise reckons with it."""
         self._timetables.offer(table, wave)
