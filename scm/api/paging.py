@@ -44,13 +44,20 @@ class Page(msgspec.Struct, Generic[T], kw_only=True, frozen=True):
 
 
 def page_of(
-    rows: Iterable[T], key: Callable[[T], str], *, limit: int = 100, cursor: str = ""
+    rows: Iterable[T],
+    key: Callable[[T], str],
+    *,
+    keep: Callable[[T], bool] = lambda _: True,
+    limit: int = 100,
+    cursor: str = "",
 ) -> Page[T]:
     """Cut a page from rows in their order.
 
     Args:
         rows: All of them; those up to the cursor's are skipped.
         key: What tells a row from all others and never changes; rows need not be sorted by it.
+        keep: Which rows are wanted. What may cease to be true of a row belongs here: a cursor holds
+            although its row is not wanted any more.
         limit: Rows a page.
         cursor: Of the page before.
 
@@ -63,6 +70,8 @@ def page_of(
         if wanted is not None:
             if key(row) == wanted:
                 wanted = None
+            continue
+        if not keep(row):
             continue
         if len(found) == limit:
             return Page(items=tuple(found), next=cursor_at(key(found[-1])))

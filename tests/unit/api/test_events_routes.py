@@ -112,6 +112,16 @@ class TestAcknowledging:
         assert LOG[0].text in texts(client("GET", f"{API}/events?open=true"))
         assert client("DELETE", f"{API}/events/acknowledgements/{wall['id']}").status_code == 404
 
+    def test_who_takes_note_page_by_page_comes_to_the_end(self, client, hear):
+        hear(1.0, *LOG)
+        found, cursor = [], ""
+        while cursor is not None:
+            page = client("GET", f"{API}/events?open=true&limit=1&cursor={cursor}").json()
+            ids, cursor = [row["id"] for row in page["items"]], page["next"]
+            client("POST", f"{API}/events/acknowledgements", json={"events": ids})
+            found += ids
+        assert found == [id_of(event) for event in reversed(LOG)]
+
     def test_without_a_name_it_was_the_keys_owner(self, client, hear):
         hear(1.0, *LOG)
         body = {"events": [id_of(LOG[0])]}
