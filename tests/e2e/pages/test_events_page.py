@@ -118,6 +118,9 @@ def test_the_audit_names_who_did_what_and_its_chain_is_whole(visit, running):
     assert rows.locator(".by").inner_text() == "ada this machine"
     told = [json.loads(text) for text in page.locator(".at-events .whole pre").all_inner_texts()]
     assert [entry["kind"] for entry in told] == ["StopRequest", "PUT /api/v1/stop"]
+    odd = {"station": "traffic", "kind": "RouteRequest", "request": {"value": [1]}}
+    said = "async (deed) => (await import('scm/pages/events/deeds.js')).said(deed)"
+    assert page.evaluate(said, odd) == "RouteRequest"  # whoever changed it: the page stands
     numbers = [str(entry["number"]) for entry in told]
     assert rows.locator(".number").inner_text() == ", ".join(numbers)
     deeds = running.get(f"/audit?text={trace}")["items"]

@@ -218,6 +218,20 @@ class TestAudit:
         assert not broken["whole"]
         assert "entry 3" in broken["error"]
 
+    def test_an_entry_that_is_none_hides_no_other_and_is_in_the_file(self, own_client, store):
+        log = AuditLog(store)
+        log.note(Deed(t_ns=1, station="world", kind="StopRequest"))
+        store.append("audit", b"rubbish")
+        log.note(Deed(t_ns=3, station="world", kind="StopRequest"))
+        rows = own_client("GET", f"{API}/audit").json()["items"]
+        assert [row["kind"] for row in rows] == ["StopRequest", "unreadable", "StopRequest"]
+        assert len(own_client("GET", f"{API}/audit.jsonl").text.splitlines()) == 3
+
+    @pytest.mark.parametrize("query", ["number=3", "digest=" + "a" * 64])
+    def test_half_of_what_was_noted_is_not_taken_for_all(self, own_client, query):
+        answer = own_client("GET", f"{API}/audit/verdict?{query}")
+        assert (answer.status_code, answer.json()["code"]) == (422, "invalid")
+
     def test_a_store_that_fails_does_not_undo_the_change(
         self, own_client, fake_city, store, caplog
     ):
