@@ -136,8 +136,7 @@ class Controller:
         self._memory: Any = None
         self.asked: tuple[Asked, ...] = ()
         self.priority: Mapping[tuple[int, int], Status] = {}
-        self.failure = ""
-        self._failed = ""
+        self.failure = self._failed = ""
         self.mode = "start"
         self.changed = False
         self.late_steps = 0
@@ -158,6 +157,11 @@ class Controller:
     def plan(self) -> str:
         """The plan in force, also while flashing or under another policy."""
         return self._timetables.plan
+
+    @property
+    def guest(self) -> tuple[Timetable, Wave | None] | None:
+        """The plan in force, where somebody made it; None: it is one of the junction's own."""
+        return self._timetables.guest
 
     @property
     def running(self) -> str:
