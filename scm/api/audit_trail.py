@@ -36,7 +36,8 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
         number: Of the entry; numbers have no gaps.
         t_ns: When it was asked for [ns since 1970].
         station: Who did it: `world`, `traffic`, `api`.
-        kind: The request's class, or method and path of a call of the web.
+        kind: The request's class, or method and path of a call of the web; `unreadable`: what
+            stands there is no entry.
         by: Who asked.
         request_id: Id of the request; empty: it had none.
         trace_id: Of what led to it: the call of the web and what the city did for it have the same;
@@ -81,11 +82,7 @@ class AuditFilter(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def newest_first(store: Repository) -> Iterator[AuditRow]:
-    """Yield deeds newest first, at most `MOST_LOOKED_AT`.
-
-    Raises:
-        StoreError: naming an entry that cannot be read.
-    """
+    """Yield deeds newest first, at most `MOST_LOOKED_AT`."""
     log = AuditLog(store)
     last = log.head().number
     first = max(0, last - MOST_LOOKED_AT)

@@ -47,7 +47,12 @@ class Page(msgspec.Struct, Generic[T], kw_only=True, frozen=True):
 
 
 def page_of(
-    rows: Iterable[T], key: Callable[[T], str], *, limit: int = 100, cursor: str = ""
+    rows: Iterable[T],
+    key: Callable[[T], str],
+    *,
+    keep: Callable[[T], bool] = lambda _: True,
+    limit: int = 100,
+    cursor: str = "",
 ) -> Page[T]:
     """Cut a page from rows in their order.
 
@@ -55,6 +60,8 @@ def page_of(
         rows: All of them; those up to the cursor's are skipped.
         key: What tells a row from others and never changes; rows need not be sorted by it. Of rows
             that have the same one the cursor counts which it is.
+        keep: Which rows are wanted. What may cease to be true of a row belongs here: a cursor holds
+            although its row is not wanted any more.
         limit: Rows a page.
         cursor: Of the page before.
 
@@ -64,16 +71,19 @@ def page_of(
     wanted = _read(cursor) if cursor else None
     found: list[T] = []
     alike = Counter[str]()
-    last = ""
+    last = ("", 0)
     for row in rows:
-        if len(found) == limit:
-            return Page(items=tuple(found), next=cursor_at(last, alike[last]))
-        last = key(row)
-        alike[last] += 1
+        name = key(row)
+        alike[name] += 1
         if wanted is not None:
-            if (last, alike[last]) == wanted:
+            if (name, alike[name]) == wanted:
                 wanted = None
             continue
+        if not keep(row):
+            continue
+        if len(found) == limit:
+            return Page(items=tuple(found), next=cursor_at(*last))
+        last = name, alike[name]
         found.append(row)
     if wanted is not None:
         raise _bad(cursor, "its row is gone: begin anew")

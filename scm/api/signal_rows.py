@@ -11,6 +11,7 @@ from scm.api.picture import Held, Picture
 from scm.clock import seconds
 from scm.maps.model import Junction
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.plan_request import SignalStage
 from scm.v2x.messages.signal_request import SignalWish
 from scm.v2x.messages.signal_status import SignalDetector, SignalStatus, SignalTurn
 from scm.v2x.messages.spat import SignalGroup, Spat
@@ -89,6 +90,8 @@ class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
         detectors: Of its groups; none: nobody listens for cars now.
         turns: Greens on and to come; none: nobody knows.
         failure: Why a policy was given up for fixed time; empty: none was.
+        stages, offset_s: Of the plan in force, where somebody made it: as it runs, whatever it was
+            edited to since. No stages: it is one of the junction's own.
     """
 
     junction: str
@@ -99,6 +102,8 @@ class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
     detectors: tuple[SignalDetector, ...]
     turns: tuple[SignalTurn, ...]
     failure: str
+    stages: tuple[SignalStage, ...]
+    offset_s: float | None
 
 
 def status_rows(picture: Picture) -> tuple[StatusRow, ...]:
@@ -117,6 +122,8 @@ def status_row(status: SignalStatus) -> StatusRow:
         detectors=status.detectors,
         turns=status.turns,
         failure=status.failure,
+        stages=status.stages,
+        offset_s=status.offset_s,
     )
 
 

@@ -15,6 +15,7 @@ from scm.errors import StoreError
 from scm.store.repository import Repository
 
 FIRST = "0" * 64
+UNREADABLE = "unreadable"
 _HEX = 64
 _PAGE = 500
 
@@ -74,15 +75,16 @@ class AuditLog:
     def deeds(self, after: int = 0) -> Iterator[tuple[int, Deed]]:
         """Yield number and content of the entries after a number.
 
-        Raises:
-            StoreError: naming an entry that cannot be read.
+        One that cannot be read comes as the kind `UNREADABLE`, with the cause as its reply: it must
+        not hide the others.
         """
         for number, body in self._bodies(after):
             try:
                 yield number, msgspec.json.decode(body[_HEX:], type=Deed)
-            except msgspec.MsgspecError as cause:
-                msg = f"audit: entry {number} cannot be read: {cause}"
-                raise StoreError(msg) from cause
+            except (msgspec.MsgspecError, UnicodeDecodeError) as cause:
+                why = {"code": UNREADABLE, "detail": f"audit: entry {number}: {cause}"}
+                reply = msgspec.Raw(msgspec.json.encode(why))
+                yield number, Deed(t_ns=0, station="", kind=UNREADABLE, reply=reply)
 
     def verify(self, head: Head | None = None) -> Head:
         """Check the whole chain; return its head.

@@ -136,8 +136,7 @@ class Controller:
         self._memory: Any = None
         self.asked: tuple[Asked, ...] = ()
         self.priority: Mapping[tuple[int, int], Status] = {}
-        self.failure = ""
-        self._failed = ""
+        self.failure = self._failed = ""
         self.mode = "start"
         self.changed = False
         self.late_steps = 0
@@ -158,6 +157,11 @@ class Controller:
     def plan(self) -> str:
         """The plan in force, also while flashing or under another policy."""
         return self._timetables.plan
+
+    @property
+    def guest(self) -> tuple[Timetable, Wave | None] | None:
+        """The plan in force, where somebody made it; None: it is one of the junction's own."""
+        return self._timetables.guest
 
     @property
     def running(self) -> str:
@@ -196,6 +200,13 @@ class Controller:
             self._timetables.ask(_known(self.junction, plan, plans))
             self._usual = FIXED
         self.failure = self._failed = ""
+
+    def end_flash(self) -> bool:
+        """Return whether to flash was usual; a timetable is then, for flash has to end."""
+        was_usual = self._policies[self._usual].is_flash
+        if was_usual:
+            self._usual = FIXED
+        return was_usual
 
     def ask_for_guest(self, table: Timetable, wave: Wave | None = None) -> None:
         """Wish for a plan that somebody made; it comes once every promise reckons with it."""

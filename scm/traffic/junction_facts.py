@@ -66,6 +66,7 @@ class JunctionFacts:
     def _status(
         self, controller: Controller, detectors: Mapping[str, Detector], now_ns: int
     ) -> SignalStatus:
+        table, wave = controller.guest or (None, None)
         return SignalStatus(
             junction=self.site.junction,
             t_ns=now_ns,
@@ -84,6 +85,8 @@ class JunctionFacts:
                 for turn in controller.outlook(now_ns)
             ),
             failure=controller.failure,
+            stages=() if table is None else stages_of(table, self.program),
+            offset_s=None if wave is None else wave.offset_ns / NS_PER_S,
         )
 
     def _in_order(self, groups: Collection[str]) -> tuple[str, ...]:

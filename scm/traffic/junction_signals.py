@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from scm.clock import NS_PER_MS
 from scm.maps.model import Junction
 from scm.store.records import PlanRecord
-from scm.traffic.asked import NEED_RINGS
+from scm.traffic.asked import NEED_RINGS, Asked
 from scm.traffic.controller import Controller, Heard
 from scm.traffic.detectors import Detector, Watcher
 from scm.traffic.junction_facts import JunctionFacts, wishes_of
@@ -62,6 +62,7 @@ class JunctionSignals:
         self._asked = "as the map says"
         self._taken = ""
         self._why_flash = ""
+        self._why_restart = ""
         self._monitor_ns: int | None = None
         self._sent_ns: int | None = None
         self._wishes = controller.asked
@@ -102,6 +103,8 @@ class JunctionSignals:
             self._flash("person", who, on=True)
             self.record = replace(self.record, flash=True, by=request.by)
             return PlanReply(junction=request.junction, plan=FLASH)
+        if not request.plan:
+            return self._end_flash(who)
         if request.stages:
             check_name(request.plan, self._names)
             table = table_of(request.plan, request.stages, self._facts.program)
@@ -113,10 +116,9 @@ class JunctionSignals:
         self.record = PlanRecord(
             plan=request.plan, by=request.by, stages=stages, offset_s=request.offset_s
         )
-        self._asked = who
+        self._asked = self._why_restart = who
         self._flash("person", who, on=False)
-        plan = FLASH if controller.is_flashing else controller.running
-        return PlanReply(junction=request.junction, plan=plan, pending=controller.pending)
+        return self._runs()
 
     def serve_wish(self, request: SignalRequest, now_ns: int) -> SignalReply:
         """Take a wish for groups, or for a policy.
@@ -127,14 +129,13 @@ class JunctionSignals:
         controller = self.controller
         controller.take(request, now_ns)
         self._wishes = controller.asked
-        what = " ".join((request.verb, request.policy, *request.groups)).replace("  ", " ")
         why = f": {request.reason}" if request.reason else ""
         text = f"{request.by} asked{why}"
         if request.verb in ("policy", "clear"):
             self._asked = text
         if controller.is_flashing and not self._why_flash:
             self._why_flash = text
-        self._tell("info", "signal_wish", f"{what} ({text}), {request.expires_s:g} s", now_ns)
+        self._tell("info", "signal_wish", f"{_what(request)} ({text}){_how_long(request)}", now_ns)
         return SignalReply(
             junction=request.junction,
             policy=controller.policy,
@@ -166,9 +167,22 @@ class JunctionSignals:
         self._detectors = watcher.by_group(watcher.read(now_ns))
         return Heard(self._detectors, watcher.sees(now_ns), calls)
 
+    def _end_flash(self, who: str) -> PlanReply:
+        """Go on with what is wanted, which a flash has not changed."""
+        plan = self.controller.plan if self.controller.end_flash() else self.record.plan
+        self._why_restart = who
+        self._flash("person", who, on=False)
+        self.record = replace(self.record, plan=plan, flash=False)
+        return self._runs()
+
+    def _runs(self) -> PlanReply:
+        controller = self.controller
+        plan = FLASH if controller.is_flashing else controller.running
+        return PlanReply(junction=self.junction.name, plan=plan, pending=controller.pending)
+
     def _flash(self, reason: str, why: str, *, on: bool) -> None:
         if on and not self.controller.is_flashing:
-            self._why_flash = why
+            self._why_flash, self._why_restart = why, ""
         self.controller.flash(reason, on=on)
 
     def _on_air(self, spat: Spat) -> list[Outgoing]:
@@ -191,8 +205,8 @@ class JunctionSignals:
             return
         for one in self._wishes:
             if one.until_ns <= now_ns and one not in held:
-                what = " ".join((one.verb, one.policy, *one.groups)).replace("  ", " ")
-                self._tell("info", "signal_wish_lapsed", f"{what} of {one.by} lapsed", now_ns)
+                text = f"{_what(one)} of {one.by} lapsed"
+                self._tell("info", "signal_wish_lapsed", text, now_ns)
         self._wishes = held
 
     def _changes(self, now_ns: int) -> None:
@@ -217,8 +231,9 @@ class JunctionSignals:
         if mode != FLASH and now[0] == FLASH:
             self._tell("warning", "signals_flash", f"flashes red: {self._why_flash}", now_ns)
         if mode == FLASH and now[0] != FLASH:
-            self._why_flash = ""
-            self._tell("info", "signals_restart", "restarts all red", now_ns)
+            why = f" ({self._why_restart})" if self._why_restart else ""
+            self._why_flash = self._why_restart = ""
+            self._tell("info", "signals_restart", f"restarts all red{why}", now_ns)
         if mode != "preempt" and now[0] == "preempt":
             self._tell("info", "signals_preempted", "is pre-empted", now_ns)
 
@@ -234,6 +249,18 @@ class JunctionSignals:
         self._news.append(
             CityEvent(severity=severity, source="traffic", t_ns=now_ns, name=name, text=text)
         )
+
+
+def _what(wish: SignalRequest | Asked) -> str:
+    """Return what is wished, in the log's words."""
+    if isinstance(wish, SignalRequest) and wish.verb == "clear":
+        of = " ".join(filter(None, (wish.clears, *wish.groups)))
+        return f"takes back {of or 'all wishes'}"
+    return " ".join(filter(None, (wish.verb, wish.policy, *wish.groups)))
+
+
+def _how_long(request: SignalRequest) -> str:
+    return "" if request.verb == "clear" else f", {request.expires_s:g} s"
 
 
 def _is_due(sent_ns: int | None, now_ns: int, every_ns: int) -> bool:

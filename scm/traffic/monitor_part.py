@@ -107,6 +107,8 @@ class _Watch:
 
     def reset(self, request: MonitorReset, now_ns: int) -> list[Message]:
         was = self.monitor.fault
+        if was is None:  # to forget what was seen would only excuse what comes next
+            return []
         self.monitor.reset(now_ns)
         text = f"{request.by} reset the monitor of {request.junction} ({was}): {request.reason}"
         return [_event("warning", "monitor_reset", text, now_ns)]

@@ -168,6 +168,9 @@ class TrafficPart:
             hint = nearest(request.junction, known)
             detail = f"no junction {request.junction!r}{hint}, only {known}"
             return [Answer(item, Refused(code="not_found", detail=detail))]
+        if not request.by.strip():
+            detail = f"junction {request.junction}: by: got nothing, expected who asks"
+            return [Answer(item, Refused(code="invalid", detail=detail))]
         try:
             if isinstance(request, SignalRequest):
                 return [Answer(item, signals.serve_wish(request, now_ns))]

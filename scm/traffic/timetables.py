@@ -40,6 +40,11 @@ class Timetables:
         """The names of all plans that may be asked for, guests included."""
         return list({**self._tables, **self._entering})
 
+    @property
+    def guest(self) -> tuple[Timetable, Wave | None] | None:
+        """The plan in force, where somebody made it; None: it is one of the junction's own."""
+        return None if self.plan in self._own else self._tables[self.plan]
+
     def ask(self, plan: str) -> None:
         """Let a plan come with the next cycle, or stay."""
         self.pending = "" if plan == self.plan and self._settled in ("", plan) else plan

@@ -8,12 +8,14 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from scm.api.audit_trail import AuditFilter, AuditRow, newest_first
 from scm.api.city import json_response
 from scm.api.paging import Cursor, Limit, page_of, page_response
+from scm.api.problem import RefusedError
 from scm.api.roles import ENGINEER
 from scm.api.schemas import answer, answer_file, answer_page
 from scm.api.tables import Form, table_response
 from scm.errors import StoreError
 from scm.store.audit import AuditLog, Head
 from scm.store.repository import Repository
+from scm.v2x.message import Refused
 
 
 class ChainVerdict(msgspec.Struct, kw_only=True, frozen=True):
@@ -21,7 +23,7 @@ class ChainVerdict(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         whole: Whether every entry follows the one before as it is now.
-        entries: How many there are, up to the first broken one.
+        entries: Number of the newest.
         digest: Hash of the newest, in hexadecimal: note it elsewhere, and give it again.
         error: What is broken; empty: nothing.
     """
@@ -84,7 +86,10 @@ def router(store: Repository) -> APIRouter:
             Query(pattern="^([0-9a-f]{64})?$", description="its hash, noted before", examples=[""]),
         ] = "",
     ) -> Response:
-        noted = Head(number, digest) if number and digest else None
+        if bool(number) != bool(digest):
+            detail = "number, digest: got one of them, expected both of an entry noted before"
+            raise RefusedError(Refused(code="invalid", detail=detail))
+        noted = Head(number, digest) if number else None
         log = AuditLog(store)
         try:
             head = log.verify(noted)

@@ -122,8 +122,12 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
         limit: Limit = 100,
         cursor: Cursor = "",
     ) -> Response:
-        rows = (row for row in _rows(city, seen, wanted, only_open=only_open) if row.seq > after)
-        return page_response(request, page_of(rows, lambda row: row.id, limit=limit, cursor=cursor))
+        def keep(row: EventRow) -> bool:
+            return row.seq > after and (not only_open or _is_open(row))
+
+        rows = _rows(city, seen, wanted)
+        page = page_of(rows, lambda row: row.id, keep=keep, limit=limit, cursor=cursor)
+        return page_response(request, page)
 
     @routes.get(
         ".{form}",
@@ -132,7 +136,7 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
         response_class=Response,
     )
     def export(form: Form, wanted: Wanted, *, only_open: Open = False) -> Response:
-        rows = _rows(city, seen, wanted, only_open=only_open)
+        rows = (row for row in _rows(city, seen, wanted) if not only_open or _is_open(row))
         return table_response(rows, EventRow, form, f"{city.city_map.name}-events")
 
     @routes.post(
@@ -162,14 +166,15 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
     return routes
 
 
-def _rows(
-    city: City, seen: Acknowledgements, wanted: EventFilter, *, only_open: bool
-) -> Iterator[EventRow]:
+def _rows(city: City, seen: Acknowledgements, wanted: EventFilter) -> Iterator[EventRow]:
     known = seen.rows()
     for event in city.view.events():
-        own = known.get(event.id)
-        if wanted.passes(event) and not (only_open and own):
-            yield _row(event, own)
+        if wanted.passes(event):
+            yield _row(event, known.get(event.id))
+
+
+def _is_open(row: EventRow) -> bool:
+    return row.acknowledged_ns is None
 
 
 def _row(event: LoggedEvent, own: Acknowledgement | None) -> EventRow:

@@ -315,10 +315,10 @@ def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         request = _policy(name, body.policy, body, signer(body.by), key)
         return json_response(city.ask(request, SignalReply))
 
-    _add_flash(routes, city, shelf)
+    _add_flash(routes, city)
 
 
-def _add_flash(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
+def _add_flash(routes: APIRouter, city: City) -> None:
     @routes.put(
         "/{name}/flash",
         summary="Flash red, or go on",
@@ -343,10 +343,14 @@ def _add_flash(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
                 reason=body.reason,
             )
             city.ask(request, SignalReply)
-        runs = held.message.plan if held.message.policy == "fixed" else held.message.policy
-        asked = _wish_for(city, shelf, name, "flash" if body.engaged else runs)
-        who = {"by": by, "reason": body.reason, "request_id": key}
-        return json_response(city.ask(msgspec.structs.replace(asked, **who), PlanReply))
+        asked = PlanRequest(
+            request_id=key,
+            junction=name,
+            plan="flash" if body.engaged else "",
+            by=by,
+            reason=body.reason,
+        )
+        return json_response(city.ask(asked, PlanReply))
 
 
 def _policy(

@@ -15,7 +15,8 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
         number: Of the entry; numbers have no gaps.
         t_ns: When it was asked for [ns since 1970].
         station: Who did it: `world`, `traffic`, `api`.
-        kind: The request's class, or method and path of a call of the web.
+        kind: The request's class, or method and path of a call of the web; `unreadable`: what
+            stands there is no entry.
         by: Who asked.
         request_id: Id of the request; empty: it had none.
         trace_id: Of what led to it: the call of the web and what the city did for it have the
@@ -52,7 +53,7 @@ class ChainVerdict(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         whole: Whether every entry follows the one before as it is now.
-        entries: How many there are, up to the first broken one.
+        entries: Number of the newest.
         digest: Hash of the newest, in hexadecimal: note it elsewhere, and give it again.
         error: What is broken; empty: nothing.
     """

@@ -268,6 +268,10 @@ class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
         detectors: Of its groups; none: nobody listens for cars now.
         turns: Greens on and to come; none: nobody knows.
         failure: Why a policy was given up for fixed time; empty: none was.
+        stages: Of the plan in force, where somebody made it: as it runs, whatever it was edited to
+            since. No stages: it is one of the junction's own.
+        offset_s: Of the plan in force, where somebody made it: as it runs, whatever it was edited
+            to since. No stages: it is one of the junction's own.
     """
 
     junction: str
@@ -278,3 +282,5 @@ class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
     detectors: tuple[SignalDetector, ...]
     turns: tuple[SignalTurn, ...]
     failure: str
+    stages: tuple[SignalStage, ...]
+    offset_s: float | None

@@ -42,6 +42,7 @@ class PlanRequest(Request, kw_only=True, frozen=True):
     """Use a plan by name, or `flash`; with who asks and why.
 
     Attributes:
+        plan: Empty: end a flash that a person asked for; what ran, what is to come and wishes stay.
         stages: Of a plan that the junction does not have: it is checked, taken and run under that
             name for as long as it is wanted. Empty: one of its own.
         offset_s: Of these stages: when their cycle begins, after a time that is a whole number of

@@ -5,6 +5,7 @@ from typing import ClassVar
 import msgspec
 
 from scm.v2x.message import Message
+from scm.v2x.messages.plan_request import SignalStage
 from scm.v2x.messages.signal_request import SignalWish
 
 
@@ -37,6 +38,8 @@ class SignalStatus(Message, kw_only=True, frozen=True):
         detectors: Of the groups; none: nobody listens for cars now.
         turns: Greens to come, by the timetable or as the policy foresees; none: nobody knows.
         failure: Why a policy was given up for fixed time; empty: none was.
+        stages, offset_s: Of the plan in force, where somebody made it: as it runs, whatever it was
+            edited to since. No stages: it is one of the junction's own.
     """
 
     KEY: ClassVar[str] = "tl/{junction}/status"
@@ -51,6 +54,8 @@ class SignalStatus(Message, kw_only=True, frozen=True):
     detectors: tuple[SignalDetector, ...] = ()
     turns: tuple[SignalTurn, ...] = ()
     failure: str = ""
+    stages: tuple[SignalStage, ...] = ()
+    offset_s: float | None = None
 
 
 MESSAGE = SignalStatus

@@ -6,6 +6,7 @@ import pytest
 
 from tests.e2e.pages.visiting import LOOKS, in_both_themes, judge, photograph
 
+STORE = "scm/shell/store.js"
 ROWS = ".at-events .entries > li"
 
 
@@ -82,6 +83,17 @@ def test_a_paused_log_stands_still_until_it_is_followed_again(visit, running):
     assert "while nobody looks" not in page.inner_text(".at-events .entries")
     page.click("text=Follow")
     page.wait_for_selector(f"{ROWS} >> text=while nobody looks")
+    page.evaluate(f"async () => {{ (await import('{STORE}')).events.value = []; }}")
+    page.wait_for_timeout(200)  # the page was drawn anew
+    assert "while nobody looks" in page.inner_text(".at-events .entries")
+    with page.expect_response(lambda answer: "/events?limit=200" in answer.url):  # what it missed
+        page.evaluate(
+            f"""async () => {{
+              const {{ events }} = await import('{STORE}');
+              const [row] = (await (await fetch("/api/v1/events?limit=1")).json()).items;
+              events.value = [{{ ...row, id: "0123456789abcdef", seq: row.seq + 500 }}];
+            }}"""
+        )
 
 
 def test_the_audit_names_who_did_what_and_its_chain_is_whole(visit, running):
@@ -106,6 +118,9 @@ def test_the_audit_names_who_did_what_and_its_chain_is_whole(visit, running):
     assert rows.locator(".by").inner_text() == "ada this machine"
     told = [json.loads(text) for text in page.locator(".at-events .whole pre").all_inner_texts()]
     assert [entry["kind"] for entry in told] == ["StopRequest", "PUT /api/v1/stop"]
+    odd = {"station": "traffic", "kind": "RouteRequest", "request": {"value": [1]}}
+    said = "async (deed) => (await import('scm/pages/events/deeds.js')).said(deed)"
+    assert page.evaluate(said, odd) == "RouteRequest"  # whoever changed it: the page stands
     numbers = [str(entry["number"]) for entry in told]
     assert rows.locator(".number").inner_text() == ", ".join(numbers)
     deeds = running.get(f"/audit?text={trace}")["items"]

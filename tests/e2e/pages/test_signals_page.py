@@ -103,6 +103,10 @@ def test_a_plan_is_made_proven_saved_asked_for_and_deleted(visit, running):
     page = visited.page
     page.click('[aria-label="Copy plan calm"]')
     page.fill("#plan-name", "rush")
+    page.click('nav a[href="/events"]')  # who looks elsewhere comes back to what was begun
+    page.click('nav a[href="/signals"]')
+    page.wait_for_selector(".editor")
+    assert page.input_value("#plan-name") == "rush"
     green = '[aria-label="Green of stage 1 in seconds"]'
     page.fill(green, "1")
     page.wait_for_selector(".verdict[data-state=bad] >> text=below the min green")
@@ -122,8 +126,19 @@ def test_a_plan_is_made_proven_saved_asked_for_and_deleted(visit, running):
     page.wait_for_selector(".verdict >> text=The search has to prove it")
     assert save.is_disabled()
     page.fill(green, "14")
-    save.click()
+    stages = [{"groups": ["south_east"], "green_s": 14}, {"groups": ["south_west"], "green_s": 8.7}]
+    rival, new = {"stages": stages, "by": "bob", "about": "his"}, {"If-None-Match": "*"}
+    running.web.put(f"{AT}/plans/rush", json=rival, headers=new).raise_for_status()
+    save.click()  # somebody was faster: nothing is lost, and nobody's work goes unseen
+    page.wait_for_selector(".editor .fault >> text=bob saved rush (his)")
+    assert "412" in visited.complaints.pop()
+    page.click(".editor .acts >> text=Save over it")
     page.wait_for_selector('.choices [data-plan="rush"] .badge >> text=proven')
+    edited = "async (now) => (await import('scm/pages/signals/plans.js')).isEdited(...now)"
+    plan = {"stages": stages, "offset_s": None}
+    for green_s, is_edited in ((14, False), (14.2, True)):
+        runs = {"offset_s": None, "stages": [{**stages[0], "green_s": green_s}, stages[1]]}
+        assert page.evaluate(edited, [plan, runs]) == is_edited
     saved = running.get("/signals/crossing/plans/rush")
     assert (saved["source"], saved["stages"][0]["green_s"], saved["usable"]) == ("saved", 14, True)
     page.click('[aria-label="Run plan rush"]')
@@ -139,6 +154,11 @@ def test_a_plan_is_made_proven_saved_asked_for_and_deleted(visit, running):
     page.click("dialog .danger")
     page.wait_for_selector('.choices [data-plan="rush"]', state="detached")
     assert running.web.get("/signals/crossing/plans/rush").status_code == 404
+    tag = running.web.put("/signals/crossing/plans/rush", json=rival, headers=new).headers["etag"]
+    try:
+        page.wait_for_selector('.choices [data-plan="rush"] >> text=his')  # nobody reloads for it
+    finally:
+        running.web.delete("/signals/crossing/plans/rush", headers={"If-Match": tag})
     assert visited.complaints == []
 
 

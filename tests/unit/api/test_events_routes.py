@@ -121,6 +121,16 @@ class TestAcknowledging:
         assert LOG[0].text in texts(client("GET", f"{API}/events?open=true"))
         assert client("DELETE", f"{API}/events/acknowledgements/{wall['id']}").status_code == 404
 
+    def test_who_takes_note_page_by_page_comes_to_the_end(self, client, hear):
+        hear(1.0, *LOG)
+        found, cursor = [], ""
+        while cursor is not None:
+            page = client("GET", f"{API}/events?open=true&limit=1&cursor={cursor}").json()
+            ids, cursor = [row["id"] for row in page["items"]], page["next"]
+            client("POST", f"{API}/events/acknowledgements", json={"events": ids})
+            found += ids
+        assert found == [id_of(event) for event in reversed(LOG)]
+
     def test_without_a_name_it_was_the_keys_owner(self, client, hear):
         hear(1.0, *LOG)
         body = {"events": [id_of(LOG[0])]}
@@ -273,6 +283,20 @@ class TestAudit:
 
         monkeypatch.setattr(AuditLog, "note", note_slowly)
         assert asyncio.run(scenario()) == "renewed"
+
+    def test_an_entry_that_is_none_hides_no_other_and_is_in_the_file(self, own_client, store):
+        log = AuditLog(store)
+        log.note(Deed(t_ns=1, station="world", kind="StopRequest"))
+        store.append("audit", b"rubbish")
+        log.note(Deed(t_ns=3, station="world", kind="StopRequest"))
+        rows = own_client("GET", f"{API}/audit").json()["items"]
+        assert [row["kind"] for row in rows] == ["StopRequest", "unreadable", "StopRequest"]
+        assert len(own_client("GET", f"{API}/audit.jsonl").text.splitlines()) == 3
+
+    @pytest.mark.parametrize("query", ["number=3", "digest=" + "a" * 64])
+    def test_half_of_what_was_noted_is_not_taken_for_all(self, own_client, query):
+        answer = own_client("GET", f"{API}/audit/verdict?{query}")
+        assert (answer.status_code, answer.json()["code"]) == (422, "invalid")
 
     def test_a_store_that_fails_does_not_undo_the_change(
         self, own_client, fake_city, store, caplog

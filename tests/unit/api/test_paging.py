@@ -39,6 +39,12 @@ def test_a_full_last_page_ends_the_list():
     assert page_of(["a", "b"], same, limit=2).next is None
 
 
+def test_a_cursor_holds_although_its_row_is_not_wanted_any_more():
+    first = page_of(["c", "b", "a"], same, limit=2)
+    second = page_of(["c", "b", "a"], same, keep=lambda row: row != "b", cursor=first.next)
+    assert (first.items, second.items) == (("c", "b"), ("a",))
+
+
 @pytest.mark.parametrize("cursor", ["!", "a", "aGVsbG8", "\u00e9", cursor_at("x")[:-3]])
 def test_a_cursor_that_is_none_of_ours_is_refused(cursor):
     with pytest.raises(RefusedError, match="expected `next` of the page before") as refused:

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scm.errors import StoreError
-from scm.store.audit import FIRST, AuditLog, Deed, Head
+from scm.store.audit import FIRST, UNREADABLE, AuditLog, Deed, Head
 from scm.store.memory import MemoryStore
 
 COUNT = 12
@@ -87,8 +87,13 @@ def test_a_log_written_anew_is_found_by_a_head_that_was_noted_before():
         other.verify(head)
 
 
-def test_an_entry_that_cannot_be_read_is_named():
+@pytest.mark.parametrize(
+    "body", [b"rubbish", b"0" * 64 + b'{"t_ns":1', b"0" * 64 + b'{"by":"\xff"}']
+)
+def test_an_entry_that_cannot_be_read_is_named_and_hides_no_other(body):
     store, log = filled(2)
-    store.append("audit", b"rubbish")
-    with pytest.raises(StoreError, match="entry 3 cannot be read"):
-        list(log.deeds())
+    store.append("audit", body)
+    log.note(deed(3))
+    found = [(number, deed.kind) for number, deed in log.deeds()]
+    assert [number for number, kind in found if kind == UNREADABLE] == [3]
+    assert [number for number, _ in found] == [1, 2, 3, 4]

@@ -133,6 +133,15 @@ def test_a_controller_that_is_still_silent_after_a_reset_is_stale_within_a_secon
     assert messages(box)[-1].fault == "stale"
 
 
+def test_a_reset_of_no_fault_says_so_and_forgets_nothing_of_what_was_seen(city):
+    city.run_for(12.0)
+    events = city.hear(Hears(CityEvent))
+    began_ns = reset(city).since_ns
+    assert began_ns < city.now_ns
+    city.run_for(0.2)
+    assert messages(events) == []
+
+
 @pytest.mark.parametrize("missing", ["by", "reason"])
 def test_a_reset_without_a_person_or_a_reason_is_refused(city, missing):
     reply = reset(city, **{missing: " "})

@@ -147,6 +147,35 @@ def test_a_person_may_flash_the_junction_and_end_it_with_a_plan(city):
     assert [event.name for event in events] == ["signals_restart"]
 
 
+def test_the_end_of_flash_changes_nothing_of_what_was_wanted(city):
+    hold = SignalRequest(junction="crossing", verb="hold", groups=("south_east",), by="ada")
+    city.run_for(10.0)
+    ask(city, "calm")
+    city.call(msgspec.structs.replace(hold, expires_s=20.0))
+    told = Told(city)
+    ask(city, "flash")
+    city.run_for(1.0)
+    ended = ask(city, "", reason="works are over")
+    assert (ended.plan, ended.pending) == ("brisk", "actuated")
+    city.run_for(60.0)  # meanwhile the hold has lapsed
+    spats, _, events = told.read()
+    assert (spats[-1].mode, spats[-1].plan) == ("plan", "calm")
+    said = next(event.text for event in events if event.name == "signals_restart")
+    assert said == "junction crossing restarts all red (test asked: works are over)"
+
+
+def test_a_policy_that_flashes_ends_as_any_flash():
+    with Lockstep([TrafficPart(MAP, "brisk", policy="flashing")]) as city:
+        city.run_for(5.0)
+        assert ask(city, "").plan == "brisk"
+
+
+@pytest.mark.parametrize("plan", ["calm", "flash", ""])
+def test_nobody_changes_what_runs_without_a_name(city, plan):
+    reply = city.call(PlanRequest(junction="crossing", plan=plan, by=" "))
+    assert (reply.code, "by: got nothing" in reply.detail) == ("invalid", True)
+
+
 def test_a_fault_of_the_monitor_makes_it_flash_until_the_monitor_is_clear(city):
     city.run_for(10.0)
     told = Told(city)

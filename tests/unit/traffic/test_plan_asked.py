@@ -2,6 +2,7 @@
 
 import random
 
+import msgspec
 import pytest
 
 from scm.errors import PlanError
@@ -154,6 +155,21 @@ def test_a_plan_of_the_bus_is_run_told_and_comes_back_after_a_restart(city):
         spats = again.hear(Hears(Spat))
         again.run_for(8.0)
         assert messages(spats)[-1].plan == "rush"
+
+
+def test_the_status_tells_the_plan_that_runs_whatever_comes_after_it(city):
+    told = city.hear(Hears(SignalStatus))
+    longer = (msgspec.structs.replace(RUSH[0], green_s=9.0), *RUSH[1:])
+    city.run_for(6.0)
+    assert messages(told)[-1].stages == ()
+    ask(city, "rush", RUSH, offset_s=7.3)
+    city.run_for(60.0)
+    runs = messages(told)[-1]
+    assert (runs.plan, runs.stages, runs.offset_s) == ("rush", RUSH, 7.3)
+    ask(city, "rush", longer)
+    city.run_for(80.0)
+    runs = messages(told)[-1]
+    assert (runs.pending, runs.stages, runs.offset_s) == ("", longer, None)
 
 
 def test_a_plan_with_an_offset_begins_its_cycles_in_step_with_the_clock_also_after_a_restart(city):

@@ -67,6 +67,17 @@ def test_a_wish_is_answered_with_what_is_in_force_and_told(city):
     assert said.count("signal_wish") == said.count("signal_wish_lapsed") == 1
 
 
+def test_the_log_says_which_wishes_were_taken_back(city):
+    events = city.hear(Hears(CityEvent))
+    wish(city, "clear", "south_east", clears="hold", expires_s=60.0)
+    wish(city, "clear", expires_s=60.0)
+    city.run_for(0.2)
+    assert [event.text for event in messages(events)] == [
+        "junction crossing takes back hold south_east (me asked: test)",
+        "junction crossing takes back all wishes (me asked: test)",
+    ]
+
+
 def test_a_wish_for_what_is_not_there_is_refused(city):
     city.run_for(1.0)
     refusal = wish(city, "hold", "south_eastt")

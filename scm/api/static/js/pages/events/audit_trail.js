@@ -54,12 +54,13 @@ export function AuditTrail() {
 function Deed({ row, call, onTrace }) {
   const [whole, setWhole] = useState(false);
   const { ended, bad } = outcome(row);
+  const isRead = row.kind !== "unreadable";
   const by = row.by || row.request.by || row.request.vehicle || "";
   const entries = call ? [row, call] : [row];
   return html`
     <tr data-deed=${row.number}>
       <td class="number">${entries.map(({ number }) => number).join(", ")}</td>
-      <td class="when"><time>${moment(row.t_ns)}</time></td>
+      <td class="when">${isRead && html`<time>${moment(row.t_ns)}</time>`}</td>
       <td class="what">
         <button class="name" aria-expanded=${whole} onClick=${() => setWhole(!whole)}>${said(row)}</button>
         ${row.request.reason && html` <small>${row.request.reason}</small>`}
@@ -87,7 +88,8 @@ function inFull({ number, station, kind, request, reply, request_id }) {
 }
 
 /** How a deed ended, in a word or two. */
-function outcome({ station, reply }) {
+function outcome({ station, kind, reply }) {
+  if (kind === "unreadable") return { ended: kind, bad: true };
   if (station === "api") return { ended: `${reply.status} in ${reply.ms} ms`, bad: reply.status >= 400 };
   const refused = reply.code !== undefined && reply.detail !== undefined;
   return { ended: refused ? `refused: ${reply.code}` : "done", bad: refused };

@@ -14,6 +14,7 @@ const SAYINGS = {
   SpawnRequest: ({ vehicle, car }) => `add ${vehicle || "a car"}, a ${car}`,
   RemoveRequest: ({ vehicle }) => `take ${vehicle} off the map`,
   RouteRequest: ({ vehicle, via }) => `send ${vehicle} ${via.length ? `through ${names(via)}` : "on its way"}`,
+  unreadable: () => "what stands here is no entry: somebody changed it",
   LightRequest: ({ vehicle }) => `set the lights of ${vehicle}`,
 };
 
@@ -23,10 +24,17 @@ function wished({ junction, verb, groups, policy, clears, expires_s }) {
   return `${what.filter(Boolean).join(" ")} at ${spaced(junction)}${lasts}`;
 }
 
-/** One deed as a sentence; of the web, the request itself. */
+/**
+ * One deed as a sentence; of the web, the request itself. An entry that is not as it was written, by an
+ * older city or by somebody who changed it, is called by its kind.
+ */
 export function said({ station, kind, request }) {
   if (station === "api") return kind.replace("/api/v1/", "/") + (request.query ? `?${request.query}` : "");
-  return SAYINGS[kind]?.(request) ?? kind;
+  try {
+    return SAYINGS[kind]?.(request) ?? kind;
+  } catch {
+    return kind;
+  }
 }
 
 /**

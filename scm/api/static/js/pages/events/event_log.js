@@ -1,12 +1,13 @@
 /** The log of the city: filtered, folded, followed live, acknowledged, exported. */
-import { useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { byName, moment, spaced, span } from "scm/shared/format.js";
 import { change } from "scm/shell/api.js";
 import { prose } from "scm/shell/prose.js";
 import { Dialog } from "scm/shared/dialog.js";
-import { events as heard, stations, topic, useTopics } from "scm/shell/store.js";
+import { stations, topic, useTopics } from "scm/shell/store.js";
 import { folded } from "scm/pages/events/folding.js";
+import { acknowledgedBy, useHeard } from "scm/pages/events/heard.js";
 import { useRested, useRows } from "scm/pages/events/rows.js";
 
 const SEVERITIES = [
@@ -25,12 +26,16 @@ export function EventLog() {
   const [pausedAt, setPausedAt] = useState(null);
   const [asking, setAsking] = useState(null);
   const wanted = { severity, source, text: useRested(text) };
-  const list = useRows("/events", wanted);
+  const list = useRows("/events", { ...wanted, open: open ? "true" : "" });
+  const heard = useHeard();
+  useEffect(() => {
+    if (pausedAt === null && heard.missed()) list.reload();
+  });
   const acknowledged = useMemo(
-    () => new Map((topic("acknowledgements").value ?? []).map((row) => [row.event, row])),
+    () => acknowledgedBy(topic("acknowledgements").value ?? []),
     [topic("acknowledgements").value],
   );
-  const rows = merged(list.rows, heard.value, wanted, acknowledged, open, pausedAt);
+  const rows = merged(list.rows, heard.rows, wanted, acknowledged, open, pausedAt);
   const groups = folded(rows);
   const waiting = rows.filter((row) => !row.acknowledged_by);
   return html`
@@ -44,7 +49,7 @@ export function EventLog() {
               data-severity=${name}
               aria-pressed=${severity === name}
               onClick=${() => setSeverity(severity === name ? "" : name)}
-            ><i aria-hidden="true">${sign}</i>${title} <b>${count(rows, name)}</b></button>
+            ><i aria-hidden="true">${sign}</i>${title} <b>${!severity || severity === name ? count(rows, name) : ""}</b></button>
           `,
         )}
       </div>
@@ -65,13 +70,13 @@ export function EventLog() {
       </label>
       <span class="room"></span>
       <button class="small" aria-pressed=${pausedAt !== null} onClick=${() =>
-        setPausedAt(pausedAt === null ? (heard.value[0]?.seq ?? 0) : null)}>
+        setPausedAt(pausedAt === null ? (heard.rows[0]?.seq ?? 0) : null)}>
         ${pausedAt === null ? "Pause" : "Follow"}
       </button>
       <button class="small" disabled=${!waiting.length} onClick=${() => setAsking(waiting)}>
         Acknowledge all ${waiting.length}
       </button>
-      <${Export} path="/events" query=${`${list.query}${open ? "&open=true" : ""}`} />
+      <${Export} path="/events" query=${list.query} />
     </div>
     ${list.error && html`<p class="empty warn" role="alert">The log could not be read: ${list.error}</p>`}
     ${pausedAt !== null && html`<p class="paused" role="status">Paused: new events are not shown.</p>`}
@@ -81,7 +86,7 @@ export function EventLog() {
           (group) => html`<${Group} key=${group.key} group=${group} onAcknowledge=${setAsking} />`,
         )}
       </ol>
-      ${!groups.length &&
+      ${!groups.length && !list.more &&
       html`<p class="empty">${list.loading ? "Reading the log." : empty(wanted, open)}</p>`}
       ${list.more &&
       html`<button class="more" disabled=${list.loading} onClick=${list.loadMore}>Older events</button>`}
@@ -95,11 +100,8 @@ function merged(read, live, wanted, acknowledged, open, pausedAt) {
   const rows = new Map();
   for (const row of [...live.filter((row) => passes(row, wanted)), ...read]) {
     if (rows.has(row.id) || (pausedAt !== null && row.seq > pausedAt)) continue;
-    const own = acknowledged.get(row.id);
-    const full = own
-      ? { ...row, acknowledged_by: own.by, acknowledged_ns: own.at_ns, note: own.note }
-      : { ...row, acknowledged_by: null };
-    if (!(open && own)) rows.set(row.id, full);
+    const full = { ...row, ...acknowledged(row) };
+    if (!(open && full.acknowledged_by)) rows.set(row.id, full);
   }
   return [...rows.values()].toSorted((a, b) => b.seq - a.seq);
 }

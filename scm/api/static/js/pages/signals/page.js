@@ -21,7 +21,6 @@ export function Page() {
   const known = names.includes(wanted);
   useEffect(keep, []);
   useEffect(() => {
-    editing.value = null;
     if (known) look(wanted);
   }, [wanted, known]);
   if (!names.length) return html`<${Empty} />`;
@@ -32,7 +31,7 @@ export function Page() {
     <${Bar} told=${told} names=${names} />
     <${Heads} told=${told} />
     <${Diagram} />
-    ${editing.value
+    ${editing.value?.junction === told.junction
       ? html`<${PlanEditor} />`
       : html`<${Plans} told=${told} /><${Wishes} told=${told} /><${Promises} />`}
   `;

@@ -2,6 +2,7 @@
 import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { change, notify } from "scm/shell/api.js";
+import { clock } from "scm/shared/format.js";
 import { prose } from "scm/shell/prose.js";
 import { changeOf, cycleOf, goingOn, PlanStrip, splitOf } from "scm/pages/signals/plan_strip.js";
 import { junction, plans, read, readPlans, site } from "scm/pages/signals/store.js";
@@ -12,7 +13,10 @@ const MOST_STAGES = 24;
 const LOOK_MS = 400;
 const NAME = /^[a-z][a-z0-9_-]{0,31}$/;
 
-/** The plan in the editor: `{plan, about, offset_s, stages, isNew, tag}`; null: it is closed. */
+/**
+ * The plan in the editor: `{junction, plan, about, offset_s, stages, isNew, tag, rival}`; null: it is closed.
+ * It is kept while the person looks elsewhere. `rival` is the plan as somebody else saved it meanwhile.
+ */
 export const editing = signal(null);
 
 /** The search: `{of, state, words}`; `of` is what it proves, as text. */
@@ -25,6 +29,7 @@ const contentOf = (draft) => JSON.stringify(draft.stages);
 /** Open the editor: on a saved plan, on a copy of a shipped one, or on a first cycle of all groups. */
 export async function edit(plan) {
   search.value = null;
+  const own = { junction: junction.value, rival: null };
   const copy = (stages) => stages.map((stage) => ({ ...stage, groups: [...stage.groups] }));
   if (plan?.source === "saved") {
     const found = await read(`/signals/${junction.value}/plans/${plan.plan}`).catch((error) => {
@@ -33,7 +38,7 @@ export async function edit(plan) {
     });
     if (!found) return;
     const { about, offset_s, stages } = found.body;
-    editing.value = { plan: plan.plan, about, offset_s, stages: copy(stages), isNew: false, tag: found.tag };
+    editing.value = { ...own, plan: plan.plan, about, offset_s, stages: copy(stages), isNew: false, tag: found.tag };
     if (plan.usable) search.value = { of: contentOf(editing.value), state: "proven", words: proofWords(found.body.proof) };
     return;
   }
@@ -45,7 +50,7 @@ export async function edit(plan) {
         extra_red_s: 0,
       }));
   const offset_s = typeof plan?.offset_s === "number" ? Math.round(10 * plan.offset_s) / 10 : null;
-  editing.value = { plan: "", about: "", offset_s, stages: copy(stages), isNew: true, tag: null };
+  editing.value = { ...own, plan: "", about: "", offset_s, stages: copy(stages), isNew: true, tag: null };
 }
 
 /** @returns all that is wrong with a draft, in words; what only the search can find is not among it. */
@@ -215,9 +220,12 @@ export function PlanEditor() {
           <button disabled=${faults.length > 0 || isProven || found?.state === "running"} onClick=${() => prove(draft)}>
             ${isProven ? "Proven" : "Prove"}
           </button>
-          <button class="primary" disabled=${!isProven || Boolean(unnamed)} title=${unnamed} onClick=${() => save(draft)}>Save</button>
+          <button class="primary" disabled=${!isProven || Boolean(unnamed)} title=${unnamed} onClick=${() => save(draft)}>
+            ${draft.rival ? "Save over it" : "Save"}
+          </button>
         </div>
       </div>
+      ${draft.rival && html`<p class="fault" role="alert">${rivalWords(draft.rival)}</p>`}
       ${draft.plan && unnamed && html`<p class="fault" role="status">${unnamed}</p>`}
     </section>
   `;
@@ -329,13 +337,32 @@ async function prove(draft) {
   }
 }
 
+function rivalWords({ plan, by, about, saved_ns }) {
+  const what = about ? ` (${about})` : "";
+  return `${by || "Somebody"} saved ${plan}${what} at ${clock(saved_ns)}, after you began. Close to see that one, or save yours over it.`;
+}
+
 async function save(draft) {
   const headers = draft.isNew ? { "If-None-Match": "*" } : { "If-Match": draft.tag };
   const { about, offset_s, stages } = draft;
   const body = { about, offset_s, stages, by: "dashboard", reason: "edited on the dashboard" };
   const path = `/signals/${junction.value}/plans/${draft.plan}`;
   const reply = await change("PUT", path, body, () => `Plan ${draft.plan} is saved.`, headers);
-  if (!reply) return;
+  if (!reply) return catchUp(draft, path);
   editing.value = null;
   await readPlans();
+}
+
+/** It was refused: somebody was faster, took the plan away, or the server forgot what it had proven. */
+async function catchUp(draft, path) {
+  const found = await read(path).catch((error) => ({ body: null, tag: null, status: error.status }));
+  if (editing.value?.junction !== draft.junction || editing.value.plan !== draft.plan) return;
+  const isGone = found.status === 404;
+  if (found.body && found.tag !== draft.tag) {
+    editing.value = { ...editing.value, isNew: false, tag: found.tag, rival: found.body };
+  } else if (isGone && !draft.isNew) {
+    editing.value = { ...editing.value, isNew: true, tag: null, rival: null };
+  } else if (found.body || isGone) {
+    search.value = null;
+  }
 }

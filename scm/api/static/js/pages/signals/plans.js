@@ -1,7 +1,7 @@
 /** What may run: plans and policies, which one does, and what each is for. */
 import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
-import { change } from "scm/shell/api.js";
+import { change, notify } from "scm/shell/api.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { edit } from "scm/pages/signals/plan_editor.js";
 import { PlanStrip } from "scm/pages/signals/plan_strip.js";
@@ -34,17 +34,28 @@ export function Plans({ told }) {
   `;
 }
 
+/** Whether a plan was edited since it began to run: the junction runs what it was given. */
+export function isEdited(plan, now) {
+  if (!now?.stages.length) return false;
+  const whole = (s) => Math.ceil(10 * s - 1e-9); // in steps of the signals, as the controller counts
+  const said = (stages) => JSON.stringify(stages.map((s) => [s.groups.toSorted(), whole(s.green_s), whole(s.extra_red_s)]));
+  return said(plan.stages) !== said(now.stages) || plan.offset_s !== now.offset_s;
+}
+
 function Plan({ plan, now, told }) {
   const runs = told.fresh && told.mode !== "flash" && now?.policy === "fixed" && now.plan === plan.plan;
   const next = now?.pending === plan.plan;
+  const edited = runs && !next && isEdited(plan, now);
   return html`
     <li data-runs=${runs} data-plan=${plan.plan}>
       <div class="what">
         <b>${plan.plan}</b>
         ${runs && html`<span class="badge on">runs</span>`}
         ${next && html`<span class="badge">next</span>`}
+        ${edited && html`<span class="badge" data-usable="false">edited since</span>`}
         ${plan.source === "saved" && html`<span class="badge" data-usable=${plan.usable}>${plan.usable ? "proven" : "not proven"}</span>`}
         <small>${plan.about || "no words about it"}</small>
+        ${edited && html`<small class="warn">It runs as it was before; Run… lets this one come.</small>`}
       </div>
       <span class="cycle">
         ${secs(plan.cycle_s)}
@@ -54,7 +65,7 @@ function Plan({ plan, now, told }) {
       <div class="acts">
         <button
           class="small"
-          disabled=${(runs && !next) || !plan.usable}
+          disabled=${(runs && !next && !edited) || !plan.usable}
           aria-label="Run plan ${plan.plan}"
           onClick=${() => (asking.value = { plan: plan.plan })}
         >
@@ -130,9 +141,13 @@ function Delete({ junction, plan }) {
   const remove = async () => {
     close();
     const path = `/signals/${junction}/plans/${plan.plan}`;
-    const tag = await read(path).then((found) => found.tag, () => null);
-    const done = () => `Plan ${plan.plan} is deleted.`;
-    await change("DELETE", path, undefined, done, { "If-Match": tag ?? "*" });
+    const found = await read(path).catch(() => null);
+    if (found && found.body.saved_ns !== plan.saved_ns) {
+      notify("error", `${found.body.by || "Somebody"} saved plan ${plan.plan} meanwhile: look at it first.`);
+    } else {
+      const done = () => `Plan ${plan.plan} is deleted.`;
+      await change("DELETE", path, undefined, done, { "If-Match": found?.tag ?? "*" });
+    }
     readPlans();
   };
   return html`

@@ -15,7 +15,7 @@ export const verdicts = signal([]);
 /** Why something could not be read; empty: all was. */
 export const trouble = signal("");
 
-const SCORE_EVERY_MS = 5000;
+const AGAIN_EVERY_MS = 5000;
 const KEPT_S = 600;
 
 /** Group to its bars `{colour, start, end}`, oldest first, in seconds of the controller's clock. */
@@ -40,7 +40,7 @@ export function clockNow() {
 export async function read(path) {
   const response = await fetch(`/api/v1${path}`);
   const body = await response.json();
-  if (!response.ok) throw new Error(body.detail || body.title);
+  if (!response.ok) throw Object.assign(new Error(body.detail || body.title), { status: response.status });
   return { body, tag: response.headers.get("ETag") };
 }
 
@@ -72,13 +72,13 @@ async function readSite(name) {
   }
 }
 
-export async function readPlans() {
+export async function readPlans(isAsked = true) {
   const name = junction.value;
   try {
     const { body } = await read(`/signals/${name}/plans?limit=200`);
     if (junction.value === name) plans.value = body.items;
   } catch (error) {
-    notify("error", error.message);
+    if (isAsked) notify("error", error.message);
   }
 }
 
@@ -152,7 +152,10 @@ export function keep() {
     if (lost) wasLost = true;
     else if (link.value === "live") wasLost = false;
   });
-  const timer = setInterval(() => junction.value && readScore(junction.value), SCORE_EVERY_MS);
+  const timer = setInterval(() => {
+    if (junction.value) readScore(junction.value);
+    if (site.value) readPlans(false); // others save and delete plans too
+  }, AGAIN_EVERY_MS);
   return () => {
     live();
     back();
