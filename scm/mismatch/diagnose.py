@@ -269,7 +269,8 @@ def gained_nothing(fit: Fit) -> bool:
 
 def as_given(fitter: Fitter, best: Fitted) -> Fitted:
     """Return the car with its own numbers as its file gives them, as sure as the file is."""
-    return replace(fitter.nominal(best), covariance=np.eye(len(best.z)))
+    as_said = replace(best, z=fitter.model.as_said())
+    return replace(fitter.at(as_said), covariance=np.eye(len(best.z)))
 
 
 def verdict_of(
