@@ -32,10 +32,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--out", type=Path, metavar="DIR", help=f"the report's folder; default: runs/{FOLDER}-NAME"
     )
     parser.add_argument(
-        "--from-s", type=float, metavar="S", help="leave out what is before, since the first row"
+        "--from-s", type=float, metavar="S", help="leave out what is before, since its begin"
     )
     parser.add_argument(
-        "--to-s", type=float, metavar="S", help="leave out what is after, since the first row"
+        "--to-s", type=float, metavar="S", help="leave out what is after, since its begin"
     )
     parser.add_argument(
         "--budget-s",

@@ -128,7 +128,8 @@ def diagnose(
         car_file: The car's name or file; None takes the recordings' own.
         data: Folder of the recordings' tables; None: beside each description.
         vehicle: Of recordings of several cars the name of the one; None: they are of one.
-        span_s: Part of each recording, seconds since its first row; None: its end.
+        span_s: Part of each recording, seconds since its begin; None: its end.
+        told: Recordings of the same car by `scm play`, whatever they call it; taken whole.
         budget_s: What is not found in time to be told after so long, is not looked for.
         tell: Is told what is being tried.
         clock: For the time it takes.
