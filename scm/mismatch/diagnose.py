@@ -117,6 +117,7 @@ def diagnose(
     *,
     vehicle: str | None = None,
     span_s: tuple[float | None, float | None] = (None, None),
+    told: Sequence[Path | str] = (),
     budget_s: float = DEFAULT_S,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
@@ -140,6 +141,7 @@ def diagnose(
     recordings = [
         part_of(one, *span_s) for path in paths for one in recordings_of_one(path, data, vehicle)
     ]
+    recordings += [one for path in told for one in recordings_of_one(path)]
     file = car_file or recordings[0].vehicle
     car = load_car(file, trusted=car_file is not None)
     if car_file is None and any(r.vehicle != file for r in recordings):
