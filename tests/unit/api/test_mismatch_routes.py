@@ -388,6 +388,8 @@ def test_an_upload_becomes_a_recording_for_a_search(call, shelves, ran):
             {"recording.yaml": f"source: &a x\nnote: *a\n{DESCRIPTION}", "commands.csv": COMMANDS},
             "alias",
         ),
+        ({"recording.yaml": "a: " + "[" * 100_000, "commands.csv": COMMANDS}, "20 deep"),
+        ({"a.csv": COMMANDS, "a.csv/b.csv": COMMANDS}, "cannot be read: File exists"),
     ],
 )
 def test_an_upload_that_asks_for_what_lies_outside_is_refused(call, shelves, files, why):
