@@ -122,7 +122,7 @@ class CalibrationDesk:
         Args:
             camera: Whose pictures.
             board: What was printed, as arguments of `scm eye calibrate`.
-            save_as: Name of the calibration; empty: only look.
+            save_as: Name of the calibration, unless it is taken by then; empty: only look.
         """
 
         def work(tell: Teller) -> str:
@@ -155,7 +155,7 @@ class CalibrationDesk:
             frame: A JPEG file.
             lens: Name of a lens on the shelf; empty: the map's.
             tags: That lie on the floor beside the map's own.
-            save_as: Name of the calibration.
+            save_as: Name of the calibration, unless it is taken by then.
         """
 
         def work(tell: Teller) -> str:
@@ -180,9 +180,12 @@ class CalibrationDesk:
         return work
 
     def _keep(self, name: str, toml: str, report: Path) -> str:
-        self.shelf.write(name, toml)
-        self.shelf.report_path(name).write_bytes(report.read_bytes())
-        return f"/api/v1/eye/calibrations/{name}"
+        """Keep what was found; under the next free name where somebody took that one meanwhile."""
+        with self.shelf.editing:
+            free = self.shelf.free_name(name)
+            self.shelf.write(free, toml)
+            self.shelf.report_path(free).write_bytes(report.read_bytes())
+        return f"/api/v1/eye/calibrations/{free}"
 
     def _report_path(self, camera: str) -> Path:
         return self._views / camera / "report.json"

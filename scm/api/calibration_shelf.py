@@ -127,6 +127,13 @@ class CalibrationShelf:
         mine = (one for one in lenses if isinstance(one, _Lens) and _is_lens_of(one, found))
         return found, next(mine, None)
 
+    def free_name(self, name: str) -> str:
+        """Return a name that no calibration has: this one, or it with a number."""
+        free, number = name, 2
+        while self.path(free).exists():
+            free, number = f"{name[:43]}-{number}", number + 1
+        return free
+
     def write(self, name: str, toml: str) -> CalibrationFile:
         """Put a calibration on the shelf, or in place of the one of that name.
 

@@ -17,11 +17,13 @@ from scm.api.problem import RefusedError
 from scm.api.programs import run_scm
 from scm.api.report_folders import Job, ReportFolders
 from scm.clock import Clock
-from scm.errors import RunError
+from scm.errors import RecordingError, RunError
+from scm.recorder.run_index import read_index
 from scm.v2x.message import Refused
 
 KIND, DRIVE_KIND = "mismatch", "drive"
 _PARTIAL = ".partial"
+_RUN = ".mcap"
 _STEP = re.compile(r" *\d+ s +(?P<share>\d+) %  (?P<said>.+)")
 
 
@@ -63,7 +65,7 @@ class MismatchJobs:
         shelf = self._city.shelves.recordings
         if shelf is not None and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}", name):
             for path in (shelf / name, shelf / f"{name}.mcap"):
-                is_run = path.suffix == ".mcap" and path.is_file()
+                is_run = path.suffix == _RUN and path.is_file()
                 if is_run or (path / "recording.yaml").is_file():
                     return path
         raise not_found("recording", name)
@@ -79,8 +81,10 @@ class MismatchJobs:
             raise not_found("upload", upload)
         return uploads.recording_in(folder)
 
-    def again(self, report: str) -> tuple[list[Path], Job]:
-        """Return what a report was made from, and what was driven since to tell more.
+    def again(self, report: str) -> Job:
+        """Return the job that a report was made by, with what was driven since to tell more.
+
+        Of a report on one of several cars it is that car alone: only it was driven.
 
         Raises:
             RefusedError: when that cannot be known.
@@ -92,31 +96,38 @@ class MismatchJobs:
         if job is None:
             detail = f"{report}: nobody noted what it was made from; start from the recording"
             raise RefusedError(Refused(code="conflict", detail=detail))
-        before = [Path(path) for path in job.recordings]
-        gone = next((path for path in before if not path.exists()), None)
+        before = (*job.recordings, *job.told)
+        gone = next((path for path in map(Path, before) if not path.exists()), None)
         if gone is not None:
             detail = f"{report}: the recording it was made from is gone: {gone.name}"
             raise RefusedError(Refused(code="conflict", detail=detail))
-        return [*before, *self.reports.told(folder)], job
+        driven = tuple(map(str, self.reports.told(folder)))
+        _, _, car = report.partition(".")
+        return msgspec.structs.replace(
+            job,
+            told=(*job.told, *driven),
+            vehicle=job.vehicle or car,
+            source=f"{job.source}, again with {len(driven)} more",
+        )
 
-    def search(self, recordings: Sequence[Path], job: Job) -> Operation:
+    def search(self, job: Job) -> Operation:
         """Start a search."""
         shelf = self.shelf()
-        job = msgspec.structs.replace(
-            job,
-            recordings=tuple(map(str, recordings)),
-            asked_ns=self._clock.now_ns(),
-        )
-        base = _slug(f"{_stem(recordings[0])}-{job.vehicle}".strip("-"))
+        job = msgspec.structs.replace(job, asked_ns=self._clock.now_ns())
+        base = _slug(f"{_stem(Path(job.recordings[0]))}-{job.vehicle}".strip("-"))
 
         def work(tell: Teller) -> str:
-            partial = shelf / f".{base}-{job.asked_ns}{_PARTIAL}"
+            partial, whole = (
+                shelf / f".{base}-{job.asked_ns}{end}{_PARTIAL}" for end in ("", "-run")
+            )
             try:
-                run_scm(_words(recordings, job, partial), tell, lambda line: _hear(line, tell))
+                runs = [_whole(Path(path), whole, tell) for path in job.recordings]
+                run_scm(_words(runs, job, partial), tell, lambda line: _hear(line, tell))
                 (partial / "job.json").write_bytes(msgspec.json.encode(job))
                 return f"/mismatch/{_placed(partial, shelf, base)}"
             finally:
                 shutil.rmtree(partial, ignore_errors=True)
+                shutil.rmtree(whole, ignore_errors=True)
 
         return self._work.start(KIND, job.source, work, owner=job.owner)
 
@@ -163,15 +174,34 @@ class MismatchJobs:
             raise RunError(early)
 
 
-def _words(recordings: Sequence[Path], job: Job, out: Path) -> list[str]:
-    words = [
-        "mismatch",
-        *map(str, recordings),
-        "--out",
-        str(out),
-        "--budget-s",
-        f"{job.budget_s:g}",
-    ]
+def _whole(recording: Path, folder: Path, tell: Teller) -> Path:
+    """Return a recording to be searched: of a run without its end a copy of what is there of it.
+
+    A run has none while it is being written, or where its writer was killed.
+
+    Raises:
+        RunError: when nothing is there yet.
+    """
+    if recording.suffix != _RUN or not _has_no_end(recording):
+        return recording
+    tell("takes what is recorded so far")
+    folder.mkdir(exist_ok=True)
+    run_scm(
+        ["recover", str(recording), "--out", str(folder / recording.name)], tell, lambda _: None
+    )
+    return folder / recording.name
+
+
+def _has_no_end(run: Path) -> bool:
+    try:
+        return not read_index(run).whole
+    except RecordingError:
+        return False  # it is no run at all: the search says so
+
+
+def _words(runs: Sequence[Path], job: Job, out: Path) -> list[str]:
+    words = ["mismatch", *map(str, runs), "--out", str(out), "--budget-s", f"{job.budget_s:g}"]
+    words += ["--told", *job.told] if job.told else []
     for option, value in (
         ("--vehicle", job.vehicle), ("--car", job.car), ("--from-s", job.from_s),
         ("--to-s", job.to_s),
@@ -202,7 +232,7 @@ def _placed(partial: Path, shelf: Path, base: str) -> str:
 
 
 def _stem(recording: Path) -> str:
-    return recording.stem if recording.suffix == ".mcap" else recording.name
+    return recording.stem if recording.suffix == _RUN else recording.name
 
 
 def _slug(text: str) -> str:

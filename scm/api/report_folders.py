@@ -8,7 +8,7 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
@@ -30,12 +30,13 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     """What a report was made from.
 
     Attributes:
-        recordings: Of the shelf, uploads and earlier reports' drives: paths below the shelves.
+        recordings: Of the shelf, or uploads: paths below the shelves.
+        told: Drives that earlier reports suggested, recorded since: likewise.
         source: The same in words.
         vehicle: Which car of the recordings; empty: all.
         car: The car file's name; empty: the recording's own.
         budget_s: Time allowed for the search; what is not found in it is not looked for.
-        from_s: Part of the recording, seconds since its first row; None: its start.
+        from_s: Part of the recording, seconds since its begin; None: its start.
         to_s: None: its end.
         asked_ns: When.
         owner: Who asked.
@@ -43,6 +44,7 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
 
     recordings: tuple[str, ...]
     source: str
+    told: Annotated[tuple[str, ...], msgspec.Meta(examples=[["told_1"]])] = ()
     vehicle: str = ""
     car: str = ""
     budget_s: float = BUDGET_S

@@ -26,6 +26,7 @@ MOST_UNPACKED_BYTES = 512 * 2**20
 MOST_FILES = 200
 MOST_ENTRIES = 10 * MOST_FILES  # folders and what is left out among them
 MOST_DESCRIPTION_BYTES = 256 * 1024
+MOST_NESTED = 20  # each level costs the reader all that follow
 KEPT = 20
 ID = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 _CHUNK = 2**20
@@ -98,7 +99,8 @@ def _unpack(body: BinaryIO, folder: Path) -> int:
     except Exception as cause:  # whatever a library makes of a damaged zip
         if isinstance(cause, OSError) and cause.errno in DISK_TROUBLE:
             raise
-        raise _refused(f"the zip cannot be read: {cause}") from cause
+        why = cause.strerror if isinstance(cause, OSError) else cause  # without our folders
+        raise _refused(f"the zip cannot be read: {why}") from cause
 
 
 def _entries(body: BinaryIO) -> int:
@@ -163,18 +165,24 @@ def _check(folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _check_size(description: Path) -> None:
-    """Refuse a description that would take minutes to read: a long one, or one that unfolds."""
+    """Refuse a description that would take minutes to read: long, deep, or one that unfolds."""
     size = description.stat().st_size
     if size > MOST_DESCRIPTION_BYTES:
         most = MOST_DESCRIPTION_BYTES // 1024
         raise _refused(f"{FILE_NAME}: got {size // 1024} KiB, expected at most {most} KiB")
+    depth = 0
     try:
         with description.open("rb") as text:
-            unfolds = any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(text))
+            for event in yaml.parse(text):
+                if isinstance(event, yaml.AliasEvent):
+                    wanted = "got an alias (*name), expected everything written out"
+                    raise _refused(f"{FILE_NAME}: {wanted}")
+                depth += isinstance(event, yaml.CollectionStartEvent)
+                depth -= isinstance(event, yaml.CollectionEndEvent)
+                if depth > MOST_NESTED:
+                    raise _refused(f"{FILE_NAME}: lists within lists, more than {MOST_NESTED} deep")
     except yaml.YAMLError:
         return  # its reader tells what is wrong
-    if unfolds:
-        raise _refused(f"{FILE_NAME}: got an alias (*name), expected everything written out")
 
 
 def _vehicles(description: Description, folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:

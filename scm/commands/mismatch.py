@@ -26,16 +26,20 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--vehicle", metavar="NAME", help="of several cars this one")
     parser.add_argument(
+        "--told", nargs="+", type=Path, default=[], metavar="DIR",
+        help="drives of the same car by scm play; whole, whatever part is taken of the others",
+    )  # fmt: skip
+    parser.add_argument(
         "--data", type=Path, metavar="DIR", help="where the tables are; default: beside"
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help=f"the report's folder; default: runs/{FOLDER}-NAME"
     )
     parser.add_argument(
-        "--from-s", type=float, metavar="S", help="leave out what is before, since the first row"
+        "--from-s", type=float, metavar="S", help="leave out what is before, since its begin"
     )
     parser.add_argument(
-        "--to-s", type=float, metavar="S", help="leave out what is after, since the first row"
+        "--to-s", type=float, metavar="S", help="leave out what is after, since its begin"
     )
     parser.add_argument(
         "--budget-s",
@@ -48,7 +52,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
     from scm.mismatch.progress import Progress
-    from scm.mismatch.several import cars_of
+    from scm.mismatch.several import cars_of, with_told
     from scm.recording.span import part_of
 
     name = arguments.recording[0].resolve()
@@ -61,6 +65,7 @@ def _run(arguments: argparse.Namespace) -> int:
                 name: [part_of(one, arguments.from_s, arguments.to_s) for one in recordings]
                 for name, recordings in cars_of(arguments.recording, arguments.data).items()
             }
+            cars = with_told(cars, arguments.told)
             said = _of_cars(cars, arguments.budget_s, out, progress)
         else:
             said = _of_one(arguments, out, progress)
@@ -77,8 +82,8 @@ def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> s
 
     found = diagnose(
         arguments.recording, arguments.car, arguments.data, vehicle=arguments.vehicle,
-        span_s=(arguments.from_s, arguments.to_s), budget_s=arguments.budget_s,
-        tell=progress.tell,
+        span_s=(arguments.from_s, arguments.to_s), told=arguments.told,
+        budget_s=arguments.budget_s, tell=progress.tell,
     )  # fmt: skip
     progress.tell("writing the report")
     write(found, out)

@@ -117,6 +117,7 @@ def diagnose(
     *,
     vehicle: str | None = None,
     span_s: tuple[float | None, float | None] = (None, None),
+    told: Sequence[Path | str] = (),
     budget_s: float = DEFAULT_S,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
@@ -128,7 +129,8 @@ def diagnose(
         car_file: The car's name or file; None takes the recordings' own.
         data: Folder of the recordings' tables; None: beside each description.
         vehicle: Of recordings of several cars the name of the one; None: they are of one.
-        span_s: Part of each recording, seconds since its first row; None: its end.
+        span_s: Part of each recording, seconds since its begin; None: its end.
+        told: Recordings of the same car by `scm play`, whatever they call it; taken whole.
         budget_s: What is not found in time to be told after so long, is not looked for.
         tell: Is told what is being tried.
         clock: For the time it takes.
@@ -139,6 +141,7 @@ def diagnose(
     recordings = [
         part_of(one, *span_s) for path in paths for one in recordings_of_one(path, data, vehicle)
     ]
+    recordings += [one for path in told for one in recordings_of_one(path)]
     file = car_file or recordings[0].vehicle
     car = load_car(file, trusted=car_file is not None)
     if car_file is None and any(r.vehicle != file for r in recordings):
@@ -269,7 +272,8 @@ def gained_nothing(fit: Fit) -> bool:
 
 def as_given(fitter: Fitter, best: Fitted) -> Fitted:
     """Return the car with its own numbers as its file gives them, as sure as the file is."""
-    return replace(fitter.nominal(best), covariance=np.eye(len(best.z)))
+    as_said = replace(best, z=fitter.model.as_said())
+    return replace(fitter.at(as_said), covariance=np.eye(len(best.z)))
 
 
 def verdict_of(

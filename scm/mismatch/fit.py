@@ -100,8 +100,12 @@ class Fitter:
         return Fitted((), z, np.zeros(0), e[:, 0], float(self.score(e, z)[0]), np.zeros((0, 0)))
 
     def nominal(self, base: Fitted) -> Fitted:
-        """Return a hypothesis with the car's own numbers as the file says, with derivatives."""
-        fitted = replace(base, z=np.zeros_like(base.z), values=base.values.copy())
+        """Return a hypothesis with the car's own numbers where they are likeliest, unfitted."""
+        return self.at(replace(base, z=np.zeros_like(base.z)))
+
+    def at(self, base: Fitted) -> Fitted:
+        """Return a hypothesis at its own numbers, with derivatives."""
+        fitted = replace(base, values=base.values.copy())
         self._differentiate([fitted], {id(fitted)})
         return fitted
 

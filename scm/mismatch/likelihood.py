@@ -196,6 +196,15 @@ class Likelihood:
         """Return the car's own numbers at `z` standard deviations from the file's."""
         return {o.key: clipped(o, v) for o, v in zip(self.ordinary, z, strict=True)}
 
+    def as_said(self) -> Floats:
+        """Return `z` of the car as it is driven where nothing is fitted.
+
+        It is 0 but for what no file says: there a car is driven by its equations' own number, and
+        likeliest is another.
+        """
+        own = [self.car.value(o.key) if o.key in _UNKNOWN else o.mean for o in self.ordinary]
+        return np.array([(x - o.mean) / o.std for x, o in zip(own, self.ordinary, strict=True)])
+
 
 def clipped(ordinary: Ordinary, z: float) -> float:
     """Return a number at `z` standard deviations, within its bounds."""

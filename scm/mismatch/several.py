@@ -7,6 +7,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock, seconds
+from scm.errors import RecordingError
 from scm.mismatch.budget import DEFAULT_S
 from scm.mismatch.diagnose import Found, diagnose_car, told, write
 from scm.mismatch.explain import said
@@ -67,6 +68,21 @@ def cars_of(
             free, number = f"{name}_{number}", number + 1
         found[free] = together
     return found
+
+
+def with_told(
+    cars: Mapping[str, list[Recording]], told: Sequence[Path | str]
+) -> dict[str, list[Recording]]:
+    """Return the recordings with drives that `scm play` recorded of the same car since.
+
+    Raises:
+        RecordingError: when they cannot be read, or there are several cars that they may be of.
+    """
+    if told and len(cars) != 1:
+        msg = f"{told[0]}: a drive of one of {', '.join(cars)}; say of which with --vehicle"
+        raise RecordingError(msg)
+    more = [recording for path in told for recording in recordings_of(path)]
+    return {name: [*recordings, *more] for name, recordings in cars.items()}
 
 
 def diagnose_one(

@@ -6,11 +6,12 @@ told, be it by others or by its own driver.
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from scm.errors import MessageError, RecordingError, nearest
 from scm.recorder.driven import SIMULATED, Heard, Report, recording_of, tells_commands
-from scm.recorder.mcap_file import read_keys, read_run
+from scm.recorder.mcap_file import read_begin_ns, read_keys, read_run
 from scm.recording.read import Recording, read_recordings
 from scm.v2x.message import Message, decode
 from scm.v2x.messages.city_event import CityEvent
@@ -109,7 +110,7 @@ def read_drives(path: Path, vehicle: str | None = None) -> list[Recording]:
             "nothing can be driven again; record anew, or drive a car by `scm play` or a script"
         )
         raise RecordingError(msg)
-    return [recording_of(heard[name], path, name, start_ns) for name in able]
+    return [replace(recording_of(heard[name], path, name, start_ns), begin_s=0.0) for name in able]
 
 
 def _of(key: str) -> tuple[str, type[Message] | None]:
@@ -135,10 +136,8 @@ def _heard(path: Path, keys: Iterable[str], chosen: Sequence[str]) -> tuple[dict
     of_all = {CityEvent, WorldSnapshot} if silent else {CityEvent}
     wanted = {key for key, (name, kind) in of.items() if name in chosen or kind in of_all}
     heard = {name: Heard() for name in chosen}
-    start_ns = None
     for message in read_run(path, wanted):
         name, kind = of[message.key]
-        start_ns = message.t_ns if start_ns is None else start_ns
         if kind is None:
             continue
         try:
@@ -154,7 +153,7 @@ def _heard(path: Path, keys: Iterable[str], chosen: Sequence[str]) -> tuple[dict
                 heard[one].take(told)
             case _ if name in heard:
                 heard[name].take(told)
-    return heard, start_ns or 0
+    return heard, read_begin_ns(path) or 0
 
 
 def _reports(snapshot: WorldSnapshot) -> Iterator[tuple[str, Report]]:

@@ -194,6 +194,18 @@ def read_keys(path: Path) -> list[str]:
         return sorted({channel.topic for channel in summary.channels.values()}) if summary else []
 
 
+def read_begin_ns(path: Path) -> int | None:
+    """Return when the first message of a complete run was heard; None: it holds none.
+
+    Raises:
+        RecordingError: when the file is not a complete MCAP file.
+    """
+    with _reading(path), path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+        chunks = summary.chunk_indexes if summary else []
+        return min((chunk.message_start_time for chunk in chunks), default=None)
+
+
 @contextmanager
 def _reading(path: Path) -> Iterator[None]:
     try:

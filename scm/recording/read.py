@@ -53,12 +53,15 @@ class Recording:
         channels: By name, as in the recordings contract.
         name: Which of the recording's cars it is: as its tables call it, or in a run as the city
             does.
+        begin_s: From when a part of it counts: a run of a city begins before its car is driven;
+            None: from the first row.
     """
 
     path: Path
     vehicle: str
     channels: dict[str, Channel]
     name: str = ""
+    begin_s: float | None = None
 
     def channel(self, name: str) -> Channel:
         """Return a channel.

@@ -8,26 +8,31 @@ from scm.recording.read import Channel, Recording
 
 
 def part_of(recording: Recording, from_s: float | None, to_s: float | None) -> Recording:
-    """Return what lies between two moments, seconds since the recording's first row; None: its end.
+    """Return what lies between two moments, seconds since the recording's begin; None: its end.
 
-    Times stay as they were recorded.
+    It begins with its first row, or as a run of a city does. Times stay as they were recorded.
 
     Raises:
-        RecordingError: when nothing lies there.
+        RecordingError: when nothing lies there; with what there is.
     """
     if from_s is None and to_s is None:
         return recording
-    starts = [float(channel.t.min()) for channel in recording.channels.values() if len(channel.t)]
-    start_s = min(starts, default=0.0)
-    first = start_s + (0.0 if from_s is None else from_s)
-    last = math.inf if to_s is None else start_s + to_s
+    times = [channel.t for channel in recording.channels.values() if len(channel.t)]
+    starts = min((float(t.min()) for t in times), default=0.0)
+    begin_s = starts if recording.begin_s is None else recording.begin_s
+    first = begin_s + (0.0 if from_s is None else from_s)
+    last = math.inf if to_s is None else begin_s + to_s
     channels = {
         name: cut
         for name, channel in recording.channels.items()
         if len((cut := _between(channel, first, last)).t)
     }
     if not channels:
-        msg = f"{recording.path}: from {from_s} s to {to_s} s: nothing was recorded there"
+        ends = max((float(t.max()) for t in times), default=0.0)
+        span = f"from {from_s or 0.0:g} s" + ("" if to_s is None else f" to {to_s:g} s")
+        of = f" of {recording.name}" if recording.begin_s is not None else ""
+        msg = f"{recording.path}: {span}: nothing{of} was recorded there that can be driven again; "
+        msg += f"there is from {starts - begin_s:.1f} s to {ends - begin_s:.1f} s"
         raise RecordingError(msg)
     return replace(recording, channels=channels)
 

@@ -44,7 +44,11 @@ ViewName = Annotated[
 ]
 SaveAs = Annotated[
     str,
-    Field(pattern=_NAME, description="what the result is called", examples=["overhead-2025"]),
+    Field(
+        pattern=_NAME,
+        description="what the result is called, with a number where it is taken by then",
+        examples=["overhead-2025"],
+    ),
 ]
 
 
@@ -106,7 +110,9 @@ class LensBody(Body):
         default=False, description="a lens of more than about 100 degrees", examples=[False]
     )
     save_as: SaveAs | None = Field(
-        None, description="what the lens is called; null: only look", examples=["overhead-lens"]
+        None,
+        description="what the lens is called, as with a place; null: only look",
+        examples=["overhead-lens"],
     )
 
 

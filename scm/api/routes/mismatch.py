@@ -61,14 +61,15 @@ class JobBody(BaseModel):
         "", pattern=_CAR, description="its car file's name; empty: what the recording says",
         examples=["nigel"],
     )  # fmt: skip
-    budget_s: float = Field(
-        BUDGET_S, ge=5.0, le=4 * BUDGET_S, examples=[120.0],
-        description="what is not found in time to be told after it is not looked for [s]",
+    budget_s: float | None = Field(
+        None, ge=5.0, le=4 * BUDGET_S, examples=[120.0],
+        description="what is not found in time to be told after it is not looked for [s]; "
+        "null: 1800, of a search again as before",
     )  # fmt: skip
     from_s: float | None = Field(
         None,
         ge=0.0,
-        description="leave out what is before, since the first row [s]",
+        description="leave out what is before, since its begin [s]",
         examples=[10.0],
     )
     to_s: float | None = Field(
@@ -191,30 +192,7 @@ def _add_jobs(routes: APIRouter, city: City, jobs: MismatchJobs) -> None:
     )
     def search(request: Request, body: JobBody, key: IdempotencyKey = "") -> Response:
         del key  # the same wish twice is two searches of one answer: harmless
-        job = Job(
-            recordings=(),
-            source=body.recording or body.upload or f"{body.again} again",
-            vehicle=body.vehicle,
-            car=_known_car(body.car),
-            budget_s=body.budget_s,
-            from_s=body.from_s,
-            to_s=body.to_s,
-            owner=str(request.scope.get("scm_owner", "")),
-        )
-        if body.recording:
-            recordings = [jobs.recording(body.recording)]
-        elif body.upload:
-            recordings = [jobs.upload(body.upload)]
-        else:
-            recordings, before = jobs.again(body.again)
-            more = len(recordings) - len(before.recordings)
-            job = msgspec.structs.replace(
-                job,
-                vehicle=body.vehicle or before.vehicle,
-                car=job.car or before.car,
-                source=f"{before.source}, again with {more} more",
-            )
-        return accepted(jobs.search(recordings, job))
+        return accepted(jobs.search(_job(jobs, body, str(request.scope.get("scm_owner", "")))))
 
 
 def _add_uploads(routes: APIRouter, jobs: MismatchJobs) -> None:
@@ -324,6 +302,22 @@ def _add_drives(routes: APIRouter, jobs: MismatchJobs) -> None:
         return accepted(jobs.drive(name, drive, body.vehicle, body.part, owner))
 
 
+def _job(jobs: MismatchJobs, body: JobBody, owner: str) -> Job:
+    """Return what is asked for; what nobody says of a search again is as in the one before."""
+    if body.again:
+        before = jobs.again(body.again)
+    else:
+        path = jobs.recording(body.recording) if body.recording else jobs.upload(body.upload)
+        before = Job(recordings=(str(path),), source=body.recording or body.upload)
+    said = {
+        name: getattr(body, name)
+        for name in ("vehicle", "budget_s", "from_s", "to_s")
+        if getattr(body, name) not in ("", None)
+    }
+    car = _known_car(body.car) or before.car
+    return msgspec.structs.replace(before, car=car, owner=owner, **said)
+
+
 def _folder(jobs: MismatchJobs, name: str) -> FilePath:
     folder = jobs.reports.find(name)
     if folder is None:
@@ -335,8 +329,10 @@ def _shown(job: Job | None) -> Job | None:
     """Return what may be told of a job: files by name, not where they lie on this machine."""
     if job is None:
         return None
-    names = tuple(FilePath(path).name for path in job.recordings)
-    return msgspec.structs.replace(job, recordings=names)
+    names, told = (
+        tuple(FilePath(path).name for path in paths) for paths in (job.recordings, job.told)
+    )
+    return msgspec.structs.replace(job, recordings=names, told=told)
 
 
 def _known_car(name: str) -> str:

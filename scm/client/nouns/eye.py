@@ -179,7 +179,7 @@ class EyeNoun:
             dictionary: markers of a ChArUco board
             first_id: of the tag at the lower left
             fisheye: a lens of more than about 100 degrees
-            save_as: what the lens is called; null: only look
+            save_as: what the lens is called, as with a place; null: only look
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
@@ -215,7 +215,7 @@ class EyeNoun:
             name: a name on the bus
             lens: a lens on the shelf; null: the map's
             tags: tags on the floor beside the map's: id, x_m, y_m, yaw_rad, size_m of each
-            save_as: what the result is called
+            save_as: what the result is called, with a number where it is taken by then
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(

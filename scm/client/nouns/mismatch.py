@@ -28,7 +28,7 @@ class MismatchNoun:
         again: str = "",
         vehicle: str = "",
         car: str = "",
-        budget_s: float = 1800.0,
+        budget_s: float | None = None,
         from_s: float | None = None,
         to_s: float | None = None,
         idempotency_key: str = "",
@@ -41,8 +41,9 @@ class MismatchNoun:
             again: a report, instead: its recordings and drives since
             vehicle: which car of it; empty: all
             car: its car file's name; empty: what the recording says
-            budget_s: what is not found in time to be told after it is not looked for [s]
-            from_s: leave out what is before, since the first row [s]
+            budget_s: what is not found in time to be told after it is not looked for [s]; null:
+                1800, of a search again as before
+            from_s: leave out what is before, since its begin [s]
             to_s: leave out what is after [s]
             idempotency_key: Same key, same effect, once; empty: a new one.
         """

@@ -84,12 +84,13 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     """What a report was made from.
 
     Attributes:
-        recordings: Of the shelf, uploads and earlier reports' drives: paths below the shelves.
+        recordings: Of the shelf, or uploads: paths below the shelves.
         source: The same in words.
+        told: Drives that earlier reports suggested, recorded since: likewise.
         vehicle: Which car of the recordings; empty: all.
         car: The car file's name; empty: the recording's own.
         budget_s: Time allowed for the search; what is not found in it is not looked for.
-        from_s: Part of the recording, seconds since its first row; None: its start.
+        from_s: Part of the recording, seconds since its begin; None: its start.
         to_s: None: its end.
         asked_ns: When.
         owner: Who asked.
@@ -97,6 +98,7 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
 
     recordings: tuple[str, ...]
     source: str
+    told: tuple[str, ...] = ()
     vehicle: str = ""
     car: str = ""
     budget_s: float = 1800.0

@@ -46,7 +46,16 @@ def test_a_person_zooms_picks_a_tag_and_a_car(visit, running):
 def test_the_place_of_the_camera_is_found_put_in_force_and_put_back(visit, running, look_around):
     visited = visit("/eye/calibrate")
     page = visited.page
+    typed(page, "text=Add a floor tag", {"x [m]": "-0.5", "yaw [rad]": "-1.5708", "edge [m]": ""})
     page.click("text=Find the place")
+    page.wait_for_selector("input:focus:invalid")
+    page.reload()
+    page.wait_for_selector("input[aria-label='Tag 1: x [m]']")
+    assert page.input_value("input[aria-label='Tag 1: x [m]']") == "-0.5"
+    page.click("[aria-label='Take tag 1 off']")
+    page.click("text=Find the place")
+    page.wait_for_selector(".eye-place progress")
+    page.reload()  # whoever comes back finds it where it is
     page.wait_for_selector(".eye-place .result table", timeout=MEASURING_MS)
     (row,) = running.get("/eye/calibrations")["items"]
     assert (row["kind"], row["camera"]) == ("place", "overhead")
@@ -67,9 +76,12 @@ def test_the_place_of_the_camera_is_found_put_in_force_and_put_back(visit, runni
     look_around(visited, ".eye-shelf", "eye_in_force")
     page.click("text=Put back…")
     page.fill("dialog input[name=reason]", "the test is over")
-    page.click("dialog .primary")
+    back = {"by": "ada", "reason": "she was quicker"}
+    running.web.post("/eye/cameras/overhead/calibration/back", json=back).raise_for_status()
+    page.wait_for_selector("dialog", state="detached")
     page.wait_for_selector(".bar .in-force b:text-is('as started')")
     page.click(f"button[aria-label='Throw {row['name']} away']")
+    page.click("dialog .danger")
     visited.until(lambda: not running.get("/eye/calibrations")["items"], "the shelf is empty")
     assert visited.complaints == []
 
@@ -79,7 +91,9 @@ def test_a_lens_is_measured_from_uploaded_pictures(visit, running, tmp_path, loo
     paths = drawn(camera, tmp_path)
     visited = visit("/eye/calibrate")
     page = visited.page
-    page.fill("input[name=square_mm]", str(1000 * SQUARE_M))
+    page.fill("input[name=square_mm]", "")
+    page.type("input[name=square_mm]", f"{1000 * SQUARE_M:.2f}")
+    assert page.input_value("input[name=square_mm]") == "100.00"
     page.set_input_files("input[type=file]", [str(path) for path in paths])
     all_found = f".eye-lens .facts:has-text('{len(paths)} of {len(paths)} pictures')"
     page.wait_for_selector(all_found, timeout=MEASURING_MS)
@@ -93,11 +107,23 @@ def test_a_lens_is_measured_from_uploaded_pictures(visit, running, tmp_path, loo
     page.wait_for_selector(f".eye-place option:text('{row['name']}')", state="attached")
     look_around(visited, ".eye-lens .result", "eye_lens")
     page.click("text=Throw all away")
+    page.click("dialog .danger")
     page.wait_for_selector(".eye-lens .views", state="detached")  # what is below moves up
     page.click(f"button[aria-label='Throw {row['name']} away']")
+    page.click("dialog .danger")
     visited.until(lambda: not running.get("/eye/calibrations")["items"], "the shelf is empty")
     assert running.get("/eye/cameras/overhead/views")["views"] == []
     assert visited.complaints == []
+
+
+def typed(page, button, values):
+    """Add a floor tag and type its numbers, key by key."""
+    page.click(button)
+    for title, text in values.items():
+        field = page.locator(f"input[aria-label='Tag 1: {title}']")
+        field.fill("")
+        field.type(text)
+        assert field.input_value() == text
 
 
 def drawn(camera, folder):

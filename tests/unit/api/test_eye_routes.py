@@ -2,6 +2,7 @@
 
 import os
 import struct
+import threading
 import time
 from pathlib import Path
 
@@ -333,6 +334,25 @@ class TestMeasuring:
             assert (refused.status_code, refused.json()["code"]) == (409, "exists")
         body = {"save_as": "new", "lens": "lab"}
         assert "which is a place" in client("POST", f"{path}/place", json=body).json()["detail"]
+
+    def test_of_two_who_ask_for_one_name_neither_loses_what_was_found(
+        self, client, monkeypatch, tmp_path
+    ):
+        both = threading.Event()
+
+        def measure(words, tell):
+            assert both.wait(20.0)
+            Path(words[words.index("--out") + 1]).write_text(LENS)
+            Path(words[words.index("--report") + 1]).write_text("{}")
+
+        monkeypatch.setattr("scm.api.calibration_desk._run", measure)
+        client("POST", TestViews.path, content=jpeg())
+        path, body = f"{EYE}/cameras/overhead/lens", {**BOARD, "save_as": "glass"}
+        asked = [client("POST", path, json=body) for _ in range(2)]
+        both.set()
+        kept = {self.wait(client, one)["result"].split("/")[-1] for one in asked}
+        assert kept == {"glass", "glass-2"}
+        assert {path.stem for path in (tmp_path / "calibrations").glob("*.json")} == kept
 
     def test_a_camera_that_the_map_does_not_know_has_no_place_to_find(self, client):
         refused = client("POST", f"{EYE}/cameras/other/place", json={"save_as": "x"})

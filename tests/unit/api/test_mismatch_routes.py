@@ -5,6 +5,7 @@ import json
 import os
 import time
 import zipfile
+from pathlib import Path
 
 import pytest
 
@@ -16,6 +17,7 @@ from scm.errors import RunError
 from scm.mismatch.report.write import write_report
 from tests.unit.api.conftest import Client
 from tests.unit.mismatch import made_up_findings as made_up
+from tests.unit.recorder.short_run import write_run
 
 API = "/api/v1/mismatch"
 COMMANDS = "t,throttle,steering\n0,0,0\n1,0.5,0\n"
@@ -202,6 +204,28 @@ def test_a_search_runs_the_program_and_puts_its_report_on_the_shelf(call, shelve
     assert sorted(path.name for path in shelves.reports.iterdir()) == ["city-1-n1", "city-1-n1-2"]
 
 
+@pytest.mark.parametrize("finish", [True, False])
+def test_of_a_run_without_its_end_what_is_there_of_it_is_searched(call, shelves, ran, finish):
+    given = []
+
+    def search(words, tell, hear):
+        if words[0] == "recover":
+            Path(words[words.index("--out") + 1]).write_bytes(b"mended")
+            return []
+        given.append((Path(words[1]).name, Path(words[1]).read_bytes()))
+        write_report(*made_up.CASES["none"](), Path(words[words.index("--out") + 1]))
+        return []
+
+    ran.then = search
+    run = write_run(shelves.recordings / "city-1.mcap", finish=finish)
+    row = wait_for(call, call("POST", f"{API}/jobs", json={"recording": "city-1"}))
+    assert row["state"] == "done", row
+    assert given == [("city-1.mcap", run.read_bytes() if finish else b"mended")]
+    assert [path.name for path in shelves.reports.iterdir()] == ["city-1"]
+    job = json.loads((shelves.reports / "city-1" / "job.json").read_text())
+    assert job["recordings"] == [str(run)]
+
+
 def test_a_search_that_fails_says_why_and_leaves_nothing(call, shelves, ran):
     def fail(words, tell, hear):
         (shelves.reports / words[words.index("--out") + 1]).mkdir()
@@ -282,18 +306,53 @@ def test_a_drive_that_ends_early_is_no_recording(call, shelves, ran):
     assert call("GET", f"{API}/reports/monday").json()["told"] == 0
 
 
-def test_a_search_again_takes_what_was_driven_since(call, shelves, ran):
-    folder = put(shelves, "monday", "undecided")
-    (shelves.recordings / "city-1.mcap").write_bytes(b"")
-    assert call("POST", f"{API}/jobs", json={"again": "monday"}).status_code == 409
-    job = {"recordings": [str(shelves.recordings / "city-1.mcap")], "source": "x", "vehicle": "n1"}
-    (folder / "job.json").write_text(json.dumps(job), "utf-8")
-    for name in ("told_10", "told_2"):
+def told(folder, *names):
+    for name in names:
         (folder / name).mkdir()
         (folder / name / "recording.yaml").write_text("", "utf-8")
-    wait_for(call, call("POST", f"{API}/jobs", json={"again": "monday"}))
-    given = ran.started[0][1 : ran.started[0].index("--out")]
-    assert given == [*job["recordings"], str(folder / "told_2"), str(folder / "told_10")]
+    return [str(folder / name) for name in names]
+
+
+def test_a_search_again_takes_what_was_driven_since(call, shelves, ran):
+    folder = put(shelves, "monday", "undecided")
+    run = str(shelves.recordings / "city-1.mcap")
+    Path(run).write_bytes(b"")
+    assert call("POST", f"{API}/jobs", json={"again": "monday"}).status_code == 409
+    job = {"recordings": [run], "source": "x", "vehicle": "n1", "budget_s": 60.0, "to_s": 40.0}
+    (folder / "job.json").write_text(json.dumps(job), "utf-8")
+    second, tenth = told(folder, "told_2", "told_10")
+
+    def search(words, tell, hear):
+        write_report(*made_up.CASES["none"](), Path(words[words.index("--out") + 1]))
+        return []
+
+    ran.then = search
+    row = wait_for(call, call("POST", f"{API}/jobs", json={"again": "monday"}))
+    (words,) = ran.started
+    assert words[1:3] == [run, "--out"]
+    at = words.index("--told")
+    assert words[at + 1 : at + 4] == [second, tenth, "--vehicle"]
+    for option, value in (("--vehicle", "n1"), ("--budget-s", "60"), ("--to-s", "40.0")):
+        assert words[words.index(option) + 1] == value
+    found = call("GET", f"{API}/reports/{row['result'].split('/')[-1]}").json()["job"]
+    assert (found["source"], found["told"]) == ("x, again with 2 more", ["told_2", "told_10"])
+    asked = {"again": row["result"].split("/")[-1], "budget_s": 30}
+    wait_for(call, call("POST", f"{API}/jobs", json=asked))
+    words = ran.started[1]
+    assert [second, tenth] == words[words.index("--told") + 1 :][:2]
+    assert words[words.index("--budget-s") + 1] == "30"
+
+
+def test_a_search_again_of_one_of_several_cars_is_of_that_car(call, shelves, ran):
+    folder = put(shelves, "fleet/n1", "undecided")
+    (shelves.recordings / "city-1.mcap").write_bytes(b"")
+    job = {"recordings": [str(shelves.recordings / "city-1.mcap")], "source": "x"}
+    (shelves.reports / "fleet" / "job.json").write_text(json.dumps(job), "utf-8")
+    (driven,) = told(folder, "told_1")
+    wait_for(call, call("POST", f"{API}/jobs", json={"again": "fleet.n1"}))
+    (words,) = ran.started
+    assert words[words.index("--vehicle") + 1] == "n1"
+    assert words[words.index("--told") + 1] == driven
 
 
 def test_an_upload_becomes_a_recording_for_a_search(call, shelves, ran):
@@ -329,6 +388,8 @@ def test_an_upload_becomes_a_recording_for_a_search(call, shelves, ran):
             {"recording.yaml": f"source: &a x\nnote: *a\n{DESCRIPTION}", "commands.csv": COMMANDS},
             "alias",
         ),
+        ({"recording.yaml": "a: " + "[" * 100_000, "commands.csv": COMMANDS}, "20 deep"),
+        ({"a.csv": COMMANDS, "a.csv/b.csv": COMMANDS}, "cannot be read: File exists"),
     ],
 )
 def test_an_upload_that_asks_for_what_lies_outside_is_refused(call, shelves, files, why):

@@ -14,7 +14,7 @@ from scm.fleet import LockstepLink
 from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.mismatch.diagnose import diagnose
-from scm.play import play
+from scm.play import play, write_recording
 from scm.recorder.drives import read_drives, recordings_of
 from scm.recorder.mcap_file import RunFile
 from scm.recorder.part import RecorderPart
@@ -134,6 +134,26 @@ def test_mismatch_takes_one_car_of_a_run(run: Path) -> None:
     assert found.car.name == "nigel"
     assert found.evidence.recordings == ("n1 of today",)
     assert "too_short" in [problem.name for problem in found.diagnosis.data]
+
+
+def test_a_drive_told_since_is_of_the_same_car_and_whole(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(
+        "scm.mismatch.diagnose.diagnose_car", lambda recordings, *_, **__: recordings
+    )
+    with Lockstep([WorldPart(load_map("parking_school"), hosted=(("n9", "nigel"),))]) as city:
+        city.run_for(0.1)
+        played = play(
+            LockstepLink(city), "n9", [(0.0, 0.0, 0.0), (0.2, 0.05, 0.0), (1.5, 0.0, 0.0)]
+        )
+    write_recording(played, "nigel", tmp_path / "told")
+    told, part = [tmp_path / "told"], (2.0, 3.0)
+    before, since = diagnose([run], vehicle="n1", span_s=part, told=told)
+    assert np.ptp(before.channel("pose.x").t) <= 1.0
+    assert np.ptp(since.channel("pose.x").t) == pytest.approx(1.5, abs=0.1)
+    assert main(["mismatch", str(run), "--told", *map(str, told), "--out", str(tmp_path)]) == 2
+    assert "told: a drive of one of n1, n2; say of which with --vehicle" in capsys.readouterr().err
 
 
 def test_cars_that_drive_themselves_are_driven_again_from_what_they_report(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """A part of a recording holds what was recorded there, and nothing else."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,5 +39,14 @@ def test_a_channel_that_has_nothing_there_is_left_out(recording):
 
 
 def test_a_part_without_anything_is_refused(recording):
-    with pytest.raises(RecordingError, match=r"from 50\.0 s"):
+    said = r"from 50 s: nothing was .* driven again; there is from 0\.0 s to 19\.0 s"
+    with pytest.raises(RecordingError, match=said):
         part_of(recording, 50.0, None)
+
+
+def test_of_a_run_times_count_from_its_begin_not_from_when_its_car_was_driven(recording):
+    run = replace(recording, begin_s=90.0, name="n1")
+    assert part_of(run, 14.0, 15.0).channel("pose.x").t.tolist() == [104, 105]
+    said = r"from 0 s to 9 s: nothing of n1 was .*; there is from 10\.0 s to 29\.0 s"
+    with pytest.raises(RecordingError, match=said):
+        part_of(run, None, 9.0)

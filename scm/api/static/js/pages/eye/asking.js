@@ -7,8 +7,8 @@ export async function read(path) {
     throw new Error("The city's server does not answer; it is asked again.");
   });
   const body = await response.json().catch(() => ({}));
-  if (!response.ok) throw new Error(body.detail || body.title || `${path}: ${response.status}`);
-  return body;
+  if (response.ok) return body;
+  throw Object.assign(new Error(body.detail || body.title || `${path}: ${response.status}`), { status: response.status });
 }
 
 /** Read a path every so often for as long as the component is there: `{body, error, again}`. */
@@ -44,8 +44,33 @@ export async function finished(operation, tell) {
   tell(row);
   while (!OVER.includes(row.state)) {
     await new Promise((resolve) => setTimeout(resolve, 250));
-    row = await read(`/operations/${row.id}`).catch(() => row); // the link may break: it is asked again
+    row = await read(`/operations/${row.id}`).catch((error) => lost(row, error));
     tell(row);
   }
   return row;
+}
+
+/** The link may break: it is asked again. A server that began anew knows nothing of it any more. */
+function lost(row, error) {
+  return error.status === 404 ? { ...row, state: "failed", error: "The server was started anew: ask again." } : row;
+}
+
+/** Follow what still runs of this when the page is opened: whoever asked may have come back. */
+export function useUnfinished(titles, follow) {
+  useEffect(() => {
+    let over = false;
+    read("/operations?limit=100").then(
+      ({ items }) => {
+        const row = items.find((one) => one.kind === "calibration" && titles.includes(one.what) && !OVER.includes(one.state));
+        if (row && !over) follow(row);
+      },
+      () => {},
+    );
+    return () => (over = true);
+  }, []);
+}
+
+/** Name of the calibration that work has kept; empty: it only looked, or failed. */
+export function keptBy({ state, result }) {
+  return state === "done" && result.includes("/calibrations/") ? result.split("/").at(-1) : "";
 }

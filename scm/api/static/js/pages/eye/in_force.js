@@ -4,7 +4,7 @@ import { html } from "scm/shared/html.js";
 import { clock } from "scm/shared/format.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { read } from "scm/pages/eye/asking.js";
-import { change } from "scm/shell/api.js";
+import { change, notify } from "scm/shell/api.js";
 
 /** `{lens, place}` as people say it. */
 export function named({ lens, place }) {
@@ -25,6 +25,13 @@ export function InForce({ camera }) {
 /** Ask for a reason, then put `wish` in force: the name of a calibration, or null for what was before. */
 export function PutInForce({ camera, wish, close }) {
   const report = useReport(wish);
+  const late = wish === null && !camera.in_force?.before;
+  useEffect(() => {
+    if (!late) return;
+    close();
+    notify("info", `${camera.camera} was put back meanwhile.`);
+  }, [late]);
+  if (late) return null;
   const what = wish ?? named(camera.in_force.before);
   const submit = async (event) => {
     event.preventDefault();

@@ -2,43 +2,53 @@
 import { useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
-import { finished, read, usePolled } from "scm/pages/eye/asking.js";
+import { Sure } from "scm/shared/sure.js";
+import { finished, keptBy, read, usePolled, useUnfinished } from "scm/pages/eye/asking.js";
 import { Coverage } from "scm/pages/eye/coverage.js";
-import { freeName, Progress } from "scm/pages/eye/progress.js";
+import { filledIn, freeName, Progress, useKept } from "scm/pages/eye/progress.js";
 import { change, notify } from "scm/shell/api.js";
 
 const WANTED = 15;
 const BLURRED = 0.4; // of the median sharpness of the set
 const BOARDS = { chessboard: "Chessboard", charuco: "ChArUco", tags: "Grid of tags" };
 
+const FIRST = { board: "chessboard", columns: 9, rows: 6, square_mm: 30, marker_mm: 22, first_id: 0, fisheye: false };
+
 export function LensStep({ camera, kept, done, put }) {
   const root = `/eye/cameras/${camera.camera}`;
   const { body, error, again } = usePolled(`${root}/views`, 0);
-  const [board, setBoard] = useState({ board: "chessboard", columns: 9, rows: 6, square_mm: 30, marker_mm: 22, first_id: 0, fisheye: false });
+  const [board, setBoard] = useKept(`board ${camera.camera}`, FIRST);
   const [row, setRow] = useState(null);
   const [lens, setLens] = useState(null);
+  const [sure, setSure] = useState(false);
+  const step = useRef(null);
   const busy = row !== null && ["waiting", "running"].includes(row.state);
   const name = freeName(`${camera.camera}-lens`, kept);
 
-  const run = async (save_as) => {
-    const asked = await change("POST", `${root}/lens`, { ...bodyOf(board), save_as });
-    if (!asked) return;
+  const follow = async (asked) => {
     const over = await finished(asked, setRow);
     again();
-    if (over.state === "done" && save_as) {
-      const report = await read(`/eye/calibrations/${save_as}/report`).catch(() => null);
-      setLens(report && { ...report.lens, called: save_as });
-      notify("info", `The lens is kept as ${save_as}.`);
-      done();
-    }
+    const called = keptBy(over);
+    if (!called) return;
+    const report = await read(`/eye/calibrations/${called}/report`).catch(() => null);
+    setLens(report && { ...report.lens, called });
+    notify("info", `The lens is kept as ${called}.`);
+    done();
+  };
+  useUnfinished([`lens of ${camera.camera}`, `board in pictures of ${camera.camera}`], follow);
+  const run = async (save_as) => {
+    if (!filledIn(step.current)) return;
+    const asked = await change("POST", `${root}/lens`, { ...bodyOf(board), save_as });
+    if (asked) await follow(asked);
   };
   const add = async (files) => {
     for (const file of files) if (!(await change("POST", `${root}/views`, file))) break;
     await run(null);
   };
+  const throwAway = async () => (await change("DELETE", `${root}/views`, undefined, () => "All pictures are gone.")) && again();
   const views = body?.views ?? [];
   return html`
-    <section class="panel eye-lens" aria-label="Lens">
+    <section ref=${step} class="panel eye-lens" aria-label="Lens">
       <div class="panel-head">
         <h2><b class="step">1</b> Lens <small>by a printed board</small></h2>
         <span class="facts">${views.length ? `${views.filter((one) => one.found).length} of ${views.length} pictures show the board` : "no pictures yet"}</span>
@@ -52,12 +62,14 @@ export function LensStep({ camera, kept, done, put }) {
         <button disabled=${busy} onClick=${() => add([undefined])}>Take a picture</button>
         <${Files} disabled=${busy} add=${add} />
         <button disabled=${busy || !views.length} onClick=${() => run(null)}>Look again</button>
-        <button
-          class="plain"
-          disabled=${busy || !views.length}
-          onClick=${async () => (await change("DELETE", `${root}/views`, undefined, () => "All pictures are gone.")) && again()}
-        >Throw all away</button>
+        <button class="plain" disabled=${busy || !views.length} onClick=${() => setSure(true)}>Throw all away</button>
       </div>
+      ${sure &&
+      html`
+        <${Sure} title="Throw all pictures away?" yes="Throw away" act=${throwAway} onClose=${() => setSure(false)}>
+          ${`All ${views.length} pictures that were taken with ${camera.camera} are deleted for everybody. What was measured by them stays.`}
+        <//>
+      `}
       ${error && html`<p class="failed" role="alert">${error}</p>`}
       <${Progress} row=${row} cancel=${() => change("DELETE", `/operations/${row.id}`)} />
       ${views.length > 0 &&
@@ -79,9 +91,17 @@ export function LensStep({ camera, kept, done, put }) {
   `;
 }
 
+/** What is asked of the server; fields hold what was typed. */
 function bodyOf({ board, columns, rows, square_mm, marker_mm, first_id, fisheye }) {
-  const marker_m = board === "chessboard" ? null : marker_mm / 1000;
-  return { board, columns, rows, square_m: square_mm / 1000, marker_m, first_id: board === "tags" ? first_id : 0, fisheye };
+  return {
+    board,
+    columns: Number(columns),
+    rows: Number(rows),
+    square_m: Number(square_mm) / 1000,
+    marker_m: board === "chessboard" ? null : Number(marker_mm) / 1000,
+    first_id: board === "tags" ? Number(first_id) : 0,
+    fisheye,
+  };
 }
 
 function BoardForm({ board, set }) {
@@ -92,8 +112,9 @@ function BoardForm({ board, set }) {
         name=${name}
         min="0"
         step=${step}
+        required
         value=${board[name]}
-        onInput=${(event) => set({ ...board, [name]: event.currentTarget.valueAsNumber || 0 })}
+        onInput=${(event) => set({ ...board, [name]: event.currentTarget.value })}
       />
     </label>
   `;

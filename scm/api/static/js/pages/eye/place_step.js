@@ -1,9 +1,9 @@
 /** Step 2: where the camera hangs, by the tags on the floor that it sees now; before and after. */
-import { useState } from "preact/hooks";
+import { useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
-import { finished, read } from "scm/pages/eye/asking.js";
-import { freeName, Progress } from "scm/pages/eye/progress.js";
+import { finished, keptBy, read, useUnfinished } from "scm/pages/eye/asking.js";
+import { filledIn, freeName, Progress, useKept } from "scm/pages/eye/progress.js";
 import { change, notify } from "scm/shell/api.js";
 
 const VAGUE_M = 0.01;
@@ -12,25 +12,30 @@ const WORDS = { x_m: "x", y_m: "y", z_m: "height", yaw_rad: "yaw", tilt_x_rad: "
 
 export function PlaceStep({ camera, kept, lenses, done, put }) {
   const [lens, setLens] = useState("");
-  const [tags, setTags] = useState([]);
+  const [tags, setTags] = useKept(`floor-tags ${camera.camera}`, []);
   const [row, setRow] = useState(null);
   const [found, setFound] = useState(null);
+  const step = useRef(null);
   const busy = row !== null && ["waiting", "running"].includes(row.state);
   const name = freeName(`${camera.camera}-place`, kept);
   const seen = camera.known.filter((one) => one.what === "map" && one.seen_s < 2);
-  const run = async () => {
-    const body = { lens: lens || null, tags, save_as: name };
-    const asked = await change("POST", `/eye/cameras/${camera.camera}/place`, body);
-    if (!asked) return;
-    const over = await finished(asked, setRow);
-    if (over.state !== "done") return;
-    const report = await read(`/eye/calibrations/${name}/report`).catch(() => null);
-    setFound(report && { ...report, name });
-    notify("info", `The place is kept as ${name}.`);
+  const follow = async (asked) => {
+    const called = keptBy(await finished(asked, setRow));
+    if (!called) return;
+    const report = await read(`/eye/calibrations/${called}/report`).catch(() => null);
+    setFound(report && { ...report, name: called });
+    notify("info", `The place is kept as ${called}.`);
     done();
   };
+  useUnfinished([`place of ${camera.camera}`], follow);
+  const run = async () => {
+    if (!filledIn(step.current)) return;
+    const body = { lens: lens || null, tags: tags.map(inNumbers), save_as: name };
+    const asked = await change("POST", `/eye/cameras/${camera.camera}/place`, body);
+    if (asked) await follow(asked);
+  };
   return html`
-    <section class="panel eye-place" aria-label="Place">
+    <section ref=${step} class="panel eye-place" aria-label="Place">
       <div class="panel-head">
         <h2><b class="step">2</b> Place <small>by tags on the floor</small></h2>
         <span class="facts">${seen.length ? `sees map tag ${seen.map((one) => one.tag_id).join(", ")}` : "sees no map tag"}</span>
@@ -59,6 +64,11 @@ export function PlaceStep({ camera, kept, lenses, done, put }) {
 const EMPTY = { id: 100, x_m: 0, y_m: 0, yaw_rad: 0, size_m: 0.12 };
 const COLUMNS = { id: "Id", x_m: "x [m]", y_m: "y [m]", yaw_rad: "yaw [rad]", size_m: "edge [m]" };
 
+/** A tag as the server takes it; fields hold what was typed. */
+function inNumbers(tag) {
+  return Object.fromEntries(Object.entries(tag).map(([field, typed]) => [field, Number(typed)]));
+}
+
 function FloorTags({ tags, set }) {
   const edit = (i, field, value) => set(tags.map((one, j) => (i === j ? { ...one, [field]: value } : one)));
   return html`
@@ -74,9 +84,10 @@ function FloorTags({ tags, set }) {
                   <input
                     type="number"
                     step=${field === "id" ? 1 : "any"}
+                    required
                     aria-label="Tag ${i + 1}: ${title}"
                     value=${tag[field]}
-                    onInput=${(event) => edit(i, field, event.currentTarget.valueAsNumber || 0)}
+                    onInput=${(event) => edit(i, field, event.currentTarget.value)}
                   />
                 </td>
               `)}

@@ -1,4 +1,5 @@
 /** What steps of the wizard share: names for what they keep, and how far long work is. */
+import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 
 /** A name that is free: `overhead-lens`, then `overhead-lens-2`. */
@@ -7,6 +8,18 @@ export function freeName(base, kept) {
   let name = base;
   for (let i = 2; taken.has(name); i++) name = `${base}-${i}`;
   return name;
+}
+
+/** State that outlives a reload of the page, in this window: what somebody measured and typed. */
+export function useKept(name, first) {
+  const [value, set] = useState(() => JSON.parse(sessionStorage.getItem(name)) ?? first);
+  useEffect(() => sessionStorage.setItem(name, JSON.stringify(value)), [name, value]);
+  return [value, set];
+}
+
+/** Whether all fields of a step hold numbers; the browser points to the first that does not. */
+export function filledIn(step) {
+  return [...step.querySelectorAll("input[type=number]")].every((field) => field.reportValidity());
 }
 
 /** What an operation is at, and how it ended. */

@@ -3,12 +3,14 @@ import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { clock, fixed } from "scm/shared/format.js";
 import { Dialog } from "scm/shared/dialog.js";
+import { Sure } from "scm/shared/sure.js";
 import { read } from "scm/pages/eye/asking.js";
 import { named } from "scm/pages/eye/in_force.js";
 import { change } from "scm/shell/api.js";
 
 export function Shelf({ camera, kept, known, changed, put }) {
   const [open, setOpen] = useState(null);
+  const [asked, setAsked] = useState(null); // to be thrown away
   return html`
     <section class="panel eye-shelf" aria-label="Calibrations">
       <div class="panel-head">
@@ -21,7 +23,7 @@ export function Shelf({ camera, kept, known, changed, put }) {
             <div class="scroll" tabindex="0" role="region" aria-label="Table of calibrations">
               <table>
                 <thead class="hidden"><tr><th scope="col">Calibration</th><th scope="col">What to do with it</th></tr></thead>
-                <tbody>${kept.map((one) => html`<${Row} key=${one.name} camera=${camera} one=${one} open=${setOpen} changed=${changed} put=${put} />`)}</tbody>
+                <tbody>${kept.map((one) => html`<${Row} key=${one.name} camera=${camera} one=${one} open=${setOpen} ask=${setAsked} put=${put} />`)}</tbody>
               </table>
             </div>
           `
@@ -30,20 +32,29 @@ export function Shelf({ camera, kept, known, changed, put }) {
         Put in force, it holds until another one is; over a restart too where the city keeps its state. For good: a
         lens by <code>scm eye MAP --calibration NAME.toml</code>, a place by its block in the map file.
       </div>
+      ${asked &&
+      html`
+        <${Sure} title="Throw ${asked.name} away?" yes="Throw away" act=${() => remove(asked).then(changed)} onClose=${() => setAsked(null)}>
+          The calibration and how it was found are deleted for everybody.
+          ${isInForce(camera, asked) && " The camera goes on seeing by it until another one is put in force."}
+        <//>
+      `}
       ${open && html`<${Text} file=${open} close=${() => setOpen(null)} />`}
     </section>
   `;
 }
 
-function Row({ camera, one, open, changed, put }) {
+const isInForce = (camera, one) => camera.in_force?.now[one.kind] === one.name;
+
+async function remove({ name }) {
+  const path = `/eye/calibrations/${name}`;
+  const tag = await fetch(`/api/v1${path}`).then((response) => response.headers.get("ETag"));
+  await change("DELETE", path, undefined, () => `${name} is gone.`, { "If-Match": tag ?? "*" });
+}
+
+function Row({ camera, one, open, ask, put }) {
   const fits = one.kind === "lens" ? one.width_px === camera.width_px && one.height_px === camera.height_px : one.camera === camera.camera;
-  const inForce = camera.in_force?.now[one.kind] === one.name;
   const path = `/eye/calibrations/${one.name}`;
-  const remove = async () => {
-    const tag = await fetch(`/api/v1${path}`).then((response) => response.headers.get("ETag"));
-    await change("DELETE", path, undefined, () => `${one.name} is gone.`, { "If-Match": tag ?? "*" });
-    changed();
-  };
   return html`
     <tr>
       <td>
@@ -51,11 +62,11 @@ function Row({ camera, one, open, changed, put }) {
         <small>${factsOf(one, fits)}</small>
       </td>
       <td>
-        ${inForce
+        ${isInForce(camera, one)
           ? html`<span class="good">in force</span>`
           : fits && html`<button class="small" aria-label="Put ${one.name} in force" onClick=${() => put(one.name)}>Put in force…</button>`}
         <a href=${`/api/v1${path}/file.toml`} download=${`${one.name}.toml`}>Download</a>
-        <button class="plain" aria-label="Throw ${one.name} away" onClick=${remove}>×</button>
+        <button class="plain" aria-label="Throw ${one.name} away" onClick=${() => ask(one)}>×</button>
       </td>
     </tr>
   `;

@@ -1,0 +1,20 @@
+/** A question before something is deleted that nobody can bring back. */
+import { html } from "scm/shared/html.js";
+import { Dialog } from "scm/shared/dialog.js";
+
+/** @param yes what the button that does it says; @param act does it */
+export function Sure({ title, yes, act, onClose, children }) {
+  const agree = () => {
+    onClose();
+    act();
+  };
+  return html`
+    <${Dialog} title=${title} onClose=${onClose}>
+      <p>${children}</p>
+      <div class="actions">
+        <button data-first onClick=${onClose}>Keep it</button>
+        <button class="danger" onClick=${agree}>${yes}</button>
+      </div>
+    <//>
+  `;
+}
