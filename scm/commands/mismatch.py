@@ -113,7 +113,7 @@ def _of_cars(
 
 
 COMMAND = Command(
-    help="find what the simulator left out",
+    help="Find what the simulator left out.",
     example="scm mismatch trial/drive --out found",
     arguments=_arguments,
     run=_run,

@@ -184,7 +184,8 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
             raise RefusedError(Refused(code="invalid", detail=detail))
         if vehicle and vehicle not in cars_of(index):
             raise not_found(f"car of {name}", vehicle)
-        file = f"{name}{f'-{vehicle}' if vehicle else ''}.csv"
+        span = "" if to_s is None and not from_s else f"-{from_s:g}-{'end' if to_s is None else f'{to_s:g}'}s"
+        file = f"{name}{f'-{vehicle}' if vehicle else ''}{span}.csv"
         table = replay.csv_of(index, vehicle, from_s, to_s)
         if table is None:
             detail = f"{name}: {replay.no_rows(index, vehicle, from_s, to_s)}"

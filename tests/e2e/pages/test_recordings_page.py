@@ -330,8 +330,10 @@ def test_a_refusal_is_said_within_the_dialog_that_asked(visit, drive):
     visited = visit(AT)
     page = visited.page
     page.click("text=Mismatch job")
-    page.fill("dialog input[name=car]", "no_such_car")
-    page.keyboard.press("Enter")
+    gone = "(car) => { car.selectedOptions[0].value = 'no_such_car' }"  # as a file that was removed
+    page.locator("dialog select[name=car]").evaluate(gone)
+    page.locator("dialog select[name=car]").dispatch_event("change")
+    page.click("dialog .primary")
     visited.wait(IN_REACH, "there is no car file named 'no_such_car'")
     assert len(visited.complaints) == 1  # the browser's own, of the answer 404
     assert page.locator("dialog[open]").count() == 1

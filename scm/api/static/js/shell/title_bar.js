@@ -120,7 +120,7 @@ function ReasonDialog() {
   return html`
     <${Dialog} title="Why was the city stopped?" onClose=${closeDialog}>
       <form onSubmit=${submit}>
-        <input name="reason" maxlength="200" required placeholder="Reason" aria-label="Reason" data-first />
+        <input name="reason" maxlength="200" required placeholder="Reason (needed)" aria-label="Reason" data-first />
         <div class="actions">
           <button type="button" onClick=${closeDialog}>Cancel</button>
           <button class="primary">Note it</button>
@@ -160,11 +160,13 @@ export function Banners() {
     </div>`}
     ${lost &&
     html`<div class="banner lost" role="alert">
-      <b>${isConnected.value ? "The world is silent" : isShutOut.value ? "Too many windows" : "No connection to the server"}</b>
+      <b>${silence()}</b>
       <span>
-        ${pulse.value.t_ns === null
-          ? "Nothing has been heard yet."
-          : `What you see is ${span(quiet_s.value)} old.`}
+        ${pulse.value.t_ns !== null
+          ? `What you see is ${span(quiet_s.value)} old.`
+          : isConnected.value
+            ? "It was not heard yet. Its first start on a computer compiles its physics, a minute or longer."
+            : "Nothing has been heard yet."}
         ${isShutOut.value ? " Other windows of this browser hold all connections that it grants: close one." : ""}
       </span>
     </div>`}
@@ -182,6 +184,12 @@ function obeyed() {
   const { moving, vehicles } = pulse.value;
   if (link.value !== "live") return "";
   return moving ? `${moving} of ${vehicles} cars still move` : "all cars stand";
+}
+
+/** What it is that is not heard, or not yet. */
+function silence() {
+  if (isConnected.value) return pulse.value.t_ns === null ? "Waiting for the world" : "The world is silent";
+  return isShutOut.value ? "Too many windows" : "No connection to the server";
 }
 
 function quietSinceStart() {

@@ -51,7 +51,7 @@ export function PutInForce({ camera, wish, close }) {
       </p>
       ${report?.is_sure === false && html`<p class="warn">Two places would show its tags alike: it may be the wrong one.</p>`}
       <form onSubmit=${submit}>
-        <input name="reason" required maxlength="200" placeholder="Reason" aria-label="Reason" data-first />
+        <input name="reason" required maxlength="200" placeholder="Reason (needed)" aria-label="Reason" data-first />
         <div class="actions">
           <button type="button" onClick=${close}>Cancel</button>
           <button class="primary">${wish ? "Put in force" : "Put back"}</button>

@@ -1,4 +1,4 @@
-/** One frame of the map: roads, heat, trails, boxes, path, scan, cars, names, signals, from below to above. */
+/** One frame of the map: roads, heat, path, scan, trails, boxes, cars, names, signals, from below to above. */
 import { drawBoxes } from "scm/shared/box_shape.js";
 import { drawCar, drawHalo, drawLabel, footprint } from "scm/shared/car_shape.js";
 import { drawLight } from "scm/shared/light_shape.js";
@@ -75,12 +75,12 @@ export class Scene {
       this.heat.note(fleet);
       this.heat.draw(paper, view, now);
     }
+    this.#drawChosenBelow(on, now);
     if (on.trails) {
-      this.trails.note(fleet);
+      this.trails.note(fleet); // above the planned path, which on a circuit lies on all of them
       this.trails.draw(paper, view, this.ratio, now, fleet);
     }
     drawBoxes(paper, view, boxes.peek(), city.peek()?.boxes ?? []);
-    this.#drawChosenBelow(on, now);
     this.#drawCars(on);
     // Signals last: no car's name may hide a colour.
     this.#drawSignals(on, now);

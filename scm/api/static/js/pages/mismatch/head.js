@@ -1,5 +1,6 @@
 /** The verdict in a sentence, how much better the simulator got, and what can be downloaded. */
 import { useState } from "preact/hooks";
+import { moment } from "scm/shared/format.js";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { change } from "scm/shell/api.js";
@@ -31,7 +32,7 @@ export function Head({ report }) {
           <p class="facts">
             <span>Car ${drawn.vehicle}</span>
             <span>${job?.source ?? drawn.recordings.join(", ")}${part}</span>
-            <span>${new Date(row.made_ns / 1e6).toLocaleString()}</span>
+            <span>${moment(row.made_ns)}</span>
             <span>searched ${Math.round(row.runtime_s)} s</span>
           </p>
         </div>

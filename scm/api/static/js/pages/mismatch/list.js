@@ -1,5 +1,6 @@
 /** All reports, what runs now, and the form that starts a search. */
 import { useEffect, useRef, useState } from "preact/hooks";
+import { moment } from "scm/shared/format.js";
 import { html } from "scm/shared/html.js";
 import { useFetched } from "scm/pages/mismatch/fetched.js";
 import { isActive, Jobs, useJobs } from "scm/pages/mismatch/jobs.js";
@@ -73,7 +74,7 @@ function Row({ row }) {
         <span class="facts">
           <span>${row.name}</span>
           <span>${[row.vehicle, row.source].filter(Boolean).join(", ")}</span>
-          <span>${new Date(row.made_ns / 1e6).toLocaleString()}</span>
+          <span>${moment(row.made_ns)}</span>
         </span>
         ${row.before_m !== null && row.after_m !== null && html`<${Gain} row=${row} />`}
       </a>

@@ -1,9 +1,10 @@
 /** Begin a mismatch job: does this car drive as its file says? */
-import { useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { change } from "scm/shell/api.js";
 import { go } from "scm/shell/router.js";
+import { read } from "scm/pages/recordings/reading.js";
 import { seconds, SpanFields, WHOLE } from "scm/pages/recordings/span_fields.js";
 import { minutes } from "scm/pages/recordings/words.js";
 
@@ -14,6 +15,8 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
   const [vehicle, setVehicle] = useState(first?.vehicle ?? "");
   const [car, setCar] = useState(first?.car ?? "nigel");
   const [span, setSpan] = useState(WHOLE);
+  const [files, setFiles] = useState([]);
+  useEffect(() => void read("/mismatch/offers").then(({ body }) => setFiles(body.cars), () => {}), []);
   const choose = (name) => {
     setVehicle(name);
     setCar(cars.find((one) => one.vehicle === name)?.car ?? car);
@@ -46,7 +49,9 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
         </label>
         <label>
           Car file
-          <input name="car" required pattern="[a-z0-9_\\-]+" maxlength="64" value=${car} onInput=${(event) => setCar(event.target.value)} />
+          <select name="car" value=${car} onChange=${(event) => setCar(event.target.value)}>
+            ${[...new Set([...files, car])].toSorted().map((name) => html`<option key=${name}>${name}</option>`)}
+          </select>
         </label>
         <${SpanFields} recording=${recording} player=${player} span=${span} onChange=${setSpan} />
         <label>

@@ -1,6 +1,6 @@
 /** One recording again: the map at a moment, the slider, who was there, what happened, and what to do with it. */
 import { signal } from "@preact/signals";
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { modeOf, stuckBy } from "scm/shared/condition.js";
 import { coded } from "scm/shared/coded.js";
 import { html } from "scm/shared/html.js";
@@ -194,12 +194,16 @@ function Car({ car, chosen, onChoose }) {
 function Events({ player, events, more }) {
   const at_s = player.at.value + 0.05;
   const here = events.findLast((event) => event.t_s <= at_s)?.number;
+  const list = useRef(null);
+  useEffect(() => {
+    if (!list.current.matches(":hover, :focus-within")) toMiddle(list.current, "[aria-current]");
+  }, [here]);
   return html`
     <section class="panel events" aria-label="Events of the recording">
       <div class="panel-head">
         <h2>Events <small>${events.length}${more ? " and more" : ""}</small></h2>
       </div>
-      <div class="scroll" tabindex="0" role="region" aria-label="List of events">
+      <div class="scroll" tabindex="0" role="region" aria-label="List of events" ref=${list}>
         <ol>
           ${events.map(
             (event) => html`
@@ -219,4 +223,12 @@ function Events({ player, events, more }) {
       </div>
     </section>
   `;
+}
+
+/** Scroll what a selector names to the middle of its list, and nothing else. */
+function toMiddle(list, selector) {
+  const found = list.querySelector(selector)?.getBoundingClientRect();
+  if (!found) return;
+  const frame = list.getBoundingClientRect();
+  list.scrollTop += found.top - frame.top - (frame.height - found.height) / 2;
 }

@@ -80,7 +80,7 @@ function Reset({ junction }) {
     <${Dialog} title="Clear the monitor's fault?" onClose=${close}>
       <p>The lights flash red because the monitor saw them unsafe. Say why that is over.</p>
       <form onSubmit=${submit}>
-        <input name="reason" required maxlength="200" placeholder="Reason" aria-label="Reason" />
+        <input name="reason" required maxlength="200" placeholder="Reason (needed)" aria-label="Reason" />
         <div class="actions">
           <button type="button" onClick=${close}>Cancel</button>
           <button class="primary">Clear the fault</button>

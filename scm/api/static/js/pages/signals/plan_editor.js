@@ -50,7 +50,8 @@ export async function edit(plan) {
         extra_red_s: 0,
       }));
   const offset_s = typeof plan?.offset_s === "number" ? Math.round(10 * plan.offset_s) / 10 : null;
-  editing.value = { ...own, plan: "", about: "", offset_s, stages: copy(stages), isNew: true, tag: null };
+  const named = plan ? { plan: `${plan.plan}-copy`, about: `copy of ${plan.plan}` } : { plan: "", about: "" };
+  editing.value = { ...own, ...named, offset_s, stages: copy(stages), isNew: true, tag: null };
 }
 
 /** @returns all that is wrong with a draft, in words; what only the search can find is not among it. */
