@@ -3,7 +3,7 @@
 import pytest
 
 from tests.e2e.city_process import wait_for
-from tests.e2e.pages.visiting import LOOKS, in_each_look, judge, photograph
+from tests.e2e.pages.visiting import LOOKS, SIZES, in_each_look, judge, photograph
 
 pytestmark = pytest.mark.e2e
 
@@ -73,7 +73,8 @@ def test_a_hold_is_asked_for_by_keyboard_shown_and_taken_back(visit, running):
     page.focus('[aria-label="hold south east"]')
     page.keyboard.press("Enter")
     page.wait_for_selector(".means >> text=up to two cycles")
-    page.keyboard.type("a parade")
+    reason = "a parade " + "W" * 150
+    page.keyboard.type(reason)
     page.keyboard.press("Enter")
     page.wait_for_selector('.held li[data-verb="hold"] >> text=dashboard: a parade')
     try:
@@ -81,10 +82,13 @@ def test_a_hold_is_asked_for_by_keyboard_shown_and_taken_back(visit, running):
         assert (wish["verb"], wish["groups"], wish["reason"]) == (
             "hold",
             ["south_east"],
-            "a parade",
+            reason,
         )
         page.wait_for_selector(".pending >> text=actuated begins")
         page.wait_for_selector(".lately >> text=a parade")
+        for size, _ in in_each_look(visited):
+            wide = page.evaluate("() => document.documentElement.scrollWidth")
+            assert wide <= SIZES[size][0]  # whatever people write
     finally:
         page.click(".held li button")
         wait_for(lambda: not running.get("/signals/crossing/wishes")["items"], 20.0, "taken back")
