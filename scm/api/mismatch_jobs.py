@@ -5,6 +5,7 @@ Each search is `scm mismatch`, each drive `scm play`: programs of their own that
 
 import re
 import shutil
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import msgspec
 
 from scm.api import uploads
 from scm.api.city import City, not_found
+from scm.api.going_on import RESUME_NS, RESUME_PAUSE_S, onward, trip_of
 from scm.api.operations import Operation, Operations, Teller
 from scm.api.problem import RefusedError
 from scm.api.programs import run_scm
@@ -20,6 +22,8 @@ from scm.clock import Clock
 from scm.errors import RecordingError, RunError
 from scm.recorder.run_index import read_index
 from scm.v2x.message import Refused
+from scm.v2x.messages.route_request import RouteReply
+from scm.v2x.messages.trip import Trip
 
 KIND, DRIVE_KIND = "mismatch", "drive"
 _PARTIAL = ".partial"
@@ -150,10 +154,28 @@ class MismatchJobs:
 
         def work(tell: Teller) -> str:
             tell(f"{vehicle} comes to rest and drives")
-            self._play(plans[part - 1], vehicle, folder, tell)
+            trip = trip_of(self._city.view, vehicle)
+            try:
+                self._play(plans[part - 1], vehicle, folder, tell)
+            finally:
+                if trip is not None:
+                    self._send_on(trip)
             return f"/mismatch/{report}"
 
         return self._work.start(DRIVE_KIND, f"{drive} of {report} by {vehicle}", work, owner=owner)
+
+    def _send_on(self, trip: Trip) -> None:
+        """Send a car on where it was going; what hinders that says so on its own page."""
+        request = onward(self._city.view, trip)
+        until_ns = self._clock.now_ns() + RESUME_NS
+        while True:
+            try:
+                self._city.ask(request, RouteReply)
+            except RefusedError as refusal:
+                if refusal.refused.code == "owned" and self._clock.now_ns() < until_ns:
+                    threading.Event().wait(RESUME_PAUSE_S)
+                    continue
+            return
 
     def _play(self, plan: Path, vehicle: str, folder: Path, tell: Teller) -> None:
         """Play a drive and keep its recording; one that ended early, or was called off, is none."""

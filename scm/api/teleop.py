@@ -17,6 +17,7 @@ import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from scm.api.city import City
+from scm.api.going_on import RESUME_NS, RESUME_PAUSE_S, onward, trip_of
 from scm.api.problem import RefusedError
 from scm.api.wheel import (
     LEASE_MS,
@@ -27,7 +28,7 @@ from scm.api.wheel import (
     Wheel,
 )
 from scm.api.wire import Wire
-from scm.clock import NS_PER_S, Clock, seconds
+from scm.clock import Clock, seconds
 from scm.errors import LinkError, StoreError
 from scm.log import event
 from scm.v2x.message import Message, Refused
@@ -41,9 +42,6 @@ BEAT_S = 0.05
 GAP_S = 0.01
 FIRST_WORD_S = 5.0
 RENEW_TIMEOUT_S = 0.7
-RESUME_NS = 2 * NS_PER_S
-RESUME_PAUSE_S = 0.1
-TRIP_KNOWN_S = 10.0
 NORMAL, GOING_AWAY, BAD_PACKET, NOT_YOURS = 1000, 1001, 1007, 4409
 
 _log = logging.getLogger(__name__)
@@ -129,7 +127,7 @@ class Seat:
         first = await self._first_word()
         if first is None:
             return
-        trip = self._trip()
+        trip = trip_of(self._city.view, self._vehicle)
         try:
             lease = await asyncio.to_thread(self._take, first.reason)
         except RefusedError as refusal:
@@ -273,13 +271,8 @@ class Seat:
     async def _resume(self, trip: Trip) -> str:
         """Send the car on; an agent first waits to be sure that nobody drives it any more."""
         until_ns = self._clock.now_ns() + RESUME_NS
-        last = self._city.view.trips.get(self._vehicle)
-        if last is not None and last.message.trip_id == trip.trip_id:
-            trip = last.message  # as it was when the car was taken
+        request = onward(self._city.view, trip)
         while True:
-            request = RouteRequest(
-                vehicle=self._vehicle, via=trip.via, speed_mps=trip.speed_mps, then=trip.then
-            )
             answer = await asyncio.to_thread(self._ask_route, request)
             if not isinstance(answer, Refused):
                 return f"{self._vehicle} goes on by itself"
@@ -292,14 +285,6 @@ class Seat:
             return self._city.ask(request, RouteReply)
         except RefusedError as refusal:
             return refusal.refused
-
-    def _trip(self) -> Trip | None:
-        """Return the trip that the car is on, which ends when it is taken."""
-        held = self._city.view.trips.get(self._vehicle)
-        now_ns = self._city.view.now_ns
-        if held is None or held.message.arrived_ns is not None:
-            return None
-        return held.message if held.age_s(now_ns) <= TRIP_KNOWN_S else None
 
     def _tell(self, name: str, text: str) -> None:
         now_ns = self._clock.now_ns()

@@ -361,11 +361,34 @@ def test_a_name_and_notes_stay_and_a_deleted_recording_goes(visit, running, driv
 def test_a_recording_that_cannot_be_read_says_so(visit, running):
     bad = running.folder / "bad.mcap"
     bad.write_bytes(b"no recording")
-    try:
-        page = visit("/recordings/bad").page
-        page.wait_for_selector("[role=alert] >> text=an MCAP file begins otherwise")
-    finally:
-        bad.unlink()
+    page = visit("/recordings/bad").page
+    page.wait_for_selector("[role=alert] >> text=an MCAP file begins otherwise")
+    os.utime(bad, (0, 0))  # nobody writes to it
+    page.click("[role=alert] button:has-text('Delete')")
+    page.click("dialog .danger")
+    page.wait_for_selector("tr[data-recording]")
+    assert not bad.exists()
+
+
+def test_of_too_many_cars_for_one_answer_fewer_pictures_a_second_are_read(visit, drive):
+    page = visit("/events").page
+    asked = []
+
+    def cut(route):
+        answer = route.fetch()
+        body = answer.json()
+        asked.append((body["from_s"], body["hz"]))
+        short = {"to_s": body["from_s"] + 3.0} if body["hz"] > 2.5 else {}
+        route.fulfill(response=answer, json={**body, **short})
+
+    page.route("**/frames?*", cut)
+    page.goto(page.url.replace("/events", AT))
+    page.wait_for_selector(READY)
+    page.click("button.play")
+    page.wait_for_timeout(500)
+    page.unroute("**/frames?*")
+    assert [hz for from_s, hz in asked if from_s == asked[0][0]] == [10.0, 5.0, 2.5]
+    assert len(set(asked)) == len(asked)
 
 
 def test_a_script_is_written_run_watched_and_stopped(visit, running):
@@ -384,6 +407,10 @@ def test_a_script_is_written_run_watched_and_stopped(visit, running):
     page.click(".runs >> text=Stop")
     page.wait_for_selector('.runs [data-state="cancelled"]')
     page.click(".script .tools >> text=Delete")
+    page.keyboard.press("Escape")
+    page.wait_for_selector("dialog", state="detached")
+    page.click(".script .tools >> text=Delete")
+    page.click("dialog .danger")
     visited.until(
         lambda: all(row["shipped"] for row in running.get("/scenarios")["items"]), "it is deleted"
     )

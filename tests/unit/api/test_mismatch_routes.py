@@ -15,6 +15,7 @@ from scm.api.city import Link
 from scm.api.shelves import shelves_in
 from scm.errors import RunError
 from scm.mismatch.report.write import write_report
+from scm.v2x.messages.trip import Trip
 from tests.unit.api.conftest import Client
 from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.recorder.short_run import write_run
@@ -288,6 +289,28 @@ def test_a_drive_is_shown_and_sent_to_a_car_on_the_citys_floor(call, shelves, ra
     assert list(map(float, floor)) == [*city_map.floor.x_m, *city_map.floor.y_m]
     assert call("GET", f"{API}/reports/monday").json()["told"] == 1
     assert call("POST", address, json={"vehicle": "n1", "part": 2}).status_code == 422
+
+
+def test_a_car_goes_on_with_its_trip_when_a_drive_has_ended(
+    call, shelves, ran, fake_city, hear, snapshot
+):
+    with_drive(put(shelves, "monday", "undecided"))
+    trip = Trip(
+        vehicle="n1", trip_id="t1", t_ns=1, route=("a", "b", "a", "b"), done_m=0.1,
+        started_ns=0, length_m=None, via=("a", "b"), then="repeat",
+    )  # fmt: skip
+    hear(1.0, snapshot(n1=(0.0, 0.0, 0.0)), trip)
+
+    def hit(words, tell, hear):
+        raise RunError("stopped: the car hit something")
+
+    ran.then = hit
+    address = f"{API}/reports/monday/drives/next_drive/play"
+    for vehicle in ("n1", "n2"):
+        row = wait_for(call, call("POST", address, json={"vehicle": vehicle}))
+        assert row["state"] == "failed"
+    (asked,) = fake_city.asked
+    assert (asked.vehicle, asked.via, asked.then) == ("n1", ("a", "b"), trip.then)
 
 
 def test_a_drive_that_ends_early_is_no_recording(call, shelves, ran):

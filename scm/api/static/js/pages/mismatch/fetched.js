@@ -9,11 +9,16 @@ export function useFetched(path, every_ms = 0) {
   useEffect(() => {
     if (!path) return undefined;
     const quit = new AbortController();
-    read(path, quit.signal).then(
-      (body) => setFound({ body, error: null }),
-      (error) => quit.signal.aborted || setFound((before) => ({ ...before, error: error.message })),
-    );
-    const next = every_ms ? setTimeout(again, every_ms) : null;
+    let next = null;
+    read(path, quit.signal)
+      .then(
+        (body) => setFound({ body, error: null }),
+        (error) => quit.signal.aborted || setFound((before) => ({ ...before, error: error.message })),
+      )
+      .then(() => {
+        // After the answer: a server that takes longer than that would be asked for ever.
+        if (every_ms && !quit.signal.aborted) next = setTimeout(again, every_ms);
+      });
     return () => {
       clearTimeout(next);
       quit.abort();

@@ -19,7 +19,7 @@ export function Head({ report }) {
   const unable = { kind: "unreadable", sign: VERDICTS.unreadable.sign, word: "No verdict" };
   const verdict = drawn.can_judge ? verdictOf(row) : unable;
   const from = job?.from_s !== null || job?.to_s !== null;
-  const part = job && from ? `, ${job.from_s ?? 0} s to ${job.to_s ?? "its end"}` : "";
+  const part = job && from ? `, ${job.from_s ?? 0} s to ${job.to_s === null ? "its end" : `${job.to_s} s`}` : "";
   return html`
     <section class="panel head" data-verdict=${verdict.kind} aria-label="Verdict">
       <p class="trail"><a href="/mismatch">Mismatch</a> / ${row.name}</p>
@@ -79,7 +79,8 @@ function Better({ report: { report, drawn } }) {
   `;
 }
 
-function Files({ report }) {
+/** What can be taken home, and the way to be rid of it all. */
+export function Files({ report }) {
   const [removing, setRemoving] = useState(false);
   const address = (file) => `/api/v1/mismatch/reports/${report.row.name}/files/${file}`;
   const shown = report.files.filter((file) => FILES[file]);

@@ -4,6 +4,7 @@ import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { byName } from "scm/shared/format.js";
 import { change } from "scm/shell/api.js";
+import { go } from "scm/shell/router.js";
 import { city, useTopics, world } from "scm/shell/store.js";
 import { DriveFloor, leavesFloor } from "scm/pages/mismatch/drive_floor.js";
 import { useFetched } from "scm/pages/mismatch/fetched.js";
@@ -12,8 +13,12 @@ import { Bar, isActive, useJobs } from "scm/pages/mismatch/jobs.js";
 import { ends, Grid, scale, useWidth } from "scm/pages/mismatch/plot.js";
 import { short } from "scm/pages/mismatch/words.js";
 
-export function Question({ question, told, report, onDriven }) {
-  const card = report.drawn.cards.find((one) => one.title.startsWith(told.titles[0]) && one.kind === "question");
+export const isQuestion = (card, drawn) => card.kind === "question" && card.label === "Undecided" && drawn.questions.length > 0;
+
+/** @param number of the question: cards of questions stand in their order */
+export function Question({ question, number, report, onDriven }) {
+  const told = report.drawn.questions[number];
+  const card = report.drawn.cards.filter((one) => isQuestion(one, report.drawn))[number];
   const rows = (card?.rows ?? [["Do this", question.drive_this]]).map(([name, said]) => [name, said]);
   const drive = report.drives.includes(told.folder) ? told.folder : null;
   return html`
@@ -34,7 +39,8 @@ export function Question({ question, told, report, onDriven }) {
 function Drive({ report, drive, onDriven }) {
   useTopics("vehicles");
   const address = `/mismatch/reports/${report.row.name}/drives/${drive}`;
-  const parts = useFetched(address).body?.parts ?? null;
+  const { body, error } = useFetched(address);
+  const parts = body?.parts ?? null;
   const { jobs, again } = useJobs();
   const [chosen, choose] = useState(null);
   const [number, setNumber] = useState(0);
@@ -48,7 +54,7 @@ function Drive({ report, drive, onDriven }) {
   useEffect(() => {
     if (driven) onDriven();
   }, [driven]);
-  if (!parts) return html`<p class="empty">Reading the drive …</p>`;
+  if (!parts) return html`<p class="empty" role=${error && "alert"}>${error ?? "Reading the drive …"}</p>`;
   const part = parts[number];
   const play = async () => {
     setAsking(false);
@@ -136,7 +142,7 @@ function Ask({ car, part, onNo, onYes }) {
     <${Dialog} title="Let ${car.vehicle} drive this?" onClose=${onNo}>
       <p>
         ${car.vehicle} comes to rest, then drives ${Math.round(part.lasts_s)} s by these commands, without looking. Keep its way free.
-        It ends at the floor's edge, at a hit, by the city stop, or when you stop it; then it goes back to who drove it.
+        It ends at the floor's edge, at a hit, by the city stop, or when you stop it; then it is given back, and goes on with the trip it was on.
       </p>
       <div class="actions">
         <button data-first onClick=${onNo}>Not now</button>
@@ -166,15 +172,18 @@ function Driving({ job, again }) {
 }
 
 function SearchAgain({ report }) {
-  const search = () => {
-    const said = () => "The search has begun: the list of reports shows how far it is.";
-    return change("POST", "/mismatch/jobs", { again: report.row.name }, said);
+  const [asked, setAsked] = useState(false);
+  const search = async () => {
+    setAsked(true);
+    const said = () => "The search has begun.";
+    if (await change("POST", "/mismatch/jobs", { again: report.row.name }, said)) go("/mismatch");
+    else setAsked(false);
   };
   const drives = report.told === 1 ? "One drive was" : `${report.told} drives were`;
   return html`
     <div class="send">
       <span>${drives} recorded for this question.</span>
-      <button class="primary" onClick=${search}>Search again with ${report.told === 1 ? "it" : "them"}</button>
+      <button class="primary" disabled=${asked} onClick=${search}>Search again with ${report.told === 1 ? "it" : "them"}</button>
     </div>
   `;
 }

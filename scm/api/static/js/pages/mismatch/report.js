@@ -4,9 +4,9 @@ import { Curves } from "scm/pages/mismatch/curves.js";
 import { EffectCard, PlainCard, TogetherCard } from "scm/pages/mismatch/effects.js";
 import { useFetched } from "scm/pages/mismatch/fetched.js";
 import { FreeRuns } from "scm/pages/mismatch/free_runs.js";
-import { Head } from "scm/pages/mismatch/head.js";
+import { Files, Head } from "scm/pages/mismatch/head.js";
 import { FitTable, OwnNumbers, Tried } from "scm/pages/mismatch/numbers.js";
-import { Question } from "scm/pages/mismatch/question.js";
+import { isQuestion, Question } from "scm/pages/mismatch/question.js";
 import { WhereWhen } from "scm/pages/mismatch/where_when.js";
 
 export function Report({ name }) {
@@ -46,7 +46,7 @@ function Whole({ report, again }) {
           <${Question}
             key=${i}
             question=${question}
-            told=${drawn.questions[i]}
+            number=${i}
             report=${report}
             onDriven=${again}
           />
@@ -68,19 +68,14 @@ function Whole({ report, again }) {
   `;
 }
 
-const isQuestion = (card, drawn) => card.kind === "question" && card.label === "Undecided" && drawn.questions.length > 0;
-
 /** A report that nothing can be drawn of: of an older version, or damaged. */
 function Bare({ report }) {
-  const address = (file) => `/api/v1/mismatch/reports/${report.row.name}/files/${file}`;
   return html`
     <section class="panel">
       <p class="trail"><a href="/mismatch">Mismatch</a> / ${report.row.name}</p>
       <h2>This report cannot be drawn</h2>
       <p>It was written by an older version, or its files are damaged. What there is can be downloaded.</p>
-      <div class="files">
-        ${report.files.map((file) => html`<a key=${file} class="button" href=${address(file)} download>${file}</a>`)}
-      </div>
+      <${Files} report=${report} />
     </section>
   `;
 }

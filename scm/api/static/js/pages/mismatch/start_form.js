@@ -83,7 +83,7 @@ function Which({ cars }) {
     <div class="fields">
       <label>
         Car
-        <input name="vehicle" placeholder="all" pattern="[A-Za-z0-9_\-]*" maxlength="64" autocomplete="off" />
+        <input name="vehicle" placeholder="all" pattern="[A-Za-z0-9_\\-]*" maxlength="64" autocomplete="off" />
       </label>
       <label>
         Car file

@@ -4,6 +4,7 @@ import { read } from "scm/pages/recordings/reading.js";
 
 const STRETCH_S = 10; // of one answer of the server
 const HZ = 10; // drawn smoothly between
+const SLOWEST_HZ = 2; // half of it is still no gap
 const KEPT = 40; // stretches: a few minutes either way
 const TOLD_MS = 100; // how often the page's words follow
 const GAP_S = 1.5; // a silence longer than this is shown as one
@@ -121,11 +122,10 @@ export class Player {
     const start_s = number * STRETCH_S;
     const end_s = start_s + STRETCH_S;
     const length_s = this.length.value;
-    const path = `/recordings/${encodeURIComponent(this.name)}/frames?from_s=${start_s}&to_s=${end_s}&hz=${HZ}`;
     try {
-      const { body } = await read(path);
+      const body = await this.whole(start_s, end_s);
       // As far as was there when it was asked: the file may go on.
-      Object.assign(stretch, body, { to_s: Math.min(body.to_s, Math.max(start_s, length_s)) });
+      Object.assign(stretch, body, { to_s: Math.min(end_s, Math.max(start_s, length_s)) });
       this.trouble.value = body.damaged.length ? `Left out here: ${body.damaged.join("; ")}` : "";
       stretch.asking = false;
       this.came.value += 1;
@@ -137,6 +137,13 @@ export class Player {
       }, 3000);
     }
     this.forget(number);
+  }
+
+  /** Frames of all of a stretch: of so many cars that one answer is too small, fewer a second. */
+  async whole(start_s, end_s, hz = HZ) {
+    const path = `/recordings/${encodeURIComponent(this.name)}/frames?from_s=${start_s}&to_s=${end_s}&hz=${hz}`;
+    const { body } = await read(path);
+    return body.to_s < end_s && hz > SLOWEST_HZ ? this.whole(start_s, end_s, hz / 2) : body;
   }
 
   forget(newest) {

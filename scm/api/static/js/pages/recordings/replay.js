@@ -9,7 +9,7 @@ import { EyeThen } from "scm/pages/recordings/eye_then.js";
 import { MismatchDialog } from "scm/pages/recordings/mismatch_dialog.js";
 import { DeleteDialog, NotesDialog } from "scm/pages/recordings/notes_dialog.js";
 import { Player } from "scm/pages/recordings/player.js";
-import { read } from "scm/pages/recordings/reading.js";
+import { read, useReading } from "scm/pages/recordings/reading.js";
 import { ReplayMap } from "scm/pages/recordings/replay_map.js";
 import { TakeHomeDialog } from "scm/pages/recordings/take_home_dialog.js";
 import { Timeline } from "scm/pages/recordings/timeline.js";
@@ -77,11 +77,17 @@ async function load(name) {
 }
 
 function Unreadable({ name, why }) {
+  const recording = useReading(address(name)).body; // null where there is none of that name
   return html`
     <section class="panel" role="alert">
       <h2>${name} cannot be shown</h2>
       <p>${coded(why)}</p>
-      <p><a href="/recordings">All recordings</a></p>
+      <div class="tools">
+        ${recording && html`<a href=${`/api/v1${address(name)}.mcap`} download>Download it</a>`}
+        ${recording && html`<button onClick=${() => (asking.value = "delete")}>Delete</button>`}
+        <a href="/recordings">All recordings</a>
+      </div>
+      ${recording && asking.value === "delete" && html`<${DeleteDialog} recording=${recording} onClose=${() => (asking.value = null)} />`}
     </section>
   `;
 }

@@ -3,6 +3,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { clock } from "scm/shared/format.js";
+import { Sure } from "scm/shared/sure.js";
 import { change } from "scm/shell/api.js";
 import { go, route } from "scm/shell/router.js";
 import { Halves } from "scm/pages/recordings/halves.js";
@@ -106,6 +107,7 @@ function Script({ name, again, seen }) {
   const [error, setError] = useState("");
   const [text, setText] = useState("");
   const [naming, setNaming] = useState(false);
+  const [sure, setSure] = useState(false);
   const take = ({ body, etag }) => {
     setKnown({ ...body, etag });
     setText(body.text);
@@ -133,7 +135,7 @@ function Script({ name, again, seen }) {
       <div class="panel-head">
         <h2>${name}.py ${known.shipped && html`<small>came with the program</small>`}</h2>
         <div class="tools">
-          ${!known.shipped && html`<button class="small" onClick=${remove}>Delete</button>`}
+          ${!known.shipped && html`<button class="small" onClick=${() => setSure(true)}>Delete</button>`}
           <button class="small" onClick=${() => setNaming(true)}>Save as…</button>
           ${!known.shipped && html`<button class="small primary" disabled=${!edited} onClick=${save}>Save</button>`}
         </div>
@@ -147,6 +149,12 @@ function Script({ name, again, seen }) {
         onInput=${(event) => setText(event.target.value)}
       ></textarea>
       <${RunForm} name=${name} edited=${edited} text=${known.text} seen=${seen} />
+      ${sure &&
+      html`
+        <${Sure} title="Delete this script?" yes="Delete it" act=${remove} onClose=${() => setSure(false)}>
+          ${`${name}.py is deleted from the disk for everybody. There is no way back.`}
+        <//>
+      `}
       ${naming && html`<${NameDialog} title="Save as" text=${text} onClose=${() => setNaming(false)} onKept=${again} />`}
     </section>
   `;
@@ -213,10 +221,12 @@ function Log({ run }) {
     const look = async () => {
       const found = await read(`/scenarios/runs/${run.id}/lines?after=${next}`).catch((failed) => failed);
       if (gone) return;
-      if (found instanceof Error) return setError(found.message);
-      mine = [...mine, ...found.body.lines].slice(-2000);
-      next = found.body.first + found.body.lines.length;
-      setLines(mine);
+      setError(found instanceof Error ? found.message : "");
+      if (!(found instanceof Error)) {
+        mine = [...mine, ...found.body.lines].slice(-2000);
+        next = found.body.first + found.body.lines.length;
+        setLines(mine);
+      }
       if (!over) timer = setTimeout(look, LOOK_MS);
     };
     look();
