@@ -184,13 +184,19 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
             raise RefusedError(Refused(code="invalid", detail=detail))
         if vehicle and vehicle not in cars_of(index):
             raise not_found(f"car of {name}", vehicle)
-        span = "" if to_s is None and not from_s else f"-{from_s:g}-{'end' if to_s is None else f'{to_s:g}'}s"
-        file = f"{name}{f'-{vehicle}' if vehicle else ''}{span}.csv"
+        file = f"{name}{f'-{vehicle}' if vehicle else ''}{_span(from_s, to_s)}.csv"
         table = replay.csv_of(index, vehicle, from_s, to_s)
         if table is None:
             detail = f"{name}: {replay.no_rows(index, vehicle, from_s, to_s)}"
             raise RefusedError(Refused(code="not_found", detail=detail))
         return StreamingResponse(table, 200, _named(file), "text/csv")
+
+
+def _span(from_s: float, to_s: float | None) -> str:
+    """Return what a file's name says of a part: `-10-20s`; empty for the whole."""
+    if to_s is None:
+        return f"-{from_s:g}s-end" if from_s else ""
+    return f"-{from_s:g}-{to_s:g}s"
 
 
 def _add_moments(routes: APIRouter, shelf: RecordingsShelf) -> None:
