@@ -179,6 +179,7 @@ def test_a_suggested_drive_is_sent_to_a_car_and_stopped(visit, shelf, running):
     assert [text.removeprefix("Undecided").strip() for text in asked] == [
         "Motor gain or payload?", "Motor gain or aero drag?",
     ]  # fmt: skip
+    page.wait_for_selector(".question dd code:text-is('scm play')")
     page.select_option(".drive select", "n2")
     page.click("button:has-text('Drive this with n2')")
     page.keyboard.press("Escape")

@@ -1,4 +1,5 @@
 /** What was left out, one card for each effect: in words, in numbers, how sure, and which rivals fell. */
+import { coded } from "scm/shared/coded.js";
 import { html } from "scm/shared/html.js";
 import { scale } from "scm/pages/mismatch/plot.js";
 import { PARTS, short, unitText } from "scm/pages/mismatch/words.js";
@@ -62,7 +63,7 @@ function Whisker({ of }) {
 
 export function Facts({ rows }) {
   return html`
-    <dl>${rows.map(([name, said]) => html`<div key=${name}><dt>${name}</dt><dd>${said}</dd></div>`)}</dl>
+    <dl>${rows.map(([name, said]) => html`<div key=${name}><dt>${name}</dt><dd>${coded(said)}</dd></div>`)}</dl>
   `;
 }
 
