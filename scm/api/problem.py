@@ -14,6 +14,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from msgspec import Meta
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.routing import Match
 
 from scm.api.trace import trace_id
@@ -138,6 +139,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(RefusedError, _on_refused)
     app.add_exception_handler(RequestValidationError, _on_invalid)
     app.add_exception_handler(HTTPException, on_http)
+    app.add_exception_handler(ClientDisconnect, _on_gone)
     app.add_exception_handler(OSError, _on_disk)
     app.add_exception_handler(StoreError, _on_store)
     app.add_exception_handler(Exception, _on_bug)
@@ -196,6 +198,11 @@ def _allowed(request: Request) -> Iterator[str]:
             yield method
             if method == "GET":
                 yield "HEAD"
+
+
+async def _on_gone(request: Request, _error: Exception) -> Response:
+    """Say of a body that broke off what metrics and audit can tell: nobody hears it, no bug."""
+    return problem(400, "invalid", "the body broke off", instance=request.url.path)
 
 
 async def _on_disk(request: Request, error: Exception) -> Response:

@@ -1,5 +1,7 @@
 """A body that is too large is refused as a problem, whoever reads it, and files may be larger."""
 
+import asyncio
+
 import pytest
 
 from scm.api.app import create_app
@@ -49,3 +51,27 @@ def test_a_file_may_be_larger_than_other_bodies(
     seen = "/api/v1/eye/cameras/overhead/views"
     read = client_of(app)("POST", seen, content=LARGE, headers=headers)
     assert "JPEG or PNG" in read.json()["detail"]
+
+
+def test_a_body_that_breaks_off_is_no_failure_of_ours(view, fake_city, city_map, tmp_path):
+    app = create_app(view, fake_city.ask, city_map, shelves=shelves_in(tmp_path))
+    came = iter(
+        [{"type": "http.request", "body": b"PK", "more_body": True}, {"type": "http.disconnect"}]
+    )
+    told = []
+
+    async def receive():
+        return next(came)
+
+    async def send(message):
+        told.append(message)
+
+    scope = {
+        "type": "http", "asgi": {"version": "3.0"}, "http_version": "1.1", "method": "POST",
+        "scheme": "http", "path": UPLOADS, "raw_path": UPLOADS.encode(), "query_string": b"",
+        "root_path": "", "headers": [(b"host", b"127.0.0.1")], "client": ("127.0.0.1", 1),
+        "server": ("127.0.0.1", 8000),
+    }  # fmt: skip
+    asyncio.run(app(scope, receive, send))
+    assert told[0]["status"] == 400
+    assert list((tmp_path / "reports").glob("uploads/*")) == []
