@@ -66,7 +66,7 @@ function unreached({ name }) {
 
 /**
  * Make sure that this page may read: ask for a key as long as the city wants one.
- * @returns whether it may; false when the person gives none.
+ * @returns whether it may; false when the person gave none, who is not asked again until something is to be done.
  */
 export function enter() {
   entering ??= knock().finally(() => (entering = null));
@@ -79,21 +79,26 @@ let entering = null;
 async function knock() {
   while ((await fetch("/api/v1/session")).status === 401) {
     const key = sessionStorage.getItem(KEY);
-    if (!key && !(await askForKey())) return false;
+    if (!key && (declined || !(await askForKey()))) return false;
     const headers = { Authorization: `Bearer ${sessionStorage.getItem(KEY)}` };
     const reply = await fetch("/api/v1/session", { method: "PUT", headers });
-    if (REFUSALS.includes(reply.status)) sessionStorage.removeItem(KEY);
+    if (REFUSALS.includes(reply.status)) {
+      sessionStorage.removeItem(KEY);
+      notify("error", "The city does not take this key.");
+    }
     if (!reply.ok && reply.status !== 401) await new Promise((resolve) => setTimeout(resolve, 5000));
   }
   return true;
 }
 
 let asking = null;
+let declined = false;
 
 function askForKey() {
   asking ??= new Promise((resolve) => (keyWanted.value = resolve)).then((key) => {
     asking = keyWanted.value = null;
     if (key) sessionStorage.setItem(KEY, key);
+    declined = !key;
     return Boolean(key);
   });
   return asking;

@@ -263,7 +263,7 @@ let mapText = "";
 /** Begin: listen for ever, and read the map. */
 export async function start() {
   keepTime();
-  if (!(await enter().catch(() => true))) return;
+  while (!(await enter().catch(() => true))) await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
   entered = true;
   listen();
   await readCity();

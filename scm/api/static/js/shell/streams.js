@@ -57,12 +57,10 @@ export function whileSeen(begin, rank) {
  * @returns what ends it.
  */
 export function hear(address, heard, rank, onOpen = () => {}) {
-  let isShut = false;
   return whileSeen(() => {
     let source = null;
     let timer = null;
     const open = () => {
-      if (isShut) return; // the person gave no key
       source = new EventSource(address);
       for (const [name, take] of Object.entries(heard)) {
         source.addEventListener(name, (message) => take(JSON.parse(message.data)));
@@ -76,8 +74,10 @@ export function hear(address, heard, rank, onOpen = () => {}) {
     };
     const again = async () => {
       const own = timer;
-      isShut = !(await enter().catch(() => true));
-      if (timer === own) open();
+      const may = await enter().catch(() => true);
+      if (timer !== own) return;
+      if (may) open();
+      else timer = setTimeout(again, AGAIN_MS); // the person gave no key, and may yet
     };
     open();
     return () => {

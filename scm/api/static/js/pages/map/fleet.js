@@ -93,7 +93,7 @@ async function listen(ended) {
   while (!ended.aborted) {
     try {
       const response = await fetch(ADDRESS, { signal: ended });
-      if (response.status === 401 && !(await enter())) return;
+      if (response.status === 401) await enter();
       if (response.ok) await readAll(response.body.getReader());
     } catch (error) {
       if (ended.aborted) return;

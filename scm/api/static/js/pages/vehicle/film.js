@@ -25,7 +25,7 @@ async function follow(address, show, ended) {
   while (!ended.aborted) {
     try {
       const response = await fetch(address, { signal: ended });
-      if (response.status === 401 && !(await enter())) return;
+      if (response.status === 401) await enter();
       if (response.ok) await readAll(response.body.getReader(), show);
     } catch {
       if (ended.aborted) return;
