@@ -74,7 +74,7 @@ class CityProcess:
         """Kill a part, and wait until it is back."""
         before = self.pid(name)
         os.kill(before, signal.SIGKILL)
-        wait_for(lambda: self.pid(name) != before, 20.0, f"{name} is back")
+        wait_for(lambda: self.pid(name) != before, 90.0, f"{name} is back")
 
     @contextmanager
     def frozen(self, name: str) -> Iterator[None]:
