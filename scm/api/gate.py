@@ -8,6 +8,7 @@ origin; and they must carry their key in the header: the cookie, which pages hav
 pictures, is for reading.
 A WebSocket is a change from its first byte. Pages cannot give it a header, nor may a key stand in
 an address, which is logged: they offer it as the subprotocol `scm.key.<key>`, which is not chosen.
+What is endless asks again as it goes: a key that ends takes its streams with it.
 """
 
 import base64
@@ -26,7 +27,7 @@ from scm.api.brake import REFILL_PER_S, Brake
 from scm.api.keys import KeyRing
 from scm.api.known_keys import Known, KnownKeys
 from scm.api.problem import problem
-from scm.clock import WallClock
+from scm.clock import NS_PER_S, Clock, WallClock
 from scm.errors import RunError, StoreError
 from scm.log import event
 from scm.v2x.access import is_loopback
@@ -38,10 +39,17 @@ GUARDED = ("/api/", "/ngsi-ld/", "/metrics")
 OPEN = frozenset({"/api/v1/openapi.json"})
 STOP = "/api/v1/stop"
 RETRY_S = str(math.ceil(1.0 / REFILL_PER_S))
+KEY_LOOKED_NS = NS_PER_S
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _INLINE_SCRIPT = re.compile(r"<script(?![^>]*\bsrc=)[^>]*>(.*?)</script>", re.DOTALL)
 
 _Refusal = tuple[int, str, str]
+
+
+class _KeyEndedError(Exception):
+    """The key of an answer that is being given."""
+
+
 _log = logging.getLogger(__name__)
 
 
@@ -81,11 +89,18 @@ class Gate:
     """
 
     def __init__(
-        self, app: ASGIApp, *, keys: KnownKeys | None, policy: str, brake: Brake | None = None
+        self,
+        app: ASGIApp,
+        *,
+        keys: KnownKeys | None,
+        policy: str,
+        brake: Brake | None = None,
+        clock: Clock | None = None,
     ) -> None:
         self._app = app
         self._keys = keys
-        self._brake = brake or Brake(WallClock())
+        self._clock = clock or WallClock()
+        self._brake = brake or Brake(self._clock)
         self._headers = {
             "Content-Security-Policy": policy,
             "X-Content-Type-Options": "nosniff",
@@ -110,13 +125,36 @@ class Gate:
             scope, headers, is_safe=is_safe
         )
         if refusal is None:
-            await self._app(scope, receive, send_guarded)
+            await self._pass(scope, receive, send_guarded)
             return
         status, code, detail = refusal
         response = problem(status, code, detail, instance=scope["path"])
         if status == HTTPStatus.TOO_MANY_REQUESTS:
             response.headers["Retry-After"] = RETRY_S
         await response(scope, receive, send_guarded)
+
+    async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let a request in; end an answer without end when its key ends."""
+        key = str(scope.get("scm_key", ""))
+        if self._keys is None or scope["type"] != "http" or not key:
+            await self._app(scope, receive, send)
+            return
+        keys, looked_ns, is_endless = self._keys, self._clock.now_ns(), False
+
+        async def send_while_known(message: Message) -> None:
+            nonlocal looked_ns, is_endless
+            if message["type"] == "http.response.start":
+                is_endless = "content-length" not in Headers(raw=message["headers"])
+            elif is_endless and self._clock.now_ns() - looked_ns >= KEY_LOOKED_NS:
+                looked_ns = self._clock.now_ns()
+                if await _has_ended(keys, key):
+                    raise _KeyEndedError
+            await send(message)
+
+        try:
+            await self._app(scope, receive, send_while_known)
+        except _KeyEndedError:
+            await send({"type": "http.response.body", "body": b""})
 
     def _refusal(self, headers: Headers, *, is_safe: bool) -> _Refusal | None:
         host = headers.get("host", "")
@@ -164,6 +202,14 @@ class Gate:
     @staticmethod
     async def _known(keys: KnownKeys, key: str, path: str) -> Known:
         return await keys.find_for_stop(key) if path == STOP else Known(await keys.find(key))
+
+
+async def _has_ended(keys: KnownKeys, key: str) -> bool:
+    """Return whether a key is nobody's any more; a store that does not answer ends nothing."""
+    try:
+        return await keys.find(key) is None
+    except StoreError:
+        return False
 
 
 def _is_embedded_elsewhere(headers: Headers) -> bool:

@@ -201,6 +201,8 @@ def test_a_silent_world_greys_the_page_then_says_so_and_comes_back_by_itself(vis
         page.click("#city-stop")
         page.wait_for_selector(".banner.lost >> text=The stop is not confirmed")
         photograph(visited, "stop_not_confirmed")
+        page.click(".banner.lost >> text=Dismiss")
+        page.wait_for_selector("text=The stop is not confirmed", state="detached")
     try:
         running.web.put("/stop", json={"engaged": True, "by": "tests"}).raise_for_status()
         page.wait_for_selector(".banner.stopped >> text=all cars stand")

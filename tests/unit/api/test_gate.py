@@ -3,6 +3,7 @@ import re
 
 import httpx
 import pytest
+from fastapi.responses import StreamingResponse
 
 from scm.api.app import create_app
 from scm.api.brake import Brake
@@ -159,6 +160,30 @@ class TestWithKeys:
         assert put_stop(client, **bearer(key)).status_code == 200
         ring.revoke(key.split("_")[1])
         assert put_stop(client, **bearer(key)).status_code == 401
+
+    @pytest.mark.parametrize("ends", [True, False])
+    def test_a_key_that_ends_takes_its_endless_answers_with_it(self, ring, key_of, ends):
+        key, clock = key_of("viewer"), StepClock()
+
+        async def beats():
+            for number in range(4):
+                yield f"{number}\n"
+                clock.set_ns(clock.now_ns() + NS_PER_S)
+                if ends and number == 1:
+                    ring.revoke(key.split("_")[1])
+
+        async def answer(scope, receive, send):
+            await StreamingResponse(beats())(scope, receive, send)
+
+        gate = Gate(answer, keys=KnownKeys(ring, clock), policy="", clock=clock)
+
+        async def ask():
+            transport = httpx.ASGITransport(gate)
+            async with httpx.AsyncClient(transport=transport, base_url="http://city") as client:
+                return await client.get("/api/v1/stream", headers=bearer(key))
+
+        told = asyncio.run(ask()).text.split()
+        assert told == (["0", "1"] if ends else ["0", "1", "2", "3"])
 
     def test_an_admin_ends_a_key(self, keyed_app, client_of, key_of):
         client, admin, other = client_of(keyed_app), key_of("admin"), key_of("viewer")

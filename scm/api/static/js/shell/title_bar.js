@@ -157,6 +157,7 @@ export function Banners() {
     html`<div class="banner lost" role="alert">
       <b>The stop is not confirmed</b>
       <span>Cars may still drive. Press City stop again, or switch them off by hand.</span>
+      <button onClick=${() => (unconfirmed.value = false)}>Dismiss</button>
     </div>`}
     ${lost &&
     html`<div class="banner lost" role="alert">

@@ -44,7 +44,8 @@ export function Picture({ camera }) {
       )}
       <canvas
         ref=${canvas}
-        class="picture"
+        class="picture moves"
+        data-stale=${behind > 1}
         tabindex="0"
         role="img"
         width=${camera.width_px ?? 16}

@@ -13,7 +13,7 @@ export function TagTable({ camera }) {
         <h2>Tags</h2>
         <span class="facts">of the last minute</span>
       </div>
-      ${tags.length ? html`<div class="scroll" tabindex="0" role="region" aria-label="Table of tags"><${Table} tags=${tags} /></div>` : html`<p class="empty">No tag has been seen for a minute.</p>`}
+      ${tags.length ? html`<div class="scroll moves" tabindex="0" role="region" aria-label="Table of tags"><${Table} tags=${tags} /></div>` : html`<p class="empty">No tag has been seen for a minute.</p>`}
     </section>
   `;
 }

@@ -93,7 +93,7 @@ function Bar({ told, names }) {
             </label>
           `
         : html`<h2>${plain(told.junction)}</h2>`}
-      <span class="runs" data-mode=${told.fresh ? told.mode : "unheard"}>
+      <span class="runs moves" data-mode=${told.fresh ? told.mode : "unheard"}>
         <b>${runs}</b>
         <small>${told.fresh ? modeOf(told) : "its controller is silent"}</small>
       </span>

@@ -2,7 +2,8 @@
 import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed, UNKNOWN } from "scm/shared/format.js";
-import { stop } from "scm/shell/store.js";
+import { change } from "scm/shell/api.js";
+import { city, stop } from "scm/shell/store.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
 import { down, drop, giveBack, most, pad, take, wheel } from "scm/pages/vehicle/wheel.js";
 
@@ -48,15 +49,22 @@ function Free({ car }) {
             <button class="primary big" disabled=${state === "asking" || !car.alive} onClick=${() => take(car.vehicle)}>
               ${state === "asking" ? "Asking …" : "Take over"}
             </button>
+            ${stands(car) && city.value?.lanes.length > 0 &&
+            html`<button class="big" disabled=${!car.alive} onClick=${() => sendOn(car)}>Let it drive</button>`}
           </div>
         `}
     <${Help} />
   `;
 }
 
+const stands = (car) => !car.trip || car.trip.arrived;
+
+/** A car that stands without a trip, as after a script, keeps all behind it waiting. */
+const sendOn = (car) => change("POST", `/vehicles/${car.vehicle}/route`, {}, () => `${car.vehicle} drives.`);
+
 /** What becomes of a car that nobody has taken, when you give it back. */
 function afterwards(car) {
-  if (car.trip && !car.trip.arrived) return `${car.vehicle} is driven by ${ownerOf(car)}, which goes on when you give it back.`;
+  if (!stands(car)) return `${car.vehicle} is driven by ${ownerOf(car)}, which goes on when you give it back.`;
   return `${car.vehicle} stands, and stands again when you give it back.`;
 }
 
