@@ -62,6 +62,7 @@ class Member:
     silent_ns: int | None = None
     was_up: bool = False
     told_slow: bool = False
+    told_gone: bool = False
 
     @property
     def is_up(self) -> bool:
@@ -105,11 +106,11 @@ class Crew:
     def _tell_up(self, member: Member) -> None:
         job, pid = member.job, member.process.pid if member.process else 0
         member.silent_ns = None
-        if member.was_up:
-            self._say(f"  {job.name:<12} is back, pid {pid}")
-        else:
-            member.was_up = True
+        if not member.was_up:
             self._say(f"  {job.name:<12} {job.what:<52} pid {pid}")
+        elif member.told_gone:  # a link that was lost for a moment is no news
+            self._say(f"  {job.name:<12} is back, pid {pid}")
+        member.was_up, member.told_gone = True, False
 
     def look(self) -> None:
         """Start what is due, and see who died."""
@@ -141,7 +142,7 @@ class Crew:
     def _tell_trouble(self, member: Member, now_ns: int) -> None:
         name = member.job.name
         if member.silent_ns is not None and now_ns > member.silent_ns + SILENT_NS:
-            member.silent_ns = None
+            member.silent_ns, member.told_gone = None, True
             self._say(f"  {name:<12} is silent: it runs, but gives no sign of life on the bus")
         if not (member.was_up or member.told_slow) and now_ns > member.started_ns + SLOW_NS:
             member.told_slow = True
@@ -150,7 +151,7 @@ class Crew:
     def _ended(self, member: Member, code: int, now_ns: int) -> None:
         name = member.job.name
         member.process = None
-        member.silent_ns = None
+        member.silent_ns, member.told_gone = None, True
         member.sessions.clear()
         if code == 0:
             self._say(f"  {name:<12} left")

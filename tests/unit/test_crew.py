@@ -39,3 +39,14 @@ def test_what_crashed_is_started_again_and_what_left_is_not():
     for code, words in ((1, "starts again"), (0, "left")):
         said = []
         assert words in until_it_died(crew_of("part", code, said), said, up=False)
+
+
+def test_a_link_that_was_lost_for_a_moment_is_no_news():
+    said = []
+    crew = crew_of("part", 0, said)
+    crew.look()
+    for alive in (True, False, True):
+        crew.heard(Presence(role="part", station="x", session="1", alive=alive))
+    crew.members["x"].process.wait(timeout=60.0)
+    assert len(said) == 1
+    assert "does it" in said[0]
