@@ -1,7 +1,7 @@
 /** The log of the city: filtered, folded, followed live, acknowledged, exported. */
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
-import { byName, moment, spaced, span } from "scm/shared/format.js";
+import { byName, moment, newestFirst, spaced, span } from "scm/shared/format.js";
 import { change } from "scm/shell/api.js";
 import { prose } from "scm/shell/prose.js";
 import { Dialog } from "scm/shared/dialog.js";
@@ -103,7 +103,7 @@ function merged(read, live, wanted, acknowledged, open, pausedAt) {
     const full = { ...row, ...acknowledged(row) };
     if (!(open && full.acknowledged_by)) rows.set(row.id, full);
   }
-  return [...rows.values()].toSorted((a, b) => b.seq - a.seq);
+  return [...rows.values()].toSorted(newestFirst);
 }
 
 function passes(row, { severity, source, text }) {

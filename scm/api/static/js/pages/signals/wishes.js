@@ -4,7 +4,7 @@ import { html } from "scm/shared/html.js";
 import { change, notify } from "scm/shell/api.js";
 import { prose } from "scm/shell/prose.js";
 import { Dialog } from "scm/shared/dialog.js";
-import { clock, span } from "scm/shared/format.js";
+import { clock, newestFirst, span } from "scm/shared/format.js";
 import { events } from "scm/shell/store.js";
 import { clockNow, row, site, status } from "scm/pages/signals/store.js";
 import { plain, toCome, VERBS } from "scm/pages/signals/words.js";
@@ -189,7 +189,10 @@ const SAYING = new Set(["traffic", "monitor"]);
 /** What was asked for and what came of it, from the log. */
 function Lately({ junction }) {
   const about = new RegExp(`\\b${junction}\\b`);
-  const told = events.value.filter((event) => SAYING.has(event.source) && about.test(event.text)).slice(0, SHOWN);
+  const told = events.value
+    .filter((event) => SAYING.has(event.source) && about.test(event.text))
+    .toSorted(newestFirst)
+    .slice(0, SHOWN);
   return html`
     <h3>Lately <a href="/events">all events</a></h3>
     <ul class="lately">
