@@ -136,3 +136,18 @@ def test_the_audit_names_who_did_what_and_its_chain_is_whole(visit, running):
     page.wait_for_selector(".at-events [data-deed]:has-text('PUT /stop') .warn >> text=422 in")
     page.click("text=Check the chain")
     page.wait_for_selector(".chain >> text=whole:")
+
+
+def test_what_is_told_late_stands_where_it_happened(visit, running):
+    page = visit("/map").page
+
+    def answer(route):
+        rows = running.get("/events?limit=2")["items"]
+        late = rows[0] | {"id": "late", "seq": 0, "t_ns": 4 * 10**18, "text": "told late"}
+        route.fulfill(json={"items": [*rows, late], "next": None})
+
+    page.route("**/api/v1/events?**", answer)
+    page.click('nav a[href="/events"]')
+    page.wait_for_selector(f"{ROWS} >> text=told late")
+    assert "told late" in page.locator(ROWS).first.inner_text()
+    page.unroute("**/api/v1/events?**")
