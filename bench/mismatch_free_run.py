@@ -9,7 +9,7 @@ import numpy as np
 from bench.mismatch_residuals import regressors, state_terms
 from scm.geometry import Pose2
 from scm.recording.motion import Poses
-from scm.replay import Commands
+from scm.replay.commands import Commands
 from scm.vehicles.fleet import Fleet
 
 EVERY_S, STEP_S, SETTLED_S = 0.1, 0.005, 3.0

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.geometry import Pose2
-from scm.mismatch.drive import Drive
 from scm.recording.read import Recording
-from scm.replay import Commands
+from scm.replay.commands import Commands
+from scm.replay.drive import Drive
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
 

@@ -16,7 +16,7 @@ from drawing import plt
 from matplotlib.axes import Axes
 
 from scm.recording.read import read_recordings
-from scm.replay import FreeRun, free_run
+from scm.replay.free_run import FreeRun, free_run
 from scm.vehicles.car import Car, load_car
 from tests.physics import commonroad_twin as twin
 

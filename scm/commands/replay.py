@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from scm.command import Command
 
 if TYPE_CHECKING:
-    from scm.replay import FreeRun
+    from scm.replay.free_run import FreeRun
 
 HORIZONS_S = (0.5, 1.0, 3.0)
 
@@ -33,7 +33,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.recorder.drives import SUFFIX, recordings_of
-    from scm.replay import free_run
+    from scm.replay.free_run import free_run
     from scm.vehicles.car import load_car
     from scm.vehicles.undone import POSES
 
@@ -62,7 +62,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _table(run: "FreeRun", horizon_s: float) -> str:
     """Return the error table as aligned text."""
-    from scm.replay import error_table
+    from scm.replay.free_run import error_table
 
     horizons = (*(h for h in HORIZONS_S if h < horizon_s), horizon_s)
     lines = [" " * 14 + "".join(f"{f'{h:g} s':>20}" for h in horizons)]

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.evidence import Curve
 from scm.mismatch.findings import Equation
 from scm.mismatch.fit import Fitted, Fitter
@@ -28,9 +27,10 @@ from scm.mismatch.leftover import (
 )
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate
-from scm.mismatch.rollouts import Numbers
-from scm.mismatch.seen import Camera, Moved
-from scm.mismatch.windows import Side, Windows
+from scm.replay.camera import Camera, Moved
+from scm.replay.drive import STEP_S, Drive
+from scm.replay.numbers import Numbers
+from scm.replay.windows import Side, Windows
 
 EVERY_S = 0.5
 BINS = 12

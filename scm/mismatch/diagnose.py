@@ -11,27 +11,19 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock
+from scm.data_quality.check import check
+from scm.data_quality.corrected import corrected
+from scm.data_quality.problem import DataProblem
+from scm.data_quality.suspicion import Quality
 from scm.errors import RecordingError
 from scm.mismatch.budget import DEFAULT_S, Budget, Question
 from scm.mismatch.curves import curve
-from scm.mismatch.doubt.corrected import corrected
-from scm.mismatch.doubt.doubt import doubt
-from scm.mismatch.doubt.suspicion import Doubts
-from scm.mismatch.drive import Drive
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns, Tried
 from scm.mismatch.experiment.folders import folders_of
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.suggest import Suggestion
 from scm.mismatch.explain import effect_of, ordinary_of, tried_of, undecided_of
-from scm.mismatch.findings import (
-    DataProblem,
-    Diagnosis,
-    Effect,
-    Fit,
-    Unasked,
-    Undecided,
-    Verdict,
-)
+from scm.mismatch.findings import Diagnosis, Effect, Fit, Unasked, Undecided, Verdict
 from scm.mismatch.fit import Fitted, Fitter
 from scm.mismatch.judge import judge, nothing_got_worse
 from scm.mismatch.law_rivals import Standing, standing
@@ -45,13 +37,14 @@ from scm.mismatch.parts import Parts, split
 from scm.mismatch.patch import patched
 from scm.mismatch.report.car_file import write_car
 from scm.mismatch.report.write import write_report
-from scm.mismatch.rollouts import Numbers
 from scm.mismatch.rough import SETTLES_FAR, is_far, roughly, strays
 from scm.mismatch.search import Search
 from scm.mismatch.strayed import strayed
 from scm.recorder.drives import SUFFIX, recordings_of_one
 from scm.recording.read import Recording
 from scm.recording.span import part_of
+from scm.replay.drive import Drive
+from scm.replay.numbers import Numbers
 from scm.vehicles.car import Car, load_car
 
 POSE = ("position_m", "yaw_rad")
@@ -178,19 +171,19 @@ def _doubted(
     recordings: Sequence[Recording], car: Car
 ) -> tuple[list[Recording], tuple[DataProblem, ...]]:
     """Return the recordings that can be used, repaired, and everything wrong with any."""
-    every = [doubt(recording, car) for recording in recordings]
+    every = [check(recording, car) for recording in recordings]
     usable, problems = list[Recording](), list[DataProblem]()
     length_s = _length_s(recordings)
-    for recording, doubts in zip(recordings, every, strict=True):
-        together = length_s > SHORTEST_S and _is_only_short(doubts)
+    for recording, quality in zip(recordings, every, strict=True):
+        together = length_s > SHORTEST_S and _is_only_short(quality)
         where = f"{_titles([recording])[0]}: " if len(recordings) > 1 else ""
         problems += [
             replace(p, said=where + p.said)
-            for p in doubts.problems
+            for p in quality.problems
             if not together or p.name not in OF_SHORT
         ]
-        if together or doubts.usable.can_diagnose:
-            usable.append(corrected(recording, doubts))
+        if together or quality.usable.can_diagnose:
+            usable.append(corrected(recording, quality))
     return usable, tuple(problems)
 
 
@@ -200,9 +193,9 @@ def _length_s(recordings: Sequence[Recording]) -> float:
     return sum(float(np.ptp(t)) for t in posed)
 
 
-def _is_only_short(doubts: Doubts) -> bool:
+def _is_only_short(quality: Quality) -> bool:
     """Say whether a recording lacks nothing but length, which several have together."""
-    lacks = doubts.usable.lacks
+    lacks = quality.usable.lacks
     return bool(lacks) and all(lack.startswith("only ") for lack in lacks)
 
 

@@ -10,19 +10,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
+from scm.data_quality.problem import Span
 from scm.errors import RecordingError
-from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.evidence import FreeRuns
-from scm.mismatch.findings import Fit, PartErrors, Span
+from scm.mismatch.findings import Fit, PartErrors
 from scm.mismatch.laws.sensed import put_right
 from scm.mismatch.leftover import on_one_axis
 from scm.mismatch.parts import NAMES, Parts
-from scm.mismatch.rollouts import Numbers
-from scm.mismatch.seen import Camera
-from scm.mismatch.smooth import Smooth, smooth
 from scm.mismatch.window_errors import poses_of, sensor_errors, turned
-from scm.mismatch.windows import Runs, Side, Windows
 from scm.recording.motion import Poses
+from scm.replay.camera import Camera
+from scm.replay.drive import STEP_S, Drive
+from scm.replay.numbers import Numbers
+from scm.replay.smooth import Smooth, smooth
+from scm.replay.windows import Runs, Side, Windows
 from scm.vehicles.car import Car
 
 FAST_MPS, FAST_HORIZON_S, SLOW_HORIZON_S = 1.0, 1.0, 3.0

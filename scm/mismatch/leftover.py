@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.evidence import Residual
-from scm.mismatch.rollouts import Numbers
-from scm.mismatch.seen import Camera
-from scm.mismatch.smooth import Smooth
-from scm.mismatch.windows import Runs, Side, Windows
+from scm.replay.camera import Camera
+from scm.replay.drive import STEP_S, Drive
+from scm.replay.numbers import Numbers
+from scm.replay.smooth import Smooth
+from scm.replay.windows import Runs, Side, Windows
 from scm.vehicles.car import Car
 
 RUN_S = 0.4

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Bools, Floats
-from scm.mismatch.drive import Drive
 from scm.mismatch.noise import Noise, usual_noise
-from scm.mismatch.predict import COMMAND_CLOCK, POSE_CLOCK, Prediction
-from scm.mismatch.rollouts import THROTTLE_CLOCK, Motions, Numbers, Rollouts, Tiles
+from scm.mismatch.predict import Prediction
+from scm.mismatch.rollouts import Motions, Rollouts, Tiles
 from scm.mismatch.whiten import Whitener
+from scm.replay.drive import Drive
+from scm.replay.numbers import COMMAND_CLOCK, POSE_CLOCK, THROTTLE_CLOCK, Numbers
 from scm.vehicles.car import Car
 from scm.vehicles.param import Param
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from scm.arrays import Bools
 from scm.errors import TermError
-from scm.mismatch.drive import Drive, has_odometer
 from scm.mismatch.findings import Equation
-from scm.mismatch.rollouts import Numbers
+from scm.replay.drive import Drive, has_odometer
+from scm.replay.numbers import Numbers
 from scm.vehicles.car import Car, all_terms
 from scm.vehicles.measure import all_measures
 from scm.vehicles.param import Param

@@ -11,14 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
+from scm.data_quality.problem import Span
 from scm.mismatch.evidence import Residual
-from scm.mismatch.findings import Equation, Located, Place, Span
+from scm.mismatch.findings import Equation, Located, Place
 from scm.mismatch.fit import TAIL, Fitted, Fitter
 from scm.mismatch.leftover import leftover, on_one_axis
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate
-from scm.mismatch.predict import NEUTRAL
 from scm.mismatch.sensed import sensed
+from scm.replay.numbers import NEUTRAL
 
 BLOCK_S = 2.5
 CELLS = 8  # along the longer side of the floor

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scm.mismatch.drive import Drive
+from scm.replay.drive import Drive
 
 ALIKE, ABRUPT = 0.003, 0.1
 JOLTS = 0.05

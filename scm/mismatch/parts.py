@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.mismatch.drive import Drive
-from scm.mismatch.findings import Span
+from scm.data_quality.problem import Span
 from scm.mismatch.likelihood import Likelihood
+from scm.replay.drive import Drive
 
 BLOCK_S = 5.0
 LEAST_BLOCKS = 4

@@ -9,23 +9,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.mismatch.drive import STEP_S, WHEELS, Drive, Stream
-from scm.mismatch.rollouts import Motions, Numbers
+from scm.mismatch.rollouts import Motions
+from scm.replay.drive import STEP_S, WHEELS, Drive, Stream
+from scm.replay.numbers import COMMAND_CLOCK, NEUTRAL, POSE_CLOCK, Numbers
 from scm.vehicles.jit import array_kernel
-
-# Faults of measurement by the key that their library parameter has, and their neutral values.
-COMMAND_CLOCK = "clock.commands_s"  # commands take effect so much later than they are stamped
-POSE_CLOCK = "clock.pose_s"  # poses are stamped so much later than the other sensors
-NEUTRAL: Mapping[str, float] = {
-    COMMAND_CLOCK: 0.0, POSE_CLOCK: 0.0, "measure.pose_delay_s": 0.0, "measure.clock_offset_s": 0.0,
-    "measure.clock_rate": 0.0, "measure.pose_scale": 1.0, "measure.camera_tilt_x_per_m": 0.0,
-    "measure.camera_tilt_y_per_m": 0.0, "measure.pose_point_x_m": 0.0,
-    "measure.pose_point_y_m": 0.0, "measure.pose_heading_rad": 0.0, "measure.encoder_loss": 0.0,
-    "measure.gyro_bias_rad_s": 0.0, "measure.gyro_scale": 1.0, "measure.speed_scale": 1.0,
-    "measure.accel_bias_x_m_s2": 0.0, "measure.accel_bias_y_m_s2": 0.0,
-    "measure.imu_angle_rad": 0.0,
-}  # fmt: skip
-
 
 POSES = ("pose.x", "pose.y", "pose.yaw")
 _LATE = (COMMAND_CLOCK, POSE_CLOCK, "measure.pose_delay_s", "measure.clock_offset_s")

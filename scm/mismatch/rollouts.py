@@ -13,7 +13,15 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.geometry import Pose2
-from scm.mismatch.drive import RUN_IN_S, STEP_S, Drive
+from scm.replay.drive import RUN_IN_S, STEP_S, Drive
+from scm.replay.numbers import (
+    SIGNALS,
+    STEERING_DELAY,
+    TETHER_STEPS,
+    THROTTLE_CLOCK,
+    THROTTLE_DELAY,
+    Numbers,
+)
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import SUBSTEP_S, Fleet, VehicleStatus
 from scm.vehicles.fleet_rows import COG, WHEELS, pool, whole_steps
@@ -22,18 +30,10 @@ from scm.vehicles.lanes import LANES, WIDTH
 from scm.vehicles.term import reads
 
 ROWS, THREADS = LANES, 2
-TETHER_STEPS = 50
 COMMANDED = 10  # parts of a step, each with a command: a servo at its rate moves by when
 REMEMBERED = 2  # of a car that remembers its commands: there each part costs a call from Python
-SIGNALS = (
-    "speed", "lateral_speed", "yaw_rate", "accel_x", "accel_y", "steer_angle",
-    "wheel_angle.fl", "wheel_angle.fr", "wheel_angle.rl", "wheel_angle.rr",
-)  # fmt: skip
 WHEEL_ANGLES = slice(6, 10)  # of these
-THROTTLE_DELAY, STEERING_DELAY = "drive.delay_s", "steering.delay_s"
-THROTTLE_CLOCK = "clock.throttle_s"  # the throttle acts so much later than the steering
 _LATE = (THROTTLE_DELAY, STEERING_DELAY, THROTTLE_CLOCK)
-Numbers = Mapping[str, float]
 _Used = TypeVar("_Used")
 
 

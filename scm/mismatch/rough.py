@@ -14,7 +14,6 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.budget import Budget
-from scm.mismatch.drive import Drive, is_led
 from scm.mismatch.findings import Equation
 from scm.mismatch.fit import Fitted
 from scm.mismatch.likelihood import Likelihood
@@ -23,6 +22,7 @@ from scm.mismatch.noise import usual_noise
 from scm.mismatch.parts import Parts, split
 from scm.mismatch.search import FALSE_ALARMS, Search, Step, sought
 from scm.mismatch.strides import Striding, learn_sizes, told_anew
+from scm.replay.drive import Drive, is_led
 from scm.vehicles.car import Car
 
 MOST_EFFECTS = 10

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.drive import Drive
 from scm.mismatch.evidence import Residual
 from scm.mismatch.leftover import honest, on_one_axis
 from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.predict import NEUTRAL
-from scm.mismatch.rollouts import Numbers
+from scm.replay.drive import Drive
+from scm.replay.numbers import NEUTRAL, Numbers
 
 BIN_S = 0.5
 MOST = 3  # residuals drawn

@@ -15,11 +15,11 @@ from itertools import pairwise
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.mismatch.drive import Drive
 from scm.mismatch.fit import TAIL
 from scm.mismatch.likelihood import SETTLED_S, Likelihood
 from scm.mismatch.noise import Noise, usual_noise
 from scm.mismatch.parts import blocks
+from scm.replay.drive import Drive
 
 LENGTH_S, SHORT_S = 1.0, 0.5  # of a stride, and where all drives are shorter than ten
 OVERLAP = 2  # strides begin so many times within one's length

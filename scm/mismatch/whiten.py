@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.mismatch.commanded import Commanded
-from scm.mismatch.drive import Drive
 from scm.mismatch.noise import Noise
+from scm.replay.commands import Commanded
+from scm.replay.drive import Drive
 from scm.vehicles.jit import array_kernel
 
 EX, EY, EPSI, DV, DY, DR = range(6)

@@ -5,10 +5,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.mismatch.drive import STEP_S, Drive, Stream
-from scm.mismatch.predict import NEUTRAL, Prediction
+from scm.mismatch.predict import Prediction
 from scm.mismatch.rollouts import Motions
-from scm.mismatch.windows import Runs, Side
+from scm.replay.drive import STEP_S, Drive, Stream
+from scm.replay.numbers import NEUTRAL
+from scm.replay.windows import Runs, Side
 
 END_S = 0.2  # speeds are means over the window's end of this length
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scm.recording.read import read_recordings
-from scm.replay import free_run
+from scm.replay.free_run import free_run
 from scm.vehicles.car import load_car
 
 ROOT = Path(__file__).parents[2]

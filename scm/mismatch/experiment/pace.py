@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.geometry import Pose2
-from scm.mismatch.drive import Drive
+from scm.replay.drive import Drive
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
 

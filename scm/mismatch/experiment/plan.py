@@ -8,7 +8,6 @@ import numpy as np
 
 from scm.arrays import Bools, Floats
 from scm.geometry import Pose2
-from scm.mismatch.drive import STEP_S, Drive
 from scm.mismatch.experiment.manoeuvres import ROW_S, Manoeuvre
 from scm.mismatch.experiment.pace import SIDEWAYS_M_S2, Pace
 from scm.mismatch.likelihood import Likelihood
@@ -17,7 +16,8 @@ from scm.mismatch.noise import Noise
 from scm.mismatch.predict import Prediction
 from scm.mismatch.rollouts import Rollouts
 from scm.recording.read import Channel, Recording
-from scm.replay import FULL_SPEED
+from scm.replay.commands import FULL_SPEED
+from scm.replay.drive import STEP_S, Drive
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from scm.mismatch.drive import STEP_S
 from scm.mismatch.experiment.pace import Floor
 from scm.mismatch.experiment.plan import Placed
 from scm.mismatch.experiment.suggest import Suggestion
+from scm.replay.drive import STEP_S
 
 NAME = "next_drive"
 WAY_S = 0.1

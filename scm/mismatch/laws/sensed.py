@@ -10,12 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Bools, Floats
-from scm.mismatch.drive import POSES, STEP_S, Drive
 from scm.mismatch.findings import Equation
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate, Knob
-from scm.mismatch.rollouts import Motions, Numbers, Tiles
-from scm.mismatch.smooth import Smooth, smooth
+from scm.mismatch.rollouts import Motions, Tiles
+from scm.replay.drive import POSES, STEP_S, Drive
+from scm.replay.numbers import Numbers
+from scm.replay.smooth import Smooth, smooth
 from scm.vehicles.car import Car
 
 PREFIX = "sensed."

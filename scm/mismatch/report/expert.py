@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from importlib.metadata import version
 
 import scm
+from scm.data_quality.problem import DataProblem
 from scm.mismatch.evidence import Evidence, Ordinary
-from scm.mismatch.findings import DataProblem, Diagnosis, Effect, Fit
+from scm.mismatch.findings import Diagnosis, Effect, Fit
 from scm.mismatch.report.drawings import Drawings
 from scm.mismatch.report.first_screen import name_of
 from scm.mismatch.report.html_text import around, figure, section, table, tag

@@ -5,9 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from scm.arrays import Floats, Ints
+from scm.data_quality.problem import Span
 from scm.maps.svg import element
 from scm.mismatch.evidence import Residual
-from scm.mismatch.findings import Located, Place, Span
+from scm.mismatch.findings import Located, Place
 from scm.mismatch.report.plot import (
     BAND_STDS,
     Frame,

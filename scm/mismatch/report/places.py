@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from scm.mismatch.findings import Equation, Located, Place, Span
+from scm.data_quality.problem import Span
+from scm.mismatch.findings import Equation, Located, Place
 from scm.mismatch.report.wording import joined, percent, short
 
 PARTS_OF_CAR = {

@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from scm.data_quality.problem import DataProblem, Span
 from scm.mismatch.evidence import Evidence
-from scm.mismatch.findings import DataProblem, Diagnosis, Span
+from scm.mismatch.findings import Diagnosis
 from scm.mismatch.report.places import sensors, spans
 from scm.mismatch.report.verdict_text import other_problems, pressing_problems
 from scm.mismatch.report.wording import capital, joined

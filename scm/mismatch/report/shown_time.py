@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from scm.arrays import Floats
+from scm.data_quality.problem import Span
 from scm.mismatch.evidence import Evidence
-from scm.mismatch.findings import Diagnosis, Span
+from scm.mismatch.findings import Diagnosis
 
 _READABLE_S = 1e5  # a clock beyond it is no stop watch
 

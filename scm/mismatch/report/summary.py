@@ -4,7 +4,8 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from scm.mismatch.findings import DataProblem, Diagnosis, Effect
+from scm.data_quality.problem import DataProblem
+from scm.mismatch.findings import Diagnosis, Effect
 from scm.mismatch.report.first_screen import name_of
 from scm.mismatch.report.places import sensors
 from scm.mismatch.report.verdict_text import can_judge, verdict_sentence

@@ -6,9 +6,10 @@ from itertools import pairwise
 import numpy as np
 
 from scm.arrays import Floats
+from scm.data_quality.problem import Span
 from scm.maps.svg import element
 from scm.mismatch.evidence import FreeRuns, Residual
-from scm.mismatch.findings import Located, Span
+from scm.mismatch.findings import Located
 from scm.mismatch.report.plot import (
     BAND_STDS,
     TEXT_PX,

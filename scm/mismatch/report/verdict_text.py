@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from scm.mismatch.findings import DataProblem, Diagnosis, Effect, Equation, Verdict
+from scm.data_quality.problem import DataProblem
+from scm.mismatch.findings import Diagnosis, Effect, Equation, Verdict
 from scm.mismatch.report.wording import capital, joined, title_of
 
 _MOST_NAMED = 4  # effects in the verdict's sentence

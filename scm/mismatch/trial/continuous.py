@@ -13,7 +13,8 @@ from scm.arrays import Floats
 from scm.geometry import Pose2
 from scm.recording.motion import Motion, Poses
 from scm.recording.read import Recording
-from scm.replay import STEP_S, Commands
+from scm.replay.commands import Commands
+from scm.replay.free_run import STEP_S
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
 

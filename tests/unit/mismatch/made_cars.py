@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from scm.mismatch.diagnose import Searched
-from scm.mismatch.drive import Drive
 from scm.mismatch.fit import Fitted
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
 from scm.mismatch.parts import split
 from scm.mismatch.search import Search, Step
+from scm.replay.drive import Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive, nigel
 
 LISTED = ("camera_tilt", "pose_point", "pose_heading", "pose_latency", "steer_trim", "grade")

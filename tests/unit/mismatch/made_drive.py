@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from scm.geometry import Pose2
-from scm.mismatch.drive import Drive
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import terms_needed
 from scm.recording.read import Channel, Recording
+from scm.replay.drive import Drive
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 

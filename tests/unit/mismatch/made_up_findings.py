@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from scm.data_quality.problem import DataProblem
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns, Ordinary, Residual, Tried
 from scm.mismatch.findings import (
-    DataProblem,
     Diagnosis,
     Effect,
     Equation,

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch.drive import POSES, Drive
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.noise import Noise
 from scm.mismatch.rollouts import Rollouts
 from scm.mismatch.strides import LENGTH_S, Strides
+from scm.replay.drive import POSES, Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
 FIRST_S, LAST_S, TURNED = 5.0, 13.0, 2.0

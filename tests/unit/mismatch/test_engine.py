@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch.drive import Drive
 from scm.mismatch.fit import Fitter, _bounded
 from scm.mismatch.learn_noise import learn_noise
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
 from scm.mismatch.noise import usual_noise
-from scm.mismatch.predict import COMMAND_CLOCK
-from scm.mismatch.rollouts import THROTTLE_CLOCK, Rollouts, _shares
+from scm.mismatch.rollouts import Rollouts, _shares
 from scm.mismatch.search import Search
 from scm.mismatch.whiten import Whitener, _Events
+from scm.replay.drive import Drive
+from scm.replay.numbers import COMMAND_CLOCK, THROTTLE_CLOCK
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
 

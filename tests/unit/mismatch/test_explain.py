@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch.drive import Drive
 from scm.mismatch.explain import effect_of, ordinary_of, said, tried_of, upright
 from scm.mismatch.findings import Estimate
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
 from scm.mismatch.search import Search
+from scm.replay.drive import Drive
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 

@@ -9,11 +9,11 @@ import pytest
 
 from scm.mismatch import likelihood
 from scm.mismatch.budget import OutOfTimeError
-from scm.mismatch.drive import Drive
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.noise import usual_noise
 from scm.mismatch.rollouts import ROWS, Rollouts, Tiles
 from scm.mismatch.whiten import Whitener
+from scm.replay.drive import Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
 KEPT = 3

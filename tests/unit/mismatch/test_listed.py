@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from scm.mismatch.drive import Drive
 from scm.mismatch.explain import said
 from scm.mismatch.findings import Estimate
 from scm.mismatch.listed import by_name, candidates, placed, shown_by, terms_needed
+from scm.replay.drive import Drive
 from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import big_nigel, made_drive, nigel
 

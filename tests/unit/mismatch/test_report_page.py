@@ -7,8 +7,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from scm.data_quality.problem import DataProblem
 from scm.mismatch.evidence import Evidence, Residual
-from scm.mismatch.findings import DataProblem, Effect, Equation, Located, Verdict
+from scm.mismatch.findings import Effect, Equation, Located, Verdict
 from scm.mismatch.report.summary import summary
 from scm.mismatch.report.verdict_text import verdict_sentence
 from scm.mismatch.report.write import write_report

@@ -18,7 +18,7 @@ from scm.play import play, write_recording
 from scm.recorder.drives import read_drives, recordings_of
 from scm.recorder.mcap_file import RunFile
 from scm.recorder.part import RecorderPart
-from scm.replay import free_run
+from scm.replay.free_run import free_run
 from scm.traffic.part import TrafficPart
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of

@@ -7,7 +7,7 @@ import pytest
 
 from scm.recording.description import read_description
 from scm.recording.read import Recording, read_recordings
-from scm.replay import free_run
+from scm.replay.free_run import free_run
 from scm.vehicles.car import load_car
 
 FOLDER = Path(__file__).parents[3] / "recordings"

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scm.mismatch.drive import Drive
 from scm.mismatch.experiment.changed import ramp_and_mass
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES
 from scm.mismatch.experiment.pace import Floor, pace_of
@@ -18,6 +17,7 @@ from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates, terms_needed
 from scm.play import read_drive
 from scm.recording.read import Channel, Recording
+from scm.replay.drive import Drive
 from scm.vehicles.car import load_car
 
 FLOOR = Floor((0.0, 3.0), (0.0, 2.0))

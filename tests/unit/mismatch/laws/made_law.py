@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 
-from scm.mismatch.drive import Drive
 from scm.mismatch.fit import Fitted, Fitter
 from scm.mismatch.law_rivals import Standing, standing
 from scm.mismatch.laws.decide import Lawful
@@ -16,6 +15,7 @@ from scm.mismatch.laws.sensed import Sensing, sensor_laws
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
 from scm.mismatch.search import Search
+from scm.replay.drive import Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
 GUST = (0.8, 0.9, 4.0, 0.5)

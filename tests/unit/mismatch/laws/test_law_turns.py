@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 
-from scm.mismatch.drive import Drive
 from scm.mismatch.fit import Fitter
 from scm.mismatch.laws.curves import law_curves
 from scm.mismatch.laws.learned import RIPPLE
@@ -12,6 +11,7 @@ from scm.mismatch.laws.seek import seek
 from scm.mismatch.laws.turns import WAVES, by_turn, ripples
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.rollouts import Rollouts
+from scm.replay.drive import Drive
 from scm.vehicles.jit import plain
 from tests.unit.mismatch.laws import made_law
 

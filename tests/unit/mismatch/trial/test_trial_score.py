@@ -5,15 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from scm.mismatch.findings import (
-    DataProblem,
-    Diagnosis,
-    Effect,
-    Equation,
-    Estimate,
-    Undecided,
-    Verdict,
-)
+from scm.data_quality.problem import DataProblem
+from scm.mismatch.findings import Diagnosis, Effect, Equation, Estimate, Undecided, Verdict
 from scm.mismatch.trial.again import Ratio
 from scm.mismatch.trial.labels import label_of
 from scm.mismatch.trial.score import failed, score

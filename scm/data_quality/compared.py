@@ -1,0 +1,105 @@
+"""Every pair of sensors that knows the same motion, compared, and what that makes suspicious."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scm.data_quality import suspect
+from scm.data_quality.gross import Sensed, compare
+from scm.data_quality.mend import GYROS
+from scm.data_quality.problem import DataProblem
+from scm.data_quality.pushing import push_of
+from scm.data_quality.sideways import sideways_of
+from scm.data_quality.suspicion import Relation, Suspicion
+from scm.data_quality.track import FEWEST, Series, Track, series
+from scm.data_quality.travel import travel_against
+from scm.data_quality.turning import yaw_against
+from scm.data_quality.way import Way
+from scm.recording.read import Recording
+from scm.vehicles.car import Car
+
+NO_WITNESS = ("derived", "copied", "unrelated")
+AROUND_S = 0.1
+
+
+def compare_all(
+    recording: Recording,
+    car: Car | None,
+    poses: Track,
+    found: Sequence[Way],
+    problems: Sequence[DataProblem],
+) -> tuple[list[Relation], list[Suspicion]]:
+    """Return all relations, and the faults that would explain those that are off.
+
+    Args:
+        recording: Repaired.
+        car: Says how long the car is.
+        poses: Of the recording.
+        found: Sensors of distance.
+        problems: Found so far: copies are no witnesses, and frozen spans witness nothing.
+    """
+    not_own = no_witnesses(problems)
+    wheelbase = car.value("body.wheelbase_m") if car else suspect.DEFAULT_WHEELBASE_M
+    timed: list[Relation] = []
+    suspicions: list[Suspicion] = []
+    for name in GYROS:
+        gyro = (
+            None if name in not_own else _turned(recording, _moving(poses, problems, (name,)), name)
+        )
+        if gyro is not None:
+            timed.append(gyro)
+            suspicions += suspect.from_gyro(gyro)
+    late = _late(timed[0]) if timed else (0.0, 0.0)
+    push = push_of(recording, poses, late)
+    for way in found:
+        rows = _moving(poses, problems, way.channels)
+        travel = travel_against(rows, way.distance, way.name, late)
+        if travel is not None:
+            timed.append(travel)
+            suspicions += suspect.from_travel(travel, way, wheelbase, push)
+    suspicions += suspect.from_clocks(timed)
+    relations = list(timed)
+    sideways = None if found else sideways_of(poses)
+    if sideways is not None:
+        relations.append(sideways)
+        suspicions += suspect.from_sideways(sideways, wheelbase)
+    if push is not None:
+        relations.append(push)
+        turned = [s.values["offset"] for s in suspicions if s.name == "pose_heading"]
+        suspicions += suspect.from_push(push, turned[0] if turned else 0.0)
+    return relations, suspicions
+
+
+def no_witnesses(problems: Sequence[DataProblem]) -> set[str]:
+    """Return channels that copy another or belong to another drive."""
+    return {problem.channel for problem in problems if problem.name in NO_WITNESS}
+
+
+def _moving(poses: Track, problems: Sequence[DataProblem], channels: tuple[str, ...]) -> Track:
+    """Return the poses while none of these channels, nor the pose itself, was frozen."""
+    keep = np.ones(len(poses.t), dtype=np.bool_)
+    for problem in problems:
+        concerned = problem.channel in channels or problem.channel.startswith("pose.")
+        if problem.name == "frozen" and concerned:
+            for start, end in problem.when_s or ():
+                keep &= (poses.t < start - AROUND_S) | (poses.t > end + AROUND_S)
+    return poses.cut(keep) if keep.sum() >= FEWEST else poses
+
+
+def _turned(recording: Recording, poses: Track, name: str) -> Relation | None:
+    gyro = series(recording, name)
+    if gyro is None:
+        return None
+    turn = Sensed(("pose.yaw",), "angular speed", Series(poses.t, poses.yaw), 1)
+    pair = compare(turn, Sensed((name,), "angular speed", gyro))
+    if pair is None or not pair.alike:
+        return None
+    start = (pair.lag.delay_s + pair.shift_s, pair.lag.rate)
+    return yaw_against(poses, gyro.integral(), name, start)
+
+
+def _late(found: Relation) -> tuple[float, float]:
+    """Return delay and rate to start the other comparisons from."""
+    rate = found.numbers.get("rate")
+    certain = rate is not None and abs(rate.value) > 3.0 * rate.std
+    return found.numbers["delay"].value, rate.value if rate is not None and certain else 0.0

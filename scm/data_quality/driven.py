@@ -1,0 +1,235 @@
+"""What drove the car: commands that are missing, constant, out of range, or of another drive."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.data_quality.problem import DataProblem
+from scm.data_quality.track import Grid, Series, Track, clean, grid, held
+from scm.recording.read import Recording
+from scm.vehicles.car import Car
+
+LARGEST_COMMAND = 1.05
+LARGEST_ANGLE = 1.2
+EXCITED = 0.02
+WIDTH_S = 0.3
+STEP_S = 0.05
+LATEST_S = 1.5
+RELATED = 0.35
+HARDLY = 0.2  # a driver who holds the speed against slopes and turns undoes most of it
+VARIED = 0.5  # a speed held steady by its driver says nothing about the throttle
+CLEARLY, CLOSELY = 0.8, 0.6
+QUICK_S, APART_S = 4.0, 3.0
+LONGEST_S, SHORT_S, SHORTEST_S = 20.0, 8.0, 5.0
+RELATED_SHORT = 0.6  # a few seconds of two drives are alike by chance more often
+WHEELBASE_M, TURNED_RAD, STARTS = 0.25, 0.25, 3
+DRIVE = ("command.throttle", "command.speed", "motor.current")
+RECORD = "Record what is sent to the car, throttle and steering, with the stamps of sending."
+
+
+def command_problems(
+    recording: Recording, movement: Series | None, poses: Track | None, car: Car | None = None
+) -> Iterator[DataProblem]:
+    """Yield what is wrong with the commands and with what they do.
+
+    Args:
+        recording: Repaired.
+        movement: As the poses show it; None where the car stands or nothing shows it.
+        poses: Likewise.
+        car: Says how long it is.
+    """
+    yield from _missing(recording)
+    for name in ("command.throttle", "command.steering", "command.speed"):
+        if name in recording.channels and len(clean(recording.channels[name]).t):
+            channel = clean(recording.channels[name])
+            yield from _range(recording, name, channel)
+            yield from _constant(name, channel)
+    if movement is not None and poses is not None:
+        yield from _without_effect(recording, movement, poses)
+        yield from _unmoved(recording, movement, poses, car)
+
+
+def _missing(recording: Recording) -> Iterator[DataProblem]:
+    have = {name for name, channel in recording.channels.items() if len(clean(channel).t) > 1}
+    if not any(name in have for name in DRIVE):
+        yield DataProblem(
+            channel="command.throttle",
+            name="missing",
+            said="Nothing says what drove the car, so no simulator can drive it again: neither its "
+            "drive nor its tyres can be judged.",
+            record_instead=RECORD,
+        )
+    elif "command.throttle" not in have:
+        yield DataProblem(
+            channel="command.throttle",
+            name="missing",
+            said="There is no throttle command; only a car whose file has a speed control can be "
+            "driven again without one.",
+            record_instead=RECORD,
+        )
+    if "command.steering" not in have:
+        yield DataProblem(
+            channel="command.steering",
+            name="missing",
+            said="There is no steering command, so no simulator can drive the same way again.",
+            record_instead=RECORD,
+        )
+    missing = [name for name in ("pose.x", "pose.y", "pose.yaw") if name not in have]
+    if missing:
+        yield DataProblem(
+            channel=", ".join(missing) if len(missing) < 3 else "pose.*",
+            name="missing",
+            said="Without a whole pose there is no measure of where the car went, and nothing that "
+            "another sensor could be held against.",
+            record_instead="Record x, y and yaw of the car by camera, motion capture or satellite.",
+        )
+
+
+def _range(recording: Recording, name: str, channel: Series) -> Iterator[DataProblem]:
+    angle = recording.channels[name].dimension == "angle"
+    limit = LARGEST_ANGLE if angle else LARGEST_COMMAND
+    largest = float(np.abs(channel.values).max())
+    if name == "command.speed" or largest <= limit:
+        return
+    beyond = float((np.abs(channel.values) > limit).mean())
+    yield DataProblem(
+        channel=name,
+        name="range",
+        said=f"Reaches {largest:.3g}; {100.0 * beyond:.1f} % of the rows are beyond {limit:g}.",
+        record_instead="Record the command that the car obeys, after its limits.",
+    )
+
+
+def _constant(name: str, channel: Series) -> Iterator[DataProblem]:
+    if not _excited(channel):
+        other = "steering" if name.endswith("steering") else "drive"
+        yield DataProblem(
+            channel=name,
+            name="constant",
+            said=f"Stays at {float(np.median(channel.values)):.3g}: delays, lags and play of the "
+            f"{other} cannot show, only its steady state.",
+            record_instead="Drive with steps and sines of this command.",
+        )
+
+
+def _without_effect(recording: Recording, movement: Series, poses: Track) -> Iterator[DataProblem]:
+    """Yield commands whose motion never follows them: those of another drive, or another clock."""
+    yaw = Series(poses.t, poses.yaw)
+    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S)
+    if len(on.t) < SHORT_S / STEP_S:
+        return
+    short = len(on.t) < LONGEST_S / STEP_S
+    related = RELATED_SHORT if short else RELATED
+    speed, rate = on.smooth(movement), on.smooth(yaw, 1)
+    steering, throttle = (_command(recording, n) for n in ("command.steering", "command.throttle"))
+    if steering is not None:
+        asked = on.smooth_even(held(steering, on.t) * speed)
+        if not _follows(rate, asked, on, related):
+            yield _unrelated("command.steering", "The car's turning does not follow its steering")
+    if throttle is not None and _varied(speed) and not short:
+        asked = on.smooth_even(held(throttle, on.t))
+        lagged = _lagged(asked, 0.5, STEP_S)
+        slope = on.smooth_even(speed, 1)
+        answers = ((speed, lagged), (slope, asked), (speed, asked))
+        if not any(_belongs(motion, signal, on) for motion, signal in answers):
+            yield _unrelated("command.throttle", "The car's speed does not follow its throttle")
+
+
+def _unmoved(
+    recording: Recording, movement: Series, poses: Track, car: Car | None
+) -> Iterator[DataProblem]:
+    """Yield commands that stay as they are while the car does what they would have to ask for."""
+    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S)
+    if len(on.t) < SHORTEST_S / STEP_S:
+        return
+    speed, rate = on.smooth(movement), on.smooth(Series(poses.t, poses.yaw), 1)
+    fast = float(np.percentile(np.abs(speed), 90))
+    going = np.abs(speed) > 0.3 * fast
+    length = car.value("body.wheelbase_m") if car else WHEELBASE_M
+    right, left = np.percentile(np.arctan(length * rate[going] / speed[going]), (5, 95))
+    if _stays(recording, "command.steering") and left - right > TURNED_RAD:
+        said = f"The steering stays as it is, and the wheels turned by {left - right:.2f} rad"
+        yield _unrelated("command.steering", said)
+    slow_or_fast = np.where(speed > 0.8 * fast, 1, np.where(speed < 0.2 * fast, -1, 0))
+    starts = int((np.diff(slow_or_fast[slow_or_fast != 0]) > 0).sum())
+    if _stays(recording, "command.throttle") and starts >= STARTS:
+        said = f"The throttle stays as it is, and the car started {starts} times"
+        yield _unrelated("command.throttle", said)
+
+
+def _stays(recording: Recording, name: str) -> bool:
+    channel = clean(recording.channels[name]) if name in recording.channels else None
+    return channel is not None and len(channel.t) > 1 and not _excited(channel)
+
+
+def _excited(channel: Series) -> bool:
+    reach = float(np.percentile(channel.values, 99) - np.percentile(channel.values, 1))
+    return reach >= EXCITED * max(0.1, float(np.abs(channel.values).max()))
+
+
+def _varied(speed: Floats) -> bool:
+    low, middle, high = np.percentile(np.abs(speed), (10, 50, 90))
+    return bool(high - low > VARIED * middle)
+
+
+def _command(recording: Recording, name: str) -> Series | None:
+    if name not in recording.channels:
+        return None
+    channel = clean(recording.channels[name])
+    varied = len(channel.t) > 20 and np.ptp(channel.values) > EXCITED
+    return channel if varied else None
+
+
+def _lagged(values: Floats, time_s: float, step_s: float) -> Floats:
+    """Return values behind a first-order lag."""
+    kernel = np.exp(-np.arange(0.0, 6.0 * time_s, step_s) / time_s)
+    padded = np.concatenate((np.full(len(kernel) - 1, values[0]), values))
+    return np.convolve(padded, kernel / kernel.sum(), mode="valid")
+
+
+def _follows(motion: Floats, asked: Floats, on: Grid, related: float) -> bool:
+    """Say whether the motion follows within a second or two, better than at any other delay."""
+    if motion.std() < 1e-6 or asked.std() < 1e-6:
+        return True
+    near = best_alike(motion, asked, on, LATEST_S)
+    return near > related
+
+
+def _belongs(motion: Floats, asked: Floats, on: Grid) -> bool:
+    """Say whether the motion follows clearly, or hardly and its quick changes better than others.
+
+    Two drives of one car, on like routes, are alike in what is slow.
+    """
+    if min(motion.std(), asked.std()) < 1e-6 or _follows(motion, asked, on, CLEARLY):
+        return True
+    if not _follows(motion, asked, on, HARDLY):
+        return False
+    motion, asked = (_quick(values, on.step_s) for values in (motion, asked))
+    near, apart = best_alike(motion, asked, on, LATEST_S), round(APART_S / on.step_s)
+    others = range(apart, len(asked) - apart, 4)
+    far = [abs(float(np.corrcoef(motion, np.roll(asked, d))[0, 1])) for d in others]
+    return near > CLOSELY or near > max(far, default=0.0)
+
+
+def _quick(values: Floats, step_s: float) -> Floats:
+    """Return values without what changes slower than `QUICK_S`."""
+    width = 2 * round(0.5 * QUICK_S / step_s) + 1
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.asarray(values - np.convolve(padded, np.full(width, 1.0 / width), mode="valid"))
+
+
+def best_alike(motion: Floats, asked: Floats, on: Grid, latest_s: float) -> float:
+    """Return the best correlation with delays of 0 to `latest_s`."""
+    delays = range(0, round(latest_s / on.step_s) + 1, 2)
+    return max(abs(float(np.corrcoef(motion[d:], asked[: len(asked) - d])[0, 1])) for d in delays)
+
+
+def _unrelated(name: str, said: str) -> DataProblem:
+    return DataProblem(
+        channel=name,
+        name="without_effect",
+        said=f"{said}: these commands belong to another drive, another car or another clock. No "
+        "effect of this command can be concluded.",
+        record_instead=RECORD,
+    )

@@ -1,0 +1,181 @@
+"""Faults so gross that nothing else can be measured beside them: units, signs, clocks far apart.
+
+Each is told by two signals of the same motion: how much alike they are, how large one is against
+the other, and how late. What is found can be undone; see `corrected.py`.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.data_quality.clocks import STEP_S, WIDTH_S, Lag, lag_between
+from scm.data_quality.track import Series, Track, grid
+from scm.recording.units import G
+
+DEGREES = math.degrees(1.0)
+FACTORS: Mapping[str, Mapping[float, str]] = {
+    "angular speed": {
+        DEGREES: "deg/s", 1.0 / DEGREES: "rad/s labelled deg/s", 1e3: "mrad/s",
+        60.0 / math.tau: "rpm", math.tau / 60.0: "rad/s labelled rpm",
+    },
+    "speed": {
+        3.6: "km/h", 1.0 / 3.6: "m/s labelled km/h", 1e3: "mm/s", 1e-3: "m/s labelled mm/s",
+        1e2: "cm/s", 1e-2: "m/s labelled cm/s", 1.0 / 0.44704: "mph", 0.44704: "m/s labelled mph",
+        2.0: "twice the counts a turn", 4.0: "four times the counts a turn",
+        0.5: "half the counts a turn", 0.25: "a quarter of the counts a turn",
+    },
+    "acceleration": {
+        1.0 / G: "g", G: "m/s^2 labelled g", 1e3 / G: "mg", 1e3: "mm/s^2",
+        1e-3: "m/s^2 labelled mm/s^2",
+    },
+}  # fmt: skip
+NEAR = 0.08
+ALIKE = 0.6
+LEVEL, BETTER = 0.95, 0.05  # wheels that spin follow the car that badly
+UNLIKE = 0.35
+FAR_S = 0.2
+LARGEST_UNKNOWN = 50.0  # a factor that is no unit's
+SMALLEST_SIZE, LARGEST_SIZE = 0.6, 1.0 / 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Two signals of one motion, compared.
+
+    Attributes:
+        first, second: Their channels; the first is the pose's wherever it takes part.
+        what: `angular speed`, `speed`, `acceleration`.
+        lag: Of the first behind the second, its size over the second's.
+        shift_s: Added to the second's stamps so that both could be laid side by side at all.
+    """
+
+    first: tuple[str, ...]
+    second: tuple[str, ...]
+    what: str
+    lag: Lag
+    shift_s: float = 0.0
+
+    @property
+    def alike(self) -> bool:
+        """Say whether both show the same motion."""
+        return abs(self.lag.alike) > ALIKE
+
+    @property
+    def factor(self) -> float:
+        """By how much the second is too large, signed; 1 where a mere scale fault explains it."""
+        size = 1.0 / self.lag.size if self.lag.size else 1.0
+        if SMALLEST_SIZE < size < LARGEST_SIZE:
+            return 1.0
+        found = nearest_factor(size, self.what)
+        believable = (
+            unit_of(found, self.what) or 1.0 / LARGEST_UNKNOWN < abs(size) < LARGEST_UNKNOWN
+        )
+        return found if believable else math.copysign(1.0, size)
+
+    @property
+    def far_s(self) -> float:
+        """How far the first's clock is ahead [s]; 0 where a latency, or slip, may explain it."""
+        least, gain = (LEVEL, BETTER) if self.what == "speed" else (ALIKE, 0.0)
+        certain = self.lag.sure and abs(self.lag.alike) >= least
+        if not self.shift_s and not (certain and self.lag.gain > gain):
+            return 0.0
+        total = self.lag.delay_s + self.shift_s
+        return total if abs(total) > FAR_S else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sensed:
+    """One signal of the car's motion: its channels, and what it shows."""
+
+    channels: tuple[str, ...]
+    what: str
+    signal: Series
+    order: int = field(default=0)
+
+
+def compare(first: Sensed, second: Sensed) -> Pair | None:
+    """Hold two signals of one motion against each other; None where either hardly moves."""
+    a, b, shift = first.signal, second.signal, 0.0
+    overlap = min(a.t[-1], b.t[-1]) - max(a.t[0], b.t[0])
+    if overlap < 0.5 * min(np.ptp(a.t), np.ptp(b.t)):
+        shift = float(a.t[0] - b.t[0])
+        b = Series(b.t + shift, b.values)
+        overlap = min(a.t[-1], b.t[-1]) - max(a.t[0], b.t[0])
+    if overlap < 4.0:
+        return None
+    start = max(a.t[0], b.t[0])
+    step = max(STEP_S, overlap / 20000.0)
+    on = grid(start, start + overlap, step, max(WIDTH_S, 2.0 * step))
+    left, right = on.smooth(a, first.order), on.smooth(b, second.order)
+    if left.std() < 1e-9 or right.std() < 1e-9:
+        return None
+    lag = lag_between(left, right, on)
+    return Pair(first.channels, second.channels, first.what, lag, shift)
+
+
+def nearest_factor(size: float, what: str) -> float:
+    """Return the unit's factor that explains a size, or the size itself where none does."""
+    known = (1.0, *FACTORS[what])
+    best = min(known, key=lambda f: abs(math.log(abs(size) / f)))
+    exact = best if abs(math.log(abs(size) / best)) < NEAR else abs(size)
+    return math.copysign(exact, size)
+
+
+def unit_of(factor: float, what: str) -> str:
+    """Return what a factor means, such as `deg/s`; empty where it is no unit's."""
+    return FACTORS[what].get(abs(factor), "")
+
+
+def heading_fault(poses: Track, raw: Floats) -> float:
+    """Return the factor by which a pose's yaw is wrong against its own direction of travel.
+
+    57.3 where degrees were taken for radians, -1 where it turns the other way, 1 where it is right
+    or cannot be told.
+
+    Args:
+        poses: With positions that can be trusted.
+        raw: Yaw as it was recorded, at the poses' stamps.
+    """
+    on = grid(
+        poses.t[0], poses.t[-1], max(STEP_S, 0.5 * poses.period_s), max(0.1, 1.5 * poses.period_s)
+    )
+    vx, vy = (on.smooth(Series(poses.t, v), 1) for v in (poses.x, poses.y))
+    at = np.clip(
+        np.rint(np.interp(poses.t, on.t, np.arange(len(on.t)))).astype(int), 0, len(on.t) - 1
+    )
+    vx, vy = vx[at], vy[at]
+    weight = np.hypot(vx, vy)
+    travel = np.arctan2(vy, vx)
+    if abs(np.sum(weight * np.exp(2j * travel))) > 0.9 * weight.sum():
+        return 1.0
+    fits = {
+        factor: abs(np.sum(weight * np.exp(2j * (travel - raw / factor)))) / (weight.sum() + 1e-12)
+        for factor in (1.0, -1.0, DEGREES, -DEGREES, 1.0 / DEGREES)
+    }
+    best = max(fits, key=lambda factor: fits[factor])
+    return best if fits[best] > 0.85 and fits[1.0] < 0.6 else 1.0
+
+
+def time_factors(
+    spans: Mapping[tuple[str, ...], tuple[float, float]],
+) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Yield tables whose stamps are in another unit than the others', and the factor to undo it.
+
+    Args:
+        spans: By channels of a table, how long it lasts and its median step.
+    """
+    middle = float(np.median([span for span, _ in spans.values()]))
+    for names, (span, step) in spans.items():
+        if span <= 0.0:
+            continue
+        for factor in (1e-3, 1e-6, 1e-9, 1e3, 1e6):
+            others = len(spans) > 1 and abs(math.log(span * factor / middle)) < 0.1
+            alone = (
+                factor < 1.0 and 1e-3 < step * factor < 0.3 and step > 0.9 and middle * factor > 1.0
+            )
+            if others or (alone and all(s > 0.9 for _, s in spans.values())):
+                yield names, factor
+                break

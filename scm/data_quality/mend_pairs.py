@@ -1,0 +1,224 @@
+"""Units, signs and clocks that two sensors disagree about, repaired where one can be blamed."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from scm.data_quality import gross
+from scm.data_quality.corrected import forward_speed
+from scm.data_quality.gross import Pair, Sensed, compare
+from scm.data_quality.mend import DESCRIBE, GYROS, Mending
+from scm.data_quality.other_car import top_speed
+from scm.data_quality.problem import DataProblem
+from scm.data_quality.pushing import push_of
+from scm.data_quality.rows import called, tables
+from scm.data_quality.suspicion import Repair
+from scm.data_quality.track import Series, series
+from scm.data_quality.travel import travel_against
+from scm.data_quality.turning import yaw_against
+from scm.data_quality.way import ways
+from scm.recording.read import Recording
+from scm.vehicles.car import Car
+
+POSE = ("pose.x", "pose.y", "pose.yaw")
+LENGTHS = (1e-3, 1e-2, 1e2, 1e3)
+CERTAIN, LARGEST_LEAK = 12.0, 3.0
+BELIEVABLE = (0.03, 1.4)  # of the car's top speed
+
+
+def mend_pairs(now: Mending, car: Car | None) -> Iterator[DataProblem]:
+    """Repair lengths, directions, units, signs and clocks, in this order."""
+    pairs = _pairs(now, car)
+    for step in (_lengths, _backwards, _sizes):
+        repaired = len(now.repairs)
+        yield from step(now, car, pairs)
+        if len(now.repairs) > repaired:
+            pairs = _pairs(now, car)
+    yield from _offsets(now, car, [pair for pair in pairs if pair.alike])
+    yield from _accelerometer(now)
+
+
+def _pairs(now: Mending, car: Car | None) -> list[Pair]:
+    """Return the pose's turning and speed, each against every sensor that knows it."""
+    poses = now.poses
+    movement = forward_speed(poses)
+    if poses is None or movement is None:
+        return []
+    turn = Sensed(POSE, "angular speed", Series(poses.t, poses.yaw), 1)
+    go = Sensed(POSE, "speed", movement)
+    found = [(turn, Sensed((name,), "angular speed", signal))
+             for name in GYROS if (signal := series(now.recording, name)) is not None]  # fmt: skip
+    found += [(go, Sensed(w.channels, "speed", w.distance, 1)) for w in ways(now.recording, car)]
+    pairs = (compare(first, second) for first, second in found)
+    return [pair for pair in pairs if pair is not None]
+
+
+def _lengths(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
+    """Blame the pose's metre where accelerometer or top speed say so, not only one way."""
+    going = [p for p in pairs if p.what == "speed" and p.alike]
+    movement, poses = forward_speed(now.poses), now.poses
+    if not going or movement is None or poses is None:
+        return
+    factor = float(np.median([abs(pair.factor) for pair in going]))
+    length = next((f for f in LENGTHS if abs(math.log(factor / f)) < 0.2), None)
+    if length is None or any(abs(math.log(abs(p.factor) / length)) > 0.2 for p in going):
+        return
+    push = push_of(now.recording, poses)
+    known = [abs(push.numbers[n].value) for n in ("along", "across")] if push else []
+    shared = any(abs(math.log(value / length)) < 0.4 for value in known)
+    top = top_speed(car) if car else None
+    fast = float(np.percentile(np.abs(movement.values), 98))
+    if not (shared or _only_then(top, fast, length)):
+        return
+    now.repair(Repair(channels=("pose.x", "pose.y"), factor=length))
+    yield DataProblem(
+        channel="pose.x, pose.y",
+        name="unit",
+        said=f"The pose moves {1.0 / length:g} times as far as every other sensor says.",
+        corrected=f"Multiplied by {length:g}.",
+        record_instead=DESCRIBE,
+    )
+
+
+def _only_then(top: float | None, fast: float, factor: float) -> bool:
+    """Say whether a speed is believable times the factor, and is not without."""
+    if top is None:
+        return False
+    low, high = BELIEVABLE[0] * top, BELIEVABLE[1] * top
+    return not low < fast < high and low < fast * factor < high
+
+
+def _backwards(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
+    """Turn a heading round that points to the back of the car."""
+    poses, movement = now.poses, forward_speed(now.poses)
+    going = [p for p in pairs if p.what == "speed" and p.alike]
+    if poses is None or movement is None or any(p.factor > 0.0 for p in going):
+        return
+    push = push_of(now.recording, poses)
+    known = [push.numbers[name] for name in ("along", "across")] if push else []
+    against = [m for m in known if m.value < -4.0 * m.std]
+    asked = series(now.recording, "command.throttle")
+    throttle = 0.0 if asked is None else float(np.mean(asked.at(movement.t) * movement.values))
+    sizes = float(np.mean(np.abs(movement.values))) * (
+        1e-9 if asked is None else float(np.mean(np.abs(asked.values)))
+    )
+    driven_back = throttle < -0.3 * sizes
+    if not (driven_back and (going or len(against) == 2)) and not (going and len(against) == 2):
+        return
+    now.repair(Repair(channels=("pose.yaw",), offset=math.pi))
+    yield DataProblem(
+        channel="pose.yaw",
+        name="sign",
+        said="The heading points to the back of the car: it drives backwards all the time.",
+        corrected="Half a turn added.",
+        record_instead="Fix the marker with its x axis ahead.",
+    )
+
+
+def _sizes(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
+    """Blame the other sensor of each pair for its unit and sign."""
+    del car
+    for pair in pairs:
+        yield from _size(now, pair)
+
+
+def _size(now: Mending, pair: Pair) -> Iterator[DataProblem]:
+    at = called(pair.second)
+    if not pair.alike:
+        if abs(pair.lag.alike) < gross.UNLIKE:
+            yield DataProblem(
+                channel=at,
+                name="unrelated",
+                said=f"Does not follow the pose's {pair.what}: correlation {pair.lag.alike:.2f}.",
+                record_instead="Check that all channels are of one drive.",
+            )
+        return
+    if pair.factor != 1.0:
+        yield _divided(now, pair.second, pair.factor, pair.what)
+
+
+def _divided(now: Mending, channels: tuple[str, ...], factor: float, what: str) -> DataProblem:
+    """Repair channels by a factor and say so."""
+    now.repair(Repair(channels=channels, factor=1.0 / factor))
+    unit = gross.unit_of(factor, what)
+    said = "Its sign is turned" if factor == -1.0 else f"Shows {factor:.4g} times the pose's {what}"
+    return DataProblem(
+        channel=called(channels),
+        name="sign" if factor == -1.0 else "unit",
+        said=said + (f": it looks like {unit}." if unit else "."),
+        corrected=f"Divided by {factor:.4g}.",
+        record_instead=DESCRIBE,
+    )
+
+
+def _offsets(now: Mending, car: Car | None, pairs: list[Pair]) -> Iterator[DataProblem]:
+    """Bring clocks together that are far apart: the pose's where all say so, else the odd one's."""
+    far = [pair for pair in pairs if pair.far_s]
+    if not far:
+        return
+    spread = max(p.far_s for p in far) - min(p.far_s for p in far)
+    moves: list[tuple[tuple[str, ...], float]]
+    if len(far) == len(pairs) and spread < gross.FAR_S:
+        names = tuple(n for n in now.recording.channels if n.startswith("pose."))
+        best = min(far, key=lambda p: p.what)  # heading tells a clock better than speed
+        moves = [(names, -_refined(now, best, car))]
+    else:
+        moves = [
+            (_clocked_with(now.recording, pair.second), _refined(now, pair, car)) for pair in far
+        ]
+    done: set[str] = set()
+    for names, shift in moves:
+        fresh = tuple(name for name in names if name not in done)
+        done.update(fresh)
+        if not fresh:
+            continue
+        now.repair(Repair(channels=fresh, shift_s=shift))
+        yield DataProblem(
+            channel=called(fresh),
+            name="clock",
+            said=f"Stamped {abs(shift):.3f} s {'later' if shift < 0.0 else 'earlier'} than the "
+            "other sensors stamp the same moment.",
+            corrected=f"Stamps moved by {shift:+.3f} s.",
+            record_instead="Stamp all sensors with one clock, or with clocks kept together.",
+        )
+
+
+def _refined(now: Mending, pair: Pair, car: Car | None) -> float:
+    """Return how far the pose's clock is ahead, from the heading where a gyro takes part [s]."""
+    poses = now.poses
+    found = None
+    if poses is not None and pair.what == "angular speed":
+        signal = series(now.recording, pair.second[0])
+        if signal is not None:
+            moved = Series(signal.t + pair.far_s, signal.values).integral()
+            found = yaw_against(poses, moved, pair.second[0], (0.0, pair.lag.rate))
+    elif poses is not None:
+        way = next(way for way in ways(now.recording, car) if way.channels == pair.second)
+        moved = Series(way.distance.t + pair.far_s, way.distance.values)
+        found = travel_against(poses, moved, way.name, (0.0, pair.lag.rate))
+    left = found.numbers["delay"].value if found else 0.0
+    return pair.far_s + (left if abs(left) < 0.5 * gross.FAR_S else 0.0)
+
+
+def _clocked_with(recording: Recording, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the channels on the clock of these: their table's, unless it holds more than them."""
+    table = next(t for t in tables(recording) if names[0] in t)
+    shared = any(name.startswith(("pose.", "command.")) for name in table)
+    return names if shared else tuple(dict.fromkeys((*names, *table)))
+
+
+def _accelerometer(now: Mending) -> Iterator[DataProblem]:
+    poses = now.poses
+    found = None if poses is None else push_of(now.recording, poses)
+    if found is None:
+        return
+    factors: dict[float, list[str]] = {}
+    for axis, name in (("x", "along"), ("y", "across")):
+        scale = found.numbers[name]
+        if abs(scale.value) > CERTAIN * scale.std and scale.leak < LARGEST_LEAK:
+            near = gross.nearest_factor(scale.value, "acceleration")
+            if near == -1.0 or gross.unit_of(near, "acceleration"):
+                factors.setdefault(near, []).append(f"imu.accel_{axis}")
+    for factor, names in factors.items():
+        yield _divided(now, tuple(names), factor, "acceleration")

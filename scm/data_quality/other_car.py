@@ -1,0 +1,182 @@
+"""Whether a recording can be of the car whose file was given: speed, turning circle, wheels."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.data_quality.conclusion import ANOTHER
+from scm.data_quality.problem import DataProblem
+from scm.data_quality.steered import STEP_S, WIDTH_S, steered
+from scm.data_quality.suspicion import Relation
+from scm.data_quality.track import Series, Track, clean, grid, held
+from scm.geometry import Pose2
+from scm.recording.read import Recording
+from scm.vehicles.car import Car
+from scm.vehicles.fleet import Fleet
+
+TOO_FAST = 1.4
+TOO_SLOW = 0.3
+TURNS = (0.55, 1.8)
+IMPOSSIBLE = (0.15, 4.0)  # in between, play, slow servos and weak steering may be to blame alone
+# No play, and no give of a steering, is so wide [rad]; a floor that is slippery follows worse.
+DOUBTFUL, MORE_THAN_PLAY, CLOSELY = (0.53, 1.9), 0.1, 0.9
+ROLLS = (0.7, 1.4)
+FOLLOWS = 0.7
+THROTTLES: Floats = np.linspace(0.0, 1.0, 11)
+STEERINGS: Floats = np.linspace(-1.0, 1.0, 21)
+SETTLED_S, STEERED_S = 8.0, 3.0
+UNSURE_THROTTLE = 0.1
+LEAST_ASKED = 0.05  # of the top speed
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Which speed throttles ask for in the end.
+
+    Attributes:
+        throttle: Rising, (n,); `speed`: reached with each [m/s].
+    """
+
+    throttle: Floats
+    speed: Floats
+
+    @property
+    def bent(self) -> bool:
+        """Say whether a little throttle may mean a lot of speed, or none."""
+        return len(self.throttle) > 2
+
+    @property
+    def top(self) -> float:
+        """With all of it [m/s]."""
+        return float(self.speed[-1])
+
+    def at(self, throttle: Floats) -> Floats:
+        """Return the speeds of throttles of any sign, as sizes [m/s]."""
+        return np.interp(np.abs(throttle), self.throttle, self.speed)
+
+
+def other_car(
+    recording: Recording, car: Car, movement: Series, poses: Track, relations: Iterable[Relation]
+) -> Iterator[DataProblem]:
+    """Yield the problem that the car file is another car's, with all that says so."""
+    reasons = [_speed(recording, car, movement), *(_wheels(relation) for relation in relations)]
+    reasons = [reason for reason in reasons if reason]
+    gain, lost_rad = _turning(recording, car, movement, poses)
+    wide = lost_rad > MORE_THAN_PLAY and gain is not None and not DOUBTFUL[0] < gain < DOUBTFUL[1]
+    length = car.value("body.wheelbase_m")
+    if gain is not None and (reasons or not IMPOSSIBLE[0] < gain < IMPOSSIBLE[1] or wide):
+        reasons.append(
+            f"it turns {gain:.2f} times as tightly as it is steered, as a wheelbase of "
+            f"{length / gain:.2f} m would instead of {length:.2f} m"
+        )
+    if reasons:
+        yield DataProblem(
+            channel="*",
+            name="other_car",
+            said=f"The car file {car.name!r} does not fit this recording: {'; '.join(reasons)}. "
+            "Effects found with it would make up for the wrong car.",
+            record_instead=ANOTHER,
+        )
+
+
+def top_speed(car: Car) -> float | None:
+    """Return the speed at full throttle without any loss [m/s]."""
+    keys = ("drive.no_load_speed_rad_s", "wheel.radius_m")
+    return car.value(keys[0]) * car.value(keys[1]) if all(car.has(k) for k in keys) else None
+
+
+def steady_speed(car: Car) -> Asked | None:
+    """Return the speed that throttles lead to on a level floor, without loss if the file says so.
+
+    None where a car is not driven by its throttle.
+    """
+    if any(term.name == "speed_control" for term in car.terms):
+        return None
+    top = top_speed(car)
+    if top is not None:
+        return Asked(np.array([0.0, 1.0]), np.array([0.0, top]))
+    fleet = Fleet(car, len(THROTTLES))
+    for _ in THROTTLES:
+        fleet.add(Pose2(0.0, 0.0, 0.0))
+    throttle = np.tile(THROTTLES, (round(SETTLED_S / STEP_S), 1))
+    reached = fleet.rollout(throttle, np.zeros_like(throttle), STEP_S, ("speed",))["speed"][-1]
+    return Asked(THROTTLES, np.maximum.accumulate(reached))
+
+
+def _speed(recording: Recording, car: Car, movement: Series) -> str:
+    asked = steady_speed(car)
+    if asked is None:
+        return ""
+    top = asked.top
+    fast = float(np.percentile(np.abs(movement.values), 98))
+    if fast > TOO_FAST * top:
+        metres = ", or its positions are not in metres" if fast > 20.0 * top else ""
+        return f"it drives {fast:.2f} m/s, the car file's car at most {top:.2f} m/s{metres}"
+    share = _share_of_asked(recording, movement, asked)
+    if share is None or share > TOO_SLOW:
+        return ""
+    return f"it drives {100.0 * share:.0f} % of the speed that the throttle asks of the file's car"
+
+
+def _share_of_asked(recording: Recording, movement: Series, wanted: Asked) -> float | None:
+    """Return steady speed over the one that the throttle asks for; None where nothing is steady."""
+    throttle = recording.channels.get("command.throttle")
+    if throttle is None or len(clean(throttle).t) < 2:
+        return None
+    on = grid(movement.t[0], movement.t[-1], STEP_S, WIDTH_S)
+    asked = np.abs(on.smooth_even(held(clean(throttle), on.t)))
+    speed, push = np.abs(on.smooth(movement)), np.abs(on.smooth(movement, 1))
+    fast = float(np.percentile(speed, 98))
+    steady = (asked > 0.3) & (push < 0.1 * fast) & (speed > 0.3 * fast)
+    full = wanted.at(np.maximum(asked - UNSURE_THROTTLE, 0.0) if wanted.bent else asked)
+    steady &= full > LEAST_ASKED * wanted.top
+    return float(np.median(speed[steady] / full[steady])) if steady.sum() * STEP_S > 3.0 else None
+
+
+def _turning(
+    recording: Recording, car: Car, movement: Series, poses: Track
+) -> tuple[float | None, float]:
+    """Return how tightly it turns against what is steered, and how many rad of steering that is.
+
+    None where nothing is odd about it, and no rad where it follows its steering badly.
+    """
+    if "command.steering" not in recording.channels:
+        return None, 0.0
+    recording, unit = _in_wheel_angles(recording, car)
+    found = steered(recording, car, movement, poses)
+    if found is None:
+        return None, 0.0
+    gain = found.gain / unit
+    odd = found.alike >= FOLLOWS and not TURNS[0] < gain < TURNS[1]
+    lost_rad = found.swing * unit * abs(1.0 - gain) if found.alike > CLOSELY else 0.0
+    return (gain if odd else None), lost_rad
+
+
+def _in_wheel_angles(recording: Recording, car: Car) -> tuple[Recording, float]:
+    """Return the recording and what one unit of its steering means [rad].
+
+    Where the car file has no such number its own steering tells, tried at rest.
+    """
+    steering = recording.channels["command.steering"]
+    if steering.dimension == "angle":
+        return recording, 1.0
+    if car.has("steering.limit_rad"):
+        return recording, car.value("steering.limit_rad")
+    fleet = Fleet(car, len(STEERINGS))
+    for _ in STEERINGS:
+        fleet.add(Pose2(0.0, 0.0, 0.0))
+    asked = np.tile(STEERINGS, (round(STEERED_S / STEP_S), 1))
+    turned = fleet.rollout(np.zeros_like(asked), asked, STEP_S, ("steer_angle",))["steer_angle"]
+    values = np.interp(steering.values, STEERINGS, turned[-1])
+    changed = replace(steering, values=values, dimension="angle")
+    return replace(recording, channels={**recording.channels, "command.steering": changed}), 1.0
+
+
+def _wheels(found: Relation) -> str:
+    scale = found.numbers.get("scale")
+    wheels = found.pair[1].startswith(("encoder", "wheel_speed")) and found.pair[0] == "pose.x"
+    if not wheels or scale is None or ROLLS[0] < scale.value < ROLLS[1]:
+        return ""
+    return f"the way driven is {scale.value:.2f} times what its wheels count"

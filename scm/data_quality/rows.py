@@ -1,0 +1,181 @@
+"""Rows of a recording: values that are none, time that goes back, gaps, jitter, too little."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.data_quality.problem import DataProblem, Span
+from scm.recording.read import Channel, Recording
+
+SHORTEST_S = 5.0
+GAP_S = 0.25
+GAP_STEPS = 5.0
+COMMAND_GAP_S = 1.0
+RESET_S = 1.0
+SLOWEST_POSE_S = 0.1
+UNEVEN = 2.0
+BURST_SHARE = 0.1
+FEW_BURSTS = 0.005  # not worth a word
+SAME_TABLE = 0.5  # of the stamps are a sister's too
+
+
+def tables(recording: Recording) -> list[tuple[str, ...]]:
+    """Return channels grouped by their stamps: those of one table, as far as can be seen."""
+    groups: list[list[str]] = []
+    for name, channel in recording.channels.items():
+        for group in groups:
+            if np.array_equal(recording.channels[group[0]].t, channel.t, equal_nan=True):
+                group.append(name)
+                break
+        else:
+            groups.append([name])
+    return [tuple(group) for group in groups]
+
+
+def called(names: Sequence[str]) -> str:
+    """Return one name for several channels: `imu.*`, or all of them."""
+    families = {name.partition(".")[0] for name in names}
+    if len(names) == 1:
+        return names[0]
+    return ", ".join(sorted(f"{f}.*" if f"{f}" not in names else f for f in families))
+
+
+def row_problems(recording: Recording) -> Iterator[DataProblem]:
+    """Yield what is wrong with the rows of each table."""
+    for names in tables(recording):
+        channel, at = recording.channels[names[0]], called(names)
+        yield from _not_finite(recording.channels, names)
+        t = channel.t[np.isfinite(channel.t)]
+        if len(t) >= 2:
+            yield from _order(t, at)
+            yield from _spacing(t, at, names)
+    yield from _lost_values(recording.channels)
+
+
+def _not_finite(channels: Mapping[str, Channel], names: Iterable[str]) -> Iterator[DataProblem]:
+    for name in names:
+        channel = channels[name]
+        bad = ~(np.isfinite(channel.t) & np.isfinite(channel.values))
+        if bad.any():
+            yield DataProblem(
+                channel=name,
+                name="not_finite",
+                said=f"{int(bad.sum())} of {len(bad)} rows hold no number.",
+                corrected="These rows are left out.",
+                record_instead="Write nothing where a sensor has nothing to say.",
+            )
+
+
+def _lost_values(channels: Mapping[str, Channel]) -> Iterator[DataProblem]:
+    """Yield channels that lack stamps which their sisters in the same table have."""
+    for name, channel in channels.items():
+        family = name.partition(".")[0] + "."
+        sisters = [c.t for n, c in channels.items() if n.startswith(family) and n != name]
+        shared = [t for t in sisters if len(t) and np.isin(channel.t, t).mean() > SAME_TABLE]
+        every = np.unique(np.concatenate((channel.t, *shared)))
+        lost = len(every) - len(np.unique(channel.t))
+        if lost > 0:
+            yield DataProblem(
+                channel=name,
+                name="not_finite",
+                said=f"{lost} of {len(every)} rows hold no number.",
+                corrected="These rows are left out.",
+            )
+
+
+def _order(t: Floats, at: str) -> Iterator[DataProblem]:
+    step = np.diff(t)
+    back, same = step < 0.0, step == 0.0
+    if back.any():
+        resets = int((step < -RESET_S).sum())
+        worst = int(np.argmin(step))
+        said = f"Time runs backwards {int(back.sum())} times, at worst by {-step[worst]:.3f} s."
+        if resets:
+            said += f" The clock is set back {resets} times: these are several recordings."
+        yield DataProblem(
+            channel=at,
+            name="time_backwards",
+            said=said,
+            when_s=((float(t[worst + 1]), float(t[worst])),),
+            corrected="Only the longest stretch is compared."
+            if resets
+            else "Late rows are left out.",
+            record_instead="Stamp with a clock that is never set, and one file a drive.",
+        )
+    if same.sum() > 0.01 * len(t):
+        yield DataProblem(
+            channel=at,
+            name="duplicate",
+            said=f"{int(same.sum())} of {len(t)} rows repeat the stamp of the row before.",
+            corrected="Only the first row of a stamp counts.",
+            record_instead="Write one row a reading, with all digits of its stamp.",
+        )
+
+
+def _spacing(t: Floats, at: str, names: Sequence[str]) -> Iterator[DataProblem]:
+    step = np.diff(t)
+    step = step[step > 0.0]
+    if len(step) == 0:
+        return
+    period, span = float(np.median(step)), float(np.ptp(t))
+    command = all(name.startswith("command.") for name in names)
+    if span < SHORTEST_S and not command:
+        yield DataProblem(
+            channel=at,
+            name="too_short",
+            said=f"Holds {span:.1f} s, less than {SHORTEST_S:.0f} s.",
+            record_instead="Drive for 60 s or more: straights, both turns, starts and stops.",
+        )
+    gaps = gaps_of(t, command)
+    if gaps:
+        lost = sum(end - start for start, end in gaps)
+        yield DataProblem(
+            channel=at,
+            name="gap",
+            said=_gaps_said(gaps, lost, span),
+            when_s=gaps,
+            corrected="Nothing is compared across a gap.",
+        )
+    if any(name.startswith("pose.") for name in names) and period > SLOWEST_POSE_S:
+        yield DataProblem(
+            channel=at,
+            name="slow",
+            said=f"A pose every {period:.2f} s shows steady driving, not how it starts or steers.",
+            record_instead="Record poses at 20 Hz or more.",
+        )
+    yield from _jitter(step, period, at, command=command)
+
+
+def _gaps_said(gaps: Sequence[Span], lost_s: float, span_s: float) -> str:
+    if len(gaps) == 1:
+        return f"One gap of {lost_s:.2f} s in {span_s:.1f} s."
+    longest_s = max(end - start for start, end in gaps)
+    lost = f"{len(gaps)} gaps, {lost_s:.1f} s of {span_s:.1f} s"
+    return f"{lost}; the longest lasts {longest_s:.2f} s."
+
+
+def _jitter(step: Floats, period: float, at: str, *, command: bool) -> Iterator[DataProblem]:
+    high = float(np.percentile(step, 95))
+    bursts = float((step < 0.1 * period).mean())
+    if not command and (high > UNEVEN * period or bursts > BURST_SHARE):
+        said = f"Rows come every {1e3 * period:.1f} ms as a rule, but one in twenty "
+        said += f"only after {1e3 * high:.0f} ms or more"
+        if bursts > FEW_BURSTS:
+            said += f", and {100.0 * bursts:.0f} % right after another"
+        yield DataProblem(
+            channel=at,
+            name="jitter",
+            said=f"{said}.",
+            record_instead="Stamp a value where it is measured, not where it arrives.",
+        )
+
+
+def gaps_of(t: Floats, command: bool = False) -> tuple[Span, ...]:
+    """Return the spans in which nothing was recorded; a command is held, so it may pause longer."""
+    step = np.diff(t)
+    forward = step[step > 0.0]
+    if len(forward) == 0:
+        return ()
+    longest = max(COMMAND_GAP_S if command else GAP_S, GAP_STEPS * float(np.median(forward)))
+    return tuple((float(t[i]), float(t[i + 1])) for i in np.flatnonzero(step > longest))

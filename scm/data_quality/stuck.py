@@ -1,0 +1,214 @@
+"""Values of a recording: frozen, held, copied from another channel, jumping, coarse."""
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.data_quality.problem import DataProblem, Span
+from scm.data_quality.rows import called
+from scm.data_quality.track import (
+    Series,
+    Track,
+    clean,
+    jumped,
+    rows_a_value,
+    runs,
+    series,
+    track_with_jumps,
+)
+from scm.data_quality.way import Way
+from scm.recording.read import Recording
+
+FROZEN_S = 1.0
+FEWEST_FROZEN = 10
+OUTLASTS = 10.0  # times what values are usually repeated for
+MOVING = 0.2  # of the speed that is hardly ever exceeded
+COARSE = 0.02
+SAME = 0.999999
+DERIVED = 0.99995
+MOTION = ("pose.", "velocity.", "speed", "yaw_rate", "wheel_speed.", "encoder.", "imu.")
+
+
+def stuck_problems(
+    recording: Recording, found: list[Way], movement: Series | None
+) -> Iterator[DataProblem]:
+    """Yield channels whose values cannot be what a sensor of a moving car says.
+
+    Args:
+        recording: Repaired.
+        found: Sensors of distance.
+        movement: As the poses show it; None where the car stands or nothing shows it.
+    """
+    yield from _held(recording)
+    coarse = list(_coarse(recording))
+    yield from _frozen(recording, movement, found, {problem.channel for problem in coarse})
+    yield from _copied(recording)
+    if movement is not None:
+        yield from _derived(recording, movement)
+    yield from coarse
+    poses = track_with_jumps(recording)
+    if poses is not None:
+        yield from _jumps(poses)
+
+
+def _held(recording: Recording) -> Iterator[DataProblem]:
+    """Yield sensors that are slower than the rows they are written in."""
+    by_rate: dict[tuple[float, float], list[str]] = {}
+    for name, channel in recording.channels.items():
+        cleaned = clean(channel)
+        if name.startswith(MOTION) and len(cleaned.t) > FEWEST_FROZEN:
+            every = rows_a_value(cleaned)
+            period = float(np.median(np.diff(cleaned.t)))
+            if every > 1:
+                by_rate.setdefault((every * period, period), []).append(name)
+    for (period, rows), names in by_rate.items():
+        yield DataProblem(
+            channel=called(names),
+            name="held",
+            said=f"Values change only every {1e3 * period:.0f} ms, though rows come every "
+            f"{1e3 * rows:.0f} ms: each is up to that old.",
+            corrected="Only rows with a new value are compared.",
+            record_instead="Write a row when the sensor has a new value, with its own stamp.",
+        )
+
+
+def _frozen(
+    recording: Recording, movement: Series | None, found: list[Way], coarse: set[str]
+) -> Iterator[DataProblem]:
+    """Yield channels that stand still while another sensor sees the car move."""
+    counted = Series(found[0].distance.t, _speed(found[0].distance)) if found else None
+    spans = {
+        name: frozen_spans(clean(channel), counted if name.startswith("pose.") else movement)
+        for name, channel in recording.channels.items()
+        if name.startswith(MOTION) and name not in coarse
+    }
+    place = [spans.get(name, ()) for name in ("pose.x", "pose.y")]
+    for name, when in spans.items():
+        if not when or (name.startswith("pose.") and not all(place)):
+            continue  # driving along an axis, or straight, is no fault
+        yield DataProblem(
+            channel=name,
+            name="frozen",
+            said=f"Stands still for {sum(b - a for a, b in when):.1f} s while the car moves.",
+            when_s=when,
+            record_instead="Check the sensor's link: it repeated its last value.",
+        )
+
+
+def frozen_spans(channel: Series, witness: Series | None) -> tuple[Span, ...]:
+    """Return spans in which values are equal to the last bit while the witness moves."""
+    if witness is None or len(channel.t) < FEWEST_FROZEN:
+        return ()
+    fast = np.percentile(np.abs(witness.values), 98) * MOVING
+    starts, ends = runs(channel.values)
+    usual = OUTLASTS * float(np.percentile(ends - starts, 95))
+    spans = []
+    for i, j in zip(starts, ends, strict=True):
+        if j - i < max(FEWEST_FROZEN, usual) or channel.t[j - 1] - channel.t[i] < FROZEN_S:
+            continue
+        inside = (witness.t >= channel.t[i]) & (witness.t <= channel.t[j - 1])
+        moving = np.abs(witness.values[inside]) > fast
+        if fast > 0.0 and moving.size and moving.mean() > 0.5:
+            spans.append((float(channel.t[i]), float(channel.t[j - 1])))
+    return tuple(spans)
+
+
+def _speed(distance: Series) -> Floats:
+    return np.gradient(distance.values, distance.t)
+
+
+def _copied(recording: Recording) -> Iterator[DataProblem]:
+    """Yield pairs of channels that hold the same numbers."""
+    for one, other in combinations(recording.channels, 2):
+        a, b = recording.channels[one], recording.channels[other]
+        if len(a.values) != len(b.values) or len(a.values) < FEWEST_FROZEN:
+            continue
+        same = float((a.values == b.values).mean())
+        if same > SAME and np.ptp(a.values) > 0.0 and _both_move(a.values):
+            yield DataProblem(
+                channel=other,
+                name="copied",
+                said=f"Holds the same numbers as {one}, to the last digit.",
+                corrected="Counts as one sensor, not two.",
+                record_instead="Record each sensor's own channel.",
+            )
+
+
+def _both_move(values: Floats) -> bool:
+    return len(np.unique(values)) > FEWEST_FROZEN
+
+
+def _derived(recording: Recording, movement: Series) -> Iterator[DataProblem]:
+    """Yield speeds that somebody computed from the poses: they witness nothing."""
+    pose = series(recording, "pose.x")
+    y, yaw = series(recording, "pose.y"), series(recording, "pose.yaw")
+    if pose is None or y is None or yaw is None or len(pose.t) != len(y.t):
+        return
+    vx, vy = (np.gradient(v, pose.t) for v in (pose.values, y.values))
+    turned = np.unwrap(yaw.at(pose.t))
+    candidates = {
+        "speed": (np.hypot(vx, vy), np.cos(turned) * vx + np.sin(turned) * vy),
+        "velocity.x": (np.cos(turned) * vx + np.sin(turned) * vy,),
+        "yaw_rate": (np.gradient(turned, pose.t),),
+    }
+    for name, derived in candidates.items():
+        given = series(recording, name)
+        if given is None or np.ptp(given.values) == 0.0:
+            continue
+        inside = (pose.t >= given.t[0]) & (pose.t <= given.t[-1])
+        noisy = [_alike(given.at(pose.t[inside]), values[inside]) for values in derived]
+        if noisy and max(noisy) > DERIVED:
+            yield DataProblem(
+                channel=name,
+                name="derived",
+                said="Follows the differences of the poses row by row, noise and all: it was "
+                "computed from them.",
+                corrected="Not counted as a sensor.",
+                record_instead="Record a speed that the car itself measures.",
+            )
+
+
+def _alike(a: Floats, b: Floats) -> float:
+    """Return the correlation of the row-to-row changes, in which noise shows."""
+    da, db = np.diff(a), np.diff(b)
+    return float(np.corrcoef(da, db)[0, 1]) if da.std() > 0.0 and db.std() > 0.0 else 0.0
+
+
+def _coarse(recording: Recording) -> Iterator[DataProblem]:
+    """Yield channels whose last digit is a sizable part of what they show."""
+    for name, channel in recording.channels.items():
+        if not name.startswith(MOTION) or name.startswith("encoder."):
+            continue
+        values = np.unique(channel.values[np.isfinite(channel.values)])
+        if len(values) < FEWEST_FROZEN:
+            continue
+        step = float(np.percentile(np.diff(values), 10))
+        middle = channel.values[np.isfinite(channel.values)]
+        reach = float(np.percentile(middle, 97.5) - np.percentile(middle, 2.5))
+        even = np.abs(np.diff(values) / step - np.rint(np.diff(values) / step)).mean() < 0.02
+        if reach > 0.0 and step > COARSE * reach and even:
+            yield DataProblem(
+                channel=name,
+                name="coarse",
+                said=f"Comes in steps of {step:.3g}, {100.0 * step / reach:.0f} % of its reach.",
+                record_instead="Record all digits that the sensor has.",
+            )
+
+
+def _jumps(poses: Track) -> Iterator[DataProblem]:
+    at = np.flatnonzero(jumped(poses))
+    if len(at) == 0:
+        return
+    far = np.hypot(np.diff(poses.x), np.diff(poses.y))[at]
+    turn = np.abs(np.diff(poses.yaw))[at]
+    yield DataProblem(
+        channel="pose.*",
+        name="jump",
+        said=f"The pose jumps {len(at)} times, by up to {far.max():.2f} m and "
+        f"{np.degrees(turn.max()):.0f} deg, faster than the car moves.",
+        when_s=tuple((float(poses.t[i]), float(poses.t[i + 1])) for i in at[:50]),
+        corrected="Short stretches between two jumps are left out.",
+        record_instead="Check for reflections and swapped markers.",
+    )

@@ -1,0 +1,115 @@
+"""What doubting a recording finds: problems, suspicions, and which parts of it can be used."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from scm.data_quality.problem import DataProblem, Span
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A number with its standard error.
+
+    Attributes:
+        leak: By how much the drive magnifies what the comparison leaves out: 1 where nothing else
+            looks like this number, large where the drive hardly tells them apart.
+    """
+
+    value: float
+    std: float
+    leak: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Relation:
+    """Two sensors held against each other, whether or not anything is wrong with them.
+
+    Attributes:
+        pair: What was compared, such as `("pose.yaw", "imu.gyro_z")`.
+        numbers: By name; what each means stands where the relation is made.
+        noise: Standard deviation of what is left, row to row, in the first one's unit.
+        rows: How many rows of the first one took part.
+        step_s: Between rows of the slower one.
+    """
+
+    pair: tuple[str, str]
+    numbers: Mapping[str, Measured]
+    noise: float
+    rows: int
+    step_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Suspicion:
+    """A fault of measurement that would explain how two sensors differ.
+
+    Attributes:
+        name: Of the library (`scm.vehicles.measures`).
+        channels: Where it would act.
+        values, std: By the measure's own parameter names.
+        sigma: How far from its neutral value, in standard deviations; what the car file allows
+            counts as one of them.
+        shown_by: The pair of sensors that shows it.
+        twins: Faults that explain the same pair just as well.
+        said: One sentence.
+        repaired: So gross that it is undone before anything else is looked at: the other values
+            are those of the repaired recording.
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    values: Mapping[str, float]
+    std: Mapping[str, float]
+    sigma: float
+    shown_by: tuple[str, str]
+    twins: tuple[str, ...] = ()
+    said: str = ""
+    repaired: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repair:
+    """A gross fault undone: `t = time_factor * t + shift_s`, `value = factor * value + offset`.
+
+    Attributes:
+        channels: Exact names.
+        signed: Only the size was recorded: the values take the sign of the pose's speed.
+        in_order: The rows are sorted by their stamps.
+    """
+
+    channels: tuple[str, ...]
+    factor: float = 1.0
+    offset: float = 0.0
+    time_factor: float = 1.0
+    shift_s: float = 0.0
+    signed: bool = False
+    in_order: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Usable:
+    """Which parts of a recording can be used, on each channel's own clock after repair.
+
+    Attributes:
+        spans: By channel, without gaps, jumps and frozen parts.
+        lacks: What keeps the recording from being driven again at all; empty when nothing does.
+    """
+
+    spans: Mapping[str, tuple[Span, ...]]
+    lacks: tuple[str, ...] = ()
+
+    @property
+    def can_diagnose(self) -> bool:
+        """Say whether there is enough to hold a simulation against."""
+        return not self.lacks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quality:
+    """All that a recording's own sensors say about each other."""
+
+    problems: tuple[DataProblem, ...]
+    suspicions: tuple[Suspicion, ...]
+    usable: Usable
+    repairs: tuple[Repair, ...] = ()
+    relations: tuple[Relation, ...] = field(default=())

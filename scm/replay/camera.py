@@ -1,0 +1,87 @@
+"""What a camera with faults sees of a car, and where a car is that such a camera saw."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.replay.drive import Drive
+from scm.replay.numbers import NEUTRAL, POSE_CLOCK, Numbers
+from scm.replay.smooth import Smooth
+
+_LATE = (POSE_CLOCK, "measure.pose_delay_s", "measure.clock_offset_s")
+_HALF_S = 0.005
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """Motion of the rear axle, arrays of one shape; speeds along and across the body."""
+
+    x: Floats
+    y: Floats
+    yaw: Floats
+    speed: Floats
+    lateral_speed: Floats
+    yaw_rate: Floats
+
+
+class Camera:
+    """One drive's camera, with the faults that some numbers give it.
+
+    Args:
+        drive: Whose poses it took.
+        numbers: By key; those that are no faults of measurement do not matter.
+        smoothed: Poses in place of the drive's own smoothed ones.
+    """
+
+    def __init__(
+        self, drive: Drive, numbers: Numbers, smoothed: Mapping[str, Smooth] | None = None
+    ) -> None:
+        now = {key: float(numbers.get(key, neutral)) for key, neutral in NEUTRAL.items()}
+        self._smoothed = smoothed or drive.smoothed
+        self._begin, self._late = float(drive.edges[0]), sum(now[key] for key in _LATE)
+        self._rate, self._scale = now["measure.clock_rate"], now["measure.pose_scale"]
+        self._tilt = now["measure.camera_tilt_x_per_m"], now["measure.camera_tilt_y_per_m"]
+        self._heading = now["measure.pose_heading_rad"]
+        self._point = (
+            drive.point[0] + now["measure.pose_point_x_m"],
+            drive.point[1] + now["measure.pose_point_y_m"],
+        )
+
+    def stamp(self, t: Floats) -> Floats:
+        """Return the stamps of poses taken at true times."""
+        return t + self._late + self._rate * (t - self._begin)
+
+    def taken(self, stamp: Floats) -> Floats:
+        """Return the true times of stamps."""
+        return self._begin + (stamp - self._late - self._begin) / (1.0 + self._rate)
+
+    def recorded(self, stamp: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the poses x, y, yaw recorded at given stamps, smoothed."""
+        x, y, yaw = (self._smoothed[f"pose.{n}"].at(stamp) for n in ("x", "y", "yaw"))
+        return x, y, yaw
+
+    def seen(self, x: Floats, y: Floats, yaw: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return what is recorded of a rear axle that is truly there."""
+        (px, py), (tilt_x, tilt_y) = self._point, self._tilt
+        c, s = np.cos(yaw), np.sin(yaw)
+        at_x, at_y = x + c * px - s * py, y + s * px + c * py
+        size = self._scale / (1.0 + tilt_x * at_x + tilt_y * at_y)
+        return size * at_x, size * at_y, yaw + self._heading
+
+    def truly(self, x: Floats, y: Floats, yaw: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return where the rear axle is of which this was recorded."""
+        (px, py), (tilt_x, tilt_y) = self._point, self._tilt
+        flat_x, flat_y, psi = x / self._scale, y / self._scale, yaw - self._heading
+        size = 1.0 / (1.0 - tilt_x * flat_x - tilt_y * flat_y)
+        c, s = np.cos(psi), np.sin(psi)
+        return size * flat_x - c * px + s * py, size * flat_y - s * px - c * py, psi
+
+    def motion(self, t: Floats) -> Moved:
+        """Return how the rear axle moved at true times."""
+        x, y, yaw = self.truly(*self.recorded(self.stamp(t)))
+        before, after = (self.truly(*self.recorded(self.stamp(t + h))) for h in (-_HALF_S, _HALF_S))
+        vx, vy, rate = ((b - a) / (2.0 * _HALF_S) for a, b in zip(before, after, strict=True))
+        c, s = np.cos(yaw), np.sin(yaw)
+        return Moved(x, y, yaw, c * vx + s * vy, c * vy - s * vx, rate)

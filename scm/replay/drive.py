@@ -1,0 +1,218 @@
+"""A recorded drive, ready to be driven again: commands, measured streams, and the measured motion.
+
+Streams keep the times and values of the recording; nothing is resampled.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from scm.arrays import Bools, Floats
+from scm.data_quality.problem import Span
+from scm.recording.motion import forward
+from scm.recording.read import Recording
+from scm.replay.commands import Commanded, Commands
+from scm.replay.smooth import Smooth, smooth
+from scm.vehicles.car import Car
+
+STEP_S = 0.01
+FASTEST_HZ = {"imu.accel_x": 25.0, "imu.accel_y": 25.0, "imu.gyro_z": 50.0, "yaw_rate": 50.0,
+              "encoder.left": 25.0, "encoder.right": 25.0}  # fmt: skip
+FASTEST_POSE_HZ = 50.0
+RUN_IN_S = 1.0
+MOVING_MPS = 0.2  # a car that begins faster was commanded before its recording began
+WHEELS = {"encoder.left": "rl", "encoder.right": "rr"}
+KNOWN = (
+    "pose.x", "pose.y", "pose.yaw", "imu.gyro_z", "yaw_rate", "encoder.left", "encoder.right",
+    "wheel_speed.fl", "wheel_speed.fr", "wheel_speed.rl", "wheel_speed.rr", "speed", "velocity.x",
+    "velocity.y", "imu.accel_x", "imu.accel_y",
+)  # fmt: skip
+LEAP = 0.3
+BLIND_S, BLIND_STEPS = 1.0, 5.0  # without a pose for longer, and for so many of its usual steps
+POSES = ("pose.x", "pose.y", "pose.yaw")
+_MAD = 1.4826
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """One measured channel; yaw is continuous.
+
+    Attributes:
+        t: (n,), rising [s].
+        values: (n,), SI; encoders in counts.
+        std: Of the noise of one value, stated or estimated.
+        taps: When the samples were taken whose mean a value is, (n, samples) [s].
+        unsure: Further standard deviation of each value, where the channel leaps, (n,).
+    """
+
+    name: str
+    t: Floats
+    values: Floats
+    std: float
+    taps: Floats
+    unsure: Floats
+
+    def within(self, first: float, last: float) -> "Stream":
+        """Return the values taken between two times."""
+        keep = (self.taps[:, 0] >= first) & (self.taps[:, -1] <= last)
+        return Stream(self.name, self.t[keep], self.values[keep], self.std, self.taps[keep],
+                      self.unsure[keep])  # fmt: skip
+
+
+class Drive:
+    """One car's recording on the simulation's grid of `STEP_S`.
+
+    Attributes:
+        edges: Where steps begin and end, (steps + 1,) [s].
+        streams: Measured channels that a car model can predict.
+        battery: Measured voltage on the edges, where the car's drive knows it [V].
+        point: On the body that the poses are of, from the rear axle [m].
+    """
+
+    def __init__(self, recording: Recording, car: Car) -> None:
+        self.recording, self.car = recording, car
+        commands = Commands(recording, car)
+        throttle, steering = commands.rows
+        names = [name for name in KNOWN if name in recording.channels and _can_predict(car, name)]
+        streams = [_stream(recording, name) for name in names]
+        self.point = recording.channel("pose.x").point
+        pose = recording.channel("pose.x").t
+        first = _on_grid(max(float(pose[0]), commands.span_s[0]), float(throttle[0][0]))
+        last = min(float(pose[-1]), commands.span_s[1] + 0.05)
+        steps = int((last - first) / STEP_S)
+        self.edges: Floats = np.asarray(first + STEP_S * np.arange(steps + 1), dtype=np.float64)
+        self.battery = commands.voltage(self.edges)
+        self.streams: Sequence[Stream] = [stream.within(first, last) for stream in streams]
+        x, y = (self.smoothed[f"pose.{axis}"].rate[0] for axis in ("x", "y"))
+        moving = bool(np.hypot(x, y) > MOVING_MPS)
+        self.throttle = _commanded(*throttle, moving=moving)
+        self.steering = _commanded(*steering, moving=moving)
+
+    def stream(self, name: str) -> Stream:
+        """Return a stream by its channel's name."""
+        return next(s for s in self.streams if s.name == name)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The streams' names."""
+        return tuple(s.name for s in self.streams)
+
+    @cached_property
+    def smoothed(self) -> dict[str, Smooth]:
+        """The poses, smoothed without a car model, of the point that was measured."""
+        return {name: smooth(s.t, s.values, s.std) for name in POSES for s in (self.stream(name),)}
+
+    @cached_property
+    def turned(self) -> Floats:
+        """How far the left and the right wheels have turned, on the edges, (steps + 1, 2) [rad].
+
+        As their encoders count, from where these begin; by the way of the smoothed poses without.
+        """
+        if all(name in self.names for name in WHEELS):
+            counts = self.car.value("encoder.counts_per_revolution") / (2.0 * math.pi)
+            both = (self.stream(name) for name in WHEELS)
+            return np.stack([np.interp(self.edges, s.t, s.values) / counts for s in both], axis=1)
+        x, y, yaw = (self.smoothed[name] for name in POSES)
+        psi = yaw.at(self.edges)
+        along, across = (np.gradient(one.at(self.edges), STEP_S) for one in (x, y))
+        speed = np.cos(psi) * along + np.sin(psi) * across
+        aside = 0.5 * self.car.value("body.track_m") * np.gradient(psi, STEP_S)
+        rates = np.stack((speed - aside, speed + aside), axis=1)
+        way: Floats = np.cumsum(rates * STEP_S, axis=0) / self.car.value("wheel.radius_m")
+        return way
+
+    @cached_property
+    def blind(self) -> tuple[Span, ...]:
+        """Spans in which a channel of the pose is missing; a smoothed pose is a guess there."""
+        found = list[Span]()
+        for t in (self.stream(name).t for name in POSES):
+            steps = np.diff(t)
+            longest = max(BLIND_S, BLIND_STEPS * float(np.median(steps)))
+            found += [(float(t[i]), float(t[i + 1])) for i in np.flatnonzero(steps > longest)]
+        return tuple(sorted(set(found)))
+
+    def is_blind(self, t: Floats, length_s: float = 0.0) -> Bools:
+        """Return whether a span of this length that begins at each time is partly blind."""
+        blind = np.zeros(t.shape, dtype=np.bool_)
+        for first, last in self.blind:
+            blind |= (t + length_s > first) & (t < last)
+        return blind
+
+
+def _on_grid(first: float, row: float) -> float:
+    """Return the first moment of a grid of steps that holds a command row.
+
+    Commands that come at an even rate then change between steps. A change within one would enter
+    as a mean, which sends a servo off at its rate as soon as the step begins.
+    """
+    return row + math.ceil(round((first - row) / STEP_S, 6)) * STEP_S
+
+
+def _commanded(t: Floats, values: Floats, *, moving: bool) -> Commanded:
+    """Return a command; what drives a car before its first row is that row's."""
+    if not moving:
+        return Commanded(t, values)
+    before = t[0] - 2.0 * RUN_IN_S
+    return Commanded(np.concatenate(([before], t)), np.concatenate((values[:1], values)))
+
+
+def has_odometer(drive: Drive) -> bool:
+    """Say whether a drive has a measured speed that is not what drives the car."""
+    return "speed" in drive.names and not is_led(drive)
+
+
+def is_led(drive: Drive) -> bool:
+    """Say whether the measured speed drives the car, so that only how it turns can be judged."""
+    given = any(term.name == "speed_control" for term in drive.car.terms)
+    return given and "command.speed" not in drive.recording.channels
+
+
+def _can_predict(car: Car, name: str) -> bool:
+    """Say whether the car file tells what a sensor counts."""
+    return not name.startswith("encoder.") or car.has("encoder.counts_per_revolution")
+
+
+def _stream(recording: Recording, name: str) -> Stream:
+    channel = forward(recording, name)
+    values = np.unwrap(channel.values) if name == "pose.yaw" else channel.values
+    std = channel.std or _roughness(values)
+    if name.startswith("encoder."):
+        std = max(std if channel.std else 0.0, 0.4)  # a count is a count
+    return _thinned(name, channel.t, values, std)
+
+
+def _thinned(name: str, t: Floats, values: Floats, std: float) -> Stream:
+    """Return a fast stream slower: rates as means of neighbours, positions and counts as they are.
+
+    What a car does is slower than that, and every sample costs.
+    """
+    pace = 1.0 / max(float(np.median(np.diff(t))), 1e-6)
+    every = max(int(pace / FASTEST_HZ.get(name, FASTEST_POSE_HZ) + 0.1), 1)
+    if name.startswith(("pose.", "encoder.")):
+        t, values = t[::every], values[::every]
+        return Stream(name, t, values, std, t[:, None], np.zeros(len(t)))
+    whole = len(t) // every * every
+    taps = t[:whole].reshape(-1, every)
+    means, std = values[:whole].reshape(-1, every).mean(axis=1), std / math.sqrt(every)
+    unsure = _leaps(means, std) if name.startswith("imu.accel") else np.zeros(len(means))
+    return Stream(name, taps.mean(axis=1), means, std, taps, unsure)
+
+
+def _leaps(values: Floats, std: float) -> Floats:
+    """Return how unsure each value is because its neighbours differ by more than noise does.
+
+    A command's edge makes a car leap within milliseconds; no recording's clock is that exact.
+    """
+    padded = np.pad(values, 1, mode="edge")
+    around = np.stack((padded[:-2], values, padded[2:]))
+    return np.asarray(LEAP * np.maximum(np.ptp(around, axis=0) - 4.0 * std, 0.0))
+
+
+def _roughness(values: Floats) -> float:
+    """Return the noise that a channel's third differences show, whose median motion is slow."""
+    jumps = np.diff(values, 3)
+    moving = jumps[jumps != 0.0] if np.any(jumps) else jumps
+    return max(_MAD * float(np.median(np.abs(moving))) / math.sqrt(20.0), 1e-6)

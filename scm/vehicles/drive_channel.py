@@ -1,0 +1,13 @@
+"""Which recorded channel drives a car: its throttle, or a speed where it has a speed control."""
+
+from scm.recording.read import Recording
+from scm.vehicles.car import Car
+
+SPEEDS = ("command.speed", "speed")  # what drives a car whose throttle means a speed, best first
+
+
+def drive_name(recording: Recording, car: Car) -> str:
+    """Return the channel that drives a car: a speed only where the car has a speed control."""
+    if any(term.name == "speed_control" for term in car.terms):
+        return next((name for name in SPEEDS if name in recording.channels), SPEEDS[0])
+    return "command.throttle"
