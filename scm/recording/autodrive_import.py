@@ -26,7 +26,7 @@ from scm.recording.autodrive import (
     STAMP,
     cell_of,
 )
-from scm.recording.autodrive_read import LeftOut, Log, read_logs
+from scm.recording.autodrive_read import Log, read_logs
 from scm.recording.autodrive_told import (
     counted_on,
     of_axes,
@@ -35,6 +35,7 @@ from scm.recording.autodrive_told import (
     of_steering,
     of_wheels,
 )
+from scm.recording.columns import LeftOut
 from scm.recording.description import FILE_NAME
 from scm.recording.units import G
 

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from scm.recording.autodrive import (
     STAMP,
     stamp_ms,
 )
-from scm.recording.columns import refuse_large
+from scm.recording.columns import LeftOut, refuse_large
 
 _LOG = re.compile(r"(V|TL)(\d+) Log\.csv")
 _PICTURE = re.compile(r"\.jpe?g\s*$", re.IGNORECASE)
@@ -32,15 +31,6 @@ STATES = tuple(map(str, range(OFF, GREEN + 1)))
 MISSES = ("inf", "infinity", "∞")
 NUMBERS = {name for layout in CAR_LAYOUTS.values() for name in layout} - {STAMP, SCAN, *PICTURES}
 Layouts = Mapping[int, tuple[str, ...]]
-
-
-class LeftOut(NamedTuple):
-    """A line that is not in the recording: where it stands, what is wrong, and the line itself."""
-
-    file: str
-    line: int
-    why: str
-    text: str
 
 
 @dataclass(frozen=True, slots=True)

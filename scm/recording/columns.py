@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,25 @@ WORDS = {
 }
 
 
+class LeftOut(NamedTuple):
+    """What a file holds that is no row of its table: where, why, and the line itself.
+
+    Attributes:
+        line: Counted from 1; of a bag or a binary table the number of the message or row; None:
+            the rest of a file, as of one that is cut off.
+    """
+
+    file: str
+    line: int | None
+    why: str
+    text: str = ""
+
+    def __str__(self) -> str:
+        """Return it as a sentence: "pose.csv: line 7: got 3 cells, expected 8"."""
+        at = "" if self.line is None else f"line {self.line}: "
+        return f"{self.file}: {at}{self.why}"
+
+
 class Columns(Mapping[str, Floats]):
     """The columns of one file, each of shape `(rows,)`; an empty cell is NaN.
 
@@ -33,6 +53,7 @@ class Columns(Mapping[str, Floats]):
         known: Names of all columns of the file, where only some were read.
         ticks: Columns of whole numbers as such, shape `(rows,)`, and how many make 1 of the
             column's value: seconds that are counted in nanoseconds have `NS_PER_S`.
+        left_out: What the file holds besides that is no row.
     """
 
     def __init__(
@@ -44,7 +65,9 @@ class Columns(Mapping[str, Floats]):
         *,
         known: Sequence[str] = (),
         ticks: Mapping[str, tuple[Ints, int]] | None = None,
+        left_out: Sequence[LeftOut] = (),
     ) -> None:
+        self.left_out = tuple(left_out)
         self._path = path
         self._known = known or names
         self._ticks = ticks or {}

@@ -8,7 +8,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import RecordingError
-from scm.recording.columns import NS_PER_S, Columns
+from scm.recording.columns import NS_PER_S, Columns, LeftOut
 from scm.recording.description import (
     ChannelColumn,
     Description,
@@ -55,6 +55,7 @@ class Recording:
             does.
         begin_s: From when a part of it counts: a run of a city begins before its car is driven;
             None: from the first row.
+        left_out: What its files hold that is no row: broken lines, the rest of a cut-off file.
     """
 
     path: Path
@@ -62,6 +63,7 @@ class Recording:
     channels: dict[str, Channel]
     name: str = ""
     begin_s: float | None = None
+    left_out: tuple[LeftOut, ...] = ()
 
     def channel(self, name: str) -> Channel:
         """Return a channel.
@@ -98,17 +100,19 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
     names: dict[str, str] = {}
     loaded = _loaded(description.tables, folder, found)
     origin_s = _origin_s(description.tables, loaded)
+    left_out: dict[str, dict[LeftOut, None]] = {}  # two tables may share a file
     for table in description.tables:
         vehicle = _vehicle(description, table, found.parent)
         names[vehicle] = table.vehicle or description.vehicle or ""
         channels = by_vehicle.setdefault(vehicle, {})
+        left_out.setdefault(vehicle, {}).update(dict.fromkeys(loaded[_rows_of(table)].left_out))
         for name, channel in _channels(table, loaded[_rows_of(table)], found, origin_s).items():
             if name in channels:
                 msg = f"{found}: table {table.file}: channel {name!r} of {vehicle} is given twice"
                 raise RecordingError(msg)
             channels[name] = channel
     return [
-        Recording(found, vehicle, channels, names[vehicle])
+        Recording(found, vehicle, channels, names[vehicle], left_out=tuple(left_out[vehicle]))
         for vehicle, channels in by_vehicle.items()
     ]
 
