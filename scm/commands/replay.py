@@ -2,13 +2,16 @@
 
 import argparse
 import csv
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scm.command import Command
 
 if TYPE_CHECKING:
+    from scm.recording.read import Recording
     from scm.replay.free_run import FreeRun
+    from scm.vehicles.car import Car
 
 HORIZONS_S = (0.5, 1.0, 3.0)
 
@@ -32,32 +35,51 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from scm.recorder.drives import SUFFIX, recordings_of
+    from scm.errors import ScmError
+    from scm.recorder.drives import recordings_of
+    from scm.vehicles.car import load_car
+
+    if arguments.save:
+        _refuse_unwritable(arguments.save)
+    given = load_car(arguments.car, trusted=True) if arguments.car else None
+    runs, failures = [], list[str]()
+    for path in arguments.recording:
+        try:
+            recordings = recordings_of(path, arguments.data, arguments.vehicle)
+        except ScmError as error:
+            failures.append(str(error))
+            continue
+        for recording in recordings:
+            try:
+                runs.append(_replayed(path, recording, given, arguments.horizon_s))
+            except ScmError as error:
+                who = f"{recording.name}: " if len(recordings) > 1 else ""
+                failures.append(f"{who}{error}")
+    if arguments.save and runs:
+        _save(arguments.save, runs)
+        print(f"windows written to {arguments.save}")
+    for failure in dict.fromkeys(failures):
+        print(f"scm replay: {failure}", file=sys.stderr)
+    return 0 if runs else 2
+
+
+def _replayed(path: Path, recording: "Recording", car: "Car | None", horizon_s: float) -> "FreeRun":
+    """Drive one car's recording again, print the errors, and return the windows."""
+    from scm.recorder.drives import SUFFIX
     from scm.replay.free_run import free_run
     from scm.vehicles.car import load_car
     from scm.vehicles.undone import POSES
 
-    if arguments.save:
-        _refuse_unwritable(arguments.save)
-    runs = []
-    for path in arguments.recording:
-        for recording in recordings_of(path, arguments.data, arguments.vehicle):
-            chosen = arguments.car or recording.vehicle
-            car = load_car(chosen, trusted=arguments.car is not None)
-            run = free_run(recording, car, arguments.horizon_s)
-            who = f"{recording.name}, " if path.suffix == SUFFIX else ""
-            windows = f"{len(run.start_s)} windows of {arguments.horizon_s:g} s"
-            print(f"{path}  {who}car {car.name}: {windows},")
-            print("free run from the measured state, median and 90th percentile of the error")
-            undone = [f.measure.name for f in car.faults if any(map(f.law_of, POSES))]
-            if undone:
-                print(f"measured poses with {', '.join(undone)} of the car file taken out")
-            print(_table(run, arguments.horizon_s) + "\n")
-            runs.append(run)
-    if arguments.save:
-        _save(arguments.save, runs)
-        print(f"windows written to {arguments.save}")
-    return 0
+    car = car or load_car(recording.vehicle, trusted=False)
+    run = free_run(recording, car, horizon_s)
+    who = f"{recording.name}, " if path.suffix == SUFFIX else ""
+    print(f"{path}  {who}car {car.name}: {len(run.start_s)} windows of {horizon_s:g} s,")
+    print("free run from the measured state, median and 90th percentile of the error")
+    undone = [f.measure.name for f in car.faults if any(map(f.law_of, POSES))]
+    if undone:
+        print(f"measured poses with {', '.join(undone)} of the car file taken out")
+    print(_table(run, horizon_s) + "\n")
+    return run
 
 
 def _table(run: "FreeRun", horizon_s: float) -> str:

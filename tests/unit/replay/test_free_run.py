@@ -129,6 +129,46 @@ def test_bad_input_exits_with_2_and_says_where(capsys: pytest.CaptureFixture[str
     assert "nowhere.yaml: no recording here" in capsys.readouterr().err
 
 
+def two_cars(folder: Path, nigel: Car) -> Path:
+    """Write a drive of one car, and of a second one whose steering was not recorded."""
+    recording = drive(nigel, 4.0)
+    names = [name for name in recording.channels if name != "command.steering"]
+    rows = np.stack(
+        [recording.channel("pose.x").t, *(c.values for c in recording.channels.values())]
+    )
+    np.savetxt(folder / "t.csv", rows.T, "%.9f", ",", header=",".join(("t", *recording.channels)),
+               comments="")  # fmt: skip
+    tables = "".join(
+        f"  - file: t.csv\n    vehicle: {car}\n    time: {{column: t}}\n    channels:\n"
+        + "".join(f"      {n}: {{column: {n}, unit: {unit_of(n)}}}\n" for n in channels)
+        for car, channels in (("dart", names), ("nigel", recording.channels))
+    )
+    (folder / "recording.yaml").write_text(f"recording: 1\ntables:\n{tables}")
+    return folder
+
+
+def unit_of(name: str) -> str:
+    return {"pose.x": "m", "pose.y": "m", "pose.yaw": "rad"}.get(name, '"1"')
+
+
+def test_a_car_that_cannot_be_replayed_does_not_stop_the_others(
+    nigel: Car, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", str(two_cars(tmp_path, nigel)), "nowhere.yaml"]) == 0
+    printed = capsys.readouterr()
+    assert "car nigel: 1 windows of 3 s" in printed.out
+    assert "scm replay: dart: " in printed.err
+    assert "missing: command.steering" in printed.err
+    assert "nowhere.yaml: no recording here" in printed.err
+
+
+def test_a_replay_of_nothing_exits_with_2_and_saves_nothing(nigel: Car, tmp_path: Path) -> None:
+    saved = tmp_path / "windows.csv"
+    words = ["replay", str(two_cars(tmp_path, nigel)), "--vehicle", "dart", "--save", str(saved)]
+    assert main(words) == 2
+    assert not saved.exists()
+
+
 def test_what_a_replay_lacks_is_said_at_once(nigel: Car) -> None:
     recording = drive(nigel, 4.0)
     recording.channels["command.speed"] = recording.channels.pop("command.throttle")
