@@ -10,6 +10,7 @@ from scm.command import Command
 from scm.mismatch.budget import DEFAULT_S
 
 if TYPE_CHECKING:
+    from scm.mismatch.diagnose import Found
     from scm.mismatch.progress import Progress
     from scm.recording.read import Recording
 
@@ -47,6 +48,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         default=DEFAULT_S,
         help="time for each car; the report says what is left unasked then [s] (%(default)g)",
     )
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="refuse a recording in which rows have to be left out or repaired",
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -66,7 +72,7 @@ def _run(arguments: argparse.Namespace) -> int:
                 for name, recordings in cars_of(arguments.recording, arguments.data).items()
             }
             cars = with_told(cars, arguments.told)
-            said = _of_cars(cars, arguments.budget_s, out, progress)
+            said = _of_cars(cars, arguments, out, progress)
         else:
             said = _of_one(arguments, out, progress)
     finally:
@@ -83,15 +89,18 @@ def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> s
     found = diagnose(
         arguments.recording, arguments.car, arguments.data, vehicle=arguments.vehicle,
         span_s=(arguments.from_s, arguments.to_s), told=arguments.told,
-        budget_s=arguments.budget_s, tell=progress.tell,
+        budget_s=arguments.budget_s, strict=arguments.strict, tell=progress.tell,
     )  # fmt: skip
     progress.tell("writing the report")
     write(found, out)
-    return summary(found.diagnosis, out, found.evidence.retuned_m)
+    return _with_account(found, summary(found.diagnosis, out, found.evidence.retuned_m))
 
 
 def _of_cars(
-    cars: "Mapping[str, Sequence[Recording]]", budget_s: float, out: Path, progress: "Progress"
+    cars: "Mapping[str, Sequence[Recording]]",
+    arguments: argparse.Namespace,
+    out: Path,
+    progress: "Progress",
 ) -> str:
     """Diagnose cars by their own files, write the report or reports, and return what to print."""
     from scm.mismatch.diagnose import write
@@ -99,17 +108,26 @@ def _of_cars(
     from scm.mismatch.report.summary import summary
     from scm.mismatch.several import diagnose_one, diagnose_several, write_all
 
+    budget_s, strict = arguments.budget_s, arguments.strict
     if len(cars) == 1:
         (recordings,) = cars.values()
-        found = diagnose_one(recordings, budget_s=budget_s, tell=progress.tell)
+        found = diagnose_one(recordings, budget_s=budget_s, strict=strict, tell=progress.tell)
         progress.tell("writing the report")
         write(found, out)
-        return summary(found.diagnosis, out, found.evidence.retuned_m)
-    several = diagnose_several(cars, budget_s=budget_s, tell=progress.tell, turn=progress.turn)
+        return _with_account(found, summary(found.diagnosis, out, found.evidence.retuned_m))
+    several = diagnose_several(
+        cars, budget_s=budget_s, strict=strict, tell=progress.tell, turn=progress.turn
+    )
     progress.tell("writing the reports")
     write_all(several, out)
     diagnoses = {name: found.diagnosis for name, found in several.cars.items()}
-    return several_summary(diagnoses, several.common, out)
+    read = [f"{name}: {line}" for name, found in several.cars.items() for line in found.account]
+    return "\n".join((*read, several_summary(diagnoses, several.common, out)))
+
+
+def _with_account(found: "Found", said: str) -> str:
+    """Return the summary below the lines on what was read, left out, repaired and cut."""
+    return "\n".join((*found.account, said))
 
 
 COMMAND = Command(

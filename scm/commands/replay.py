@@ -3,12 +3,15 @@
 import argparse
 import csv
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scm.command import Command
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from scm.recording.read import Recording
     from scm.replay.free_run import FreeRun
     from scm.vehicles.car import Car
@@ -31,6 +34,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--horizon-s", type=float, default=3.0, help="length of a window [s] (%(default)g)"
     )
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="refuse a recording in which rows have to be left out or repaired",
+    )
     parser.add_argument("--save", type=Path, metavar="CSV", help="write every window's poses here")
 
 
@@ -51,7 +59,7 @@ def _run(arguments: argparse.Namespace) -> int:
             continue
         for recording in recordings:
             try:
-                runs.append(_replayed(path, recording, given, arguments.horizon_s))
+                runs.append(_replayed(path, recording, given, arguments))
             except ScmError as error:
                 who = f"{recording.name}: " if len(recordings) > 1 else ""
                 failures.append(f"{who}{error}")
@@ -63,23 +71,39 @@ def _run(arguments: argparse.Namespace) -> int:
     return 0 if runs else 2
 
 
-def _replayed(path: Path, recording: "Recording", car: "Car | None", horizon_s: float) -> "FreeRun":
+def _replayed(
+    path: Path, recording: "Recording", car: "Car | None", arguments: argparse.Namespace
+) -> "FreeRun":
     """Drive one car's recording again, print the errors, and return the windows."""
+    from scm.data_quality.prepare import prepare
     from scm.recorder.drives import SUFFIX
     from scm.replay.free_run import free_run
     from scm.vehicles.car import load_car
     from scm.vehicles.undone import POSES
 
     car = car or load_car(recording.vehicle, trusted=False)
-    run = free_run(recording, car, horizon_s)
     who = f"{recording.name}, " if path.suffix == SUFFIX else ""
-    print(f"{path}  {who}car {car.name}: {len(run.start_s)} windows of {horizon_s:g} s,")
+    prepared = prepare(recording, car, strict=arguments.strict)
+    for line in prepared.account:
+        print(f"{path}  {who}{line}")
+    run = _joined([free_run(part, car, arguments.horizon_s) for part in prepared.recordings])
+    windows = f"{len(run.start_s)} windows of {arguments.horizon_s:g} s"
+    print(f"{path}  {who}car {car.name}: {windows},")
     print("free run from the measured state, median and 90th percentile of the error")
     undone = [f.measure.name for f in car.faults if any(map(f.law_of, POSES))]
     if undone:
         print(f"measured poses with {', '.join(undone)} of the car file taken out")
-    print(_table(run, horizon_s) + "\n")
+    print(_table(run, arguments.horizon_s) + "\n")
     return run
+
+
+def _joined(runs: "Sequence[FreeRun]") -> "FreeRun":
+    """Return the windows of all stretches of a recording as one run."""
+    import numpy as np
+
+    fields = [name for name in runs[0].__slots__ if name != "t_s"]
+    together = {name: np.concatenate([getattr(run, name) for run in runs]) for name in fields}
+    return replace(runs[0], **together)
 
 
 def _table(run: "FreeRun", horizon_s: float) -> str:

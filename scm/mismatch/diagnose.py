@@ -11,8 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock
-from scm.data_quality.check import check
-from scm.data_quality.corrected import corrected
+from scm.data_quality.prepare import Prepared, prepare
 from scm.data_quality.problem import DataProblem
 from scm.data_quality.suspicion import Quality
 from scm.errors import RecordingError
@@ -91,6 +90,7 @@ class Found:
         best: What was found; `retuned`: the car's own numbers refitted alone.
         suggestions: Drives that would tell what this one cannot.
         searched: What it was told from; None where nothing could be searched.
+        account: What was read, left out, repaired and cut, a line each.
     """
 
     diagnosis: Diagnosis
@@ -101,6 +101,7 @@ class Found:
     retuned: Fitted | None = None
     suggestions: tuple[Suggestion, ...] = ()
     searched: Searched | None = None
+    account: tuple[str, ...] = ()
 
 
 def diagnose(
@@ -112,6 +113,7 @@ def diagnose(
     span_s: tuple[float | None, float | None] = (None, None),
     told: Sequence[Path | str] = (),
     budget_s: float = DEFAULT_S,
+    strict: bool = False,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
 ) -> Found:
@@ -125,6 +127,7 @@ def diagnose(
         span_s: Part of each recording, seconds since its begin; None: its end.
         told: Recordings of the same car by `scm play`, whatever they call it; taken whole.
         budget_s: What is not found in time to be told after so long, is not looked for.
+        strict: Refuse recordings in which anything has to be left out or repaired.
         tell: Is told what is being tried.
         clock: For the time it takes.
 
@@ -140,7 +143,7 @@ def diagnose(
     if car_file is None and any(r.vehicle != file for r in recordings):
         msg = f"{paths[0]}: recordings of several cars; say which with --car"
         raise RecordingError(msg)
-    return diagnose_car(recordings, car, budget_s=budget_s, tell=tell, clock=clock)
+    return diagnose_car(recordings, car, budget_s=budget_s, strict=strict, tell=tell, clock=clock)
 
 
 def diagnose_car(
@@ -148,6 +151,7 @@ def diagnose_car(
     car: Car,
     *,
     budget_s: float = DEFAULT_S,
+    strict: bool = False,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
 ) -> Found:
@@ -158,32 +162,34 @@ def diagnose_car(
     """
     budget = Budget(budget_s, clock or WallClock())
     tell("doubting the data")
-    usable, problems = _doubted(recordings, car)
+    prepared = [prepare(recording, car, strict=strict) for recording in recordings]
+    usable, problems = _usable(recordings, prepared)
+    account = tuple(line for one in prepared for line in one.account)
     if not usable:
-        return _nothing(recordings, car, problems, budget.spent_s())
+        return replace(_nothing(recordings, car, problems, budget.spent_s()), account=account)
     with threadpool_limits(1):  # two threads drive already: more for small matrices only wait
         found = _searched(usable, car, tell, budget)
     diagnosis = replace(found.diagnosis, data=problems, runtime_s=budget.spent_s())
-    return replace(found, diagnosis=diagnosis)
+    return replace(found, diagnosis=diagnosis, account=account)
 
 
-def _doubted(
-    recordings: Sequence[Recording], car: Car
+def _usable(
+    recordings: Sequence[Recording], every: Sequence[Prepared]
 ) -> tuple[list[Recording], tuple[DataProblem, ...]]:
     """Return the recordings that can be used, repaired, and everything wrong with any."""
-    every = [check(recording, car) for recording in recordings]
     usable, problems = list[Recording](), list[DataProblem]()
     length_s = _length_s(recordings)
-    for recording, quality in zip(recordings, every, strict=True):
+    for recording, one in zip(recordings, every, strict=True):
+        quality = one.quality
         together = length_s > SHORTEST_S and _is_only_short(quality)
         where = f"{_titles([recording])[0]}: " if len(recordings) > 1 else ""
         problems += [
             replace(p, said=where + p.said)
-            for p in quality.problems
+            for p in one.problems
             if not together or p.name not in OF_SHORT
         ]
         if together or quality.usable.can_diagnose:
-            usable.append(corrected(recording, quality))
+            usable += one.recordings
     return usable, tuple(problems)
 
 

@@ -89,6 +89,7 @@ def diagnose_one(
     recordings: Sequence[Recording],
     *,
     budget_s: float = DEFAULT_S,
+    strict: bool = False,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
 ) -> Found:
@@ -98,13 +99,14 @@ def diagnose_one(
         ScmError: when a recording or the car file cannot be used.
     """
     car = load_car(recordings[0].vehicle, trusted=False)
-    return diagnose_car(recordings, car, budget_s=budget_s, tell=tell, clock=clock)
+    return diagnose_car(recordings, car, budget_s=budget_s, strict=strict, tell=tell, clock=clock)
 
 
 def diagnose_several(
     cars: Mapping[str, Sequence[Recording]],
     *,
     budget_s: float = DEFAULT_S,
+    strict: bool = False,
     tell: Tell = lambda _: None,
     turn: Turn = lambda *_: None,
     clock: Clock | None = None,
@@ -114,6 +116,7 @@ def diagnose_several(
     Args:
         cars: Recordings by car, as `cars_of` returns them.
         budget_s: For each car, as in `diagnose`.
+        strict: As in `diagnose`.
         tell: Is told what is being tried; `turn` for whom, which turn it is, and of how many.
         turn: None of both matters to the result.
         clock: For the time it took.
@@ -125,7 +128,9 @@ def diagnose_several(
     began_ns, turns, found = clock.now_ns(), len(cars) + 1, dict[str, Found]()
     for number, (name, recordings) in enumerate(cars.items()):
         turn(name, number, turns)
-        found[name] = diagnose_one(recordings, budget_s=budget_s, tell=tell, clock=clock)
+        found[name] = diagnose_one(
+            recordings, budget_s=budget_s, strict=strict, tell=tell, clock=clock
+        )
     turn(TOGETHER, len(cars), turns)
     searches = {name: one.searched for name, one in found.items() if one.searched is not None}
     common = list[Common]()
