@@ -12,7 +12,6 @@ import numpy as np
 
 from scm.mismatch.diagnose import Found, diagnose, write
 from scm.mismatch.evidence import FreeRuns
-from scm.mismatch.fit import Fitter
 from scm.mismatch.judge import judge
 from scm.mismatch.parts import split
 
@@ -67,12 +66,10 @@ def _figures(found: Found) -> None:
     for own in found.evidence.ordinary:
         if abs(own.found.value - own.given) > 0.5 * (own.given_std or 1.0):
             _say(f"own: {own.key}: {own.given:.4g} -> {own.found.value:.4g}")
-    model, retuned, runs = found.model, found.retuned, found.evidence.free_runs
+    model, retuned, runs = found.model, found.retuned_car, found.evidence.free_runs
     if model is None or retuned is None or runs is None or diagnosis.fit is None:
         return
-    plain = Fitter(model, np.ones(len(model.t))).numbers((), retuned.z, np.zeros(0))
-    parts = split(model)
-    tuned = judge(model.drives, model.car, {}, plain, parts, diagnosis.fit.horizon_s)[1]
+    tuned = judge(model.drives, model.car, retuned, split(model), diagnosis.fit.horizon_s)[1]
     _say(f"free runs of {diagnosis.fit.horizon_s:g} s, position [cm], held out:")
     for title, side in (("nominal", runs), ("retuned", tuned), ("found", runs)):
         _say(f"  {title}: {_errors(side, 'before' if title == 'nominal' else 'after')}")

@@ -1,6 +1,7 @@
 """`scm mismatch`: what the simulator left out, found in recordings of a car."""
 
 import argparse
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -92,7 +93,7 @@ def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> s
         budget_s=arguments.budget_s, strict=arguments.strict, tell=progress.tell,
     )  # fmt: skip
     progress.tell("writing the report")
-    write(found, out)
+    write(found, out, _check(arguments, out))
     return _with_account(found, summary(found.diagnosis, out, found.evidence.retuned_m))
 
 
@@ -113,16 +114,29 @@ def _of_cars(
         (recordings,) = cars.values()
         found = diagnose_one(recordings, budget_s=budget_s, strict=strict, tell=progress.tell)
         progress.tell("writing the report")
-        write(found, out)
+        write(found, out, _check(arguments, out))
         return _with_account(found, summary(found.diagnosis, out, found.evidence.retuned_m))
     several = diagnose_several(
         cars, budget_s=budget_s, strict=strict, tell=progress.tell, turn=progress.turn
     )
     progress.tell("writing the reports")
-    write_all(several, out)
+    write_all(several, out, lambda name: _check(arguments, out / name, name))
     diagnoses = {name: found.diagnosis for name, found in several.cars.items()}
     read = [f"{name}: {line}" for name, found in several.cars.items() for line in found.account]
     return "\n".join((*read, several_summary(diagnoses, several.common, out)))
+
+
+def _check(arguments: argparse.Namespace, out: Path, vehicle: str = "") -> str:
+    """Return the command that works out a report's figures again."""
+    paths = [*arguments.recording, *arguments.told]
+    words = ["scm", "replay", *map(str, paths), "--report", str(out)]
+    for option, value in (
+        ("--vehicle", vehicle or arguments.vehicle), ("--data", arguments.data),
+        ("--from-s", arguments.from_s), ("--to-s", arguments.to_s),
+    ):  # fmt: skip
+        words += [option, str(value)] if value is not None else []
+    spanned = arguments.from_s is not None or arguments.to_s is not None
+    return "" if arguments.told and spanned else shlex.join(words)
 
 
 def _with_account(found: "Found", said: str) -> str:

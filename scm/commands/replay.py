@@ -3,15 +3,12 @@
 import argparse
 import csv
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scm.command import Command
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from scm.recording.read import Recording
     from scm.replay.free_run import FreeRun
     from scm.vehicles.car import Car
@@ -39,14 +36,22 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="refuse a recording in which rows have to be left out or repaired",
     )
+    parser.add_argument("--from-s", type=float, metavar="S", help="leave out what is before [s]")
+    parser.add_argument("--to-s", type=float, metavar="S", help="leave out what is after [s]")
+    parser.add_argument(
+        "--report", type=Path, metavar="DIR", help="work out the figures of this report again"
+    )
     parser.add_argument("--save", type=Path, metavar="CSV", help="write every window's poses here")
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.errors import ScmError
     from scm.recorder.drives import recordings_of
+    from scm.recording.span import part_of
     from scm.vehicles.car import load_car
 
+    if arguments.report is not None:
+        return _of_report(arguments)
     if arguments.save:
         _refuse_unwritable(arguments.save)
     given = load_car(arguments.car, trusted=True) if arguments.car else None
@@ -59,7 +64,8 @@ def _run(arguments: argparse.Namespace) -> int:
             continue
         for recording in recordings:
             try:
-                runs.append(_replayed(path, recording, given, arguments))
+                part = part_of(recording, arguments.from_s, arguments.to_s)
+                runs.append(_replayed(path, part, given, arguments))
             except ScmError as error:
                 who = f"{recording.name}: " if len(recordings) > 1 else ""
                 failures.append(f"{who}{error}")
@@ -71,13 +77,36 @@ def _run(arguments: argparse.Namespace) -> int:
     return 0 if runs else 2
 
 
+def _of_report(arguments: argparse.Namespace) -> int:
+    """Print a report's figures beside the same ones worked out again."""
+    from scm.mismatch.check_report import check_report
+    from scm.recorder.drives import recordings_of
+    from scm.recording.span import part_of
+
+    recordings = [
+        part_of(recording, arguments.from_s, arguments.to_s)
+        for path in arguments.recording
+        for recording in recordings_of(path, arguments.data, arguments.vehicle)
+    ]
+    figures = check_report(arguments.report, recordings)
+    if not figures:
+        print(f"{arguments.report}: the report states no errors of free runs")
+    for one in figures:
+        same = "" if one.agrees else "   DIFFERS"
+        print(
+            f"{one.part:<8}{one.windows:>5} windows  {one.car:<11}{one.name:<11}"
+            f"report {one.reported:.5g}, again {one.again:.5g}{same}"
+        )
+    return 0 if all(one.agrees for one in figures) else 2
+
+
 def _replayed(
     path: Path, recording: "Recording", car: "Car | None", arguments: argparse.Namespace
 ) -> "FreeRun":
     """Drive one car's recording again, print the errors, and return the windows."""
     from scm.data_quality.prepare import prepare
     from scm.recorder.drives import SUFFIX
-    from scm.replay.free_run import free_run
+    from scm.replay.free_run import free_run, joined
     from scm.vehicles.car import load_car
     from scm.vehicles.undone import POSES
 
@@ -86,7 +115,7 @@ def _replayed(
     prepared = prepare(recording, car, strict=arguments.strict)
     for line in prepared.account:
         print(f"{path}  {who}{line}")
-    run = _joined([free_run(part, car, arguments.horizon_s) for part in prepared.recordings])
+    run = joined([free_run(part, car, arguments.horizon_s) for part in prepared.recordings])
     windows = f"{len(run.start_s)} windows of {arguments.horizon_s:g} s"
     print(f"{path}  {who}car {car.name}: {windows},")
     print("free run from the measured state, median and 90th percentile of the error")
@@ -95,15 +124,6 @@ def _replayed(
         print(f"measured poses with {', '.join(undone)} of the car file taken out")
     print(_table(run, arguments.horizon_s) + "\n")
     return run
-
-
-def _joined(runs: "Sequence[FreeRun]") -> "FreeRun":
-    """Return the windows of all stretches of a recording as one run."""
-    import numpy as np
-
-    fields = [name for name in runs[0].__slots__ if name != "t_s"]
-    together = {name: np.concatenate([getattr(run, name) for run in runs]) for name in fields}
-    return replace(runs[0], **together)
 
 
 def _table(run: "FreeRun", horizon_s: float) -> str:

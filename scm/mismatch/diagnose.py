@@ -1,7 +1,6 @@
 """A whole diagnosis: read, doubt, fit, search, judge, say."""
 
 import shutil
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,7 +13,7 @@ from scm.clock import Clock, WallClock
 from scm.data_quality.prepare import Prepared, prepare
 from scm.data_quality.problem import DataProblem
 from scm.data_quality.suspicion import Quality
-from scm.errors import RecordingError
+from scm.errors import RecordingError, ScmError
 from scm.mismatch.budget import DEFAULT_S, Budget, Question
 from scm.mismatch.curves import curve
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns, Tried
@@ -33,8 +32,7 @@ from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate, candidates, placed, shown_by, terms_needed
 from scm.mismatch.locate import locate
 from scm.mismatch.parts import Parts, split
-from scm.mismatch.patch import patched
-from scm.mismatch.report.car_file import write_car
+from scm.mismatch.patch import CarFiles, as_written, on
 from scm.mismatch.report.write import write_report
 from scm.mismatch.rough import SETTLES_FAR, is_far, roughly, strays
 from scm.mismatch.search import Search
@@ -43,10 +41,10 @@ from scm.recorder.drives import SUFFIX, recordings_of_one
 from scm.recording.read import Recording
 from scm.recording.span import part_of
 from scm.replay.drive import Drive
-from scm.replay.numbers import Numbers
 from scm.vehicles.car import Car, load_car
 
 POSE = ("position_m", "yaw_rad")
+RETUNED = "retuned.toml"
 POSE_X, SHORTEST_S = "pose.x", 20.0  # of several recordings together, where each is short
 OF_SHORT = ("no_verdict", "too_short")
 TAIL = 1.0  # what follows a search takes as long as its first fit
@@ -90,6 +88,8 @@ class Found:
         best: What was found; `retuned`: the car's own numbers refitted alone.
         suggestions: Drives that would tell what this one cannot.
         searched: What it was told from; None where nothing could be searched.
+        found_car, retuned_car: As their written files say; None where none could be written.
+        files: Keeps the folder of those files.
         account: What was read, left out, repaired and cut, a line each.
     """
 
@@ -101,6 +101,9 @@ class Found:
     retuned: Fitted | None = None
     suggestions: tuple[Suggestion, ...] = ()
     searched: Searched | None = None
+    found_car: Car | None = None
+    retuned_car: Car | None = None
+    files: CarFiles | None = None
     account: tuple[str, ...] = ()
 
 
@@ -173,6 +176,11 @@ def diagnose_car(
     return replace(found, diagnosis=diagnosis, account=account)
 
 
+def usable_of(recordings: Sequence[Recording], car: Car) -> list[Recording]:
+    """Return the stretches of recordings that a diagnosis would use, repaired."""
+    return _usable(recordings, [prepare(recording, car) for recording in recordings])[0]
+
+
 def _usable(
     recordings: Sequence[Recording], every: Sequence[Prepared]
 ) -> tuple[list[Recording], tuple[DataProblem, ...]]:
@@ -205,27 +213,24 @@ def _is_only_short(quality: Quality) -> bool:
     return bool(lacks) and all(lack.startswith("only ") for lack in lacks)
 
 
-def write(found: Found, out: Path) -> None:
+def write(found: Found, out: Path, check: str = "") -> None:
     """Write the report, the car found, the re-tuned car, `retuned.toml`, and the next drive.
 
     A drive that would tell what this one cannot goes to `next_drive/`, for `scm play`; that of a
     second question to `next_drive_2/`.
 
+    Args:
+        found: To be written.
+        out: Folder of the report.
+        check: The command that works out the report's figures again; empty: none is printed.
+
     Raises:
         ScmError: when the folder cannot be written.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        cars = [
-            found.car if fit is None or found.model is None
-            else patched(found.car, found.model, fit, Path(folder))
-            for fit in (found.best, found.retuned)
-        ]  # fmt: skip
-        write_report(found.diagnosis, found.evidence, found.car, cars[0], out)
-        plain = replace(found.diagnosis, effects=())
-        aside = Path(folder) / "retuned"
-        aside.mkdir()
-        write_car(plain, found.evidence, found.car, cars[1], aside)
-        shutil.copy(aside / "car.toml", out / "retuned.toml")
+    found_car = found.found_car or found.car
+    write_report(found.diagnosis, found.evidence, found.car, found_car, out, check)
+    retuned = found.retuned_car or found.car
+    shutil.copyfile(retuned.path, out / RETUNED)
     folders = folders_of([suggestion.undecided for suggestion in found.suggestions])
     for suggestion, name in zip(found.suggestions, folders, strict=True):
         if name:
@@ -239,25 +244,27 @@ def _curves(model: Likelihood, best: Fitted, sought: Sought | None) -> tuple[Cur
     return (*(c for c in drawn if c is not None), *of_laws)
 
 
-def _judged(
-    drives: Sequence[Drive], car: Car, numbers: Numbers, parts: Parts
-) -> tuple[Fit | None, FreeRuns | None]:
-    """Return free runs before and after; nothing where no part has a whole window."""
+def _judged(searched: Searched, car: Car | None) -> tuple[Fit | None, FreeRuns | None]:
+    """Return free runs before and after; nothing where no part has a whole window, or no file."""
+    if car is None:
+        return None, None
+    before = searched.model.car
     try:
-        return judge(drives, car, {}, numbers, parts)
+        return judge(searched.drives, before, on(before, car), searched.parts)
     except RecordingError:
         return None, None
 
 
-def retuned_error(
-    drives: Sequence[Drive], car: Car, tuned: Numbers, found: Numbers, parts: Parts
-) -> float | None:
+def retuned_error(searched: Searched, retuned: Car | None, found: Car | None) -> float | None:
     """Return how far the re-tuned car strays [m] in the windows in which the one found is judged.
 
-    None where no part has a whole window.
+    None where no part has a whole window, or a car has no file.
     """
+    if retuned is None or found is None:
+        return None
+    base = searched.model.car
     try:
-        fit, _ = judge(drives, car, tuned, found, parts)
+        fit, _ = judge(searched.drives, on(base, retuned), on(base, found), searched.parts)
     except RecordingError:
         return None
     return fit.confirm.before.get(POSE[0])
@@ -353,26 +360,22 @@ def _by_strides(
 
 def told(searched: Searched, tell: Tell) -> Found:
     """Return the diagnosis that a search's best model is, judged, located and put into words."""
-    drives, model, parts, search = (
-        searched.drives, searched.model, searched.parts, searched.search
-    )  # fmt: skip
+    model, search = searched.model, searched.search
     car, best, rough = searched.car, searched.best, searched.rough
-    numbers = search.fitter.numbers(best.effects, best.z, best.values)
-    fit, free_runs = _judged(drives, model.car, numbers, parts)
+    titles = _titles(searched.recordings)
+    files = CarFiles(car, model, titles)
+    effects, found_car = _written(searched, files, best)
+    fit, free_runs = _judged(searched, found_car)
     while rough and best.effects and fit is not None and POSE[0] in nothing_got_worse(fit):
         best = search.without_one(best)
-        numbers = search.fitter.numbers(best.effects, best.z, best.values)
-        fit, free_runs = _judged(drives, model.car, numbers, parts)
+        effects, found_car = _written(searched, files, best)
+        fit, free_runs = _judged(searched, found_car)
     if not best.effects and fit is not None and gained_nothing(fit):
-        best = as_given(search.fitter, best)
-        numbers = search.fitter.numbers((), best.z, best.values)
-        fit, free_runs = _judged(drives, model.car, numbers, parts)
-    tuned = search.fitter.numbers((), search.retuned.z, np.zeros(0))
-    retuned_m = retuned_error(drives, model.car, tuned, numbers, parts) if best.effects else None
+        best, found_car = as_given(search.fitter, best), car
+        fit, free_runs = _judged(searched, car)
+    _, retuned_car = _written(searched, files, search.retuned)
+    retuned_m = retuned_error(searched, retuned_car, found_car) if best.effects else None
     located, residuals = locate(model, search.retuned, best)
-    effects = tuple(
-        effect_of(search, best, i, searched.held, searched.sought) for i in range(len(best.effects))
-    )
     suggestions = () if rough else undecided_of(model, search, best, tell)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
     verdict = verdict_of(effects, undecided, fit)
@@ -381,8 +384,25 @@ def told(searched: Searched, tell: Tell) -> Found:
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
                           fit=fit, runtime_s=0.0, unasked=searched.unasked)  # fmt: skip
     evidence = Evidence(
-        vehicle=car.name, recordings=_titles(searched.recordings), residuals=residuals,
-        free_runs=free_runs, ordinary=ordinary_of(model, best, car), tried=searched.tried,
+        vehicle=car.name, recordings=titles, residuals=residuals, free_runs=free_runs,
+        ordinary=as_written(ordinary_of(model, best, car), found_car or car), tried=searched.tried,
         curves=_curves(model, best, searched.sought), retuned_m=retuned_m,
     )  # fmt: skip
-    return Found(diagnosis, car, evidence, model, best, search.retuned, suggestions, searched)
+    return Found(
+        diagnosis, car, evidence, model, best, search.retuned, suggestions, searched, found_car,
+        retuned_car, files,
+    )  # fmt: skip
+
+
+def _written(
+    searched: Searched, files: CarFiles, fitted: Fitted
+) -> tuple[tuple[Effect, ...], Car | None]:
+    """Return a model's effects, and its car as the written file says; None where none loads."""
+    effects = tuple(
+        effect_of(searched.search, fitted, i, searched.held, searched.sought)
+        for i in range(len(fitted.effects))
+    )
+    try:
+        return effects, files.written(fitted, effects)
+    except ScmError:
+        return effects, None

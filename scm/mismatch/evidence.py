@@ -6,7 +6,7 @@ Times of several recordings follow one another; the first keeps its own.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from scm.arrays import Floats
+from scm.arrays import Floats, Ints
 from scm.mismatch.findings import Estimate
 
 
@@ -53,11 +53,16 @@ class FreeRuns:
 
     Attributes:
         part: `fit`, `choose` or `confirm` of each window.
-        start_s: (windows,); t_s: since the window's start, (times,).
+        recording: Number of the recording that each window is of, (windows,).
+        stamp_s: When each starts on its recording's own clock, (windows,).
+        start_s: The same on one axis for all recordings, (windows,).
+        t_s: Since the window's start, (times,).
         measured, before, after: x, y [m] and yaw [rad] by name.
     """
 
     part: tuple[str, ...]
+    recording: Ints
+    stamp_s: Floats
     start_s: Floats
     t_s: Floats
     measured: Mapping[str, Floats]
@@ -67,12 +72,17 @@ class FreeRuns:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ordinary:
-    """An ordinary number of the car file, before and after, with what the file allows it."""
+    """A nominal parameter of the car file, before and after, with what the file allows it.
+
+    Attributes:
+        found_std: Of what was found; None: as its interval says, which ends at physical bounds.
+    """
 
     key: str
     given: float
     given_std: float
     found: Estimate
+    found_std: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,6 +3,9 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
+from scm.arrays import Floats
 from scm.mismatch.evidence import Ordinary, Tried
 from scm.mismatch.experiment.plan import Rival as Contender
 from scm.mismatch.experiment.suggest import Suggestion, suggest
@@ -38,11 +41,11 @@ def ordinary_of(model: Likelihood, best: Fitted, car: Car) -> tuple[Ordinary, ..
 
     No recording makes a number less sure than its file, or unphysical.
     """
-    found = []
+    found, covariance = [], covariance_of(best)
     for j, own in enumerate(model.ordinary):
         if own.key.startswith("clock."):
             continue
-        std = math.sqrt(min(max(best.covariance[j, j], 0.0), 1.0)) * own.std
+        std = math.sqrt(min(max(covariance[j, j], 0.0), 1.0)) * own.std
         value = model.numbers(best.z)[own.key]
         unit = model.unit(own.key)
         least, most = own.bounds
@@ -51,8 +54,15 @@ def ordinary_of(model: Likelihood, best: Fitted, car: Car) -> tuple[Ordinary, ..
             unit=unit,
         )  # fmt: skip
         given = car.value(own.key) if car.has(own.key) else own.mean
-        found.append(Ordinary(key=own.key, given=given, given_std=own.std, found=estimate))
+        found.append(
+            Ordinary(key=own.key, given=given, given_std=own.std, found=estimate, found_std=std)
+        )
     return tuple(found)
+
+
+def covariance_of(best: Fitted) -> Floats:
+    """Return the covariance of a model's numbers; where none was worked out, the car file's."""
+    return best.covariance if best.covariance.size else np.eye(len(best.z) + best.knobs)
 
 
 def tried_of(search: Search) -> tuple[Tried, ...]:
@@ -87,7 +97,7 @@ def effect_of(
     mine = upright(candidate, best.values[at : at + len(candidate.knobs)].tolist())
     for j, knob in enumerate(candidate.knobs):
         value, place = mine[j], own + at + j
-        told = WIDER * knob.step * math.sqrt(max(best.covariance[place, place], 0.0))
+        told = WIDER * knob.step * math.sqrt(max(covariance_of(best)[place, place], 0.0))
         spread = NINETY * math.hypot(
             told, _scatter(search.model, knob, value), LAW * _size(candidate, j, mine)
         )

@@ -87,7 +87,12 @@ class Fitter:
     def score(self, e: Floats, z: Floats) -> Floats:
         """Return Q of each column of innovations."""
         losses = self.part @ (TAIL * np.log1p(e * e / TAIL))
-        return np.asarray(losses + (np.atleast_2d(z) ** 2).sum(axis=1))
+        return np.asarray(losses + self.prior_loss(z))
+
+    def prior_loss(self, z: Floats) -> Floats:
+        """Return what the car file makes of each row of the car's own numbers, (n,)."""
+        rows = np.atleast_2d(z)
+        return np.asarray(((rows @ self.model.prior) * rows).sum(axis=1))
 
     def weights(self, e: Floats) -> Floats:
         """Return how much each innovation counts in a least-squares step, (events,)."""
@@ -129,8 +134,11 @@ class Fitter:
         e, ok = self.model(sets)
         weights = self.weights(base.e)
         jacobian = base.jacobian[:, : len(base.z)]
-        normal = _normal(jacobian, weights) + np.eye(len(base.z))
-        slopes = jacobian.T @ (weights[:, None] * np.nan_to_num(e)) + base.z[:, None]
+        normal = _normal(jacobian, weights) + self.model.prior
+        slopes = (
+            jacobian.T @ (weights[:, None] * np.nan_to_num(e))
+            + (self.model.prior @ base.z)[:, None]
+        )
         masked, found = dict[bytes, Floats](), list[Fitted]()
         better = dict[int, list[tuple[float, Trial]]]()
         for i, (effects, values) in enumerate(trials):
@@ -166,7 +174,7 @@ class Fitter:
         """
         own = np.linalg.pinv(normal) @ (jacobian.T @ (weights * change))
         left = weights * (change - jacobian @ own)
-        slope = float(left @ base.e) - float(own @ base.z)
+        slope = float(left @ base.e) - float(own @ self.model.prior @ base.z)
         size = float(left @ change)
         return (slope * slope / size, -slope / size) if size > 1e-9 else (0.0, 1.0)
 
@@ -253,11 +261,12 @@ class Fitter:
     def _plan(self, f: Fitted) -> "_Plan":
         """Return the quadratic that one fit's next step is to lower; renew its covariance."""
         own, knobs = len(f.z), _knobs(f)
-        prior = np.concatenate((np.ones(own), np.full(f.knobs, 1e-6)))
+        prior = np.diag(np.concatenate((np.ones(own), np.full(f.knobs, 1e-6))))
+        prior[:own, :own] = self.model.prior
         weights = self.weights(f.e)
-        normal = _normal(f.jacobian, weights) + np.diag(prior)
+        normal = _normal(f.jacobian, weights) + prior
         f.covariance = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
-        slope = f.jacobian.T @ (weights * f.e) + prior * np.concatenate((f.z, np.zeros(f.knobs)))
+        slope = f.jacobian.T @ (weights * f.e) + prior @ np.concatenate((f.z, np.zeros(f.knobs)))
         bounds = [
             [(k.bounds[side] - v) / k.step for k, v in zip(knobs, f.values, strict=True)]
             for side in (0, 1)

@@ -1,36 +1,35 @@
 """Free runs of the car as given and of the car as found, against the recording.
 
-A window starts in the smoothed measured motion and then gets nothing but the recorded commands.
-Errors are those at its end, root mean squares over windows of one part of the recordings.
+Windows are those of `scm.replay.free_run`, so `scm replay` of a car file finds the same errors:
+those at a window's end, root mean squares over windows of one part of the recordings.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from scm.arrays import Bools, Floats, Ints
+from scm.arrays import Bools, Floats
 from scm.data_quality.problem import Span
 from scm.errors import RecordingError
 from scm.mismatch.evidence import FreeRuns
 from scm.mismatch.findings import Fit, PartErrors
-from scm.mismatch.laws.sensed import put_right
 from scm.mismatch.leftover import on_one_axis
 from scm.mismatch.parts import NAMES, Parts
-from scm.mismatch.window_errors import poses_of, sensor_errors, turned
+from scm.mismatch.window_errors import sensor_errors
 from scm.recording.motion import Poses
 from scm.replay.camera import Camera
 from scm.replay.drive import STEP_S, Drive
-from scm.replay.numbers import Numbers
+from scm.replay.free_run import SAVE_EVERY_S, Replay
 from scm.replay.smooth import Smooth, smooth
-from scm.replay.windows import Runs, Side, Windows
+from scm.replay.windows import at_times
 from scm.vehicles.car import Car
 
 FAST_MPS, FAST_HORIZON_S, SLOW_HORIZON_S = 1.0, 1.0, 3.0
 SHORTEST_S = 0.2
 NEXT_S = 1.0  # between the starts of windows at most
-SHOWN_EVERY_S = 0.05
 DRAWS = 2
+START_DIGITS = 6  # of a window's start in a report [s]: whoever replays it starts there too
 WORSE = 1.02
 _BEFORE, _AFTER = 0, 1
 
@@ -40,11 +39,13 @@ class _Judged:
     """One drive's windows: errors by channel, each (sides, windows, values), and what is drawn.
 
     Attributes:
+        number: Of the drive.
         start_s: (windows,), by the poses' stamps; `part`: of each.
         floor: What noise alone makes of each error, (draws, windows, values).
         shown: Poses recorded, before and after, (3, windows, times).
     """
 
+    number: int
     start_s: Floats
     part: tuple[str, ...]
     errors: Mapping[str, Floats]
@@ -63,9 +64,8 @@ def horizon_of(drives: Sequence[Drive], parts: Parts) -> float:
 
 def judge(
     drives: Sequence[Drive],
-    car: Car,
-    before: Numbers,
-    after: Numbers,
+    before: Car,
+    after: Car,
     parts: Parts,
     horizon_s: float | None = None,
 ) -> tuple[Fit, FreeRuns]:
@@ -73,9 +73,8 @@ def judge(
 
     Args:
         drives: The recordings.
-        car: With every effect at its neutral numbers.
-        before: Numbers of the car as given, by key.
-        after: Numbers of the car as found; its faults of measurement act on what is predicted.
+        before: The car as given.
+        after: The car as found.
         parts: Of the recordings.
         horizon_s: Length of a window; None chooses it.
 
@@ -85,15 +84,15 @@ def judge(
     horizon = horizon_of(drives, parts) if horizon_s is None else horizon_s
     horizon = max(round(horizon / STEP_S) * STEP_S, SHORTEST_S)
     judged = [
-        replace(one, start_s=one.start_s + move)
-        for number, (drive, move) in enumerate(zip(drives, on_one_axis(drives), strict=True))
-        if (one := _judged(drive, car, (before, after), _spans(parts, number), horizon))
+        one
+        for number, drive in enumerate(drives)
+        if (one := _judged(drive, (before, after), _spans(parts, number), number, horizon))
     ]
     if not judged:
         msg = f"{drives[0].recording.path}: no window of {horizon:g} s without a gap in the poses"
         raise RecordingError(msg)
     every = {name: _part(judged, name) for name in NAMES}
-    return Fit(horizon_s=horizon, **every), _free_runs(judged, horizon)
+    return Fit(horizon_s=horizon, **every), _free_runs(judged, on_one_axis(drives), horizon)
 
 
 def nothing_got_worse(fit: Fit) -> tuple[str, ...]:
@@ -118,58 +117,124 @@ def _spans(parts: Parts, drive: int) -> list[tuple[str, Span]]:
 
 
 def _judged(
-    drive: Drive, car: Car, numbers: tuple[Numbers, Numbers], spans: Sequence[tuple[str, Span]],
+    drive: Drive, cars: tuple[Car, Car], spans: Sequence[tuple[str, Span]], number: int,
     horizon: float,
 ) -> _Judged | None:  # fmt: skip
-    right = put_right(drive, numbers[_AFTER]) or drive.smoothed
-    seen = (drive.smoothed, right)
-    sides = [Side(n, Camera(drive, n, poses)) for n, poses in zip(numbers, seen, strict=True)]
-    cameras = [Camera(drive, numbers[_AFTER], noisy) for noisy in _draws(drive, right)]
-    sides += [Side(numbers[_AFTER], camera, like=_AFTER) for camera in cameras]
-    stamps, part = _starts(drive, sides, spans, horizon)
-    if not len(stamps):
+    replays = [Replay(drive.recording, car) for car in cars]
+    starts, part = _starts(drive, replays, spans, horizon)
+    if not len(starts):
         return None
-    first, last = (
-        np.stack([side.camera.taken(at) for side in sides]) for at in (stamps, stamps + horizon)
-    )
-    starts: Ints = np.floor((first - drive.edges[0]) / STEP_S).astype(np.int64)
-    steps = round(horizon / STEP_S) + 2
-    runs = Windows(drive, car).run(sides, starts, steps)
-    fine: Bools = np.asarray(runs.ok.all(axis=0))
-    since = first - drive.edges[starts], last - drive.edges[starts]
-    errors, floor = _pose_errors(sides, runs, since[1], stamps + horizon)
-    for name, miss, noise in sensor_errors(drive, sides, runs, starts, since):
-        _join(errors, name, miss[: _AFTER + 1])
-        _join(floor, name, np.sqrt((miss[_AFTER + 1 :] - miss[_AFTER]) ** 2 + noise))
-    shown = _shown(sides, runs, stamps, drive.edges[starts], horizon)
+    noisy = [Camera(replays[_AFTER].drive, {}, poses) for poses in _draws(replays[_AFTER].drive)]
+    t_s = np.append(np.arange(0.0, horizon - 0.5 * SAVE_EVERY_S, SAVE_EVERY_S), horizon)
+    sides = [
+        _driven(replay, starts, t_s, cameras)
+        for replay, cameras in zip(replays, ((), noisy), strict=True)
+    ]
+    fine: Bools = np.asarray(np.all([side.ok for side in sides], axis=0))
+    apart = {name: [side.apart[name] for side in sides] for name in ("x", "y", "yaw")}
+    errors = {
+        "position_m": np.stack([
+            np.hypot(x[0, :, -1], y[0, :, -1])
+            for x, y in zip(apart["x"], apart["y"], strict=True)
+        ])[..., None],
+        "yaw_rad": np.stack([_wrapped(yaw[0, :, -1]) for yaw in apart["yaw"]])[..., None],
+    }  # fmt: skip
+    noise = {name: sides[_AFTER].apart[name][1:, :, -1] - apart[name][_AFTER][0, :, -1]
+             for name in apart}  # fmt: skip
+    floor = {
+        "position_m": np.hypot(noise["x"], noise["y"])[..., None],
+        "yaw_rad": _wrapped(noise["yaw"])[..., None],
+    }
+    for name, miss, chance in zip(
+        sides[_AFTER].names, _sensor_misses(sides), sides[_AFTER].chances, strict=True
+    ):
+        mine, draws = miss
+        _join(errors, name, mine)
+        _join(floor, name, np.sqrt((draws - mine[_AFTER]) ** 2 + chance))
+    measured = sides[_BEFORE].measured
+    shown = {
+        name: np.stack([measured[name], *(measured[name] + one[0] for one in apart[name])])
+        for name in measured
+    }
     return _Judged(
-        stamps[fine],
+        number,
+        starts[fine],
         tuple(name for name, ok in zip(part, fine, strict=True) if ok),
         {name: error[:, fine] for name, error in errors.items()},
         {name: error[:, fine] for name, error in floor.items()},
-        {name: values[..., fine, :] for name, values in shown.items()},
+        {name: values[:, fine] for name, values in shown.items()},
     )
 
 
-def _draws(drive: Drive, poses: Mapping[str, Smooth]) -> Iterator[dict[str, Smooth]]:
+@dataclass(frozen=True, slots=True)
+class _Driven:
+    """What one car did in all windows, its own side first and then those of noisy starts.
+
+    Attributes:
+        ok: Whether all stayed within physical bounds, (windows,).
+        apart: Simulated minus measured x, y [m] and yaw [rad], each (sides, windows, times).
+        measured: What was measured, each (windows, times).
+        names: Of the other sensors' errors; `misses` and `chances` of each: the error at a window's
+            end, (sides, windows), and its own variance.
+    """
+
+    ok: Bools
+    apart: Mapping[str, Floats]
+    measured: Mapping[str, Floats]
+    names: Sequence[str]
+    misses: Sequence[Floats]
+    chances: Sequence[float]
+
+
+def _driven(replay: Replay, starts: Floats, t_s: Floats, cameras: Sequence[Camera]) -> _Driven:
+    """Drive one car through all windows, from the measured motion and from noisy ones."""
+    runs, begun, _ = replay.run(starts, float(t_s[-1]), cameras)
+    at = replay.taken((starts[:, None] + t_s).ravel()).reshape(len(starts), -1)
+    edges = replay.drive.edges[begun[0]]
+    seen = [camera.motion(at.ravel()) for camera in (replay.camera, *cameras)]
+    signals = {"x": runs["x"], "y": runs["y"], "yaw": np.unwrap(runs["yaw"], axis=0)}
+    apart, sides = dict[str, Floats](), len(seen)
+    for name, signal in signals.items():
+        driven = np.stack([at_times(signal, np.tile(t - edges, (sides, 1))) for t in at.T], axis=2)
+        real = np.stack([getattr(moved, name).reshape(at.shape) for moved in seen])
+        apart[name] = driven - real
+    measured = {name: getattr(seen[0], name).reshape(at.shape) for name in signals}
+    since = (np.tile(at[:, 0] - edges, (sides, 1)), np.tile(at[:, -1] - edges, (sides, 1)))
+    ok: Bools = np.asarray(runs.ok.all(axis=0), dtype=np.bool_)
+    found = list(sensor_errors(replay.drive, runs, begun, since))
+    return _Driven(
+        ok, apart, measured, [name for name, _, _ in found],
+        [miss for _, miss, _ in found], [chance for _, _, chance in found],
+    )  # fmt: skip
+
+
+def _sensor_misses(sides: Sequence[_Driven]) -> list[tuple[Floats, Floats]]:
+    """Return, of each sensor, both cars' errors, (2, windows), and those of noisy starts."""
+    return [
+        (np.stack([before[0], after[0]]), after[1:])
+        for before, after in zip(sides[_BEFORE].misses, sides[_AFTER].misses, strict=True)
+    ]
+
+
+def _draws(drive: Drive) -> Iterator[dict[str, Smooth]]:
     """Yield smoothed poses as they would be with noise once more."""
     rng = np.random.default_rng(len(drive.edges))
     for _ in range(DRAWS):
         yield {
             name: smooth(s.t, s.value + std * rng.standard_normal(len(s.t)), std)
-            for name, s in poses.items()
+            for name, s in drive.smoothed.items()
             for std in (drive.stream(name).std,)
         }
 
 
 def _starts(
-    drive: Drive, sides: Sequence[Side], spans: Sequence[tuple[str, Span]], horizon: float
+    drive: Drive, replays: Sequence[Replay], spans: Sequence[tuple[str, Span]], horizon: float
 ) -> tuple[Floats, tuple[str, ...]]:
     """Return when windows start, by the poses' stamps, and the part of each.
 
     They lie within one block and have no gap in the poses.
     """
-    poses, edges = Poses(drive.recording), drive.edges
+    poses = Poses(drive.recording)
     found, part = list[float](), list[str]()
     for name, (begin, end) in spans:
         room = end - begin - horizon
@@ -177,55 +242,22 @@ def _starts(
             continue
         count = 1 + int(room / min(0.5 * horizon, NEXT_S) + 0.1)
         for start in np.linspace(begin, begin + max(room, 0.0), count):
-            ends = np.array([start, start + horizon + 2.0 * STEP_S])
-            taken = np.stack([side.camera.taken(ends) for side in sides])
-            inside = taken.min() >= edges[0] and taken.max() <= edges[-1] - STEP_S
+            inside = all(replay.holds(start, start + horizon) for replay in replays)
             if inside and poses.unbroken(start, start + horizon):
-                found.append(float(start))
+                found.append(round(float(start), START_DIGITS))
                 part.append(name)
     return np.array(found), tuple(part)
 
 
-def _pose_errors(
-    sides: Sequence[Side], runs: Runs, since: Floats, stamps: Floats
-) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """Return pose errors of both cars at the windows' ends, and those of noise alone."""
-    x, y, psi = poses_of(sides, runs, since)
-    recorded = [np.stack(each) for each in zip(
-        *(side.camera.recorded(stamps) for side in sides), strict=True)]  # fmt: skip
-    dx, dy, turn = x - recorded[0], y - recorded[1], turned(psi - recorded[2])
-    both, draws = slice(0, _AFTER + 1), slice(_AFTER + 1, None)
-    far = np.hypot(dx, dy)
-    noise = np.hypot(dx[draws] - dx[_AFTER], dy[draws] - dy[_AFTER])
-    return (
-        {"position_m": far[both, :, None], "yaw_rad": turn[both, :, None]},
-        {"position_m": noise[..., None], "yaw_rad": turned(turn[draws] - turn[_AFTER])[..., None]},
-    )
+def _wrapped(angle: Floats) -> Floats:
+    """Return angles in (-pi, pi]."""
+    return np.arctan2(np.sin(angle), np.cos(angle))
 
 
 def _join(errors: dict[str, Floats], name: str, more: Floats) -> None:
     """Add one stream's errors, (sides, windows), to its channel's."""
     more = more[..., None]
     errors[name] = np.concatenate((errors[name], more), axis=2) if name in errors else more
-
-
-def _shown(
-    sides: Sequence[Side], runs: Runs, stamps: Floats, edges: Floats, horizon: float
-) -> dict[str, Floats]:
-    """Return poses recorded, before and after along the windows, (3, windows, times)."""
-    both = sides[: _AFTER + 1]
-    times = np.append(np.arange(0.0, horizon - 0.5 * SHOWN_EVERY_S, SHOWN_EVERY_S), horizon)
-    out = {name: np.empty((3, len(stamps), len(times))) for name in ("x", "y", "yaw")}
-    part = replace(runs, signals={n: runs[n][:, : _AFTER + 1] for n in ("x", "y", "yaw")})
-    for k, t in enumerate(times):
-        since = np.stack([
-            side.camera.taken(stamps + t) - edges[i] for i, side in enumerate(both)
-        ])  # fmt: skip
-        found = poses_of(both, part, since)
-        recorded = both[0].camera.recorded(stamps + t)
-        for name, sim, real in zip(("x", "y", "yaw"), found, recorded, strict=True):
-            out[name][0, :, k], out[name][1:, :, k] = real, sim
-    return out
 
 
 def _part(judged: Sequence[_Judged], part: str) -> PartErrors:
@@ -252,15 +284,17 @@ def _part(judged: Sequence[_Judged], part: str) -> PartErrors:
     )
 
 
-def _free_runs(judged: Sequence[_Judged], horizon: float) -> FreeRuns:
+def _free_runs(judged: Sequence[_Judged], moves: Sequence[float], horizon: float) -> FreeRuns:
     sides = [
         {name: np.concatenate([one.shown[name][i] for one in judged]) for name in ("x", "y", "yaw")}
         for i in range(3)
     ]
     times = sides[0]["x"].shape[1]
-    t_s = np.append(SHOWN_EVERY_S * np.arange(times - 1), horizon)
+    t_s = np.append(SAVE_EVERY_S * np.arange(times - 1), horizon)
     return FreeRuns(
         part=tuple(name for one in judged for name in one.part),
-        start_s=np.concatenate([one.start_s for one in judged]),
+        recording=np.concatenate([np.full(len(one.start_s), one.number) for one in judged]),
+        stamp_s=np.concatenate([one.start_s for one in judged]),
+        start_s=np.concatenate([one.start_s + moves[one.number] for one in judged]),
         t_s=t_s, measured=sides[0], before=sides[1], after=sides[2],
     )  # fmt: skip

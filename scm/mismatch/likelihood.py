@@ -3,6 +3,7 @@
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -54,6 +55,18 @@ def ordinary_numbers(car: Car, params: Sequence[Param]) -> tuple[Ordinary, ...]:
             std = max(std, LEAST_SCATTER.get(param.key, 0.0) * abs(mean))
             found[param.key] = Ordinary(param.key, mean, std, param.bounds)
     return (*found.values(), *_CLOCKS)
+
+
+def prior_precision(car: Car, keys: Sequence[str]) -> Floats:
+    """Return the inverse of the correlations that the car file states between numbers, (n, n)."""
+    at, found = {key: i for i, key in enumerate(keys)}, np.eye(len(keys))
+    for block in car.correlated:
+        mine = [j for j, key in enumerate(block.numbers) if key in at]
+        where = [at[block.numbers[j]] for j in mine]
+        if where:
+            matrix = np.array(block.matrix)[np.ix_(mine, mine)]
+            found[np.ix_(where, where)] = np.linalg.inv(matrix)
+    return found
 
 
 class _Recent:
@@ -117,6 +130,11 @@ class Likelihood:
         self.believe(usual_noise(drives))
         self.runs = 0
         self.asked: Callable[[], None] = lambda: None
+
+    @cached_property
+    def prior(self) -> Floats:
+        """Precision of the car's own numbers `z` before anything is measured, (n, n)."""
+        return prior_precision(self.car, [o.key for o in self.ordinary])
 
     def unit(self, key: str) -> str:
         """Return the unit of one of the car's numbers."""

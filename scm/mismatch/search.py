@@ -372,12 +372,11 @@ class Search:
         while best.effects:
             others = self._without_each(best)
             fitter = Fitter(self.model, unseen)
-            own = float(best.z @ best.z)
+            own = float(fitter.prior_loss(best.z)[0])
             seen = fitter.score(best.e[:, None], best.z)[0] - own
             seen_gains = np.array([max(f.q - best.q, 0.0) for f in others])
-            gains = np.array(
-                [float(fitter.score(f.e[:, None], f.z)[0] - f.z @ f.z - seen) for f in others]
-            )
+            losses = [fitter.score(f.e[:, None], f.z) - fitter.prior_loss(f.z) for f in others]
+            gains = np.concatenate(losses) - seen
             shown = np.array([float(fitter.weights(best.e) @ (f.e - best.e) ** 2) for f in others])
             least = np.where(self._pays(best, seen_gains), shown - CHANCE * np.sqrt(shown), np.inf)
             asked = self.holds * np.minimum(share * seen_gains, least)

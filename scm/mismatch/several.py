@@ -144,14 +144,19 @@ def diagnose_several(
     return Several(found, tuple(common), seconds(clock.now_ns() - began_ns))
 
 
-def write_all(several: Several, out: Path) -> None:
+def write_all(several: Several, out: Path, check: Callable[[str], str] = lambda _: "") -> None:
     """Write each car's report into its folder, and the page and `cars.json` of them all.
+
+    Args:
+        several: To be written.
+        out: The folder.
+        check: Gives, by a car's name, the command that works out its figures again.
 
     Raises:
         ScmError: when a folder cannot be written.
     """
     for name, found in several.cars.items():
-        write(found, out / name)
+        write(found, out / name, check(name))
     diagnoses = {name: found.diagnosis for name, found in several.cars.items()}
     recordings = {name: found.evidence.recordings for name, found in several.cars.items()}
     write_several(diagnoses, recordings, several.common, several.runtime_s, out)

@@ -1,6 +1,6 @@
 """What free runs' windows show at their ends, as every sensor would have recorded it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -9,40 +9,18 @@ from scm.mismatch.predict import Prediction
 from scm.mismatch.rollouts import Motions
 from scm.replay.drive import STEP_S, Drive, Stream
 from scm.replay.numbers import NEUTRAL
-from scm.replay.windows import Runs, Side
+from scm.replay.windows import Runs, at_times
 
 END_S = 0.2  # speeds are means over the window's end of this length
 
 
-def taken(signal: Floats, since: Floats) -> Floats:
-    """Return signals (steps + 1, sides, windows) at times since the start, (sides, windows)."""
-    at = since / STEP_S
-    row = np.clip(at.astype(np.int64), 0, len(signal) - 2)
-    low = np.take_along_axis(signal, row[None], axis=0)[0]
-    high = np.take_along_axis(signal, row[None] + 1, axis=0)[0]
-    return np.asarray(low + (at - row) * (high - low))
-
-
-def turned(angle: Floats) -> Floats:
-    """Return angles in (-pi, pi]."""
-    return np.arctan2(np.sin(angle), np.cos(angle))
-
-
-def poses_of(sides: Sequence[Side], runs: Runs, since: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return what each side's camera would have recorded, each (sides, windows)."""
-    yaw = np.unwrap(runs["yaw"], axis=0)
-    at = [taken(signal, since) for signal in (runs["x"], runs["y"], yaw)]
-    seen = [side.camera.seen(*(s[i] for s in at)) for i, side in enumerate(sides)]
-    x, y, psi = (np.stack(each) for each in zip(*seen, strict=True))
-    return x, y, psi
-
-
 def sensor_errors(
-    drive: Drive, sides: Sequence[Side], runs: Runs, starts: Ints, since: tuple[Floats, Floats]
+    drive: Drive, runs: Runs, starts: Ints, since: tuple[Floats, Floats]
 ) -> Iterator[tuple[str, Floats, float]]:
     """Yield name, error (sides, windows) and own variance of what every other sensor shows.
 
-    Rates are summed over the window, speeds are means at its end.
+    Rates are summed over the window, speeds are means at its end. Faults of these sensors that the
+    car file states are part of what it predicts.
     """
     prediction, radius = Prediction(drive), drive.car.value("wheel.radius_m")
     shape = (len(next(iter(runs.signals.values()))), -1)
@@ -50,7 +28,7 @@ def sensor_errors(
         {k: v.reshape(shape) for k, v in runs.signals.items()}, runs.ok.ravel().astype(np.float64)
     )
     faults = {
-        key: np.repeat([side.numbers.get(key, neutral) for side in sides], starts.shape[1])
+        key: np.full(starts.size, drive.car.value(key) if drive.car.has(key) else neutral)
         for key, neutral in NEUTRAL.items()
     }
     begin = drive.edges[starts]
@@ -63,12 +41,12 @@ def sensor_errors(
         length = since[1] - first
         seen = _sums(stream, begin + first, begin + since[1], kind)
         if kind == "count":
-            meant = taken(signal, since[1]) - taken(signal, first)
+            meant = at_times(signal, since[1]) - at_times(signal, first)
             variance = 2.0 * stream.std**2
         else:
             total = np.zeros_like(signal)
             np.cumsum(0.5 * STEP_S * (signal[1:] + signal[:-1]), axis=0, out=total[1:])
-            meant = taken(total, since[1]) - taken(total, first)
+            meant = at_times(total, since[1]) - at_times(total, first)
             pace = float(np.median(np.diff(stream.t)))
             variance = stream.std**2 * pace * float(length.mean())
         scale = per_unit / (END_S if kind == "end" else 1.0)

@@ -23,7 +23,8 @@ FASTEST_HZ = {"imu.accel_x": 25.0, "imu.accel_y": 25.0, "imu.gyro_z": 50.0, "yaw
               "encoder.left": 25.0, "encoder.right": 25.0}  # fmt: skip
 FASTEST_POSE_HZ = 50.0
 RUN_IN_S = 1.0
-MOVING_MPS = 0.2  # a car that begins faster was commanded before its recording began
+MOVING_MPS = 0.2  # a car that begins faster was commanded before its recording began;
+CREEPING_MPS, MOVING_SEEN_S = 0.05, 0.2  # or this fast, where poses show it before its commands
 WHEELS = {"encoder.left": "rl", "encoder.right": "rr"}
 KNOWN = (
     "pose.x", "pose.y", "pose.yaw", "imu.gyro_z", "yaw_rate", "encoder.left", "encoder.right",
@@ -86,8 +87,11 @@ class Drive:
         self.edges: Floats = np.asarray(first + STEP_S * np.arange(steps + 1), dtype=np.float64)
         self.battery = commands.voltage(self.edges)
         self.streams: Sequence[Stream] = [stream.within(first, last) for stream in streams]
-        x, y = (self.smoothed[f"pose.{axis}"].rate[0] for axis in ("x", "y"))
-        moving = bool(np.hypot(x, y) > MOVING_MPS)
+        around = first - RUN_IN_S, last + RUN_IN_S  # a smoothed rate is poor at its very ends
+        self._poses = {s.name: s.within(*around) for s in streams if s.name in POSES}
+        x, y = (self.smoothed[f"pose.{axis}"] for axis in ("x", "y"))
+        at_start = float(np.hypot(x.rate_at(self.edges[:1]), y.rate_at(self.edges[:1]))[0])
+        moving = at_start > (MOVING_MPS if x.t[0] > first - MOVING_SEEN_S else CREEPING_MPS)
         self.throttle = _commanded(*throttle, moving=moving)
         self.steering = _commanded(*steering, moving=moving)
 
@@ -103,7 +107,7 @@ class Drive:
     @cached_property
     def smoothed(self) -> dict[str, Smooth]:
         """The poses, smoothed without a car model, of the point that was measured."""
-        return {name: smooth(s.t, s.values, s.std) for name in POSES for s in (self.stream(name),)}
+        return {name: smooth(s.t, s.values, s.std) for name, s in self._poses.items()}
 
     @cached_property
     def turned(self) -> Floats:

@@ -1,32 +1,37 @@
 """Drive a recording again: free runs of the simulator from the measured state, and their error.
 
-Every window starts from the measured pose and velocities and then gets nothing but the recorded
-commands. All windows run side by side as rows of one fleet. Before a window starts, its commands of
-the last second run the actuators in, so that servo and lags begin where they were. A car whose
-drive knows its battery gets the voltage that was measured. Faults of measurement that the car file
-states, such as a tilted camera, are undone in the poses first.
+A window starts in the smoothed measured motion and then gets nothing but the recorded commands. All
+windows run side by side as rows of one fleet. What else a car remembers where a window starts, such
+as its servo's angle or its motor's heat, comes from the same car having driven the whole recording
+up to there. Faults of the poses that the car file states, such as a tilted camera, are taken out of
+the recording first. A report of `scm mismatch` is judged by these same windows.
 """
 
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from scm.arrays import Floats
+from scm.arrays import Floats, Ints
 from scm.errors import RecordingError
-from scm.geometry import Pose2
-from scm.recording.motion import Motion, Poses
+from scm.recording.motion import Poses
 from scm.recording.read import Recording
+from scm.replay.camera import Camera
 from scm.replay.commands import Commands
+from scm.replay.drive import STEP_S, Drive
+from scm.replay.windows import Runs, Side, Windows, at_times
 from scm.vehicles.car import Car
 from scm.vehicles.drive_channel import drive_name
-from scm.vehicles.fleet import Fleet
 from scm.vehicles.undone import without_faults
 
-STEP_S = 0.005
-RUN_IN_S = 1.0
 HORIZONS_S = (0.5, 1.0, 3.0)
 SHORTEST_HORIZON_S = 0.05
+SAVE_EVERY_S = 0.05
+TINY_S = 1e-6
+FEWEST_POSES = 4  # of which a smoothed motion can be made
 NEEDED = ("command.steering", "pose.x", "pose.y", "pose.yaw")
+GAP, DIVERGED = "a gap or a jump in the poses", "the simulated car left physical bounds"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +42,9 @@ class FreeRun:
         start_s: When each window starts on the recording's clock, shape `(windows,)`.
         t_s: Time since the window's start, shape `(times,)`.
         x, y, yaw, speed: Simulated.
-        x_measured, y_measured, yaw_measured, speed_measured: From the recording, without the faults
-            of measurement in the car file; NaN in a gap.
+        x_measured, y_measured, yaw_measured, speed_measured: From the recording, smoothed, without
+            the faults of measurement in the car file.
+        left_out: How many windows are not here, by reason.
     """
 
     start_s: Floats
@@ -51,6 +57,7 @@ class FreeRun:
     y_measured: Floats
     yaw_measured: Floats
     speed_measured: Floats
+    left_out: Mapping[str, int]
 
     def position_error(self) -> Floats:
         """Return the distance between simulated and measured position [m]."""
@@ -78,10 +85,94 @@ def _refuse_incomplete(recording: Recording, car: Car) -> None:
         raise RecordingError(msg + (hint if speed else ""))
 
 
+class Replay:
+    """One recording as one car file explains it, to be driven again in windows.
+
+    Attributes:
+        drive: The recording on the simulation's grid, without the faults that the car file states.
+    """
+
+    def __init__(self, recording: Recording, car: Car) -> None:
+        _refuse_incomplete(recording, car)
+        self.recording, self.car = recording, car
+        right = without_faults(recording, car.faults)
+        _refuse_apart(right, car)
+        self.drive = Drive(right, car)
+        self.camera = Camera(self.drive, {})
+        self._stamps = recording.channel("pose.x").t
+        self._taken = right.channel("pose.x").t
+        self._windows = Windows(self.drive, car)
+
+    def taken(self, stamps: Floats) -> Floats:
+        """Return when poses of these stamps were taken, on the commands' clock [s]."""
+        if np.array_equal(self._stamps, self._taken):
+            return stamps
+        late = np.interp(stamps, self._stamps, self._stamps - self._taken)
+        return np.asarray(stamps - late)
+
+    def stamp(self, taken_s: float) -> float:
+        """Return the stamp of a pose taken at a time on the commands' clock [s]."""
+        return float(np.interp(taken_s, self._taken, self._stamps))
+
+    def holds(self, first: Floats, last: Floats) -> bool:
+        """Return whether poses and commands cover the time between two stamps."""
+        edges = self.drive.edges
+        begin, end = float(self.taken(first).min()), float(self.taken(last).max())
+        return bool(begin >= edges[0] - TINY_S and end <= edges[-1] + STEP_S)
+
+    def run(
+        self, starts_s: Floats, horizon_s: float, cameras: Sequence[Camera] = ()
+    ) -> tuple[Runs, Ints, Floats]:
+        """Drive windows again.
+
+        Args:
+            starts_s: Stamps at which they start, (windows,), rising.
+            horizon_s: Length of a window.
+            cameras: Other views of the measured motion to start from, each a side beside the first.
+
+        Returns:
+            What the sides did, the edges at which their windows began, (sides, windows), and each
+            window's start since its edge, (windows,).
+        """
+        taken = self.taken(starts_s)
+        begun = np.floor((taken - self.drive.edges[0]) / STEP_S + TINY_S).astype(np.int64)
+        begun = np.clip(begun, 0, len(self.drive.edges) - 1)
+        sides = [Side({}, self.camera), *(Side({}, camera, like=0) for camera in cameras)]
+        starts: Ints = np.tile(begun, (len(sides), 1))
+        steps = int(np.ceil(horizon_s / STEP_S - TINY_S)) + 1
+        return self._windows.run(sides, starts, steps), starts, taken - self.drive.edges[begun]
+
+
+def _refuse_apart(recording: Recording, car: Car) -> None:
+    """Refuse poses and commands that share too little time to be driven again."""
+    poses, commands = Poses(recording), Commands(recording, car).span_s
+    together = min(float(poses.t[-1]), commands[1]) - max(float(poses.t[0]), commands[0])
+    if len(poses.t) < FEWEST_POSES or together < SHORTEST_HORIZON_S:
+        raise RecordingError(_too_short(recording, poses, commands, "nothing to drive again"))
+
+
+def _too_short(recording: Recording, poses: Poses, commands: tuple[float, float], why: str) -> str:
+    return (
+        f"{recording.path}: {why}: poses from {poses.t[0]:.3f} s to {poses.t[-1]:.3f} s, "
+        f"commands from {commands[0]:.3f} s to {commands[1]:.3f} s"
+    )
+
+
 def free_run(
-    recording: Recording, car: Car, horizon_s: float = 3.0, save_every_s: float = 0.05
+    recording: Recording,
+    car: Car,
+    horizon_s: float = 3.0,
+    save_every_s: float = SAVE_EVERY_S,
+    starts_s: Floats | None = None,
 ) -> FreeRun:
-    """Simulate every whole window of `horizon_s` that the recording holds.
+    """Simulate windows of `horizon_s`: every whole one that the recording holds, or those given.
+
+    Args:
+        recording: Screened, and without long gaps.
+        car: To be held against it.
+        horizon_s: Length of a window.
+        save_every_s: Between the times that are returned.
+        starts_s: Stamps at which windows start, (windows,); None: end to end.
 
     Raises:
         RecordingError: when a needed channel is missing or no window is whole.
@@ -89,111 +180,67 @@ def free_run(
     if not SHORTEST_HORIZON_S <= horizon_s < np.inf:
         msg = f"horizon: got {horizon_s:g} s, expected {SHORTEST_HORIZON_S:g} s or more"
         raise RecordingError(msg)
-    _refuse_incomplete(recording, car)
-    recording = without_faults(recording, car.faults)
-    poses, commands = Poses(recording), Commands(recording, car)
-    starts, initial = _windows(recording, poses, commands, horizon_s)
-    fleet = Fleet(car, len(starts) + 1)
-    _run_in(fleet, commands, starts, initial)
+    replay = Replay(recording, car)
+    starts, left_out = _whole_windows(replay, horizon_s) if starts_s is None else (starts_s, {})
+    runs, begun, _ = replay.run(starts, horizon_s)
+    ok = runs.ok[0]
+    if not ok.all():
+        left_out = {**left_out, DIVERGED: int((~ok).sum())}
     t_s: Floats = np.append(np.arange(0.0, horizon_s - 0.5 * STEP_S, save_every_s), horizon_s)
-    steps = np.diff(np.rint(t_s / STEP_S).astype(np.int64))
-    x, y, yaw, speed = (np.empty((len(starts), len(t_s))) for _ in range(4))
-    for k, t in enumerate(t_s):
-        for out, now in zip(
-            (x, y, yaw, speed), (fleet.x, fleet.y, fleet.yaw, fleet.speed), strict=True
-        ):
-            out[:, k] = now[: len(starts)]
-        if k < len(steps):
-            _advance(fleet, commands, starts + t, int(steps[k]))
-    measured = poses.motion((starts[:, None] + t_s).ravel())
+    at = replay.taken((starts[:, None] + t_s).ravel()).reshape(len(starts), -1)
+    after = at - replay.drive.edges[begun[0]][:, None]
+    yaw = np.unwrap(runs["yaw"], axis=0)
+    x, y, psi, speed = (
+        np.stack([at_times(signal, after[None, :, k])[0] for k in range(len(t_s))], axis=1)[ok]
+        for signal in (runs["x"], runs["y"], yaw, runs["speed"])
+    )
+    measured = replay.camera.motion(at[ok].ravel())
     return FreeRun(
-        start_s=starts,
+        start_s=starts[ok],
         t_s=t_s,
         x=x,
         y=y,
-        yaw=yaw,
+        yaw=psi,
         speed=speed,
         x_measured=measured.x.reshape(x.shape),
         y_measured=measured.y.reshape(x.shape),
         yaw_measured=measured.yaw.reshape(x.shape),
         speed_measured=measured.speed.reshape(x.shape),
+        left_out=left_out,
     )
 
 
-def _windows(
-    recording: Recording, poses: Poses, commands: Commands, horizon_s: float
-) -> tuple[Floats, Motion]:
-    """Return the starts of whole windows, end to end, and the measured motion there."""
-    (first_command, last_command), tiny = commands.span_s, 1e-6
-    first = max(poses.t[0], first_command)
-    span = min(poses.t[-1], last_command) - first
-    if span < horizon_s - tiny:
-        msg = (
-            f"{recording.path}: no window of {horizon_s:g} s: poses from {poses.t[0]:.3f} s to "
-            f"{poses.t[-1]:.3f} s, commands from {first_command:.3f} s to {last_command:.3f} s"
+def joined(runs: Sequence[FreeRun]) -> FreeRun:
+    """Return the windows of several stretches as one run."""
+    names = [field.name for field in fields(FreeRun) if field.name not in ("t_s", "left_out")]
+    together = {name: np.concatenate([getattr(run, name) for run in runs]) for name in names}
+    left_out = Counter[str]()
+    for run in runs:
+        left_out.update(run.left_out)
+    return FreeRun(t_s=runs[0].t_s, left_out=dict(left_out), **together)
+
+
+def _whole_windows(replay: Replay, horizon_s: float) -> tuple[Floats, dict[str, int]]:
+    """Return the stamps at which whole windows start, end to end, and how many are left out."""
+    recording = replay.recording
+    poses = Poses(recording)
+    commands = Commands(recording, replay.car).span_s
+    seen = replay.taken(poses.t[[0, -1]])
+    first = max(float(seen[0]), commands[0])
+    span = min(float(seen[1]), commands[1]) - first
+    if span < horizon_s - TINY_S:
+        raise RecordingError(
+            _too_short(recording, poses, commands, f"no window of {horizon_s:g} s")
         )
-        raise RecordingError(msg)
-    every: Floats = first + horizon_s * np.arange(int((span + tiny) / horizon_s))
-    starts = np.array([t for t in every if poses.unbroken(t, t + horizon_s - tiny)])
-    initial = poses.motion(starts)
-    if not initial.valid.any():
+    begin_s = replay.stamp(first)
+    count = int((span + TINY_S) / horizon_s)
+    every: Floats = begin_s + horizon_s * np.arange(count, dtype=np.float64)
+    whole = [poses.unbroken(t, t + horizon_s - TINY_S) for t in every]
+    if not any(whole):
         msg = f"{recording.path}: no window of {horizon_s:g} s without a gap in the poses"
         raise RecordingError(msg)
-    keep = initial.valid
-    return starts[keep], poses.motion(starts[keep])
-
-
-def _run_in(fleet: Fleet, commands: Commands, starts: Floats, initial: Motion) -> None:
-    """Put a car at the start of every window, all it remembers as the whole drive before left it.
-
-    One more car drives the recording through; where a window starts it is copied and put in the
-    measured place and motion. So servo, lags, motor heat and the time since the start are right.
-    """
-    poses = [Pose2(*at) for at in zip(initial.x, initial.y, initial.yaw, strict=True)]
-    leader = fleet.capacity - 1
-    fleet.alive[leader] = True
-    fleet.place(leader, poses[0], float(initial.speed[0]))
-    now = float(starts[0]) - RUN_IN_S
-    for row, start in enumerate(starts):
-        _lead(fleet, leader, commands, now, round((start - now) / STEP_S))
-        now = float(start)
-        time = float(fleet.time[leader])
-        fleet.copy_row(leader, row)
-        fleet.place(
-            row,
-            poses[row],
-            float(initial.speed[row]),
-            float(initial.lateral_speed[row]),
-            float(initial.yaw_rate[row]),
-            keep_actuators=True,
-        )
-        fleet.time[row] = time - RUN_IN_S
-    fleet.remove(leader)
-
-
-def _lead(fleet: Fleet, row: int, commands: Commands, t: float, steps: int) -> None:
-    """Advance one car alone by `steps` from the time `t`."""
-    for k in range(steps):
-        at = np.array([t + k * STEP_S])
-        throttle, steering = commands.at(at)
-        fleet.throttle[row], fleet.steering[row] = throttle[0], steering[0]
-        voltage = commands.voltage(at)
-        if voltage is not None:
-            fleet.battery[row] = voltage[0]
-        fleet.advance_rows(row, row + 1, STEP_S)
-
-
-def _advance(fleet: Fleet, commands: Commands, t: Floats, steps: int) -> None:
-    """Advance every window by `steps` from its own time `t`, shape `(windows,)`."""
-    n = len(t)
-    for k in range(steps):
-        throttle, steering = commands.at(t + k * STEP_S)
-        fleet.throttle[:n] = throttle
-        fleet.steering[:n] = steering
-        voltage = commands.voltage(t + k * STEP_S)
-        if voltage is not None:
-            fleet.battery[:n] = voltage
-        fleet.advance(STEP_S)
+    broken = len(every) - sum(whole)
+    return every[np.array(whole)], {GAP: broken} if broken else {}
 
 
 def error_table(

@@ -26,6 +26,7 @@ from scm.replay.numbers import (
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 
+BEYOND_STEPS = 3  # behind the last edge, for which commands hold
 KEPT = ("x", "y", *SIGNALS, "yaw")
 
 
@@ -113,13 +114,17 @@ class Windows:
         return self._free(fleet, commands, starts, steps, len(leaders))
 
     def _commands(self, numbers: Numbers) -> Floats:
-        """Return throttle and steering of each step, as late as the numbers say, (2, steps)."""
+        """Return throttle and steering of each step, as late as the numbers say, (2, steps).
+
+        They go on for a few steps behind the drive: its last window may end between two edges.
+        """
         late = [
             sum(numbers.get(key, 0.0) for key in (COMMAND_CLOCK, *keys))
             for keys in ((THROTTLE_DELAY, THROTTLE_CLOCK), (STEERING_DELAY,))
         ]
         before = STEP_S * np.arange(-round(RUN_IN_S / STEP_S), 0)
-        edges = np.concatenate((self.drive.edges[0] + before, self.drive.edges))
+        after = self.drive.edges[-1] + STEP_S * np.arange(1, BEYOND_STEPS + 1)
+        edges = np.concatenate((self.drive.edges[0] + before, self.drive.edges, after))
         return np.stack([
             command.means(edges, np.array([delay]))[:, 0]
             for command, delay in zip((self.drive.throttle, self.drive.steering), late, strict=True)
@@ -174,7 +179,8 @@ class Windows:
         fleet.time[row] = fleet.time[leader]
         turned = fleet.wheel_angle[leader]
         fleet.wheel_angle[row] = turned + np.tile(self.drive.turned[now] - turned[2:], 2)
-        fleet.battery[row] = fleet.battery[leader]
+        if self.drive.battery is not None:
+            fleet.battery[row] = self.drive.battery[now]
         fleet.alive[row] = False
 
     def _push(self, fleet: Fleet, row: int, push: tuple[float, float]) -> None:
@@ -195,7 +201,7 @@ class Windows:
             rows = slice(leaders + i * windows, leaders + (i + 1) * windows)
             wide[:, :, rows] = command[:, run_in + at[i]]
         first = {name: _signal(fleet, name)[leaders:] for name in KEPT}
-        got = fleet.rollout(wide[0], wide[1], STEP_S, KEPT)
+        got = self._rolled(fleet, wide, starts.ravel(), leaders)
         signals = {
             name: np.concatenate((first[name][None], got[name][:, leaders:])).reshape(
                 steps + 1, sides, windows
@@ -204,6 +210,27 @@ class Windows:
         }
         ok = fleet.status[leaders:].reshape(sides, windows) == VehicleStatus.OK
         return Runs(signals, ok)
+
+    def _rolled(self, fleet: Fleet, wide: Floats, starts: Ints, leaders: int) -> dict[str, Floats]:
+        """Drive all windows through their commands, at the voltage measured meanwhile."""
+        battery = self.drive.battery
+        if battery is None:
+            return dict(fleet.rollout(wide[0], wide[1], STEP_S, KEPT))
+        parts = []
+        for a in range(0, wide.shape[1], TETHER_STEPS):
+            part = wide[:, a : a + TETHER_STEPS]
+            fleet.battery[leaders:] = battery[np.minimum(starts + a, len(battery) - 1)]
+            parts.append(fleet.rollout(part[0], part[1], STEP_S, KEPT))
+        return {name: np.concatenate([part[name] for part in parts]) for name in KEPT}
+
+
+def at_times(signal: Floats, since: Floats) -> Floats:
+    """Return signals (steps + 1, sides, windows) at times since the start, (sides, windows)."""
+    at = since / STEP_S
+    row = np.clip(at.astype(np.int64), 0, len(signal) - 2)
+    low = np.take_along_axis(signal, row[None], axis=0)[0]
+    high = np.take_along_axis(signal, row[None] + 1, axis=0)[0]
+    return np.asarray(low + (at - row) * (high - low))
 
 
 def _place(fleet: Fleet, row: int, moved: Moved, i: int) -> None:

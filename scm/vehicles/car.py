@@ -17,6 +17,7 @@ from scm.errors import CarError, TermError, nearest
 from scm.vehicles import body14
 from scm.vehicles.assemble import setters_of
 from scm.vehicles.car_files import TYPES_DIR, car_files
+from scm.vehicles.correlated import Correlated, read_correlated
 from scm.vehicles.facts import FACTS, Fact
 from scm.vehicles.measure import Fault, all_measures, read_faults
 from scm.vehicles.own_term import SUFFIX, load_own_term
@@ -50,6 +51,7 @@ class Car:
 
     Attributes:
         measures: What its recordings are known to get wrong, without numbers; see `faults`.
+        correlated: Groups of numbers whose errors are correlated; all others are independent.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Car:
     terms: tuple[Term, ...]
     values: Mapping[str, Quantity]
     measures: tuple[Fault, ...] = ()
+    correlated: tuple[Correlated, ...] = ()
 
     @property
     def faults(self) -> tuple[Fault, ...]:
@@ -210,6 +213,8 @@ def car_of(data: Mapping[str, Any], path: Path, *, trusted: bool = True) -> Car:
     values = _defaults(terms) | _fault_defaults(faults) | _fact_defaults(data)
     values |= _values(data, terms, problems)
     problems += _contradictions(data, values)
+    stds = {key: quantity.std for key, quantity in values.items()}
+    correlated = read_correlated(data.get("correlated", []), stds, problems)
     try:
         setters_of(terms)
     except TermError as error:
@@ -220,7 +225,7 @@ def car_of(data: Mapping[str, Any], path: Path, *, trusted: bool = True) -> Car:
         rear = 0.0 if values["drive.layout"].value == "front" else 1.0
         values["drive.rear_driven"] = Quantity(rear, None, "1", "drive.layout")
     name, scale = str(data.get("name", path.stem)), str(data.get("scale", ""))
-    return Car(name, scale, path, terms, values, faults)
+    return Car(name, scale, path, terms, values, faults, correlated)
 
 
 def _terms(data: Mapping[str, Any], folder: Path | None, problems: list[str]) -> tuple[Term, ...]:
@@ -332,10 +337,10 @@ def _top_problems(data: Mapping[str, Any], sections: set[str]) -> Iterator[str]:
                 yield f"{name}: expected text, got {body!r}"
             elif name == "name" and not re.fullmatch(r"[A-Za-z0-9_-]{1,40}", body):
                 yield f"name: expected up to 40 letters, digits, - and _, got {body!r}"
-        elif name not in {"terms", "measures"} and (
+        elif name not in {"terms", "measures", "correlated"} and (
             name not in sections or not isinstance(body, dict)
         ):
-            valid = [*sorted(sections), "measures", "name", "scale", "terms"]
+            valid = [*sorted(sections), "correlated", "measures", "name", "scale", "terms"]
             yield f"[{name}]: no such section{nearest(name, valid)}"
 
 

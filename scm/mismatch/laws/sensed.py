@@ -14,9 +14,8 @@ from scm.mismatch.findings import Equation
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate, Knob
 from scm.mismatch.rollouts import Motions, Tiles
-from scm.replay.drive import POSES, STEP_S, Drive
+from scm.replay.drive import STEP_S, Drive
 from scm.replay.numbers import Numbers
-from scm.replay.smooth import Smooth, smooth
 from scm.vehicles.car import Car
 
 PREFIX = "sensed."
@@ -136,29 +135,6 @@ def sensor_laws() -> tuple[Sensed, ...]:
         )
         for i, (channel, word, knob, unit, step, said, law, reads) in enumerate(_TABLE)
     )  # fmt: skip
-
-
-def put_right(drive: Drive, numbers: Numbers) -> Mapping[str, Smooth] | None:
-    """Return a drive's smoothed poses without what laws of its camera read too much.
-
-    None where the numbers name no such law. A law is taken at the pose that was measured, as it was
-    when it was fitted.
-    """
-    laws = [law for law in sensor_laws() if numbers.get(law.knobs[0].key)]
-    wrong = dict[str, Floats]()
-    for law in (one for one in laws if one.name.startswith("camera")):
-        for name in POSES:
-            t = drive.stream(name).t
-            seen = {n[-1]: drive.smoothed[n].at(t) for n in POSES[:2]}
-            read = law.reads({**seen, "yaw": drive.smoothed["pose.yaw"].at(t)}).get(name)
-            if read is not None:
-                more = numbers[law.knobs[0].key] * read
-                wrong[name] = wrong.get(name, np.zeros(len(t))) + more
-    if not wrong:
-        return None
-    streams = {name: drive.stream(name) for name in wrong}
-    right = {n: smooth(s.t, s.values - wrong[n], s.std) for n, s in streams.items()}
-    return {**drive.smoothed, **right}
 
 
 class Sensing(Likelihood):

@@ -5,6 +5,7 @@ recording, with its 90 % interval, and what stood there before.
 """
 
 import math
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -57,6 +58,7 @@ def _says(path: Path, patched: Car) -> bool:
     same = same and list(map(measure_entry, read.measures)) == list(
         map(measure_entry, patched.measures)
     )
+    same = same and read.correlated == patched.correlated
     return same and all(
         key in read.values and _equal(read.values[key].value, quantity.value, rel_tol=1e-5)
         for key, quantity in patched.values.items()
@@ -81,13 +83,17 @@ def _entries(
     """Yield key and new text of each number that the given car's file does not say."""
     stands = _file_entries(car.path)
     estimates = estimates_by_key(diagnosis, evidence, car, patched)
+    stds = {one.key: one.found_std for one in evidence.ordinary}
     for key, quantity in patched.values.items():
         old = stands.get(key)
         told = old is not None and _equal(_value_of(old), quantity.value)
         silent = old is None and quantity.source.startswith(("default", "drive.layout"))
         if not told and not silent:
             moved = key not in car.values or car.values[key].value != quantity.value
-            yield key, _entry(quantity, estimates.get(key), old, evidence, moved=moved)
+            yield (
+                key,
+                _entry(quantity, estimates.get(key), stds.get(key), old, evidence, moved=moved),
+            )
 
 
 def _file_entries(path: Path) -> _Entries:
@@ -108,6 +114,7 @@ def _value_of(entry: Mapping[str, object]) -> Value:
 def _entry(
     quantity: Quantity,
     estimate: Estimate | None,
+    found_std: float | None,
     old: Mapping[str, object] | None,
     evidence: Evidence,
     *,
@@ -118,7 +125,7 @@ def _entry(
     std, source = quantity.std, f"mismatch: {_recording(evidence)}"
     if estimate is not None and math.isfinite(estimate.high - estimate.low):
         source += f", 90 % {estimate.low:.4g}..{estimate.high:.4g}"
-        std = max(0.0, estimate.high - estimate.low) / _INTERVAL_STDS
+        std = found_std or max(0.0, estimate.high - estimate.low) / _INTERVAL_STDS
     if old is not None:
         source += f"; before: {_before(old)}"
     return _inline(quantity.value, std, source, FOUND_DIGITS)
@@ -161,7 +168,14 @@ def _edited(car: Car, patched: Car, entries: Mapping[str, str], evidence: Eviden
     for key, entry in entries.items():
         section, _, name = key.partition(".")
         text = set_entry(text, section, name, entry)
-    return _headline(evidence) + text
+    return _headline(evidence) + _with_correlated(text, patched)
+
+
+def given_text(car: Car) -> str:
+    """Return the text of a car's file; of a car that has none, one that says the same."""
+    if car.path.is_file():
+        return car.path.read_text(encoding="utf-8")
+    return _anew(car, {}, None)
 
 
 def _headline(evidence: Evidence) -> str:
@@ -176,7 +190,7 @@ def _plain(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-def _anew(patched: Car, entries: Mapping[str, str], evidence: Evidence) -> str:
+def _anew(patched: Car, entries: Mapping[str, str], evidence: Evidence | None) -> str:
     """Return the car as a file of its own, where the given text cannot be changed in place."""
     lines = [f"name = {quoted(patched.name)}"]
     lines += [f"scale = {quoted(patched.scale)}"] if patched.scale else []
@@ -193,4 +207,16 @@ def _anew(patched: Car, entries: Mapping[str, str], evidence: Evidence) -> str:
             sections.setdefault(section, []).append(f"{name} = {entries.get(key, plain)}")
     for section, rows in sections.items():
         lines += ["", f"[{section}]", *rows]
-    return _headline(evidence) + "\n".join(lines) + "\n"
+    head = "" if evidence is None else _headline(evidence)
+    return head + _with_correlated("\n".join(lines) + "\n", patched)
+
+
+def _with_correlated(text: str, patched: Car) -> str:
+    """Return a car file's text with the correlations of this car, in place of what it had."""
+    kept = re.sub(r"^\[\[correlated\]\][^\n]*\n(?:(?!\[).*\n?)*", "", text, flags=re.MULTILINE)
+    blocks = []
+    for group in patched.correlated:
+        rows = ",\n".join(f"    [{', '.join(f'{v:g}' for v in row)}]" for row in group.matrix)
+        names = ", ".join(quoted(name) for name in group.numbers)
+        blocks.append(f"\n[[correlated]]\nnumbers = [{names}]\nmatrix = [\n{rows},\n]\n")
+    return kept.rstrip() + "\n" + "".join(blocks)

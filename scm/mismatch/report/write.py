@@ -10,17 +10,19 @@ from scm.mismatch.evidence import Evidence
 from scm.mismatch.findings import Diagnosis
 from scm.mismatch.report.as_drawn import drawn_text
 from scm.mismatch.report.as_json import json_text
-from scm.mismatch.report.car_file import FILE, write_car
+from scm.mismatch.report.car_file import FILE, given_text, write_car
 from scm.mismatch.report.drawings import draw
+from scm.mismatch.report.own_files import write_own_terms
 from scm.mismatch.report.page import page_html
 from scm.mismatch.report.shown_time import since_start
 from scm.vehicles.car import Car
 
 PAGE, FIELDS, DRAWN, PICTURES = "report.html", "report.json", "drawn.json", "pictures"
+GIVEN, WINDOWS = "given.toml", "windows.csv"
 
 
 def write_report(
-    diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car, out: Path
+    diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car, out: Path, check: str = ""
 ) -> None:
     """Write everything into the folder `out`, which is made where it is missing.
 
@@ -31,6 +33,7 @@ def write_report(
         patched: The same with the effects found. An effect outside the library is one of its own,
             read from a file that is still there; the file is copied beside `car.toml`.
         out: Pictures of an earlier report there are removed.
+        check: The command that works out the report's figures again; empty: none is printed.
     """
     pictures = out / PICTURES
     pictures.mkdir(parents=True, exist_ok=True)
@@ -38,6 +41,9 @@ def write_report(
         old.unlink()
     (out / FIELDS).write_text(json_text(diagnosis), encoding="utf-8")
     use = _written_car(diagnosis, evidence, car, patched, out)
+    _write_windows(evidence, car, out)
+    if check and diagnosis.fit is not None:
+        use += f". These figures are of that file; to work them out again: `{check}`"
     diagnosis, evidence, start_s = since_start(diagnosis, evidence)
     drawn = drawn_text(diagnosis, evidence, start_s)
     (out / DRAWN).write_text(drawn, encoding="utf-8")
@@ -65,6 +71,19 @@ def _written_car(
         f"`{FILE}` beside this page is the given car {what}.{beside} The simulator loads it; see "
         f"how it does on another drive: `scm replay ANOTHER_DRIVE --car {FILE}`"
     )
+
+
+def _write_windows(evidence: Evidence, car: Car, out: Path) -> None:
+    """Write the car as given and when each window starts, so that anybody can drive them again."""
+    (out / GIVEN).write_text(given_text(car), encoding="utf-8")
+    write_own_terms(car, out)
+    runs = evidence.free_runs
+    if runs is None:
+        (out / WINDOWS).unlink(missing_ok=True)
+        return
+    rows = zip(runs.recording.tolist(), runs.part, runs.stamp_s.tolist(), strict=True)
+    lines = [f"{number},{part},{start:.6f}" for number, part, start in rows]
+    (out / WINDOWS).write_text("\n".join(["recording,part,start_s", *lines, ""]), encoding="utf-8")
 
 
 def _is_changed(car: Car, patched: Car) -> bool:

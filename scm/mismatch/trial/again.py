@@ -1,11 +1,11 @@
 """Judges a patched car on another drive of the same car: free runs against the recording."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from scm.errors import ScmError
 from scm.mismatch.listed import terms_needed
+from scm.mismatch.patch import on
 from scm.mismatch.trial.continuous import position_error
 from scm.mismatch.trial.known import is_measure, parameters_of
 from scm.mismatch.trial.labels import Case, Label
@@ -50,13 +50,13 @@ def compare(case: Case, label: Label, folder: Path) -> Ratio | None:
     recording = read_recordings(case.again)[0]
     base = _ready(load_car(label.car))
     nominal = error(recording, base)
-    found = error(recording, _on(base, load_car(patched)))
+    found = error(recording, on(base, load_car(patched)))
     cars = true_cars(base, label)
     true = min((error(recording, car) for car in cars), default=None)
     if true is not None and nominal < SHOWS * true:
         return None
     retuned = folder / "retuned.toml"
-    tuned = error(recording, _on(base, load_car(retuned))) if retuned.is_file() else None
+    tuned = error(recording, on(base, load_car(retuned))) if retuned.is_file() else None
     return Ratio(case.name, nominal, found, true, tuned)
 
 
@@ -100,16 +100,3 @@ def true_cars(base: Car, label: Label) -> list[Car]:
 def _ready(car: Car) -> Car:
     """Return a car with every effect at rest: all cars of one type then share one kernel."""
     return car.with_terms([*terms_needed(car), "drive_delay", "steer_delay"])
-
-
-def _on(base: Car, patched: Car) -> Car:
-    """Return the patched car's numbers on the base, where the base has all its effects."""
-    if not {term.name for term in patched.terms} <= {term.name for term in base.terms}:
-        return patched
-    moved: Mapping[str, float] = {
-        key: quantity.value
-        for key, quantity in patched.values.items()
-        if isinstance(quantity.value, float) and base.has(key) and quantity != base.quantity(key)
-    }
-    car = base.with_terms([], moved)
-    return replace(car, measures=patched.measures, values={**patched.values, **car.values})

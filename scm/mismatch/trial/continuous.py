@@ -14,10 +14,10 @@ from scm.geometry import Pose2
 from scm.recording.motion import Motion, Poses
 from scm.recording.read import Recording
 from scm.replay.commands import Commands
-from scm.replay.free_run import STEP_S
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
 
+STEP_S = 0.005
 EVERY_S = 0.1
 SETTLED_S = 3.0
 COUNTS, ENCODERS = "encoder.counts_per_revolution", ("encoder.left", "encoder.right")

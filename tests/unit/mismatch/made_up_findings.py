@@ -207,6 +207,8 @@ def free_runs(before=0.36, after=0.042, windows=30, seed=3):
     parts = tuple(block[(i // 3) % 5] for i in range(windows))
     return FreeRuns(
         part=parts,
+        recording=np.zeros(windows, dtype=np.int64),
+        stamp_s=start,
         start_s=start,
         t_s=t,
         measured=measured,

@@ -1,5 +1,7 @@
 """What a diagnosis says of the car as a whole."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -25,7 +27,7 @@ from scm.mismatch.parts import split
 from scm.mismatch.patch import patched
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch import made_up_findings as made_up
-from tests.unit.mismatch.made_drive import big_nigel, driven, healthy_model, nigel
+from tests.unit.mismatch.made_drive import big_nigel, car_with, driven, healthy_model, nigel
 
 
 def suggested(name, between):
@@ -41,9 +43,11 @@ def suggested(name, between):
 def test_the_re_tuned_car_strays_by_what_refitting_alone_could_not_take_off():
     drive, true, half = driven((("steering.trim_rad", 0.05),)), 0.05, 0.025
     parts = split(Likelihood([drive], big_nigel()), 5.0)
-    fit, _ = judge([drive], big_nigel(), {}, {"steering.trim_rad": true}, parts)
-    tuned = {"steering.trim_rad": half}
-    strays_m = retuned_error([drive], big_nigel(), tuned, {"steering.trim_rad": true}, parts)
+    model = Likelihood([drive], big_nigel())
+    searched = SimpleNamespace(model=model, drives=[drive], parts=parts)
+    found, tuned = (car_with({"steering.trim_rad": trim}) for trim in (true, half))
+    fit, _ = judge([drive], big_nigel(), found, parts)
+    strays_m = retuned_error(searched, tuned, found)
     before, after = (side["position_m"] for side in (fit.confirm.before, fit.confirm.after))
     assert after < 0.9 * strays_m < 0.7 * before
 

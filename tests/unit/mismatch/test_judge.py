@@ -9,14 +9,14 @@ from scm.errors import RecordingError
 from scm.mismatch.judge import judge, nothing_got_worse
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.parts import split
-from tests.unit.mismatch.made_drive import big_nigel, driven
+from tests.unit.mismatch.made_drive import big_nigel, car_with, driven
 
 TRIM = {"steering.trim_rad": 0.05}
 
 
 def judged(drive, after, before=(), horizon_s=2.0):
     parts = split(Likelihood([drive], big_nigel()), 5.0)
-    return judge([drive], big_nigel(), dict(before), dict(after), parts, horizon_s)
+    return judge([drive], car_with(before), car_with(after), parts, horizon_s)
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +114,7 @@ def test_what_noise_may_change_is_not_called_worse(trimmed):
 def test_two_drives_are_judged_together():
     drives = [driven(seed=seed) for seed in (1, 2)]
     parts = split(Likelihood(drives, big_nigel()))
-    fit, runs = judge(drives, big_nigel(), {}, {}, parts, 2.0)
+    fit, runs = judge(drives, big_nigel(), big_nigel(), parts, 2.0)
     alone, _ = judged(drives[0], {})
     assert fit.fit.windows + fit.confirm.windows > alone.fit.windows + alone.confirm.windows
     assert len(runs.start_s) == len(runs.part) == len(runs.measured["x"])

@@ -131,7 +131,7 @@ def test_drives_follow_one_another_on_one_axis_for_lines_windows_and_places():
     assert on_one_axis(drives)[0] == 0.0
     t = leftover(drives, big_nigel(), {}, {})[0].t_s
     parts = split(Likelihood(drives, big_nigel()), 3.0)
-    _, runs = judge(drives, big_nigel(), {}, {}, parts, 1.0)
+    _, runs = judge(drives, big_nigel(), big_nigel(), parts, 1.0)
     second = [times[times > end] for times in (t, runs.start_s)]
     assert len(second[0]) == pytest.approx(0.5 * len(t), abs=1)
     assert len(second[1]) == pytest.approx(0.5 * len(runs.start_s), abs=1)

@@ -1,0 +1,88 @@
+"""What a report says of a car is true of the car file beside it: `scm replay --report` agrees."""
+
+import json
+import math
+
+import pytest
+
+from scm.clock import WallClock
+from scm.mismatch import diagnose as module
+from scm.mismatch.budget import Budget
+from scm.mismatch.check_report import check_report
+from scm.mismatch.diagnose import diagnose_car, write
+from scm.vehicles.car import load_car
+from tests.unit.mismatch.made_drive import made_drive, nigel
+
+TRIM = (("steering.trim_rad", 0.06),)
+
+
+class Batches(Budget):
+    """Is over after so many batches of simulated cars: interrupts a search in its midst."""
+
+    left = math.inf
+
+    def is_over(self):
+        return self.left <= 0
+
+    def check(self):
+        self.left -= 1
+        super().check()
+
+
+def interrupted_after(batches):
+    def budget(_asked_s, clock):
+        made = Batches(1.0, clock)
+        made.left = batches
+        return made
+
+    return budget
+
+
+def late(name, _t, values):
+    """Poses stamped in a unit that is slightly wrong: the camera's metre is 1.05 of a metre."""
+    return 1.05 * values if name in ("pose.x", "pose.y") else values
+
+
+CASES = {
+    "no time at all": (TRIM, None, {"budget_s": 0.0}),
+    "5 s": (TRIM, None, {"budget_s": 5.0}),
+    "an effect of the car": (TRIM, None, {}),
+    "a fault of the camera": ((), late, {}),
+    "interrupted at once": (TRIM, None, {"batches": 3}),
+    "interrupted in a round": (TRIM, None, {"batches": 40}),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_figure_of_a_report_is_that_of_its_car_file(case, tmp_path, monkeypatch):
+    numbers, sense, how = CASES[case]
+    more = {} if sense is None else {"sense": sense}
+    recording = made_drive(numbers, seconds=20.0, **more)
+    if "batches" in how:
+        monkeypatch.setattr(module, "Budget", interrupted_after(how["batches"]))
+    found = diagnose_car([recording], nigel(), budget_s=how.get("budget_s", 600.0),
+                         clock=WallClock())  # fmt: skip
+    write(found, tmp_path)
+    figures = check_report(tmp_path, [recording])
+    assert {figure.part for figure in figures} == {"fit", "choose", "confirm"}
+    assert [figure for figure in figures if not figure.agrees] == []
+    assert_numbers_are_the_file_s(tmp_path)
+
+
+def assert_numbers_are_the_file_s(folder):
+    """Check every number that the report shows against the file beside it."""
+    drawn = json.loads((folder / "drawn.json").read_text(encoding="utf-8"))
+    car = load_car(folder / "car.toml")
+    shown = [one for one in drawn["numbers"] if car.has(one["key"])]
+    assert shown
+    for one in shown:
+        assert car.value(one["key"]) == pytest.approx(one["found"]["value"], rel=1e-3, abs=1e-9)
+
+
+def test_a_figure_of_another_car_is_found_out(tmp_path):
+    recording = made_drive(TRIM, seconds=20.0)
+    write(diagnose_car([recording], nigel(), budget_s=0.0, clock=WallClock()), tmp_path)
+    text = (tmp_path / "given.toml").read_text(encoding="utf-8")
+    (tmp_path / "car.toml").write_text(text, encoding="utf-8")
+    figures = check_report(tmp_path, [recording])
+    assert any(not figure.agrees for figure in figures if figure.car == "car.toml")
