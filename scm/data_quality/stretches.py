@@ -1,0 +1,163 @@
+"""A recording cut at its gaps: each stretch is driven again on its own."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scm.arrays import Bools, Floats
+from scm.data_quality.problem import DataProblem, Span
+from scm.data_quality.rows import called, tables
+from scm.recording.read import Channel, Recording
+from scm.vehicles.car import Car
+from scm.vehicles.drive_channel import drive_name
+
+GAP_S = 2.0  # nobody knows what a car did for so long: a smoothed pose bridges 1 s, as Drive.blind
+GAP_STEPS = 5.0  # of the channel's own: slow poses, and commands that are written when they change
+USUAL = 95  # percentile of the steps
+SHORTEST_S = 2.0  # a second to settle the actuators in, and one to compare
+FEWEST_POSES = 8
+EDGE_S = (
+    0.5 * GAP_S
+)  # tables do not stop at the same row: what comes so soon after is of the stretch
+RUN_IN_S = 2.0  # of commands before a stretch: where servo and lags stand when it begins
+POSE = ("pose.x", "pose.y", "pose.yaw")
+STEERING = "command.steering"
+
+
+@dataclass(frozen=True, slots=True)
+class Stretches:
+    """What a recording was cut into.
+
+    Attributes:
+        recordings: In the order of time; of a recording without such gaps the very recording.
+        problems: Where it was cut, and which rows are in no stretch.
+    """
+
+    recordings: tuple[Recording, ...]
+    problems: tuple[DataProblem, ...] = ()
+
+
+def stretches(recording: Recording, car: Car) -> Stretches:
+    """Cut a recording where its poses or the commands that drive the car are missing for long.
+
+    All its tables are cut at the same moments. Other sensors may pause: they are compared where
+    they are. A stretch that is too short to be driven again is left out, with a problem that says
+    which rows.
+
+    Args:
+        recording: With stamps on one clock that go forward, see `corrected.corrected`.
+        car: Says which command drives it.
+    """
+    needed = (drive_name(recording, car), STEERING, *POSE)
+    if any(len(_stamps(recording, name)) == 0 for name in needed):
+        return Stretches((recording,))
+    gaps = _merged(gap for name in needed for gap in long_gaps(_stamps(recording, name)))
+    if not gaps:
+        return Stretches((recording,))
+    edges = [moment for first, last in gaps for moment in (first + EDGE_S, last - EDGE_S)]
+    ends = [-np.inf, *edges, np.inf]
+    parts = [
+        _part(recording, first, last) for first, last in zip(ends[::2], ends[1::2], strict=True)
+    ]
+    whole = tuple(part for part in parts if _can_be_driven(part, needed))
+    return Stretches(whole, (_problem(recording, gaps, whole),))
+
+
+def long_gaps(t: Floats) -> list[Span]:
+    """Return the spans in which a channel has no rows for longer than a smoother can bridge.
+
+    Args:
+        t: Its stamps, rising, shape `(n,)`.
+    """
+    step = np.diff(t)
+    if len(step) == 0 or step.max() <= GAP_S:
+        return []
+    longest = max(GAP_S, GAP_STEPS * float(np.percentile(step, USUAL)))
+    return [(float(t[i]), float(t[i + 1])) for i in np.flatnonzero(step > longest)]
+
+
+def _stamps(recording: Recording, name: str) -> Floats:
+    channel = recording.channels.get(name)
+    return np.empty(0) if channel is None else channel.t
+
+
+def _merged(gaps: Iterable[Span]) -> list[Span]:
+    """Return spans in order, those that overlap as one."""
+    merged: list[Span] = []
+    for first, last in sorted(gaps):
+        if merged and first <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(merged[-1][1], last)
+        else:
+            merged.append((first, last))
+    return merged
+
+
+def _part(recording: Recording, first: float, last: float) -> Recording:
+    """Return what was recorded between two moments, and the commands that lead there."""
+    channels = dict[str, Channel]()
+    for name, channel in recording.channels.items():
+        rows = _rows(channel.t, first, last)
+        if name.startswith("command."):
+            rows |= _leading(channel.t, first)
+        if rows.any():
+            channels[name] = replace(channel, t=channel.t[rows], values=channel.values[rows])
+    return replace(recording, channels=channels)
+
+
+def _rows(t: Floats, first: float, last: float) -> Bools:
+    return (t >= first) & (t <= last)
+
+
+def _leading(t: Floats, first: float) -> Bools:
+    """Return the command rows before a moment that still matter there: the last one is held."""
+    before = np.flatnonzero(t < first)
+    rows = (t >= first - RUN_IN_S) & (t < first)
+    rows[before[-1:]] = True
+    return rows
+
+
+def _can_be_driven(part: Recording, needed: Sequence[str]) -> bool:
+    """Say whether poses and commands are there together for long enough."""
+    if any(name not in part.channels for name in needed):
+        return False
+    times = [part.channels[name].t for name in needed]
+    posed = all(len(part.channels[name].t) >= FEWEST_POSES for name in POSE)
+    return posed and min(t[-1] for t in times) - max(t[0] for t in times) >= SHORTEST_S
+
+
+def _problem(recording: Recording, gaps: Sequence[Span], whole: Sequence[Recording]) -> DataProblem:
+    """Say where a recording was cut, and which of its rows are in no stretch."""
+    longest_s = max(last - first for first, last in gaps)
+    where = f"a gap of {longest_s:.1f} s" if len(gaps) == 1 else f"{len(gaps)} gaps"
+    more = f", the longest {longest_s:.1f} s" if len(gaps) > 1 else ""
+    how = {0: "nothing is left", 1: "one stretch is left"}.get(
+        len(whole), f"{len(whole)} stretches"
+    )
+    lost = [
+        f"{count} of {len(recording.channels[names[0]].t)} rows of {called(names)}"
+        for names in tables(recording)
+        if (count := _lost(recording.channels[names[0]].t, names[0], whole))
+    ]
+    rest = (
+        f" Left out, without poses and commands for {SHORTEST_S:g} s: {', '.join(lost)}."
+        if lost
+        else ""
+    )
+    return DataProblem(
+        channel="*",
+        name="stretches",
+        said=f"Poses or commands are missing in {where}{more}: {how}, each driven again on its "
+        f"own.{rest}",
+        when_s=tuple(gaps),
+        corrected="Cut at each gap.",
+        record_instead="Record poses and commands without pauses, or one file a drive.",
+    )
+
+
+def _lost(t: Floats, name: str, whole: Iterable[Recording]) -> int:
+    """Return how many rows of a channel are in no stretch."""
+    return len(t) - len(np.unique(np.concatenate([
+        np.flatnonzero(np.isin(t, part.channels[name].t))
+        for part in whole if name in part.channels
+    ] or [np.empty(0, dtype=np.int64)])))  # fmt: skip

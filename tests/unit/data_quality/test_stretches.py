@@ -1,0 +1,165 @@
+"""A recording is cut where poses or commands are missing for long, and nowhere else."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scm.arrays import Floats
+from scm.data_quality.stretches import stretches
+from scm.recording.read import Recording
+from scm.vehicles.car import Car
+
+Drive = Callable[[int], Recording]
+
+DAY_S = 86_400.0
+COMMANDS = ("command.throttle", "command.steering")
+
+
+def paused(recording: Recording, at_s: float, for_s: float, only: str = "") -> Recording:
+    """Return a recording whose stamps from one moment on are later."""
+    channels = {
+        name: replace(c, t=np.where(c.t >= at_s, c.t + for_s, c.t)) if name.startswith(only) else c
+        for name, c in recording.channels.items()
+    }
+    return replace(recording, channels=channels)
+
+
+def without(recording: Recording, prefix: str, first_s: float, last_s: float) -> Recording:
+    """Return a recording in which some channels lack the rows between two moments."""
+    channels = dict(recording.channels)
+    for name, c in recording.channels.items():
+        if name.startswith(prefix):
+            keep = (c.t <= first_s) | (c.t >= last_s)
+            channels[name] = replace(c, t=c.t[keep], values=c.values[keep])
+    return replace(recording, channels=channels)
+
+
+def spans(parts: tuple[Recording, ...], name: str) -> list[tuple[float, float]]:
+    return [(float(p.channel(name).t[0]), float(p.channel(name).t[-1])) for p in parts]
+
+
+def test_a_recording_without_gaps_is_one_stretch_bit_for_bit(drive: Drive, nigel: Car) -> None:
+    found = stretches(drive(0), nigel)
+    assert found.recordings == (drive(0),)
+    assert found.recordings[0] is drive(0)
+    assert not found.problems
+
+
+@pytest.mark.parametrize("pause_s", [2.5, 300.0, 3600.0, DAY_S, 1.7e9])
+def test_a_pause_of_all_tables_cuts_them_together(drive: Drive, nigel: Car, pause_s: float) -> None:
+    found = stretches(paused(drive(0), 40.0, pause_s), nigel)
+    assert len(found.recordings) == 2
+    for name, channel in drive(0).channels.items():
+        first, second = (part.channel(name) for part in found.recordings)
+        assert np.array_equal(first.values, channel.values[channel.t < 40.0]), name
+        after = second.values[second.t >= 40.0 + pause_s]
+        assert np.array_equal(after, channel.values[channel.t >= 40.0]), name
+    (problem,) = found.problems
+    assert problem.name == "stretches"
+    assert "2 stretches" in problem.said
+    assert "Left out" not in problem.said
+
+
+def test_a_pause_of_less_than_two_seconds_is_bridged(drive: Drive, nigel: Car) -> None:
+    shorter = without(drive(0), "pose.", 40.0, 41.5)
+    assert stretches(shorter, nigel).recordings == (shorter,)
+
+
+def test_ten_gaps_make_eleven_stretches(drive: Drive, nigel: Car) -> None:
+    recording = drive(0)
+    for k in range(10):
+        recording = paused(recording, 6.0 + 6.5 * k + 100.0 * k, 100.0)
+    assert len(stretches(recording, nigel).recordings) == 11
+
+
+@pytest.mark.parametrize("prefix", ["pose.", "pose.x", "command.", "command.steering"])
+def test_a_gap_of_what_a_replay_needs_cuts_all_tables(
+    drive: Drive, nigel: Car, prefix: str
+) -> None:
+    found = stretches(without(drive(0), prefix, 30.0, 40.0), nigel)
+    ends = spans(found.recordings, "imu.gyro_z")
+    assert len(ends) == 2
+    assert ends[0][1] == pytest.approx(31.0, abs=0.1)
+    assert ends[1][0] == pytest.approx(39.0, abs=0.1)
+
+
+@pytest.mark.parametrize("prefix", ["imu.", "encoder.", "encoder.left"])
+def test_other_sensors_may_pause(drive: Drive, nigel: Car, prefix: str) -> None:
+    paused_sensor = without(drive(0), prefix, 30.0, 40.0)
+    assert stretches(paused_sensor, nigel).recordings == (paused_sensor,)
+
+
+def test_commands_that_led_to_a_stretch_stay_with_it(drive: Drive, nigel: Car) -> None:
+    second = stretches(without(drive(0), "pose.", 30.0, 40.0), nigel).recordings[1]
+    first_s = second.channel("command.steering").t[0]
+    assert 36.9 < first_s < 37.2
+
+
+def test_commands_written_when_they_change_do_not_cut(drive: Drive, nigel: Car) -> None:
+    rng = np.random.default_rng(3)
+    channels = dict(drive(0).channels)
+    for name in COMMANDS:
+        c = channels[name]
+        at = np.cumsum(rng.exponential(1.5, size=60))
+        rows = np.unique(np.searchsorted(c.t, at[at < 74.0]))
+        channels[name] = replace(c, t=c.t[rows], values=c.values[rows])
+    recording = replace(drive(0), channels=channels)
+    assert stretches(recording, nigel).recordings == (recording,)
+
+
+def test_a_held_command_reaches_into_the_next_stretch(drive: Drive, nigel: Car) -> None:
+    channels = dict(drive(0).channels)
+    for name in COMMANDS:
+        c = channels[name]
+        rows = np.searchsorted(c.t, np.arange(1.0, 74.0, 7.0))
+        channels[name] = replace(c, t=c.t[rows], values=c.values[rows])
+    slow = without(replace(drive(0), channels=channels), "pose.", 30.5, 42.0)
+    second = stretches(slow, nigel).recordings[1]
+    assert second.channel("command.throttle").t[0] == pytest.approx(36.0, abs=0.1)
+
+
+def test_slow_poses_are_not_cut_at_every_row(drive: Drive, nigel: Car) -> None:
+    channels = dict(drive(0).channels)
+    for name in ("pose.x", "pose.y", "pose.yaw"):
+        c = channels[name]
+        channels[name] = replace(c, t=c.t[::75], values=c.values[::75])
+    slow = replace(drive(0), channels=channels)
+    assert stretches(slow, nigel).recordings == (slow,)
+
+
+def test_short_rest_is_left_out_and_its_rows_are_counted(drive: Drive, nigel: Car) -> None:
+    cut = paused(paused(drive(0), 40.0, 60.0), 101.0, 60.0)
+    found = stretches(cut, nigel)
+    assert len(found.recordings) == 2
+    (problem,) = found.problems
+    t = cut.channel("pose.x").t
+    left, of = int(((t > 99.0) & (t < 102.0)).sum()), len(t)
+    assert f"{left} of {of} rows of pose.*" in problem.said
+    assert len(problem.when_s or ()) == 2
+
+
+def test_a_table_whose_second_half_is_a_day_late_is_left_out_there(
+    drive: Drive, nigel: Car
+) -> None:
+    found = stretches(paused(drive(0), 40.0, DAY_S, only="command."), nigel)
+    assert spans(found.recordings, "pose.x")[0][1] == pytest.approx(41.0, abs=0.1)
+    assert len(found.recordings) == 1
+    assert "rows of pose.*" in found.problems[0].said
+    assert "rows of command.*" in found.problems[0].said
+
+
+def test_a_recording_that_cannot_be_driven_stays_whole(drive: Drive, nigel: Car) -> None:
+    channels = {n: c for n, c in drive(0).channels.items() if n != "command.throttle"}
+    recording = replace(paused(drive(0), 40.0, DAY_S), channels=channels)
+    assert stretches(recording, nigel).recordings == (recording,)
+
+
+def test_cutting_costs_as_much_as_there_are_rows(drive: Drive, nigel: Car) -> None:
+    def rows(parts: tuple[Recording, ...]) -> int:
+        return sum(len(c.t) for part in parts for c in part.channels.values())
+
+    whole: Floats = np.array([rows(stretches(drive(0), nigel).recordings)])
+    cut = rows(stretches(paused(drive(0), 40.0, DAY_S), nigel).recordings)
+    assert whole[0] <= cut <= whole[0] + 2
