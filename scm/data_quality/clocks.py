@@ -43,7 +43,7 @@ class Lag:
 def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
     """Return how the first signal, on even times, lags behind the second on the same ones."""
     first, second = _clipped(first), _clipped(second)
-    reach = int(min(LARGEST_S, 0.4 * (on.t[-1] - on.t[0])) / on.step_s)
+    reach = int(min(LARGEST_S, 0.4 * on.length_s) / on.step_s)
     curve = _correlations(first, second, reach)
     best = _best(curve, reach)
     sign = float(np.sign(curve[best])) or 1.0
@@ -51,7 +51,7 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
     delay, rate = (whole + _between(sign * curve, best)) * on.step_s, 0.0
     gain = float(abs(curve[best]) - abs(curve[reach]))
     a, b = _overlap(first, second, whole)
-    windows = _windows(a, sign * b, on.step_s)
+    windows = _windows(a, sign * b, on)
     sure = len(windows) < 3 and abs(curve[best]) > SURE
     if len(windows) >= 3:
         at, late = windows.T
@@ -137,8 +137,9 @@ def _overlap(first: Floats, second: Floats, steps: int) -> tuple[Floats, Floats]
     return first[:steps], second[-steps:]
 
 
-def _windows(first: Floats, second: Floats, step_s: float) -> Floats:
+def _windows(first: Floats, second: Floats, on: Grid) -> Floats:
     """Return rows of (middle of a window, delay in it) for windows that correlate, [s]."""
+    step_s, paused_s = on.step_s, on.paused_s
     length, near = round(WINDOW_S / step_s), round(LOCAL_S / step_s)
     whole = np.array([float(first.std()), float(second.std())])
     found = []
@@ -150,5 +151,5 @@ def _windows(first: Floats, second: Floats, step_s: float) -> Floats:
         best = int(np.argmax(curve))
         if curve[best] > ALIKE and 0 < best < len(curve) - 1:
             late = (best - near + _between(curve, best)) * step_s
-            found.append(((start + 0.5 * length) * step_s, late))
+            found.append(((start + 0.5 * length) * step_s + paused_s[start], late))
     return np.array(found).reshape(-1, 2)

@@ -8,7 +8,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.suspicion import Quality, Repair
-from scm.data_quality.track import POSE, Series, Track, grid, track
+from scm.data_quality.track import POSE, Series, Track, grid, long_gaps, track
 from scm.recording.read import Channel, Recording
 
 WIDTH_S = 0.1
@@ -61,7 +61,8 @@ def forward_speed(poses: Track | None) -> Series | None:
     if poses is None or len(poses.t) < 8:
         return None
     width = max(WIDTH_S, 1.5 * poses.period_s)
-    on = grid(poses.t[0], poses.t[-1], max(STEP_S, 0.25 * poses.period_s), width)
+    step_s = max(STEP_S, 0.25 * poses.period_s)
+    on = grid(poses.t[0], poses.t[-1], step_s, width, long_gaps(poses.t))
     if len(on.t) < 8:
         return None
     vx, vy = (on.smooth(Series(poses.t, values), 1) for values in (poses.x, poses.y))

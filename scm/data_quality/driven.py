@@ -6,7 +6,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.problem import DataProblem
-from scm.data_quality.track import Grid, Series, Track, clean, grid, held
+from scm.data_quality.track import Grid, Series, Track, clean, grid, held, long_gaps
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
@@ -116,7 +116,7 @@ def _constant(name: str, channel: Series) -> Iterator[DataProblem]:
 def _without_effect(recording: Recording, movement: Series, poses: Track) -> Iterator[DataProblem]:
     """Yield commands whose motion never follows them: those of another drive, or another clock."""
     yaw = Series(poses.t, poses.yaw)
-    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S)
+    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S, long_gaps(poses.t))
     if len(on.t) < SHORT_S / STEP_S:
         return
     short = len(on.t) < LONGEST_S / STEP_S
@@ -140,7 +140,7 @@ def _unmoved(
     recording: Recording, movement: Series, poses: Track, car: Car | None
 ) -> Iterator[DataProblem]:
     """Yield commands that stay as they are while the car does what they would have to ask for."""
-    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S)
+    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S, long_gaps(poses.t))
     if len(on.t) < SHORTEST_S / STEP_S:
         return
     speed, rate = on.smooth(movement), on.smooth(Series(poses.t, poses.yaw), 1)

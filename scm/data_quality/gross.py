@@ -5,14 +5,15 @@ the other, and how late. What is found can be undone; see `corrected.py`.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.clocks import STEP_S, WIDTH_S, Lag, lag_between
-from scm.data_quality.track import Series, Track, grid
+from scm.data_quality.problem import Span
+from scm.data_quality.track import Series, Track, grid, long_gaps
 from scm.recording.units import G
 
 DEGREES = math.degrees(1.0)
@@ -33,6 +34,8 @@ FACTORS: Mapping[str, Mapping[float, str]] = {
     },
 }  # fmt: skip
 NEAR = 0.08
+SHORTEST_S = 4.0
+MOST_POINTS = 20_000  # of a comparison: slower steps show a long drive as well
 ALIKE = 0.6
 LEVEL, BETTER = 0.95, 0.05  # wheels that spin follow the car that badly
 UNLIKE = 0.35
@@ -104,16 +107,25 @@ def compare(first: Sensed, second: Sensed) -> Pair | None:
         shift = float(a.t[0] - b.t[0])
         b = Series(b.t + shift, b.values)
         overlap = min(a.t[-1], b.t[-1]) - max(a.t[0], b.t[0])
-    if overlap < 4.0:
+    if overlap < SHORTEST_S:
         return None
     start = max(a.t[0], b.t[0])
-    step = max(STEP_S, overlap / 20000.0)
-    on = grid(start, start + overlap, step, max(WIDTH_S, 2.0 * step))
+    gaps = long_gaps(a.t, b.t)
+    end = start + overlap
+    step = max(STEP_S, (overlap - _within(gaps, start, end)) / MOST_POINTS)
+    on = grid(start, end, step, max(WIDTH_S, 2.0 * step), gaps)
+    if len(on.t) * step < SHORTEST_S:
+        return None
     left, right = on.smooth(a, first.order), on.smooth(b, second.order)
     if left.std() < 1e-9 or right.std() < 1e-9:
         return None
     lag = lag_between(left, right, on)
     return Pair(first.channels, second.channels, first.what, lag, shift)
+
+
+def _within(gaps: Sequence[Span], start: float, end: float) -> float:
+    """Return how much of a span lies in gaps [s]."""
+    return sum(max(0.0, min(last, end) - max(first, start)) for first, last in gaps)
 
 
 def nearest_factor(size: float, what: str) -> float:
@@ -139,9 +151,10 @@ def heading_fault(poses: Track, raw: Floats) -> float:
         poses: With positions that can be trusted.
         raw: Yaw as it was recorded, at the poses' stamps.
     """
-    on = grid(
-        poses.t[0], poses.t[-1], max(STEP_S, 0.5 * poses.period_s), max(0.1, 1.5 * poses.period_s)
-    )
+    step_s, width_s = max(STEP_S, 0.5 * poses.period_s), max(0.1, 1.5 * poses.period_s)
+    on = grid(poses.t[0], poses.t[-1], step_s, width_s, long_gaps(poses.t))
+    if len(on.t) == 0:
+        return 1.0
     vx, vy = (on.smooth(Series(poses.t, v), 1) for v in (poses.x, poses.y))
     at = np.clip(
         np.rint(np.interp(poses.t, on.t, np.arange(len(on.t)))).astype(int), 0, len(on.t) - 1

@@ -12,7 +12,7 @@ from scm.data_quality.problem import DataProblem
 from scm.data_quality.rows import called, tables
 from scm.data_quality.standing import moves
 from scm.data_quality.suspicion import Repair
-from scm.data_quality.track import Series, Track, clean, series, track
+from scm.data_quality.track import Series, Track, clean, recorded_s, series, track
 from scm.recording.read import Recording
 
 GYROS = ("imu.gyro_z", "yaw_rate")
@@ -65,7 +65,7 @@ def mend_stamps(now: Mending) -> Iterator[DataProblem]:
     for names in tables(now.recording):
         t = clean(now.recording.channels[names[0]]).t
         if len(t) > 2:
-            spans[names] = float(np.ptp(t)), float(np.median(np.diff(t)))
+            spans[names] = recorded_s(t), float(np.median(np.diff(t)))
     for names, factor in list(gross.time_factors(spans)) if spans else ():
         now.repair(Repair(channels=names, time_factor=factor))
         yield DataProblem(

@@ -10,7 +10,7 @@ from scm.data_quality.conclusion import ANOTHER
 from scm.data_quality.problem import DataProblem
 from scm.data_quality.steered import STEP_S, WIDTH_S, steered
 from scm.data_quality.suspicion import Relation
-from scm.data_quality.track import Series, Track, clean, grid, held
+from scm.data_quality.track import Series, Track, clean, grid, held, long_gaps
 from scm.geometry import Pose2
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
@@ -125,7 +125,7 @@ def _share_of_asked(recording: Recording, movement: Series, wanted: Asked) -> fl
     throttle = recording.channels.get("command.throttle")
     if throttle is None or len(clean(throttle).t) < 2:
         return None
-    on = grid(movement.t[0], movement.t[-1], STEP_S, WIDTH_S)
+    on = grid(movement.t[0], movement.t[-1], STEP_S, WIDTH_S, long_gaps(movement.t))
     asked = np.abs(on.smooth_even(held(clean(throttle), on.t)))
     speed, push = np.abs(on.smooth(movement)), np.abs(on.smooth(movement, 1))
     fast = float(np.percentile(speed, 98))

@@ -10,7 +10,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import Series, Track, grid, series
+from scm.data_quality.track import Series, Track, grid, long_gaps, series
 from scm.data_quality.whitened import Fit, fit
 from scm.recording.read import Recording
 
@@ -54,7 +54,8 @@ def push_against(
     end = min(poses.t[-1], along.t[-1] + late[0], across.t[-1] + late[0]) - 2.0 * width
     if end - start < max(SHORTEST_S, 40.0 * width):
         return None
-    on = grid(start, end, STEP_S, width)
+    gaps = long_gaps(poses.t, along.t + late[0], across.t + late[0])
+    on = grid(start, end, STEP_S, width, gaps)
     yaw = np.interp(on.t, poses.t, poses.yaw)
     c, s = np.cos(yaw), np.sin(yaw)
     u = on.t - late[0] - late[1] * (on.t - poses.t[0])
@@ -79,11 +80,9 @@ def push_against(
         ),
         axis=2,
     )
-    rows = slice(
-        round(2.0 * width / STEP_S), -round(2.0 * width / STEP_S), round(2.0 * width / STEP_S)
-    )
+    rows = on.inner(round(2.0 * width / STEP_S))
     priors = np.array([np.inf] * 5 + [LEVER_STD] * 2 + [np.inf])
-    found = fit(measured[rows], columns[rows], priors)
+    found = fit(measured[rows], columns[rows], priors, on.starts_of(rows))
     return Relation(
         pair=("pose.x", "imu.accel_x"), numbers=_numbers(found),
         noise=found.noise,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import Series, Track, grid
+from scm.data_quality.track import Series, Track, grid, long_gaps
 from scm.data_quality.whitened import fit
 
 WIDTH_S = 0.1
@@ -25,14 +25,13 @@ def sideways_of(poses: Track) -> Relation | None:
     width = max(WIDTH_S, 1.5 * poses.period_s)
     if poses.t[-1] - poses.t[0] < max(SHORTEST_S, 60.0 * width):
         return None
-    on = grid(poses.t[0], poses.t[-1], STEP_S, width)
+    on = grid(poses.t[0], poses.t[-1], STEP_S, width, long_gaps(poses.t))
     yaw = on.smooth(Series(poses.t, poses.yaw))
     rate = on.smooth(Series(poses.t, poses.yaw), 1)
     vx, vy = (on.smooth(Series(poses.t, values), 1) for values in (poses.x, poses.y))
     along = np.cos(yaw) * vx + np.sin(yaw) * vy
     left = np.cos(yaw) * vy - np.sin(yaw) * vx
-    stride = round(2.0 * width / STEP_S)
-    rows = slice(stride, -stride, stride)
+    rows = on.inner(round(2.0 * width / STEP_S))
     quiet = np.abs(along * rate)[rows] < QUIET_MPS2
     if quiet.sum() < FEWEST_ROWS:
         return None

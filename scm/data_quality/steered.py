@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scm.data_quality.track import Series, Track, clean, grid, held
+from scm.data_quality.track import Series, Track, clean, grid, held, long_gaps
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
@@ -42,7 +42,7 @@ def steered(recording: Recording, car: Car, movement: Series, poses: Track) -> S
     steering = clean(recording.channels["command.steering"])
     if len(steering.t) < 20:
         return None
-    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S)
+    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S, long_gaps(poses.t))
     if len(on.t) < SHORTEST_S / STEP_S:
         return None
     speed, rate = on.smooth(movement), on.smooth(Series(poses.t, poses.yaw), 1)

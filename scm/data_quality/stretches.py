@@ -8,20 +8,15 @@ import numpy as np
 from scm.arrays import Bools, Floats
 from scm.data_quality.problem import DataProblem, Span
 from scm.data_quality.rows import called, tables
+from scm.data_quality.track import LONG_GAP_S, POSE, long_gaps
 from scm.recording.read import Channel, Recording
 from scm.vehicles.car import Car
 from scm.vehicles.drive_channel import drive_name
 
-GAP_S = 2.0  # nobody knows what a car did for so long: a smoothed pose bridges 1 s, as Drive.blind
-GAP_STEPS = 5.0  # of the channel's own: slow poses, and commands that are written when they change
-USUAL = 95  # percentile of the steps
 SHORTEST_S = 2.0  # a second to settle the actuators in, and one to compare
 FEWEST_POSES = 8
-EDGE_S = (
-    0.5 * GAP_S
-)  # tables do not stop at the same row: what comes so soon after is of the stretch
+EDGE_S = 0.5 * LONG_GAP_S  # tables do not stop at one row: rows that soon after belong to it
 RUN_IN_S = 2.0  # of commands before a stretch: where servo and lags stand when it begins
-POSE = ("pose.x", "pose.y", "pose.yaw")
 STEERING = "command.steering"
 
 
@@ -52,7 +47,7 @@ def stretches(recording: Recording, car: Car) -> Stretches:
     needed = (drive_name(recording, car), STEERING, *POSE)
     if any(len(_stamps(recording, name)) == 0 for name in needed):
         return Stretches((recording,))
-    gaps = _merged(gap for name in needed for gap in long_gaps(_stamps(recording, name)))
+    gaps = long_gaps(*(_stamps(recording, name) for name in needed))
     if not gaps:
         return Stretches((recording,))
     edges = [moment for first, last in gaps for moment in (first + EDGE_S, last - EDGE_S)]
@@ -64,33 +59,9 @@ def stretches(recording: Recording, car: Car) -> Stretches:
     return Stretches(whole, (_problem(recording, gaps, whole),))
 
 
-def long_gaps(t: Floats) -> list[Span]:
-    """Return the spans in which a channel has no rows for longer than a smoother can bridge.
-
-    Args:
-        t: Its stamps, rising, shape `(n,)`.
-    """
-    step = np.diff(t)
-    if len(step) == 0 or step.max() <= GAP_S:
-        return []
-    longest = max(GAP_S, GAP_STEPS * float(np.percentile(step, USUAL)))
-    return [(float(t[i]), float(t[i + 1])) for i in np.flatnonzero(step > longest)]
-
-
 def _stamps(recording: Recording, name: str) -> Floats:
     channel = recording.channels.get(name)
     return np.empty(0) if channel is None else channel.t
-
-
-def _merged(gaps: Iterable[Span]) -> list[Span]:
-    """Return spans in order, those that overlap as one."""
-    merged: list[Span] = []
-    for first, last in sorted(gaps):
-        if merged and first <= merged[-1][1]:
-            merged[-1] = merged[-1][0], max(merged[-1][1], last)
-        else:
-            merged.append((first, last))
-    return merged
 
 
 def _part(recording: Recording, first: float, last: float) -> Recording:

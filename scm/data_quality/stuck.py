@@ -102,7 +102,7 @@ def frozen_spans(channel: Series, witness: Series | None) -> tuple[Span, ...]:
     if witness is None or len(channel.t) < FEWEST_FROZEN:
         return ()
     fast = np.percentile(np.abs(witness.values), 98) * MOVING
-    starts, ends = runs(channel.values)
+    starts, ends = runs(channel.values, channel.t)
     usual = OUTLASTS * float(np.percentile(ends - starts, 95))
     spans = []
     for i, j in zip(starts, ends, strict=True):

@@ -1,16 +1,20 @@
 """Channels made clean enough to compare: time goes forward, no bad rows, yaw is continuous."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
+from scm.data_quality.problem import Span
 from scm.recording.read import Channel, Recording
 
 RESET_S = 1.0
 GAP_S = 0.25
 GAP_STEPS = 5.0
+LONG_GAP_S = 2.0  # nothing says what a car did for so long: a smoothed pose bridges less than that
+USUAL = 95  # percentile of the steps; of commands that are written when they change many are long
 FEWEST = 8
 SHORTEST_ISLAND_S = 0.5
 HELD_SHARE = 0.6
@@ -35,8 +39,9 @@ class Series:
         return np.interp(t, self.t, self.values)
 
     def integral(self) -> "Series":
-        """Return what it adds up to since its first row."""
+        """Return what it adds up to since its first row, nothing over long gaps."""
         areas = 0.5 * (self.values[1:] + self.values[:-1]) * np.diff(self.t)
+        areas[_after_gaps(self.t) - 1] = 0.0
         return Series(self.t, np.concatenate(([0.0], np.cumsum(areas))))
 
 
@@ -63,6 +68,49 @@ class Track:
     def cut(self, keep: Bools) -> "Track":
         """Return the rows that are kept."""
         return Track(self.t[keep], self.x[keep], self.y[keep], self.yaw[keep])
+
+
+def long_gaps(*times: Floats) -> list[Span]:
+    """Return the spans without rows that are too long to be bridged, those that overlap as one.
+
+    Args:
+        times: Stamps of channels, each rising, shape `(n,)`.
+    """
+    gaps = sorted((float(t[i - 1]), float(t[i])) for t in times for i in _after_gaps(t))
+    merged: list[Span] = []
+    for first, last in gaps:
+        if merged and first <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(merged[-1][1], last)
+        else:
+            merged.append((first, last))
+    return merged
+
+
+def recorded_s(t: Floats) -> float:
+    """Return how long a channel lasts without its long gaps [s]."""
+    return float(t[-1] - t[0]) - sum(last - first for first, last in long_gaps(t))
+
+
+def cut_at_gaps(starts: Sequence[int], t: Floats, other: Floats) -> tuple[int, ...]:
+    """Return the first rows of stretches, where another channel's long gaps end them too.
+
+    Args:
+        starts: First row of each stretch so far.
+        t: Stamps of the rows.
+        other: Stamps of the other channel.
+    """
+    gaps = long_gaps(other)
+    rows = np.searchsorted(t, [moment for gap in gaps for moment in gap])
+    return tuple(sorted({*starts, *(int(row) for row in rows if row < len(t))}))
+
+
+def _after_gaps(t: Floats) -> Ints:
+    """Return the first row after each long gap."""
+    step = np.diff(t)
+    if len(step) == 0 or step.max() <= LONG_GAP_S:
+        return np.empty(0, dtype=np.int64)
+    longest = max(LONG_GAP_S, GAP_STEPS * float(np.percentile(step, USUAL)))
+    return np.flatnonzero(step > longest) + 1
 
 
 def clean(channel: Channel) -> Series:
@@ -100,9 +148,11 @@ def held(channel: Series, t: Floats) -> Floats:
     return channel.values[np.maximum(row, 0)]
 
 
-def runs(values: Floats) -> tuple[Ints, Ints]:
-    """Return where runs of equal values start, and where they end."""
+def runs(values: Floats, t: Floats | None = None) -> tuple[Ints, Ints]:
+    """Return where runs of equal values start, and where they end: at long gaps of `t` too."""
     edges = np.flatnonzero(np.diff(values) != 0.0) + 1
+    if t is not None:
+        edges = np.union1d(edges, _after_gaps(t))
     return np.concatenate(([0], edges)), np.concatenate((edges, [len(values)]))
 
 
@@ -178,18 +228,52 @@ def _mainland(poses: Track) -> Bools:
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Even times, and a Gaussian that smooths whatever is put on them."""
+    """Even times in pieces between long gaps, and a Gaussian that smooths what is put on them.
+
+    Attributes:
+        starts: First point of each piece.
+    """
 
     t: Floats
     step_s: float
     width_s: float
+    starts: tuple[int, ...] = (0,)
+
+    @property
+    def length_s(self) -> float:
+        """How long the pieces are together."""
+        return sum(float(self.t[j - 1] - self.t[i]) for i, j in self._pieces)
+
+    @property
+    def paused_s(self) -> Floats:
+        """How long the gaps before each point are together, shape `(n,)`."""
+        paused = np.zeros(len(self.t))
+        for i in self.starts[1:]:
+            paused[i:] += self.t[i] - self.t[i - 1] - self.step_s
+        return paused
+
+    def inner(self, margin: int) -> Ints:
+        """Return every `margin`-th point that is not so near to an end of its piece."""
+        return np.concatenate([np.arange(i + margin, j - margin, margin) for i, j in self._pieces])
+
+    def starts_of(self, points: Ints) -> tuple[int, ...]:
+        """Return which of some rising points are the first of their piece."""
+        return tuple(sorted({int(i) for i in np.searchsorted(points, self.starts)} - {len(points)}))
 
     def smooth(self, source: Series, order: int = 0) -> Floats:
         """Return a series, or its first or second derivative, smoothed on the grid."""
         return self.smooth_even(source.at(self.t), order)
 
     def smooth_even(self, values: Floats, order: int = 0) -> Floats:
-        """Return even values, or their derivative, smoothed."""
+        """Return even values, or their derivative, smoothed, each piece alone."""
+        parts = [self._smooth_piece(values[i:j], order) for i, j in self._pieces]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    @property
+    def _pieces(self) -> list[tuple[int, int]]:
+        return list(pairwise((*self.starts, len(self.t))))
+
+    def _smooth_piece(self, values: Floats, order: int) -> Floats:
         kernel = _gaussian(self.width_s / self.step_s, order) / self.step_s**order
         half = min(len(kernel) // 2, len(values) - 2)
         kernel = kernel[len(kernel) // 2 - half : len(kernel) // 2 + half + 1]
@@ -199,9 +283,22 @@ class Grid:
         return np.asarray(np.convolve(padded, kernel, mode="valid"), dtype=np.float64)
 
 
-def grid(start: float, end: float, step_s: float, width_s: float) -> Grid:
-    """Return a grid from start to end."""
-    return Grid(np.arange(start, end, step_s), step_s, width_s)
+def grid(
+    start: float, end: float, step_s: float, width_s: float, gaps: Iterable[Span] = ()
+) -> Grid:
+    """Return a grid from start to end, without what lies in gaps or in tiny pieces between them."""
+    inside = [gap for gap in gaps if gap[1] > start and gap[0] < end]
+    if not inside:
+        return Grid(np.arange(start, end, step_s), step_s, width_s)
+    edges = [start, *(moment for gap in inside for moment in gap), end]
+    pieces = [
+        np.arange(first, last, step_s)
+        for first, last in zip(edges[::2], edges[1::2], strict=True)
+        if last - first >= FEWEST * step_s
+    ] or [np.empty(0)]
+    lengths = [len(piece) for piece in pieces]
+    starts = (0, *(int(n) for n in np.cumsum(lengths[:-1])))
+    return Grid(np.concatenate(pieces), step_s, width_s, starts)
 
 
 def _gaussian(width: float, order: int) -> Floats:

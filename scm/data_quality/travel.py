@@ -9,7 +9,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import Grid, Series, Track
+from scm.data_quality.track import Grid, Series, Track, cut_at_gaps
 from scm.data_quality.whitened import Fit, fit
 
 ROUNDS = 6
@@ -59,7 +59,7 @@ def travel_against(
     rows = rows.cut(np.arange(len(rows.t)) % (1 + len(rows.t) // MOST_ROWS) == 0)
     since, warp, tilt = rows.t - rows.t[0], np.array(start), np.zeros(2)
     count = len(NAMES) if since[-1] >= SHORTEST_DRIFT_S else len(NAMES) - 1
-    found, starts = None, rows.starts
+    found, starts = None, cut_at_gaps(rows.starts, rows.t, distance.t)
     for _ in range(ROUNDS):
         straight = _straightened(rows, tilt)
         measured = np.stack((straight.x, straight.y), axis=1)

@@ -6,7 +6,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import Series, Track
+from scm.data_quality.track import Series, Track, cut_at_gaps
 from scm.data_quality.whitened import Fit, fit
 
 ROUNDS = 4
@@ -40,7 +40,7 @@ def yaw_against(
     since = rows.t - rows.t[0]
     rate = Series(turned.t, np.gradient(turned.values, turned.t))
     warp = np.array(start)
-    found, starts = None, rows.starts
+    found, starts = None, cut_at_gaps(rows.starts, rows.t, turned.t)
     for _ in range(ROUNDS):
         u = rows.t - warp[0] - warp[1] * since
         columns = np.stack((turned.at(u), since, -rate.at(u), -rate.at(u) * since), axis=1)
