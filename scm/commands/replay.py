@@ -106,7 +106,7 @@ def _replayed(
     """Drive one car's recording again, print the errors, and return the windows."""
     from scm.data_quality.prepare import prepare
     from scm.recorder.drives import SUFFIX
-    from scm.replay.free_run import free_run, joined
+    from scm.replay.free_run import joined
     from scm.vehicles.car import load_car
     from scm.vehicles.undone import POSES
 
@@ -115,7 +115,7 @@ def _replayed(
     prepared = prepare(recording, car, strict=arguments.strict)
     for line in prepared.account:
         print(f"{path}  {who}{line}")
-    run = joined([free_run(part, car, arguments.horizon_s) for part in prepared.recordings])
+    run = joined(_runs(path, prepared.recordings, car, arguments.horizon_s))
     windows = f"{len(run.start_s)} windows of {arguments.horizon_s:g} s"
     print(f"{path}  {who}car {car.name}: {windows},")
     print("free run from the measured state, median and 90th percentile of the error")
@@ -124,6 +124,41 @@ def _replayed(
         print(f"measured poses with {', '.join(undone)} of the car file taken out")
     print(_table(run, arguments.horizon_s) + "\n")
     return run
+
+
+def _runs(
+    path: Path, stretches: "Sequence[Recording]", car: "Car", horizon_s: float
+) -> "list[FreeRun]":
+    """Drive each stretch of a recording again; those without a whole window are printed.
+
+    Raises:
+        RecordingError: when no stretch has one.
+    """
+    import numpy as np
+
+    from scm.errors import RecordingError
+    from scm.replay.free_run import free_run
+
+    runs: list[FreeRun] = []
+    failures: list[RecordingError] = []
+    for stretch in stretches:
+        try:
+            runs.append(free_run(stretch, car, horizon_s))
+        except RecordingError as error:
+            failures.append(error)
+    if not stretches:
+        msg = f"{path}: poses and commands are nowhere together for long enough to be driven again"
+        raise RecordingError(msg)
+    if not runs and len(stretches) > 1:
+        longest_s = max(float(np.ptp(stretch.channel("pose.x").t)) for stretch in stretches)
+        msg = f"{path}: no window of {horizon_s:g} s in {len(stretches)} stretches; the longest "
+        msg += f"lasts {longest_s:.1f} s: give a shorter --horizon-s"
+        raise RecordingError(msg)
+    if not runs:
+        raise failures[0]
+    for failure in failures:
+        print(failure)
+    return runs
 
 
 def _table(run: "FreeRun", horizon_s: float) -> str:

@@ -46,8 +46,11 @@ def command_problems(
             yield from _range(recording, name, channel)
             yield from _constant(name, channel)
     if movement is not None and poses is not None:
-        yield from _without_effect(recording, movement, poses)
-        yield from _unmoved(recording, movement, poses, car)
+        apart = list(_apart(recording, poses))
+        yield from apart
+        if not apart:
+            yield from _without_effect(recording, movement, poses)
+            yield from _unmoved(recording, movement, poses, car)
 
 
 def _missing(recording: Recording) -> Iterator[DataProblem]:
@@ -111,6 +114,21 @@ def _constant(name: str, channel: Series) -> Iterator[DataProblem]:
             f"{other} cannot show, only its steady state.",
             record_instead="Drive with steps and sines of this command.",
         )
+
+
+def _apart(recording: Recording, poses: Track) -> Iterator[DataProblem]:
+    """Yield commands that share no time with the poses: they were stamped by another clock."""
+    for name in (*DRIVE, "command.steering"):
+        t = clean(recording.channels[name]).t if name in recording.channels else np.empty(0)
+        if len(t) and (t[-1] < poses.t[0] or t[0] > poses.t[-1]):
+            yield DataProblem(
+                channel=name,
+                name="clock",
+                said=f"Is stamped from {t[0]:.1f} s to {t[-1]:.1f} s, the poses from "
+                f"{poses.t[0]:.1f} s to {poses.t[-1]:.1f} s: they share no time, as of two clocks.",
+                record_instead="Stamp every table by one clock, or give the `offset` of the time "
+                "column in the recording's description.",
+            )
 
 
 def _without_effect(recording: Recording, movement: Series, poses: Track) -> Iterator[DataProblem]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from scm.data_quality.check import check
 from scm.data_quality.corrected import corrected
 from scm.data_quality.problem import DataProblem
+from scm.data_quality.stretches import stretches
 from scm.data_quality.suspicion import Quality
 from scm.errors import RecordingError
 from scm.recording.read import Recording
@@ -40,13 +41,15 @@ def prepare(recording: Recording, car: Car, *, strict: bool = False) -> Prepared
         RecordingError: when `strict` is set and the recording is not in order.
     """
     quality = check(recording, car)
-    repairs = [p for p in quality.problems if p.corrected]
+    cut = stretches(corrected(recording, quality), car)
+    problems = (*(p for p in quality.problems if not cut.explains(p)), *cut.problems)
+    repairs = [p for p in problems if p.corrected]
     account = tuple(f"{p.channel}: {p.said} {p.corrected}" for p in repairs)
     if strict and account:
         raise RecordingError("\n".join(f"{recording.path}: {line}" for line in account))
     return Prepared(
-        recordings=(corrected(recording, quality),),
-        problems=quality.problems,
+        recordings=cut.recordings,
+        problems=problems,
         account=account,
         quality=quality,
     )

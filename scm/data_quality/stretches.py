@@ -32,6 +32,12 @@ class Stretches:
     recordings: tuple[Recording, ...]
     problems: tuple[DataProblem, ...] = ()
 
+    def explains(self, other: DataProblem) -> bool:
+        """Say whether another problem names nothing but the gaps at which this was cut."""
+        cut = {gap for problem in self.problems for gap in problem.when_s or ()}
+        spans = other.when_s or ()
+        return other.name == "gap" and bool(cut) and all(_is_inside(span, cut) for span in spans)
+
 
 def stretches(recording: Recording, car: Car) -> Stretches:
     """Cut a recording where its poses or the commands that drive the car are missing for long.
@@ -57,6 +63,10 @@ def stretches(recording: Recording, car: Car) -> Stretches:
     ]
     whole = tuple(part for part in parts if _can_be_driven(part, needed))
     return Stretches(whole, (_problem(recording, gaps, whole),))
+
+
+def _is_inside(span: Span, gaps: Iterable[Span]) -> bool:
+    return any(first <= span[0] and span[1] <= last for first, last in gaps)
 
 
 def _stamps(recording: Recording, name: str) -> Floats:
@@ -100,35 +110,31 @@ def _can_be_driven(part: Recording, needed: Sequence[str]) -> bool:
 def _problem(recording: Recording, gaps: Sequence[Span], whole: Sequence[Recording]) -> DataProblem:
     """Say where a recording was cut, and which of its rows are in no stretch."""
     longest_s = max(last - first for first, last in gaps)
-    where = f"a gap of {longest_s:.1f} s" if len(gaps) == 1 else f"{len(gaps)} gaps"
-    more = f", the longest {longest_s:.1f} s" if len(gaps) > 1 else ""
-    how = {0: "nothing is left", 1: "one stretch is left"}.get(
-        len(whole), f"{len(whole)} stretches"
-    )
+    often = "" if len(gaps) == 1 else f"{len(gaps)} times, at most "
+    rest = {
+        0: f"no stretch of {SHORTEST_S:g} s is left",
+        1: "one stretch of it is driven again",
+    }.get(len(whole), f"{len(whole)} stretches of it are driven again, each on its own")
     lost = [
         f"{count} of {len(recording.channels[names[0]].t)} rows of {called(names)}"
         for names in tables(recording)
-        if (count := _lost(recording.channels[names[0]].t, names[0], whole))
+        if (count := _lost(recording, names[0], whole))
     ]
-    rest = (
-        f" Left out, without poses and commands for {SHORTEST_S:g} s: {', '.join(lost)}."
-        if lost
-        else ""
-    )
+    said = f"Poses or commands are missing {often}for {longest_s:.1f} s: {rest}."
+    if lost:
+        said += f" Not in a stretch of {SHORTEST_S:g} s that has both: {', '.join(lost)}."
     return DataProblem(
         channel="*",
         name="stretches",
-        said=f"Poses or commands are missing in {where}{more}: {how}, each driven again on its "
-        f"own.{rest}",
+        said=said,
         when_s=tuple(gaps),
         corrected="Cut at each gap.",
         record_instead="Record poses and commands without pauses, or one file a drive.",
     )
 
 
-def _lost(t: Floats, name: str, whole: Iterable[Recording]) -> int:
+def _lost(recording: Recording, name: str, whole: Iterable[Recording]) -> int:
     """Return how many rows of a channel are in no stretch."""
-    return len(t) - len(np.unique(np.concatenate([
-        np.flatnonzero(np.isin(t, part.channels[name].t))
-        for part in whole if name in part.channels
-    ] or [np.empty(0, dtype=np.int64)])))  # fmt: skip
+    t = recording.channels[name].t
+    parts = [part.channels[name].t for part in whole if name in part.channels]
+    return int((~np.isin(t, np.concatenate(parts))).sum()) if parts else len(t)

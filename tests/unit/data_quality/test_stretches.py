@@ -7,13 +7,19 @@ import numpy as np
 import pytest
 
 from scm.arrays import Floats
+from scm.data_quality.check import check
+from scm.data_quality.corrected import forward_speed
+from scm.data_quality.prepare import prepare
 from scm.data_quality.stretches import stretches
+from scm.data_quality.suspicion import Quality
+from scm.data_quality.track import grid, long_gaps, track
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
 Drive = Callable[[int], Recording]
 
 DAY_S = 86_400.0
+SINCE_1970_S = 1.7e9
 COMMANDS = ("command.throttle", "command.steering")
 
 
@@ -163,3 +169,72 @@ def test_cutting_costs_as_much_as_there_are_rows(drive: Drive, nigel: Car) -> No
     whole: Floats = np.array([rows(stretches(drive(0), nigel).recordings)])
     cut = rows(stretches(paused(drive(0), 40.0, DAY_S), nigel).recordings)
     assert whole[0] <= cut <= whole[0] + 2
+
+
+def faults(found: Quality) -> set[str]:
+    return {suspicion.name for suspicion in found.suspicions} | {p.name for p in found.problems}
+
+
+@pytest.mark.parametrize("pause_s", [2.5, 300.0, DAY_S, SINCE_1970_S])
+def test_a_pause_makes_no_sensor_wrong(drive: Drive, nigel: Car, pause_s: float) -> None:
+    found = check(paused(drive(0), 40.0, pause_s), nigel)
+    assert faults(found) - faults(check(drive(0), nigel)) == {"gap"}
+    assert found.usable.can_diagnose
+
+
+def test_ten_pauses_make_no_sensor_wrong(drive: Drive, nigel: Car) -> None:
+    recording = drive(0)
+    for k in range(10):
+        recording = paused(recording, 6.0 + 106.5 * k, 100.0)
+    assert faults(check(recording, nigel)) - faults(check(drive(0), nigel)) == {"gap"}
+
+
+@pytest.mark.parametrize("prefix", ["imu.", "encoder."])
+def test_a_sensor_that_pauses_is_not_made_wrong(drive: Drive, nigel: Car, prefix: str) -> None:
+    found = check(without(drive(0), prefix, 30.0, 40.0), nigel)
+    assert faults(found) - faults(check(drive(0), nigel)) == {"gap"}
+
+
+def test_a_stray_stamp_at_zero_costs_one_row(drive: Drive, nigel: Car) -> None:
+    recording = paused(drive(0), 0.0, SINCE_1970_S)
+    for name, c in recording.channels.items():
+        if name.startswith("pose."):
+            recording.channels[name] = replace(c, t=np.concatenate(([0.0], c.t[1:])))
+    found = prepare(recording, nigel)
+    (part,) = found.recordings
+    assert len(part.channel("pose.x").t) == len(drive(0).channel("pose.x").t) - 1
+
+
+def test_prepare_says_once_that_a_recording_pauses(drive: Drive, nigel: Car) -> None:
+    found = prepare(paused(drive(0), 40.0, DAY_S), nigel)
+    assert len(found.recordings) == 2
+    assert [p.name for p in found.problems] == ["stretches"]
+
+
+def test_commands_of_another_clock_are_named_as_such(drive: Drive, nigel: Car) -> None:
+    recording = paused(drive(0), 0.0, SINCE_1970_S, only="pose.")
+    own = {n: c for n, c in recording.channels.items() if n.startswith(("pose.", "command."))}
+    found = check(replace(recording, channels=own), nigel)
+    said = {p.name: p.said for p in found.problems if p.channel.startswith("command.")}
+    assert "share no time" in said["clock"]
+    assert "without_effect" not in said
+
+
+def test_a_grid_has_as_many_points_as_there_are_rows(drive: Drive) -> None:
+    poses, late = track(drive(0)), track(paused(drive(0), 40.0, DAY_S))
+    assert poses is not None
+    assert late is not None
+    whole = grid(poses.t[0], poses.t[-1], 0.02, 0.1, long_gaps(poses.t))
+    cut = grid(late.t[0], late.t[-1], 0.02, 0.1, long_gaps(late.t))
+    assert abs(len(whole.t) - len(cut.t)) <= 2
+    assert len(cut.starts) == 2
+    assert cut.length_s == pytest.approx(whole.length_s, abs=0.1)
+    assert cut.paused_s[-1] == pytest.approx(DAY_S, abs=0.1)
+
+
+def test_speeds_beside_a_pause_are_those_without_it(drive: Drive) -> None:
+    cut, whole = (forward_speed(track(r)) for r in (paused(drive(0), 40.0, DAY_S), drive(0)))
+    assert cut is not None
+    assert whole is not None
+    t = cut.t - np.where(cut.t > 40.0, DAY_S, 0.0)
+    assert float(np.abs(cut.values - whole.at(t)).max()) < 0.05
