@@ -31,6 +31,11 @@ def nanoseconds(t_s: float) -> int:
     return round(t_s * NS_PER_S)
 
 
+def processor_s() -> float:
+    """Return the processor time that this process has had so far, on all its threads [s]."""
+    return time.process_time()
+
+
 class Clock(Protocol):
     """What a part's runner needs of time."""
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scm.command import Command
-from scm.mismatch.budget import DEFAULT_S
+from scm.mismatch.budget import DEFAULT_S, Budget
 
 if TYPE_CHECKING:
     from scm.mismatch.diagnose import Found
@@ -65,6 +65,7 @@ def _run(arguments: argparse.Namespace) -> int:
     name = arguments.recording[0].resolve()
     title = name.parent.name if name.name == "recording.yaml" else name.stem
     out = arguments.out or Path("runs") / f"{FOLDER}-{title}"
+    budget = Budget(arguments.budget_s, WallClock())  # reading counts
     progress = Progress(sys.stderr, WallClock())
     try:
         if arguments.car is None and arguments.vehicle is None:
@@ -73,7 +74,7 @@ def _run(arguments: argparse.Namespace) -> int:
                 for name, recordings in cars_of(arguments.recording, arguments.data).items()
             }
             cars = with_told(cars, arguments.told)
-            said = _of_cars(cars, arguments, out, progress)
+            said = _of_cars(cars, arguments, out, progress, budget)
         else:
             said = _of_one(arguments, out, progress)
     finally:
@@ -102,6 +103,7 @@ def _of_cars(
     arguments: argparse.Namespace,
     out: Path,
     progress: "Progress",
+    budget: Budget,
 ) -> str:
     """Diagnose cars by their own files, write the report or reports, and return what to print."""
     from scm.mismatch.diagnose import write
@@ -112,7 +114,7 @@ def _of_cars(
     budget_s, strict = arguments.budget_s, arguments.strict
     if len(cars) == 1:
         (recordings,) = cars.values()
-        found = diagnose_one(recordings, budget_s=budget_s, strict=strict, tell=progress.tell)
+        found = diagnose_one(recordings, budget=budget, strict=strict, tell=progress.tell)
         progress.tell("writing the report")
         write(found, out, _check(arguments, out))
         return _with_account(found, summary(found.diagnosis, out, found.evidence.retuned_m))

@@ -59,7 +59,7 @@ def stretches(recording: Recording, car: Car) -> Stretches:
     edges = [moment for first, last in gaps for moment in (first + EDGE_S, last - EDGE_S)]
     ends = [-np.inf, *edges, np.inf]
     parts = [
-        _part(recording, first, last) for first, last in zip(ends[::2], ends[1::2], strict=True)
+        between(recording, first, last) for first, last in zip(ends[::2], ends[1::2], strict=True)
     ]
     whole = tuple(part for part in parts if _can_be_driven(part, needed))
     return Stretches(whole, (_problem(recording, gaps, whole),))
@@ -74,7 +74,7 @@ def _stamps(recording: Recording, name: str) -> Floats:
     return np.empty(0) if channel is None else channel.t
 
 
-def _part(recording: Recording, first: float, last: float) -> Recording:
+def between(recording: Recording, first: float, last: float) -> Recording:
     """Return what was recorded between two moments, and the commands that lead there."""
     channels = dict[str, Channel]()
     for name, channel in recording.channels.items():
@@ -125,7 +125,7 @@ def _problem(recording: Recording, gaps: Sequence[Span], whole: Sequence[Recordi
         said += f" Not in a stretch of {SHORTEST_S:g} s that has both: {', '.join(lost)}."
     return DataProblem(
         channel="*",
-        name="stretches",
+        name="gap",
         said=said,
         when_s=tuple(gaps),
         corrected="Cut at each gap.",

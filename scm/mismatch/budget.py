@@ -9,11 +9,13 @@ from collections.abc import Callable
 from enum import StrEnum
 from typing import TypeVar
 
-from scm.clock import Clock, seconds
+from scm.clock import Clock, processor_s, seconds
 from scm.mismatch.findings import Unasked
 
 DEFAULT_S = 1800.0  # enough for all that is looked for, on a slow and busy computer too
 MOST_KEPT = 0.5  # of what was allowed
+COMPARED = 3.0  # seconds of a recording for each second: a first fit of them takes half of it
+LEAST_COMPARED_S = 90.0  # less shows too little, however short the time
 _Answer = TypeVar("_Answer")
 
 
@@ -48,10 +50,17 @@ class Budget:
     Args:
         asked_s: After so long a diagnosis is to be there.
         clock: Says how late it is.
+        processor: Says how much processor time the process has had [s].
     """
 
-    def __init__(self, asked_s: float = math.inf, clock: Clock | None = None) -> None:
+    def __init__(
+        self,
+        asked_s: float = math.inf,
+        clock: Clock | None = None,
+        processor: Callable[[], float] = processor_s,
+    ) -> None:
         self._asked_s, self._clock = asked_s, clock
+        self._processor, self._processor_s = processor, processor()
         self._began_ns = clock.now_ns() if clock else 0
         self._kept_s, self._attempts = 0.0, False
         self._left: dict[Question, Unasked] = {}
@@ -65,6 +74,19 @@ class Budget:
         """Return how long it has been [s]."""
         return seconds(self._clock.now_ns() - self._began_ns) if self._clock else 0.0
 
+    def processor_share(self) -> float:
+        """Return how much of one processor the process got so far; several threads get more."""
+        spent_s = self.spent_s()
+        return (self._processor() - self._processor_s) / spent_s if spent_s else 1.0
+
+    def allowed_s(self) -> float:
+        """Return how long a recording can be that is compared in that time [s]."""
+        return max(LEAST_COMPARED_S, COMPARED * self._asked_s)
+
+    def needed_s(self, compared_s: float) -> float:
+        """Return the least budget in which a recording of that length is compared [s]."""
+        return math.ceil(compared_s / COMPARED)
+
     def keep(self, kept_s: float) -> None:
         """Keep time for what follows a search, half of all at most."""
         self._kept_s = min(kept_s, MOST_KEPT * self._asked_s)
@@ -72,6 +94,10 @@ class Budget:
     def is_over(self) -> bool:
         """Say whether what is left is needed for what follows."""
         return self.spent_s() >= self._asked_s - self._kept_s
+
+    def is_spent(self) -> bool:
+        """Say whether nothing is left, not even for what follows."""
+        return self.spent_s() >= self._asked_s
 
     def check(self) -> None:
         """Give up the present attempt, if there is one, where time is up.

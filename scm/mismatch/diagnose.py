@@ -35,6 +35,7 @@ from scm.mismatch.parts import Parts, split
 from scm.mismatch.patch import CarFiles, as_written, on
 from scm.mismatch.report.write import write_report
 from scm.mismatch.rough import SETTLES_FAR, is_far, roughly, strays
+from scm.mismatch.sample import sampled
 from scm.mismatch.search import Search
 from scm.mismatch.strayed import strayed
 from scm.recorder.drives import SUFFIX, recordings_of_one
@@ -137,6 +138,7 @@ def diagnose(
     Raises:
         ScmError: when a recording or the car file cannot be read.
     """
+    budget = Budget(budget_s, clock or WallClock())
     recordings = [
         part_of(one, *span_s) for path in paths for one in recordings_of_one(path, data, vehicle)
     ]
@@ -146,7 +148,7 @@ def diagnose(
     if car_file is None and any(r.vehicle != file for r in recordings):
         msg = f"{paths[0]}: recordings of several cars; say which with --car"
         raise RecordingError(msg)
-    return diagnose_car(recordings, car, budget_s=budget_s, strict=strict, tell=tell, clock=clock)
+    return diagnose_car(recordings, car, budget=budget, strict=strict, tell=tell)
 
 
 def diagnose_car(
@@ -154,25 +156,39 @@ def diagnose_car(
     car: Car,
     *,
     budget_s: float = DEFAULT_S,
+    budget: Budget | None = None,
     strict: bool = False,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
 ) -> Found:
     """Return what `diagnose` does, of recordings that were read already, all of one car.
 
+    Args:
+        recordings: As they were read.
+        car: As given.
+        budget_s: As in `diagnose`.
+        budget: One that began with the reading, in place of `budget_s`.
+        strict: As in `diagnose`, like `tell` and `clock`.
+        tell: Is told what is being tried.
+        clock: For the time it takes.
+
     Raises:
         ScmError: when a recording cannot be used as such a car's.
     """
-    budget = Budget(budget_s, clock or WallClock())
+    budget = budget or Budget(budget_s, clock or WallClock())
     tell("doubting the data")
     prepared = [prepare(recording, car, strict=strict) for recording in recordings]
     usable, problems = _usable(recordings, prepared)
     account = tuple(line for one in prepared for line in one.account)
     if not usable:
         return replace(_nothing(recordings, car, problems, budget.spent_s()), account=account)
+    usable, partly = sampled(usable, budget)
     with threadpool_limits(1):  # two threads drive already: more for small matrices only wait
         found = _searched(usable, car, tell, budget)
-    diagnosis = replace(found.diagnosis, data=problems, runtime_s=budget.spent_s())
+    diagnosis = replace(
+        found.diagnosis, data=(*problems, *partly), runtime_s=budget.spent_s(),
+        processor_share=budget.processor_share(),
+    )  # fmt: skip
     return replace(found, diagnosis=diagnosis, account=account)
 
 

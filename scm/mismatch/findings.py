@@ -153,7 +153,11 @@ class Unasked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
-    """All that was found, and what was not asked; `report.json` holds these fields."""
+    """All that was found, and what was not asked; `report.json` holds these fields.
+
+    Attributes:
+        processor_share: How much of one processor the search got; None where nobody measured.
+    """
 
     verdict: Verdict
     located: tuple[Located, ...]
@@ -163,3 +167,4 @@ class Diagnosis:
     runtime_s: float
     data: tuple[DataProblem, ...] = field(default=())
     unasked: tuple[Unasked, ...] = field(default=())
+    processor_share: float | None = None

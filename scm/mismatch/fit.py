@@ -196,7 +196,7 @@ class Fitter:
         stalled = set[int]()  # by derivatives that were not new: that says nothing yet
         for count in range(rounds):
             active = [f for f in fits if not f.done]
-            if not active:
+            if not active or (count and self.model.is_late()):
                 break
             renewed = {id(f) for f in active if fresh and (count % 3 == 0 or id(f) in stalled)}
             self._differentiate(active, renewed)

@@ -115,6 +115,7 @@ class Likelihood:
         ordinary: The car's own uncertain numbers, in the order of every `z`.
         t: Times of all innovations, (events,).
         settled: 0 while the start still matters and where poses are missing for long, else 1.
+        is_late: Says that no time is left: a fit ends with the round that it is in.
         asked: Is called before sets are driven and between, on all threads; what it raises ends
             that, and leaves nothing behind.
     """
@@ -130,6 +131,7 @@ class Likelihood:
         self.believe(usual_noise(drives))
         self.runs = 0
         self.asked: Callable[[], None] = lambda: None
+        self.is_late: Callable[[], bool] = lambda: False
 
     @cached_property
     def prior(self) -> Floats:

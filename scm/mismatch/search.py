@@ -110,7 +110,7 @@ class Search:
     ) -> None:
         self.model, self.listed, self.tell = model, tuple(library), tell
         self._learn, self.budget = learn, budget or Budget()
-        model.asked = self.budget.check
+        model.asked, model.is_late = self.budget.check, self.budget.is_spent
         self.fitter = Fitter(model, part)
         self.events = int(part.sum())
         self.steps: list[Step] = []

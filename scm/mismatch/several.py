@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock, seconds
 from scm.errors import RecordingError
-from scm.mismatch.budget import DEFAULT_S
+from scm.mismatch.budget import DEFAULT_S, Budget
 from scm.mismatch.diagnose import Found, diagnose_car, told, write
 from scm.mismatch.explain import said
 from scm.mismatch.findings import Effect, Undecided, Verdict
@@ -89,17 +89,28 @@ def diagnose_one(
     recordings: Sequence[Recording],
     *,
     budget_s: float = DEFAULT_S,
+    budget: Budget | None = None,
     strict: bool = False,
     tell: Tell = lambda _: None,
     clock: Clock | None = None,
 ) -> Found:
     """Return what a simulator lacks to explain one car, by the file that its recordings name.
 
+    Args:
+        recordings: As they were read.
+        budget_s: As in `diagnose`.
+        budget: One that began with the reading, in place of `budget_s`.
+        strict: As in `diagnose`, like `tell` and `clock`.
+        tell: Is told what is being tried.
+        clock: For the time it takes.
+
     Raises:
         ScmError: when a recording or the car file cannot be used.
     """
     car = load_car(recordings[0].vehicle, trusted=False)
-    return diagnose_car(recordings, car, budget_s=budget_s, strict=strict, tell=tell, clock=clock)
+    return diagnose_car(
+        recordings, car, budget_s=budget_s, budget=budget, strict=strict, tell=tell, clock=clock
+    )
 
 
 def diagnose_several(

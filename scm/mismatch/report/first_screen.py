@@ -13,7 +13,7 @@ from scm.mismatch.report.html_text import around, tag
 from scm.mismatch.report.places import where_and_when
 from scm.mismatch.report.plot import Picture
 from scm.mismatch.report.problems import other_problems_said, problem_cards
-from scm.mismatch.report.verdict_text import all_named, can_judge, verdict_sentence
+from scm.mismatch.report.verdict_text import all_named, can_judge, processor_said, verdict_sentence
 from scm.mismatch.report.wording import (
     capital,
     interval,
@@ -209,6 +209,7 @@ def _unasked_card(diagnosis: Diagnosis) -> Card:
     """Say what there was no time for, and that more time would help."""
     rows = [
         ("What", "\n".join(question.said for question in diagnosis.unasked)),
+        ("Why", processor_said(diagnosis)),
         ("What to do", "Search again with more time, `--budget-s`. What is reported above was "
                        "looked for, and fitted, to the end."),
     ]  # fmt: skip

@@ -8,7 +8,7 @@ from scm.data_quality.problem import DataProblem
 from scm.mismatch.findings import Diagnosis, Effect
 from scm.mismatch.report.first_screen import name_of
 from scm.mismatch.report.places import sensors
-from scm.mismatch.report.verdict_text import can_judge, verdict_sentence
+from scm.mismatch.report.verdict_text import can_judge, processor_said, verdict_sentence
 from scm.mismatch.report.wording import (
     interval,
     percent,
@@ -42,6 +42,8 @@ def _lines(diagnosis: Diagnosis, out: Path, retuned_m: float | None) -> Iterator
         yield f"    drive this: {question.drive_this}"
     for left in diagnosis.unasked:
         yield f"  left unasked: {left.said}"
+    if busy := processor_said(diagnosis):
+        yield f"  {busy}"
     yield from _problems(diagnosis.data)
     yield from _better(diagnosis, retuned_m)
     yield f"  {out / PAGE}  ({diagnosis.runtime_s:.0f} s)"

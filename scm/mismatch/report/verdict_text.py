@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 from scm.data_quality.problem import DataProblem
 from scm.mismatch.findings import Diagnosis, Effect, Equation, Verdict
-from scm.mismatch.report.wording import capital, joined, title_of
+from scm.mismatch.report.wording import capital, joined, percent, title_of
 
 _MOST_NAMED = 4  # effects in the verdict's sentence
+_WHOLE_PROCESSOR = 0.8  # below, a search on an idle computer is clearly faster
 _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
@@ -32,6 +33,14 @@ def _nothing_named(diagnosis: Diagnosis) -> str:
     if diagnosis.unasked:
         return "Simulator and recording differ, and time ran out before a cause was found."
     return "Simulator and recording differ, and no cause could be named."
+
+
+def processor_said(diagnosis: Diagnosis) -> str:
+    """Say that other processes took the time that a search lacked; nothing where they did not."""
+    share = diagnosis.processor_share
+    if not diagnosis.unasked or share is None or share >= _WHOLE_PROCESSOR:
+        return ""
+    return f"This process got {percent(share)} of a processor: the computer was busy."
 
 
 def _mismatch_sentence(effects: Sequence[Effect]) -> str:

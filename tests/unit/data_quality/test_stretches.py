@@ -63,7 +63,7 @@ def test_a_pause_of_all_tables_cuts_them_together(drive: Drive, nigel: Car, paus
         after = second.values[second.t >= 40.0 + pause_s]
         assert np.array_equal(after, channel.values[channel.t >= 40.0]), name
     (problem,) = found.problems
-    assert problem.name == "stretches"
+    assert problem.name == "gap"
     assert "2 stretches" in problem.said
     assert "Left out" not in problem.said
 
@@ -208,7 +208,7 @@ def test_a_stray_stamp_at_zero_costs_one_row(drive: Drive, nigel: Car) -> None:
 def test_prepare_says_once_that_a_recording_pauses(drive: Drive, nigel: Car) -> None:
     found = prepare(paused(drive(0), 40.0, DAY_S), nigel)
     assert len(found.recordings) == 2
-    assert [p.name for p in found.problems] == ["stretches"]
+    assert [p.name for p in found.problems] == ["gap"]
 
 
 def test_commands_of_another_clock_are_named_as_such(drive: Drive, nigel: Car) -> None:

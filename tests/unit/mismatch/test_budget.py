@@ -11,6 +11,7 @@ from scm.clock import StepClock, nanoseconds
 from scm.mismatch import diagnose
 from scm.mismatch.budget import DEFAULT_S, MOST_KEPT, WORDS, Budget, Question
 from scm.mismatch.diagnose import diagnose_car
+from scm.mismatch.fit import Fitter
 from scm.mismatch.laws.decide import Lawful, _Best, _Settled
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.report.first_screen import cards_of
@@ -94,6 +95,29 @@ def test_a_question_is_told_once_and_whether_it_was_begun():
         "Laws outside the library were not sought to the end: the budget of 60 s ended.",
         "Effects that the noise believed in may hide were not sought: the budget of 60 s ended.",
     ]
+
+
+@pytest.mark.parametrize(("got_s", "share"), [(3.0, 0.3), (18.0, 1.8)])
+def test_a_budget_knows_how_much_of_a_processor_it_got(got_s, share):
+    had = iter((100.0, 100.0 + got_s))
+    clock = StepClock()
+    budget = Budget(60.0, clock, lambda: next(had))
+    clock.set_ns(nanoseconds(10.0))
+    assert budget.processor_share() == pytest.approx(share)
+
+
+def test_a_fit_ends_with_its_round_when_no_time_is_left():
+    model = Likelihood([driven((("steering.trim_rad", 0.05),), seconds=6.0)], big_nigel())
+    fitter = Fitter(model, np.ones(len(model.t)))
+    runs = list[int]()
+    for late in (True, False):
+        model.is_late = lambda late=late: late
+        before = model.runs
+        (fitted,) = fitter.refine([fitter.null()], fresh=True)
+        runs.append(model.runs - before)
+        assert np.isfinite(fitted.q)
+        assert len(fitted.covariance) == len(fitted.z)
+    assert runs[0] < runs[1]
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,8 @@ from scm.mismatch.findings import Estimate
 from scm.mismatch.report.as_json import json_text, report_fields
 from tests.unit.mismatch import made_up_findings as made_up
 
-TOP = {"verdict", "located", "effects", "undecided", "fit", "runtime_s", "data", "unasked"}
+TOP = {"verdict", "located", "effects", "undecided", "fit", "runtime_s", "data", "unasked",
+       "processor_share"}  # fmt: skip
 LOCATED = {"equation", "channels", "depends_on", "when_s", "where", "share_of_error"}
 EFFECT = {"name", "listed", "equation", "depends_on", "parameters", "probability", "said", "law",
           "rivals"}  # fmt: skip

@@ -187,6 +187,15 @@ def test_page_and_command_line_say_what_there_was_no_time_for(tmp_path):
     assert "Time ran out" not in written(tmp_path, made_up.none())
 
 
+@pytest.mark.parametrize(("share", "said"), [(0.31, True), (1.7, False), (None, False)])
+def test_a_search_that_got_little_of_the_processor_says_so(tmp_path, share, said):
+    found, *others = made_up.cut_short()
+    case = replace(found, processor_share=share), *others
+    words = "This process got 31"
+    assert (words in written(tmp_path, case)) is said
+    assert (words in summary(case[0], tmp_path)) is said
+
+
 def test_a_difference_that_was_not_explained_in_time_may_have_a_cause():
     found = replace(made_up.cut_short()[0], verdict=Verdict.MISMATCH)
     assert verdict_sentence(found) == (
