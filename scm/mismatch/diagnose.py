@@ -28,6 +28,7 @@ from scm.mismatch.law_rivals import Standing, standing
 from scm.mismatch.laws.curves import law_curves
 from scm.mismatch.laws.decide import Lawful, is_law
 from scm.mismatch.laws.seek import Sought, with_laws
+from scm.mismatch.leftover import on_one_axis
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import Candidate, candidates, placed, shown_by, terms_needed
 from scm.mismatch.locate import locate
@@ -319,7 +320,16 @@ def _nothing(
 
 
 def _titles(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    return tuple(map(_title, recordings))
+    return tuple(dict.fromkeys(map(_title, recordings)))  # stretches have one title
+
+
+def _pauses(searched: Searched) -> tuple[tuple[float, float], ...]:
+    """Return what `Evidence.pauses` holds; nothing of several recordings, or of a whole one."""
+    recordings, drives = searched.recordings, searched.drives
+    if len(drives) == 1 or len({(r.path, r.name) for r in recordings}) > 1:
+        return ()
+    moves = on_one_axis(drives)
+    return tuple((float(d.edges[0]) + move, -move) for d, move in zip(drives, moves, strict=True))
 
 
 def _title(recording: Recording) -> str:
@@ -403,6 +413,7 @@ def told(searched: Searched, tell: Tell) -> Found:
         vehicle=car.name, recordings=titles, residuals=residuals, free_runs=free_runs,
         ordinary=as_written(ordinary_of(model, best, car), found_car or car), tried=searched.tried,
         curves=_curves(model, best, searched.sought), retuned_m=retuned_m,
+        pauses=_pauses(searched),
     )  # fmt: skip
     return Found(
         diagnosis, car, evidence, model, best, search.retuned, suggestions, searched, found_car,

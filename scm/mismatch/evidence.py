@@ -106,6 +106,8 @@ class Evidence:
     Attributes:
         retuned_m: Position error, as in `Fit.confirm`, of the given car with its own numbers
             refitted and no effect; None where none was found, then `after` is that car.
+        pauses: Of a recording that was cut into stretches, by stretch: its first time as drawn,
+            and how much later the recording's clock is [s]. Pauses are not drawn.
     """
 
     vehicle: str
@@ -116,3 +118,4 @@ class Evidence:
     ordinary: tuple[Ordinary, ...] = ()
     tried: tuple[Tried, ...] = ()
     retuned_m: float | None = None
+    pauses: tuple[tuple[float, float], ...] = ()

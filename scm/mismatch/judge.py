@@ -27,6 +27,7 @@ from scm.vehicles.car import Car
 
 FAST_MPS, FAST_HORIZON_S, SLOW_HORIZON_S = 1.0, 1.0, 3.0
 SHORTEST_S = 0.2
+MOST_TIME = 0.8  # of a recording: blocks that make up the rest may be too short for a window
 NEXT_S = 1.0  # between the starts of windows at most
 DRAWS = 2
 START_DIGITS = 6  # of a window's start in a report [s]: whoever replays it starts there too
@@ -58,8 +59,14 @@ def horizon_of(drives: Sequence[Drive], parts: Parts) -> float:
     speeds = [np.hypot(d.smoothed["pose.x"].rate, d.smoothed["pose.y"].rate) for d in drives]
     fast = float(np.percentile(np.concatenate(speeds), 90)) > FAST_MPS
     blocks = [b - a for name in NAMES for spans in getattr(parts, name).spans for a, b in spans]
-    longest = 0.9 * min(blocks, default=SLOW_HORIZON_S)
+    longest = 0.9 * _usual(blocks) if blocks else SLOW_HORIZON_S
     return round(min(FAST_HORIZON_S if fast else SLOW_HORIZON_S, longest), 2)
+
+
+def _usual(blocks: Sequence[float]) -> float:
+    """Return the length that blocks have which are most of the time: short ones show nothing."""
+    lengths = np.sort(blocks)[::-1]
+    return float(lengths[np.searchsorted(np.cumsum(lengths), MOST_TIME * lengths.sum() - 1e-9)])
 
 
 def judge(

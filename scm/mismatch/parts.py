@@ -67,15 +67,20 @@ def split(model: Likelihood, block_s: float = BLOCK_S) -> Parts:
 
 
 def blocks(drives: Sequence[Drive], block_s: float = BLOCK_S) -> list[Floats]:
-    """Return where the blocks of each drive begin and end, all of a drive of one length."""
-    longest = max(float(drive.edges[-1] - drive.edges[0]) for drive in drives)
-    least = 1 if len(drives) >= LEAST_BLOCKS and longest < WHOLE * block_s else LEAST_BLOCKS
-    return [
-        np.linspace(
-            first, last, max(round((last - first) / block_s) if least > 1 else 1, least) + 1
-        )
-        for first, last in ((float(drive.edges[0]), float(drive.edges[-1])) for drive in drives)
-    ]
+    """Return where the blocks of each drive begin and end, all of a drive of one length.
+
+    Short drives are one block each, where there are enough of them, or enough beside them.
+    """
+    spans = [(float(drive.edges[0]), float(drive.edges[-1])) for drive in drives]
+    lengths = [last - first for first, last in spans]
+    are_many = len(drives) >= LEAST_BLOCKS and max(lengths) < WHOLE * block_s
+    cuts = []
+    for (first, last), length in zip(spans, lengths, strict=True):
+        others = sum(lengths) - length
+        is_short = length < WHOLE * block_s and others >= LEAST_BLOCKS * block_s
+        count = 1 if are_many or is_short else max(round(length / block_s), LEAST_BLOCKS)
+        cuts.append(np.linspace(first, last, count + 1))
+    return cuts
 
 
 def _whose(count: int, first: int) -> Ints:

@@ -46,6 +46,8 @@ def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Draw
     clock = ON_ITS_CLOCK
     if len(evidence.recordings) > 1:
         clock = "time, one recording after another [s]"
+    elif evidence.pauses:
+        clock = "time without pauses [s]"
     elif start_s:
         clock = f"time since {start_s:.0f} s of the recording's clock [s]"
     return Drawings(

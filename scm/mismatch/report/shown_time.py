@@ -9,8 +9,33 @@ from scm.arrays import Floats
 from scm.data_quality.problem import Span
 from scm.mismatch.evidence import Evidence
 from scm.mismatch.findings import Diagnosis
+from scm.mismatch.leftover import APART_S
 
 _READABLE_S = 1e5  # a clock beyond it is no stop watch
+
+
+def on_clock(diagnosis: Diagnosis, evidence: Evidence) -> Diagnosis:
+    """Return a diagnosis whose places in time are by the recording's clock, its pauses included."""
+    if not evidence.pauses:
+        return diagnosis
+    located = tuple(
+        replace(e, when_s=e.when_s and _with_pauses(e.when_s, evidence.pauses))
+        for e in diagnosis.located
+    )
+    return replace(diagnosis, located=located)
+
+
+def _with_pauses(
+    when_s: tuple[Span, ...], pauses: tuple[tuple[float, float], ...]
+) -> tuple[Span, ...]:
+    """Return spans as they were before pauses were left out; one over a pause becomes two."""
+    ends = [first for first, _ in pauses[1:]] + [math.inf]
+    return tuple(
+        (max(a, first) + later, min(b, end - APART_S) + later)
+        for a, b in when_s
+        for (first, later), end in zip(pauses, ends, strict=True)
+        if a < end - APART_S and b > first
+    )
 
 
 def since_start(diagnosis: Diagnosis, evidence: Evidence) -> tuple[Diagnosis, Evidence, float]:

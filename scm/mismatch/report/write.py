@@ -14,7 +14,7 @@ from scm.mismatch.report.car_file import FILE, given_text, write_car
 from scm.mismatch.report.drawings import draw
 from scm.mismatch.report.own_files import write_own_terms
 from scm.mismatch.report.page import page_html
-from scm.mismatch.report.shown_time import since_start
+from scm.mismatch.report.shown_time import on_clock, since_start
 from scm.vehicles.car import Car
 
 PAGE, FIELDS, DRAWN, PICTURES = "report.html", "report.json", "drawn.json", "pictures"
@@ -39,7 +39,7 @@ def write_report(
     pictures.mkdir(parents=True, exist_ok=True)
     for old in pictures.glob("*.svg"):
         old.unlink()
-    (out / FIELDS).write_text(json_text(diagnosis), encoding="utf-8")
+    (out / FIELDS).write_text(json_text(on_clock(diagnosis, evidence)), encoding="utf-8")
     use = _written_car(diagnosis, evidence, car, patched, out)
     _write_windows(evidence, car, out)
     if check and diagnosis.fit is not None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from scm.mismatch.judge import horizon_of
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.parts import NAMES, split
 from tests.unit.mismatch.made_drive import big_nigel, driven, healthy_model
@@ -61,3 +62,15 @@ def test_many_drives_too_short_to_cut_take_turns_as_wholes():
     assert held == [1, 1, 1, 1]
     counts = {name: sum(map(bool, getattr(parts, name).spans)) for name in NAMES}
     assert counts == {"fit": 2, "choose": 1, "confirm": 1}
+
+
+def test_a_short_stretch_beside_a_long_one_is_not_cut():
+    parts = split(Likelihood([driven(seconds=8.0), driven(seconds=3.0)], big_nigel()), 1.9)
+    held = [sum(len(getattr(parts, name).spans[i]) for name in NAMES) for i in range(2)]
+    assert held == [4, 1]
+
+
+def test_a_short_stretch_does_not_shorten_the_windows_of_all():
+    drives = [driven(seconds=14.0), driven(seconds=2.5)]
+    parts = split(Likelihood(drives, big_nigel()), 3.4)
+    assert horizon_of(drives, parts) > 2.8

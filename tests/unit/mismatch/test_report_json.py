@@ -7,6 +7,7 @@ import pytest
 
 from scm.mismatch.findings import Estimate
 from scm.mismatch.report.as_json import json_text, report_fields
+from scm.mismatch.report.shown_time import on_clock
 from tests.unit.mismatch import made_up_findings as made_up
 
 TOP = {"verdict", "located", "effects", "undecided", "fit", "runtime_s", "data", "unasked",
@@ -66,3 +67,17 @@ def test_what_is_no_finite_number_is_null():
     found = report["effects"][0]["parameters"]["time_constant_s"]
     assert (found["value"], found["low"], found["high"]) == (None, None, None)
     assert report["runtime_s"] is None
+
+
+def test_places_in_time_are_by_the_clock_of_a_recording_with_pauses():
+    diagnosis, evidence, *_ = made_up.pair()
+    spans = ((1.0, 2.0), (14.0, 17.0), (18.0, 19.0))
+    first = replace(diagnosis.located[0], when_s=spans)
+    always = replace(first, when_s=None)
+    cut = replace(evidence, pauses=((0.0, 0.0), (16.0, 86_400.0)))
+    shown = on_clock(replace(diagnosis, located=(first, always)), cut)
+    assert shown.located[0].when_s == (
+        (1.0, 2.0), (14.0, 15.0), (86_416.0, 86_417.0), (86_418.0, 86_419.0)
+    )  # fmt: skip
+    assert shown.located[1].when_s is None
+    assert on_clock(diagnosis, evidence) is diagnosis
