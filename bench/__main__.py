@@ -16,6 +16,7 @@ BENCHMARKS = (
     "eye",
     "camera",
     "lidar",
+    "recordings",
     "sensors",
     "signals",
     "signing",
