@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from scm.command import Command
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from scm.recording.read import Recording
     from scm.replay.free_run import FreeRun
     from scm.vehicles.car import Car

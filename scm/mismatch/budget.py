@@ -44,6 +44,11 @@ class OutOfTimeError(Exception):
     """Time is up in the midst of an attempt; it never leaves a search."""
 
 
+def needed_s(compared_s: float) -> float:
+    """Return the least budget in which recordings of that length are compared whole [s]."""
+    return math.ceil(compared_s / COMPARED)
+
+
 class Budget:
     """Time for a search, from now on; without a clock it never ends.
 
@@ -80,12 +85,8 @@ class Budget:
         return (self._processor() - self._processor_s) / spent_s if spent_s else 1.0
 
     def allowed_s(self) -> float:
-        """Return how long a recording can be that is compared in that time [s]."""
+        """Return how long recordings can be that are compared whole in that time [s]."""
         return max(LEAST_COMPARED_S, COMPARED * self._asked_s)
-
-    def needed_s(self, compared_s: float) -> float:
-        """Return the least budget in which a recording of that length is compared [s]."""
-        return math.ceil(compared_s / COMPARED)
 
     def keep(self, kept_s: float) -> None:
         """Keep time for what follows a search, half of all at most."""

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,11 +56,12 @@ def check_report(folder: Path, recordings: Sequence[Recording]) -> list[Figure]:
     Raises:
         ScmError: when a file of the report is missing, or these are other recordings.
     """
-    fit = _fields(folder)["fit"]
+    fields = _fields(folder)
+    fit, compared_s = fields["fit"], fields.get("compared_s")
     if fit is None:
         return []
     given, found = (load_car(folder / name) for name in (GIVEN, FILE))
-    usable = usable_of(recordings, given)
+    usable = usable_of(recordings, given, math.inf if compared_s is None else compared_s)
     rows = _windows(folder, len(usable))
     figures = list[Figure]()
     for car, name, side in ((given, GIVEN, "before"), (found, FILE, "after")):

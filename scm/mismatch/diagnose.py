@@ -1,5 +1,6 @@
 """A whole diagnosis: read, doubt, fit, search, judge, say."""
 
+import math
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -13,6 +14,7 @@ from scm.clock import Clock, WallClock
 from scm.data_quality.prepare import Prepared, prepare
 from scm.data_quality.problem import DataProblem
 from scm.data_quality.suspicion import Quality
+from scm.data_quality.track import clean, recorded_s
 from scm.errors import RecordingError, ScmError
 from scm.mismatch.budget import DEFAULT_S, Budget, Question
 from scm.mismatch.curves import curve
@@ -183,19 +185,28 @@ def diagnose_car(
     account = tuple(line for one in prepared for line in one.account)
     if not usable:
         return replace(_nothing(recordings, car, problems, budget.spent_s()), account=account)
-    usable, partly = sampled(usable, budget)
+    usable, partly = sampled(usable, budget.allowed_s())
     with threadpool_limits(1):  # two threads drive already: more for small matrices only wait
         found = _searched(usable, car, tell, budget)
     diagnosis = replace(
         found.diagnosis, data=(*problems, *partly), runtime_s=budget.spent_s(),
-        processor_share=budget.processor_share(),
+        processor_share=budget.processor_share(), compared_s=budget.allowed_s(),
     )  # fmt: skip
     return replace(found, diagnosis=diagnosis, account=account)
 
 
-def usable_of(recordings: Sequence[Recording], car: Car) -> list[Recording]:
-    """Return the stretches of recordings that a diagnosis would use, repaired."""
-    return _usable(recordings, [prepare(recording, car) for recording in recordings])[0]
+def usable_of(
+    recordings: Sequence[Recording], car: Car, allowed_s: float = math.inf
+) -> list[Recording]:
+    """Return the stretches of recordings that a diagnosis would use, repaired.
+
+    Args:
+        recordings: As they were read.
+        car: As given.
+        allowed_s: How much of them the budget let be compared.
+    """
+    usable, _ = _usable(recordings, [prepare(recording, car) for recording in recordings])
+    return sampled(usable, allowed_s)[0]
 
 
 def _usable(
@@ -220,8 +231,8 @@ def _usable(
 
 def _length_s(recordings: Sequence[Recording]) -> float:
     """Return how long recordings with poses are together."""
-    posed = [r.channel(POSE_X).t for r in recordings if POSE_X in r.channels]
-    return sum(float(np.ptp(t)) for t in posed)
+    posed = [clean(r.channel(POSE_X)).t for r in recordings if POSE_X in r.channels]
+    return sum(recorded_s(t) for t in posed if len(t))
 
 
 def _is_only_short(quality: Quality) -> bool:

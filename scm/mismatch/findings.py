@@ -157,6 +157,8 @@ class Diagnosis:
 
     Attributes:
         processor_share: How much of one processor the search got; None where nobody measured.
+        compared_s: How long the recordings could be that the budget let be compared whole; of
+            longer ones pieces are. None where there was no budget.
     """
 
     verdict: Verdict
@@ -168,3 +170,4 @@ class Diagnosis:
     data: tuple[DataProblem, ...] = field(default=())
     unasked: tuple[Unasked, ...] = field(default=())
     processor_share: float | None = None
+    compared_s: float | None = None

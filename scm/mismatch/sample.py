@@ -8,7 +8,7 @@ import numpy as np
 from scm.arrays import Floats
 from scm.data_quality.problem import DataProblem
 from scm.data_quality.stretches import between
-from scm.mismatch.budget import Budget
+from scm.mismatch.budget import needed_s
 from scm.recording.read import Recording
 
 PIECE_S = 30.0  # long enough for slow effects, short enough for several in any sample
@@ -25,16 +25,16 @@ class _Piece(NamedTuple):
 
 
 def sampled(
-    recordings: Sequence[Recording], budget: Budget
+    recordings: Sequence[Recording], allowed_s: float
 ) -> tuple[list[Recording], tuple[DataProblem, ...]]:
     """Return what of some recordings is compared in a budget, and what to say if it is not all.
 
     Args:
         recordings: Without gaps, with poses.
-        budget: Says how much can be compared.
+        allowed_s: So much of them, see `Budget.allowed_s`.
     """
     times = [recording.channel("pose.x").t for recording in recordings]
-    whole_s, allowed_s = sum(float(t[-1] - t[0]) for t in times), budget.allowed_s()
+    whole_s = sum(float(t[-1] - t[0]) for t in times)
     if whole_s <= allowed_s:
         return list(recordings), ()
     pieces = [piece for i, t in enumerate(times) for piece in _pieces(i, t)]
@@ -50,7 +50,7 @@ def sampled(
         name="partly_compared",
         said=f"{taken_s:.0f} s of {whole_s:.0f} s are compared, in {len(parts)} pieces all over "
         f"the recording in which the car moves: the budget allows no more. All of it takes "
-        f"`--budget-s {budget.needed_s(whole_s):.0f}`.",
+        f"`--budget-s {needed_s(whole_s):.0f}`.",
     )
     return parts, (problem,)
 

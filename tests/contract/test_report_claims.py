@@ -2,10 +2,13 @@
 
 import json
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from scm.clock import WallClock
+from scm.mismatch import budget, sample
 from scm.mismatch import diagnose as module
 from scm.mismatch.budget import Budget
 from scm.mismatch.check_report import check_report
@@ -30,12 +33,12 @@ class Batches(Budget):
 
 
 def interrupted_after(batches):
-    def budget(_asked_s, clock):
+    def made_with(_asked_s, clock):
         made = Batches(1.0, clock)
         made.left = batches
         return made
 
-    return budget
+    return made_with
 
 
 def late(name, _t, values):
@@ -67,6 +70,31 @@ def test_every_figure_of_a_report_is_that_of_its_car_file(case, tmp_path, monkey
     assert {figure.part for figure in figures} == {"fit", "choose", "confirm"}
     assert [figure for figure in figures if not figure.agrees] == []
     assert_numbers_are_the_file_s(tmp_path)
+
+
+def test_every_figure_of_a_recording_with_a_pause_of_a_day_is_that_of_its_car_file(tmp_path):
+    recording = made_drive(TRIM, seconds=20.0)
+    for name, channel in recording.channels.items():
+        late = np.where(channel.t >= 9.0, channel.t + 86_400.0, channel.t)
+        recording.channels[name] = replace(channel, t=late)
+    found = diagnose_car([recording], nigel(), budget_s=0.0, clock=WallClock())
+    write(found, tmp_path)
+    figures = check_report(tmp_path, [recording])
+    assert {figure.part for figure in figures} == {"fit", "choose", "confirm"}
+    assert [figure for figure in figures if not figure.agrees] == []
+    assert len(found.evidence.recordings) == 1
+
+
+def test_every_figure_of_pieces_that_a_budget_allows_is_that_of_its_car_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(budget, "LEAST_COMPARED_S", 15.0)
+    monkeypatch.setattr(sample, "PIECE_S", 4.0)
+    recording = made_drive(TRIM, seconds=20.0)
+    found = diagnose_car([recording], nigel(), budget_s=0.0, clock=WallClock())
+    assert "partly_compared" in {problem.name for problem in found.diagnosis.data}
+    write(found, tmp_path)
+    figures = check_report(tmp_path, [recording])
+    assert figures
+    assert [figure for figure in figures if not figure.agrees] == []
 
 
 def assert_numbers_are_the_file_s(folder):

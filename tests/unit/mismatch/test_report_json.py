@@ -11,7 +11,7 @@ from scm.mismatch.report.shown_time import on_clock
 from tests.unit.mismatch import made_up_findings as made_up
 
 TOP = {"verdict", "located", "effects", "undecided", "fit", "runtime_s", "data", "unasked",
-       "processor_share"}  # fmt: skip
+       "processor_share", "compared_s"}  # fmt: skip
 LOCATED = {"equation", "channels", "depends_on", "when_s", "where", "share_of_error"}
 EFFECT = {"name", "listed", "equation", "depends_on", "parameters", "probability", "said", "law",
           "rivals"}  # fmt: skip
