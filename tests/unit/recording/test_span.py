@@ -50,3 +50,27 @@ def test_of_a_run_times_count_from_its_begin_not_from_when_its_car_was_driven(re
     said = r"from 0 s to 9 s: nothing of n1 was .*; there is from 10\.0 s to 29\.0 s"
     with pytest.raises(RecordingError, match=said):
         part_of(run, None, 9.0)
+
+
+def with_stamp(recording, row, at_s):
+    """Return the recording with one stamp of its poses changed."""
+    pose = recording.channel("pose.x")
+    t = pose.t.copy()
+    t[row] = at_s
+    return replace(recording, channels={**recording.channels, "pose.x": replace(pose, t=t)})
+
+
+@pytest.mark.parametrize("row", [0, 5])
+def test_a_stray_stamp_at_zero_is_no_begin(recording, row):
+    later = {n: replace(c, t=c.t + 1.7e9) for n, c in recording.channels.items()}
+    stray = with_stamp(replace(recording, channels=later), row, 0.0)
+    begin = 1.7e9 + (101.0 if row == 0 else 100.0)
+    part = part_of(stray, 4.0, 8.0).channel("pose.x").t
+    assert part.tolist() == [t for t in stray.channel("pose.x").t if begin + 4 <= t <= begin + 8]
+    assert len(part)
+
+
+def test_a_stray_stamp_a_day_ahead_is_no_end(recording):
+    stray = with_stamp(recording, 7, 86_500.0)
+    with pytest.raises(RecordingError, match=r"there is from 0\.0 s to 19\.0 s"):
+        part_of(stray, 30.0, 40.0)
