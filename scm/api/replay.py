@@ -131,6 +131,8 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
         pictures: The Eye's and the cars' own, of each camera the one that is newest at `from_s`
             first.
         damaged: What of the stretch cannot be read, in words.
+        next_s: When the first frame after a stretch without frames comes; None: there is none, or
+            the stretch has frames.
     """
 
     from_s: float
@@ -141,6 +143,7 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
     signals: tuple[SignalChange, ...]
     pictures: tuple[PictureAt, ...]
     damaged: tuple[str, ...]
+    next_s: float | None
 
 
 class RecordedEvent(msgspec.Struct, kw_only=True, frozen=True):
@@ -179,7 +182,14 @@ def frames_of(index: RunIndex, from_s: float, to_s: float, hz: float) -> Frames:
         signals=tuple(gathering.signals),
         pictures=tuple(gathering.pictures),
         damaged=tuple(damage),
+        next_s=None if gathering.frames else _next_frame_s(index, end_ns),
     )
+
+
+def _next_frame_s(index: RunIndex, after_ns: int) -> float | None:
+    """Return when the world next told where cars are, since the recording's begin."""
+    found = next(index.read(after_ns + 1, index.end_ns, SNAPSHOT), None)
+    return None if found is None else round((found.t_ns - index.begin_ns) / NS_PER_S, 3)
 
 
 class _Frames:

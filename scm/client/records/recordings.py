@@ -160,6 +160,8 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
         pictures: The Eye's and the cars' own, of each camera the one that is newest at `from_s`
             first.
         damaged: What of the stretch cannot be read, in words.
+        next_s: When the first frame after a stretch without frames comes; None: there is none, or
+            the stretch has frames.
     """
 
     from_s: float
@@ -170,6 +172,7 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
     signals: tuple[SignalChange, ...]
     pictures: tuple[PictureAt, ...]
     damaged: tuple[str, ...]
+    next_s: float | None
 
 
 class RecordedEvent(msgspec.Struct, kw_only=True, frozen=True):

@@ -121,6 +121,15 @@ def test_frames_tell_where_cars_were_and_what_signals_showed(ask, folder):
     assert [(one["t_s"], one["colour"]) for one in between] == [(1.05, "red")]
 
 
+def test_a_stretch_in_a_pause_tells_when_the_next_frame_comes(ask, folder):
+    write_run(folder / "run.mcap", pause_s=86_400.0)
+    assert ask("/run/frames?from_s=0&to_s=10")["next_s"] is None
+    silent = ask("/run/frames?from_s=10&to_s=20")
+    assert (silent["frames"], silent["next_s"]) == ([], 86_402.05)
+    assert ask("/run/frames?from_s=86402&to_s=86412")["frames"][0]["t_s"] == 86_402.05
+    assert ask("/run/frames?from_s=90000&to_s=90010")["next_s"] is None
+
+
 def test_frames_tell_who_is_stuck_and_against_what(ask, folder):
     write_run(folder / "run.mcap")
     frames = ask(f"/run/frames?from_s={STUCK_S - 0.1}&to_s={STUCK_S}")["frames"]

@@ -25,18 +25,19 @@ RANGES_M = (1.0, 2.0, float("inf"), 0.5)  # ahead, left, a miss behind, right
 
 
 def write_run(
-    path, seconds=5.0, *, finish=True, leaves_s=float("inf"), picture=PICTURE, of_n1=None
-):
+    path, seconds=5.0, *, finish=True, leaves_s=float("inf"), picture=PICTURE, of_n1=None,
+    pause_s=0.0,
+):  # fmt: skip
     """Write the run, a chunk each quarter of a second; without `finish` as a kill leaves it.
 
     From `leaves_s` on the world tells of n10 no more. `of_n1` holds pictures of its front camera by
-    their times [s].
+    their times [s]. With `pause_s` nothing is recorded for so long after 2 s.
     """
     file = RunFile(path, "city")
     file.write(_sample(0.0, "world/def", _definition()))
     file.write(_sample(0.0, "event/info/world", _event("info", "n1 stands on the map")))
     for tick in range(round(seconds * HZ) + 1):
-        at_s = tick / HZ
+        at_s = tick / HZ + (pause_s if tick > 2 * HZ else 0.0)
         for name, x_m in (("n1", at_s), ("n10", -at_s)):
             file.write(_sample(at_s, f"v/{name}/state", _state(name, at_s, x_m, tick)))
         file.write(_sample(at_s, "world/snapshot", _snapshot(at_s, tick, leaves_s)))

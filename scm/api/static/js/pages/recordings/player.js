@@ -52,6 +52,7 @@ export class Player {
     const passed_s = this.last_ms === null ? 0 : Math.min(0.25, (ms - this.last_ms) / 1000);
     this.last_ms = ms;
     if (this.playing.value && this.has(this.t_s)) this.go(this.t_s + passed_s * this.speed.value);
+    if (this.playing.value) this.skipPause();
     if (ms - this.told_ms > TOLD_MS && this.at.value !== this.t_s) {
       this.told_ms = ms;
       this.at.value = this.t_s;
@@ -68,6 +69,15 @@ export class Player {
       this.t_s = this.length.value;
       this.playing.value = false;
     }
+  }
+
+  /** A stretch in which the world was silent is not played: what was recorded next is. */
+  skipPause() {
+    const next_s = this.stretchAt(this.t_s)?.next_s ?? null;
+    if (next_s === null || next_s <= this.t_s) return;
+    const words = `Skipped ${Math.round(next_s - this.t_s)} s in which the world was silent.`;
+    this.seek(next_s);
+    this.trouble.value = words;
   }
 
   seek(t_s) {
