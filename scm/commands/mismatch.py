@@ -142,7 +142,7 @@ def _check(arguments: argparse.Namespace, out: Path, vehicle: str = "") -> str:
 
 
 def _with_account(found: "Found", said: str) -> str:
-    """Return the summary below the lines on what was read, left out, repaired and cut."""
+    """Return the summary below the lines on which rows were read."""
     return "\n".join((*found.account, said))
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from scm.vehicles.car import Car
 
 HORIZONS_S = (0.5, 1.0, 3.0)
+DOUBTFUL = ("other_car", "without_effect", "unrelated", "standing")  # is driven again nevertheless
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -115,11 +116,13 @@ def _replayed(
     car = car or load_car(recording.vehicle, trusted=False)
     who = f"{recording.name}, " if path.suffix == SUFFIX else ""
     prepared = prepare(recording, car, strict=arguments.strict)
-    for line in prepared.account:
+    doubtful = [f"{p.channel}: {p.said}" for p in prepared.problems if p.name in DOUBTFUL]
+    for line in (*prepared.account, *doubtful):
         print(f"{path}  {who}{line}")
     run = joined(_runs(path, prepared.recordings, car, arguments.horizon_s))
     windows = f"{len(run.start_s)} windows of {arguments.horizon_s:g} s"
-    print(f"{path}  {who}car {car.name}: {windows},")
+    left_out = "".join(f", {count} left out: {why}" for why, count in run.left_out.items())
+    print(f"{path}  {who}car {car.name}: {windows}{left_out},")
     print("free run from the measured state, median and 90th percentile of the error")
     undone = [f.measure.name for f in car.faults if any(map(f.law_of, POSES))]
     if undone:
@@ -159,7 +162,7 @@ def _runs(
     if not runs:
         raise failures[0]
     for failure in failures:
-        print(failure)
+        print(f"a stretch left out: {failure}")
     return runs
 
 

@@ -7,8 +7,6 @@ from scm.data_quality.driven import command_problems
 from scm.data_quality.mend import (
     Mending,
     mend_heading,
-    mend_order,
-    mend_stamps,
     mend_unsigned,
 )
 from scm.data_quality.mend_commands import mend_commands
@@ -33,12 +31,11 @@ def check(recording: Recording, car: Car | None = None) -> Quality:
     """Return what is wrong with a recording, or with its sensors against each other.
 
     Args:
-        recording: As it was read; it is not changed, see `corrected.corrected`.
+        recording: Screened row by row; it is not changed, see `corrected.corrected`.
         car: Gives wheel radius, counts a turn and track; without it wheels are not compared.
     """
     state = Mending(recording)
-    problems = [*mend_order(state), *mend_stamps(state)]
-    problems += row_problems(state.recording)
+    problems = list(row_problems(recording))
     problems += mend_heading(state)
     problems += mend_unsigned(state)
     problems += mend_pairs(state, car)

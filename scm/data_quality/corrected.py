@@ -72,10 +72,7 @@ def forward_speed(poses: Track | None) -> Series | None:
 
 def _repaired(channel: Channel, repair: Repair, signs: Series | None) -> Channel:
     values: Floats = repair.factor * channel.values + repair.offset
-    t = repair.time_factor * channel.t + repair.shift_s
-    if repair.in_order:
-        rows = np.argsort(t, kind="stable")
-        t, values = t[rows], values[rows]
+    t = channel.t + repair.shift_s
     if signs is not None:
         values = np.abs(values) * np.where(signs.at(t) < 0.0, -1.0, 1.0)
     # Nobody knows in which unit a std beside a wrong unit was meant: the values tell it instead.

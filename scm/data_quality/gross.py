@@ -5,7 +5,7 @@ the other, and how late. What is found can be undone; see `corrected.py`.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -170,25 +170,3 @@ def heading_fault(poses: Track, raw: Floats) -> float:
     }
     best = max(fits, key=lambda factor: fits[factor])
     return best if fits[best] > 0.85 and fits[1.0] < 0.6 else 1.0
-
-
-def time_factors(
-    spans: Mapping[tuple[str, ...], tuple[float, float]],
-) -> Iterator[tuple[tuple[str, ...], float]]:
-    """Yield tables whose stamps are in another unit than the others', and the factor to undo it.
-
-    Args:
-        spans: By channels of a table, how long it lasts and its median step.
-    """
-    middle = float(np.median([span for span, _ in spans.values()]))
-    for names, (span, step) in spans.items():
-        if span <= 0.0:
-            continue
-        for factor in (1e-3, 1e-6, 1e-9, 1e3, 1e6):
-            others = len(spans) > 1 and abs(math.log(span * factor / middle)) < 0.1
-            alone = (
-                factor < 1.0 and 1e-3 < step * factor < 0.3 and step > 0.9 and middle * factor > 1.0
-            )
-            if others or (alone and all(s > 0.9 for _, s in spans.values())):
-                yield names, factor
-                break

@@ -9,15 +9,13 @@ from scm.data_quality import gross
 from scm.data_quality.corrected import forward_speed, repaired
 from scm.data_quality.gross import Sensed, compare
 from scm.data_quality.problem import DataProblem
-from scm.data_quality.rows import called, tables
 from scm.data_quality.standing import moves
 from scm.data_quality.suspicion import Repair
-from scm.data_quality.track import Series, Track, clean, recorded_s, series, track
+from scm.data_quality.track import Series, Track, series, track
 from scm.recording.read import Recording
 
 GYROS = ("imu.gyro_z", "yaw_rate")
 SHORTEST_S = 4.0
-OUT_OF_ORDER = 0.1
 DESCRIBE = "Give the unit and sign of the column in the recording's description."
 
 
@@ -39,42 +37,6 @@ class Mending:
         found = track(self.recording)
         long = found is not None and np.ptp(found.t) > SHORTEST_S
         return found if found is not None and long and moves(found) else None
-
-
-def mend_order(now: Mending) -> Iterator[DataProblem]:
-    """Sort tables whose rows stand in another order than their stamps, not a few late ones."""
-    for names in tables(now.recording):
-        step = np.diff(now.recording.channels[names[0]].t)
-        back = int((step < 0.0).sum())
-        if back <= OUT_OF_ORDER * len(step):
-            continue
-        now.repair(Repair(channels=names, in_order=True))
-        yield DataProblem(
-            channel=called(names),
-            name="time_backwards",
-            said="Rows do not stand in the order of their stamps: time runs backwards after "
-            f"{back} of {len(step)} rows.",
-            corrected="Sorted by their stamps.",
-            record_instead="Write rows as they come, each stamped where it is measured.",
-        )
-
-
-def mend_stamps(now: Mending) -> Iterator[DataProblem]:
-    """Repair stamps in another unit than seconds."""
-    spans = {}
-    for names in tables(now.recording):
-        t = clean(now.recording.channels[names[0]]).t
-        if len(t) > 2:
-            spans[names] = recorded_s(t), float(np.median(np.diff(t)))
-    for names, factor in list(gross.time_factors(spans)) if spans else ():
-        now.repair(Repair(channels=names, time_factor=factor))
-        yield DataProblem(
-            channel=called(names),
-            name="unit",
-            said=f"Stamps are {1.0 / factor:g} times too large for seconds.",
-            corrected=f"Multiplied by {factor:g}.",
-            record_instead="Give the unit of the time column in the recording's description.",
-        )
 
 
 def mend_heading(now: Mending) -> Iterator[DataProblem]:

@@ -9,12 +9,18 @@ from scm.data_quality import gross
 from scm.data_quality.corrected import forward_speed
 from scm.data_quality.gross import Pair, Sensed, compare
 from scm.data_quality.mend import DESCRIBE, GYROS, Mending
-from scm.data_quality.other_car import top_speed
+from scm.data_quality.other_car import (
+    FOLLOWS,
+    share_of_asked,
+    steady_speed,
+    steered_in_wheel_angles,
+    top_speed,
+)
 from scm.data_quality.problem import DataProblem
 from scm.data_quality.pushing import push_of
 from scm.data_quality.rows import called, tables
 from scm.data_quality.suspicion import Repair
-from scm.data_quality.track import Series, series
+from scm.data_quality.track import Series, Track, series
 from scm.data_quality.travel import travel_against
 from scm.data_quality.turning import yaw_against
 from scm.data_quality.way import ways
@@ -58,7 +64,10 @@ def _lengths(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[D
     """Blame the pose's metre where accelerometer or top speed say so, not only one way."""
     going = [p for p in pairs if p.what == "speed" and p.alike]
     movement, poses = forward_speed(now.poses), now.poses
-    if not going or movement is None or poses is None:
+    if movement is None or poses is None:
+        return
+    if not going:
+        yield from _length_by_commands(now, car, movement, poses)
         return
     factor = float(np.median([abs(pair.factor) for pair in going]))
     length = next((f for f in LENGTHS if abs(math.log(factor / f)) < 0.2), None)
@@ -71,11 +80,38 @@ def _lengths(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[D
     fast = float(np.percentile(np.abs(movement.values), 98))
     if not (shared or _only_then(top, fast, length)):
         return
+    yield _length(now, length, "every other sensor says")
+
+
+def _length_by_commands(
+    now: Mending, car: Car | None, movement: Series, poses: Track
+) -> Iterator[DataProblem]:
+    """Blame the pose's metre where only with another both speed and turning are as commanded.
+
+    Another car would be faster too, but would turn as its own wheelbase lets it.
+    """
+    asked = None if car is None else steady_speed(car)
+    if car is None or asked is None:
+        return
+    share = share_of_asked(now.recording, movement, asked)
+    for length in LENGTHS:
+        if share is None or abs(math.log(share * length)) > math.log(2.0):
+            continue
+        slower = Series(movement.t, length * movement.values)
+        nearer = Track(poses.t, length * poses.x, length * poses.y, poses.yaw)
+        turns = steered_in_wheel_angles(now.recording, car, slower, nearer)
+        if turns and turns.alike > FOLLOWS and abs(math.log(turns.gain)) < math.log(2.0):
+            yield _length(now, length, "its commands ask for")
+            return
+
+
+def _length(now: Mending, length: float, than: str) -> DataProblem:
+    """Repair the pose's metre and say so."""
     now.repair(Repair(channels=("pose.x", "pose.y"), factor=length))
-    yield DataProblem(
+    return DataProblem(
         channel="pose.x, pose.y",
         name="unit",
-        said=f"The pose moves {1.0 / length:g} times as far as every other sensor says.",
+        said=f"The pose moves {1.0 / length:g} times as far as {than}.",
         corrected=f"Multiplied by {length:g}.",
         record_instead=DESCRIBE,
     )
@@ -142,6 +178,8 @@ def _divided(now: Mending, channels: tuple[str, ...], factor: float, what: str) 
     """Repair channels by a factor and say so."""
     now.repair(Repair(channels=channels, factor=1.0 / factor))
     unit = gross.unit_of(factor, what)
+    if channels[0].startswith("encoder.") != ("counts" in unit):
+        unit = ""
     said = "Its sign is turned" if factor == -1.0 else f"Shows {factor:.4g} times the pose's {what}"
     return DataProblem(
         channel=called(channels),

@@ -8,7 +8,7 @@ import numpy as np
 from scm.arrays import Floats
 from scm.data_quality.conclusion import ANOTHER
 from scm.data_quality.problem import DataProblem
-from scm.data_quality.steered import STEP_S, WIDTH_S, steered
+from scm.data_quality.steered import STEP_S, WIDTH_S, Steered, steered
 from scm.data_quality.suspicion import Relation
 from scm.data_quality.track import Series, Track, clean, grid, held, long_gaps
 from scm.geometry import Pose2
@@ -114,13 +114,13 @@ def _speed(recording: Recording, car: Car, movement: Series) -> str:
     if fast > TOO_FAST * top:
         metres = ", or its positions are not in metres" if fast > 20.0 * top else ""
         return f"it drives {fast:.2f} m/s, the car file's car at most {top:.2f} m/s{metres}"
-    share = _share_of_asked(recording, movement, asked)
+    share = share_of_asked(recording, movement, asked)
     if share is None or share > TOO_SLOW:
         return ""
     return f"it drives {100.0 * share:.0f} % of the speed that the throttle asks of the file's car"
 
 
-def _share_of_asked(recording: Recording, movement: Series, wanted: Asked) -> float | None:
+def share_of_asked(recording: Recording, movement: Series, wanted: Asked) -> float | None:
     """Return steady speed over the one that the throttle asks for; None where nothing is steady."""
     throttle = recording.channels.get("command.throttle")
     if throttle is None or len(clean(throttle).t) < 2:
@@ -142,16 +142,25 @@ def _turning(
 
     None where nothing is odd about it, and no rad where it follows its steering badly.
     """
-    if "command.steering" not in recording.channels:
+    found = steered_in_wheel_angles(recording, car, movement, poses)
+    if found is None:
         return None, 0.0
+    odd = found.alike >= FOLLOWS and not TURNS[0] < found.gain < TURNS[1]
+    lost_rad = found.swing * abs(1.0 - found.gain) if found.alike > CLOSELY else 0.0
+    return (found.gain if odd else None), lost_rad
+
+
+def steered_in_wheel_angles(
+    recording: Recording, car: Car, movement: Series, poses: Track
+) -> Steered | None:
+    """Return how turning follows the angle of the wheels; None where the drive does not show it."""
+    if "command.steering" not in recording.channels:
+        return None
     recording, unit = _in_wheel_angles(recording, car)
     found = steered(recording, car, movement, poses)
     if found is None:
-        return None, 0.0
-    gain = found.gain / unit
-    odd = found.alike >= FOLLOWS and not TURNS[0] < gain < TURNS[1]
-    lost_rad = found.swing * unit * abs(1.0 - gain) if found.alike > CLOSELY else 0.0
-    return (gain if odd else None), lost_rad
+        return None
+    return Steered(found.alike, found.gain / unit, found.swing * unit)
 
 
 def _in_wheel_angles(recording: Recording, car: Car) -> tuple[Recording, float]:

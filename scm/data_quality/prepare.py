@@ -1,15 +1,22 @@
 """A recording as tools compare it with a car: screened row by row, cut at gaps, repaired."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from scm.data_quality.check import check
 from scm.data_quality.corrected import corrected
 from scm.data_quality.problem import DataProblem
+from scm.data_quality.rows import called
+from scm.data_quality.screen import screen
+from scm.data_quality.stamps import Table, count_of, tables_of
 from scm.data_quality.stretches import stretches
 from scm.data_quality.suspicion import Quality
 from scm.errors import RecordingError
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
+
+REPAIRS = ("unit", "sign", "clock")
+EMPTY = "not_finite"  # a cell without a number is no row that was changed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,16 +47,38 @@ def prepare(recording: Recording, car: Car, *, strict: bool = False) -> Prepared
     Raises:
         RecordingError: when `strict` is set and the recording is not in order.
     """
-    quality = check(recording, car)
-    cut = stretches(corrected(recording, quality), car)
-    problems = (*(p for p in quality.problems if not cut.explains(p)), *cut.problems)
-    repairs = [p for p in problems if p.corrected]
-    account = tuple(f"{p.channel}: {p.said} {p.corrected}" for p in repairs)
-    if strict and account:
-        raise RecordingError("\n".join(f"{recording.path}: {line}" for line in account))
+    screened = screen(recording, car)
+    quality = check(screened.recording, car)
+    cut = stretches(corrected(screened.recording, quality), car, screened.jumps)
+    found = [p for p in quality.problems if not cut.explains(p)]
+    done = (*screened.problems, *(p for p in found if p.name in REPAIRS and p.corrected))
+    changes = (*done, *cut.problems)
+    account = _account(tables_of(recording), changes)
+    if strict and any(p.name != EMPTY for p in changes):
+        refused = "".join(f"\n  {line}" for line in account[1:])
+        msg = f"{recording.path}: --strict refuses to leave out, repair or cut:{refused}"
+        raise RecordingError(msg)
     return Prepared(
         recordings=cut.recordings,
-        problems=problems,
+        problems=(*screened.problems, *found, *cut.problems),
         account=account,
         quality=quality,
     )
+
+
+def _account(tables: Sequence[Table], changes: Sequence[DataProblem]) -> tuple[str, ...]:
+    """Return which rows were read, and a line for each change: of a whole table by its file."""
+    files = {called(table.names): table.label for table in tables} | {"*": "all tables"}
+    read = "read " + "; ".join(map(_rows_of, tables))
+    return (
+        read,
+        *(f"{files.get(p.channel, p.channel)}: {p.said} {p.corrected}".rstrip() for p in changes),
+    )
+
+
+def _rows_of(table: Table) -> str:
+    if table.source is None:
+        return f"{table.label}: {count_of(len(table.t))}"
+    excluded = table.source.excluded
+    left = f", {excluded} of them excluded by `where`" if excluded else ""
+    return f"{table.label}: {count_of(table.source.rows)}{left}"

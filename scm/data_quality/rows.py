@@ -1,23 +1,21 @@
-"""Rows of a recording: values that are none, time that goes back, gaps, jitter, too little."""
+"""How the rows of a recording are spaced: gaps, jitter, too slow, too short."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.problem import DataProblem, Span
-from scm.recording.read import Channel, Recording
+from scm.recording.read import Recording
 
 SHORTEST_S = 5.0
 GAP_S = 0.25
 GAP_STEPS = 5.0
 COMMAND_GAP_S = 1.0
-RESET_S = 1.0
 SLOWEST_POSE_S = 0.1
 UNEVEN = 2.0
 BURST_SHARE = 0.1
 FEW_BURSTS = 0.005  # not worth a word
-SAME_TABLE = 0.5  # of the stamps are a sister's too
 
 
 def tables(recording: Recording) -> list[tuple[str, ...]]:
@@ -42,75 +40,11 @@ def called(names: Sequence[str]) -> str:
 
 
 def row_problems(recording: Recording) -> Iterator[DataProblem]:
-    """Yield what is wrong with the rows of each table."""
+    """Yield what is wrong with the spacing of the rows of each table."""
     for names in tables(recording):
-        channel, at = recording.channels[names[0]], called(names)
-        yield from _not_finite(recording.channels, names)
-        t = channel.t[np.isfinite(channel.t)]
-        if len(t) >= 2:
-            yield from _order(t, at)
-            yield from _spacing(t, at, names)
-    yield from _lost_values(recording.channels)
-
-
-def _not_finite(channels: Mapping[str, Channel], names: Iterable[str]) -> Iterator[DataProblem]:
-    for name in names:
-        channel = channels[name]
-        bad = ~(np.isfinite(channel.t) & np.isfinite(channel.values))
-        if bad.any():
-            yield DataProblem(
-                channel=name,
-                name="not_finite",
-                said=f"{int(bad.sum())} of {len(bad)} rows hold no number.",
-                corrected="These rows are left out.",
-                record_instead="Write nothing where a sensor has nothing to say.",
-            )
-
-
-def _lost_values(channels: Mapping[str, Channel]) -> Iterator[DataProblem]:
-    """Yield channels that lack stamps which their sisters in the same table have."""
-    for name, channel in channels.items():
-        family = name.partition(".")[0] + "."
-        sisters = [c.t for n, c in channels.items() if n.startswith(family) and n != name]
-        shared = [t for t in sisters if len(t) and np.isin(channel.t, t).mean() > SAME_TABLE]
-        every = np.unique(np.concatenate((channel.t, *shared)))
-        lost = len(every) - len(np.unique(channel.t))
-        if lost > 0:
-            yield DataProblem(
-                channel=name,
-                name="not_finite",
-                said=f"{lost} of {len(every)} rows hold no number.",
-                corrected="These rows are left out.",
-            )
-
-
-def _order(t: Floats, at: str) -> Iterator[DataProblem]:
-    step = np.diff(t)
-    back, same = step < 0.0, step == 0.0
-    if back.any():
-        resets = int((step < -RESET_S).sum())
-        worst = int(np.argmin(step))
-        said = f"Time runs backwards {int(back.sum())} times, at worst by {-step[worst]:.3f} s."
-        if resets:
-            said += f" The clock is set back {resets} times: these are several recordings."
-        yield DataProblem(
-            channel=at,
-            name="time_backwards",
-            said=said,
-            when_s=((float(t[worst + 1]), float(t[worst])),),
-            corrected="Only the longest stretch is compared."
-            if resets
-            else "Late rows are left out.",
-            record_instead="Stamp with a clock that is never set, and one file a drive.",
-        )
-    if same.sum() > 0.01 * len(t):
-        yield DataProblem(
-            channel=at,
-            name="duplicate",
-            said=f"{int(same.sum())} of {len(t)} rows repeat the stamp of the row before.",
-            corrected="Only the first row of a stamp counts.",
-            record_instead="Write one row a reading, with all digits of its stamp.",
-        )
+        channel = recording.channels[names[0]]
+        if len(channel.t) >= 2:
+            yield from _spacing(channel.t, called(names), names)
 
 
 def _spacing(t: Floats, at: str, names: Sequence[str]) -> Iterator[DataProblem]:

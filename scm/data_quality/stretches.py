@@ -39,7 +39,7 @@ class Stretches:
         return other.name == "gap" and bool(cut) and all(_is_inside(span, cut) for span in spans)
 
 
-def stretches(recording: Recording, car: Car) -> Stretches:
+def stretches(recording: Recording, car: Car, jumps: Sequence[Span] = ()) -> Stretches:
     """Cut a recording where its poses or the commands that drive the car are missing for long.
 
     All its tables are cut at the same moments. Other sensors may pause: they are compared where
@@ -49,20 +49,21 @@ def stretches(recording: Recording, car: Car) -> Stretches:
     Args:
         recording: With stamps on one clock that go forward, see `corrected.corrected`.
         car: Says which command drives it.
+        jumps: Further spans to cut at, over which the poses jump.
     """
     needed = (drive_name(recording, car), STEERING, *POSE)
     if any(len(_stamps(recording, name)) == 0 for name in needed):
         return Stretches((recording,))
     gaps = long_gaps(*(_stamps(recording, name) for name in needed))
-    if not gaps:
+    if not gaps and not jumps:
         return Stretches((recording,))
-    edges = [moment for first, last in gaps for moment in (first + EDGE_S, last - EDGE_S)]
-    ends = [-np.inf, *edges, np.inf]
+    cuts = sorted([*((first + EDGE_S, last - EDGE_S) for first, last in gaps), *jumps])
+    ends = [-np.inf, *(moment for cut in cuts for moment in cut), np.inf]
     parts = [
         between(recording, first, last) for first, last in zip(ends[::2], ends[1::2], strict=True)
     ]
     whole = tuple(part for part in parts if _can_be_driven(part, needed))
-    return Stretches(whole, (_problem(recording, gaps, whole),))
+    return Stretches(whole, (_problem(recording, gaps, jumps, whole),))
 
 
 def _is_inside(span: Span, gaps: Iterable[Span]) -> bool:
@@ -107,10 +108,21 @@ def _can_be_driven(part: Recording, needed: Sequence[str]) -> bool:
     return posed and min(t[-1] for t in times) - max(t[0] for t in times) >= SHORTEST_S
 
 
-def _problem(recording: Recording, gaps: Sequence[Span], whole: Sequence[Recording]) -> DataProblem:
+def _problem(
+    recording: Recording,
+    gaps: Sequence[Span],
+    jumps: Sequence[Span],
+    whole: Sequence[Recording],
+) -> DataProblem:
     """Say where a recording was cut, and which of its rows are in no stretch."""
-    longest_s = max(last - first for first, last in gaps)
-    often = "" if len(gaps) == 1 else f"{len(gaps)} times, at most "
+    causes = []
+    if gaps:
+        longest_s = max(last - first for first, last in gaps)
+        often = "" if len(gaps) == 1 else f"{len(gaps)} times, at most "
+        causes.append(f"Poses or commands are missing {often}for {longest_s:.1f} s")
+    if jumps:
+        often = "once" if len(jumps) == 1 else f"{len(jumps)} times"
+        causes.append(f"{'the' if gaps else 'The'} poses jump {often}")
     rest = {
         0: f"no stretch of {SHORTEST_S:g} s is left",
         1: "one stretch of it is driven again",
@@ -120,15 +132,15 @@ def _problem(recording: Recording, gaps: Sequence[Span], whole: Sequence[Recordi
         for names in tables(recording)
         if (count := _lost(recording, names[0], whole))
     ]
-    said = f"Poses or commands are missing {often}for {longest_s:.1f} s: {rest}."
+    said = f"{', and '.join(causes)}: {rest}."
     if lost:
         said += f" Not in a stretch of {SHORTEST_S:g} s that has both: {', '.join(lost)}."
     return DataProblem(
         channel="*",
         name="gap",
         said=said,
-        when_s=tuple(gaps),
-        corrected="Cut at each gap.",
+        when_s=tuple(sorted([*gaps, *jumps])),
+        corrected="Cut there.",
         record_instead="Record poses and commands without pauses, or one file a drive.",
     )
 

@@ -1,4 +1,4 @@
-"""Values of a recording: frozen, held, copied from another channel, jumping, coarse."""
+"""Values of a recording: frozen, held, copied from another channel, coarse."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -10,13 +10,10 @@ from scm.data_quality.problem import DataProblem, Span
 from scm.data_quality.rows import called
 from scm.data_quality.track import (
     Series,
-    Track,
     clean,
-    jumped,
     rows_a_value,
     runs,
     series,
-    track_with_jumps,
 )
 from scm.data_quality.way import Way
 from scm.recording.read import Recording
@@ -48,9 +45,6 @@ def stuck_problems(
     if movement is not None:
         yield from _derived(recording, movement)
     yield from coarse
-    poses = track_with_jumps(recording)
-    if poses is not None:
-        yield from _jumps(poses)
 
 
 def _held(recording: Recording) -> Iterator[DataProblem]:
@@ -195,20 +189,3 @@ def _coarse(recording: Recording) -> Iterator[DataProblem]:
                 said=f"Comes in steps of {step:.3g}, {100.0 * step / reach:.0f} % of its reach.",
                 record_instead="Record all digits that the sensor has.",
             )
-
-
-def _jumps(poses: Track) -> Iterator[DataProblem]:
-    at = np.flatnonzero(jumped(poses))
-    if len(at) == 0:
-        return
-    far = np.hypot(np.diff(poses.x), np.diff(poses.y))[at]
-    turn = np.abs(np.diff(poses.yaw))[at]
-    yield DataProblem(
-        channel="pose.*",
-        name="jump",
-        said=f"The pose jumps {len(at)} times, by up to {far.max():.2f} m and "
-        f"{np.degrees(turn.max()):.0f} deg, faster than the car moves.",
-        when_s=tuple((float(poses.t[i]), float(poses.t[i + 1])) for i in at[:50]),
-        corrected="Short stretches between two jumps are left out.",
-        record_instead="Check for reflections and swapped markers.",
-    )

@@ -69,21 +69,18 @@ class Suspicion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Repair:
-    """A gross fault undone: `t = time_factor * t + shift_s`, `value = factor * value + offset`.
+    """A gross fault undone: `t = t + shift_s`, `value = factor * value + offset`.
 
     Attributes:
         channels: Exact names.
         signed: Only the size was recorded: the values take the sign of the pose's speed.
-        in_order: The rows are sorted by their stamps.
     """
 
     channels: tuple[str, ...]
     factor: float = 1.0
     offset: float = 0.0
-    time_factor: float = 1.0
     shift_s: float = 0.0
     signed: bool = False
-    in_order: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -94,7 +94,7 @@ class Found:
         searched: What it was told from; None where nothing could be searched.
         found_car, retuned_car: As their written files say; None where none could be written.
         files: Keeps the folder of those files.
-        account: What was read, left out, repaired and cut, a line each.
+        account: Which rows were read, a line a recording.
     """
 
     diagnosis: Diagnosis
@@ -182,7 +182,7 @@ def diagnose_car(
     tell("doubting the data")
     prepared = [prepare(recording, car, strict=strict) for recording in recordings]
     usable, problems = _usable(recordings, prepared)
-    account = tuple(line for one in prepared for line in one.account)
+    account = tuple(one.account[0] for one in prepared)  # what was done is in the problems
     if not usable:
         return replace(_nothing(recordings, car, problems, budget.spent_s()), account=account)
     usable, partly = sampled(usable, budget.allowed_s())
@@ -214,7 +214,7 @@ def _usable(
 ) -> tuple[list[Recording], tuple[DataProblem, ...]]:
     """Return the recordings that can be used, repaired, and everything wrong with any."""
     usable, problems = list[Recording](), list[DataProblem]()
-    length_s = _length_s(recordings)
+    length_s = _length_s([part for one in every for part in one.recordings])
     for recording, one in zip(recordings, every, strict=True):
         quality = one.quality
         together = length_s > SHORTEST_S and _is_only_short(quality)

@@ -1,7 +1,7 @@
 """A recording as channels in SI, each with its own times."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,27 @@ LONGEST_FROM_ZERO_S = 1e6  # one float holds so many seconds to a nanosecond
 
 
 @dataclass(frozen=True, slots=True)
+class Source:
+    """Where a channel was read from, so that a message can count rows.
+
+    Attributes:
+        table: Its file, with the topic of a bag.
+        index: Which table of the description it is: two may share a file.
+        rows: How many rows the file has.
+        excluded: How many of them the table's `where` excludes.
+        numbers: Of the row in which each value stands, from 1, shape `(n,)`.
+        time_unit: As the description gives it.
+    """
+
+    table: str
+    index: int
+    rows: int
+    excluded: int
+    numbers: Ints
+    time_unit: str = "s"
+
+
+@dataclass(frozen=True, slots=True)
 class Channel:
     """One measured or commanded quantity of one car, in SI.
 
@@ -34,6 +55,7 @@ class Channel:
         std: Standard deviation of the noise; None where the description gives none.
         point: For poses, where on the body the measured point is, from the rear axle [m].
         dimension: What it measures: a steering command may be a ratio or an angle.
+        source: The rows of a table that it was read from; None where it is no file's.
     """
 
     t: Floats
@@ -41,6 +63,21 @@ class Channel:
     std: float | None
     point: tuple[float, float]
     dimension: str
+    source: Source | None = None
+
+    def at(self, rows: Bools | Ints) -> "Channel":
+        """Return the channel with some of its rows, in this order."""
+        source = self.source
+        if source is not None and len(source.numbers) == len(self.t):
+            source = replace(source, numbers=source.numbers[rows])
+        return replace(self, t=self.t[rows], values=self.values[rows], source=source)
+
+    @property
+    def row_numbers(self) -> Ints:
+        """Number of the row in which each value stands, from 1, shape `(n,)`."""
+        if self.source is not None and len(self.source.numbers) == len(self.t):
+            return self.source.numbers
+        return np.arange(1, len(self.t) + 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +138,13 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
     loaded = _loaded(description.tables, folder, found)
     origin_s = _origin_s(description.tables, loaded)
     left_out: dict[str, dict[LeftOut, None]] = {}  # two tables may share a file
-    for table in description.tables:
+    for index, table in enumerate(description.tables):
         vehicle = _vehicle(description, table, found.parent)
         names[vehicle] = table.vehicle or description.vehicle or ""
         channels = by_vehicle.setdefault(vehicle, {})
         left_out.setdefault(vehicle, {}).update(dict.fromkeys(loaded[_rows_of(table)].left_out))
-        for name, channel in _channels(table, loaded[_rows_of(table)], found, origin_s).items():
+        read = _channels(table, index, loaded[_rows_of(table)], found, origin_s)
+        for name, channel in read.items():
             if name in channels:
                 msg = f"{found}: table {table.file}: channel {name!r} of {vehicle} is given twice"
                 raise RecordingError(msg)
@@ -173,7 +211,9 @@ def _vehicle(description: Description, table: Table, folder: Path) -> str:
     return str(beside) if beside.suffix == ".toml" and beside.is_file() else vehicle
 
 
-def _channels(table: Table, columns: Columns, path: Path, origin_s: int) -> dict[str, Channel]:
+def _channels(
+    table: Table, index: int, columns: Columns, path: Path, origin_s: int
+) -> dict[str, Channel]:
     """Return the channels of one table in SI, times counted from `origin_s`."""
     where = f"{path}: table {table.file}"
     keep: Bools = np.ones(columns.rows, dtype=np.bool_)
@@ -181,8 +221,18 @@ def _channels(table: Table, columns: Columns, path: Path, origin_s: int) -> dict
         keep = evaluate(table.where, columns, columns.rows, f"{where}: where") > 0.0
     t = _times(table, columns, f"{where}: time", origin_s)[keep]
     _refuse_no_rows(t, where)
+    source = Source(
+        table=f"{table.file} {table.topic}" if table.topic else table.file,
+        index=index,
+        rows=columns.rows,
+        excluded=columns.rows - len(t),
+        numbers=np.flatnonzero(keep) + 1,
+        time_unit=str(table.time.unit),
+    )
     return {
-        name: _channel(name, channel, t, _values(channel, columns, f"{where}: {name}")[keep], where)
+        name: _channel(
+            name, channel, t, _values(channel, columns, f"{where}: {name}")[keep], where, source
+        )
         for name, channel in table.channels.items()
     }
 
@@ -208,18 +258,24 @@ def _values(source: TimeColumn | ChannelColumn, columns: Columns, at: str) -> Fl
         raise RecordingError(msg) from cause
 
 
-def _channel(name: str, channel: ChannelColumn, t: Floats, raw: Floats, where: str) -> Channel:
+def _channel(
+    name: str, channel: ChannelColumn, t: Floats, raw: Floats, where: str, source: Source
+) -> Channel:
     at, unit = f"{where}: {name}", str(channel.unit)
     to_si = factor(unit, dimensions_of(name, where), at)
     values = channel.sign * (channel.scale * raw + channel.offset) * to_si
     valid: Bools = np.isfinite(values) & np.isfinite(t)
     _refuse_no_rows(t[valid], at)
+    if not valid.all():
+        source = replace(source, numbers=source.numbers[valid])
+        t, values = t[valid], values[valid]
     return Channel(
-        t=t[valid],
-        values=values[valid],
+        t=t,
+        values=values,
         std=None if channel.std is None else channel.std * to_si,
         point=channel.point or (0.0, 0.0),
         dimension=UNITS[unit][0],
+        source=source,
     )
 
 

@@ -52,5 +52,4 @@ def _begin_s(t: Floats) -> float:
 
 
 def _between(channel: Channel, first: float, last: float) -> Channel:
-    inside = (channel.t >= first) & (channel.t <= last)
-    return replace(channel, t=channel.t[inside], values=channel.values[inside])
+    return channel.at((channel.t >= first) & (channel.t <= last))

@@ -32,7 +32,8 @@ class Commands:
         for name, channel in (("throttle", self._throttle), ("steering", self._steering)):
             largest = float(np.abs(channel.values).max())
             if channel.dimension == "ratio" and largest > LARGEST_COMMAND:
-                msg = f"{recording.path}: command.{name}: reaches {largest:g}, expected -1 to 1"
+                msg = f"{recording.path}: command.{name}: reaches {largest:g}, expected -1 to 1; "
+                msg += "give its unit, or scale and offset, in the description"
                 raise RecordingError(msg)
         self._battery = None
         if "battery.voltage" in recording.channels and car.has("drive.battery_nominal_v"):

@@ -9,6 +9,7 @@ import pytest
 
 from scm.arrays import Floats
 from scm.data_quality.check import check
+from scm.data_quality.prepare import Prepared, prepare
 from scm.data_quality.suspicion import Quality
 from scm.recording.read import Recording
 from scm.vehicles.car import Car, load_car
@@ -34,7 +35,7 @@ def without(recording: Recording, *names: str) -> Recording:
     return replace(recording, channels=kept)
 
 
-def said(found: Quality) -> set[tuple[str, str]]:
+def said(found: Quality | Prepared) -> set[tuple[str, str]]:
     return {(problem.channel, problem.name) for problem in found.problems}
 
 
@@ -95,7 +96,7 @@ BROKEN = [
     (POSE, frozen, ("pose.x", "frozen")),
     (("encoder.left", "encoder.right"), frozen, ("encoder.left", "frozen")),
     (POSE, gap, ("pose.*", "gap")),
-    (("pose.x",), glitch, ("pose.*", "jump")),
+    (("pose.x",), glitch, ("pose.*", "spike")),
     (IMU, slow_sensor, ("imu.*", "held")),
     (("imu.gyro_z",), rounded, ("imu.gyro_z", "coarse")),
 ]
@@ -105,7 +106,7 @@ BROKEN = [
 def test_a_broken_channel_is_named(
     drive: Drive, nigel: Car, names: tuple[str, ...], change: Change, problem: tuple[str, str]
 ) -> None:
-    assert problem in said(check(changed(drive(0), names, change), nigel))
+    assert problem in said(prepare(changed(drive(0), names, change), nigel))
 
 
 @pytest.mark.parametrize(("names", "change", "problem"), BROKEN)
@@ -113,7 +114,7 @@ def test_a_broken_channel_makes_no_sensor_suspicious(
     drive: Drive, nigel: Car, names: tuple[str, ...], change: Change, problem: tuple[str, str]
 ) -> None:
     del problem
-    found = check(changed(drive(1), names, change), nigel).suspicions
+    found = prepare(changed(drive(1), names, change), nigel).quality.suspicions
     assert [suspicion for suspicion in found if not suspicion.repaired] == []
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from scm.data_quality.check import check
 from scm.data_quality.corrected import corrected
+from scm.data_quality.prepare import prepare
 from scm.data_quality.suspicion import Quality
 from scm.recording.read import Channel, Recording
 from scm.vehicles.car import Car, load_car
@@ -65,33 +66,15 @@ def test_a_car_that_never_moves_allows_no_verdict(drive: Drive, nigel: Car) -> N
     assert found.usable.lacks == ("the car does not move",)
 
 
-@pytest.mark.parametrize("order", ["descending", "shuffled"])
-def test_rows_out_of_order_are_sorted(drive: Drive, nigel: Car, order: str) -> None:
-    rng = np.random.default_rng(1)
-    rows = {len(c.t): rng.permutation(len(c.t)) for c in drive(0).channels.values()}
-
-    def mixed(_name: str, c: Channel) -> Channel:
-        at = slice(None, None, -1) if order == "descending" else rows[len(c.t)]
-        return replace(c, t=c.t[at], values=c.values[at])
-
-    recording = changed(drive(0), mixed)
-    found = check(recording, nigel)
-    assert names_of(found) == {"time_backwards"}
-    right = corrected(recording, found)
-    for name, channel in drive(0).channels.items():
-        np.testing.assert_array_equal(right.channels[name].values, channel.values)
-
-
 def test_rows_without_a_number_are_counted_in_each_column(drive: Drive, nigel: Car) -> None:
     rng = np.random.default_rng(2)
 
     def holes(name: str, c: Channel) -> Channel:
         keep = rng.random(len(c.t)) > (0.05 if name in POSE else -1.0)
-        return replace(c, t=c.t[keep], values=c.values[keep])
+        return replace(c, values=np.where(keep, c.values, np.nan))
 
-    recording = changed(drive(0), holes)
-    found = check(recording, nigel)
-    x, y, yaw = (corrected(recording, found).channels[name].t for name in POSE)
+    found = prepare(changed(drive(0), holes), nigel)
+    x, y, yaw = (found.recordings[0].channels[name].t for name in POSE)
     np.testing.assert_array_equal(x, y)
     np.testing.assert_array_equal(x, yaw)
     assert {p.channel for p in found.problems if p.name == "not_finite"} == set(POSE)

@@ -9,6 +9,7 @@ import pytest
 
 from scm.data_quality.check import check
 from scm.data_quality.corrected import corrected
+from scm.data_quality.prepare import prepare
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
@@ -92,8 +93,7 @@ def test_clocks_that_are_far_apart_are_brought_together(
 
 @pytest.mark.parametrize("family", ["pose.", "imu.", ""])
 def test_stamps_in_milliseconds_become_seconds(drive: Drive, nigel: Car, family: str) -> None:
-    wrong = moved(drive(0), family, 0.0, 1000.0)
-    right = corrected(wrong, check(wrong, nigel))
+    (right,) = prepare(moved(drive(0), family, 0.0, 1000.0), nigel).recordings
     for name, channel in drive(0).channels.items():
         np.testing.assert_allclose(right.channels[name].t, channel.t, atol=1e-6)
 
