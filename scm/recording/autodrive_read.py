@@ -35,7 +35,11 @@ STATES = range(OFF, GREEN + 1)
 FEW_ROWS, FEW_SHARE = 3, 0.01  # with fractions of a count: more, and the column is no counter
 FEWEST_ZEROS = 6  # measured values that are 0 at once by design, not by chance
 NEAR_M, NEAR_RAD = 0.03, 0.05  # a car that drives off from where it stood; its axle is higher up
-PLACEHOLDER_MS, LEAP_M, FASTEST_MPS = 1000, 0.1, 20.0  # no scaled car is faster
+PLACEHOLDER_MS, LEAP_M = 1000, 0.1
+FASTER, FASTEST_MPS = (
+    3.0,
+    20.0,
+)  # than the log's own speed; no scaled car is faster, where it has none
 MISSES = ("inf", "infinity", "∞")
 NUMBERS = {name for layout in CAR_LAYOUTS.values() for name in layout} - {STAMP, SCAN, *PICTURES}
 Layouts = Mapping[int, tuple[str, ...]]
@@ -185,16 +189,16 @@ def _zeros(log: Log) -> dict[int, str]:
 
 
 def _leap(log: Log) -> dict[int, str]:
-    """Return the first rows that stand still where no car can be a row later."""
-    measured, place = np.nan_to_num(_columns(log, MOTION)), _columns(log, POSITION[:2])
-    moves = np.flatnonzero((measured != measured[:, :1]).any(axis=0))
+    """Return the first rows whose place is one from which the car cannot be at the next."""
+    place = _columns(log, POSITION[:2])
+    moves = np.flatnonzero((place != place[:, :1]).any(axis=0))
     if not len(moves) or log.stamps_ms[moves[0]] - log.stamps_ms[0] > PLACEHOLDER_MS:
         return {}
     first = int(moves[0])
     step_m = float(np.hypot(*(place[:, first] - place[:, 0])))
     step_s = max(1, int(log.stamps_ms[first] - log.stamps_ms[first - 1])) / 1000.0
-    fastest = max(FASTEST_MPS, 2.0 * float(np.nanmax(np.abs(log.numbers("speed")), initial=0.0)))
-    if not step_m > LEAP_M + fastest * step_s:
+    fastest = float(np.nanmax(np.abs(log.numbers("speed")), initial=0.0))
+    if not step_m > LEAP_M + (FASTER * fastest or FASTEST_MPS) * step_s:
         return {}
     why = f"a placeholder: the next row is {step_m:.2f} m away, {step_s:.3f} s later"
     return dict.fromkeys(range(first), why)

@@ -275,7 +275,7 @@ def test_a_column_of_fractions_is_no_encoder(tmp_path: Path) -> None:
 NOTHING = dict.fromkeys((*MOTION, "throttle", "steering"), "0")
 
 
-@pytest.mark.parametrize("first", [NOTHING, {"posX": "7", "posY": "-3", "yaw": "1"}])
+@pytest.mark.parametrize("first", [NOTHING, {"posX": "7", "posY": "-3"}, {"posX": "0.9"}])
 def test_first_rows_that_hold_defaults_are_left_out(tmp_path: Path, first: dict[str, str]) -> None:
     rows = counted(1e-4, 40, posY="1.5")
     rows[:3] = [row(k, **first) for k in range(3)]
