@@ -265,16 +265,16 @@ class _Reported:
 
     def __init__(self, reports: Sequence[Report]) -> None:
         self.t_ns: Ints = np.array([report.t_ns for report in reports], np.int64)
-        self.tells: Bools = np.array([report.steering is not None for report in reports])
-        self.moves: Bools = np.array([report.mode in MOVED for report in reports])
-        self.obeys: Bools = np.array([report.mode in OBEYED for report in reports])
-        self.epoch: Ints = np.array([report.epoch for report in reports])
+        self.tells: Bools = np.array([report.steering is not None for report in reports], np.bool_)
+        self.moves: Bools = np.array([report.mode in MOVED for report in reports], np.bool_)
+        self.obeys: Bools = np.array([report.mode in OBEYED for report in reports], np.bool_)
+        self.epoch: Ints = np.array([report.epoch for report in reports], np.int64)
         self.car = np.array([report.car for report in reports])
         self.stands: Bools = self._stands(reports)
 
     def _stands(self, reports: Sequence[Report]) -> Bools:
         """Return whether nobody drives the car, and it has not moved for a second."""
-        idle: Bools = np.array([report.mode == "idle" for report in reports])
+        idle: Bools = np.array([report.mode == "idle" for report in reports], np.bool_)
         x, y = np.array([(report.x_m, report.y_m) for report in reports]).reshape(-1, 2).T
         before = self.at(self.t_ns - NS_PER_S)
         long_enough = self.t_ns - self.t_ns[before] >= NS_PER_S

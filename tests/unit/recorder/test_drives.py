@@ -410,6 +410,11 @@ def test_a_real_car_that_no_camera_saw_is_refused(tmp_path: Path) -> None:
         read_drives(said(tmp_path / "a.mcap", *states, told(100)))
 
 
+def test_a_car_that_never_reports_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="n1: neither it nor the world reports which car"):
+        read_drives(said(tmp_path / "a.mcap", *(told(ms) for ms in range(0, 400, 20))))
+
+
 def test_times_count_from_the_first_message_of_the_car_to_the_nanosecond(tmp_path: Path) -> None:
     states = [reported(ms) for ms in range(0, 400, 20)]
     read = VehicleSensors(
