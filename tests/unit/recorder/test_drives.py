@@ -160,7 +160,9 @@ def test_a_stretch_too_short_for_a_window_does_not_stop_the_longer_ones(
         for k in range(820)
     ]
     assert main(["replay", str(said(tmp_path / "a.mcap", *states))]) == 0
-    assert "n1, car nigel: 2 windows of 3 s" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "n1, car nigel: 2 windows of 3 s" in printed
+    assert "poses left out: 299 while its guard stopped it" in printed
 
 
 def test_each_of_two_owners_of_an_older_car_is_replayed_by_its_own_commands(tmp_path: Path) -> None:
