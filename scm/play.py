@@ -251,7 +251,7 @@ def write_recording(played: Played, car: str, folder: Path) -> Recording:
     Raises:
         RecordingError: when nothing of it can be driven again.
     """
-    recording = recording_of(played.heard, folder, played.vehicle)
+    recording = recording_of(played.heard, folder, played.vehicle, sent_only=True)
     folder.mkdir(parents=True, exist_ok=True)
     there = recording.channels.keys()
     written = {file: of for file, of in _FILES.items() if there >= set(of.values())}

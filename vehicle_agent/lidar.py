@@ -62,6 +62,7 @@ class LidarKind:
         range_min_m: Nearest that it sees; likewise `range_max_m`.
         open: Makes a driver.
         dtr: How the port's DTR line must be while it is used.
+        clockwise: How it turns, seen from above.
     """
 
     baud: int
@@ -70,10 +71,21 @@ class LidarKind:
     range_max_m: float
     open: Callable[[], Lidar]
     dtr: bool = True
+    clockwise: bool = False
 
 
-def scan_of(turn: Turn, kind: LidarKind, vehicle: str, t_ns: int) -> LidarScan:
-    """Return a turn as a message: of all beams around a bearing the nearest range, else a miss."""
+def scan_of(
+    turn: Turn, kind: LidarKind, vehicle: str, t_ns: int, turn_ns: int | None = None
+) -> LidarScan:
+    """Return a turn as a message: of all beams around a bearing the nearest range, else a miss.
+
+    Args:
+        turn: Of the scanner.
+        kind: Of scanner.
+        vehicle: Whose it is.
+        t_ns: When the turn was over.
+        turn_ns: How long it took; None: not known.
+    """
     bins = np.rint(turn.bearings * (kind.beams / (2.0 * np.pi))).astype(np.int64) % kind.beams
     seen = (turn.ranges >= kind.range_min_m) & (turn.ranges <= kind.range_max_m)
     ranges = np.full(kind.beams, np.inf, dtype=np.float32)
@@ -85,4 +97,7 @@ def scan_of(turn: Turn, kind: LidarKind, vehicle: str, t_ns: int) -> LidarScan:
         range_min_m=kind.range_min_m,
         range_max_m=kind.range_max_m,
         payload=ranges.astype("<f4").tobytes(),
+        sweep_ns=turn_ns,
+        period_ns=turn_ns,
+        clockwise=kind.clockwise,
     )

@@ -18,6 +18,7 @@ from vehicle_agent.nigel.cable import Cable, open_serial
 LIDARS = "vehicle_agent.lidars"
 DRAIN_TURNS, DRAIN_S = 10, 0.005
 QUIET_NS = 3 * NS_PER_S
+SLOWEST_TURN_NS = NS_PER_S // 2  # scanners turn twice a second at least: in more a turn was lost
 
 _log = logging.getLogger(__name__)
 
@@ -34,6 +35,7 @@ class LidarPort:
         self._kind, self._cable = kind, cable
         self._driver: Lidar | None = None
         self._opened = self._heard_ns = 0
+        self._turned_ns: int | None = None  # when the newest turn was over
         self._said = self._quiet = ""
 
     def step(self, vehicle: str, now_ns: int) -> list[LidarScan]:
@@ -47,13 +49,26 @@ class LidarPort:
                 self._kind.open(),
                 now_ns,
             )
+            self._turned_ns = None
             self._cable.write([self._driver.begin()])
         data = self._cable.read()
         turns = self._driver.hear(data) if self._driver is not None and data else ()
+        turn_ns = self._turn_ns(len(turns), now_ns)
         if turns:
             self._heard_ns, self._quiet = now_ns, ""
+            self._turned_ns = now_ns
         self._tell(self._cable.trouble or self._quiet)
-        return [scan_of(turn, self._kind, vehicle, now_ns) for turn in turns]
+        return [
+            scan_of(turn, self._kind, vehicle, now_ns - after * (turn_ns or 0), turn_ns)
+            for after, turn in zip(reversed(range(len(turns))), turns, strict=True)
+        ]
+
+    def _turn_ns(self, turns: int, now_ns: int) -> int | None:
+        """Return how long each of the turns took that are over now; None: not known."""
+        if not turns or self._turned_ns is None:
+            return None
+        turn_ns = (now_ns - self._turned_ns) // turns
+        return turn_ns if turn_ns <= SLOWEST_TURN_NS else None
 
     def _tell(self, trouble: str) -> None:
         if trouble != self._said:

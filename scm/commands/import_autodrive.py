@@ -50,10 +50,10 @@ def _run(arguments: argparse.Namespace) -> int:
     )
     print("\n".join(made.told))
     for one in made.left_out[:MOST_TOLD]:
-        print(f"{one.file}: line {one.line}: {one.why}")
+        print(one)
     if made.left_out:
         told = f", the first {MOST_TOLD} above" if len(made.left_out) > MOST_TOLD else ""
-        print(f"{len(made.left_out)} lines are no rows{told}: kept in {arguments.out / LEFT_OUT}")
+        print(f"{len(made.left_out)} lines are left out{told}: kept in {arguments.out / LEFT_OUT}")
     print(f"scm replay {arguments.out}")
     return 0
 

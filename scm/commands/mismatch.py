@@ -4,6 +4,7 @@ import argparse
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,8 +60,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
     from scm.mismatch.progress import Progress
-    from scm.mismatch.several import cars_of, with_told
-    from scm.recording.span import part_of
+    from scm.mismatch.several import with_told
 
     name = arguments.recording[0].resolve()
     title = name.parent.name if name.name == "recording.yaml" else name.stem
@@ -69,18 +69,36 @@ def _run(arguments: argparse.Namespace) -> int:
     progress = Progress(sys.stderr, WallClock())
     try:
         if arguments.car is None and arguments.vehicle is None:
-            cars = {
-                name: [part_of(one, arguments.from_s, arguments.to_s) for one in recordings]
-                for name, recordings in cars_of(arguments.recording, arguments.data).items()
-            }
+            cars, failed = _cars(arguments)
             cars = with_told(cars, arguments.told)
-            said = _of_cars(cars, arguments, out, progress, budget)
+            said, failed = _of_cars(cars, failed, arguments, out, progress, budget)
         else:
-            said = _of_one(arguments, out, progress)
+            said, failed = _of_one(arguments, out, progress), ()
     finally:
         progress.close()
     print(said)
+    for why in failed:
+        print(f"scm mismatch: {why}", file=sys.stderr)
     return 0
+
+
+def _cars(arguments: argparse.Namespace) -> "tuple[dict[str, list[Recording]], tuple[str, ...]]":
+    """Return the recordings of each car, and why there are none of others."""
+    from scm.errors import RecordingError
+    from scm.mismatch.several import cars_of
+    from scm.recording.span import part_of
+
+    cars: dict[str, list[Recording]] = {}
+    failed: list[str] = []
+    found = cars_of(arguments.recording, arguments.data, warn=failed.append)
+    for name, recordings in found.items():
+        try:
+            cars[name] = [part_of(one, arguments.from_s, arguments.to_s) for one in recordings]
+        except RecordingError as error:
+            failed.append(str(error))
+    if not cars:
+        raise RecordingError("\n".join(failed))
+    return cars, tuple(failed)
 
 
 def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> str:
@@ -100,12 +118,17 @@ def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> s
 
 def _of_cars(
     cars: "Mapping[str, Sequence[Recording]]",
+    failed: tuple[str, ...],
     arguments: argparse.Namespace,
     out: Path,
     progress: "Progress",
     budget: Budget,
-) -> str:
-    """Diagnose cars by their own files, write the report or reports, and return what to print."""
+) -> tuple[str, tuple[str, ...]]:
+    """Diagnose cars by their own files and write the report or reports.
+
+    Returns:
+        What to print, and why other cars could not be diagnosed.
+    """
     from scm.mismatch.diagnose import write
     from scm.mismatch.report.several_page import several_summary
     from scm.mismatch.report.summary import summary
@@ -113,19 +136,22 @@ def _of_cars(
 
     budget_s, strict = arguments.budget_s, arguments.strict
     if len(cars) == 1:
-        (recordings,) = cars.values()
+        ((name, recordings),) = cars.items()
         found = diagnose_one(recordings, budget=budget, strict=strict, tell=progress.tell)
         progress.tell("writing the report")
-        write(found, out, _check(arguments, out))
-        return _with_account(found, summary(found.diagnosis, out, found.evidence.retuned_m))
+        write(found, out, _check(arguments, out, name if failed else ""))
+        said = summary(found.diagnosis, out, found.evidence.retuned_m)
+        return _with_account(found, said), failed
     several = diagnose_several(
         cars, budget_s=budget_s, strict=strict, tell=progress.tell, turn=progress.turn
     )
+    several = replace(several, failed=(*failed, *several.failed))
     progress.tell("writing the reports")
     write_all(several, out, lambda name: _check(arguments, out / name, name))
     diagnoses = {name: found.diagnosis for name, found in several.cars.items()}
     read = [f"{name}: {line}" for name, found in several.cars.items() for line in found.account]
-    return "\n".join((*read, several_summary(diagnoses, several.common, out)))
+    said = several_summary(diagnoses, several.common, out)
+    return "\n".join((*read, said)), several.failed
 
 
 def _check(arguments: argparse.Namespace, out: Path, vehicle: str = "") -> str:

@@ -61,7 +61,7 @@ def _run(arguments: argparse.Namespace) -> int:
     runs, failures = [], list[str]()
     for path in arguments.recording:
         try:
-            recordings = recordings_of(path, arguments.data, arguments.vehicle)
+            recordings = recordings_of(path, arguments.data, arguments.vehicle, failures.append)
         except ScmError as error:
             failures.append(str(error))
             continue

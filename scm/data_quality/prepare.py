@@ -1,6 +1,6 @@
 """A recording as tools compare it with a car: screened row by row, cut at gaps, repaired."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from scm.data_quality.check import check
@@ -12,11 +12,13 @@ from scm.data_quality.stamps import Table, count_of, tables_of
 from scm.data_quality.stretches import stretches
 from scm.data_quality.suspicion import Quality
 from scm.errors import RecordingError
+from scm.recording.columns import LeftOut
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
 REPAIRS = ("unit", "sign", "clock")
 EMPTY = "not_finite"  # a cell without a number is no row that was changed
+MOST_LISTED = 10  # reasons: whoever reads more has the wrong file
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,8 +55,9 @@ def prepare(recording: Recording, car: Car, *, strict: bool = False) -> Prepared
     found = [p for p in quality.problems if not cut.explains(p)]
     done = (*screened.problems, *(p for p in found if p.name in REPAIRS and p.corrected))
     changes = (*done, *cut.problems)
-    account = _account(tables_of(recording), changes)
-    if strict and any(p.name != EMPTY for p in changes):
+    account = _account(tables_of(recording), recording.left_out, changes)
+    no_rows = any(one.line is not None for one in recording.left_out)
+    if strict and (no_rows or any(p.name != EMPTY for p in changes)):
         refused = "".join(f"\n  {line}" for line in account[1:])
         msg = f"{recording.path}: --strict refuses to leave out, repair or cut:{refused}"
         raise RecordingError(msg)
@@ -66,12 +69,15 @@ def prepare(recording: Recording, car: Car, *, strict: bool = False) -> Prepared
     )
 
 
-def _account(tables: Sequence[Table], changes: Sequence[DataProblem]) -> tuple[str, ...]:
+def _account(
+    tables: Sequence[Table], left_out: Sequence[LeftOut], changes: Sequence[DataProblem]
+) -> tuple[str, ...]:
     """Return which rows were read, and a line for each change: of a whole table by its file."""
     files = {called(table.names): table.label for table in tables} | {"*": "all tables"}
     read = "read " + "; ".join(map(_rows_of, tables))
     return (
         read,
+        *lines_left_out(left_out),
         *(f"{files.get(p.channel, p.channel)}: {p.said} {p.corrected}".rstrip() for p in changes),
     )
 
@@ -82,3 +88,17 @@ def _rows_of(table: Table) -> str:
     excluded = table.source.excluded
     left = f", {excluded} of them excluded by `where`" if excluded else ""
     return f"{table.label}: {count_of(table.source.rows)}{left}"
+
+
+def lines_left_out(left_out: Iterable[LeftOut]) -> tuple[str, ...]:
+    """Return what a recording's files hold that was not read: what is alike in one sentence."""
+    alike: dict[tuple[str, str], list[LeftOut]] = {}
+    for one in left_out:
+        alike.setdefault((one.file, one.why), []).append(one)
+    said = []
+    for (file, why), some in list(alike.items())[:MOST_LISTED]:
+        first = ", ".join(str(one.line) for one in some[:3])
+        more = f" and {len(some) - 3} more" if len(some) > 3 else ""
+        said.append(f"{file}: lines {first}{more}: {why}" if len(some) > 1 else str(some[0]))
+    rest = sum(map(len, list(alike.values())[MOST_LISTED:]))
+    return (*said, f"and {rest} more lines that are no rows") if rest else tuple(said)

@@ -7,7 +7,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock, seconds
-from scm.errors import RecordingError
+from scm.errors import RecordingError, ScmError
 from scm.mismatch.budget import DEFAULT_S, Budget
 from scm.mismatch.diagnose import Found, diagnose_car, told, write
 from scm.mismatch.explain import said
@@ -33,26 +33,32 @@ class Several:
     Attributes:
         cars: By name, which is also that of the folder of its report.
         common: Effects of what the cars share.
+        failed: Why a car could not be diagnosed, a sentence each.
     """
 
     cars: Mapping[str, Found]
     common: tuple[Common, ...]
     runtime_s: float
+    failed: tuple[str, ...] = ()
 
 
 def cars_of(
-    paths: Sequence[Path | str], data: Path | None = None, vehicle: str | None = None
+    paths: Sequence[Path | str],
+    data: Path | None = None,
+    vehicle: str | None = None,
+    warn: Tell = lambda _: None,
 ) -> dict[str, list[Recording]]:
     """Return the recordings of each car by a name for it, in the order of the recordings.
 
     In descriptions one `vehicle:` is one car; in runs of a city a car is who the city says. Where
-    nothing given holds several cars and all name one car file, they are of one car.
+    nothing given holds several cars and all name one car file, they are of one car. `warn` gets the
+    reason why a car of a run is left out.
 
     Raises:
         RecordingError: when there is nothing to read.
     """
     grouped: dict[tuple[str, str], list[Recording]] = {}
-    read = [(path, recordings_of(path, data, vehicle)) for path in paths]
+    read = [(path, recordings_of(path, data, vehicle, warn)) for path in paths]
     every = [recording for _, recordings in read for recording in recordings]
     if len(every) == len(read) and len({recording.vehicle for recording in every}) == 1:
         return {every[0].name or Path(every[0].vehicle).stem: every}
@@ -133,15 +139,21 @@ def diagnose_several(
         clock: For the time it took.
 
     Raises:
-        ScmError: when a recording or a car file cannot be used.
+        ScmError: when no car's recording or file can be used.
     """
     clock = clock or WallClock()
     began_ns, turns, found = clock.now_ns(), len(cars) + 1, dict[str, Found]()
+    failed = list[str]()
     for number, (name, recordings) in enumerate(cars.items()):
         turn(name, number, turns)
-        found[name] = diagnose_one(
-            recordings, budget_s=budget_s, strict=strict, tell=tell, clock=clock
-        )
+        try:
+            found[name] = diagnose_one(
+                recordings, budget_s=budget_s, strict=strict, tell=tell, clock=clock
+            )
+        except ScmError as error:
+            failed.append(f"{name}: {error}")
+    if not found:
+        raise RecordingError("\n".join(failed))
     turn(TOGETHER, len(cars), turns)
     searches = {name: one.searched for name, one in found.items() if one.searched is not None}
     common = list[Common]()
@@ -152,7 +164,7 @@ def diagnose_several(
             anew = {name: told(one, tell) for name, one in changed.items()}
             for name, one in anew.items():
                 found[name] = _sharing(name, found[name], one, common, anew)
-    return Several(found, tuple(common), seconds(clock.now_ns() - began_ns))
+    return Several(found, tuple(common), seconds(clock.now_ns() - began_ns), tuple(failed))
 
 
 def write_all(several: Several, out: Path, check: Callable[[str], str] = lambda _: "") -> None:
@@ -170,7 +182,8 @@ def write_all(several: Several, out: Path, check: Callable[[str], str] = lambda 
         write(found, out / name, check(name))
     diagnoses = {name: found.diagnosis for name, found in several.cars.items()}
     recordings = {name: found.evidence.recordings for name, found in several.cars.items()}
-    write_several(diagnoses, recordings, several.common, several.runtime_s, out)
+    write_several(diagnoses, recordings, several.common, several.runtime_s, out,
+                  several.failed)  # fmt: skip
 
 
 def _sharing(

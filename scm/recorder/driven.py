@@ -1,16 +1,17 @@
-"""What a run tells of one car, as a recording: what it was told, where it was, what it sensed.
+"""What a run tells of one car, as a recording: its commands, where it was, what it sensed.
 
 Commands are those that the car itself reports: they passed its guard, and are dated by the motion
-that they led to. Where reports do not tell the steering, as those of other programs and of older
-runs, they are what was sent over the bus, as far as the guard lets it through.
+that they led to, whoever drove it: its own driver, a person, a script. Where reports do not tell
+the steering, as those of other programs and of older runs, they are what was sent over the bus, as
+far as the guard lets it through.
 
-Of a car that was commanded over the bus only commanded stretches count: from a command on until its
-guard would stop the car. What follows each hit that the city tells of does not count for any car: a
-second at least, and until the car is away.
+Poses count while the commands in force are known and the car obeys them. What follows each hit
+that the city tells of does not count for any car: a second at least, and until the car is away.
 """
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -18,10 +19,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from scm.arrays import Bools, Floats
+from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RecordingError
+from scm.recording.columns import LeftOut
 from scm.recording.read import Channel, Recording
 from scm.v2x.message import Message
 from scm.v2x.messages.city_event import CityEvent
@@ -36,6 +39,13 @@ IN_FORCE_NS = NS_PER_S // 4
 TICK_NS, RUN_IN_NS = 20 * NS_PER_MS, NS_PER_S
 HIT, BEFORE_HIT_NS, AFTER_HIT_NS, AWAY_M = "contact", NS_PER_S // 10, NS_PER_S, 0.3
 SIMULATED = "simulated"
+# Why rows of a car do not count: what stands behind their number.
+HIT_LATELY = "until a second after a hit and 0.3 m away"
+STOPPED = "while its guard stopped it"
+PLACED = "in the first second after it was placed"
+NO_COMMAND = "without a command that it is known to obey"
+STANDS, STILL_M = "while it stood and nobody drove it", 0.002
+NO_REPORT = "without a report of the car"
 OBEYED, MOVED = ("drive", "hold"), ("drive", "hold", "idle")
 Row = tuple[int, float, float]
 Span = tuple[int, int]
@@ -94,14 +104,11 @@ class Heard:
 
 
 class Stretch(NamedTuple):
-    """From the first command to where the guard stops the car for want of the next [ns].
-
-    `epoch` None: the car drove itself.
-    """
+    """From the first command of an owner to where the guard stops the car for want of the next."""
 
     start_ns: int
     end_ns: int
-    epoch: int | None
+    epoch: int
 
 
 def tells_commands(heard: Heard) -> bool:
@@ -109,31 +116,43 @@ def tells_commands(heard: Heard) -> bool:
     return any(report.steering is not None for report in heard.reports)
 
 
-def recording_of(heard: Heard, path: Path, name: str, start_ns: int = 0) -> Recording:
+def recording_of(
+    heard: Heard, path: Path, name: str, start_ns: int = 0, *, sent_only: bool = False
+) -> Recording:
     """Return what was heard of a car as a recording, times since `start_ns`.
 
     Poses are those of the car's own reports where it is simulated, else those of the overhead
     camera that saw it most.
 
+    Args:
+        heard: All of it.
+        path: Of the run, to name it by.
+        name: Of the car.
+        start_ns: What times are counted from.
+        sent_only: Leave out where the car obeyed other commands than those in `heard`.
+
     Raises:
         RecordingError: naming `path` and the car, when it lacks poses, or obeyed no command.
     """
-    return _Drive(path, name, heard, start_ns).recording()
+    return _Drive(path, name, heard, start_ns, sent_only=sent_only).recording()
 
 
 class _Drive:
     """One car's part of a run on its way to being a recording."""
 
-    def __init__(self, path: Path, name: str, heard: Heard, start_ns: int) -> None:
+    def __init__(
+        self, path: Path, name: str, heard: Heard, start_ns: int, *, sent_only: bool
+    ) -> None:
         self._at, self._path, self._name = f"{path}: {name}", path, name
         self._heard, self._start_ns = heard, start_ns
         heard.reports.sort(key=lambda report: report.t_ns)
-        self._report_ns = [report.t_ns for report in heard.reports]
-        self._rows, self._stretches = _obeyed(heard.commands)
-        if tells_commands(heard):
-            self._rows, self._stretches = _told(heard.reports, self._stretches)
+        sent, self._sent = _obeyed(heard.commands)
+        self._lives = [] if sent_only and self._sent else _lives(heard.reports)
+        self._rows = self._clipped(_commands(heard.reports, sent))
+        self._reported = _Reported(heard.reports)
         hits = heard.hit_ns if heard.reports else []
-        self._leans = [_lean(hit_ns, heard.reports, self._report_ns) for hit_ns in hits]
+        self._hits = [_about_hit(hit_ns, heard.reports) for hit_ns in hits]
+        self._left_out: tuple[LeftOut, ...] = ()
 
     def recording(self) -> Recording:
         """Return what stands of this car in the run.
@@ -153,10 +172,11 @@ class _Drive:
             values = np.array([row[i] for row in self._rows], np.float64)
             channels[name] = self._channel(t, values, None, "ratio")
         channels |= self._sensors()
-        return Recording(self._path, self._heard.reports[-1].car, channels, self._name)
+        car = self._heard.reports[-1].car
+        return Recording(self._path, car, channels, self._name, left_out=self._left_out)
 
     def _poses(self) -> dict[str, Channel]:
-        """Return the poses while the car was commanded."""
+        """Return the poses that count, and note how many do not, and why."""
         rows: list[tuple[float, ...]] = [
             report[:4] for report in self._heard.reports if report.source == SIMULATED
         ]
@@ -166,95 +186,163 @@ class _Drive:
             rows = sorted((pose.t_ns, pose.x_m, pose.y_m, pose.yaw_rad) for pose in seen)
             variances = [pose.covariance[::4] for pose in seen] or [(np.nan,) * 3]
             std = tuple(np.sqrt(np.maximum(np.median(variances, axis=0), 1e-12)))
-        rows = [row for row in rows if self._is_commanded(int(row[0]))]
-        if not rows:
-            msg = f"{self._at}: no pose while it obeyed commands: nothing can be driven again"
+        t = np.array([row[0] for row in rows], np.int64)
+        reasons = self._reasons(t)
+        if not (reasons == "").any():
+            why = f" ({_counted(reasons)})" if rows else ""
+            msg = f"{self._at}: no pose while it obeyed commands{why}: nothing can be driven again"
             raise RecordingError(msg)
-        t, columns = np.array([row[0] for row in rows], np.int64), np.array(rows, np.float64).T[1:]
+        if (reasons != "").any():
+            left_out = np.count_nonzero(reasons)
+            why = f"{self._name}: {left_out} of {len(rows)} poses left out: {_counted(reasons)}"
+            self._left_out = (LeftOut(self._path.name, None, why),)
+        columns = np.array(rows, np.float64).T[1:, reasons == ""]
         kinds = zip(("pose.x", "pose.y", "pose.yaw"), ("length", "length", "angle"), strict=True)
         return {
-            name: self._channel(t, column, float(noise), kind)
+            name: self._channel(t[reasons == ""], column, float(noise), kind)
             for (name, kind), column, noise in zip(kinds, columns, std, strict=True)
         }
 
     def _sensors(self) -> dict[str, Channel]:
         """Return encoders and yaw gyro, where the car has them."""
-        read = [one for one in self._heard.sensors if self._is_commanded(one.t_ns)]
-        if not read:
+        t = np.array([one.t_ns for one in self._heard.sensors], np.int64)
+        counts = self._reasons(t) == ""
+        if not counts.any():
             return {}
-        t = np.array([one.t_ns for one in read], np.int64)
         of: dict[str, tuple[Callable[[VehicleSensors], float], float | None, str]] = {
             "encoder.left": (lambda one: one.encoder_left, None, "count"),
             "encoder.right": (lambda one: one.encoder_right, None, "count"),
             "imu.gyro_z": (lambda one: one.gyro_radps[2], GYRO_RAD_S, "angular speed"),
         }
-        return {
-            name: self._channel(t, np.array([value(one) for one in read], np.float64), std, kind)
+        every = {
+            name: (np.array([value(one) for one in self._heard.sensors], np.float64), std, kind)
             for name, (value, std, kind) in of.items()
         }
+        return {
+            name: self._channel(t[counts], values[counts], std, kind)
+            for name, (values, std, kind) in every.items()
+        }
 
-    def _channel(self, t_ns: np.ndarray, values: Floats, std: float | None, kind: str) -> Channel:
+    def _channel(self, t_ns: Ints, values: Floats, std: float | None, kind: str) -> Channel:
         fit: Bools = np.isfinite(values)
         t: Floats = (t_ns - self._start_ns) / NS_PER_S
         return Channel(t[fit], values[fit], std, (0.0, 0.0), kind)
 
-    def _is_commanded(self, t_ns: int) -> bool:
-        """Say whether the car obeyed the commands of the run at a time, as far as it tells."""
-        i = bisect_right(self._stretches, t_ns, key=lambda stretch: stretch.start_ns) - 1
-        if i < 0 or t_ns > self._stretches[i].end_ns:
-            return False
-        if any(start_ns <= t_ns <= end_ns for start_ns, end_ns in self._leans):
-            return False
-        k = bisect_right(self._report_ns, t_ns) - 1
-        if k < 0 or t_ns - self._report_ns[k] > IN_FORCE_NS:
-            return False
-        report = self._heard.reports[k]
-        epoch = self._stretches[i].epoch
-        return (
-            report.mode in MOVED
-            if epoch is None
-            else (report.mode in OBEYED and report.epoch == epoch)
-        )
+    def _clipped(self, rows: list[Row]) -> list[Row]:
+        """Return the commands from a little before poses count, so that the servo stands right."""
+        spans = [*self._lives, *(stretch[:2] for stretch in self._sent)]
+        first_ns = min((start_ns for start_ns, _ in spans), default=0) - RUN_IN_NS
+        last_ns = max((end_ns for _, end_ns in spans), default=0)
+        return [row for row in rows if first_ns <= row[0] <= last_ns]
+
+    def _reasons(self, t_ns: Ints) -> NDArray[np.object_]:
+        """Return for each time why it does not count; empty where it does, shape `(n,)`."""
+        reasons = np.full(len(t_ns), NO_COMMAND, object)
+        reported, k = self._reported, self._reported.at(t_ns)
+        lives = np.zeros(len(t_ns), np.bool_)
+        for start_ns, end_ns in self._lives:
+            reasons[(t_ns >= start_ns - RUN_IN_NS) & (t_ns < start_ns)] = PLACED
+            lives |= (t_ns >= start_ns) & (t_ns <= end_ns)
+        known = lives & reported.tells[k] & reported.moves[k]
+        reasons[lives & reported.tells[k] & ~reported.moves[k]] = STOPPED
+        for stretch in self._sent:
+            inside = (t_ns >= stretch.start_ns) & (t_ns <= stretch.end_ns)
+            own = reported.epoch[k] == stretch.epoch
+            reasons[inside & own & ~reported.obeys[k]] = STOPPED
+            known |= inside & own & reported.obeys[k]
+        reasons[known] = ""
+        reasons[known & reported.stands[k]] = STANDS
+        reasons[(t_ns - reported.t_ns[k] > IN_FORCE_NS) | (t_ns < reported.t_ns[k])] = NO_REPORT
+        for start_ns, end_ns in self._hits:
+            reasons[(t_ns >= start_ns) & (t_ns <= end_ns)] = HIT_LATELY
+        for car in np.unique(reported.car)[reported.car[-1] != np.unique(reported.car)]:
+            reasons[reported.car[k] == car] = f"of a car that was a {car}"
+        return reasons
 
 
-def _lean(hit_ns: int, reports: Sequence[Report], report_ns: Sequence[int]) -> Span:
+class _Reported:
+    """The reports of a car, by column."""
+
+    def __init__(self, reports: Sequence[Report]) -> None:
+        self.t_ns: Ints = np.array([report.t_ns for report in reports], np.int64)
+        self.tells: Bools = np.array([report.steering is not None for report in reports], np.bool_)
+        self.moves: Bools = np.array([report.mode in MOVED for report in reports], np.bool_)
+        self.obeys: Bools = np.array([report.mode in OBEYED for report in reports], np.bool_)
+        self.epoch: Ints = np.array([report.epoch for report in reports], np.int64)
+        self.car = np.array([report.car for report in reports])
+        self.stands: Bools = self._stands(reports)
+
+    def _stands(self, reports: Sequence[Report]) -> Bools:
+        """Return whether nobody drives the car, and it has not moved for a second."""
+        idle: Bools = np.array([report.mode == "idle" for report in reports], np.bool_)
+        x, y = np.array([(report.x_m, report.y_m) for report in reports]).reshape(-1, 2).T
+        before = self.at(self.t_ns - NS_PER_S)
+        long_enough = self.t_ns - self.t_ns[before] >= NS_PER_S
+        still: Bools = np.hypot(x - x[before], y - y[before]) < STILL_M
+        return idle & long_enough & still
+
+    def at(self, t_ns: Ints) -> Ints:
+        """Return which report is the newest at each time; before the first, the first."""
+        return np.maximum(np.searchsorted(self.t_ns, t_ns, side="right") - 1, 0)
+
+
+def _counted(reasons: NDArray[np.object_]) -> str:
+    """Return how many rows are left out for which reason."""
+    counts = Counter(reason for reason in reasons if reason)
+    return ", ".join(f"{count} {reason}" for reason, count in counts.most_common())
+
+
+def _about_hit(hit_ns: int, reports: Sequence[Report]) -> Span:
     """Return from when to when what a car hit may move it: until it is away from there [ns]."""
-    k = min(bisect_right(report_ns, hit_ns), len(reports) - 1)
+    k = min(bisect_right(reports, hit_ns, key=lambda report: report.t_ns), len(reports) - 1)
     at = reports[k]
     away = (r for r in reports[k:] if math.hypot(r.x_m - at.x_m, r.y_m - at.y_m) > AWAY_M)
     left = next(away, reports[-1])
     return hit_ns - BEFORE_HIT_NS, max(hit_ns + AFTER_HIT_NS, left.t_ns)
 
 
-def _told(reports: Sequence[Report], commanded: list[Stretch]) -> tuple[list[Row], list[Stretch]]:
-    """Return what a car reports that it was told, and when; as commanded, or all it drove itself.
+def _commands(reports: Sequence[Report], sent: Sequence[Row]) -> list[Row]:
+    """Return the commands that a car reports, and those that were sent where it reports none.
 
-    Commands begin with the report before. A car that reports more seldom than it decides keeps
-    what was in force between to itself: then the new ones begin, on average, half way through it.
-    Rows begin a little before poses count, so that the servo stands right by then.
+    A reported command begins with the report before. A car that reports more seldom than it
+    decides keeps what was in force between to itself: then the new one begins, on average, half
+    way through it.
     """
-    stretches = commanded or _lives(reports)
-    first_ns, last_ns = stretches[0].start_ns - RUN_IN_NS, stretches[-1].end_ns
     spans = [now.t_ns - before.t_ns for before, now in pairwise(reports)] or [TICK_NS]
     unknown_ns = max(0, int(np.median(spans)) - TICK_NS) // 2
     rows = []
     for before, now in pairwise(reports):
-        if now.steering is not None and first_ns < now.t_ns <= last_ns:
+        if now.steering is not None:
             follows = now.seq == before.seq + 1
             since_ns = before.t_ns + unknown_ns if follows else now.t_ns - TICK_NS
             rows.append((since_ns, now.throttle, now.steering))
-    return rows, stretches
+    for row in sent:
+        k = min(bisect_left(reports, row[0], key=lambda report: report.t_ns), len(reports) - 1)
+        if k < 0 or reports[k].steering is None:
+            rows.append(row)
+    return sorted(rows, key=lambda row: row[0])
 
 
-def _lives(reports: Sequence[Report]) -> list[Stretch]:
-    """Return from when to when a car was there without having been placed anew."""
-    anew = [i for i in range(1, len(reports)) if reports[i].seq <= reports[i - 1].seq]
-    parts = pairwise([0, *anew, len(reports)])
-    return [Stretch(reports[i].t_ns + RUN_IN_NS, reports[j - 1].t_ns, None) for i, j in parts]
+def _lives(reports: Sequence[Report]) -> list[Span]:
+    """Return the spans in which a car reports its commands and is not placed anew [ns].
+
+    Each begins when the servo has followed reported commands for `RUN_IN_NS`.
+    """
+
+    def goes_on(before: Report, now: Report) -> bool:
+        alike = (before.steering is None) == (now.steering is None) and before.car == now.car
+        return alike and now.seq > before.seq
+
+    ends = [i for i, two in enumerate(pairwise(reports), start=1) if not goes_on(*two)]
+    return [
+        (reports[i].t_ns + RUN_IN_NS, reports[j - 1].t_ns)
+        for i, j in pairwise([0, *ends, len(reports)])
+        if j > i and reports[i].steering is not None
+    ]
 
 
 def _obeyed(commands: Iterable[DriveCommand]) -> tuple[list[Row], list[Stretch]]:
-    """Return what the guard let through: time [ns], throttle, steering; and the stretches.
+    """Return what the guard let through: time [ns], throttle, steering; and each owner's stretches.
 
     Where the next command is late the throttle is let go, as the guard does.
     """

@@ -1,11 +1,11 @@
 """Runs of the city as recordings of its cars.
 
-A car can be driven again when it was commanded over the bus, or when its reports tell what it was
-told, be it by others or by its own driver.
+A car can be driven again where its reports tell the commands that it obeyed, whoever drove it, or
+where it was commanded over the bus.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,13 +29,18 @@ _OF_ALL: dict[type[Message], re.Pattern[str]] = {
     WorldSnapshot: re.compile(r"scm/@v\d+/[^/]+/world/snapshot"),
     CityEvent: re.compile(r"scm/@v\d+/[^/]+/event/[^/]+/[^/]+"),
 }
+_OF_A_CAR = (DriveCommand, VehicleState, EyePose)
+Warn = Callable[[str], None]
 _KINDS: dict[str | None, type[Message]] = {
     "cmd/drive": DriveCommand, "state": VehicleState, "sensors": VehicleSensors, None: EyePose,
 }  # fmt: skip
 
 
 def recordings_of(
-    path: Path | str, data: Path | str | None = None, vehicle: str | None = None
+    path: Path | str,
+    data: Path | str | None = None,
+    vehicle: str | None = None,
+    warn: Warn = lambda _: None,
 ) -> list[Recording]:
     """Read what was recorded of cars: a run of the city (`.mcap`), or a described recording.
 
@@ -43,12 +48,13 @@ def recordings_of(
         path: A run, a description, or the folder of one.
         data: Folder of a description's tables; None: its own.
         vehicle: The one of several cars; None: all of them.
+        warn: Gets the reason why a car of a run is left out.
 
     Raises:
         RecordingError: when there is nothing to read, or no such car.
     """
     if Path(path).suffix == SUFFIX:
-        return read_drives(Path(path), vehicle)
+        return read_drives(Path(path), vehicle, warn)
     found = read_recordings(path, data)
     chosen = [recording for recording in found if vehicle in (None, recording.name)]
     if not chosen:
@@ -74,13 +80,15 @@ def recordings_of_one(
     return found
 
 
-def read_drives(path: Path, vehicle: str | None = None) -> list[Recording]:
+def read_drives(
+    path: Path, vehicle: str | None = None, warn: Warn = lambda _: None
+) -> list[Recording]:
     """Read the cars of a run that can be driven again, times since its first message.
 
     Args:
         path: The `.mcap` that the recorder wrote.
-        vehicle: One of its cars; None: all that were commanded over the bus, and where
-            none was, all.
+        vehicle: One of its cars; None: all.
+        warn: Gets the reason why a car is left out.
 
     Returns:
         One recording a car, by name.
@@ -93,24 +101,36 @@ def read_drives(path: Path, vehicle: str | None = None) -> list[Recording]:
         msg = f"{path}: no run of a city: it holds {', '.join(keys[:5])}; a ROS 2 bag is read as a "
         msg += "table of a recording.yaml"
         raise RecordingError(msg)
-    commanded = sorted({name for name, kind in map(_of, keys) if kind is DriveCommand})
-    known = sorted({name for name, kind in map(_of, keys) if kind in (VehicleState, EyePose)})
-    if vehicle is not None and vehicle not in {*commanded, *known}:
-        names = sorted({*commanded, *known})
-        msg = f"{path}: no car {vehicle!r}{nearest(vehicle, names) or _listed(names)}"
+    cars = sorted({name for name, kind in map(_of, keys) if name and kind in _OF_A_CAR})
+    if vehicle is not None and vehicle not in cars:
+        msg = f"{path}: no car {vehicle!r}{nearest(vehicle, cars) or _listed(cars)}"
         raise RecordingError(msg)
-    chosen = [vehicle] if vehicle is not None else commanded or known
-    heard, start_ns = _heard(path, keys, chosen)
-    able = [name for name in chosen if heard[name].commands or tells_commands(heard[name])]
+    heard, start_ns = _heard(path, keys, [vehicle] if vehicle is not None else cars)
+    able = {name: one for name, one in heard.items() if one.commands or tells_commands(one)}
     if not able:
-        none = f"none of its cars ({', '.join(known) or 'none'}) was"
+        none = f"none of its cars ({', '.join(cars) or 'none'}) was"
         who = f"{vehicle} was not" if vehicle else none
         msg = (
             f"{path}: {who} commanded over the bus, and no report tells the steering command: "
             "nothing can be driven again; record anew, or drive a car by `scm play` or a script"
         )
         raise RecordingError(msg)
-    return [replace(recording_of(heard[name], path, name, start_ns), begin_s=0.0) for name in able]
+    found, failures = [], list[str]()
+    for name, one in able.items():
+        try:
+            found.append(replace(recording_of(one, path, name, start_ns), begin_s=0.0))
+        except RecordingError as error:
+            failures.append(str(error))
+    if not found:
+        raise RecordingError("\n".join(failures))
+    if unable := [name for name in heard if name not in able]:
+        failures.append(
+            f"{path}: {', '.join(unable)}: not commanded over the bus, and no report tells the "
+            "steering command: left out"
+        )
+    for failure in failures:
+        warn(failure)
+    return found
 
 
 def _of(key: str) -> tuple[str, type[Message] | None]:

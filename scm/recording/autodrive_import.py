@@ -26,7 +26,7 @@ from scm.recording.autodrive import (
     STAMP,
     cell_of,
 )
-from scm.recording.autodrive_read import Log, read_logs
+from scm.recording.autodrive_read import TICKS, Log, read_logs
 from scm.recording.autodrive_told import (
     counted_on,
     of_axes,
@@ -83,7 +83,7 @@ class Imported:
 
     Attributes:
         told: What is to be known of the logs, in lines.
-        left_out: Lines of the logs that are no rows; they stand in `left_out.csv`.
+        left_out: Lines of the logs that are no rows, or placeholders; they stand in `left_out.csv`.
     """
 
     told: list[str]
@@ -127,21 +127,22 @@ def import_logs(
     out.mkdir(parents=True, exist_ok=True)
     start_ms = min(int(log.stamps_ms[0]) for log in logs)
     told: list[str] = []
+    names = [log.name for log in logs if log.kind == "V"]
+    vehicles = {name: car if len(names) == 1 else f"{name}.toml" for name in names}
     for log in logs:
         told += of_clock(log)
         if log.kind == "V":
             if unity_axes:
                 _turn(log)
-            else:
-                told += of_axes(log)
-            told += _told_of_car(log, steering_sign, m_per_count)
-            told += _find_pictures(log, folder)
+            copy = f"put its car file in place of {vehicles[log.name]} in {out}"
+            instead = "give its car file with --car" if len(names) == 1 else copy
+            axes = [] if unity_axes else of_axes(log)
+            told += axes or _of_motion(log, steering_sign, m_per_count, car, instead)
+            told += of_scans(log) + _find_pictures(log, folder)
         _write_table(log, out, start_ms)
     left_out = [one for log in logs for one in log.left_out]
     if left_out:
         _write_left_out(out / LEFT_OUT, left_out)
-    names = [log.name for log in logs if log.kind == "V"]
-    vehicles = {name: car if len(names) == 1 else f"{name}.toml" for name in names}
     if len(names) > 1:
         for vehicle in vehicles.values():
             shutil.copyfile(car_file, out / vehicle)
@@ -149,11 +150,12 @@ def import_logs(
     return Imported(told, left_out)
 
 
-def _told_of_car(log: Log, steering_sign: int, m_per_count: float | None) -> list[str]:
-    x, y = log.numbers("posX"), log.numbers("posY")
+def _of_motion(
+    log: Log, steering_sign: int, m_per_count: float | None, car: str, instead: str
+) -> list[str]:
     steering = steering_sign * log.numbers("steering")
     told = of_steering(steering, log.numbers("speed"), log.numbers("angZ"))
-    return told + of_wheels(log, x, y, m_per_count) + of_scans(log)
+    return told + of_wheels(log, m_per_count, car, instead)
 
 
 def _turn(log: Log) -> None:
@@ -240,7 +242,8 @@ def _channels(log: Log, steering_sign: int, axle_m: float) -> dict[str, dict[str
     """Return where the channels of a car stand, of those columns that have a number in them."""
     channels = {}
     for name, (channel, unit) in CHANNELS.items():
-        if not np.isfinite(log.numbers(name)).any():
+        is_no_counter = name in TICKS and not log.is_counter(name)
+        if is_no_counter or not np.isfinite(log.numbers(name)).any():
             continue
         column = OURS.get(name, name)
         value = f"atan2(sin({column}), cos({column}))"

@@ -5,20 +5,23 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from scm.arrays import Floats, Ints
+from scm.arrays import Bools, Floats, Ints
 from scm.errors import RecordingError
 from scm.recording.autodrive import (
     CAR,
     CAR_LAYOUTS,
+    EULER,
     GREEN,
     LIGHT_LAYOUTS,
+    MOTION,
     OFF,
     PICTURES,
+    POSITION,
     SCAN,
     STAMP,
     stamp_ms,
@@ -27,7 +30,16 @@ from scm.recording.columns import LeftOut, refuse_large
 
 _LOG = re.compile(r"(V|TL)(\d+) Log\.csv")
 _PICTURE = re.compile(r"\.jpe?g\s*$", re.IGNORECASE)
-STATES = tuple(map(str, range(OFF, GREEN + 1)))
+TICKS = ("leftTicks", "rightTicks")
+STATES = range(OFF, GREEN + 1)
+FEW_ROWS, FEW_SHARE = 3, 0.01  # with fractions of a count: more, and the column is no counter
+FEWEST_ZEROS = 6  # measured values that are 0 at once by design, not by chance
+NEAR_M, NEAR_RAD = 0.03, 0.05  # a car that drives off from where it stood; its axle is higher up
+PLACEHOLDER_MS, LEAP_M = 1000, 0.1
+FASTER, FASTEST_MPS = (
+    3.0,
+    20.0,
+)  # than the log's own speed; no scaled car is faster, where it has none
 MISSES = ("inf", "infinity", "∞")
 NUMBERS = {name for layout in CAR_LAYOUTS.values() for name in layout} - {STAMP, SCAN, *PICTURES}
 Layouts = Mapping[int, tuple[str, ...]]
@@ -45,7 +57,7 @@ class Log:
         stamps_ms: Of each row, since 1970, shape (rows,).
         scans: LIDAR ranges [m], shape (rows, beams): infinite for a miss, NaN where there is no
             scan; None: no row has one.
-        left_out: Lines that are no rows.
+        left_out: Lines that are no rows, or hold what was measured before the first measurement.
     """
 
     path: Path
@@ -66,6 +78,10 @@ class Log:
         """Return a column as numbers, shape (rows,); NaN where a cell is empty or it is missing."""
         cells = self.cells.get(column, [""] * len(self.lines))
         return np.array([float(cell) if cell else math.nan for cell in cells])
+
+    def is_counter(self, column: str) -> bool:
+        """Return whether a column holds whole numbers, as the counts of an encoder are."""
+        return not _has_fraction(self.numbers(column)).any()
 
 
 def read_logs(folder: Path) -> list[Log]:
@@ -107,7 +123,90 @@ def read_log(path: Path, kind: str, number: int) -> Log:
         raise RecordingError(msg)
     scans = reader.all_scans()
     stamps = np.array(reader.stamps_ms, np.int64)
-    return Log(path, kind, number, reader.cells, reader.lines, stamps, scans, reader.left_out)
+    log = Log(path, kind, number, reader.cells, reader.lines, stamps, scans, reader.left_out)
+    for placeholders in (_fractions, _zeros, _leap) if kind == "V" else ():
+        found = placeholders(log)
+        if found:
+            texts = {i: line for i, line, _ in rows if i in {log.lines[k] for k in found}}
+            log = _without(log, found, texts)
+    return log
+
+
+def _without(log: Log, found: Mapping[int, str], texts: Mapping[int, str]) -> Log:
+    """Return a log without some rows, left out for the reasons given."""
+    keep = [k for k in range(len(log.lines)) if k not in found]
+    left_out = [
+        LeftOut(log.path.name, log.lines[k], why, texts[log.lines[k]]) for k, why in found.items()
+    ]
+    return replace(
+        log,
+        cells={name: [cells[k] for k in keep] for name, cells in log.cells.items()},
+        lines=[log.lines[k] for k in keep],
+        stamps_ms=log.stamps_ms[keep],
+        scans=None if log.scans is None else log.scans[keep],
+        left_out=sorted([*log.left_out, *left_out], key=lambda one: one.line or 0),
+    )
+
+
+def _fractions(log: Log) -> dict[int, str]:
+    """Return the rows in which an encoder has a fraction of a count, where few rows have one.
+
+    The recorder begins with placeholders. A column that is not whole elsewhere is no counter.
+    """
+    found: dict[int, str] = {}
+    for name in TICKS:
+        values = log.numbers(name)
+        odd = _has_fraction(values)
+        first = int(np.argmin(odd)) if odd.any() and not odd.all() else 0
+        few = max(FEW_ROWS, FEW_SHARE * len(odd))
+        if first <= len(odd) // 2 and odd[first:].sum() <= few and not odd.all():
+            for k in np.flatnonzero(odd).tolist():
+                why = f"{name}: got {values[k]:g}, expected whole counts of an encoder"
+                found.setdefault(k, why)
+    return found
+
+
+def _has_fraction(values: Floats) -> Bools:
+    has_fraction: Bools = np.isfinite(values) & (values != np.rint(values))
+    return has_fraction
+
+
+def _zeros(log: Log) -> dict[int, str]:
+    """Return the first rows where every measured value is 0 and the next row is somewhere else."""
+    measured = _columns(log, MOTION)
+    zeros = (np.nan_to_num(measured) == 0.0).all(axis=0)
+    zeros &= np.isfinite(measured).sum(axis=0) >= FEWEST_ZEROS
+    ends = np.flatnonzero(~zeros)
+    if not len(ends) or ends[0] == 0:
+        return {}
+    next_row = int(ends[0])
+    place = np.nan_to_num(_columns(log, POSITION)[:, next_row])
+    turn = np.nan_to_num(_columns(log, EULER)[:, next_row])
+    turned = np.abs(np.arctan2(np.sin(turn), np.cos(turn)))
+    if np.hypot.reduce(place) < NEAR_M and turned.max() < NEAR_RAD:
+        return {}
+    return dict.fromkeys(range(next_row), "a placeholder: every measured value is 0")
+
+
+def _leap(log: Log) -> dict[int, str]:
+    """Return the first rows whose place is one from which the car cannot be at the next."""
+    place = _columns(log, POSITION[:2])
+    moves = np.flatnonzero((place != place[:, :1]).any(axis=0))
+    if not len(moves) or log.stamps_ms[moves[0]] - log.stamps_ms[0] > PLACEHOLDER_MS:
+        return {}
+    first = int(moves[0])
+    step_m = float(np.hypot(*(place[:, first] - place[:, 0])))
+    step_s = max(1, int(log.stamps_ms[first] - log.stamps_ms[first - 1])) / 1000.0
+    fastest = float(np.nanmax(np.abs(log.numbers("speed")), initial=0.0))
+    if not step_m > LEAP_M + (FASTER * fastest or FASTEST_MPS) * step_s:
+        return {}
+    why = f"a placeholder: the next row is {step_m:.2f} m away, {step_s:.3f} s later"
+    return dict.fromkeys(range(first), why)
+
+
+def _columns(log: Log, names: Sequence[str]) -> Floats:
+    """Return columns as numbers, shape (columns, rows)."""
+    return np.array([log.numbers(name) for name in names])
 
 
 Row = tuple[int, str, list[str]]
@@ -194,7 +293,7 @@ class _Rows:
             if name in NUMBERS and not _is_number(cell):
                 msg = f"{name}: got {cell[:40]!r}, expected a number"
                 raise RecordingError(msg)
-        if self._is_light and named.get("state") not in STATES:
+        if self._is_light and not _is_state(named.get("state", "")):
             msg = f"state: got {named.get('state')!r}, expected {OFF} to {GREEN}"
             raise RecordingError(msg)
         return named
@@ -234,6 +333,11 @@ def _cells(line: str) -> list[str]:
         return next(csv.reader([line]), [])
     except csv.Error:
         return line.split(",")
+
+
+def _is_state(cell: str) -> bool:
+    """Return whether a cell is a light's state, be it saved anew as a decimal."""
+    return bool(cell) and _is_number(cell) and float(cell) in STATES
 
 
 def _is_number(cell: str) -> bool:

@@ -1,19 +1,20 @@
 """What is to be known of AutoDRIVE's logs before one believes them: clocks, signs, wheels."""
 
-import math
-
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.recording.autodrive import POSITION
-from scm.recording.autodrive_read import Log
+from scm.recording.autodrive_read import TICKS, Log
 
 LONGEST_STEP_MS = 250  # longer is a gap, as for a replay
 SET_BACK_MS = 1000  # so far back a clock was set; less is a row out of order
 AFTER_SET_BACK_MS = 1000
 TURNING_RAD, MOVING_MPS, FEWEST_ROWS, DISAGREE = 0.02, 0.02, 20, 0.7
 FLAT_M, LONGEST_STEERING_RAD, SAME_SCAN_M = 1e-3, 1.6, 1e-3
-SLIPS = 0.02
+SLIPS, MOST_SLIP = 0.02, 0.2  # at more, a tyre pushes less and less: Nigel's is at its limit there
+OTHER_CAR = 0.6, 1.6  # of the way that the file's wheels would count: no wear, no filling does more
+SHORTEST_WAY_M = 0.1
+LEAP, USUAL = 4.0, 95  # a step so many times the 95th percentile of all is none that was driven
 
 
 def counted_on(stamps_ms: Ints) -> Ints:
@@ -89,18 +90,48 @@ def of_steering(steering: Floats, speed: Floats, yaw_rate: Floats) -> list[str]:
     return told
 
 
-def of_wheels(log: Log, x: Floats, y: Floats, m_per_count: float | None) -> list[str]:
-    """Tell by how much the wheels turned more than the car went: that is kept as it is."""
-    counts = (log.numbers("leftTicks") + log.numbers("rightTicks")) / 2.0
-    gone = _length(np.stack((x, y)))
-    rolled = _length(counts[None]) * (m_per_count or math.nan)
-    if not (gone > 0.1 and rolled > 0.0 and abs(rolled / gone - 1.0) > SLIPS):
-        return []
-    return [
-        f"  wheels rolled {rolled:.2f} m, poses went {gone:.2f} m: encoders read "
-        f"{rolled / gone - 1.0:+.1%} (AutoDRIVE's wheels slip, by 11 % straight ahead at full "
-        "throttle): kept as they are"
-    ]
+def of_wheels(log: Log, m_per_count: float | None, car: str, instead: str) -> list[str]:
+    """Tell of encoders that do not count the way that the poses go; cells are kept as they are.
+
+    Args:
+        log: Of a car.
+        m_per_count: What the file's car rolls for one count [m]; None: not known.
+        car: Name of that file.
+        instead: What to do where it is another car's.
+    """
+    place = np.stack((log.numbers("posX"), log.numbers("posY")))
+    told, counters = [], []
+    for name in TICKS:
+        counts = log.numbers(name)
+        known = counts[np.isfinite(counts)]
+        odd = known[known != np.rint(known)]
+        way_m, _ = _ways(place, np.stack((counts, counts)))
+        if len(odd):
+            some = ", ".join(f"{value:g}" for value in odd[:3])
+            told.append(
+                f"  {name}: {len(odd)} of {len(known)} cells are not whole ({some}, ...): not the "
+                "counts of an encoder, and not read as such"
+            )
+        elif len(known) and np.ptp(known) == 0.0 and way_m > SHORTEST_WAY_M:
+            told.append(f"  {name} stays at {known[0]:g} while poses go {way_m:.2f} m")
+        elif len(known):
+            counters.append(counts)
+    if m_per_count is None or not counters:
+        return told
+    gone_m, rolled_m = _ways(place, m_per_count * np.mean(counters, axis=0)[None])
+    ratio = rolled_m / gone_m if gone_m > SHORTEST_WAY_M else 1.0
+    ways = f"  wheels rolled {rolled_m:.2f} m, poses went {gone_m:.2f} m"
+    more = f"{ways}: encoders read {ratio - 1:+.1%}"
+    if not OTHER_CAR[0] < ratio < OTHER_CAR[1]:
+        told.append(f"{more}: {log.path.name} is not of the car {car}, by its encoders: {instead}")
+    elif SLIPS < ratio - 1.0 < MOST_SLIP:
+        told.append(f"{more}, as driven wheels that slip do: kept as they are")
+    elif abs(ratio - 1.0) > SLIPS:
+        told.append(
+            f"{more}, expected 0 to {MOST_SLIP:+.0%}: check wheel.radius_m and "
+            f"encoder.counts_per_revolution of the car {car}; kept as they are"
+        )
+    return told
 
 
 def of_scans(log: Log) -> list[str]:
@@ -125,7 +156,16 @@ def _is_alike(scan: Floats, other: Floats) -> bool:
     return bool(both.any() and np.median(np.abs(scan[both] - other[both])) < SAME_SCAN_M)
 
 
-def _length(points: Floats) -> float:
-    """Return the length of a path, shape (dimensions, rows); rows with a NaN are left out."""
-    kept = points[:, np.isfinite(points).all(axis=0)]
-    return float(np.sum(np.hypot.reduce(np.diff(kept, axis=1), axis=0)))
+def _ways(first: Floats, second: Floats) -> tuple[float, float]:
+    """Return how long two paths are over the same steps, each of shape (dimensions, rows).
+
+    Steps in which either leaps count in neither: the car was put elsewhere, a counter began anew.
+    """
+    known = np.isfinite(first).all(axis=0) & np.isfinite(second).all(axis=0)
+    steps = [np.hypot.reduce(np.diff(one[:, known], axis=1), axis=0) for one in (first, second)]
+    usual = np.ones(max(0, int(known.sum()) - 1), np.bool_)
+    for step in steps:
+        if (step > 0.0).any():
+            usual &= step <= LEAP * np.percentile(step[step > 0.0], USUAL)
+    first_m, second_m = (float(step[usual].sum()) for step in steps)
+    return first_m, second_m

@@ -26,7 +26,7 @@ class LeftOut(NamedTuple):
 
     Attributes:
         line: Counted from 1; of a bag or a binary table the number of the message or row; None:
-            the rest of a file, as of one that is cut off.
+            the rest of a file, as of one that is cut off, or many rows, which `why` counts.
     """
 
     file: str

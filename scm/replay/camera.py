@@ -11,7 +11,7 @@ from scm.replay.numbers import NEUTRAL, POSE_CLOCK, Numbers
 from scm.replay.smooth import Smooth
 
 _LATE = (POSE_CLOCK, "measure.pose_delay_s", "measure.clock_offset_s")
-_HALF_S = 0.005
+_HALF_S, _TINY_S = 0.005, 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,11 @@ class Camera:
     def motion(self, t: Floats) -> Moved:
         """Return how the rear axle moved at true times."""
         x, y, yaw = self.truly(*self.recorded(self.stamp(t)))
-        before, after = (self.truly(*self.recorded(self.stamp(t + h))) for h in (-_HALF_S, _HALF_S))
-        vx, vy, rate = ((b - a) / (2.0 * _HALF_S) for a, b in zip(before, after, strict=True))
+        known = [self._smoothed[name].t for name in ("pose.x", "pose.y", "pose.yaw")]
+        first, last = max(one[0] for one in known), min(one[-1] for one in known)
+        around = [np.clip(self.stamp(t + h), first, last) for h in (-_HALF_S, _HALF_S)]
+        before, after = (self.truly(*self.recorded(stamp)) for stamp in around)
+        span = np.maximum(self.taken(around[1]) - self.taken(around[0]), _TINY_S)
+        vx, vy, rate = ((b - a) / span for a, b in zip(before, after, strict=True))
         c, s = np.cos(yaw), np.sin(yaw)
         return Moved(x, y, yaw, c * vx + s * vy, c * vy - s * vx, rate)

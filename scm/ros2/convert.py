@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from scm.clock import seconds
+from scm.clock import NS_PER_S, seconds
 from scm.geometry import TAU, Pose2
 from scm.ros2.frames import header, pose, quaternion, time, vector
 from scm.ros2.types import ros
@@ -46,23 +46,31 @@ def odometry(name: str, state: VehicleState, at: Pose2) -> Any:
 def scan(name: str, turn: LidarScan, before_ns: int | None) -> Any:
     """Return `sensor_msgs/LaserScan`: infinity is a miss, as there (REP-117).
 
-    The stamp is the last beam's time: the scan comes as if all had looked then.
+    The stamp is when the first ray looked; the ray with index i looked `i * time_increment` later.
+    A clockwise sweep is listed from its left end, with a negative `angle_increment`.
 
     Args:
         name: The car's in ROS.
         turn: The scan.
-        before_ns: Time of the scan before it; None: not known.
+        before_ns: Time of the scan before it, for scans that do not tell their period; None: not
+            known.
     """
-    step = turn.bearing_step_rad if turn.bearing_step_rad is not None else TAU / turn.beams
+    step = turn.bearing_step_rad if turn.bearing_step_rad is not None else TAU / max(1, turn.beams)
     ranges = np.frombuffer(turn.payload, "<f4", count=len(turn.payload) // SCAN_BYTES)
+    ends = turn.bearing_first_rad, turn.bearing_first_rad + step * (turn.beams - 1)
+    if turn.clockwise:
+        ranges, ends, step = ranges[::-1], ends[::-1], -step
+    period_ns = turn.period_ns
+    if period_ns is None:
+        period_ns = 0 if before_ns is None else max(0, turn.t_ns - before_ns)
     return ros(
         "sensor_msgs/LaserScan",
-        header=header(turn.t_ns, f"{name}/laser"),
-        angle_min=turn.bearing_first_rad,
-        angle_max=turn.bearing_first_rad + step * (turn.beams - 1),
+        header=header(turn.t_ns - round((turn.beams - 1) * turn.beam_ns), f"{name}/laser"),
+        angle_min=ends[0],
+        angle_max=ends[1],
         angle_increment=step,
-        time_increment=0.0,
-        scan_time=0.0 if before_ns is None else seconds(turn.t_ns - before_ns),
+        time_increment=turn.beam_ns / NS_PER_S,
+        scan_time=seconds(period_ns),
         range_min=turn.range_min_m,
         range_max=turn.range_max_m,
         ranges=ranges.astype(np.float32),

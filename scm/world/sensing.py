@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
+from scm.clock import NS_PER_S
 from scm.v2x.message import Message
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
@@ -103,6 +104,8 @@ def _known(value: float) -> float | None:
 def _scans(world: World, scans: Readings) -> Iterator[LidarScan]:
     nearest, farthest = scans.car.vector("lidar.range_m")
     first, step, _ = lidar.bearings_of(scans.car)
+    sweep_ns = round(lidar.sweep_s(scans.car) * NS_PER_S)
+    period_ns = round(NS_PER_S / scans.car.value("lidar.rate_hz"))
     ranges = scans.values.astype("<f4")
     for row, slot in enumerate(scans.slots.tolist()):
         yield LidarScan(
@@ -114,4 +117,6 @@ def _scans(world: World, scans: Readings) -> Iterator[LidarScan]:
             payload=ranges[row].tobytes(),
             bearing_first_rad=first,
             bearing_step_rad=step,
+            sweep_ns=sweep_ns,
+            period_ns=period_ns,
         )

@@ -105,4 +105,7 @@ def _open() -> Lidar:
     return RplidarA1()
 
 
-LIDAR = LidarKind(baud=115200, beams=360, range_min_m=0.15, range_max_m=12.0, open=_open, dtr=False)
+LIDAR = LidarKind(
+    baud=115200, beams=360, range_min_m=0.15, range_max_m=12.0, open=_open, dtr=False,
+    clockwise=True,
+)  # fmt: skip

@@ -49,6 +49,7 @@ def write_several(
     common: Sequence[Common],
     runtime_s: float,
     out: Path,
+    failed: Sequence[str] = (),
 ) -> None:
     """Write `report.html` and `cars.json` beside the folders of the cars' own reports.
 
@@ -58,6 +59,7 @@ def write_several(
         common: What they share.
         runtime_s: Of all.
         out: Is made where it is missing.
+        failed: Why other cars could not be diagnosed, a sentence each.
     """
     out.mkdir(parents=True, exist_ok=True)
     fields = {
@@ -74,17 +76,19 @@ def write_several(
         "said": common_sentence(common),
         "conclusions": _conclusions(common),
         "common": [plain(one) for one in common],
+        "failed": list(failed),
         "runtime_s": runtime_s,
     }
     text = json.dumps(fields, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     (out / CARS).write_text(text, encoding="utf-8")
-    (out / PAGE).write_text(several_html(cars, recordings, common), encoding="utf-8")
+    (out / PAGE).write_text(several_html(cars, recordings, common, failed), encoding="utf-8")
 
 
 def several_html(
     cars: Mapping[str, Diagnosis],
     recordings: Mapping[str, Sequence[str]],
     common: Sequence[Common],
+    failed: Sequence[str] = (),
 ) -> str:
     """Return the page of several cars."""
     titles = list(dict.fromkeys(title for one in recordings.values() for title in one))
@@ -93,6 +97,7 @@ def several_html(
     sentence = common_sentence(common)
     head = tag("p", where, "inputs") + tag("h1", sentence)
     head += "".join(tag("p", conclusion) for conclusion in _conclusions(common))
+    head += "".join(tag("p", f"Not diagnosed: {why}") for why in failed)
     kind = "mismatch" if common or any(one.effects for one in cars.values()) else "none"
     body = around("header", around("div", head, "words"), f"verdict {kind}")
     body += around("div", "".join(_car_card(*one) for one in cars.items()), "cards")

@@ -43,6 +43,14 @@ def bearings_of(car: Car) -> Bearings:
     return Bearings(0.0 if whole else -0.5 * view, view / count, count)
 
 
+def sweep_s(car: Car) -> float:
+    """Return how long a car's device takes from its first beam to one past its last; 0: no time."""
+    if car.text("lidar.sweep") == "frozen":
+        return 0.0
+    _, step, beams = bearings_of(car)
+    return beams * step / (2.0 * math.pi) / car.value("lidar.rate_hz")
+
+
 def facts(car: Car) -> Facts:
     """Return the device of a car file."""
     nearest, farthest = car.vector("lidar.range_m")

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from scm.__main__ import main
 from scm.commands import mismatch
 from scm.mismatch.findings import Estimate, Undecided, Verdict
 from scm.mismatch.report.several_page import several_html, several_summary, write_several
@@ -67,6 +68,20 @@ def test_all_cars_are_diagnosed_each_into_its_own_folder(two, tmp_path, capsys):
     assert [one["name"] for one in cars["cars"]] == ["car_1", "car_2"]
     assert cars["common"] == []
     assert "Nothing that the cars have in common was found." in capsys.readouterr().out
+
+
+def test_a_car_that_cannot_be_diagnosed_does_not_stop_the_others(tmp_path, capsys):
+    write_cars(tmp_path / "three", 3, 3.0, lambda _: {})
+    (tmp_path / "three/car_2.toml").write_text("name = 3\n", encoding="utf-8")
+    out = tmp_path / "out"
+    assert main(["mismatch", str(tmp_path / "three"), "--out", str(out)]) == 0
+    assert not (out / "car_2").exists()
+    assert (out / "car_3/report.html").is_file()
+    failed = json.loads((out / "cars.json").read_text(encoding="utf-8"))["failed"]
+    assert len(failed) == 1
+    assert "car_2.toml" in failed[0]
+    assert f"scm mismatch: {failed[0]}" in capsys.readouterr().err
+    assert "Not diagnosed: car_2: " in (out / "report.html").read_text(encoding="utf-8")
 
 
 def test_the_page_says_each_verdict_and_what_is_common(tmp_path):

@@ -110,6 +110,29 @@ def test_over_a_port_it_is_begun_read_and_ended():
     os.close(slave)
 
 
+def test_a_turn_lasts_from_the_turn_before_to_its_own():
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    port = open_lidar(os.ttyname(slave), "rplidar_a1")
+    port.step("n7", 0)
+    os.write(master, DESCRIPTOR + turn() + node(0, 2, first=True))
+    (first,) = told(port, NS_PER_S)
+    assert (first.sweep_ns, first.period_ns) == (None, None), "nobody knows when it began"
+    os.write(master, turn()[5:] + node(0, 2, first=True))
+    (second,) = told(port, NS_PER_S + 180_000_000)
+    assert (second.sweep_ns, second.period_ns) == (180_000_000, 180_000_000)
+    assert second.clockwise
+    os.write(master, (turn()[5:] + node(0, 2, first=True)) * 2)
+    both = []
+    while len(both) < 2:
+        both += port.step("n7", NS_PER_S + 580_000_000)
+    assert [one.t_ns - NS_PER_S for one in both] in ([380_000_000, 580_000_000], [580_000_000] * 2)
+    port.close()
+    os.close(master)
+    os.close(slave)
+
+
 def test_the_scanner_is_given_its_millisecond_between_stop_and_scan():
     assert len(PAUSE) * 10 / LIDAR.baud > 0.001
     assert b"\xa5" not in PAUSE

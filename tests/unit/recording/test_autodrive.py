@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from scm.__main__ import main
 from scm.errors import RecordingError
 from scm.recorder.autodrive_described import car_track
-from scm.recording.autodrive import CAR, stamp_ms, stamp_of
+from scm.recording.autodrive import CAR, MOTION, stamp_ms, stamp_of
 from scm.recording.autodrive_import import Imported, import_logs
 from scm.recording.autodrive_write import CarTrack, LightTrack, Series, write_logs
 from scm.recording.read import Recording, read_recordings
@@ -199,11 +199,127 @@ def test_unity_axes_are_told_and_converted(tmp_path: Path) -> None:
     assert_allclose(recording.channel("imu.gyro_z").values, 0.1)
 
 
+def counted(m_per_count: float, n: int = 20, **changed: str) -> list[str]:
+    """Return rows of a car whose wheels count so; `import_logs` is told 0.1 mm a count."""
+    counts = [f"{round(0.01 * k / m_per_count)}" for k in range(n)]
+    return [row(k, leftTicks=c, rightTicks=c, **changed) for k, c in enumerate(counts)]
+
+
 def test_wheels_that_slip_are_told_and_kept(tmp_path: Path) -> None:
-    rows = [row(k, leftTicks=f"{111 * k}", rightTicks=f"{111 * k}") for k in range(20)]
-    folder = logs(tmp_path / "log", *rows)
-    assert "encoders read +11.0%" in "\n".join(imported(folder).told)
-    assert read_one(folder).channel("encoder.left").values[-1] == 111 * 19
+    folder = logs(tmp_path / "log", *counted(1e-4 / 1.11))
+    told = "\n".join(imported(folder).told)
+    assert "encoders read +11.0%" in told
+    assert "slip" in told
+    assert read_one(folder).channel("encoder.left").values[-1] == round(0.19 * 1.11e4)
+
+
+@pytest.mark.parametrize("factor", [0.7, 0.9, 1.3, 1.5])
+def test_what_slip_cannot_do_is_not_put_down_to_slip(tmp_path: Path, factor: float) -> None:
+    told = "\n".join(imported(logs(tmp_path / "log", *counted(1e-4 / factor))).told)
+    assert f"encoders read {factor - 1:+.1%}" in told
+    assert "slip" not in told
+    assert "encoder.counts_per_revolution" in told
+    assert "--car" not in told
+
+
+@pytest.mark.parametrize("factor", [0.17, 0.2, 0.5, 6.0])
+def test_wheels_of_another_car_ask_for_its_file(tmp_path: Path, factor: float) -> None:
+    told = "\n".join(imported(logs(tmp_path / "log", *counted(1e-4 / factor))).told)
+    assert "V1 Log.csv is not of the car nigel" in told
+    assert "give its car file with --car" in told
+    assert "slip" not in told
+
+
+def test_of_several_cars_the_one_that_is_another_is_named(tmp_path: Path) -> None:
+    rows = {f"V{k}": "\n".join(counted(m)) for k, m in ((1, 1e-4), (2, 5e-4), (3, 1e-4))}
+    folder = logs(tmp_path / "log", rows.pop("V1"), **rows)
+    (told,) = [line for line in imported(folder).told if "is not of the car" in line]
+    assert "V2 Log.csv is not of the car nigel" in told
+    assert "put its car file in place of V2.toml" in told
+
+
+def test_backward_counts_are_counts(tmp_path: Path) -> None:
+    rows = [row(k, posX=f"{-0.01 * k:g}", leftTicks=f"{-100 * k}", rightTicks=f"{-100 * k}")
+            for k in range(20)]  # fmt: skip
+    made = imported(logs(tmp_path / "log", *rows))
+    assert made.left_out == []
+    assert "encoders" not in "\n".join(made.told)
+    assert read_one(tmp_path / "log").channel("encoder.left").values[-1] == -1900
+
+
+@pytest.mark.parametrize("column", ["leftTicks", "rightTicks"])
+def test_rows_with_a_fraction_of_a_count_are_left_out(tmp_path: Path, column: str) -> None:
+    rows = counted(1e-4, 40)
+    rows[:2] = [row(k, **{column: "0.2"}) for k in range(2)]
+    made = imported(logs(tmp_path / "log", *rows))
+    assert [one.line for one in made.left_out] == [1, 2]
+    assert made.left_out[0].why == f"{column}: got 0.2, expected whole counts of an encoder"
+    assert "encoders read" not in "\n".join(made.told)
+    recording = read_one(tmp_path / "log")
+    assert recording.channel("encoder.left").values[0] == 200
+    with (tmp_path / "log/out/left_out.csv").open(newline="") as stream:
+        assert [cells[3] for cells in csv.reader(stream)][1:] == rows[:2]
+
+
+def test_a_column_of_fractions_is_no_encoder(tmp_path: Path) -> None:
+    rows = [row(k, leftTicks=f"{0.31 * k:g}", rightTicks=f"{0.3 * k:g}") for k in range(40)]
+    made = imported(logs(tmp_path / "log", *rows))
+    assert made.left_out == []
+    assert "leftTicks: 39 of 40 cells are not whole (0.31, 0.62, 0.93, ...)" in "\n".join(made.told)
+    channels = read_one(tmp_path / "log").channels
+    assert "pose.x" in channels
+    assert not {"encoder.left", "encoder.right"} & channels.keys()
+    assert "0.31" in (tmp_path / "log/out/V1.csv").read_text()
+
+
+NOTHING = dict.fromkeys((*MOTION, "throttle", "steering"), "0")
+
+
+@pytest.mark.parametrize("first", [NOTHING, {"posX": "7", "posY": "-3"}, {"posX": "0.9"}])
+def test_first_rows_that_hold_defaults_are_left_out(tmp_path: Path, first: dict[str, str]) -> None:
+    rows = counted(1e-4, 40, posY="1.5")
+    rows[:3] = [row(k, **first) for k in range(3)]
+    made = imported(logs(tmp_path / "log", *rows))
+    assert [one.line for one in made.left_out] == [1, 2, 3]
+    assert "placeholder" in made.left_out[0].why
+    assert "encoders read" not in "\n".join(made.told)
+    recording = read_one(tmp_path / "log")
+    assert recording.channel("pose.x").values[0] == pytest.approx(0.03)
+    assert recording.channel("pose.x").t[0] == 0.0
+
+
+def test_a_car_that_stands_before_it_drives_off_loses_no_row(tmp_path: Path) -> None:
+    rows = [row(k, posX=f"{max(0.0, 0.01 * (k - 10)):g}") for k in range(40)]
+    assert imported(logs(tmp_path / "log", *rows)).left_out == []
+
+
+def test_a_full_size_car_that_is_driven_fast_from_the_first_row_on_loses_none(
+    tmp_path: Path,
+) -> None:
+    rows = [row(k, posX=f"{1.5 * k:g}", speed="30") for k in range(40)]
+    assert imported(logs(tmp_path / "log", *rows)).left_out == []
+
+
+def test_an_encoder_that_stays_while_the_car_drives_is_told(tmp_path: Path) -> None:
+    rows = [row(k, leftTicks="5", rightTicks=f"{100 * k}") for k in range(40)]
+    told = "\n".join(imported(logs(tmp_path / "log", *rows)).told)
+    assert "leftTicks stays at 5 while poses go 0.39 m" in told
+    assert "encoders read" not in told
+
+
+def test_a_car_put_elsewhere_and_a_counter_that_begins_anew_are_no_other_car(
+    tmp_path: Path,
+) -> None:
+    rows = [row(k, posX=f"{0.01 * k + 9 * (k > 20):g}", leftTicks=f"{100 * (k % 30)}",
+                rightTicks=f"{100 * (k % 30)}") for k in range(60)]  # fmt: skip
+    assert "encoders read" not in "\n".join(imported(logs(tmp_path / "log", *rows)).told)
+
+
+def test_a_light_that_was_saved_as_decimals_is_read(tmp_path: Path) -> None:
+    light = f"{stamp_of(START_MS)},2.0\n{stamp_of(START_MS + 9)},1.5\n"
+    (left_out,) = imported(logs(tmp_path / "log", row(0), TL1=light)).left_out
+    assert left_out.why == "state: got '1.5', expected 0 to 3"
+    assert read_one(tmp_path / "log").channel("light.TL1").values.tolist() == [2.0]
 
 
 def test_several_cars_are_several_recordings(tmp_path: Path) -> None:

@@ -63,6 +63,47 @@ def test_a_full_turn_is_shared_out_evenly():
     assert_allclose(got.ranges, (1.0, 2.0, math.inf, 3.0))
 
 
+def stamp_ns(got):
+    return got.header.stamp.sec * 1_000_000_000 + got.header.stamp.nanosec
+
+
+def test_a_moving_sweep_is_stamped_when_its_first_ray_looked():
+    period_ns = 142_857_143
+    turn = LidarScan(
+        vehicle="n1", t_ns=T_NS, beams=360, range_min_m=0.15, range_max_m=12.0,
+        payload=np.ones(360, "<f4").tobytes(), sweep_ns=period_ns, period_ns=period_ns,
+    )  # fmt: skip
+    got = again("sensor_msgs/LaserScan", convert.scan("n1", turn, None))
+    assert T_NS - stamp_ns(got) == pytest.approx(0.14246e9, rel=1e-4)
+    assert got.time_increment == pytest.approx(1 / 7 / 360, rel=1e-6)
+    assert got.scan_time == pytest.approx(1 / 7, rel=1e-6)
+    last_ns = stamp_ns(got) + 359 * 1e9 * float(got.time_increment)
+    assert last_ns == pytest.approx(T_NS, abs=20_000), "float32 seconds keep to 10 us"
+
+
+def test_a_sweep_over_part_of_a_circle_is_shorter_than_its_period():
+    seen = scan(bearing_first_rad=-1.0, bearing_step_rad=0.5, sweep_ns=8_000_000,
+                period_ns=25_000_000)  # fmt: skip
+    got = convert.scan("n1", seen, T_NS - 1)
+    assert T_NS - stamp_ns(got) == 6_000_000
+    assert (got.time_increment, got.scan_time) == (0.002, 0.025)
+
+
+def test_a_clockwise_sweep_is_listed_from_the_ray_that_looked_first():
+    got = convert.scan("n1", scan(sweep_ns=100_000_000, clockwise=True), None)
+    assert T_NS - stamp_ns(got) == 75_000_000
+    assert_allclose(got.ranges, (3.0, math.inf, 2.0, 1.0))
+    assert_allclose(
+        (got.angle_min, got.angle_max, got.angle_increment), (1.5 * math.pi, 0.0, -0.5 * math.pi)
+    )
+
+
+@pytest.mark.parametrize("sweep_ns", [None, 0])
+def test_rays_that_looked_at_once_bear_that_time(sweep_ns):
+    got = convert.scan("n1", scan(sweep_ns=sweep_ns), None)
+    assert (stamp_ns(got), got.time_increment) == (T_NS, 0.0)
+
+
 def test_a_narrow_view_begins_at_its_right_end():
     seen = scan(bearing_first_rad=-1.0, bearing_step_rad=0.5)
     got = convert.scan("n1", seen, None)

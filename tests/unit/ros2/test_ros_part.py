@@ -108,7 +108,7 @@ def test_a_scan_is_asked_for_of_the_car_that_is_looked_at(city):
     scans = city.graph.sent("/n1/scan")
     assert 4 <= len(scans) <= 7  # 7 Hz, from the next look on
     assert len(scans[-1].ranges) == 360
-    assert scans[-1].scan_time == pytest.approx(1 / 7, abs=0.021)
+    assert scans[-1].scan_time == pytest.approx(1 / 7)
 
 
 def test_odometry_comes_twenty_times_a_second(city):

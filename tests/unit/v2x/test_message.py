@@ -59,9 +59,15 @@ def test_a_payload_is_the_body_and_the_rest_is_the_attachment():
     assert body == b"\x00\xffab"
     assert attachment == (
         b'{"vehicle":"n1","t_ns":5,"beams":1,"range_min_m":0.15,"range_max_m":12.0,'
-        b'"bearing_first_rad":0.0,"bearing_step_rad":null}'
+        b'"bearing_first_rad":0.0,"bearing_step_rad":null,"sweep_ns":null,"period_ns":null,'
+        b'"clockwise":false}'
     )
     assert decode(LidarScan, body, attachment) == scan()
+
+
+def test_a_scan_without_the_sweep_s_times_is_still_read():
+    old = b'{"vehicle":"n1","t_ns":5,"beams":1,"range_min_m":0.15,"range_max_m":12.0}'
+    assert decode(LidarScan, b"\x00\xffab", old) == scan()
 
 
 def test_the_collector_of_cycles_does_not_walk_over_messages():

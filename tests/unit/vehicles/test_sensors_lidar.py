@@ -11,7 +11,7 @@ from scm.vehicles.placed import Placed
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sight
-from scm.vehicles.sensors.lidar import SENSOR, bearings_of, scan
+from scm.vehicles.sensors.lidar import SENSOR, bearings_of, scan, sweep_s
 
 NIGEL = load_car("nigel")
 NEAREST, FARTHEST = NIGEL.vector("lidar.range_m")
@@ -124,6 +124,20 @@ def test_noise_may_carry_a_hit_over_the_range_but_no_reading_lies_beyond_it():
     ahead = np.array([bank.step(now, lambda: scene)[0].values[0, 0] for now in steps])
     assert 0.2 < np.isfinite(ahead).mean() < 0.5
     assert ahead[np.isfinite(ahead)].max() <= FARTHEST
+
+
+@pytest.mark.parametrize(("view_rad", "share"), [(2.0 * np.pi, 1.0), (np.pi, 0.5)])
+def test_a_moving_sweep_lasts_its_share_of_a_turn_and_a_frozen_one_no_time(
+    tmp_path, view_rad, share
+):
+    text = NIGEL.path.read_text(encoding="utf-8")
+    moving = f"""[lidar]
+sweep = {{ value = "moving", source = "test" }}
+field_of_view_rad = {{ value = {view_rad}, unit = "rad", source = "test" }}"""
+    path = tmp_path / "sweeping.toml"
+    path.write_text(text.replace("[lidar]", moving), encoding="utf-8")
+    assert sweep_s(load_car(path)) == pytest.approx(share / 7.0)
+    assert sweep_s(NIGEL) == 0.0
 
 
 def test_a_moving_sweep_smears_what_a_frozen_one_does_not(tmp_path):

@@ -127,6 +127,7 @@ def test_a_remote_car_gets_scans_of_walls_and_cars_but_not_of_itself(city):
     ranges = np.frombuffer(scan.payload, "<f4")
     assert len(ranges) == scan.beams == 360
     assert np.isfinite(ranges).mean() > 0.5
+    assert (scan.sweep_ns, scan.period_ns) == (0, round(NS_PER_S / 7)), "Nigel's looks at once"
 
 
 def test_a_real_car_is_not_pushed_but_pushes(city):
