@@ -241,7 +241,8 @@ def test_the_horizon_asked_for_is_in_the_table(
     tinytown = str(root / "recordings/autodrive_sim_tinytown.yaml")
     data = str(shared / "recordings/autodrive_sim_tinytown")
     assert main(["replay", tinytown, "--data", data, "--horizon-s", "2"]) == 0
-    assert capsys.readouterr().out.splitlines()[2].split() == ["0.5", "s", "1", "s", "2", "s"]
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["0.5", "s", "1", "s", "2", "s"] in lines
 
 
 def test_a_car_file_may_lie_beside_the_description(tmp_path: Path, root: Path) -> None:
