@@ -31,6 +31,7 @@ LONG = (
     "kill",
     "misbehaviour",
     "mismatch",
+    "recording_faults",
     "serial",
     "stop",
 )  # takes minutes: only where it is asked for, alone, with its own arguments

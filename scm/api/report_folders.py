@@ -19,6 +19,8 @@ FILES = {
     "drawn.json": "application/json",
     "car.toml": "application/toml",
     "retuned.toml": "application/toml",
+    "given.toml": "application/toml",
+    "windows.csv": "text/csv",
 }
 _FIELDS, _DRAWN, _JOB, _CARS = "report.json", "drawn.json", "job.json", "cars.json"
 _DRIVE, _TOLD = re.compile(r"next_drive(_\d{1,2})?"), re.compile(r"told_\d{1,4}")

@@ -112,8 +112,10 @@ def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> s
         budget_s=arguments.budget_s, strict=arguments.strict, tell=progress.tell,
     )  # fmt: skip
     progress.tell("writing the report")
-    write(found, out, _check(arguments, out))
-    return _with_account(found, summary(found.diagnosis, out, found.evidence.retuned_m))
+    check = _check(arguments, out)
+    write(found, out, check)
+    said = summary(found.diagnosis, out, found.evidence.retuned_m)
+    return _with_account(found, said, check)
 
 
 def _of_cars(
@@ -139,9 +141,10 @@ def _of_cars(
         ((name, recordings),) = cars.items()
         found = diagnose_one(recordings, budget=budget, strict=strict, tell=progress.tell)
         progress.tell("writing the report")
-        write(found, out, _check(arguments, out, name if failed else ""))
+        check = _check(arguments, out, name if failed else "")
+        write(found, out, check)
         said = summary(found.diagnosis, out, found.evidence.retuned_m)
-        return _with_account(found, said), failed
+        return _with_account(found, said, check), failed
     several = diagnose_several(
         cars, budget_s=budget_s, strict=strict, tell=progress.tell, turn=progress.turn
     )
@@ -167,9 +170,10 @@ def _check(arguments: argparse.Namespace, out: Path, vehicle: str = "") -> str:
     return "" if arguments.told and spanned else shlex.join(words)
 
 
-def _with_account(found: "Found", said: str) -> str:
-    """Return the summary below the lines on which rows were read."""
-    return "\n".join((*found.account, said))
+def _with_account(found: "Found", said: str, check: str) -> str:
+    """Return the summary between the lines on which rows were read and how to check it."""
+    again = (f"  the figures again: {check}",) if check and found.diagnosis.fit else ()
+    return "\n".join((*found.account, said, *again))
 
 
 COMMAND = Command(

@@ -163,6 +163,8 @@ def test_a_report_tells_its_fields_what_it_draws_and_its_files(call, shelves):
         "report.json",
         "drawn.json",
         "car.toml",
+        "given.toml",
+        "windows.csv",
     }
 
 

@@ -12,6 +12,8 @@ const FILES = {
   "report.json": "Fields",
   "car.toml": "Car with what was found",
   "retuned.toml": "Car with its numbers refitted",
+  "given.toml": "Car as it was given",
+  "windows.csv": "Windows driven",
 };
 
 export function Head({ report }) {
