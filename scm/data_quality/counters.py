@@ -9,7 +9,7 @@ from scm.arrays import Bools, Floats, Ints
 from scm.data_quality.limits import GENEROUS, Limits
 from scm.data_quality.problem import DataProblem
 from scm.data_quality.spikes import chained, held_since, single
-from scm.data_quality.stamps import left_out, problem, rows_named, times
+from scm.data_quality.stamps import left_out, problem, rows_named, times, usual_step
 from scm.recording.read import Channel, Recording
 
 COUNTERS = ("encoder.left", "encoder.right")
@@ -47,7 +47,7 @@ def _repaired(
     problems = []
     wrapped = _unwrapped(channel, rate, slack)
     if wrapped is not None:
-        most = (limits.counts or 0.0) / GENEROUS * float(np.median(np.diff(channel.t)))
+        most = (limits.counts or 0.0) / GENEROUS * usual_step(channel.t)
         channel, modulus, at = wrapped
         is_clear = most < 0.5 * modulus
         problems.append(problem((name,), "wrap", (
@@ -76,7 +76,7 @@ def _repaired(
 def _reach(channel: Channel, limits: Limits) -> tuple[float, float]:
     """Return how many counts a second, and how many more at once, the wheels can make."""
     t, values = channel.t, channel.values
-    period = float(np.median(np.diff(t)))
+    period = usual_step(t)
     step = np.abs(np.diff(values))
     passed = np.maximum(t[1:] - held_since(t, values)[:-1], period)
     usual = GENEROUS * float(np.percentile(step / passed, 90))
@@ -124,7 +124,7 @@ def _moduli(values: Floats, step: Floats) -> Iterator[float]:
 def _glitches(channel: Channel, rate: float, slack: float) -> Bools:
     """Return the rows that count what the wheels cannot have turned, and turned back."""
     t, values = channel.t, channel.values
-    period = float(np.median(np.diff(t)))
+    period = usual_step(t)
 
     def off(row: Ints, a: Ints, b: Ints) -> Floats:
         low, high = np.minimum(values[a], values[b]), np.maximum(values[a], values[b])
@@ -155,7 +155,7 @@ def _joined(
 ) -> tuple[Channel, list[DataProblem]]:
     """Return a counter whose restarts and jumps are joined: it goes on as fast as around them."""
     t, values = channel.t, channel.values
-    period = float(np.median(np.diff(t)))
+    period = usual_step(t)
     step, passed = np.diff(values), np.maximum(np.diff(t), period)
     held = t[1:] - held_since(t, values)[:-1]
     at = np.flatnonzero(np.abs(step) > rate * np.maximum(passed, held) + slack)

@@ -12,7 +12,7 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.data_quality.limits import GENEROUS, Limits
 from scm.data_quality.problem import DataProblem, Span
-from scm.data_quality.stamps import left_out, problem, rows_named, times
+from scm.data_quality.stamps import left_out, problem, rows_named, times, usual_step
 from scm.recording.read import Channel, Recording
 
 SHORT_S = 0.5  # what lies elsewhere for less is a row or a few, not a place where the car was
@@ -200,7 +200,7 @@ def _screened_pose(
         beside = part - np.clip(share, 0.0, 1.0)[:, None] * whole
         return np.asarray(np.linalg.norm(beside, axis=1))
 
-    period = float(np.median(np.diff(t)))
+    period = usual_step(t)
     since = held_since(t, *values.T)
     every = np.arange(len(t) - 1)
     step = apart(every, every + 1)

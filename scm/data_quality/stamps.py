@@ -16,8 +16,9 @@ from scm.recording.units import UNITS
 FACTORS = (1e-3, 1e-6, 1e-9, 1e3, 1e6, 1e9, 1.0 / 60.0, 60.0)
 POSE_STEP_S = (2e-4, 2.0)  # no camera is faster, and slower poses show no driving
 USUAL_STEP_S = 0.02
+LONGEST_STEPS = 5.0  # times what hardly any step exceeds: what is longer is a gap
 OFF = 5.0  # times what the car can do: no other car explains that, but another unit of time does
-CREEPS = 0.005  # of what the car can do
+CREEPS = 0.01  # of what the car can do: no drive is so slow all the time
 ALIKE = math.log(3.0)  # two tables of one drive last about as long
 OTHERWISE = math.log(30.0)
 EPOCH = 100.0  # times its own length from zero: a clock that counts from 1970
@@ -61,14 +62,21 @@ class Table:
     @property
     def step_s(self) -> float:
         """Usual time between two rows; NaN of one row [s]."""
-        steps = np.diff(np.unique(self.t))
-        return float(np.median(steps)) if len(steps) else math.nan
+        return usual_step(np.sort(self.t)) or math.nan
 
     @property
     def span_s(self) -> tuple[float, float]:
         """Stamps between which nine tenths of the rows lie [s]."""
         low, high = np.percentile(self.t, (5.0, 95.0))
         return float(low), float(high)
+
+
+def usual_step(t: Floats) -> float:
+    """Return the mean time between rows without gaps; in bursts most steps are next to none [s]."""
+    steps = np.diff(t)
+    if len(steps) == 0:
+        return 0.0
+    return float(steps[steps <= LONGEST_STEPS * np.percentile(steps, 98)].mean())
 
 
 def tables_of(recording: Recording) -> list[Table]:
@@ -93,8 +101,10 @@ def _together(one: Channel, other: Channel) -> bool:
 def _table(recording: Recording, names: tuple[str, ...]) -> Table:
     channels = [recording.channels[name] for name in names]
     source = channels[0].source
-    every = np.concatenate([channel.row_numbers for channel in channels])
-    numbers, first = np.unique(every, return_index=True)
+    every = [channel.row_numbers for channel in channels]
+    if all(np.array_equal(numbers, every[0]) for numbers in every[1:]):
+        return Table(names, every[0], channels[0].t, source)
+    numbers, first = np.unique(np.concatenate(every), return_index=True)
     t = np.concatenate([channel.t for channel in channels])[first]
     return Table(names, numbers, t, source)
 
@@ -158,10 +168,9 @@ def _motion(recording: Recording) -> tuple[float, float] | None:
         if channel is None:
             return None
         order = np.argsort(channel.t, kind="stable")
-        steps = np.diff(channel.t[order])
         moved = np.abs(np.diff(channel.values[order]))
-        rates.append(float(np.percentile(moved[steps > 0.0] / steps[steps > 0.0], 75))
-                     if (steps > 0.0).any() else 0.0)  # fmt: skip
+        step = usual_step(channel.t[order])
+        rates.append(float(np.percentile(moved, 90)) / step if step > 0.0 else 0.0)
     speed = math.hypot(rates[0], rates[1])
     return (speed, rates[2]) if speed > 0.0 else None
 

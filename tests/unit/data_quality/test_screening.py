@@ -129,6 +129,18 @@ def test_one_table_in_another_unit_becomes_seconds(
     np.testing.assert_allclose(t, clean["t"] + start_s, atol=1e-3)
 
 
+@pytest.mark.parametrize("together", [2, 5, 10])
+@pytest.mark.parametrize("apart_s", [0.0, 2e-4])
+def test_rows_of_one_moment_are_in_seconds_and_no_spikes(
+    clean: dict[str, Floats], nigel: Car, together: int, apart_s: float
+) -> None:
+    number = np.arange(1500)
+    last = np.minimum(number // together * together + together - 1, 1499)
+    handed_over = clean["t"][last] + apart_s * (number % together)
+    found = screen(recording(changed(clean, t=handed_over)), nigel)
+    assert not {"unit", "spike", "jump", "stray"} & set(names(found))
+
+
 @pytest.mark.parametrize("row", [0, 1, 700, 1498, 1499])
 @pytest.mark.parametrize("stamp", [0.0, EPOCH_S + 86_400.0, EPOCH_S - 86_400.0, EPOCH_S + 3e3])
 def test_one_bad_stamp_costs_one_row(
