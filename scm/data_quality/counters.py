@@ -14,6 +14,7 @@ from scm.recording.read import Channel, Recording
 
 COUNTERS = ("encoder.left", "encoder.right")
 BITS = (8, 10, 12, 14, 16, 20, 24, 32)
+DIGITS = (2, 3, 4, 5, 6)  # of counters that are decimal
 FULL = 0.9  # of its range a counter has passed where it wrapped
 SMALL_COUNTS = 4.0  # a pulse more or less, read a moment earlier or later
 FEW = 5  # rows of a glitch
@@ -45,7 +46,7 @@ def _repaired(
     """Return a counter in order, and what was done; None where it wraps too often to be read."""
     rate, slack = _reach(channel, limits)
     problems = []
-    wrapped = _unwrapped(channel, rate, slack)
+    wrapped = _unwrapped(channel, rate, slack, limits.turn)
     if wrapped is not None:
         most = (limits.counts or 0.0) / GENEROUS * usual_step(channel.t)
         channel, modulus, at = wrapped
@@ -83,42 +84,49 @@ def _reach(channel: Channel, limits: Limits) -> tuple[float, float]:
     return max(limits.counts or 0.0, usual), SMALL_COUNTS
 
 
-def _unwrapped(channel: Channel, rate: float, slack: float) -> tuple[Channel, float, Ints] | None:
+def _unwrapped(
+    channel: Channel, rate: float, slack: float, turn: float | None
+) -> tuple[Channel, float, Ints] | None:
     """Return the channel unwrapped, by how much it wraps, and the rows; None where it does not."""
     values = channel.values
     step = np.diff(values)
-    for modulus in _moduli(values, step):
+    best: tuple[float, Channel, float, Ints] | None = None
+    for modulus in _moduli(values, step, turn):
         turns = np.rint(step / modulus)
         at = np.flatnonzero(turns)
         if len(at) == 0:
             continue
         reach = np.minimum(rate * np.diff(channel.t)[at] + slack, 0.5 * modulus)
-        fits = np.abs(step[at] - turns[at] * modulus) <= reach
+        true = step - turns * modulus
         # An integer wraps from one end of its range to the other.
         low, high = float(values.min()), float(values.max())
         ends = (np.minimum(values[at], values[at + 1]) - low <= reach) & (
             high - np.maximum(values[at], values[at + 1]) <= reach
         )
-        if not np.all(fits & ends):
+        if not np.all((np.abs(true[at]) <= reach) & ends):
             continue
-        added = np.concatenate(([0.0], np.cumsum(-modulus * turns)))
-        numbers = channel.row_numbers[at + 1]
-        return replace(channel, values=values + added), modulus, numbers
-    return None
+        beside = 0.5 * (true[np.maximum(at - 1, 0)] + true[np.minimum(at + 1, len(true) - 1)])
+        misfit = float(np.median(np.abs(true[at] - beside)))
+        if best is None or misfit < best[0] - slack:
+            added = np.concatenate(([0.0], np.cumsum(-modulus * turns)))
+            unwrapped = replace(channel, values=values + added)
+            best = misfit, unwrapped, modulus, channel.row_numbers[at + 1]
+    return None if best is None else best[1:]
 
 
-def _moduli(values: Floats, step: Floats) -> Iterator[float]:
-    """Yield by how much a counter may wrap: its range is passed nearly whole."""
+def _moduli(values: Floats, step: Floats, turn: float | None) -> Iterator[float]:
+    """Yield by how much a counter may wrap, likely ones first: its range is passed nearly whole."""
     reach = float(np.ptp(values))
     for bits in BITS:
-        modulus = 2.0**bits
-        if FULL * modulus <= reach < modulus:
-            yield modulus
+        if FULL * 2.0**bits <= reach < 2.0**bits:
+            yield 2.0**bits
     at = np.flatnonzero(np.abs(step) > FULL * reach)
-    far = np.abs(step[at])
     if len(at) > 1 and np.diff(at).min() > FEW:  # an angle, or scaled counts; not there and back
         usual = float(np.median(np.abs(step[step != 0.0])))
-        yield float(np.rint(np.median(far) + usual))
+        found = float(np.rint(np.median(np.abs(step[at])) + usual))
+        known = [10.0**digits for digits in DIGITS] + ([] if turn is None else [turn])
+        yield from (m for m in known if abs(m - found) <= 2.0 * usual + SMALL_COUNTS)
+        yield found
 
 
 def _glitches(channel: Channel, rate: float, slack: float) -> Bools:

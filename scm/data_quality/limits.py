@@ -20,7 +20,7 @@ class Limits:
     Attributes:
         speed: [m/s]; `acceleration`: in any direction [m/s^2]; `turning`: of its heading [rad/s].
         wheels: Angular speed of its wheels [rad/s].
-        counts: Of its encoders a second; None where the file does not say what a turn counts.
+        counts: Of its encoders a second; `turn`: a turn; None where the file does not say it.
         length: Its wheelbase [m].
     """
 
@@ -29,6 +29,7 @@ class Limits:
     turning: float
     wheels: float
     counts: float | None
+    turn: float | None
     length: float
 
 
@@ -44,15 +45,15 @@ def limits_of(car: Car) -> Limits:
     curvature = math.tan(min(lock, 1.5)) / length
     turning = min(top * curvature, math.sqrt(grip * curvature))  # its tyres slip beyond
     wheels = top / car.value("wheel.radius_m")
-    counts = None
-    if car.has("encoder.counts_per_revolution"):
-        counts = wheels * car.value("encoder.counts_per_revolution") / math.tau
+    key = "encoder.counts_per_revolution"
+    turn = car.value(key) if car.has(key) else None
     return Limits(
         speed=GENEROUS * top,
         acceleration=GENEROUS * grip,
         turning=GENEROUS * turning,
         wheels=GENEROUS * wheels,
-        counts=None if counts is None else GENEROUS * counts,
+        counts=None if turn is None else GENEROUS * wheels * turn / math.tau,
+        turn=turn,
         length=length,
     )
 

@@ -218,9 +218,11 @@ def _screened_pose(
     )
     whole = np.zeros(len(t), dtype=np.bool_)
     whole[kept[keep]] = True
-    rows = np.clip(np.flatnonzero(~whole), 1, len(t) - 2)
-    size = float(off(rows, rows - 1, rows + 1).max()) if len(rows) else 0.0
-    return whole, jumps, size
+    after = np.clip(np.searchsorted(np.flatnonzero(whole), np.flatnonzero(~whole)), 1, None)
+    good = np.flatnonzero(whole)
+    after = np.minimum(after, len(good) - 1)
+    beside = off(np.flatnonzero(~whole), good[after - 1], good[after])
+    return whole, jumps, float(beside.max(initial=0.0))
 
 
 def _wrapped(angles: Floats) -> Floats:

@@ -168,9 +168,11 @@ def _motion(recording: Recording) -> tuple[float, float] | None:
         if channel is None:
             return None
         order = np.argsort(channel.t, kind="stable")
-        moved = np.abs(np.diff(channel.values[order]))
+        # In which order the rows belong is not known yet: in the one in which they move less.
+        orders = (channel.values, channel.values[order])
+        moved = min(float(np.percentile(np.abs(np.diff(values)), 90)) for values in orders)
         step = usual_step(channel.t[order])
-        rates.append(float(np.percentile(moved, 90)) / step if step > 0.0 else 0.0)
+        rates.append(moved / step if step > 0.0 else 0.0)
     speed = math.hypot(rates[0], rates[1])
     return (speed, rates[2]) if speed > 0.0 else None
 
@@ -287,8 +289,11 @@ def _alone(table: Table) -> Bools:
 def _stray_problem(table: Table, stray: Bools) -> DataProblem:
     t, others = table.t[stray], table.t[~stray]
     low, high = float(others.min()), float(others.max())
-    span = f"near {low:.6g}" if abs(low) > EPOCH * (high - low) else f"from {low:.6g} to {high:.6g}"
-    values = ", ".join(dict.fromkeys(f"{value:.6g}" for value in t[:3]))
+    epoch = abs(low) > EPOCH * (high - low)
+    close = epoch and bool(np.all(np.abs(t - low) < abs(low) * 1e-3))
+    digits = ".3f" if close else ".6g"
+    span = f"near {low:.6g}" if epoch and not close else f"from {low:{digits}} to {high:{digits}}"
+    values = ", ".join(dict.fromkeys(f"{value:{digits}}" for value in t[:3]))
     more = " ..." if len(t) > 3 else ""
     verb = "is" if len(t) == 1 else "are"
     return problem(table.names, "stray", (
