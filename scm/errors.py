@@ -17,7 +17,11 @@
 A message says what was wrong, where (file and key), what was got and what was expected.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+MAX_REASON = 200  # characters of another library's words: a line of a terminal or two
 
 
 class ScmError(Exception):
@@ -81,3 +85,41 @@ def nearest(name: str, valid: Sequence[str]) -> str:
 
     close = get_close_matches(name, list(valid), n=1)
     return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+@contextmanager
+def reading(
+    path: Path, what: str, error: type[ScmError] = RecordingError, hint: str = ""
+) -> Iterator[None]:
+    """Turn whatever a library raises over a file that a user gave into one line of ours.
+
+    Args:
+        path: The file.
+        what: Which kind of file was expected: "a Parquet file".
+        error: What to raise.
+        hint: What to do about it.
+
+    Raises:
+        ScmError: an `error` that names the file, what was expected and what was found.
+    """
+    try:
+        yield
+    except ScmError:
+        raise
+    except Exception as cause:
+        msg = f"{path}: {_refusal(cause, what)}{hint and f': {hint}'}"
+        raise error(msg) from cause
+
+
+def _refusal(cause: Exception, what: str) -> str:
+    """Return why a file cannot be read, in one line."""
+    if isinstance(cause, OSError) and cause.strerror:
+        return f"cannot be read: {cause.strerror}"
+    if isinstance(cause, MemoryError):
+        return f"not {what} that can be read: it declares more than fits into memory"
+    if isinstance(cause, RecursionError):
+        return f"not {what} that can be read: it is nested too deeply"
+    words = " ".join(str(cause).split())
+    words = words if len(words) <= MAX_REASON else words[:MAX_REASON] + " ..."
+    kind = "" if words and isinstance(cause, OSError | ValueError) else f"{type(cause).__name__} "
+    return f"not {what} that can be read: {kind}{words}".rstrip()

@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from scm.arrays import Floats, Ints
 from scm.errors import RecordingError, nearest
-from scm.recording.columns import NS_PER_S, Columns, refuse_large
+from scm.recording.columns import NS_PER_S, Columns, Selection, refuse_large
 
 RECEIVED, STAMP, STAMP_FIELD = "received_s", "stamp_s", "header.stamp"
 OTHER_PROFILE = "Profile is not ros2"
@@ -29,7 +29,7 @@ class _Instant(int):
     """A time in a message [ns]."""
 
 
-def read(path: Path, topic: str | None, wanted: Collection[str] | None) -> Columns:
+def read(path: Path, selection: Selection) -> Columns:
     """Return the wanted fields of one topic's messages.
 
     Raises:
@@ -38,7 +38,7 @@ def read(path: Path, topic: str | None, wanted: Collection[str] | None) -> Colum
     try:
         reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
         with reader:
-            return _topic(reader, _chosen(reader, topic, path), path, wanted)
+            return _topic(reader, _chosen(reader, selection.topic, path), path, selection.wanted)
     except RecordingError:
         raise
     except Exception as cause:

@@ -1,7 +1,11 @@
 """The columns of one file, as numbers or words, whatever the file's format."""
 
+import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,12 +17,15 @@ from scm.recording.units import UNITS
 
 LARGEST_BYTES = 1 << 30
 MOST_NAMED = 40
+MAX_BAD_CELLS = 0.1  # of a column; where more are no numbers it is no column of numbers
 NS_PER_S = 1_000_000_000
 WORDS = {
     **dict.fromkeys(("", "nan", "na", "n/a", "null", "none"), np.nan),
     "true": 1.0,
     "false": 0.0,
 }
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
+_DATE = re.compile(r"\s*\d{4}[-/]\d\d[-/]\d\d[ T]\d\d:\d\d")
 
 
 class LeftOut(NamedTuple):
@@ -40,11 +47,30 @@ class LeftOut(NamedTuple):
         return f"{self.file}: {at}{self.why}"
 
 
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """What of a file is its table.
+
+    Attributes:
+        topic: Whose messages are the rows, where the file is a ROS bag.
+        wanted: Names of the columns that will be asked for; None: all. Others may be left out.
+        columns: Names of the columns by position, where the file names none; None: of a column
+            that nobody needs.
+        definitions: Folder of `.msg` files, for a bag without definitions of its messages.
+    """
+
+    topic: str | None = None
+    wanted: Collection[str] | None = None
+    columns: Sequence[str | None] | None = None
+    definitions: Path | None = None
+
+
 class Columns(Mapping[str, Floats]):
     """The columns of one file, each of shape `(rows,)`; an empty cell is NaN.
 
     Asking for a column raises a `RecordingError` when there is none of that name, when its name
-    stands twice, or, with the line, when a cell is not a number.
+    stands twice, or, with the line, when its cells are not numbers. A few that are not are NaN, and
+    left out; dates with a time of day are seconds since 1970.
 
     Args:
         path: What to name in an error: the file.
@@ -67,10 +93,10 @@ class Columns(Mapping[str, Floats]):
         ticks: Mapping[str, tuple[Ints, int]] | None = None,
         left_out: Sequence[LeftOut] = (),
     ) -> None:
-        self.left_out = tuple(left_out)
+        self._left_out = list(left_out)
         self._path = path
         self._known = known or names
-        self._ticks = ticks or {}
+        self._ticks = dict(ticks or {})
         self._count = Counter(names)
         self._cells = dict(zip(names, cells, strict=True))
         self._lines = lines
@@ -106,6 +132,14 @@ class Columns(Mapping[str, Floats]):
         return np.array([cell.strip() for cell in cells], dtype=np.str_)
 
     @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What of the file is in no row, and which cells of the columns read so far are no numbers.
+
+        It grows as columns are read.
+        """
+        return tuple(self._left_out)
+
+    @property
     def rows(self) -> int:
         """How many rows each column has."""
         return len(next(iter(self._cells.values()), ()))
@@ -115,6 +149,8 @@ class Columns(Mapping[str, Floats]):
 
         Seconds since 1970 as one float are good to a quarter of a microsecond only.
         """
+        if name not in self._ticks:
+            self._read_dates(name)
         if name not in self._ticks or unit not in UNITS:
             return None
         ticks, per_value = self._ticks[name]
@@ -140,11 +176,35 @@ class Columns(Mapping[str, Floats]):
         cells = self._cells[name]
         if isinstance(cells, np.ndarray):
             return cells
-        numbers = (
-            number(cell, f"{self._path}: line {line}, column {name!r}")
-            for line, cell in zip(self._lines, cells, strict=True)
-        )
-        return np.fromiter(numbers, np.float64, len(cells))
+        if self._read_dates(name):
+            ticks, per_value = self._ticks[name]
+            return ticks / per_value
+        return self._as_numbers(name, cells)
+
+    def _as_numbers(self, name: str, cells: Sequence[str]) -> Floats:
+        """Return cells as numbers; a few that are none are NaN, and left out."""
+        numbers, bad = np.full(len(cells), np.nan), []
+        for k, cell in enumerate(cells):
+            try:
+                numbers[k] = number(cell, f"column {name!r}")
+            except RecordingError as error:
+                bad.append(LeftOut(self._path.name, self._lines[k], str(error), cell))
+                if len(bad) > MAX_BAD_CELLS * len(cells):
+                    msg = f"{self._path}: line {bad[0].line}, {bad[0].why}"
+                    raise RecordingError(msg) from error
+        self._left_out += bad
+        return numbers
+
+    def _read_dates(self, name: str) -> bool:
+        """Read a column of dates with times of day; return whether it is one."""
+        cells = self._cells.get(name, ())
+        if isinstance(cells, np.ndarray) or not len(cells) or not _DATE.match(cells[0]):
+            return False
+        with suppress(ValueError):
+            since = np.array([_instant(cell) for cell in cells], "datetime64[ns]")
+            self._ticks[name] = since.astype(np.int64), NS_PER_S
+            return True
+        return False
 
 
 def refuse_large(size: int, path: Path, what: str = "") -> None:
@@ -175,6 +235,19 @@ def refuse_unequal(columns: Mapping[str, Collection[object]], path: Path) -> Non
         raise RecordingError(msg)
 
 
+def _instant(cell: str) -> np.datetime64:
+    """Return a date and time of day; without a zone it counts as UTC.
+
+    Raises:
+        ValueError: when it is none.
+    """
+    text = cell.strip().replace("/", "-")
+    try:
+        return np.datetime64(text.removesuffix("Z"), "ns")
+    except ValueError:
+        return np.datetime64(datetime.fromisoformat(text).astimezone(UTC).replace(tzinfo=None))
+
+
 def number(cell: str, where: str) -> float:
     """Return a cell as a number; an empty one, or a word for it, is NaN.
 
@@ -186,5 +259,7 @@ def number(cell: str, where: str) -> float:
         value = WORDS.get(text.lower())
         return float(text.replace("_", "?")) if value is None else value
     except ValueError as cause:
-        msg = f"{where}: got {text[:40]!r}, expected a number"
+        is_comma = _DECIMAL_COMMA.fullmatch(text) is not None
+        expected = "a decimal point: other cells have points" if is_comma else "a number"
+        msg = f"{where}: got {text[:40]!r}, expected {expected}"
         raise RecordingError(msg) from cause

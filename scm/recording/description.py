@@ -1,16 +1,18 @@
 """The file `recording.yaml` as data, checked while it is read."""
 
 import math
-from collections.abc import Hashable, Mapping
+from collections import Counter
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
 import yaml
 
-from scm.errors import RecordingError
+from scm.errors import RecordingError, reading
 
 FILE_NAME = "recording.yaml"
+MAX_BYTES = 16 << 20  # longer than any description that people or programs write
 
 
 class TimeColumn(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -54,6 +56,10 @@ class Table(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     Attributes:
         file: Relative to the description, or to the folder given when reading.
         topic: Whose messages are the rows, where the file is a ROS bag.
+        columns: Names of the columns by position, where the file names none; null: of a column
+            that is not needed.
+        definitions: Folder of `.msg` files, where a ROS 2 bag does not define its messages;
+            relative as `file` is.
         where: Keep only rows for which this expression over columns is true.
     """
 
@@ -61,6 +67,8 @@ class Table(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     time: TimeColumn
     channels: dict[str, ChannelColumn]
     topic: str | None = None
+    columns: tuple[str | None, ...] | None = None
+    definitions: str | None = None
     where: str | None = None
     vehicle: str | None = None
 
@@ -100,12 +108,13 @@ def read_description(path: Path) -> Description:
     Raises:
         RecordingError: naming the file, the key, what was expected and what was got.
     """
-    try:
+    with reading(path, "a YAML file"):
+        if path.stat().st_size > MAX_BYTES:
+            msg = f"{path}: a description of more than {MAX_BYTES >> 20} MiB: is it the data?"
+            raise RecordingError(msg)
         raw = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_Loader)
+    try:
         description = msgspec.convert(raw, Description)
-    except (yaml.YAMLError, OSError, UnicodeDecodeError, RecursionError) as cause:
-        msg = f"{path}: not a YAML file that can be read: {cause}"
-        raise RecordingError(msg) from cause
     except msgspec.ValidationError as cause:
         msg = f"{path}: {_guilty_channel(raw)}{cause}"
         raise RecordingError(msg) from cause
@@ -115,18 +124,20 @@ def read_description(path: Path) -> Description:
     return description
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
     """Plain YAML, but a key that stands twice is refused: the first one would be lost silently."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         """Return a mapping of distinct keys."""
-        keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
-        for i, key in enumerate(keys):
-            if key in keys[:i]:
-                line = node.value[i][0].start_mark.line + 1
-                msg = f"line {line}: the key {key!r} stands twice"
-                raise yaml.YAMLError(msg)
-        return super().construct_mapping(node, deep)
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if key.value in seen:
+                    msg = f"line {key.start_mark.line + 1}: the key {key.value!r} stands twice"
+                    raise yaml.YAMLError(msg)
+                seen.add(key.value)
+        mapping: dict[Hashable, Any] = super().construct_mapping(node, deep)
+        return mapping
 
 
 def _guilty_channel(raw: Any) -> str:
@@ -152,9 +163,19 @@ def _problems(description: Description) -> list[str]:
             problems.append(f"{where}: no vehicle, neither here nor at the top")
         if not table.channels:
             problems.append(f"{where}: no channels")
+        problems += _columns_problems(where, table.columns)
         problems += _time_problems(where, table.time)
         problems += _channel_problems(where, table.channels)
     return problems
+
+
+def _columns_problems(where: str, columns: Sequence[str | None] | None) -> list[str]:
+    if columns is None:
+        return []
+    if not any(columns):
+        return [f"{where}: columns: expected at least one name, got none"]
+    counts = Counter(name for name in columns if name is not None)
+    return [f"{where}: columns: {name!r} stands twice" for name, n in counts.items() if n > 1]
 
 
 def _time_problems(where: str, time: TimeColumn) -> list[str]:

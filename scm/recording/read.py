@@ -18,9 +18,10 @@ from scm.recording.description import (
     read_description,
 )
 from scm.recording.expression import columns_of, evaluate
-from scm.recording.table import SUFFIXES, read_table
+from scm.recording.table import read_table, refuse_data
 from scm.recording.units import UNITS, dimensions_of, factor
 
+RowsOf = tuple[str, str | None, tuple[str | None, ...] | None, str | None]
 LONGEST_FROM_ZERO_S = 1e6  # one float holds so many seconds to a nanosecond
 
 
@@ -127,9 +128,8 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
     Raises:
         RecordingError: naming file, table, column, line and reason.
     """
-    if Path(path).name.endswith(SUFFIXES):
-        msg = f"{path}: a file of data: give the recording.yaml that says what stands where in it"
-        raise RecordingError(msg)
+    if not Path(path).is_dir():
+        refuse_data(Path(path))
     found = find_description(Path(path))
     description = read_description(found)
     folder = found.parent if data is None else Path(data)
@@ -142,29 +142,27 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
         vehicle = _vehicle(description, table, found.parent)
         names[vehicle] = table.vehicle or description.vehicle or ""
         channels = by_vehicle.setdefault(vehicle, {})
-        left_out.setdefault(vehicle, {}).update(dict.fromkeys(loaded[_rows_of(table)].left_out))
         read = _channels(table, index, loaded[_rows_of(table)], found, origin_s)
         for name, channel in read.items():
             if name in channels:
                 msg = f"{found}: table {table.file}: channel {name!r} of {vehicle} is given twice"
                 raise RecordingError(msg)
             channels[name] = channel
+        left_out.setdefault(vehicle, {}).update(dict.fromkeys(loaded[_rows_of(table)].left_out))
     return [
         Recording(found, vehicle, channels, names[vehicle], left_out=tuple(left_out[vehicle]))
         for vehicle, channels in by_vehicle.items()
     ]
 
 
-def _rows_of(table: Table) -> tuple[str, str | None]:
+def _rows_of(table: Table) -> RowsOf:
     """Return what says whose rows a table has: two tables may share a file and a topic."""
-    return table.file, table.topic
+    return table.file, table.topic, table.columns, table.definitions
 
 
-def _loaded(
-    tables: Sequence[Table], folder: Path, path: Path
-) -> dict[tuple[str, str | None], Columns]:
+def _loaded(tables: Sequence[Table], folder: Path, path: Path) -> dict[RowsOf, Columns]:
     """Return the columns that the tables ask for; each file, or topic of a bag, is read once."""
-    wanted: dict[tuple[str, str | None], set[str]] = {}
+    wanted: dict[RowsOf, set[str]] = {}
     for table in tables:
         names = wanted.setdefault(_rows_of(table), set())
         sources: dict[str, TimeColumn | ChannelColumn] = {"time": table.time, **table.channels}
@@ -176,12 +174,18 @@ def _loaded(
         if table.where is not None:
             names |= columns_of(table.where, f"{path}: table {table.file}: where")
     return {
-        (file, topic): read_table(folder / file, topic, names)
-        for (file, topic), names in wanted.items()
+        rows: read_table(
+            folder / rows[0],
+            rows[1],
+            names,
+            columns=rows[2],
+            definitions=None if rows[3] is None else folder / rows[3],
+        )
+        for rows, names in wanted.items()
     }
 
 
-def _origin_s(tables: Sequence[Table], loaded: Mapping[tuple[str, str | None], Columns]) -> int:
+def _origin_s(tables: Sequence[Table], loaded: Mapping[RowsOf, Columns]) -> int:
     """Return the instant that all times of the recording are counted from, in whole seconds.
 
     It is 0 unless a table counts nanoseconds on a clock whose seconds are too many for one float

@@ -1,198 +1,195 @@
-"""Files of rows as named columns of floats: CSV, gzipped CSV and NPZ, and whose reader is asked.
+"""The door to all files of rows: which reader a file needs, and why it may not be read.
 
-A column becomes numbers when somebody asks for it: text in one that nobody names does no harm.
+Whatever a library makes of a damaged file leaves here as one line that names the file.
 """
 
-import csv
-import gzip
 import importlib
-import io
-import zipfile
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
-import numpy as np
-
-from scm.arrays import Floats
-from scm.errors import RecordingError
-from scm.recording import columns as limits
-from scm.recording.columns import Columns, refuse_large, refuse_unequal
+from scm.errors import RecordingError, reading
+from scm.recording.columns import Columns, Selection
 
 BAGS = (".bag", ".db3", ".mcap")
-READERS = {  # how a file's name ends -> the module with `read`, and what it needs installed
-    ".parquet": ("scm.recording.parquet", "pyarrow"),
-    ".mat": ("scm.recording.matlab", "scipy"),
-    **dict.fromkeys(BAGS, ("scm.recording.bag", "rosbags")),
+PACKED_BAGS = (".db3.zstd", ".mcap.zstd")
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".tum", ".log")
+Reader = Callable[[Path, Selection], Columns]
+
+
+class Kind(NamedTuple):
+    """A kind of file: what it is called, the module with its `read`, and what that needs."""
+
+    what: str
+    module: str
+    library: str = ""
+
+
+_TEXT = Kind("a text table", "scm.recording.text")
+_BAG = Kind("a ROS bag", "scm.recording.bag", "rosbags")
+_ARROW = Kind("a Feather file", "scm.recording.parquet", "pyarrow")
+_NUMPY = Kind("a NumPy file", "scm.recording.arrays")
+KINDS = {  # how a file's name ends
+    **dict.fromkeys(TEXTS, _TEXT),
+    **{f"{suffix}.gz": _TEXT for suffix in TEXTS},
+    ".npz": _NUMPY,
+    ".npy": _NUMPY,
+    ".parquet": Kind("a Parquet file", "scm.recording.parquet", "pyarrow"),
+    ".feather": _ARROW,
+    ".arrow": _ARROW,
+    ".mat": Kind("a .mat file", "scm.recording.matlab", "scipy"),
+    **dict.fromkeys((*BAGS, *PACKED_BAGS), _BAG),
 }
-SUFFIXES = (".csv", ".csv.gz", ".npz", *READERS)
+_PANDAS = "with pandas: `pd.read_{}('{}').to_parquet('drive.parquet')` or `.to_csv('drive.csv')`"
+_PICKLE = "a pickle can run any program, so it is never opened: write it as a table, " + _PANDAS
+_PACKED = "a packed file: unpack it"
+REFUSED = {  # how other files' names end -> what to do with them
+    **dict.fromkeys((".pkl", ".pickle", ".p"), _PICKLE.format("pickle", "drive.pkl")),
+    ".joblib": "a pickle can run any program, so it is never opened: write it as a table, "
+    "in Python: `pd.DataFrame(joblib.load('drive.joblib')).to_parquet('drive.parquet')`",
+    **dict.fromkeys((".xlsx", ".xls", ".ods"), "a spreadsheet: save the sheet as CSV"),
+    **dict.fromkeys(
+        (".h5", ".hdf5", ".hdf"), "HDF5: write it as a table, " + _PANDAS.format("hdf", "drive.h5")
+    ),
+    ".json": "JSON: write it as a table, " + _PANDAS.format("json", "drive.json"),
+    **dict.fromkeys(
+        (".jsonl", ".ndjson"),
+        "JSON: write it as a table, with pandas: "
+        "`pd.read_json('drive.jsonl', lines=True).to_csv('drive.csv')`",
+    ),
+    **dict.fromkeys((".zip", ".tar", ".tgz", ".7z", ".rar", ".bz2", ".xz", ".zst", ".gz"), _PACKED),
+}
+CONTENTS = {  # how other kinds of files begin, and how their names should end
+    b"PK\x03\x04": ("a zip archive or an Excel file", (".npz",)),
+    b"PAR1": ("a Parquet file", (".parquet",)),
+    b"ARROW1": ("a Feather file", (".feather", ".arrow")),
+    b"\x89HDF\r\n\x1a\n": ("an HDF5 file", (".mat",)),
+    b"SQLite format 3\0": ("a ROS 2 bag (.db3)", (".db3",)),
+    b"\x89MCAP0\r\n": ("an MCAP file", (".mcap",)),
+    b"#ROSBAG V": ("a ROS 1 bag", (".bag",)),
+    b"\x93NUMPY": ("a NumPy array (.npy)", (".npy",)),
+    b"MATLAB 5.0 MAT-file": ("a .mat file", (".mat",)),
+    **{bytes([0x80, v]): ("a Python pickle", ()) for v in range(2, 6)},
+}
 BAG_FOLDER = "metadata.yaml"
-Reader = Callable[[Path, str | None, Collection[str] | None], Columns]
 
 
 def read_table(
-    path: Path, topic: str | None = None, wanted: Collection[str] | None = None
+    path: Path,
+    topic: str | None = None,
+    wanted: Collection[str] | None = None,
+    *,
+    columns: Sequence[str | None] | None = None,
+    definitions: Path | None = None,
 ) -> Columns:
     """Return the columns of a file.
 
     Args:
         path: The file, or the folder of a ROS 2 bag.
-        topic: Whose messages are the rows, where the file is a ROS bag.
-        wanted: Names of the columns that will be asked for; None: all. Others may be left out.
+        topic: As in `Selection`, as are the others.
+        wanted: Names of the columns that are needed; None: all.
+        columns: Names of the columns by position.
+        definitions: Folder of `.msg` files.
 
     Raises:
-        RecordingError: naming the file, and for CSV the line that cannot be read.
+        RecordingError: naming the file, and for text the line that cannot be read.
     """
-    is_bag = path.suffix in BAGS or (path / BAG_FOLDER).is_file()
-    if not path.is_file() and not (is_bag and path.is_dir()):
-        msg = f"{path}: {'a folder, expected a file' if path.is_dir() else 'no such file'}"
-        raise RecordingError(msg)
-    if topic is not None and not is_bag:
-        msg = f"{path}: no ROS bag: it has no topic {topic!r}"
-        raise RecordingError(msg)
-    read = _reader(path, is_bag)
-    try:
-        return read(path, topic, wanted)
-    except RecordingError:
-        raise
-    except Exception as cause:  # whatever a library makes of a damaged file
-        kind = "" if isinstance(cause, OSError | ValueError) else f"{type(cause).__name__}: "
-        msg = f"{path}: cannot be read: {kind}{cause}"
-        raise RecordingError(msg) from cause
+    with reading(path, "a file"):
+        kind = _kind(path)
+        if topic is not None and kind is not _BAG:
+            msg = f"{path}: no ROS bag: it has no topic {topic!r}"
+            raise RecordingError(msg)
+        if columns is not None and kind is not _TEXT and not path.name.lower().endswith(".npy"):
+            msg = f"{path}: {kind.what} names its columns itself: take `columns:` out of the table"
+            raise RecordingError(msg)
+        _refuse_content(path, kind)
+        read = _reader(path, kind)
+    with reading(path, kind.what):
+        return read(path, Selection(topic, wanted, columns, definitions))
 
 
-def _reader(path: Path, is_bag: bool) -> Reader:
-    """Return what reads a file of that name.
+def refuse_data(path: Path) -> None:
+    """Refuse a file of data, or of another program's, where a description is expected.
 
     Raises:
-        RecordingError: when nothing does, or a library for it is not installed.
+        RecordingError: when the name ends as such files do, with what to give instead.
     """
-    if path.name.endswith(".npz"):
-        return _read_npz
-    if path.name.endswith((".csv", ".csv.gz")):
-        return _read_csv
-    suffix = BAGS[0] if is_bag else path.suffix
-    if suffix not in READERS:
-        got = path.suffix or "nameless"
-        msg = f"{path}: got a {got} file, expected one of {', '.join(SUFFIXES)}"
+    name = path.name.lower()
+    if name.endswith(tuple(KINDS)):
+        msg = f"{path}: a file of data: give the recording.yaml that says what stands where in it"
         raise RecordingError(msg)
-    module, library = READERS[suffix]
+    _refuse_name(path)
+
+
+def _refuse_name(path: Path) -> None:
+    for suffix, way_out in REFUSED.items():
+        if path.name.lower().endswith(suffix):
+            msg = f"{path}: {way_out}"
+            raise RecordingError(msg)
+
+
+def _kind(path: Path) -> Kind:
+    """Return which kind of file it is, by its name.
+
+    Raises:
+        RecordingError: when it is not there, or of no kind that can be read.
+    """
+    if path.is_dir():
+        if _is_bag(path):
+            return _BAG
+        msg = f"{path}: a folder, expected a file or the folder of a ROS 2 bag"
+        raise RecordingError(msg)
+    if not path.is_file():
+        msg = f"{path}: {'not a regular file' if path.exists() else 'no such file'}"
+        raise RecordingError(msg)
+    name = path.name.lower()
+    for suffix, kind in KINDS.items():
+        if name.endswith(suffix):
+            return kind
+    _refuse_name(path)
+    got = path.suffix or "nameless"
+    names = [suffix for suffix in KINDS if suffix.count(".") == 1]
+    msg = f"{path}: got a {got} file, expected one of {', '.join(names)}; text may be gzipped (.gz)"
+    raise RecordingError(msg)
+
+
+def _is_bag(folder: Path) -> bool:
+    """Say whether a folder is that of a ROS 2 bag; its metadata may be missing."""
+    return (folder / BAG_FOLDER).is_file() or any(
+        path.name.endswith((*BAGS[1:], *PACKED_BAGS)) for path in folder.iterdir()
+    )
+
+
+def _refuse_content(path: Path, kind: Kind) -> None:
+    """Refuse a file that is empty, or whose content is of another kind than its name says."""
+    if path.is_dir():
+        return
+    with path.open("rb") as stream:
+        begin = stream.read(32)
+    if not begin:
+        msg = f"{path}: empty, expected {kind.what}"
+        raise RecordingError(msg)
+    for mark, (what, suffixes) in CONTENTS.items():
+        if begin.startswith(mark) and not path.name.lower().endswith(suffixes):
+            do = f": rename it to {suffixes[0]}" if suffixes else f": {REFUSED['.pkl']}"
+            msg = f"{path}: got {what}, expected {kind.what}{do}"
+            raise RecordingError(msg)
+
+
+def _reader(path: Path, kind: Kind) -> Reader:
+    """Return what reads a kind of file.
+
+    Raises:
+        RecordingError: when a library for it is not installed.
+    """
     try:
-        reader: Reader = importlib.import_module(module).read
+        reader: Reader = importlib.import_module(kind.module).read
     except ModuleNotFoundError as cause:
-        if (cause.name or "").split(".")[0] != library:
+        if (cause.name or "").split(".")[0] != kind.library:
             raise
         msg = (
-            f"{path}: reading it needs {library}, which is not installed: "
+            f"{path}: reading it needs {kind.library}, which is not installed: "
             "pip install -e '.[formats]'"
         )
         raise RecordingError(msg) from cause
     return reader
-
-
-def _read_npz(path: Path, topic: str | None, wanted: Collection[str] | None) -> Columns:
-    """Return the one-dimensional numeric arrays of an NPZ file; others are for other readers."""
-    del topic, wanted
-    with zipfile.ZipFile(path) as members:
-        refuse_large(sum(member.file_size for member in members.infolist()), path)
-    columns: dict[str, Floats] = {}
-    with np.load(path, allow_pickle=False) as arrays:
-        for name in arrays.files:
-            array = arrays[name] if _is_plain(path, name) else np.empty((0, 0))
-            if array.ndim == 1 and array.dtype.kind in "biuf":
-                columns[name] = np.asarray(array, np.float64)
-    refuse_unequal(columns, path)
-    return Columns(path, list(columns), list(columns.values()))
-
-
-def _is_plain(path: Path, name: str) -> bool:
-    """Say whether an array holds plain values: one of Python objects would have to be unpickled."""
-    with zipfile.ZipFile(path) as members, members.open(f"{name}.npy") as stream:
-        version = np.lib.format.read_magic(stream)
-        read = np.lib.format.read_array_header_1_0
-        header = (read if version == (1, 0) else np.lib.format.read_array_header_2_0)(stream)
-    return not header[2].hasobject
-
-
-def _text(path: Path) -> str:
-    """Return the text of a plain or gzipped file, without a byte order mark."""
-    with gzip.open(path) if path.name.endswith(".gz") else path.open("rb") as stream:
-        data: bytes = stream.read(limits.LARGEST_BYTES + 1)
-    refuse_large(len(data), path)
-    return data.decode("utf-8-sig")
-
-
-def _read_csv(path: Path, topic: str | None, wanted: Collection[str] | None) -> Columns:
-    """Return the columns of a CSV file; lines that are empty or start with # are comments."""
-    del topic, wanted
-    text = _text(path)
-    csv.field_size_limit(limits.LARGEST_BYTES)
-    header, skip = _header(text, path)
-    delimiter = _delimiter(header)
-    names = [name.strip() for name in next(csv.reader([header], delimiter=delimiter))]
-    body = io.StringIO(text, newline=None)
-    for _ in range(skip):
-        body.readline()
-    start = body.tell()
-    if not body.read().strip():
-        msg = f"{path}: no rows below the header"
-        raise RecordingError(msg)
-    body.seek(start)
-    try:
-        cells = np.loadtxt(body, delimiter=delimiter, ndmin=2)
-    except ValueError:
-        cells = np.empty((0, 0))
-    if cells.shape[1] == len(names):
-        return Columns(path, names, list(np.ascontiguousarray(cells.T)))
-    body.seek(start)
-    return _read_cells(csv.reader(body, delimiter=delimiter), skip, names, path)
-
-
-def _header(text: str, path: Path) -> tuple[str, int]:
-    """Return the line that names the columns, and how many lines end with it.
-
-    It is the first that is no comment; but where that one holds numbers, the comment above it.
-    """
-    comment = None
-    for number, line in enumerate(io.StringIO(text, newline=None), start=1):
-        stripped = line.strip()
-        if stripped.startswith("#"):
-            comment = stripped.lstrip("# "), number
-        elif stripped:
-            if not _is_numbers(stripped):
-                return stripped, number
-            if comment is not None:
-                return comment
-            msg = f"{path}: line {number}: got numbers, expected the names of the columns"
-            raise RecordingError(msg)
-    msg = f"{path}: no rows below the header"
-    raise RecordingError(msg)
-
-
-def _is_numbers(line: str) -> bool:
-    try:
-        [float(cell) for cell in line.split(_delimiter(line))]
-    except ValueError:
-        return False
-    return True
-
-
-def _delimiter(line: str) -> str:
-    """Return what stands between a line's cells: a comma, or where it has none ; or a tab."""
-    return next((mark for mark in (",", ";", "\t") if mark in line), ",")
-
-
-def _read_cells(reader: Iterator[list[str]], skip: int, names: list[str], path: Path) -> Columns:
-    """Read cell by cell: slow, tolerates empty cells and text, and knows where a bad one is."""
-    rows, lines = [], []
-    for row in reader:
-        line = skip + reader.line_num  # type: ignore[attr-defined]
-        if not any(row) or row[0].lstrip().startswith("#"):
-            continue
-        if len(row) == len(names) + 1 and not row[-1].strip():
-            row.pop()
-        if len(row) != len(names):
-            msg = f"{path}: line {line}: {len(row)} values, expected {len(names)} as in the header"
-            raise RecordingError(msg)
-        rows.append(row)
-        lines.append(line)
-    return Columns(path, names, list(zip(*rows, strict=True)) or [()] * len(names), lines)

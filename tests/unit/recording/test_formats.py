@@ -2,13 +2,16 @@
 
 import datetime
 import importlib
+import io
 import struct
+import zipfile
 import zlib
 from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.feather
 import pyarrow.parquet as pq
 import pytest
 import scipy.io
@@ -78,7 +81,7 @@ def test_every_number_of_parquet_is_read(tmp_path: Path) -> None:
         "exact": pa.array([Decimal("1.25"), None, Decimal(3)], pa.decimal128(5, 2)),
         "late": pa.array([datetime.timedelta(milliseconds=1500)] * 2 + [None], pa.duration("ms")),
         "name": ["1", "", "x"],
-        "points": [[1.0], [], [2.0]],
+        "picture": [b"x", b"", None],
     }
     read = read_table(write_parquet(tmp_path, **columns))
     assert_allclose(read["whole"], [1.0, np.nan, 3.0])
@@ -86,7 +89,7 @@ def test_every_number_of_parquet_is_read(tmp_path: Path) -> None:
     assert_allclose(read["true"], [1.0, np.nan, 0.0])
     assert_allclose(read["exact"], [1.25, np.nan, 3.0])
     assert_allclose(read["late"], [1.5, 1.5, np.nan])
-    assert "points" not in list(read)
+    assert "picture" not in list(read)
     with pytest.raises(RecordingError, match="line 3, column 'name': got 'x', expected a number"):
         read["name"]
 
@@ -101,10 +104,56 @@ def test_a_column_that_parquet_has_not_is_refused(tmp_path: Path, wanted: str, s
         read[wanted]
 
 
-def test_a_column_of_lists_is_refused(tmp_path: Path) -> None:
+def test_elements_of_lists_are_columns_in_parquet_and_feather(tmp_path: Path) -> None:
+    ranges = pa.array([[1.0, 2.0], [3.0], None], pa.list_(pa.float32()))
+    fixed = pa.array([[1, 2], [3, 4], [5, 6]], pa.list_(pa.int64(), 2))
+    poses_of = pa.array([[{"x": 1.5}], [], [{"x": 2.5}, {"x": 3.5}]])
+    file = write_parquet(tmp_path, t=T_NS, ranges=ranges, fixed=fixed, poses=poses_of)
+    feather = tmp_path / "drive.feather"
+    pa.feather.write_feather(pq.read_table(file), feather)
+    for one in (file, feather):
+        wanted = ["t", "ranges[0]", "ranges[1]", "fixed[1]", "poses[0].x", "ranges[7]"]
+        read = read_table(one, None, wanted)
+        assert_allclose(read["ranges[0]"], [1.0, 3.0, np.nan])
+        assert_allclose(read["ranges[1]"], [2.0, np.nan, np.nan])
+        assert_allclose(read["fixed[1]"], [2, 4, 6])
+        assert_allclose(read["poses[0].x"], [1.5, np.nan, 2.5])
+        assert read.nanoseconds("t", "ns") is not None
+        with pytest.raises(RecordingError, match=r"no column 'ranges\[7\]'"):
+            read["ranges[7]"]
+        assert {"ranges[0]", "fixed[0]", "fixed[1]", "poses[1].x"} <= set(read_table(one))
+
+
+def test_a_whole_list_is_refused_with_what_to_write(tmp_path: Path) -> None:
     file = write_parquet(tmp_path, t=T_NS, points=[[1.0], [2.0], []])
-    with pytest.raises(RecordingError, match=r"holds list<.*, expected numbers, times or words"):
-        read_table(file, None, ["t", "points.list.element"])
+    with pytest.raises(RecordingError, match=r"holds list<.*name one element, as `points\[0\]`"):
+        read_table(file, None, ["t", "points"])
+
+
+def test_times_of_day_and_dates_are_times(tmp_path: Path) -> None:
+    day, clock = datetime.date(1970, 1, 3), datetime.time(0, 1, 0, 500_000)
+    columns = {
+        "ns": pa.array([clock, None], pa.time64("ns")),
+        "us": pa.array([clock, clock], pa.time64("us")),
+        "ms": pa.array([clock, clock], pa.time32("ms")),
+        "s": pa.array([datetime.time(0, 1), None], pa.time32("s")),
+        "date": pa.array([day, None], pa.date32()),
+        "date64": pa.array([day, day], pa.date64()),
+        "none": pa.nulls(2),
+        "half": pa.array(np.array([1.5, 2.5], np.float16)),
+    }
+    read = read_table(write_parquet(tmp_path, **columns))
+    assert_allclose(read["ns"], [60.5, np.nan])
+    assert_allclose(read["us"], 60.5)
+    assert_allclose(read["ms"], 60.5)
+    assert_allclose(read["s"], [60.0, np.nan])
+    assert_allclose(read["date"], [2 * 86400.0, np.nan])
+    assert_allclose(read["date64"], 2 * 86400.0)
+    assert_allclose(read["none"], np.nan)
+    assert_allclose(read["half"], [1.5, 2.5])
+    t_ns = read.nanoseconds("us", "s")
+    assert t_ns is not None
+    assert t_ns.tolist() == [60_500_000_000] * 2
 
 
 def test_a_large_parquet_file_is_refused_by_what_is_asked_of_it(
@@ -145,6 +194,77 @@ def test_columns_of_a_matrix_and_fields_of_many_structs_are_read(tmp_path: Path)
     assert_allclose(read["steps.v"], [1.0, 2.0])
     with pytest.raises(RecordingError, match=r"no column 'steps.who'"):
         read["steps.who"]
+
+
+@pytest.mark.parametrize("shape", [(6, 40), (40, 6)])
+def test_the_short_side_of_a_matrix_are_its_columns(tmp_path: Path, shape: tuple[int, int]) -> None:
+    values = np.arange(240.0).reshape(6, 40)
+    file = write_mat(tmp_path, m=values if shape == values.shape else values.T)
+    read = read_table(file, None, ["m[0]", "m[5]", "m[6]"])
+    assert_allclose(read["m[0]"], values[0])
+    assert_allclose(read["m[5]"], values[5])
+    with pytest.raises(RecordingError, match=r"no column 'm\[6\]'"):
+        read["m[6]"]
+
+
+@pytest.mark.parametrize("shape", [(1, 5), (5, 1)])
+def test_a_matrix_of_one_row_or_column_is_a_vector(tmp_path: Path, shape: tuple[int, int]) -> None:
+    file = write_mat(tmp_path, m=np.arange(5.0).reshape(shape))
+    read = read_table(file, None, ["m", "m[0]"])
+    assert_allclose(read["m"], np.arange(5))
+    assert_allclose(read["m[0]"], np.arange(5))
+
+
+def test_structs_of_simulink_are_read(tmp_path: Path) -> None:
+    signals = np.zeros(2, [("values", object), ("label", object)])
+    signals[0] = (np.arange(4.0), "x")
+    signals[1] = (np.arange(8.0).reshape(4, 2), "yz")
+    one = {"time": np.arange(4.0), "signals": {"values": np.arange(4.0), "label": "x"}}
+    file = write_mat(tmp_path, one=one, two={"time": np.arange(4.0), "signals": signals})
+    wanted = ["one.time", "one.signals.values", "two.signals[0].values", "two.signals[1].values[1]"]
+    read = read_table(file, None, wanted)
+    assert_allclose(read["one.time"], np.arange(4))
+    assert_allclose(read["one.signals.values"], np.arange(4))
+    assert_allclose(read["two.signals[0].values"], np.arange(4))
+    assert_allclose(read["two.signals[1].values[1]"], [1, 3, 5, 7])
+
+
+def test_an_npy_file_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "drive.npy"
+    np.save(file, np.array([(0.0, 1), (1.0, 2)], [("t", "f8"), ("x", "i4")]))
+    assert_allclose(read_table(file)["x"], [1, 2])
+    np.save(file, np.arange(12.0).reshape(4, 3))
+    assert_allclose(read_table(file)["[2]"], [2, 5, 8, 11])
+    assert_allclose(read_table(file, columns=("t", None, "x"))["x"], [2, 5, 8, 11])
+    with pytest.raises(RecordingError, match=r"shape \(4, 3\), but names for 2 columns"):
+        read_table(file, columns=("t", "x"))
+    np.save(file, np.array([{}, 1], object))
+    with pytest.raises(RecordingError, match="a pickle, which is never opened"):
+        read_table(file)
+
+
+def test_matrices_structs_and_times_of_an_npz_file_are_columns(tmp_path: Path) -> None:
+    log = np.array([(0.5, 1), (1.5, 2)], [("t", "f8"), ("x", "i4")])
+    stamps = np.array(["2025-11-25T10:00:00.25", "2025-11-25T10:00:01"], "datetime64[ns]")
+    np.savez(tmp_path / "drive.npz", log=log, m=np.array([[1.0, 2.0], [3.0, 4.0]]), at=stamps)
+    read = read_table(tmp_path / "drive.npz", None, ["log.t", "m[1]", "at"])
+    assert_allclose(read["log.t"], [0.5, 1.5])
+    assert_allclose(read["m[1]"], [2, 4])
+    t_ns = read.nanoseconds("at", "s")
+    assert t_ns is not None
+    assert t_ns[0] == 1_764_064_800_250_000_000
+
+
+@pytest.mark.parametrize("name", ["drive.npy", "drive.npz"])
+def test_an_array_that_declares_a_huge_size_is_refused(tmp_path: Path, name: str) -> None:
+    head = io.BytesIO()
+    shape = {"shape": (10**12,), "fortran_order": False, "descr": "<f8"}
+    np.lib.format.write_array_header_1_0(head, shape)
+    (tmp_path / "drive.npy").write_bytes(head.getvalue() + bytes(80))
+    with zipfile.ZipFile(tmp_path / "drive.npz", "w") as packed:
+        packed.writestr("t.npy", head.getvalue() + bytes(80))
+    with pytest.raises(RecordingError, match="more than 1024 MiB"):
+        read_table(tmp_path / name)
 
 
 def test_mat_columns_of_different_lengths_are_refused_where_they_are_asked_for(
@@ -206,7 +326,7 @@ def test_a_library_that_is_not_there_is_named_with_the_command_that_brings_it(
     def without(module: str) -> None:
         raise ModuleNotFoundError(name=f"{library}.part")
 
-    (tmp_path / name).touch()
+    (tmp_path / name).write_bytes(b"x")
     monkeypatch.setattr(importlib, "import_module", without)
     with pytest.raises(RecordingError, match=rf"needs {library}.*pip install -e '\.\[formats\]'"):
         read_table(tmp_path / name)

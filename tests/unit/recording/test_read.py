@@ -106,7 +106,7 @@ def test_data_may_lie_elsewhere(tmp_path: Path) -> None:
     ("tables", "csv", "said"),
     [
         (POSE_TABLE, POSE_CSV.replace("200", "two"), "line 3, column 'x': got 'two'"),
-        (POSE_TABLE, POSE_CSV.replace("50,200", "50"), "line 3: 4 values, expected 5"),
+        (POSE_TABLE, POSE_CSV.replace(",1\n", ",1,1\n"), "line 2: 6 cells, as 2 of 3 lines have"),
         (
             POSE_TABLE.replace("unit: mm", "unit: deg"),
             POSE_CSV,
