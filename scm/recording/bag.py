@@ -5,21 +5,28 @@ seconds; `received_s` is when a message was recorded, `stamp_s` the time in its 
 """
 
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_typestore
 
 from scm.arrays import Floats, Ints
 from scm.errors import RecordingError, nearest
-from scm.recording.columns import NS_PER_S, Columns, Selection, refuse_large
+from scm.recording.bag_file import BagFile, Raw, open_bag
+from scm.recording.bag_types import Deserialize, deserializer
+from scm.recording.columns import (
+    MAX_BAD_CELLS,
+    NS_PER_S,
+    Columns,
+    LeftOut,
+    Selection,
+    refuse_large,
+)
 
 RECEIVED, STAMP, STAMP_FIELD = "received_s", "stamp_s", "header.stamp"
-OTHER_PROFILE = "Profile is not ros2"
 ELEMENTS_NAMED = 9
 _FIELD = re.compile(r"[A-Za-z]\w*(\[\d+\])*(\.[A-Za-z]\w*(\[\d+\])*)*")
 _PART = re.compile(r"\w+")
@@ -33,24 +40,19 @@ def read(path: Path, selection: Selection) -> Columns:
     """Return the wanted fields of one topic's messages.
 
     Raises:
-        RecordingError: when there is no such topic, or its messages are none, or too many.
+        RecordingError: when there is no such topic, or its messages are none, or too many, or of
+            a type that nobody defines.
     """
-    try:
-        reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-        with reader:
-            return _topic(reader, _chosen(reader, selection.topic, path), path, selection.wanted)
-    except RecordingError:
-        raise
-    except Exception as cause:
-        if OTHER_PROFILE not in str(cause):
-            raise
-        msg = f"{path}: no ROS 2 recording; a run of this city is read as it is: scm replay {path}"
-        raise RecordingError(msg) from cause
+    with ExitStack() as stack:
+        bag = open_bag(path, stack)
+        topic = _chosen(bag, selection.topic, path)
+        raws = _messages(bag, topic, path)
+        return _Topic(path, topic, selection, bag.left_out).columns(raws)
 
 
-def _chosen(reader: AnyReader, topic: str | None, path: Path) -> str:
+def _chosen(bag: BagFile, topic: str | None, path: Path) -> str:
     """Return the topic, if the bag has it."""
-    known = sorted({connection.topic for connection in reader.connections})
+    known = sorted({one.name for one in bag.topics})
     if topic is None:
         msg = f"{path}: a ROS bag: its table needs a topic, one of {', '.join(known)}"
         raise RecordingError(msg)
@@ -61,31 +63,79 @@ def _chosen(reader: AnyReader, topic: str | None, path: Path) -> str:
     return topic
 
 
-def _topic(reader: AnyReader, topic: str, path: Path, wanted: Collection[str] | None) -> Columns:
-    """Return the columns of one topic."""
-    connections = [one for one in reader.connections if one.topic == topic]
-    received: list[int] = []
-    known: list[str] = []
-    picked: dict[str, list[Any]] = {}
+def _messages(bag: BagFile, topic: str, path: Path) -> list[Raw]:
+    """Return the messages of a topic in the order in which they were recorded."""
+    raws: list[Raw] = []
     size = 0
-    for connection, t_ns, raw in reader.messages(connections=connections):
-        size += len(raw)
+    for raw in bag.messages(topic):
+        size += len(raw[2])
         refuse_large(size, path, f"topic {topic!r} ")
-        message = reader.deserialize(raw, connection.msgtype)
-        if not received:
-            known = [RECEIVED, *_names(message)]
-            picked = {name: [] for name in (known if wanted is None else wanted)}
-        received.append(t_ns)
-        for name, values in picked.items():
-            values.append(_pick(message, name))
-    if not received:
+        raws.append(raw)
+    if not raws:
         msg = f"{path}: topic {topic!r} holds no messages"
         raise RecordingError(msg)
-    return _as_columns(path, topic, received, picked, known)
+    return sorted(raws, key=lambda raw: raw[1])
+
+
+class _Topic:
+    """The messages of a topic on their way to being columns."""
+
+    def __init__(
+        self, path: Path, topic: str, selection: Selection, left_out: Sequence[LeftOut]
+    ) -> None:
+        self._path, self._name, self._selection = path, topic, selection
+        self._left_out = list(left_out)
+        self._deserialize: dict[str, Deserialize] = {}
+
+    def columns(self, raws: Sequence[Raw]) -> Columns:
+        """Return the columns of messages; the few that cannot be read are left out."""
+        received: list[int] = []
+        lines: list[int] = []
+        known: list[str] = []
+        picked: dict[str, list[Any]] = {}
+        bad: list[LeftOut] = []
+        for number, raw in enumerate(raws, start=1):
+            try:
+                message = self._message(raw)
+            except RecordingError:
+                raise
+            except Exception as cause:
+                why = f"{self._name}: no {raw[0].kind}: {' '.join(str(cause).split())}"
+                bad.append(LeftOut(self._path.name, number, why))
+                if len(bad) > MAX_BAD_CELLS * len(raws):
+                    msg = (
+                        f"{self._path}: message {bad[0].line} of {bad[0].why}; is its definition "
+                        "of another version? `definitions:` gives the right one"
+                    )
+                    raise RecordingError(msg) from cause
+                continue
+            if not received:
+                wanted = self._selection.wanted
+                known = [RECEIVED, *_names(message)]
+                picked = {name: [] for name in (known if wanted is None else wanted)}
+            received.append(raw[1])
+            lines.append(number)
+            for name, values in picked.items():
+                values.append(_pick(message, name))
+        self._left_out += bad
+        return _as_columns(self._path, self._name, received, picked, known, lines, self._left_out)
+
+    def _message(self, raw: Raw) -> Any:
+        topic, _, data = raw
+        if topic.kind not in self._deserialize:
+            definitions = self._selection.definitions
+            self._deserialize[topic.kind] = deserializer(topic, definitions, self._path)
+        return self._deserialize[topic.kind](data)
 
 
 def _as_columns(
-    path: Path, topic: str, received: list[int], picked: dict[str, list[Any]], known: list[str]
+    path: Path,
+    topic: str,
+    received: list[int],
+    picked: dict[str, list[Any]],
+    known: list[str],
+    lines: Sequence[int],
+    left_out: Sequence[LeftOut],
 ) -> Columns:
     """Return what was picked of each message as columns; what no message has is left out."""
     picked = {**picked, RECEIVED: [_Instant(t) for t in received]}
@@ -106,8 +156,8 @@ def _as_columns(
         cells[name] = numbers / per_value
         if len(there) == len(values) and all(_is_whole(value) for value in there):
             ticks[name] = np.array(there, np.int64), per_value
-    lines = range(1, len(received) + 1)
-    return Columns(path, list(cells), list(cells.values()), lines, known=known, ticks=ticks)
+    values = list(cells.values())
+    return Columns(path, list(cells), values, lines, known=known, ticks=ticks, left_out=left_out)
 
 
 def _is_whole(value: Any) -> bool:

@@ -11,8 +11,9 @@ from typing import NamedTuple
 from scm.errors import RecordingError, reading
 from scm.recording.columns import Columns, Selection
 
-BAGS = (".bag", ".db3", ".mcap")
-PACKED_BAGS = (".db3.zstd", ".mcap.zstd")
+ROS2_BAGS = (".db3", ".mcap")
+BAGS = (".bag", *ROS2_BAGS)
+MORE_BAGS = (".db3.zstd", ".mcap.zstd", ".bag.active")  # packed, or as ROS 1 writes it
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".tum", ".log")
 Reader = Callable[[Path, Selection], Columns]
 
@@ -38,7 +39,7 @@ KINDS = {  # how a file's name ends
     ".feather": _ARROW,
     ".arrow": _ARROW,
     ".mat": Kind("a .mat file", "scm.recording.matlab", "scipy"),
-    **dict.fromkeys((*BAGS, *PACKED_BAGS), _BAG),
+    **dict.fromkeys((*BAGS, *MORE_BAGS), _BAG),
 }
 _PANDAS = "with pandas: `pd.read_{}('{}').to_parquet('drive.parquet')` or `.to_csv('drive.csv')`"
 _PICKLE = "a pickle can run any program, so it is never opened: write it as a table, " + _PANDAS
@@ -66,7 +67,7 @@ CONTENTS = {  # how other kinds of files begin, and how their names should end
     b"\x89HDF\r\n\x1a\n": ("an HDF5 file", (".mat",)),
     b"SQLite format 3\0": ("a ROS 2 bag (.db3)", (".db3",)),
     b"\x89MCAP0\r\n": ("an MCAP file", (".mcap",)),
-    b"#ROSBAG V": ("a ROS 1 bag", (".bag",)),
+    b"#ROSBAG V": ("a ROS 1 bag", (".bag", ".bag.active")),
     b"\x93NUMPY": ("a NumPy array (.npy)", (".npy",)),
     b"MATLAB 5.0 MAT-file": ("a .mat file", (".mat",)),
     **{bytes([0x80, v]): ("a Python pickle", ()) for v in range(2, 6)},
@@ -156,7 +157,7 @@ def _kind(path: Path) -> Kind:
 def _is_bag(folder: Path) -> bool:
     """Say whether a folder is that of a ROS 2 bag; its metadata may be missing."""
     return (folder / BAG_FOLDER).is_file() or any(
-        path.name.endswith((*BAGS[1:], *PACKED_BAGS)) for path in folder.iterdir()
+        path.name.removesuffix(".zstd").endswith(ROS2_BAGS) for path in folder.iterdir()
     )
 
 
