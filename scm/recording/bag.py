@@ -43,11 +43,32 @@ def read(path: Path, selection: Selection) -> Columns:
         RecordingError: when there is no such topic, or its messages are none, or too many, or of
             a type that nobody defines.
     """
-    with ExitStack() as stack:
-        bag = open_bag(path, stack)
-        topic = _chosen(bag, selection.topic, path)
-        raws = _messages(bag, topic, path)
-        return _Topic(path, topic, selection, bag.left_out).columns(raws)
+    topic = _Topic(path, selection)
+    received: list[int] = []
+    lines: list[int] = []
+    known: list[str] = []
+    picked: dict[str, list[Any]] = {}
+    for number, raw, message in topic.messages():
+        if not received:
+            known = [RECEIVED, *_names(message)]
+            picked = {
+                name: [] for name in (known if selection.wanted is None else selection.wanted)
+            }
+        received.append(raw[1])
+        lines.append(number)
+        for name, values in picked.items():
+            values.append(_pick(message, name))
+    return _as_columns(topic, received, picked, known, lines)
+
+
+def messages(path: Path, selection: Selection) -> Iterator[tuple[str, int, Any]]:
+    """Yield the type, the time of arrival [ns] and the content of each row's message.
+
+    Raises:
+        RecordingError: as `read` does.
+    """
+    for _, (topic, t_ns, _), message in _Topic(path, selection).messages():
+        yield topic.kind, t_ns, message
 
 
 def _chosen(bag: BagFile, topic: str | None, path: Path) -> str:
@@ -63,81 +84,64 @@ def _chosen(bag: BagFile, topic: str | None, path: Path) -> str:
     return topic
 
 
-def _messages(bag: BagFile, topic: str, path: Path) -> list[Raw]:
-    """Return the messages of a topic in the order in which they were recorded."""
-    raws: list[Raw] = []
-    size = 0
-    for raw in bag.messages(topic):
-        size += len(raw[2])
-        refuse_large(size, path, f"topic {topic!r} ")
-        raws.append(raw)
-    if not raws:
-        msg = f"{path}: topic {topic!r} holds no messages"
-        raise RecordingError(msg)
-    return sorted(raws, key=lambda raw: raw[1])
-
-
 class _Topic:
-    """The messages of a topic on their way to being columns."""
+    """The messages of one topic, in the order in which they were recorded."""
 
-    def __init__(
-        self, path: Path, topic: str, selection: Selection, left_out: Sequence[LeftOut]
-    ) -> None:
-        self._path, self._name, self._selection = path, topic, selection
-        self._left_out = list(left_out)
+    def __init__(self, path: Path, selection: Selection) -> None:
+        self.path, self._definitions = path, selection.definitions
         self._deserialize: dict[str, Deserialize] = {}
+        self._raws: list[Raw] = []
+        with ExitStack() as stack:
+            bag = open_bag(path, stack)
+            self.name = _chosen(bag, selection.topic, path)
+            size = 0
+            for raw in bag.messages(self.name):
+                size += len(raw[2])
+                refuse_large(size, path, f"topic {self.name!r} ")
+                self._raws.append(raw)
+            self.left_out = bag.left_out
+        if not self._raws:
+            msg = f"{path}: topic {self.name!r} holds no messages"
+            raise RecordingError(msg)
+        self._raws.sort(key=lambda raw: raw[1])
 
-    def columns(self, raws: Sequence[Raw]) -> Columns:
-        """Return the columns of messages; the few that cannot be read are left out."""
-        received: list[int] = []
-        lines: list[int] = []
-        known: list[str] = []
-        picked: dict[str, list[Any]] = {}
+    def messages(self) -> Iterator[tuple[int, Raw, Any]]:
+        """Yield messages with their numbers from 1; the few that cannot be read are left out."""
         bad: list[LeftOut] = []
-        for number, raw in enumerate(raws, start=1):
+        for number, raw in enumerate(self._raws, start=1):
             try:
                 message = self._message(raw)
             except RecordingError:
                 raise
             except Exception as cause:
-                why = f"{self._name}: no {raw[0].kind}: {' '.join(str(cause).split())}"
-                bad.append(LeftOut(self._path.name, number, why))
-                if len(bad) > MAX_BAD_CELLS * len(raws):
+                why = f"{self.name}: no {raw[0].kind}: {' '.join(str(cause).split())}"
+                bad.append(LeftOut(self.path.name, number, why))
+                if len(bad) > MAX_BAD_CELLS * len(self._raws):
                     msg = (
-                        f"{self._path}: message {bad[0].line} of {bad[0].why}; is its definition "
+                        f"{self.path}: message {bad[0].line} of {bad[0].why}; is its definition "
                         "of another version? `definitions:` gives the right one"
                     )
                     raise RecordingError(msg) from cause
                 continue
-            if not received:
-                wanted = self._selection.wanted
-                known = [RECEIVED, *_names(message)]
-                picked = {name: [] for name in (known if wanted is None else wanted)}
-            received.append(raw[1])
-            lines.append(number)
-            for name, values in picked.items():
-                values.append(_pick(message, name))
-        self._left_out += bad
-        return _as_columns(self._path, self._name, received, picked, known, lines, self._left_out)
+            yield number, raw, message
+        self.left_out += bad
 
     def _message(self, raw: Raw) -> Any:
         topic, _, data = raw
         if topic.kind not in self._deserialize:
-            definitions = self._selection.definitions
-            self._deserialize[topic.kind] = deserializer(topic, definitions, self._path)
+            self._deserialize[topic.kind] = deserializer(topic, self._definitions, self.path)
         return self._deserialize[topic.kind](data)
 
 
 def _as_columns(
-    path: Path,
-    topic: str,
+    topic: _Topic,
     received: list[int],
     picked: dict[str, list[Any]],
     known: list[str],
     lines: Sequence[int],
-    left_out: Sequence[LeftOut],
 ) -> Columns:
     """Return what was picked of each message as columns; what no message has is left out."""
+    path = topic.path
     picked = {**picked, RECEIVED: [_Instant(t) for t in received]}
     cells: dict[str, Sequence[str] | Floats] = {}
     ticks: dict[str, tuple[Ints, int]] = {}
@@ -146,7 +150,7 @@ def _as_columns(
         if not there:
             continue
         if name == STAMP and not any(there):
-            msg = f"{path}: topic {topic!r}: {STAMP} is 0 in every message: use {RECEIVED}"
+            msg = f"{path}: topic {topic.name!r}: {STAMP} is 0 in every message: use {RECEIVED}"
             raise RecordingError(msg)
         if isinstance(there[0], str):
             cells[name] = [value or "" for value in values]
@@ -156,8 +160,10 @@ def _as_columns(
         cells[name] = numbers / per_value
         if len(there) == len(values) and all(_is_whole(value) for value in there):
             ticks[name] = np.array(there, np.int64), per_value
-    values = list(cells.values())
-    return Columns(path, list(cells), values, lines, known=known, ticks=ticks, left_out=left_out)
+    names, left_out = list(cells), topic.left_out
+    return Columns(
+        path, names, list(cells.values()), lines, known=known, ticks=ticks, left_out=left_out
+    )
 
 
 def _is_whole(value: Any) -> bool:

@@ -1,6 +1,7 @@
 """Types of ROS messages: from the bag, from `.msg` files, or those that are known here."""
 
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -79,21 +80,30 @@ def deserializer(topic: Topic, definitions: Path | None, path: Path) -> Deserial
 
 
 def _store(topic: Topic, definitions: Path | None, path: Path) -> Typestore:
+    if topic.language:
+        return _defined(topic.kind, topic.language, topic.definition)
+    known: Types = dict(get_typestore(Stores.ROS2_HUMBLE).fielddefs)
+    for kind, text in KNOWN.items():
+        known.update(get_types_from_msg(text, kind))
+    if definitions is not None:
+        known.update(_types_of_folder(definitions, topic.kind))
+    return _registered(_needed(topic, known, path))
+
+
+@lru_cache(maxsize=64)
+def _defined(kind: str, language: str, definition: str) -> Typestore:
+    """Return the types of a definition; to parse one takes as long as to read a thousand messages."""
+    if language == "msg":
+        return _registered(get_types_from_msg(definition, kind))
+    types: Types = {}
+    for part in _idl_parts(definition):
+        types.update(get_types_from_idl(part))
+    return _registered(types)
+
+
+def _registered(types: Types) -> Typestore:
     store = get_typestore(Stores.EMPTY)
-    if topic.language == "msg":
-        store.register(get_types_from_msg(topic.definition, topic.kind))
-    elif topic.language == "idl":
-        types: Types = {}
-        for part in _idl_parts(topic.definition):
-            types.update(get_types_from_idl(part))
-        store.register(types)
-    else:
-        known: Types = dict(get_typestore(Stores.ROS2_HUMBLE).fielddefs)
-        for kind, text in KNOWN.items():
-            known.update(get_types_from_msg(text, kind))
-        if definitions is not None:
-            known.update(_types_of_folder(definitions, topic.kind))
-        store.register(_needed(topic, known, path))
+    store.register(types)
     return store
 
 
