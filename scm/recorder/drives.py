@@ -11,7 +11,8 @@ from pathlib import Path
 
 from scm.errors import MessageError, RecordingError, nearest
 from scm.recorder.driven import SIMULATED, Heard, Report, recording_of, tells_commands
-from scm.recorder.mcap_file import read_begin_ns, read_keys, read_run
+from scm.recorder.mcap_file import has_end, read_begin_ns, read_keys, read_run
+from scm.recording.columns import LeftOut
 from scm.recording.read import Recording, read_recordings
 from scm.v2x.message import Message, decode
 from scm.v2x.messages.city_event import CityEvent
@@ -96,7 +97,7 @@ def read_drives(
     Raises:
         RecordingError: when the file is no complete run, or holds no car that can be driven again.
     """
-    keys = read_keys(path)
+    keys = read_keys(path, whole=False)
     if keys and not any(_OURS.match(key) for key in keys):
         msg = f"{path}: no run of a city: it holds {', '.join(keys[:5])}; a ROS 2 bag is read as a "
         msg += "table of a recording.yaml"
@@ -115,10 +116,12 @@ def read_drives(
             "nothing can be driven again; record anew, or drive a car by `scm play` or a script"
         )
         raise RecordingError(msg)
-    found, failures = [], list[str]()
+    found, failures, unfinished = [], list[str](), _unfinished(path)
     for name, one in able.items():
         try:
-            found.append(replace(recording_of(one, path, name, start_ns), begin_s=0.0))
+            recording = recording_of(one, path, name, start_ns)
+            left_out = (*recording.left_out, *unfinished)
+            found.append(replace(recording, begin_s=0.0, left_out=left_out))
         except RecordingError as error:
             failures.append(str(error))
     if not found:
@@ -131,6 +134,14 @@ def read_drives(
     for failure in failures:
         warn(failure)
     return found
+
+
+def _unfinished(path: Path) -> list[LeftOut]:
+    """Return what is to be said of a run whose file has no end."""
+    if has_end(path):
+        return []
+    why = "has no end: it is still being written, or its recorder was killed; read as far as it is "
+    return [LeftOut(path.name, None, f"{why}whole")]
 
 
 def _of(key: str) -> tuple[str, type[Message] | None]:
@@ -156,7 +167,7 @@ def _heard(path: Path, keys: Iterable[str], chosen: Sequence[str]) -> tuple[dict
     of_all = {CityEvent, WorldSnapshot} if silent else {CityEvent}
     wanted = {key for key, (name, kind) in of.items() if name in chosen or kind in of_all}
     heard = {name: Heard() for name in chosen}
-    for message in read_run(path, wanted):
+    for message in read_run(path, wanted, whole=False):
         name, kind = of[message.key]
         if kind is None:
             continue
@@ -173,7 +184,7 @@ def _heard(path: Path, keys: Iterable[str], chosen: Sequence[str]) -> tuple[dict
                 heard[one].take(told)
             case _ if name in heard:
                 heard[name].take(told)
-    return heard, read_begin_ns(path) or 0
+    return heard, read_begin_ns(path, whole=False) or 0
 
 
 def _reports(snapshot: WorldSnapshot) -> Iterator[tuple[str, Report]]:

@@ -5,27 +5,33 @@ too, its payload in base64, so that any MCAP tool can read the whole file; so do
 JSON though they should be.
 """
 
+import os
 import struct
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple, cast
 
 import msgspec
 import zstandard
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
+from mcap.records import Channel
+from mcap.records import Message as McapMessage
+from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from scm import __version__
-from scm.errors import RecordingError
+from scm.errors import MAX_REASON, RecordingError
 from scm.registry import load, names
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import matches, prefix, variables
 from scm.v2x.message import Message, Request
 
 MESSAGES = "scm.v2x.messages"
+MAGIC = b"\x89MCAP0\r\n"
+MOST_UNPACKED = 256 * 2**20  # of one chunk: a file that claims more is damaged or hostile
 UNREADABLE = (  # what a torn or damaged file makes its readers raise
     McapError, EOFError, ValueError, LookupError, MemoryError, OverflowError, struct.error,
     zstandard.ZstdError,
@@ -172,34 +178,105 @@ class Recorded(NamedTuple):
     body: bytes
 
 
-def read_run(path: Path, keys: Collection[str] | None = None) -> Iterator[Recorded]:
-    """Yield the messages of a complete run in the order of their times; of some keys or of all.
+class Begin:
+    """The first bytes of a file, however it grows: who read to its end could read for ever."""
+
+    def __init__(self, stream: IO[bytes], size: int) -> None:
+        self._stream, self._left = stream, size
+
+    def read(self, length: int) -> bytes:
+        """Return so many bytes, or what is left."""
+        data = self._stream.read(min(length, self._left))
+        self._left -= len(data)
+        return data
+
+
+def has_end(path: Path) -> bool:
+    """Say whether a run's recorder ended the file; else it still writes it, or was killed.
+
+    Raises:
+        RecordingError: when it is no MCAP file, or cannot be read.
+    """
+    with _reading(path), path.open("rb") as stream:
+        begin = stream.read(len(MAGIC))
+        if begin != MAGIC:
+            msg = f"{path}: no run of a city: an MCAP file begins otherwise"
+            raise RecordingError(msg)
+    return _ends(path)
+
+
+def _ends(path: Path) -> bool:
+    with path.open("rb") as stream:
+        stream.seek(max(len(MAGIC), stream.seek(0, 2) - len(MAGIC)))
+        return stream.read() == MAGIC
+
+
+def read_run(
+    path: Path, keys: Collection[str] | None = None, *, whole: bool = True
+) -> Iterator[Recorded]:
+    """Yield the messages of a run in the order of their times; of some keys or of all.
+
+    Args:
+        path: The `.mcap`.
+        keys: Whose messages; None: all.
+        whole: Refuse a file without its end; else read it as far as it is whole.
 
     Raises:
         RecordingError: when the file is not a complete MCAP file.
     """
+    if not whole and not has_end(path):
+        yield from _begun(path, keys)
+        return
     with _reading(path), path.open("rb") as stream:
         for _, channel, message in make_reader(stream).iter_messages(topics=keys):
             yield Recorded(message.log_time, channel.topic, message.data)
 
 
-def read_keys(path: Path) -> list[str]:
-    """Return the keys on which something was heard in a complete run, sorted.
+def _begun(path: Path, keys: Collection[str] | None) -> Iterator[Recorded]:
+    """Yield the messages of a file without its end, as far as it is whole."""
+    topics: dict[int, str] = {}
+    with _reading(path), path.open("rb") as stream:
+        begin = Begin(stream, os.fstat(stream.fileno()).st_size)
+        reader = StreamReader(cast("IO[bytes]", begin), record_size_limit=MOST_UNPACKED)
+        with suppress(*UNREADABLE):
+            for record in reader.records:
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                elif isinstance(record, McapMessage):
+                    key = topics[record.channel_id]
+                    if keys is None or key in keys:
+                        yield Recorded(record.log_time, key, record.data)
+
+
+def read_keys(path: Path, *, whole: bool = True) -> list[str]:
+    """Return the keys on which something was heard in a run, sorted.
+
+    Args:
+        path: The `.mcap`.
+        whole: As for `read_run`.
 
     Raises:
         RecordingError: when the file is not a complete MCAP file.
     """
+    if not whole and not has_end(path):
+        return sorted({one.key for one in _begun(path, None)})
     with _reading(path), path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
         return sorted({channel.topic for channel in summary.channels.values()}) if summary else []
 
 
-def read_begin_ns(path: Path) -> int | None:
-    """Return when the first message of a complete run was heard; None: it holds none.
+def read_begin_ns(path: Path, *, whole: bool = True) -> int | None:
+    """Return when the first message of a run was heard; None: it holds none.
+
+    Args:
+        path: The `.mcap`.
+        whole: As for `read_run`.
 
     Raises:
         RecordingError: when the file is not a complete MCAP file.
     """
+    if not whole and not has_end(path):
+        return next((one.t_ns for one in _begun(path, None)), None)
     with _reading(path), path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
         chunks = summary.chunk_indexes if summary else []
@@ -214,6 +291,11 @@ def _reading(path: Path) -> Iterator[None]:
         msg = f"{path}: cannot be read: {cause.strerror or cause}"
         raise RecordingError(msg) from cause
     except UNREADABLE as cause:
-        why = str(cause) or "it ends too soon"
+        if isinstance(cause, RecordingError):
+            raise
+        if not _ends(path):
+            why = "it has no end: it is still being written, or its recorder was killed"
+        else:
+            why = " ".join(str(cause).split())[:MAX_REASON] or "it ends too soon"
         msg = f"{path}: not a complete recording ({why}): try `scm recover {path}`"
         raise RecordingError(msg) from cause

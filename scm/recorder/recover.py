@@ -10,7 +10,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from scm.errors import RecordingError
-from scm.recorder.mcap_file import UNREADABLE
+from scm.recorder.mcap_file import UNREADABLE, Begin
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,23 +69,10 @@ def recover(broken: Path, mended: Path | None = None) -> Recovered:
     return Recovered(target, copy.messages, (copy.last_ns - copy.first_ns) * 1e-9, whole, grew)
 
 
-class _Begin:
-    """The first bytes of a file, however it grows: who read to its end could read for ever."""
-
-    def __init__(self, stream: IO[bytes], size: int) -> None:
-        self._stream, self._left = stream, size
-
-    def read(self, length: int) -> bytes:
-        """Return so many bytes, or what is left."""
-        data = self._stream.read(min(length, self._left))
-        self._left -= len(data)
-        return data
-
-
 def _copy_all(stream: IO[bytes], size: int, copy: "_Copy") -> bool:
     """Copy until `size` or where it stops making sense; return whether it has its end record."""
     try:
-        for record in StreamReader(cast("IO[bytes]", _Begin(stream, size))).records:
+        for record in StreamReader(cast("IO[bytes]", Begin(stream, size))).records:
             copy.add(record)
     except UNREADABLE:
         return False

@@ -15,11 +15,9 @@ from mcap.reader import make_reader
 from mcap.records import ChunkIndex
 
 from scm.errors import RecordingError
-from scm.recorder.mcap_file import UNREADABLE, Recorded
+from scm.recorder.mcap_file import MAGIC, MOST_UNPACKED, UNREADABLE, Recorded
 
-MAGIC = b"\x89MCAP0\r\n"
 CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, DATA_END = 0x04, 0x05, 0x06, 0x07, 0x0F
-MOST_UNPACKED = 256 * 2**20  # of one chunk: a file that claims more is damaged or hostile
 _RECORD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")
 _MESSAGE = struct.Struct("<BQHIQQ")  # behind its record's head

@@ -92,7 +92,7 @@ def _store(topic: Topic, definitions: Path | None, path: Path) -> Typestore:
 
 @lru_cache(maxsize=64)
 def _defined(kind: str, language: str, definition: str) -> Typestore:
-    """Return the types of a definition; to parse one takes as long as to read a thousand messages."""
+    """Return the types of a definition; parsing one takes as long as reading 1 000 messages."""
     if language == "msg":
         return _registered(get_types_from_msg(definition, kind))
     types: Types = {}

@@ -17,7 +17,7 @@ from scm.maps.load import load_map
 from scm.mismatch.diagnose import diagnose
 from scm.play import play, write_recording
 from scm.recorder.drives import read_drives, recordings_of
-from scm.recorder.mcap_file import RunFile
+from scm.recorder.mcap_file import RunFile, read_run
 from scm.recorder.part import RecorderPart
 from scm.replay.free_run import free_run
 from scm.traffic.part import TrafficPart
@@ -446,8 +446,8 @@ def test_what_strangers_say_on_the_bus_is_passed_over(tmp_path: Path) -> None:
 
 def test_a_file_that_is_no_whole_run_is_refused(tmp_path: Path, run: Path) -> None:
     torn = tmp_path / "torn.mcap"
-    torn.write_bytes(run.read_bytes()[:-100])
-    with pytest.raises(RecordingError, match="try `scm recover"):
+    torn.write_bytes(run.read_bytes()[100:])
+    with pytest.raises(RecordingError, match="no run of a city"):
         read_drives(torn)
     with (tmp_path / "ros.mcap").open("wb") as stream:
         writer = Writer(stream)
@@ -469,3 +469,27 @@ def test_a_described_recording_is_read_as_ever_and_may_be_of_several_cars(tmp_pa
     assert [one.vehicle for one in recordings_of(tmp_path, None, "f1tenth")] == ["f1tenth"]
     with pytest.raises(RecordingError, match=r"no car 'nigl' \(did you mean 'nigel'\?\)"):
         recordings_of(tmp_path, None, "nigl")
+
+
+@pytest.mark.parametrize("cut", ["no end", "within a chunk", "still growing"])
+def test_a_run_without_its_end_is_read_as_far_as_it_is_whole(tmp_path: Path, cut: str) -> None:
+    path = tmp_path / "live.mcap"
+    with RunFile(path, "city") as file:
+        for k in range(400):
+            at = reported(20 * k, seq=k, x_m=k / 100, throttle=0.5, steering=0.1)
+            file.write(RawSample(key_of("city", at), *encode(at), t_ns=at.t_ns))
+            if k % 25 == 24:
+                file.flush()
+        content = path.read_bytes()
+        if cut == "still growing":
+            expect_live(path, 7.0)
+    path.write_bytes(content[: len(content) // 2 if cut == "within a chunk" else None])
+    expect_live(path, 3.0 if cut == "within a chunk" else 7.0)
+    with pytest.raises(RecordingError, match=r"it has no end: .*scm recover"):
+        list(read_run(path))
+
+
+def expect_live(path: Path, longest_s: float) -> None:
+    (recording,) = read_drives(path)
+    assert longest_s < recording.channel("pose.x").t[-1] < longest_s + 1.5
+    assert any("still being written" in str(one) for one in recording.left_out)
