@@ -12,6 +12,7 @@ import yaml
 from scm.errors import RecordingError, reading
 
 FILE_NAME = "recording.yaml"
+MAX_PROBLEMS = 20  # in one message: a screen of a terminal
 MAX_BYTES = 16 << 20  # longer than any description that people or programs write
 
 
@@ -120,6 +121,8 @@ def read_description(path: Path) -> Description:
         raise RecordingError(msg) from cause
     problems = _problems(description)
     if problems:
+        more = len(problems) - MAX_PROBLEMS
+        problems = problems[:MAX_PROBLEMS] + ([f"and {more} problems more"] if more > 0 else [])
         raise RecordingError("\n".join(f"{path}: {problem}" for problem in problems))
     return description
 

@@ -18,6 +18,7 @@ from scm.errors import RecordingError
 from scm.recording.columns import NS_PER_S, Columns, Selection, refuse_large
 
 BYTES_A_CELL = 8
+BATCH_ROWS = 1 << 16
 MAX_NAMED = 9  # elements of a list that get a name where nobody said which are wanted
 NS_PER_DAY = 86_400 * NS_PER_S
 _ELEMENT = re.compile(r"\[\d+\]")
@@ -60,13 +61,15 @@ def _of_parquet(path: Path, wanted: Collection[str] | None) -> tuple[pa.Table, l
         leaves = [file.schema.column(i).path for i in range(len(file.schema))]
         plain = [_LEAF_OF_LIST.sub("", leaf) for leaf in leaves]
         chosen = [k for k, name in enumerate(plain) if _is_wanted(name, wanted)]
-        rows, groups = file.metadata.num_rows, range(file.metadata.num_row_groups)
-        encoded = sum(
-            group.column(k).total_uncompressed_size
-            for group in map(file.metadata.row_group, groups)
-            for k in chosen
-        )
-        refuse_large(max(encoded, rows * BYTES_A_CELL * len(chosen)), path)
+        refuse_large(file.metadata.num_rows * BYTES_A_CELL * len(chosen), path)
+        # Sizes by column stand in the metadata, but pyarrow aborts where those are damaged.
+        batches, size = [], 0
+        for batch in file.iter_batches(BATCH_ROWS, columns=[leaves[k] for k in chosen]):
+            size += batch.nbytes
+            refuse_large(size, path)
+            batches.append(batch)
+        if batches:
+            return pa.Table.from_batches(batches), plain
         return file.read(columns=[leaves[k] for k in chosen]), plain
 
 

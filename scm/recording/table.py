@@ -38,7 +38,7 @@ KINDS = {  # how a file's name ends
     ".parquet": Kind("a Parquet file", "scm.recording.parquet", "pyarrow"),
     ".feather": _ARROW,
     ".arrow": _ARROW,
-    ".mat": Kind("a .mat file", "scm.recording.matlab", "scipy"),
+    ".mat": Kind("a .mat file", "scm.recording.matlab"),
     **dict.fromkeys((*BAGS, *MORE_BAGS), _BAG),
 }
 _PANDAS = "with pandas: `pd.read_{}('{}').to_parquet('drive.parquet')` or `.to_csv('drive.csv')`"

@@ -229,6 +229,38 @@ def test_structs_of_simulink_are_read(tmp_path: Path) -> None:
     assert_allclose(read["two.signals[1].values[1]"], [1, 3, 5, 7])
 
 
+@pytest.mark.parametrize("version", ["4", "5"])
+def test_every_class_of_numbers_of_matlab_is_read(tmp_path: Path, version: str) -> None:
+    kinds = (
+        ("f8", "f4", "i4", "i2", "u2", "u1")
+        if version == "4"
+        else ["f8", "f4", "i1", "u1", "i2", "i8", "u8"]
+    )
+    values = {f"a_{kind}": np.arange(5).astype(kind) for kind in kinds}
+    scipy.io.savemat(tmp_path / "a.mat", values, format=version)
+    read = read_table(tmp_path / "a.mat", None, list(values))
+    for name in values:
+        assert_array_equal(read[name], np.arange(5))
+
+
+def test_cells_of_matlab_are_read(tmp_path: Path) -> None:
+    cell = np.empty(2, object)
+    cell[:] = [np.arange(3.0), "word"]
+    read = read_table(write_mat(tmp_path, c=cell), None, ["c[0]"])
+    assert_allclose(read["c[0]"], np.arange(3))
+
+
+def test_an_object_of_matlab_is_refused_with_what_to_save(tmp_path: Path) -> None:
+    def element(kind: int, data: bytes) -> bytes:
+        return struct.pack("<II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
+
+    parts = element(6, struct.pack("<II", 17, 0)) + element(1, b"log") + element(1, b"MCOS")
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
+    (tmp_path / "log.mat").write_bytes(head + element(14, parts + element(1, b"timeseries")))
+    with pytest.raises(RecordingError, match=r"log: MATLAB objects .*x\.Time"):
+        read_table(tmp_path / "log.mat", None, ["log.Time"])
+
+
 def test_an_npy_file_is_read(tmp_path: Path) -> None:
     file = tmp_path / "drive.npy"
     np.save(file, np.array([(0.0, 1), (1.0, 2)], [("t", "f8"), ("x", "i4")]))
@@ -318,7 +350,7 @@ def test_a_damaged_file_is_refused_in_a_sentence(tmp_path: Path, name: str) -> N
 
 
 @pytest.mark.parametrize(
-    ("name", "library"), [("a.parquet", "pyarrow"), ("a.mat", "scipy"), ("a.bag", "rosbags")]
+    ("name", "library"), [("a.parquet", "pyarrow"), ("a.feather", "pyarrow"), ("a.bag", "rosbags")]
 )
 def test_a_library_that_is_not_there_is_named_with_the_command_that_brings_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, library: str
