@@ -117,6 +117,8 @@ def _refusal(cause: Exception, what: str) -> str:
         return f"cannot be read: {cause.strerror}"
     if isinstance(cause, MemoryError):
         return f"not {what} that can be read: it declares more than fits into memory"
+    if isinstance(cause, UnicodeDecodeError):
+        return f"not {what} that can be read: it is not text in UTF-8 (byte {cause.start})"
     if isinstance(cause, RecursionError):
         return f"not {what} that can be read: it is nested too deeply"
     words = " ".join(str(cause).split())

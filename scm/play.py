@@ -19,7 +19,7 @@ import msgspec
 import yaml
 
 from scm.clock import NS_PER_S
-from scm.errors import RunError, ScmError
+from scm.errors import RecordingError, RunError, ScmError, reading
 from scm.fleet import Link
 from scm.geometry import Pose2
 from scm.part import Hears
@@ -128,14 +128,8 @@ def read_drive(path: Path) -> tuple[Drive, list[Row]]:
     Raises:
         ScmError: naming the file and what is wrong with it.
     """
-    try:
+    with reading(path, "a drive", RecordingError, "expected one as `scm mismatch` writes it"):
         drive = msgspec.convert(yaml.safe_load(path.read_text(encoding="utf-8")), Drive)
-    except OSError as cause:
-        msg = f"{path}: cannot be read: {cause.strerror or cause}"
-        raise ScmError(msg) from cause
-    except (yaml.YAMLError, msgspec.ValidationError) as cause:
-        msg = f"{path}: {cause}; expected a drive as `scm mismatch` writes it"
-        raise ScmError(msg) from cause
     table = read_table(path.parent / drive.commands)
     columns = [table[name] for name in ("t_s", "throttle", "steering")]
     rows = [(float(t), float(u), float(s)) for t, u, s in zip(*columns, strict=True)]

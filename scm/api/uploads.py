@@ -17,7 +17,7 @@ import yaml
 from scm.api.problem import DISK_TROUBLE, RefusedError
 from scm.errors import RecordingError
 from scm.recording.description import FILE_NAME, Description, read_description
-from scm.recording.table import SUFFIXES
+from scm.recording.table import KINDS
 from scm.v2x.message import Refused
 
 FOLDER = "uploads"
@@ -125,7 +125,7 @@ def _unpack_one(packed: zipfile.ZipFile, info: zipfile.ZipInfo, folder: Path, le
     inner = PurePosixPath(info.filename.replace("\\", "/"))
     if inner.is_absolute() or ".." in inner.parts or len(inner.parts) > 6:
         raise _refused(f"{info.filename!r}: expected a path inside the recording's folder")
-    known = inner.name.endswith((*SUFFIXES, ".yaml"))
+    known = inner.name.lower().endswith((*KINDS, ".yaml", ".msg"))
     if not known:
         return 0
     path, size = folder.joinpath(*inner.parts), 0
@@ -186,10 +186,12 @@ def _check_size(description: Path) -> None:
 
 
 def _vehicles(description: Description, folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:
-    for table in description.tables:
-        lies = (folder / table.file).resolve()
+    paths = [table.file for table in description.tables]
+    paths += [table.definitions for table in description.tables if table.definitions is not None]
+    for path in paths:
+        lies = (folder / path).resolve()
         if not lies.is_relative_to(folder.resolve()) or not lies.exists():
-            raise _refused(f"{FILE_NAME}: table {table.file!r}: no such file in the zip")
+            raise _refused(f"{FILE_NAME}: table {path!r}: no such file in the zip")
     named = [description.vehicle, *(table.vehicle for table in description.tables)]
     vehicles = tuple(dict.fromkeys(name for name in named if name))
     unknown = next((name for name in vehicles if name not in cars), None)

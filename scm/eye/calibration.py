@@ -97,7 +97,7 @@ def load_calibration(path: Path) -> Calibration:
     try:
         read = tomllib.loads(path.read_text(encoding="utf-8"))
         calibration = msgspec.convert(read, Calibration)
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+    except (ValueError, RecursionError, OSError) as error:
         raise EyeError(f"{path}: expected a calibration of `scm eye calibrate`: {error}") from error
     faults = covariance_faults(calibration.covariance)
     if faults:

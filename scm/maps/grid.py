@@ -11,7 +11,7 @@ import yaml
 from numpy.typing import NDArray
 
 from scm.arrays import Bools, Floats
-from scm.errors import MapError
+from scm.errors import MapError, reading
 from scm.geometry import Pose2
 
 _REQUIRED = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
@@ -72,10 +72,8 @@ def load_occupancy(yaml_path: str | Path) -> OccupancyGrid:
 
 
 def _read_description(path: Path) -> dict[str, Any]:
-    try:
+    with reading(path, "a YAML file", MapError):
         info = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise MapError(f"{path}: cannot be read as YAML: {error}") from error
     if not isinstance(info, dict):
         raise MapError(f"{path}: expected keys {', '.join(_REQUIRED)}, got {type(info).__name__}")
     missing = [key for key in _REQUIRED if key not in info]

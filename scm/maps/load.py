@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 import scm
-from scm.errors import MapError, nearest
+from scm.errors import MapError, nearest, reading
 from scm.maps import model
 from scm.maps.check import problems_of
 from scm.maps.grey import read_grey
@@ -85,10 +85,8 @@ def _find(name_or_path: str | Path) -> Path:
 
 def _read(path: Path) -> CityMap:
     """Return the file as a map whose keys and types are right."""
-    try:
+    with reading(path, "a TOML file", MapError):
         data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise MapError(f"{path}: cannot be read as TOML: {error}") from error
     try:
         return msgspec.convert(data, CityMap)
     except msgspec.ValidationError as error:

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from scm.errors import CarError, nearest
+from scm.errors import CarError, nearest, reading
 from scm.traffic.timing import NIGEL, CarFacts
 from scm.vehicles.car_files import car_files
 
@@ -35,10 +35,8 @@ def facts_of(name_or_path: str) -> CarFacts:
         known = sorted(named)
         hint = nearest(path.stem, known)
         raise CarError(f"{name_or_path}: no such car{hint}; cars by name: {', '.join(known)}")
-    try:
+    with reading(path, "a TOML file", CarError):
         data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise CarError(f"{path}: not a TOML file: {error}") from error
     footprint = _numbers(data, "body", "footprint_x_m")
     if len(footprint) != 2 or not footprint[0] < footprint[1]:
         raise CarError(f"{path}: body.footprint_x_m: got {footprint}, expected [rear, front]")

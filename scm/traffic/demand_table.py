@@ -19,7 +19,7 @@ from random import Random
 from typing import Any
 from xml.etree import ElementTree
 
-from scm.errors import ScmError, nearest
+from scm.errors import ScmError, nearest, reading
 
 DAY_S = 86_400.0
 DEFAULT_CAR = "nigel"
@@ -80,11 +80,8 @@ def load_demand(path: Path) -> tuple[Flow, ...]:
     Raises:
         DemandError: naming file, row and key that are wrong.
     """
-    try:
+    with reading(path, "a demand file", DemandError):
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise DemandError(f"{path}: cannot be read: {why}") from error
     if path.suffix == ".xml":
         flows = _of_sumo(text, path)
     elif path.suffix == ".toml":
@@ -100,10 +97,8 @@ def load_demand(path: Path) -> tuple[Flow, ...]:
 
 
 def _toml(text: str, path: Path) -> list[Mapping[str, Any]]:
-    try:
+    with reading(path, "a TOML file", DemandError):
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise DemandError(f"{path}: cannot be read as TOML: {error}") from error
     rows = data.get("flow", [])
     if not isinstance(rows, list) or set(data) - {"flow"}:
         raise DemandError(f"{path}: expected tables [[flow]] alone, got {', '.join(data)}")

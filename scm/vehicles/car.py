@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from scm import registry
-from scm.errors import CarError, TermError, nearest
+from scm.errors import CarError, TermError, nearest, reading
 from scm.vehicles import body14
 from scm.vehicles.assemble import setters_of
 from scm.vehicles.car_files import TYPES_DIR, car_files
@@ -193,11 +193,8 @@ def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
         what = "file" if Path(name_or_path).suffix == ".toml" else "car"
         msg = f"{name_or_path}: no such {what}; cars by name: {', '.join(car_names())}{hint}"
         raise CarError(msg)
-    try:
+    with reading(path, "a TOML file", CarError):
         data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        msg = f"{path}: not a TOML file: {error}"
-        raise CarError(msg) from error
     return car_of(data, path, trusted=trusted)
 
 

@@ -9,7 +9,7 @@ import importlib.util
 import sys
 from pathlib import Path
 
-from scm.errors import ScmError, TermError, nearest
+from scm.errors import ScmError, TermError, nearest, reading
 from scm.vehicles.inline import law_problems
 from scm.vehicles.term import Term, flat
 
@@ -46,7 +46,8 @@ def load_own_term(folder: Path, name: str) -> Term:
 
 def _module(path: Path) -> object:
     """Run the file once for each state it is in; compiled laws stay with the state they saw."""
-    state = hashlib.sha256(f"{path}\0{path.read_text(encoding='utf-8')}".encode()).hexdigest()
+    with reading(path, "a Python file", TermError):
+        state = hashlib.sha256(f"{path}\0{path.read_text(encoding='utf-8')}".encode()).hexdigest()
     name = f"scm_own_{path.stem}_{state[:12]}"
     if name in sys.modules:
         return sys.modules[name]

@@ -111,7 +111,7 @@ def known_tags(city_map: CityMap, more: Path | None = None) -> dict[int, MapTag]
         raise EyeError(f"{more}: expected a file of [[tags]], found none")
     try:
         read = msgspec.convert(tomllib.loads(more.read_text(encoding="utf-8")), _Tags)
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+    except (ValueError, RecursionError, OSError) as error:
         raise EyeError(f"{more}: expected [[tags]] of id, x_m, y_m, size_m: {error}") from error
     for tag in read.tags:
         if tag.id in tags:
