@@ -20,12 +20,14 @@ MOST_NAMED = 40
 MAX_BAD_CELLS = 0.1  # of a column; where more are no numbers it is no column of numbers
 NS_PER_S = 1_000_000_000
 WORDS = {
-    **dict.fromkeys(("", "nan", "na", "n/a", "null", "none"), np.nan),
+    **dict.fromkeys(("", "nan", "na", "n/a", "null", "none", "#n/a", "-"), np.nan),
+    **dict.fromkeys(("1.#ind", "-1.#ind", "1.#qnan", "nan(ind)", "-nan(ind)"), np.nan),  # Windows
     "true": 1.0,
     "false": 0.0,
 }
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
-_DATE = re.compile(r"\s*\d{4}[-/]\d\d[-/]\d\d[ T]\d\d:\d\d")
+_DATE = re.compile(r"\s*(\d{4}[-/]\d\d[-/]\d\d[ T])?\d\d:\d\d(:\d\d|\s*$)")
+_ZONE = re.compile(r"[+-]\d\d:?\d\d$")
 
 
 class LeftOut(NamedTuple):
@@ -183,6 +185,9 @@ class Columns(Mapping[str, Floats]):
 
     def _as_numbers(self, name: str, cells: Sequence[str]) -> Floats:
         """Return cells as numbers; a few that are none are NaN, and left out."""
+        with suppress(ValueError):
+            if not any("_" in cell for cell in cells):
+                return np.fromiter(map(float, cells), np.float64, len(cells))
         numbers, bad = np.full(len(cells), np.nan), []
         for k, cell in enumerate(cells):
             try:
@@ -236,16 +241,16 @@ def refuse_unequal(columns: Mapping[str, Collection[object]], path: Path) -> Non
 
 
 def _instant(cell: str) -> np.datetime64:
-    """Return a date and time of day; without a zone it counts as UTC.
+    """Return a date and time of day; without a zone it counts as UTC, without a date from 1970.
 
     Raises:
         ValueError: when it is none.
     """
-    text = cell.strip().replace("/", "-")
-    try:
-        return np.datetime64(text.removesuffix("Z"), "ns")
-    except ValueError:
+    text = cell.strip().replace("/", "-").removesuffix("Z")
+    text = text if "-" in text[:5] else f"1970-01-01T{text}"
+    if _ZONE.search(text[10:]):
         return np.datetime64(datetime.fromisoformat(text).astimezone(UTC).replace(tzinfo=None))
+    return np.datetime64(text, "ns")
 
 
 def number(cell: str, where: str) -> float:

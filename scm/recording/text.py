@@ -39,6 +39,7 @@ _NUMBER = re.compile(
     r"\s*[+-]?((\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf(inity)?)\s*", re.IGNORECASE
 )
 _COMMA, _POINT = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*"), re.compile(r"\s*[+-]?\d*\.\d.*")
+EXCEL = re.compile(r"sep=.", re.IGNORECASE)  # a first line that is for a spreadsheet
 _CONTROLS = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
 
 
@@ -121,7 +122,7 @@ class _Table:
     def __init__(self, path: Path, text: str, selection: Selection, *, is_cut: bool) -> None:
         self._path, self._selection = path, selection
         self._left_out: list[LeftOut] = []
-        self._comment = ""
+        self._comment, self._is_tangled = "", False
         self._has_quotes, self._has_commas = '"' in text, "," in text
         texts = text.split("\n")
         if is_cut:
@@ -152,7 +153,7 @@ class _Table:
         chosen = [names[k] for k in picked]
         self._left_out.sort(key=lambda one: one.line or 0)
         texts = [self._texts[i] for i in rows]
-        numbers = self._numbers(texts, picked) if picked else []
+        numbers = self._numbers(texts, width, picked) if picked else []
         if numbers is not None:
             return Columns(self._path, chosen, numbers, known=names, left_out=self._left_out)
         words, places = self._words(texts, picked), [self._places[i] for i in rows]
@@ -186,6 +187,8 @@ class _Table:
         unclear = {"", " ", *SEPARATORS, *COMMENTS}  # how lines begin that may be none
         others: set[int] = set()
         comment = -1
+        if EXCEL.fullmatch(texts[0]):
+            others.add(0)
         for i in [i for i, text in enumerate(texts) if text[:1] in unclear]:
             if not texts[i].strip(BLANK):
                 others.add(i)
@@ -202,7 +205,7 @@ class _Table:
         if others:
             places = [i + 1 for i in range(len(texts)) if i not in others]
             texts = [texts[place - 1] for place in places]
-        if self._has_quotes:
+        if self._has_quotes and any(text.count('"') % 2 for text in texts):
             joined = list(_joined([Line(*one) for one in zip(places, texts, strict=True)]))
             texts, places = [line.text for line in joined], [line.number for line in joined]
         return texts, places
@@ -212,7 +215,19 @@ class _Table:
         if self._separator != " " and not self._has_quotes:
             separator = self._separator
             return [text.count(separator) + 1 for text in self._texts]
-        return [len(_cells(text, self._separator)) for text in self._texts]
+        widths = [len(cells) for cells in self._parsed(self._texts)]
+        if len(widths) != len(self._texts):  # a quote within a cell joins lines
+            self._is_tangled = True
+            widths = [len(cells) for cells in self._parsed(self._texts)]
+        return widths
+
+    def _parsed(self, texts: Sequence[str]) -> Iterator[list[str]]:
+        """Yield the cells of lines: as `_cells` does, but all at once."""
+        separator = self._separator
+        if not self._has_quotes or self._is_tangled:
+            return (_cells(text, separator) for text in texts)
+        lines = (text.strip() for text in texts) if separator == " " else texts
+        return iter(csv.reader(lines, delimiter=separator, skipinitialspace=True))
 
     def _common_width(self) -> int:
         """Return how many cells most lines have."""
@@ -244,14 +259,23 @@ class _Table:
             return [name or "" for name in given], 0
         if above == 0:
             return self._named_by_comment(width), 0
-        header = fits[0] if fits else above - 1
+        header, names = self._header(fits or [above - 1], width)
         for i in range(header):
             self._leave_out(self._line(i), "above the names of the columns")
         first = header + 1
         while first < above and not _count_numbers(self._cells_of(first)):
             self._leave_out(self._line(first), "no numbers: units of the columns?")
             first += 1
-        return [name.strip() for name in self._cells_of(header)], first
+        return names, first
+
+    def _header(self, lines: Sequence[int], width: int) -> tuple[int, list[str]]:
+        """Return which of some lines gives the most names, the first of equals, and its names."""
+        best, found = lines[0], list[str]()
+        for i in lines:
+            names = _names(self._texts[i], self._separator, width)
+            if len({*names} - {""}) > len({*found} - {""}):
+                best, found = i, names
+        return best, found
 
     def _above(self, width: int) -> int:
         """Return how many lines stand above the first that is clearly a row of numbers."""
@@ -263,10 +287,9 @@ class _Table:
 
     def _named_by_comment(self, width: int) -> list[str]:
         """Return the names that a comment above the rows gives, or the format."""
-        for separator in (self._separator, *SEPARATORS):
-            names = [name.strip() for name in _cells(self._comment, separator)]
-            if self._comment and len(names) == width:
-                return names
+        names = _names(self._comment, self._separator, width)
+        if self._comment and len(names) == width:
+            return names
         if ".tum" in self._path.name.lower() and width == len(TUM):
             return list(TUM)
         msg = (
@@ -305,11 +328,13 @@ class _Table:
         steps = [int(after) - int(before) for before, after in pairwise(firsts)]
         return min(steps) > 0 and 2 * steps.count(1) > len(steps)
 
-    def _numbers(self, rows: list[str], picked: Sequence[int]) -> list[Floats] | None:
+    def _numbers(self, rows: list[str], width: int, picked: Sequence[int]) -> list[Floats] | None:
         """Return columns as numbers, None where some of their cells are none."""
         separator = None if self._separator == " " else self._separator
         if self._has_quotes:
-            return None
+            if any(row.count(separator or " ") + 1 != width or "\n" in row for row in rows):
+                return None
+            rows = [row.replace('"', "") for row in rows]  # they only enclose cells
         if self._separator != "," and self._has_commas and any("," in row for row in rows):
             if any("." in row for row in rows):
                 return None
@@ -328,8 +353,7 @@ class _Table:
     def _words(self, rows: Sequence[str], picked: Sequence[int]) -> list[list[str]]:
         """Return columns as they stand: slow, but takes any text."""
         found: list[list[str]] = [[] for _ in picked]
-        for row in rows:
-            cells = _cells(row, self._separator)
+        for cells in self._parsed(rows):
             for k, column in zip(picked, found, strict=True):
                 column.append(cells[k])
         has_comma = any(
@@ -353,8 +377,11 @@ def _joined(lines: Sequence[Line]) -> Iterator[Line]:
         while count % 2 and last + 1 < min(len(lines), i + MAX_IN_QUOTES):
             last += 1
             count += lines[last].text.count('"')
-        last = last if count % 2 == 0 else i
-        yield Line(lines[i].number, "\n".join(line.text for line in lines[i : last + 1]))
+        if count % 2:  # it is never closed
+            last = i
+            yield Line(lines[i].number, lines[i].text.replace('"', ""))
+        else:
+            yield Line(lines[i].number, "\n".join(line.text for line in lines[i : last + 1]))
         i = last + 1
 
 
@@ -382,6 +409,12 @@ def _cells(line: str, separator: str) -> list[str]:
         except csv.Error:
             pass
     return line.split() if separator == " " else line.split(separator)
+
+
+def _names(line: str, separator: str, width: int) -> list[str]:
+    """Return the names on a line, which something else may part than the cells below it."""
+    parted = [_cells(line, one) for one in (separator, *SEPARATORS)]
+    return [name.strip() for name in next((p for p in parted if len(p) == width), parted[0])]
 
 
 def _count_numbers(cells: Sequence[str]) -> int:

@@ -211,6 +211,19 @@ def test_a_row_of_units_and_lines_above_the_names_are_left_out(tmp_path: Path) -
     assert [one.line for one in read.left_out] == [1, 2, 5]
 
 
+def test_of_several_lines_of_names_the_one_with_most_counts(tmp_path: Path) -> None:
+    lines = ["Format,1.23", ",,Marker,Marker", ",,m1,m1", ",,Position,Position", "Frame,Time,X,Y"]
+    lines += [f"{k},{k / 100},{k}.5,2.5" for k in range(9)]
+    read = columns(tmp_path, "\n".join(lines))
+    assert_allclose(read["X"], np.arange(9) + 0.5)
+    assert [one.line for one in read.left_out] == [1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("head", ["t;x;y", "t\tx\ty", "t x y", "# t x y", "sep=,\nt,x,y"])
+def test_names_may_be_parted_by_something_else_than_the_cells(tmp_path: Path, head: str) -> None:
+    expect_rows(columns(tmp_path, head + "\n" + table(head="")))
+
+
 @pytest.mark.parametrize(
     "encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-8-sig", "latin-1", "cp1252"]
 )
@@ -273,6 +286,22 @@ def test_a_date_and_time_of_day_is_a_time(tmp_path: Path) -> None:
     t_ns = read.nanoseconds("t", "s")
     assert t_ns is not None
     assert t_ns.tolist() == [1_764_064_800_250_000_000, 1_764_064_801_500_000_000]
+
+
+@pytest.mark.parametrize(
+    ("cells", "since_s"),
+    [
+        (["12:34:56.5", "12:34:57.75"], 45296.5),
+        (["2025-11-25 11:00:00.5+01:00", "2025-11-25 11:00:01.75+01:00"], 1764064800.5),
+        (["2025/11/25 10:00:00.5", "2025/11/25 10:00:01.75"], 1764064800.5),
+        (["2025-11-25T10:00:00.500000000", "2025-11-25T10:00:01.750000000"], 1764064800.5),
+    ],
+)
+def test_times_of_any_common_form_are_seconds(
+    tmp_path: Path, cells: list[str], since_s: float
+) -> None:
+    read = columns(tmp_path, "t,x\n" + "".join(f"{cell},1\n" for cell in cells))
+    assert_allclose(read["t"], [since_s, since_s + 1.25], rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize(
