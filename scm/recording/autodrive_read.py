@@ -121,6 +121,13 @@ def read_log(path: Path, kind: str, number: int) -> Log:
         why = "".join(f": line {one.line}: {one.why}" for one in reader.left_out[:1])
         msg = f"{path}: no row of AutoDRIVE's recorder{why}"
         raise RecordingError(msg)
+    if len(reader.left_out) > len(reader.lines):
+        first, bad = reader.left_out[0], len(reader.left_out)
+        msg = (
+            f"{path}: {bad} of {bad + len(reader.lines)} rows are none of AutoDRIVE's recorder: "
+            f"line {first.line}: {first.why}; are decimals written with a comma?"
+        )
+        raise RecordingError(msg)
     scans = reader.all_scans()
     stamps = np.array(reader.stamps_ms, np.int64)
     log = Log(path, kind, number, reader.cells, reader.lines, stamps, scans, reader.left_out)
@@ -227,16 +234,17 @@ def _layout(path: Path, rows: list[Row], layouts: Layouts) -> tuple[tuple[str, .
             raise RecordingError(msg)
         return names, rows[1:]
     widths = Counter(len(cells) for _, _, cells in rows).most_common()
-    for width, _ in widths:
-        if width in layouts and _shows_pictures(layouts[width], rows):
+    for width, count in widths:
+        is_common = 2 * count >= len(rows)
+        if width in layouts and is_common and _shows_pictures(layouts[width], rows):
             return layouts[width], rows
     pictures = max(line.lower().count(".jpg,") for _, line, _ in rows)
     if pictures and len(CAR) + 1 + pictures in layouts:
         return layouts[len(CAR) + 1 + pictures], rows
     msg = (
-        f"{path}: line {rows[0][0]}: rows of {widths[0][0]} cells, expected "
-        f"{', '.join(map(str, layouts))} or a header with {STAMP!r}; are decimals written with a "
-        "comma?"
+        f"{path}: line {rows[0][0]}: {widths[0][1]} of {len(rows)} rows have {widths[0][0]} cells, "
+        f"expected {', '.join(map(str, layouts))} or a header with {STAMP!r}; are decimals written "
+        "with a comma?"
     )
     raise RecordingError(msg)
 

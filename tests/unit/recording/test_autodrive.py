@@ -149,7 +149,7 @@ def test_a_light_that_shows_what_is_no_state_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("lines", "why"),
     [
-        (["a,b,c"], "rows of 3 cells, expected 18, 20, 21, 35"),
+        (["a,b,c"], "1 of 1 rows have 3 cells, expected 18, 20, 21, 35"),
         ([row(0, posX="north")], "line 1: posX: got 'north'"),
         ([""], "empty"),
         (["timestamp,posX,posx"], "columns named twice: posX"),
@@ -160,6 +160,17 @@ def test_a_light_that_shows_what_is_no_state_is_told(tmp_path: Path) -> None:
 def test_a_file_of_something_else_is_refused(tmp_path: Path, lines: list[str], why: str) -> None:
     with pytest.raises(RecordingError, match=why):
         imported(logs(tmp_path / "log", *lines))
+
+
+@pytest.mark.parametrize("header", [[], [",".join(CAR)]])
+def test_a_log_of_which_most_rows_have_decimal_commas_is_refused(
+    tmp_path: Path, header: list[str]
+) -> None:
+    whole = dict.fromkeys(CAR, "0")
+    rows = [row(k, **{**whole, "timestamp": stamp_of(START_MS + 50 * k)}) for k in range(6)]
+    rows += [row(k).replace(".", ",") for k in range(6, 200)]
+    with pytest.raises(RecordingError, match=r"of 200 rows .*decimals written with a comma"):
+        imported(logs(tmp_path / "log", *header, *rows))
 
 
 def test_clocks_that_repeat_gap_and_go_back_are_told(tmp_path: Path) -> None:
