@@ -61,14 +61,14 @@ def read(path: Path, selection: Selection) -> Columns:
     return _as_columns(topic, received, picked, known, lines)
 
 
-def messages(path: Path, selection: Selection) -> Iterator[tuple[str, int, Any]]:
+def messages(path: Path, topic: str | None) -> Iterator[tuple[str, int, Any]]:
     """Yield the type, the time of arrival [ns] and the content of each row's message.
 
     Raises:
         RecordingError: as `read` does.
     """
-    for _, (topic, t_ns, _), message in _Topic(path, selection).messages():
-        yield topic.kind, t_ns, message
+    for _, (of, t_ns, _), message in _Topic(path, Selection(topic)).messages():
+        yield of.kind, t_ns, message
 
 
 def _chosen(bag: BagFile, topic: str | None, path: Path) -> str:

@@ -176,8 +176,8 @@ class _Table:
             if self._widths[i] == width:
                 rows.append(i)
             else:
-                why = f"{self._widths[i]} cells, expected {width} as most lines have"
-                self._leave_out(self._line(i), why)
+                got = f"{self._widths[i]} cell{'s' if self._widths[i] != 1 else ''}"
+                self._leave_out(self._line(i), f"{got}, expected {width} as most lines have")
         return rows
 
     def _without_comments(
