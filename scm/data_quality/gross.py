@@ -5,15 +5,14 @@ the other, and how late. What is found can be undone; see `corrected.py`.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.clocks import STEP_S, WIDTH_S, Lag, lag_between
-from scm.data_quality.problem import Span
-from scm.data_quality.track import Series, Track, grid, long_gaps
+from scm.data_quality.track import Series, Track, between_gaps_s, grid, long_gaps
 from scm.recording.units import G
 
 DEGREES = math.degrees(1.0)
@@ -112,7 +111,8 @@ def compare(first: Sensed, second: Sensed) -> Pair | None:
     start = max(a.t[0], b.t[0])
     gaps = long_gaps(a.t, b.t)
     end = start + overlap
-    step = max(STEP_S, (overlap - _within(gaps, start, end)) / MOST_POINTS)
+    length_s = between_gaps_s(start, end, gaps) if gaps else overlap
+    step = max(STEP_S, length_s / MOST_POINTS)
     on = grid(start, end, step, max(WIDTH_S, 2.0 * step), gaps)
     if len(on.t) * step < SHORTEST_S:
         return None
@@ -121,11 +121,6 @@ def compare(first: Sensed, second: Sensed) -> Pair | None:
         return None
     lag = lag_between(left, right, on)
     return Pair(first.channels, second.channels, first.what, lag, shift)
-
-
-def _within(gaps: Sequence[Span], start: float, end: float) -> float:
-    """Return how much of a span lies in gaps [s]."""
-    return sum(max(0.0, min(last, end) - max(first, start)) for first, last in gaps)
 
 
 def nearest_factor(size: float, what: str) -> float:

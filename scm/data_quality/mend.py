@@ -11,7 +11,7 @@ from scm.data_quality.gross import Sensed, compare
 from scm.data_quality.problem import DataProblem
 from scm.data_quality.standing import moves
 from scm.data_quality.suspicion import Repair
-from scm.data_quality.track import Series, Track, series, track
+from scm.data_quality.track import Series, Track, recorded_s, series, track
 from scm.recording.read import Recording
 
 GYROS = ("imu.gyro_z", "yaw_rate")
@@ -35,7 +35,7 @@ class Mending:
     def poses(self) -> Track | None:
         """The poses, None where there are too few to compare."""
         found = track(self.recording)
-        long = found is not None and np.ptp(found.t) > SHORTEST_S
+        long = found is not None and recorded_s(found.t) > SHORTEST_S
         return found if found is not None and long and moves(found) else None
 
 

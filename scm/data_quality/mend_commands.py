@@ -10,7 +10,7 @@ from scm.data_quality.mend import DESCRIBE, Mending
 from scm.data_quality.problem import DataProblem
 from scm.data_quality.steered import Steered, steered
 from scm.data_quality.suspicion import Repair
-from scm.data_quality.track import clean, held
+from scm.data_quality.track import clean, held, recorded_s
 from scm.vehicles.car import Car
 
 LARGEST_RATIO, PERCENT = 1.5, 105.0
@@ -39,7 +39,7 @@ def mend_commands(now: Mending, car: Car | None) -> Iterator[DataProblem]:
 
 
 def _is_long(now: Mending) -> bool:
-    return now.poses is not None and float(np.ptp(now.poses.t)) > LONG_S
+    return now.poses is not None and recorded_s(now.poses.t) > LONG_S
 
 
 def _pulls_back(now: Mending) -> bool:

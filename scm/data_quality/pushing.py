@@ -10,7 +10,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import Series, Track, grid, long_gaps, series
+from scm.data_quality.track import Series, Track, between_gaps_s, grid, long_gaps, series
 from scm.data_quality.whitened import Fit, fit
 from scm.recording.read import Recording
 
@@ -52,9 +52,9 @@ def push_against(
     width = max(WIDTH_S, 1.5 * poses.period_s)
     start = max(poses.t[0], along.t[0] + late[0], across.t[0] + late[0]) + 2.0 * width
     end = min(poses.t[-1], along.t[-1] + late[0], across.t[-1] + late[0]) - 2.0 * width
-    if end - start < max(SHORTEST_S, 40.0 * width):
-        return None
     gaps = long_gaps(poses.t, along.t + late[0], across.t + late[0])
+    if between_gaps_s(start, end, gaps) < max(SHORTEST_S, 40.0 * width):
+        return None
     on = grid(start, end, STEP_S, width, gaps)
     yaw = np.interp(on.t, poses.t, poses.yaw)
     c, s = np.cos(yaw), np.sin(yaw)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import Series, Track, grid, long_gaps
+from scm.data_quality.track import Series, Track, grid, long_gaps, recorded_s
 from scm.data_quality.whitened import fit
 
 WIDTH_S = 0.1
@@ -23,7 +23,7 @@ def sideways_of(poses: Track) -> Relation | None:
         is; None where the car does not move enough.
     """
     width = max(WIDTH_S, 1.5 * poses.period_s)
-    if poses.t[-1] - poses.t[0] < max(SHORTEST_S, 60.0 * width):
+    if recorded_s(poses.t) < max(SHORTEST_S, 60.0 * width):
         return None
     on = grid(poses.t[0], poses.t[-1], STEP_S, width, long_gaps(poses.t))
     yaw = on.smooth(Series(poses.t, poses.yaw))

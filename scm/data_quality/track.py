@@ -91,6 +91,11 @@ def recorded_s(t: Floats) -> float:
     return float(t[-1] - t[0]) - sum(last - first for first, last in long_gaps(t))
 
 
+def between_gaps_s(start: float, end: float, gaps: Iterable[Span]) -> float:
+    """Return how long a span lasts without what lies in gaps [s]."""
+    return (end - start) - sum(max(0.0, min(b, end) - max(a, start)) for a, b in gaps)
+
+
 def cut_at_gaps(starts: Sequence[int], t: Floats, other: Floats) -> tuple[int, ...]:
     """Return the first rows of stretches, where another channel's long gaps end them too.
 

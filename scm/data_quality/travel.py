@@ -9,7 +9,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import Grid, Series, Track, cut_at_gaps
+from scm.data_quality.track import Grid, Series, Track, cut_at_gaps, recorded_s
 from scm.data_quality.whitened import Fit, fit
 
 ROUNDS = 6
@@ -54,7 +54,7 @@ def travel_against(
     """
     inside = (poses.t - start[0] > distance.t[0]) & (poses.t - start[0] < distance.t[-1])
     rows = poses.cut(inside)
-    if len(rows.t) < 50 or np.ptp(rows.t) < SHORTEST_S:
+    if len(rows.t) < 50 or recorded_s(rows.t) < SHORTEST_S:
         return None
     rows = rows.cut(np.arange(len(rows.t)) % (1 + len(rows.t) // MOST_ROWS) == 0)
     since, warp, tilt = rows.t - rows.t[0], np.array(start), np.zeros(2)

@@ -6,7 +6,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import Series, Track, cut_at_gaps
+from scm.data_quality.track import Series, Track, cut_at_gaps, recorded_s
 from scm.data_quality.whitened import Fit, fit
 
 ROUNDS = 4
@@ -34,7 +34,7 @@ def yaw_against(
     """
     inside = (poses.t - start[0] > turned.t[0]) & (poses.t - start[0] < turned.t[-1])
     rows = poses.cut(inside)
-    if len(rows.t) < 50 or np.ptp(rows.t) < SHORTEST_S or np.ptp(rows.yaw) < 0.2:
+    if len(rows.t) < 50 or recorded_s(rows.t) < SHORTEST_S or np.ptp(rows.yaw) < 0.2:
         return None
     rows = rows.cut(np.arange(len(rows.t)) % (1 + len(rows.t) // MOST_ROWS) == 0)
     since = rows.t - rows.t[0]

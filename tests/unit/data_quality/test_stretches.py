@@ -14,6 +14,7 @@ from scm.data_quality.stretches import stretches
 from scm.data_quality.suspicion import Quality
 from scm.data_quality.track import grid, long_gaps, track
 from scm.recording.read import Recording
+from scm.recording.span import part_of
 from scm.vehicles.car import Car
 
 Drive = Callable[[int], Recording]
@@ -238,3 +239,10 @@ def test_speeds_beside_a_pause_are_those_without_it(drive: Drive) -> None:
     assert whole is not None
     t = cut.t - np.where(cut.t > 40.0, DAY_S, 0.0)
     assert float(np.abs(cut.values - whole.at(t)).max()) < 0.05
+
+
+def test_a_pause_does_not_make_a_drive_long_enough(drive: Drive, nigel: Car) -> None:
+    short = part_of(drive(0), 20.0, 24.0)
+    found = check(paused(short, 22.1, DAY_S), nigel)
+    assert not found.usable.can_diagnose
+    assert not found.relations
