@@ -51,7 +51,7 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
     delay, rate = (whole + _between(sign * curve, best)) * on.step_s, 0.0
     gain = float(abs(curve[best]) - abs(curve[reach]))
     a, b = _overlap(first, second, whole)
-    windows = _windows(a, sign * b, on)
+    windows = _windows(a, sign * b, on.step_s)
     sure = len(windows) < 3 and abs(curve[best]) > SURE
     if len(windows) >= 3:
         at, late = windows.T
@@ -64,9 +64,9 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
         off = late - rate * at
         sure = float(np.median(np.abs(off - np.median(off)))) < SAME_S
         delay = whole * on.step_s + float(np.median(late - rate * at))
-    if abs(rate) * (on.t[-1] - on.t[0]) < 0.05:
+    if abs(rate) * on.length_s < 0.05:
         delay, rate = (whole + _between(sign * curve, best)) * on.step_s, 0.0
-    a, b = _overlap(first, second, round((delay + rate * 0.5 * (on.t[-1] - on.t[0])) / on.step_s))
+    a, b = _overlap(first, second, round((delay + rate * 0.5 * on.length_s) / on.step_s))
     return Lag(delay, rate, float(curve[best]), sign * _size(a, sign * b), sure, gain)
 
 
@@ -137,9 +137,8 @@ def _overlap(first: Floats, second: Floats, steps: int) -> tuple[Floats, Floats]
     return first[:steps], second[-steps:]
 
 
-def _windows(first: Floats, second: Floats, on: Grid) -> Floats:
+def _windows(first: Floats, second: Floats, step_s: float) -> Floats:
     """Return rows of (middle of a window, delay in it) for windows that correlate, [s]."""
-    step_s, paused_s = on.step_s, on.paused_s
     length, near = round(WINDOW_S / step_s), round(LOCAL_S / step_s)
     whole = np.array([float(first.std()), float(second.std())])
     found = []
@@ -151,5 +150,5 @@ def _windows(first: Floats, second: Floats, on: Grid) -> Floats:
         best = int(np.argmax(curve))
         if curve[best] > ALIKE and 0 < best < len(curve) - 1:
             late = (best - near + _between(curve, best)) * step_s
-            found.append(((start + 0.5 * length) * step_s + paused_s[start], late))
+            found.append(((start + 0.5 * length) * step_s, late))
     return np.array(found).reshape(-1, 2)

@@ -10,7 +10,15 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import Series, Track, between_gaps_s, grid, long_gaps, series
+from scm.data_quality.track import (
+    Series,
+    Track,
+    between_gaps_s,
+    grid,
+    long_gaps,
+    series,
+    without_pauses,
+)
 from scm.data_quality.whitened import Fit, fit
 from scm.recording.read import Recording
 
@@ -58,7 +66,7 @@ def push_against(
     on = grid(start, end, STEP_S, width, gaps)
     yaw = np.interp(on.t, poses.t, poses.yaw)
     c, s = np.cos(yaw), np.sin(yaw)
-    u = on.t - late[0] - late[1] * (on.t - poses.t[0])
+    u = on.t - late[0] - late[1] * without_pauses(on.t, float(poses.t[0]), gaps)
     ax, ay = along.at(u), across.at(u)
 
     def both(x: Floats, y: Floats, order: int = 0) -> Floats:

@@ -65,6 +65,11 @@ class Track:
         gap = np.diff(self.t) > max(GAP_S, GAP_STEPS * self.period_s)
         return (0, *(int(i) + 1 for i in np.flatnonzero(gap | jumped(self))))
 
+    @property
+    def since(self) -> Floats:
+        """Time since the first row without long gaps: a clock's drift over a pause is a delay."""
+        return without_pauses(self.t, float(self.t[0]), long_gaps(self.t))
+
     def cut(self, keep: Bools) -> "Track":
         """Return the rows that are kept."""
         return Track(self.t[keep], self.x[keep], self.y[keep], self.yaw[keep])
@@ -89,6 +94,14 @@ def long_gaps(*times: Floats) -> list[Span]:
 def recorded_s(t: Floats) -> float:
     """Return how long a channel lasts without its long gaps [s]."""
     return float(t[-1] - t[0]) - sum(last - first for first, last in long_gaps(t))
+
+
+def without_pauses(t: Floats, start: float, gaps: Iterable[Span]) -> Floats:
+    """Return how long it is from a start to some times, gaps left out [s]."""
+    since: Floats = t - start
+    for first, last in gaps:
+        since = since - np.clip(t - first, 0.0, last - first)
+    return since
 
 
 def between_gaps_s(start: float, end: float, gaps: Iterable[Span]) -> float:
@@ -248,14 +261,6 @@ class Grid:
     def length_s(self) -> float:
         """How long the pieces are together."""
         return sum(float(self.t[j - 1] - self.t[i]) for i, j in self._pieces)
-
-    @property
-    def paused_s(self) -> Floats:
-        """How long the gaps before each point are together, shape `(n,)`."""
-        paused = np.zeros(len(self.t))
-        for i in self.starts[1:]:
-            paused[i:] += self.t[i] - self.t[i - 1] - self.step_s
-        return paused
 
     def inner(self, margin: int) -> Ints:
         """Return every `margin`-th point that is not so near to an end of its piece."""

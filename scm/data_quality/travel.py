@@ -57,7 +57,7 @@ def travel_against(
     if len(rows.t) < 50 or recorded_s(rows.t) < SHORTEST_S:
         return None
     rows = rows.cut(np.arange(len(rows.t)) % (1 + len(rows.t) // MOST_ROWS) == 0)
-    since, warp, tilt = rows.t - rows.t[0], np.array(start), np.zeros(2)
+    since, warp, tilt = rows.since, np.array(start), np.zeros(2)
     count = len(NAMES) if since[-1] >= SHORTEST_DRIFT_S else len(NAMES) - 1
     found, starts = None, cut_at_gaps(rows.starts, rows.t, distance.t)
     for _ in range(ROUNDS):
@@ -142,7 +142,7 @@ def _columns(rows: Track, distance: Series, u: Floats) -> Floats:
     chord = np.sinc(np.diff(yaw) / (2.0 * np.pi))
     ahead = np.stack((np.cos(middle), np.sin(middle)), axis=1) * chord[:, None]
     side = np.stack((-ahead[:, 1], ahead[:, 0]), axis=1)
-    since = rows.t - rows.t[0]
+    since = rows.since
     here = np.stack((rows.x, rows.y), axis=1)
 
     def added(direction: Floats, amounts: Floats) -> Floats:

@@ -37,7 +37,7 @@ def yaw_against(
     if len(rows.t) < 50 or recorded_s(rows.t) < SHORTEST_S or np.ptp(rows.yaw) < 0.2:
         return None
     rows = rows.cut(np.arange(len(rows.t)) % (1 + len(rows.t) // MOST_ROWS) == 0)
-    since = rows.t - rows.t[0]
+    since = rows.since
     rate = Series(turned.t, np.gradient(turned.values, turned.t))
     warp = np.array(start)
     found, starts = None, cut_at_gaps(rows.starts, rows.t, turned.t)
