@@ -14,6 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from scm.arrays import Floats
@@ -35,11 +36,13 @@ MAX_CONTROLS = 0.02  # of the characters at the begin of a text
 SHOWN = 80  # characters of a line in a message
 GZIP = b"\x1f\x8b"
 PIECE_BYTES = 1 << 20
+PIECE_ROWS = 4096  # read at once: their cells as objects take a few MB
 _NUMBER = re.compile(
     r"\s*[+-]?((\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf(inity)?)\s*", re.IGNORECASE
 )
 _COMMA, _POINT = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*"), re.compile(r"\s*[+-]?\d*\.\d.*")
 EXCEL = re.compile(r"sep=.", re.IGNORECASE)  # a first line that is for a spreadsheet
+_NUMBERS = msgspec.json.Decoder(list[float])
 _CONTROLS = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
 
 
@@ -422,6 +425,26 @@ def _count_numbers(cells: Sequence[str]) -> int:
 
 
 def _loaded(rows: Sequence[str], separator: str | None, picked: Sequence[int]) -> Floats:
+    """Return some columns of rows of one width as numbers, shape `(rows, columns)`.
+
+    Rows whose cells are numbers as JSON writes them are read as JSON, twice as fast.
+
+    Raises:
+        ValueError: when a cell is no number.
+    """
+    pieces = [rows[i : i + PIECE_ROWS] for i in range(0, len(rows), PIECE_ROWS)]
+    return np.concatenate([_piece(piece, separator, picked) for piece in pieces])
+
+
+def _piece(rows: Sequence[str], separator: str | None, picked: Sequence[int]) -> Floats:
+    if separator is not None:
+        text = ",".join(rows)
+        try:
+            cells = _NUMBERS.decode(f"[{text.replace(separator, ',')}]")
+        except msgspec.DecodeError:
+            pass
+        else:
+            return np.array(cells, dtype=np.float64).reshape(len(rows), -1)[:, picked]
     return np.loadtxt(rows, delimiter=separator, usecols=picked, ndmin=2, comments=None)
 
 

@@ -355,3 +355,34 @@ def test_errors_are_one_line_that_begins_with_the_file(tmp_path: Path) -> None:
             [read[name] for name in set(read) if name]
         except RecordingError as error:
             assert re.match(rf"{re.escape(str(file))}: .*\Z", str(error))  # noqa: PT017
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_numbers_are_read_to_the_last_bit(tmp_path, separator):
+    rng = np.random.default_rng(5)
+    rows = rng.normal(size=(5000, 3)) * 10.0 ** rng.integers(-20, 20, size=(5000, 3))
+    lines = [separator.join(repr(float(cell)) for cell in row) for row in rows]
+    path = tmp_path / "t.csv"
+    path.write_text("\n".join(("a b c".replace(" ", separator), *lines)) + "\n")
+    found = read_table(path)
+    assert np.array_equal(np.column_stack([found[name] for name in "abc"]), rows)
+
+
+@pytest.mark.parametrize(
+    "cell",
+    ["1.", ".5", "+1", "007", "1e5", "1E+05", "-0.0", "1700000000123456789", "18446744073709551615",
+     "123456789012345678901234567890", "1e400", "nan", "-inf", "0.10000000000000000555111"],
+)  # fmt: skip
+def test_a_number_is_what_python_makes_of_it_however_it_is_written(tmp_path, cell):
+    path = tmp_path / "t.csv"
+    path.write_text("a,b\n1.5,2.5\n" + f"{cell},4.5\n" + "5.5,6.5\n")
+    found = read_table(path)["a"]
+    assert np.array_equal(found, [1.5, float(cell), 5.5], equal_nan=True)
+    assert np.signbit(found[1]) == np.signbit(float(cell)) or cell == "nan"
+
+
+@pytest.mark.parametrize("cell", ["[1", "1]", "true", '"2"', "1 2", "{}"])
+def test_what_is_no_number_is_none_in_json_either(tmp_path, cell):
+    path = tmp_path / "t.csv"
+    path.write_text("a,b\n1.5,2.5\n" + f"{cell},4.5\n" + "5.5,6.5\n" * 3)
+    assert list(read_table(path)["b"]) == [2.5, 4.5, 6.5, 6.5, 6.5]
