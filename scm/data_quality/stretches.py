@@ -63,7 +63,8 @@ def stretches(recording: Recording, car: Car, jumps: Sequence[Span] = ()) -> Str
         between(recording, first, last) for first, last in zip(ends[::2], ends[1::2], strict=True)
     ]
     whole = tuple(part for part in parts if _can_be_driven(part, needed))
-    return Stretches(whole, (_problem(recording, gaps, jumps, whole),))
+    silent = [name for name in needed if long_gaps(_stamps(recording, name))]
+    return Stretches(whole, (_problem(recording, silent, gaps, jumps, whole),))
 
 
 def _is_inside(span: Span, gaps: Iterable[Span]) -> bool:
@@ -110,6 +111,7 @@ def _can_be_driven(part: Recording, needed: Sequence[str]) -> bool:
 
 def _problem(
     recording: Recording,
+    silent: Sequence[str],
     gaps: Sequence[Span],
     jumps: Sequence[Span],
     whole: Sequence[Recording],
@@ -119,7 +121,7 @@ def _problem(
     if gaps:
         longest_s = max(last - first for first, last in gaps)
         often = "" if len(gaps) == 1 else f"{len(gaps)} times, at most "
-        causes.append(f"Poses or commands are missing {often}for {longest_s:.1f} s")
+        causes.append(f"{_missing(silent)} are missing {often}for {longest_s:.1f} s")
     if jumps:
         often = "once" if len(jumps) == 1 else f"{len(jumps)} times"
         causes.append(f"{'the' if gaps else 'The'} poses jump {often}")
@@ -136,13 +138,20 @@ def _problem(
     if lost:
         said += f" Not in a stretch of {SHORTEST_S:g} s that has both: {', '.join(lost)}."
     return DataProblem(
-        channel="*",
+        channel=called(silent) if gaps and not jumps else "*",
         name="gap",
         said=said,
         when_s=tuple(sorted([*gaps, *jumps])),
         corrected="Cut there.",
         record_instead="Record poses and commands without pauses, or one file a drive.",
     )
+
+
+def _missing(silent: Sequence[str]) -> str:
+    """Return what is missing at the gaps, in words."""
+    posed = any(name in POSE for name in silent)
+    commanded = any(name not in POSE for name in silent)
+    return "Poses" if not commanded else "Commands" if not posed else "Poses or commands"
 
 
 def _lost(recording: Recording, name: str, whole: Iterable[Recording]) -> int:
