@@ -73,7 +73,8 @@ def _account(
     tables: Sequence[Table], left_out: Sequence[LeftOut], changes: Sequence[DataProblem]
 ) -> tuple[str, ...]:
     """Return which rows were read, and a line for each change: of a whole table by its file."""
-    files = {called(table.names): table.label for table in tables} | {"*": "all tables"}
+    files = {called(table.names): table.label for table in tables if len(table.names) > 1}
+    files |= {"*": "all tables"}
     read = "read " + "; ".join(map(_rows_of, tables))
     return (
         read,

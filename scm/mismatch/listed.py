@@ -219,8 +219,8 @@ def shown_by(found: tuple[Candidate, ...], drives: Sequence[Drive]) -> tuple[Can
     """Return the candidates that these drives are fast enough to show."""
     fast, hard = 0.0, 0.0
     for drive in drives:
-        speed, t = drive.pose_speed, drive.stream("pose.x").t
-        turning = np.abs(drive.smoothed["pose.yaw"].rate_at(t))
+        speed, yaw = drive.pose_speed, drive.smoothed["pose.yaw"]
+        turning = np.abs(yaw.rate_at(drive.smoothed["pose.x"].t))
         fast = max(fast, float(np.percentile(speed, 95)))
         hard = max(hard, float(np.percentile(speed * turning, 95)))
     needs = {c.name: SHOWS_ABOVE.get(c.name, (0.0, 0.0)) for c in found}

@@ -8,6 +8,7 @@ import pytest
 
 from scm.data_quality.check import check
 from scm.data_quality.corrected import corrected
+from scm.data_quality.prepare import prepare
 from scm.data_quality.suspicion import Quality
 from scm.recording.read import Channel, Recording
 from scm.vehicles.car import Car
@@ -222,3 +223,10 @@ def test_a_jump_of_the_poses_is_not_blamed_on_the_gyro(drive: Make, nigel: Car) 
         return replace(channel, values=values)
 
     assert wrapped_in(check(changed(drive(0), "pose.yaw", jumping), nigel)) == []
+
+
+def test_the_account_names_the_channel_that_is_clipped(drive: Make, nigel: Car) -> None:
+    ready = prepare(clipped(drive(0), "imu.gyro_z", -0.2, 0.2), nigel)
+    (line,) = [line for line in ready.account if "Stops at" in line]
+    assert line.startswith("imu.gyro_z: Stops at ±0.2 rad/s")
+    assert line.endswith("These rows are left out.")
