@@ -19,6 +19,7 @@ from scm.data_quality.stuck import stuck_problems
 from scm.data_quality.suspect import from_repairs
 from scm.data_quality.suspicion import Quality, Relation, Suspicion
 from scm.data_quality.track import track
+from scm.data_quality.unmeasured import clipped_rows, wrapped_rows
 from scm.data_quality.usable import usable
 from scm.data_quality.way import uncounted, ways
 from scm.recording.read import Recording
@@ -38,6 +39,7 @@ def check(recording: Recording, car: Car | None = None) -> Quality:
     problems = list(row_problems(recording))
     problems += mend_heading(state)
     problems += mend_unsigned(state)
+    problems += [*wrapped_rows(state), *clipped_rows(state)]
     problems += mend_pairs(state, car)
     problems += mend_commands(state, car)
     now = state.recording
@@ -47,7 +49,8 @@ def check(recording: Recording, car: Car | None = None) -> Quality:
         poses = None
     movement = forward_speed(poses)
     sees_stops = poses is not None and poses.period_s < SLOWEST_WITNESS_S
-    problems += stuck_problems(now, found, movement if sees_stops else None)
+    clipped = [span for p in problems if p.name == "clipped" for span in p.when_s or ()]
+    problems += stuck_problems(now, found, movement if sees_stops else None, clipped)
     not_own = no_witnesses(problems)
     found = [way for way in found if not not_own.intersection((*way.channels, way.name))]
     problems += command_problems(now, movement, poses, car)

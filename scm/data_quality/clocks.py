@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scm.arrays import Floats
-from scm.data_quality.track import Grid
+from scm.arrays import Bools, Floats
+from scm.data_quality.track import FEWEST, Grid
 
 STEP_S = 0.02
 WIDTH_S = 0.12
@@ -70,6 +70,15 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
     return Lag(delay, rate, float(curve[best]), sign * _size(a, sign * b), sure, gain)
 
 
+def size_where(first: Floats, second: Floats, lag: Lag, known: Bools, step_s: float) -> float:
+    """Return how large the first is against the second, signed, while the second is known."""
+    steps = round(lag.delay_s / step_s)
+    a, b = _overlap(first, second, steps)
+    rows = _overlap(first, known.astype(np.float64), steps)[1] > 0.0
+    sign = float(np.sign(lag.alike)) or 1.0
+    return sign * _size(a[rows], sign * b[rows]) if rows.sum() > FEWEST else lag.size
+
+
 def _clipped(values: Floats) -> Floats:
     """Return values without spikes, that one glitch may not outweigh a whole drive."""
     middle = float(np.median(values))
@@ -82,7 +91,7 @@ def _size(first: Floats, second: Floats) -> float:
 
     def ratio(over: Floats, under: Floats) -> float:
         usual, most = np.percentile(np.abs(under), (70, MOST))
-        large = np.abs(under) > max(usual, LARGE * most, 1e-30)
+        large = np.abs(under) >= max(usual, LARGE * most, 1e-30)  # a clipped signal has no more
         return max(float(np.median(over[large] / under[large])), 1e-12) if large.any() else 1e-12
 
     return float(np.sqrt(ratio(first, second) / ratio(second, first)))

@@ -20,6 +20,7 @@ from scm.vehicles.car import Car
 
 NO_WITNESS = ("derived", "copied", "unrelated")
 AROUND_S = 0.1
+ACCELEROMETER = ("imu.accel_x", "imu.accel_y")
 
 
 def compare_all(
@@ -43,17 +44,17 @@ def compare_all(
     timed: list[Relation] = []
     suspicions: list[Suspicion] = []
     for name in GYROS:
-        gyro = (
-            None if name in not_own else _turned(recording, _moving(poses, problems, (name,)), name)
-        )
+        rows = None if name in not_own else _measured(poses, problems, (name,))
+        gyro = None if rows is None else _turned(recording, rows, name)
         if gyro is not None:
             timed.append(gyro)
             suspicions += suspect.from_gyro(gyro)
     late = _late(timed[0]) if timed else (0.0, 0.0)
-    push = push_of(recording, poses, late)
+    clipped = {problem.channel for problem in problems if problem.name == "clipped"}
+    push = None if clipped.intersection(ACCELEROMETER) else push_of(recording, poses, late)
     for way in found:
-        rows = _moving(poses, problems, way.channels)
-        travel = travel_against(rows, way.distance, way.name, late)
+        rows = _measured(poses, problems, way.channels)
+        travel = None if rows is None else travel_against(rows, way.distance, way.name, late)
         if travel is not None:
             timed.append(travel)
             suspicions += suspect.from_travel(travel, way, wheelbase, push)
@@ -75,15 +76,22 @@ def no_witnesses(problems: Sequence[DataProblem]) -> set[str]:
     return {problem.channel for problem in problems if problem.name in NO_WITNESS}
 
 
-def _moving(poses: Track, problems: Sequence[DataProblem], channels: tuple[str, ...]) -> Track:
-    """Return the poses while none of these channels, nor the pose itself, was frozen."""
+def _measured(
+    poses: Track, problems: Sequence[DataProblem], channels: tuple[str, ...]
+) -> Track | None:
+    """Return the poses while these channels, and the pose itself, showed what they measure.
+
+    None where hardly any are left.
+    """
     keep = np.ones(len(poses.t), dtype=np.bool_)
+    around_s = {"frozen": AROUND_S, "clipped": max(AROUND_S, 0.5 * poses.longest_step_s)}
     for problem in problems:
         concerned = problem.channel in channels or problem.channel.startswith("pose.")
-        if problem.name == "frozen" and concerned:
+        if problem.name in around_s and concerned:
             for start, end in problem.when_s or ():
-                keep &= (poses.t < start - AROUND_S) | (poses.t > end + AROUND_S)
-    return poses.cut(keep) if keep.sum() >= FEWEST else poses
+                around = around_s[problem.name]
+                keep &= (poses.t < start - around) | (poses.t > end + around)
+    return poses.cut(keep) if keep.sum() >= FEWEST else None
 
 
 def _turned(recording: Recording, poses: Track, name: str) -> Relation | None:

@@ -8,12 +8,12 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.suspicion import Quality, Repair
-from scm.data_quality.track import POSE, Series, Track, grid, long_gaps, track
+from scm.data_quality.track import POSE, Series, Track, grid, inside, long_gaps, track
 from scm.recording.read import Channel, Recording
 
 WIDTH_S = 0.1
 STEP_S = 0.02
-SHARED = 0.2  # of the stamps, where x, y and yaw are columns of one table
+SHARED = 0.6  # of the stamps, where x, y and yaw are columns of one table with empty cells
 
 
 def corrected(recording: Recording, quality: Quality) -> Recording:
@@ -25,9 +25,9 @@ def corrected(recording: Recording, quality: Quality) -> Recording:
 
 
 def _whole_poses(recording: Recording) -> Recording:
-    """Return a recording whose poses are whole: x, y and yaw of the same rows, as far as any are.
+    """Return a recording whose poses are whole: without the rows that lack x, y or yaw.
 
-    Where they were never rows of one table they stay as they are.
+    Where each comes at a rate of its own they stay as they are.
     """
     poses = {name: recording.channels[name] for name in POSE if name in recording.channels}
     if len(poses) < len(POSE):
@@ -77,4 +77,5 @@ def _repaired(channel: Channel, repair: Repair, signs: Series | None) -> Channel
         values = np.abs(values) * np.where(signs.at(t) < 0.0, -1.0, 1.0)
     # Nobody knows in which unit a std beside a wrong unit was meant: the values tell it instead.
     std = channel.std if abs(repair.factor) == 1.0 else None
-    return replace(channel, t=t, values=values, std=std)
+    changed = replace(channel, t=t, values=values, std=std)
+    return changed.at(~inside(t, repair.out_s)) if repair.out_s else changed

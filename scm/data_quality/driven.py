@@ -9,6 +9,7 @@ from scm.data_quality.problem import DataProblem
 from scm.data_quality.track import Grid, Series, Track, clean, grid, held, long_gaps
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
+from scm.vehicles.drive_channel import COMMANDED_SPEEDS
 
 LARGEST_COMMAND = 1.05
 LARGEST_ANGLE = 1.2
@@ -24,7 +25,7 @@ QUICK_S, APART_S = 4.0, 3.0
 LONGEST_S, SHORT_S, SHORTEST_S = 20.0, 8.0, 5.0
 RELATED_SHORT = 0.6  # a few seconds of two drives are alike by chance more often
 WHEELBASE_M, TURNED_RAD, STARTS = 0.25, 0.25, 3
-DRIVE = ("command.throttle", "command.speed", "motor.current")
+DRIVE = ("command.throttle", "command.speed", "command.acceleration", "motor.current")
 RECORD = "Record what is sent to the car, throttle and steering, with the stamps of sending."
 
 
@@ -40,7 +41,7 @@ def command_problems(
         car: Says how long it is.
     """
     yield from _missing(recording)
-    for name in ("command.throttle", "command.steering", "command.speed"):
+    for name in ("command.throttle", "command.steering", *COMMANDED_SPEEDS):
         if name in recording.channels and len(clean(recording.channels[name]).t):
             channel = clean(recording.channels[name])
             yield from _range(recording, name, channel)
@@ -71,6 +72,15 @@ def _missing(recording: Recording) -> Iterator[DataProblem]:
             "driven again without one.",
             record_instead=RECORD,
         )
+    if "command.acceleration" in have and not have & {"command.throttle", "command.speed"}:
+        yield DataProblem(
+            channel="command.acceleration",
+            name="assumed",
+            said="The car is driven by its commanded acceleration: over more than 3 s its speed is "
+            "the measured one, so one that drifts slowly from its command does not show.",
+            corrected="Added up to a speed from the measured one.",
+            record_instead="Record the speed that the car was asked for as well.",
+        )
     if "command.steering" not in have:
         yield DataProblem(
             channel="command.steering",
@@ -93,7 +103,7 @@ def _range(recording: Recording, name: str, channel: Series) -> Iterator[DataPro
     angle = recording.channels[name].dimension == "angle"
     limit = LARGEST_ANGLE if angle else LARGEST_COMMAND
     largest = float(np.abs(channel.values).max())
-    if name == "command.speed" or largest <= limit:
+    if name in COMMANDED_SPEEDS or largest <= limit:
         return
     beyond = float((np.abs(channel.values) > limit).mean())
     yield DataProblem(

@@ -5,31 +5,35 @@ the other, and how late. What is found can be undone; see `corrected.py`.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from scm.arrays import Floats
-from scm.data_quality.clocks import STEP_S, WIDTH_S, Lag, lag_between
-from scm.data_quality.track import Series, Track, between_gaps_s, grid, long_gaps
+from scm.data_quality.clocks import STEP_S, WIDTH_S, Lag, lag_between, size_where
+from scm.data_quality.problem import Span
+from scm.data_quality.track import Series, Track, between_gaps_s, grid, inside, long_gaps
 from scm.recording.units import G
 
 DEGREES = math.degrees(1.0)
+SHIFTED = {10.0**k: "a shifted decimal point" for k in (-3, -2, -1, 1, 2, 3)}
 FACTORS: Mapping[str, Mapping[float, str]] = {
     "angular speed": {
-        DEGREES: "deg/s", 1.0 / DEGREES: "rad/s labelled deg/s", 1e3: "mrad/s",
+        **SHIFTED, DEGREES: "deg/s", 1.0 / DEGREES: "rad/s labelled deg/s",
+        1e2 * DEGREES: "hundredths of deg/s", 1e3 * DEGREES: "mdeg/s", 1e3: "mrad/s",
         60.0 / math.tau: "rpm", math.tau / 60.0: "rad/s labelled rpm",
     },
     "speed": {
-        3.6: "km/h", 1.0 / 3.6: "m/s labelled km/h", 1e3: "mm/s", 1e-3: "m/s labelled mm/s",
-        1e2: "cm/s", 1e-2: "m/s labelled cm/s", 1.0 / 0.44704: "mph", 0.44704: "m/s labelled mph",
+        **SHIFTED, 3.6: "km/h", 1.0 / 3.6: "m/s labelled km/h", 1e3: "mm/s",
+        1e-3: "m/s labelled mm/s", 1e2: "cm/s", 1e-2: "m/s labelled cm/s",
+        1.0 / 0.44704: "mph", 0.44704: "m/s labelled mph",
         2.0: "twice the counts a turn", 4.0: "four times the counts a turn",
         0.5: "half the counts a turn", 0.25: "a quarter of the counts a turn",
     },
     "acceleration": {
         1.0 / G: "g", G: "m/s^2 labelled g", 1e3 / G: "mg", 1e3: "mm/s^2",
-        1e-3: "m/s^2 labelled mm/s^2",
+        1e-3: "m/s^2 labelled mm/s^2", 1e2: "cm/s^2", 1e-2: "m/s^2 labelled cm/s^2",
     },
 }  # fmt: skip
 NEAR = 0.08
@@ -39,7 +43,7 @@ ALIKE = 0.6
 LEVEL, BETTER = 0.95, 0.05  # wheels that spin follow the car that badly
 UNLIKE = 0.35
 FAR_S = 0.2
-LARGEST_UNKNOWN = 50.0  # a factor that is no unit's
+LARGEST_UNKNOWN = 1500.0  # a factor that is no unit's: beyond milli-units one signal hardly moves
 SMALLEST_SIZE, LARGEST_SIZE = 0.6, 1.0 / 0.6
 
 
@@ -98,8 +102,14 @@ class Sensed:
     order: int = field(default=0)
 
 
-def compare(first: Sensed, second: Sensed) -> Pair | None:
-    """Hold two signals of one motion against each other; None where either hardly moves."""
+def compare(first: Sensed, second: Sensed, clipped: Sequence[Span] = ()) -> Pair | None:
+    """Hold two signals of one motion against each other; None where either hardly moves.
+
+    Args:
+        first: One signal, the pose's wherever it takes part.
+        second: The other.
+        clipped: Spans in which the second was at the end of its range: its size is taken outside.
+    """
     a, b, shift = first.signal, second.signal, 0.0
     overlap = min(a.t[-1], b.t[-1]) - max(a.t[0], b.t[0])
     if overlap < 0.5 * min(np.ptp(a.t), np.ptp(b.t)):
@@ -120,6 +130,9 @@ def compare(first: Sensed, second: Sensed) -> Pair | None:
     if left.std() < 1e-9 or right.std() < 1e-9:
         return None
     lag = lag_between(left, right, on)
+    if clipped:
+        known = ~inside(on.t - shift, [(a - WIDTH_S, b + WIDTH_S) for a, b in clipped])
+        lag = replace(lag, size=size_where(left, right, lag, known, on.step_s))
     return Pair(first.channels, second.channels, first.what, lag, shift)
 
 

@@ -1,6 +1,6 @@
 """Gross faults found one after the other, each repaired before the next is looked for."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from scm.data_quality import gross
 from scm.data_quality.corrected import forward_speed, repaired
 from scm.data_quality.gross import Sensed, compare
-from scm.data_quality.problem import DataProblem
+from scm.data_quality.problem import DataProblem, Span
 from scm.data_quality.standing import moves
 from scm.data_quality.suspicion import Repair
 from scm.data_quality.track import Series, Track, recorded_s, series, track
@@ -30,6 +30,11 @@ class Mending:
         """Apply one more."""
         self.recording = repaired(self.recording, [repair])
         self.repairs.append(repair)
+
+    def left_out_s(self, channels: Iterable[str]) -> list[Span]:
+        """Return the spans whose rows are left out of any of these channels."""
+        names = set(channels)
+        return [span for one in self.repairs if names & {*one.channels} for span in one.out_s]
 
     @property
     def poses(self) -> Track | None:

@@ -28,7 +28,7 @@ from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
 POSE = ("pose.x", "pose.y", "pose.yaw")
-LENGTHS = (1e-3, 1e-2, 1e2, 1e3)
+LENGTHS = (1e-3, 1e-2, 1e-1, 1e1, 1e2, 1e3)
 CERTAIN, LARGEST_LEAK = 12.0, 3.0
 BELIEVABLE = (0.03, 1.4)  # of the car's top speed
 
@@ -56,7 +56,7 @@ def _pairs(now: Mending, car: Car | None) -> list[Pair]:
     found = [(turn, Sensed((name,), "angular speed", signal))
              for name in GYROS if (signal := series(now.recording, name)) is not None]  # fmt: skip
     found += [(go, Sensed(w.channels, "speed", w.distance, 1)) for w in ways(now.recording, car)]
-    pairs = (compare(first, second) for first, second in found)
+    pairs = (compare(first, second, now.left_out_s(second.channels)) for first, second in found)
     return [pair for pair in pairs if pair is not None]
 
 

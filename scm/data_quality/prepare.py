@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from scm.data_quality.check import check
 from scm.data_quality.corrected import corrected
-from scm.data_quality.problem import DataProblem
+from scm.data_quality.problem import DataProblem, folded
 from scm.data_quality.rows import called
 from scm.data_quality.screen import screen
 from scm.data_quality.stamps import Table, count_of, tables_of
@@ -16,8 +16,8 @@ from scm.recording.columns import LeftOut
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
-REPAIRS = ("unit", "sign", "clock")
-EMPTY = "not_finite"  # a cell without a number is no row that was changed
+REPAIRS = ("unit", "sign", "clock", "clipped", "wrapped", "assumed")
+UNCHANGED = ("not_finite", "assumed")  # a cell without a number is no row that was changed
 MOST_LISTED = 10  # reasons: whoever reads more has the wrong file
 
 
@@ -54,16 +54,16 @@ def prepare(recording: Recording, car: Car, *, strict: bool = False) -> Prepared
     cut = stretches(corrected(screened.recording, quality), car, screened.jumps)
     found = [p for p in quality.problems if not cut.explains(p)]
     done = (*screened.problems, *(p for p in found if p.name in REPAIRS and p.corrected))
-    changes = (*done, *cut.problems)
+    changes = folded((*done, *cut.problems))
     account = _account(tables_of(recording), recording.left_out, changes)
     no_rows = any(one.line is not None for one in recording.left_out)
-    if strict and (no_rows or any(p.name != EMPTY for p in changes)):
+    if strict and (no_rows or any(p.name not in UNCHANGED for p in changes)):
         refused = "".join(f"\n  {line}" for line in account[1:])
         msg = f"{recording.path}: --strict refuses to leave out, repair or cut:{refused}"
         raise RecordingError(msg)
     return Prepared(
         recordings=cut.recordings,
-        problems=(*screened.problems, *found, *cut.problems),
+        problems=folded((*screened.problems, *found, *cut.problems)),
         account=account,
         quality=quality,
     )
@@ -73,7 +73,8 @@ def _account(
     tables: Sequence[Table], left_out: Sequence[LeftOut], changes: Sequence[DataProblem]
 ) -> tuple[str, ...]:
     """Return which rows were read, and a line for each change: of a whole table by its file."""
-    files = {called(table.names): table.label for table in tables} | {"*": "all tables"}
+    files = {called(table.names): table.label for table in tables if len(table.names) > 1}
+    files |= {"*": "all tables"}
     read = "read " + "; ".join(map(_rows_of, tables))
     return (
         read,

@@ -1,8 +1,10 @@
 """A problem of a recording itself, as a report names it."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 Span = tuple[float, float]
+MOST_NAMED = 3  # channels that one line names; of more it gives their number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,3 +27,20 @@ class DataProblem:
     when_s: tuple[Span, ...] | None = None
     corrected: str = ""
     record_instead: str = ""
+
+
+def folded(problems: Iterable[DataProblem]) -> tuple[DataProblem, ...]:
+    """Return problems, those that say the same of several channels as one."""
+    alike = dict[DataProblem, list[str]]()
+    for problem in problems:
+        channels = alike.setdefault(replace(problem, channel=""), [])
+        if problem.channel not in channels:
+            channels.append(problem.channel)
+    return tuple(replace(one, channel=_together(names)) for one, names in alike.items())
+
+
+def _together(channels: list[str]) -> str:
+    if len(channels) <= MOST_NAMED:
+        return ", ".join(channels)
+    families = dict.fromkeys(name.partition(".")[0] + ".*" * ("." in name) for name in channels)
+    return f"{len(channels)} channels ({', '.join(families)})"

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import partial
 
+from scm.data_quality.bursts import without_bursts
 from scm.data_quality.counters import repaired_counters
 from scm.data_quality.limits import limits_of
 from scm.data_quality.problem import DataProblem, Span
@@ -41,7 +42,13 @@ def screen(recording: Recording, car: Car) -> Screened:
     """
     limits = limits_of(car)
     now, problems = with_numbers(recording)
-    for step in (partial(in_seconds, limits=limits), without_strays, in_order, without_repeats):
+    for step in (
+        partial(in_seconds, limits=limits),
+        without_strays,
+        in_order,
+        without_bursts,
+        without_repeats,
+    ):
         now, found = step(now)
         problems += found
     now, found, jumps = without_spikes(now, limits)

@@ -1,6 +1,6 @@
 """Values of a recording: frozen, held, copied from another channel, coarse."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from itertools import combinations
 
 import numpy as np
@@ -29,7 +29,7 @@ MOTION = ("pose.", "velocity.", "speed", "yaw_rate", "wheel_speed.", "encoder.",
 
 
 def stuck_problems(
-    recording: Recording, found: list[Way], movement: Series | None
+    recording: Recording, found: list[Way], movement: Series | None, clipped: Collection[Span] = ()
 ) -> Iterator[DataProblem]:
     """Yield channels whose values cannot be what a sensor of a moving car says.
 
@@ -37,10 +37,13 @@ def stuck_problems(
         recording: Repaired.
         found: Sensors of distance.
         movement: As the poses show it; None where the car stands or nothing shows it.
+        clipped: Spans in which a sensor stays at the end of its range.
     """
     yield from _held(recording)
     coarse = list(_coarse(recording))
-    yield from _frozen(recording, movement, found, {problem.channel for problem in coarse})
+    for problem in _frozen(recording, movement, found, {problem.channel for problem in coarse}):
+        if not set(problem.when_s or ()) <= set(clipped):
+            yield problem
     yield from _copied(recording)
     if movement is not None:
         yield from _derived(recording, movement)

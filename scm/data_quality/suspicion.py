@@ -74,6 +74,7 @@ class Repair:
     Attributes:
         channels: Exact names.
         signed: Only the size was recorded: the values take the sign of the pose's speed.
+        out_s: The rows in these spans are left out.
     """
 
     channels: tuple[str, ...]
@@ -81,6 +82,7 @@ class Repair:
     offset: float = 0.0
     shift_s: float = 0.0
     signed: bool = False
+    out_s: tuple[Span, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

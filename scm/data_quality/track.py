@@ -19,6 +19,7 @@ FEWEST = 8
 SHORTEST_ISLAND_S = 0.5
 HELD_SHARE = 0.6
 LONGEST_RUN = 50
+SLOWER = 1.5  # times the rows' usual step: a sensor of its own
 POSE = ("pose.x", "pose.y", "pose.yaw")
 
 
@@ -60,9 +61,14 @@ class Track:
         return float(np.median(np.diff(self.t)))
 
     @property
+    def longest_step_s(self) -> float:
+        """Longest time between two rows that is no gap."""
+        return max(GAP_S, GAP_STEPS * self.period_s)
+
+    @property
     def starts(self) -> tuple[int, ...]:
         """First row of each stretch without gap or jump."""
-        gap = np.diff(self.t) > max(GAP_S, GAP_STEPS * self.period_s)
+        gap = np.diff(self.t) > self.longest_step_s
         return (0, *(int(i) + 1 for i in np.flatnonzero(gap | jumped(self))))
 
     @property
@@ -166,6 +172,13 @@ def held(channel: Series, t: Floats) -> Floats:
     return channel.values[np.maximum(row, 0)]
 
 
+def inside(t: Floats, spans: Iterable[Span]) -> Bools:
+    """Return which times lie in any of some spans."""
+    begins, ends = np.array(sorted(spans)).T
+    i = np.searchsorted(begins, t, side="right") - 1
+    return np.asarray((i >= 0) & (t <= np.maximum.accumulate(ends)[i]))
+
+
 def runs(values: Floats, t: Floats | None = None) -> tuple[Ints, Ints]:
     """Return where runs of equal values start, and where they end: at long gaps of `t` too."""
     edges = np.flatnonzero(np.diff(values) != 0.0) + 1
@@ -205,13 +218,17 @@ def track(recording: Recording) -> Track | None:
 
 
 def track_with_jumps(recording: Recording) -> Track | None:
-    """Return the poses at the rear axle, every one of them; None where too few."""
+    """Return the poses at the rear axle, every one of them; None where too few.
+
+    A pose stands at each row of the slowest of its channels; the others are interpolated.
+    """
     x, y, yaw = (series(recording, name) for name in POSE)
     if x is None or y is None or yaw is None:
         return None
     turned = Series(yaw.t, np.unwrap(yaw.values))
-    inside = (x.t >= max(y.t[0], yaw.t[0])) & (x.t <= min(y.t[-1], yaw.t[-1]))
-    t = x.t[inside]
+    slowest = max((x, y, yaw), key=lambda one: one.period_s)
+    t = slowest.t if slowest.period_s > SLOWER * x.period_s else x.t
+    t = t[(t >= max(x.t[0], y.t[0], yaw.t[0])) & (t <= min(x.t[-1], y.t[-1], yaw.t[-1]))]
     if len(t) < FEWEST:
         return None
     px, py = next((p for p in (recording.channels[n].point for n in POSE) if any(p)), (0.0, 0.0))
@@ -222,7 +239,7 @@ def track_with_jumps(recording: Recording) -> Track | None:
 
 def jumped(poses: Track) -> Bools:
     """Return which steps from pose to pose are farther than the car can have moved, `(n - 1,)`."""
-    dt = np.diff(poses.t)
+    dt = np.maximum(np.diff(poses.t), poses.period_s)  # the row after a late one comes too soon
     far = np.hypot(np.diff(poses.x), np.diff(poses.y))
     return _too_far(far, dt, 0.01) | _too_far(np.abs(np.diff(poses.yaw)), dt, 0.15)
 

@@ -123,10 +123,10 @@ def _seen(drive: Drive, variable: str, axis: int) -> Floats:
     if variable == "time":
         return drive.edges
     if variable == "speed":
-        return np.hypot(x.rate, y.rate)
+        return drive.pose_speed
     if variable == "yaw rate":
         return yaw.rate
-    return (x, y)[axis].value if variable == "position" else np.hypot(x.value, y.value)
+    return (x, y)[axis].value if variable == "position" else np.hypot(x.value, y.at(x.t))
 
 
 def _acted(

@@ -22,7 +22,7 @@ from scm.mismatch.evidence import Curve, Evidence, FreeRuns, Tried
 from scm.mismatch.experiment.folders import folders_of
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.suggest import Suggestion
-from scm.mismatch.explain import effect_of, ordinary_of, tried_of, undecided_of
+from scm.mismatch.explain import effect_of, ordinary_of, tried_of, undecided_of, widened_of
 from scm.mismatch.findings import Diagnosis, Effect, Fit, Unasked, Undecided, Verdict
 from scm.mismatch.fit import Fitted, Fitter
 from scm.mismatch.judge import judge, nothing_got_worse
@@ -425,6 +425,7 @@ def told(searched: Searched, tell: Tell) -> Found:
         ordinary=as_written(ordinary_of(model, best, car), found_car or car), tried=searched.tried,
         curves=_curves(model, best, searched.sought), retuned_m=retuned_m,
         pauses=_pauses(searched),
+        widened=widened_of(model, car),
     )  # fmt: skip
     return Found(
         diagnosis, car, evidence, model, best, search.retuned, suggestions, searched, found_car,

@@ -108,6 +108,7 @@ class Evidence:
             refitted and no effect; None where none was found, then `after` is that car.
         pauses: Of a recording that was cut into stretches, by stretch: its first time as drawn,
             and how much later the recording's clock is [s]. Pauses are not drawn.
+        widened: What was believed less firmly than car file and recording state it.
     """
 
     vehicle: str
@@ -119,3 +120,4 @@ class Evidence:
     tried: tuple[Tried, ...] = ()
     retuned_m: float | None = None
     pauses: tuple[tuple[float, float], ...] = ()
+    widened: tuple[str, ...] = ()

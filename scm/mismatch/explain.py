@@ -1,7 +1,7 @@
 """What is said of a model that was found: its effects, their rivals, what stays undecided."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,13 +16,18 @@ from scm.mismatch.laws.decide import is_law
 from scm.mismatch.laws.law import Law
 from scm.mismatch.laws.seek import Sought
 from scm.mismatch.laws.sensed import Sensed
-from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.likelihood import LEAST_SCATTER, LOCK, TIMING_S, UNKNOWN, Likelihood
 from scm.mismatch.listed import Candidate, Knob
-from scm.mismatch.report.wording import quantity
+from scm.mismatch.report.wording import joined, percent, quantity, short
 from scm.mismatch.search import Search
 from scm.vehicles.car import Car
 
 NINETY = 1.645
+WORTH_SAYING = 1.1  # times what was stated
+WHY = {
+    "body.mass_kg": "cars are weighed without cables, tape and battery",
+    LOCK: "no data sheet tells a locked axle from an open one",
+}
 WIDER = 1.3  # intervals from curvature alone are too narrow for what any model leaves out
 LAW = 0.03  # of an effect's size: no equation of an effect is exactly that of the car
 SHARES = {"slope", "difference", "fraction", "fraction_per_min"}
@@ -63,6 +68,54 @@ def ordinary_of(model: Likelihood, best: Fitted, car: Car) -> tuple[Ordinary, ..
 def covariance_of(best: Fitted) -> Floats:
     """Return the covariance of a model's numbers; where none was worked out, the car file's."""
     return best.covariance if best.covariance.size else np.eye(len(best.z) + best.knobs)
+
+
+def widened_of(model: Likelihood, car: Car) -> tuple[str, ...]:
+    """Return what was believed less firmly than car file and recording state it, a sentence each.
+
+    Args:
+        model: With its belief about noise.
+        car: As given.
+    """
+    said = list[str]()
+    for own in model.ordinary:
+        stated = car.quantity(own.key).std if car.has(own.key) else None
+        now = f"{short(own.std)} {model.unit(own.key)}".rstrip(" 1")
+        if stated and own.std > WORTH_SAYING * stated:
+            share = percent(LEAST_SCATTER[own.key])
+            said.append(
+                f"The car file's std of {own.key}, {short(stated)}, was taken as {now}, {share} of "
+                f"the value: {WHY[own.key]}."
+            )
+        elif own.key in UNKNOWN and not stated:
+            said.append(
+                f"The car file states no std of {own.key}: it was taken as {short(own.mean)} ± "
+                f"{now}, because {WHY[own.key]}."
+            )
+    said.append(
+        f"Stamps of poses and commands may be off by {short(1e3 * TIMING_S)} ms, because no "
+        "recording's are better."
+    )
+    said += _noise_said(model)
+    return tuple(said)
+
+
+def _noise_said(model: Likelihood) -> Iterator[str]:
+    """Yield which stated noise of the recordings was taken for another."""
+    alike = dict[tuple[float, float], list[str]]()
+    for drive in model.drives[:1]:
+        for stream in drive.streams:
+            stated = drive.recording.channels[stream.name].std
+            scale = model.noise.scale.get(stream.name, 1.0)
+            if stated and stream.name.startswith("encoder."):
+                scale *= stream.std / stated
+            if stated and not 1.0 / WORTH_SAYING < scale < WORTH_SAYING:
+                alike.setdefault((stated, scale * stated), []).append(stream.name)
+    for (stated, taken), names in alike.items():
+        yield (
+            f"The recording's std of {joined(names)}, {short(stated)}, was taken as "
+            f"{short(taken)}, because its rows differ from any car's motion by as much."
+        )
 
 
 def tried_of(search: Search) -> tuple[Tried, ...]:

@@ -56,7 +56,7 @@ class _Judged:
 
 def horizon_of(drives: Sequence[Drive], parts: Parts) -> float:
     """Return how long windows should be: 1 s for a fast car, 3 s for a slow one, or a block."""
-    speeds = [np.hypot(d.smoothed["pose.x"].rate, d.smoothed["pose.y"].rate) for d in drives]
+    speeds = [drive.pose_speed for drive in drives]
     fast = float(np.percentile(np.concatenate(speeds), 90)) > FAST_MPS
     blocks = [b - a for name in NAMES for spans in getattr(parts, name).spans for a, b in spans]
     longest = 0.9 * _usual(blocks) if blocks else SLOW_HORIZON_S

@@ -31,7 +31,7 @@ class Ordinary:
 
 
 LOCK = "drive.axle_lock"
-_UNKNOWN = {LOCK: (0.5, 0.5)}  # what no car file says and every car has
+UNKNOWN = {LOCK: (0.5, 0.5)}  # what no car file says and every car has
 SETTLED_S = 1.0
 KEPT = 160  # sets whose residuals are remembered
 TIMING_S = 0.003  # no recording's stamps, and no model of a motor's controller, are better
@@ -47,8 +47,8 @@ def ordinary_numbers(car: Car, params: Sequence[Param]) -> tuple[Ordinary, ...]:
     found = dict[str, Ordinary]()
     for param in params:
         std = car.quantity(param.key).std
-        if param.key in _UNKNOWN:
-            mean, std = _UNKNOWN[param.key]
+        if param.key in UNKNOWN and not std:
+            mean, std = UNKNOWN[param.key]
             found[param.key] = Ordinary(param.key, mean, std, param.bounds)
         elif param.fit and std:
             mean = car.value(param.key)
@@ -223,7 +223,7 @@ class Likelihood:
         It is 0 but for what no file says: there a car is driven by its equations' own number, and
         likeliest is another.
         """
-        own = [self.car.value(o.key) if o.key in _UNKNOWN else o.mean for o in self.ordinary]
+        own = [self.car.value(o.key) if o.key in UNKNOWN else o.mean for o in self.ordinary]
         return np.array([(x - o.mean) / o.std for x, o in zip(own, self.ordinary, strict=True)])
 
 

@@ -219,10 +219,10 @@ def shown_by(found: tuple[Candidate, ...], drives: Sequence[Drive]) -> tuple[Can
     """Return the candidates that these drives are fast enough to show."""
     fast, hard = 0.0, 0.0
     for drive in drives:
-        x, y, yaw = (drive.smoothed[f"pose.{name}"] for name in ("x", "y", "yaw"))
-        speed = np.hypot(x.rate, y.rate)
+        speed, yaw = drive.pose_speed, drive.smoothed["pose.yaw"]
+        turning = np.abs(yaw.rate_at(drive.smoothed["pose.x"].t))
         fast = max(fast, float(np.percentile(speed, 95)))
-        hard = max(hard, float(np.percentile(speed * np.abs(yaw.rate), 95)))
+        hard = max(hard, float(np.percentile(speed * turning, 95)))
     needs = {c.name: SHOWS_ABOVE.get(c.name, (0.0, 0.0)) for c in found}
     return tuple(
         c for c in found
@@ -238,8 +238,10 @@ def placed(found: Sequence[Candidate], drives: Sequence[Drive]) -> tuple[Candida
 
 def _spots(patch: Candidate, drives: Sequence[Drive]) -> tuple[Candidate, ...]:
     """Return a spot of other grip and one of other rolling resistance, from cells of the way."""
-    x = np.concatenate([drive.smoothed["pose.x"].value for drive in drives])
-    y = np.concatenate([drive.smoothed["pose.y"].value for drive in drives])
+    x, y = (
+        np.concatenate([d.smoothed[name].at(d.stream("pose.x").t) for d in drives])
+        for name in ("pose.x", "pose.y")
+    )
     cell = max(float(np.ptp(x)), float(np.ptp(y))) / SPOTS_ACROSS
     cells = np.stack((np.round(x / cell), np.round(y / cell)))
     centres = np.unique(cells, axis=1).T * cell

@@ -58,7 +58,7 @@ def usual_noise(drives: Sequence[Drive]) -> Noise:
     A launch leaves a tenth of a throttle leap's speed open, a steering leap a tenth of its turning.
     Less is never believed: two simulators of the same car differ by as much.
     """
-    speeds = [np.hypot(d.smoothed["pose.x"].rate, d.smoothed["pose.y"].rate) for d in drives]
+    speeds = [drive.pose_speed for drive in drives]
     turns = [np.abs(d.smoothed["pose.yaw"].rate) for d in drives]
     fast = max(float(np.percentile(np.concatenate(speeds), 90)), SLOWEST_MPS)
     turning = max(float(np.percentile(np.concatenate(turns), 90)), STRAIGHTEST_RAD_S)

@@ -11,8 +11,10 @@ from scm.arrays import Bools, Floats
 from scm.errors import RecordingError
 from scm.recording.read import Channel, Recording
 
+POSE = ("pose.x", "pose.y", "pose.yaw")
 HALF_WIDTH_S = 0.1
-LONGEST_GAP_S = 0.25
+LONGEST_GAP_S, GAP_STEPS = 0.25, 2.5  # without a pose: so long, or so many of its usual steps
+ONE_TABLE = 0.5  # of the rows have a stamp in common: x, y and yaw are columns of one table
 FASTEST_MPS = 20.0  # of a scaled car
 FASTEST_OVER_USUAL = 2.0  # of a full-size one: over the speed that it keeps below nearly always
 LARGEST_STEP_BACK_S = 1.0
@@ -41,23 +43,21 @@ class Motion:
 class Poses:
     """The pose channels of a recording, moved to the rear axle and made continuous.
 
-    A pose counts where all three channels have a row of the same time.
+    Where x, y and yaw are rows of one table, a pose counts where all three have a row. Where each
+    comes at a rate of its own, it counts at the rows of the slowest; the others are interpolated.
 
     Raises:
-        RecordingError: when x, y and yaw share no times, name different points of the body, or
-            time does not go forward.
+        RecordingError: when x, y and yaw have no time in common, name different points of the
+            body, or time does not go forward.
     """
 
     def __init__(self, recording: Recording) -> None:
-        channels = {name: forward(recording, name) for name in ("pose.x", "pose.y", "pose.yaw")}
-        common = reduce(np.intersect1d, (channel.t for channel in channels.values()))
-        if len(common) < 0.5 * max(len(channel.t) for channel in channels.values()):
-            msg = f"{recording.path}: pose.x, pose.y and pose.yaw must have the same times"
-            raise RecordingError(msg)
-        self.t: Floats = common
-        x, y, yaw = (c.values[np.isin(c.t, common)] for c in channels.values())
-        self.yaw = np.unwrap(yaw)
-        self.x, self.y = _at_rear_axle(x, y, self.yaw, _point(recording.path, channels))
+        channels = {name: forward(recording, name) for name in POSE}
+        self.t: Floats = _pose_times(recording.path, channels)
+        yaw = channels["pose.yaw"]
+        channels["pose.yaw"] = replace(yaw, values=np.unwrap(yaw.values))
+        x, y, self.yaw = (np.interp(self.t, c.t, c.values) for c in channels.values())
+        self.x, self.y = _at_rear_axle(x, y, self.yaw, pose_point(recording))
         self._broken = _broken_intervals(self.t, self.x, self.y)
 
     def motion(self, t: Floats) -> Motion:
@@ -120,11 +120,45 @@ def forward(recording: Recording, name: str) -> Channel:
     return replace(channel, t=channel.t[keep], values=channel.values[keep])
 
 
-def _point(path: Path, channels: Mapping[str, Channel]) -> tuple[float, float]:
-    """Return the measured point of the body: it may stand on any one of the pose channels."""
-    named = {name: channel.point for name, channel in channels.items() if any(channel.point)}
+def _pose_times(path: Path, channels: Mapping[str, Channel]) -> Floats:
+    """Return the stamps at which all pose channels are known."""
+    stamps = {name: channel.t for name, channel in channels.items()}
+    common: Floats = reduce(np.intersect1d, stamps.values())
+    if len(common) >= ONE_TABLE * max(len(t) for t in stamps.values()):
+        return common
+    found = max(stamps.values(), key=_usual_step)
+    for t in stamps.values():
+        after = np.clip(np.searchsorted(t, found), 1, len(t) - 1)
+        near = (t[after] == found) | (t[after] - t[after - 1] <= _longest_step(t))
+        found = found[near & (found >= t[0]) & (found <= t[-1])]
+    if len(found) == 0:
+        spans = ", ".join(
+            f"{name} from {t[0]:.3f} s to {t[-1]:.3f} s" for name, t in stamps.items()
+        )
+        msg = f"{path}: pose channels have no time in common: {spans}"
+        raise RecordingError(msg)
+    return found
+
+
+def _usual_step(t: Floats) -> float:
+    return float(np.median(np.diff(t))) if len(t) > 1 else np.inf
+
+
+def _longest_step(t: Floats) -> float:
+    """Return the longest time between two rows that is no gap [s]."""
+    return max(LONGEST_GAP_S, GAP_STEPS * _usual_step(t))
+
+
+def pose_point(recording: Recording) -> tuple[float, float]:
+    """Return the measured point of the body [m]: it may stand on any one of the pose channels.
+
+    Raises:
+        RecordingError: when two channels name different points.
+    """
+    points = {name: recording.channel(name).point for name in POSE}
+    named = {name: point for name, point in points.items() if any(point)}
     if len(set(named.values())) > 1:
-        msg = f"{path}: point: expected the same on all pose channels, got {named}"
+        msg = f"{recording.path}: point: expected the same on all pose channels, got {named}"
         raise RecordingError(msg)
     return next(iter(named.values()), (0.0, 0.0))
 
@@ -141,8 +175,11 @@ def _at_rear_axle(
 def _broken_intervals(t: Floats, x: Floats, y: Floats) -> Bools:
     """Return which steps from pose to pose are a gap or a jump, shape `(n - 1,)`."""
     dt, step = np.diff(t), np.hypot(np.diff(x), np.diff(y))
-    usual = float(np.percentile(step / dt, 95)) if len(dt) else 0.0
-    broken: Bools = (dt > LONGEST_GAP_S) | (
-        step > max(FASTEST_MPS, FASTEST_OVER_USUAL * usual) * dt
+    if len(dt) == 0:
+        return np.zeros(0, dtype=np.bool_)
+    moved_s = np.maximum(dt, _usual_step(t))  # a row after a late one comes too soon, not too far
+    usual = float(np.percentile(step / moved_s, 95))
+    broken: Bools = (dt > _longest_step(t)) | (
+        step > max(FASTEST_MPS, FASTEST_OVER_USUAL * usual) * moved_s
     )
     return broken

@@ -43,6 +43,7 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
     "command.throttle": ("ratio",),
     "command.steering": ("ratio", "angle"),
     "command.speed": ("speed",),
+    "command.acceleration": ("acceleration",),
     "pose.x": ("length",),
     "pose.y": ("length",),
     "pose.z": ("length",),

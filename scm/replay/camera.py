@@ -40,6 +40,7 @@ class Camera:
     ) -> None:
         now = {key: float(numbers.get(key, neutral)) for key, neutral in NEUTRAL.items()}
         self._smoothed = smoothed or drive.smoothed
+        self._odometer = drive.odometer
         self._begin, self._late = float(drive.edges[0]), sum(now[key] for key in _LATE)
         self._rate, self._scale = now["measure.clock_rate"], now["measure.pose_scale"]
         self._tilt = now["measure.camera_tilt_x_per_m"], now["measure.camera_tilt_y_per_m"]
@@ -79,7 +80,11 @@ class Camera:
         return size * flat_x - c * px + s * py, size * flat_y - s * px - c * py, psi
 
     def motion(self, t: Floats) -> Moved:
-        """Return how the rear axle moved at true times."""
+        """Return how the rear axle moved at true times.
+
+        The speed along the body is the odometer's where that is known better than the rate of the
+        poses.
+        """
         x, y, yaw = self.truly(*self.recorded(self.stamp(t)))
         known = [self._smoothed[name].t for name in ("pose.x", "pose.y", "pose.yaw")]
         first, last = max(one[0] for one in known), min(one[-1] for one in known)
@@ -88,4 +93,17 @@ class Camera:
         span = np.maximum(self.taken(around[1]) - self.taken(around[0]), _TINY_S)
         vx, vy, rate = ((b - a) / span for a, b in zip(before, after, strict=True))
         c, s = np.cos(yaw), np.sin(yaw)
-        return Moved(x, y, yaw, c * vx + s * vy, c * vy - s * vx, rate)
+        return Moved(x, y, yaw, self._along(t, c * vx + s * vy), c * vy - s * vx, rate)
+
+    def _along(self, t: Floats, posed: Floats) -> Floats:
+        """Return the forward speed at true times, of which the poses' rate is one measurement."""
+        if self._odometer is None:
+            return posed
+        _, _, psi = self.recorded(self.stamp(t))
+        std_x, std_y = (
+            np.interp(self.stamp(t), smoothed.t, smoothed.rate_std)
+            for smoothed in (self._smoothed["pose.x"], self._smoothed["pose.y"])
+        )
+        posed_std = np.hypot(np.cos(psi) * std_x, np.sin(psi) * std_y)
+        counted, std = self._odometer.at(t)
+        return np.where(std < posed_std, counted / self._scale, posed)

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scm.arrays import Floats
+from scm.data_quality.corrected import forward_speed
+from scm.data_quality.track import Series, series, track
 from scm.errors import RecordingError
 from scm.recording.motion import forward
 from scm.recording.read import Channel, Recording
@@ -13,14 +15,16 @@ from scm.vehicles.drive_channel import drive_name
 from scm.vehicles.jit import array_kernel
 
 FULL_SPEED = "drive.full_speed_m_s"
+RAMP_S, HELD_S = 0.02, 1.0  # steps of a commanded acceleration, and how long a row counts
+ANCHORED_S = 3.0  # as long as a window: slower than that a commanded speed is the measured one
 LARGEST_COMMAND = 1.5  # some drivers overshoot 1 a little; a percentage is far beyond
 
 
 class Commands:
     """Recorded throttle and steering, held between their rows, as the car's commands in [-1, 1].
 
-    A car with `speed_control` is driven by the speed that was commanded, or else by the measured
-    one: then its throttle is that speed over the car's full one.
+    A car with `speed_control` is driven by the speed or the acceleration that was commanded, or
+    else by the measured speed: then its throttle is that speed over the car's full one.
     """
 
     def __init__(self, recording: Recording, car: Car) -> None:
@@ -66,7 +70,49 @@ def _drive_of(recording: Recording, car: Car) -> Channel:
     channel = forward(recording, name)
     if name == "command.throttle":
         return channel
+    if name == "command.acceleration":
+        channel = _speed_of(channel, recording, car.value(FULL_SPEED))
     return replace(channel, values=channel.values / car.value(FULL_SPEED), dimension="ratio")
+
+
+def _speed_of(acceleration: Channel, recording: Recording, full_mps: float) -> Channel:
+    """Return the speed that commanded accelerations ask for, from the measured one on.
+
+    It leads back to the measured speed within `ANCHORED_S`: no car keeps an acceleration so exactly
+    that the sum of minutes is still its speed.
+    """
+    measured = _measured_speed(recording)
+    steps = np.clip(np.ceil(np.diff(acceleration.t) / RAMP_S), 1, round(HELD_S / RAMP_S))
+    count = np.append(steps.astype(np.int64), 1)
+    row = np.repeat(np.arange(len(acceleration.t)), count)
+    since = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)) / count[row]
+    gap = np.append(np.diff(acceleration.t), 0.0)
+    t = acceleration.t[row] + since * gap[row]
+    rate = np.where(since * gap[row] < HELD_S, acceleration.values[row], 0.0)
+    step = np.diff(t)
+    gained, lead = rate[:-1] * np.minimum(step, HELD_S), -np.expm1(-step / ANCHORED_S)
+    target = measured.at(t)
+    speed = np.empty(len(t))
+    speed[0] = now = float(target[0])
+    for k in range(len(step)):
+        now += gained[k]
+        now += lead[k] * (target[k + 1] - now)
+        speed[k + 1] = now = min(max(now, -full_mps), full_mps)
+    return replace(acceleration, t=t, values=speed)
+
+
+def _measured_speed(recording: Recording) -> Series:
+    """Return the forward speed that was measured, by the car itself or by its poses.
+
+    Raises:
+        RecordingError: when nothing measured it.
+    """
+    own = (series(recording, name) for name in ("speed", "velocity.x"))
+    found = next((one for one in own if one is not None), None) or forward_speed(track(recording))
+    if found is None:
+        msg = f"{recording.path}: command.acceleration needs a measured speed to begin with: "
+        raise RecordingError(msg + "expected speed, velocity.x or poses")
+    return found
 
 
 def _steering_limit(recording: Recording, car: Car) -> float:

@@ -12,11 +12,12 @@ import numpy as np
 
 from scm.arrays import Bools, Floats
 from scm.data_quality.problem import Span
-from scm.recording.motion import forward
+from scm.recording.motion import forward, pose_point
 from scm.recording.read import Recording
 from scm.replay.commands import Commanded, Commands
 from scm.replay.smooth import Smooth, smooth
 from scm.vehicles.car import Car
+from scm.vehicles.drive_channel import COMMANDED_SPEEDS
 
 STEP_S = 0.01
 FASTEST_HZ = {"imu.accel_x": 25.0, "imu.accel_y": 25.0, "imu.gyro_z": 50.0, "yaw_rate": 50.0,
@@ -34,6 +35,10 @@ KNOWN = (
 LEAP = 0.3
 BLIND_S, BLIND_STEPS = 1.0, 5.0  # without a pose for longer, and for so many of its usual steps
 POSES = ("pose.x", "pose.y", "pose.yaw")
+ODOMETERS = ("speed", "velocity.x")  # best first
+SLIP = 0.03  # of the speed: wheels that count it slip, and their tyres grow
+LARGEST_SCALE = 1.6  # of an odometer against the poses: beyond, it is another unit or another car
+FEWEST_ROWS, SMOOTHED_ROWS = 20, 4.0  # to tell its scale by, and those that share their noise
 _MAD = 1.4826
 
 
@@ -63,6 +68,37 @@ class Stream:
                       self.unsure[keep])  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class Odometer:
+    """Forward speed as the car itself measures it, in the metre of its poses.
+
+    Attributes:
+        smoothed: As recorded, without its noise.
+        scale: What one of its metres is in those of the poses.
+        unsure: Standard deviation of the scale, slip included, as a share of the speed.
+        usual: Speed that its errors go by where the car is slower: it feels no slow wheels [m/s].
+    """
+
+    smoothed: Smooth
+    scale: float
+    unsure: float
+    usual: float
+
+    def at(self, t: Floats) -> tuple[Floats, Floats]:
+        """Return the speed at given times, and its std: infinite where it was not measured."""
+        own = self.smoothed
+        speed = self.scale * own.at(t)
+        std = np.hypot(
+            self.scale * np.interp(t, own.t, own.std),
+            self.unsure * np.maximum(np.abs(speed), self.usual),
+        )
+        after = np.clip(np.searchsorted(own.t, t), 1, len(own.t) - 1)
+        steps = np.diff(own.t)
+        measured = (t >= own.t[0]) & (t <= own.t[-1])
+        measured &= steps[after - 1] <= BLIND_STEPS * np.median(steps)
+        return speed, np.where(measured, std, np.inf)
+
+
 class Drive:
     """One car's recording on the simulation's grid of `STEP_S`.
 
@@ -79,10 +115,11 @@ class Drive:
         throttle, steering = commands.rows
         names = [name for name in KNOWN if name in recording.channels and _can_predict(car, name)]
         streams = [_stream(recording, name) for name in names]
-        self.point = recording.channel("pose.x").point
-        pose = recording.channel("pose.x").t
-        first = _on_grid(max(float(pose[0]), commands.span_s[0]), float(throttle[0][0]))
-        last = min(float(pose[-1]), commands.span_s[1] + 0.05)
+        self.point = pose_point(recording)
+        poses = [recording.channel(name).t for name in POSES]
+        begin = max(float(t[0]) for t in poses)
+        first = _on_grid(max(begin, commands.span_s[0]), float(throttle[0][0]))
+        last = min(*(float(t[-1]) for t in poses), commands.span_s[1] + 0.05)
         steps = int((last - first) / STEP_S)
         self.edges: Floats = np.asarray(first + STEP_S * np.arange(steps + 1), dtype=np.float64)
         self.battery = commands.voltage(self.edges)
@@ -108,6 +145,36 @@ class Drive:
     def smoothed(self) -> dict[str, Smooth]:
         """The poses, smoothed without a car model, of the point that was measured."""
         return {name: smooth(s.t, s.values, s.std) for name, s in self._poses.items()}
+
+    @cached_property
+    def pose_speed(self) -> Floats:
+        """How fast the measured point moves, at the stamps of `pose.x`, without sign [m/s]."""
+        x, y = (self.smoothed[name] for name in POSES[:2])
+        return np.hypot(x.rate, y.rate_at(x.t))
+
+    @cached_property
+    def odometer(self) -> Odometer | None:
+        """The forward speed that the car measures itself; None where it follows no pose."""
+        name = next((name for name in ODOMETERS if name in self.names), None)
+        if name is None or len(self.stream(name).t) < FEWEST_ROWS:
+            return None
+        stream = self.stream(name)
+        smoothed = smooth(stream.t, stream.values, stream.std)
+        x, y, yaw = (self.smoothed[name] for name in POSES)
+        psi = yaw.at(smoothed.t)
+        along = np.cos(psi) * x.rate_at(smoothed.t) + np.sin(psi) * y.rate_at(smoothed.t)
+        usual = float(np.percentile(np.abs(smoothed.value), 90))
+        going = np.abs(smoothed.value) > 0.3 * usual
+        if going.sum() < FEWEST_ROWS:
+            return None
+        ratio = along[going] / smoothed.value[going]
+        scale = float(np.median(ratio))
+        if not 1.0 / LARGEST_SCALE < scale < LARGEST_SCALE:
+            return None
+        spread = _MAD * float(np.median(np.abs(ratio - scale)))
+        rows = min(going.sum(), going.mean() * len(x.t)) / SMOOTHED_ROWS
+        unsure = math.hypot(SLIP, spread / math.sqrt(max(rows, 1.0)))
+        return Odometer(smoothed, scale, unsure, scale * usual)
 
     @cached_property
     def turned(self) -> Floats:
@@ -171,7 +238,7 @@ def has_odometer(drive: Drive) -> bool:
 def is_led(drive: Drive) -> bool:
     """Say whether the measured speed drives the car, so that only how it turns can be judged."""
     given = any(term.name == "speed_control" for term in drive.car.terms)
-    return given and "command.speed" not in drive.recording.channels
+    return given and not any(name in drive.recording.channels for name in COMMANDED_SPEEDS)
 
 
 def _can_predict(car: Car, name: str) -> bool:

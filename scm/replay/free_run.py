@@ -22,7 +22,7 @@ from scm.replay.commands import Commands
 from scm.replay.drive import STEP_S, Drive
 from scm.replay.windows import Runs, Side, Windows, at_times
 from scm.vehicles.car import Car
-from scm.vehicles.drive_channel import drive_name
+from scm.vehicles.drive_channel import COMMANDED_SPEEDS, drive_name
 from scm.vehicles.undone import without_faults
 
 HORIZONS_S = (0.5, 1.0, 3.0)
@@ -79,8 +79,9 @@ def _refuse_incomplete(recording: Recording, car: Car) -> None:
     needed = (drive_name(recording, car), *NEEDED)
     missing = [name for name in needed if name not in recording.channels]
     if missing:
-        speed = missing[0] == "command.throttle" and "command.speed" in recording.channels
-        hint = f"; {car.name} has no speed_control, so command.speed cannot drive it"
+        given = next((name for name in COMMANDED_SPEEDS if name in recording.channels), "")
+        speed = missing[0] == "command.throttle" and given
+        hint = f"; {car.name} has no speed_control, so {given} cannot drive it"
         msg = f"{recording.path}: a replay needs {', '.join(needed)}; missing: {', '.join(missing)}"
         raise RecordingError(msg + (hint if speed else ""))
 

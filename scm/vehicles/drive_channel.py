@@ -3,7 +3,9 @@
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
-SPEEDS = ("command.speed", "speed")  # what drives a car whose throttle means a speed, best first
+# what a driver commands of a car whose throttle means a speed, best first
+COMMANDED_SPEEDS = ("command.speed", "command.acceleration")
+SPEEDS = (*COMMANDED_SPEEDS, "speed")
 
 
 def drive_name(recording: Recording, car: Car) -> str:

@@ -3,20 +3,24 @@
 import math
 import platform
 from collections.abc import Iterable
+from dataclasses import replace
 from importlib.metadata import version
 
 import scm
-from scm.data_quality.problem import DataProblem
+from scm.data_quality.problem import MOST_NAMED, DataProblem
 from scm.mismatch.evidence import Evidence, Ordinary
 from scm.mismatch.findings import Diagnosis, Effect, Fit
 from scm.mismatch.report.drawings import Drawings
 from scm.mismatch.report.first_screen import name_of
 from scm.mismatch.report.html_text import around, figure, section, table, tag
 from scm.mismatch.report.places import sensors, spans
+from scm.mismatch.report.problems import of_recording
 from scm.mismatch.report.wording import (
     capital,
     interval,
+    joined,
     percent,
+    pretty,
     quantities,
     quantity,
     short,
@@ -71,10 +75,11 @@ def expert_sections(
                 _fit_table(diagnosis.fit), _grid(map(figure, drawings.errors)),
                 _windows_head(drawings) + windows if drawings.windows else ""),
         section("numbers", "Numbers", _parameter_table(diagnosis),
-                _beside(figure(drawings.numbers), _ordinary_table(evidence, cars[0]))),
+                _beside(figure(drawings.numbers), _ordinary_table(evidence, cars[0])),
+                "".join(tag("p", pretty(said)) for said in evidence.widened)),
         section("tried", "What was tried, and what ruled rivals out",
                 _beside(figure(drawings.tried), _rival_table(diagnosis))),
-        section("data", "The recording itself", _data_table(diagnosis)),
+        section("data", "The recording itself", _data_table(diagnosis, evidence)),
         section("reading", "How to read this page", _reading()),
         section("inputs", "Inputs and versions", _inputs(diagnosis, evidence, cars)),
     ))  # fmt: skip
@@ -198,11 +203,25 @@ def _rival_table(diagnosis: Diagnosis) -> str:
     return table(("found", "rival", "probability", "ruled out by"), rows, (2,))
 
 
-def _data_table(diagnosis: Diagnosis) -> str:
+def _data_table(diagnosis: Diagnosis, evidence: Evidence) -> str:
     head = ("sensor", "problem", "what", "when", "put right", "record instead")
-    rows = [_data_row(problem) for problem in diagnosis.data]
+    rows = [_data_row(problem) for problem in _of_recordings(diagnosis.data, evidence)]
     nothing = tag("p", "Sensors were held against each other; nothing wrong was found.")
     return table(head, rows) or nothing
+
+
+def _of_recordings(problems: Iterable[DataProblem], evidence: Evidence) -> list[DataProblem]:
+    """Return problems, one for all recordings of which it says the same."""
+    alike = dict[DataProblem, list[str]]()
+    for problem in problems:
+        recording, said = of_recording(problem.said, evidence)
+        alike.setdefault(replace(problem, said=said), []).append(recording)
+    found = list[DataProblem]()
+    for problem, names in alike.items():
+        named = [name for name in dict.fromkeys(names) if name]
+        every = joined(named) if len(named) <= MOST_NAMED else f"{len(named)} recordings"
+        found.append(replace(problem, said=f"{every}: {problem.said}") if named else problem)
+    return found
 
 
 def _data_row(problem: DataProblem) -> tuple[str, ...]:

@@ -34,6 +34,7 @@ _SENSORS = {  # what a person calls the channels, in the order in which they are
     "throttle command": ("command.throttle",),
     "steering command": ("command.steering",),
     "speed command": ("command.speed",),
+    "acceleration command": ("command.acceleration",),
     "commands": ("command.*",),
 }  # fmt: skip
 _SINGLE = {"encoder.left": "left encoder", "encoder.right": "right encoder"}

@@ -49,7 +49,7 @@ def alike(problems: Sequence[DataProblem], evidence: Evidence) -> list[Alike]:
     """Return problems, those that say the same of several channels or recordings together."""
     found: dict[tuple[object, ...], Alike] = {}
     for problem in problems:
-        recording, said = _of_recording(problem.said, evidence)
+        recording, said = of_recording(problem.said, evidence)
         key = (problem.name, said, problem.record_instead, problem.when_s)
         one = found.setdefault(
             key, Alike(problem.name, said, problem.record_instead, [], [], problem.when_s)
@@ -59,7 +59,7 @@ def alike(problems: Sequence[DataProblem], evidence: Evidence) -> list[Alike]:
     return list(found.values())
 
 
-def _of_recording(said: str, evidence: Evidence) -> tuple[str, str]:
+def of_recording(said: str, evidence: Evidence) -> tuple[str, str]:
     """Return the recording that a sentence begins with, if it does, and the sentence."""
     for name in evidence.recordings:
         if said.startswith(f"{name}: "):

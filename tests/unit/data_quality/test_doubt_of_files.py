@@ -36,7 +36,7 @@ def without(recording: Recording, *names: str) -> Recording:
 
 
 def said(found: Quality | Prepared) -> set[tuple[str, str]]:
-    return {(problem.channel, problem.name) for problem in found.problems}
+    return {(name, p.name) for p in found.problems for name in p.channel.split(", ")}
 
 
 def holes(t: Floats, values: Floats) -> tuple[Floats, Floats]:

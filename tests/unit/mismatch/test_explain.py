@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch.explain import effect_of, ordinary_of, said, tried_of, upright
+from scm.mismatch.explain import effect_of, ordinary_of, said, tried_of, upright, widened_of
 from scm.mismatch.findings import Estimate
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.listed import by_name, candidates
@@ -80,3 +80,42 @@ def test_a_sentence_holds_numbers_as_a_mechanic_says_them(name, numbers, sentenc
         for key, (value, unit) in numbers.items()
     }
     assert said(by_name(candidates(big_nigel()), name), estimates) == sentence
+
+
+def weighed_to(std_kg):
+    car = big_nigel()
+    mass = replace(car.quantity("body.mass_kg"), std=std_kg)
+    return replace(car, values={**car.values, "body.mass_kg": mass})
+
+
+def test_a_std_of_the_car_file_that_was_widened_is_said_with_the_reason():
+    car = weighed_to(0.01)
+    model = Likelihood([Drive(made_drive(seconds=6.0), car)], car)
+    (said,) = [line for line in widened_of(model, car) if "body.mass_kg" in line]
+    assert "std of body.mass_kg, 0.01, was taken as 0.192 kg, 8 % of the value: cars are" in said
+    assert not any("body.mass_kg" in line for line in widened_of(model, weighed_to(0.5)))
+
+
+def test_a_number_that_no_file_states_is_said_to_be_assumed():
+    model, _, _ = made_fit.healthy()
+    (said,) = [line for line in widened_of(model, big_nigel()) if "axle_lock" in line]
+    assert "states no std of drive.axle_lock: it was taken as 0.5 ± 0.5" in said
+    assert any("3 ms" in line for line in widened_of(model, big_nigel()))
+
+
+def test_a_stated_std_of_an_axle_lock_is_used():
+    car = big_nigel()
+    lock = replace(car.quantity("drive.axle_lock"), value=0.8, std=0.1)
+    car = replace(car, values={**car.values, "drive.axle_lock": lock})
+    model = Likelihood([Drive(made_drive(seconds=6.0), car)], car)
+    (own,) = [own for own in model.ordinary if own.key == "drive.axle_lock"]
+    assert (own.mean, own.std) == (0.8, 0.1)
+
+
+def test_noise_that_is_larger_than_the_recording_states_is_said():
+    made = made_drive(seconds=6.0)
+    model = Likelihood([Drive(made, big_nigel())], big_nigel())
+    assert not any("recording's std" in line for line in widened_of(model, big_nigel()))
+    model.believe(replace(model.noise, scale={**model.noise.scale, "pose.x": 3.0, "pose.y": 3.0}))
+    (said,) = [line for line in widened_of(model, big_nigel()) if "recording's std" in line]
+    assert "std of pose.x and pose.y, 0.002, was taken as 0.006" in said

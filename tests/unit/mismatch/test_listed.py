@@ -1,5 +1,7 @@
 """The effects that a search may propose."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -82,3 +84,18 @@ def test_spots_begin_where_the_car_was():
     x = drive.smoothed["pose.x"].value
     assert all(x.min() - 0.5 <= start[0] <= x.max() + 0.5 for c in spots for start in c.starts)
     assert np.ptp([start[0] for start in spots[0].starts]) > 0.0
+
+
+@pytest.mark.parametrize("offset_s", [0.0, 0.004])
+def test_effects_are_listed_where_position_and_heading_have_rates_of_their_own(offset_s):
+    made = made_drive(seconds=8.0)
+    sent = made.channel("command.throttle")
+    channels, t = dict(made.channels), np.arange(0.02, 7.9, 1.0 / 12.0)
+    for name in ("pose.x", "pose.y"):
+        whole = channels[name]
+        stamps = t + (offset_s if name == "pose.y" else 0.0)
+        channels[name] = replace(whole, t=stamps, values=np.interp(stamps, whole.t, whole.values))
+    early = sent.t < 6.0  # poses go on after the commands
+    channels["command.throttle"] = replace(sent, t=sent.t[early], values=sent.values[early])
+    drive = Drive(replace(made, channels=channels), big_nigel())
+    assert placed(shown_by(candidates(big_nigel()), [drive]), [drive])

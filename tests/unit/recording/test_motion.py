@@ -81,12 +81,56 @@ def test_a_cell_missing_in_one_column_costs_that_pose_only() -> None:
     assert_allclose(poses.motion(np.array([10.0])).speed, SPEED_MPS, rtol=1e-3)
 
 
-def test_pose_channels_of_different_tables_are_refused() -> None:
+def at_rates(x_hz: float, y_hz: float, yaw_hz: float) -> Recording:
+    """A circle of which each pose channel has a table of its own, with stamps of its own."""
+    begins = {"pose.x": (0.0, x_hz), "pose.y": (0.001, y_hz), "pose.yaw": (0.003, yaw_hz)}
+    channels = {
+        name: circle(np.arange(begin, 20.0, 1.0 / hz)).channel(name)
+        for name, (begin, hz) in begins.items()
+    }
+    return Recording(Path("circle"), "nigel", channels)
+
+
+@pytest.mark.parametrize("rates", [(12, 12, 90), (90, 90, 12), (12, 30, 90), (50, 50, 50)])
+def test_a_pose_counts_at_the_stamps_of_its_slowest_channel(rates: tuple[int, int, int]) -> None:
+    poses = Poses(at_rates(*rates))
+    motion = poses.motion(np.array([5.0, 10.0, 15.0]))
+    assert len(poses.t) == pytest.approx(20.0 * min(rates), abs=2)
+    assert poses.unbroken(1.0, 19.0)
+    assert_allclose(motion.speed, SPEED_MPS, rtol=6e-3)
+    assert_allclose(motion.yaw_rate, SPEED_MPS / RADIUS_M, rtol=1e-3)
+    assert_allclose(np.hypot(motion.x, motion.y), RADIUS_M, atol=1e-3)
+
+
+def test_a_gap_in_the_faster_channel_is_not_bridged() -> None:
+    recording = at_rates(12, 12, 90)
+    yaw = recording.channel("pose.yaw")
+    recording.channels["pose.yaw"] = without(yaw, slice(720, 765))  # 8.0 s to 8.5 s
+    poses = Poses(recording)
+    assert not poses.unbroken(7.0, 9.0)
+    assert poses.unbroken(9.0, 12.0)
+
+
+def test_poses_of_three_a_second_are_slow_and_not_gaps() -> None:
+    assert Poses(circle(np.arange(0.0, 20.0, 1.0 / 3.0))).unbroken(1.0, 19.0)
+
+
+def test_pose_channels_that_never_meet_in_time_are_refused() -> None:
     recording = circle(np.arange(0.0, 20.0, 0.01))
-    y = recording.channel("pose.y")
-    recording.channels["pose.y"] = replace(y, t=y.t + 0.005)
-    with pytest.raises(RecordingError, match="same times"):
+    yaw = recording.channel("pose.yaw")
+    recording.channels["pose.yaw"] = replace(yaw, t=yaw.t + 100.0)
+    with pytest.raises(RecordingError, match=r"no time in common.*pose\.yaw from 100\.000 s"):
         Poses(recording)
+
+
+def test_late_stamps_are_no_jumps() -> None:
+    t = np.arange(0.0, 20.0, 0.02)
+    recording = circle(t)
+    late = t.copy()
+    late[500] += 0.0195  # handed over just before the next one
+    for name, channel in recording.channels.items():
+        recording.channels[name] = replace(channel, t=late, values=40.0 * channel.values)
+    assert Poses(recording).unbroken(1.0, 19.0)
 
 
 @pytest.mark.parametrize("keeps", ["pose.x", "pose.y", "pose.yaw"])
