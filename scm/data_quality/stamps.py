@@ -307,14 +307,16 @@ def in_order(recording: Recording) -> tuple[Recording, list[DataProblem]]:
     """Return a recording with the rows in the order of their stamps.
 
     Rows that were written late are sorted in. Of neighbours whose stamps are swapped by less than
-    half a step the second is left out. Where a clock was set back, what follows is moved behind
-    what came before, with a pause between them.
+    half a step the second is left out. Where all clocks were set back, what follows is moved behind
+    what came before, with a pause between them; where some were, it goes on beside the others.
     """
     recording, problems = _without_jitter(recording)
     every = tables_of(recording)
     cuts = {table.names: _resets(recording, table) for table in every}
     set_back = [table for table in every if len(cuts[table.names]) == max(map(len, cuts.values()))]
-    moves = _moves([_parts(table.t, cuts[table.names]) for table in set_back])
+    # a table whose clock alone was set back goes on beside the others, which did not pause
+    between_s = BETWEEN_S if len(set_back) == len(every) else max(map(_step, set_back))
+    moves = _moves([_parts(table.t, cuts[table.names]) for table in set_back], between_s)
     channels = dict(recording.channels)
     for table in every:
         t = table.t
@@ -356,12 +358,12 @@ def _parts(t: Floats, cuts: Sequence[int]) -> list[Floats]:
     return np.split(t, np.asarray(cuts, dtype=np.int64))
 
 
-def _moves(tables: Sequence[Sequence[Floats]]) -> list[float]:
+def _moves(tables: Sequence[Sequence[Floats]], between_s: float) -> list[float]:
     """Return what to add to the stamps of each part, so that it comes after the one before."""
     moves, end = list[float](), -np.inf
     for parts in zip(*tables, strict=True):
         begin = min(float(t.min()) for t in parts)
-        moves.append(0.0 if begin > end + BETWEEN_S or not moves else end + BETWEEN_S - begin)
+        moves.append(0.0 if begin > end + between_s or not moves else end + between_s - begin)
         end = max(float(t.max()) for t in parts) + moves[-1]
     return moves
 
@@ -404,8 +406,8 @@ def _order_problems(
         )
         by = ", ".join(f"{move:+.3f} s" for move in moves[1:4])
         yield problem(table.names, "time_backwards", (
-            f"The clock is set back {times(len(resets))}, {jumps}: these are several recordings.",
-            f"What follows is compared on its own, its stamps moved by {by}.",
+            f"The clock is set back {times(len(resets))}, {jumps}.",
+            f"What follows stands behind what came before, its stamps moved by {by}.",
             "Stamp with a clock that is never set, and write one file a drive.",
         ))  # fmt: skip
     lag = np.maximum.accumulate(moved) - moved
