@@ -19,6 +19,7 @@ LARGEST_BYTES = 1 << 30
 MOST_NAMED = 40
 MAX_BAD_CELLS = 0.1  # of a column; where more are no numbers it is no column of numbers
 NS_PER_S = 1_000_000_000
+ROW = "row"
 WORDS = {
     **dict.fromkeys(("", "nan", "na", "n/a", "null", "none", "#n/a", "-"), np.nan),
     **dict.fromkeys(("1.#ind", "-1.#ind", "1.#qnan", "nan(ind)", "-nan(ind)"), np.nan),  # Windows
@@ -69,6 +70,8 @@ class Selection:
 
 class Columns(Mapping[str, Floats]):
     """The columns of one file, each of shape `(rows,)`; an empty cell is NaN.
+
+    `row` counts the rows from 0, unless the file has a column of that name.
 
     Asking for a column raises a `RecordingError` when there is none of that name, when its name
     stands twice, or, with the line, when its cells are not numbers. A few that are not are NaN, and
@@ -169,6 +172,8 @@ class Columns(Mapping[str, Floats]):
         return nearest(name, known) or f"; it has {', '.join(known[:MOST_NAMED])}{more}"
 
     def _read(self, name: str) -> Floats:
+        if name == ROW and name not in self._known:
+            return np.arange(self.rows, dtype=np.float64)
         if name not in self._cells:
             msg = f"{self._path}: no column {name!r}{self._hint(name)}"
             raise RecordingError(msg)

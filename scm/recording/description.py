@@ -10,6 +10,7 @@ import msgspec
 import yaml
 
 from scm.errors import RecordingError, reading
+from scm.recording.shortcuts import written_out
 
 FILE_NAME = "recording.yaml"
 MAX_PROBLEMS = 20  # in one message: a screen of a terminal
@@ -37,6 +38,7 @@ class ChannelColumn(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
         column: Its column; or `expression` over columns, names with spaces in backquotes.
         unit: Of the value, and of `offset` and `std`; `1` without quotes is a number to YAML.
         std: Standard deviation of the value's noise; None: to be estimated.
+        variance: Column of the noise's variance, where rows give it, instead of `std`.
         scale, offset, sign: `value = sign * (scale * raw + offset)`, before the unit is converted.
         point: For poses: where on the body the point is, from the rear axle's centre [m].
     """
@@ -45,6 +47,7 @@ class ChannelColumn(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
     expression: str | None = None
     unit: str | int = "1"
     std: float | None = None
+    variance: str | None = None
     scale: float = 1.0
     offset: float = 0.0
     sign: Literal[1, -1] = 1
@@ -62,6 +65,8 @@ class Table(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
         definitions: Folder of `.msg` files, where a ROS 2 bag does not define its messages;
             relative as `file` is.
         where: Keep only rows for which this expression over columns is true.
+        hold_s: How long the car obeys a command that no other follows; from then on it is 0.
+            None: after the last command nothing is known.
     """
 
     file: str
@@ -72,6 +77,7 @@ class Table(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     definitions: str | None = None
     where: str | None = None
     vehicle: str | None = None
+    hold_s: float | None = None
 
 
 class Description(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -114,6 +120,8 @@ def read_description(path: Path) -> Description:
             msg = f"{path}: a description of more than {MAX_BYTES >> 20} MiB: is it the data?"
             raise RecordingError(msg)
         raw = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_Loader)
+    if isinstance(raw, dict) and isinstance(raw.get("tables"), list):
+        raw = {**raw, "tables": [written_out(table, path) for table in raw["tables"]]}
     try:
         description = msgspec.convert(raw, Description)
     except msgspec.ValidationError as cause:
@@ -167,6 +175,7 @@ def _problems(description: Description) -> list[str]:
         if not table.channels:
             problems.append(f"{where}: no channels")
         problems += _columns_problems(where, table.columns)
+        problems += _hold_problems(where, table)
         problems += _time_problems(where, table.time)
         problems += _channel_problems(where, table.channels)
     return problems
@@ -188,6 +197,15 @@ def _time_problems(where: str, time: TimeColumn) -> list[str]:
     if not math.isfinite(time.offset):
         problems.append(f"{where}: time: offset: expected a finite number, got {time.offset}")
     return problems
+
+
+def _hold_problems(where: str, table: Table) -> list[str]:
+    if table.hold_s is None:
+        return []
+    if not table.hold_s > 0.0:
+        return [f"{where}: hold_s: expected more than 0, got {table.hold_s}"]
+    commanded = any(name.startswith("command.") for name in table.channels)
+    return [] if commanded else [f"{where}: hold_s: the table has no command to hold"]
 
 
 def _channel_problems(where: str, channels: Mapping[str, ChannelColumn]) -> list[str]:

@@ -1,6 +1,7 @@
 """Formulas over the columns of a table: arithmetic, comparisons, and, or, not, some functions.
 
-The functions are `abs`, `sqrt`, `sin`, `cos`, `tan`, `atan` and `atan2(y, x)`; angles are in rad.
+The functions are `abs`, `sqrt`, `sin`, `cos`, `tan`, `atan`, `atan2(y, x)`, `min(a, b)` and
+`max(a, b)`; angles are in rad. `row` counts the rows of the file from 0.
 A text column may be compared with a word: "source == 'pose'". A column name that is not a plain
 word stands in backquotes: "`elapsed time` > 0 and gas > 0.1"; fields of messages need none:
 "2 * pose.position.x + axes[1]".
@@ -50,6 +51,8 @@ _FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
     "tan": (1, np.tan),
     "atan": (1, np.arctan),
     "atan2": (2, np.arctan2),
+    "min": (2, np.minimum),
+    "max": (2, np.maximum),
 }
 
 

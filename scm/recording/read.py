@@ -18,11 +18,16 @@ from scm.recording.description import (
     read_description,
 )
 from scm.recording.expression import columns_of, evaluate
+from scm.recording.scans import Scans, read_scans
+from scm.recording.shortcuts import SCAN
 from scm.recording.table import read_table, refuse_data
 from scm.recording.units import UNITS, dimensions_of, factor
 
 RowsOf = tuple[str, str | None, tuple[str | None, ...] | None, str | None]
 LONGEST_FROM_ZERO_S = 1e6  # one float holds so many seconds to a nanosecond
+TINY_S = 1e-6
+SILENCE_S = 0.2  # whoever drives a car commands it oftener
+LARGEST_VARIANCE = 1e3  # whoever does not know writes 1e6, 99999 or -1; nothing measures so badly
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +99,7 @@ class Recording:
         begin_s: From when a part of it counts: a run of a city begins before its car is driven;
             None: from the first row.
         left_out: What its files hold that is no row: broken lines, the rest of a cut-off file.
+        scans: Of its LIDAR, where the description names any.
     """
 
     path: Path
@@ -102,6 +108,7 @@ class Recording:
     name: str = ""
     begin_s: float | None = None
     left_out: tuple[LeftOut, ...] = ()
+    scans: Scans | None = None
 
     def channel(self, name: str) -> Channel:
         """Return a channel.
@@ -134,6 +141,8 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
     description = read_description(found)
     folder = found.parent if data is None else Path(data)
     by_vehicle: dict[str, dict[str, Channel]] = {}
+    scans: dict[str, Scans] = {}
+    held: dict[str, dict[str, float]] = {}
     names: dict[str, str] = {}
     loaded = _loaded(description.tables, folder, found)
     origin_s = _origin_s(description.tables, loaded)
@@ -142,17 +151,65 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
         vehicle = _vehicle(description, table, found.parent)
         names[vehicle] = table.vehicle or description.vehicle or ""
         channels = by_vehicle.setdefault(vehicle, {})
-        read = _channels(table, index, loaded[_rows_of(table)], found, origin_s)
-        for name, channel in read.items():
+        columns = loaded[_rows_of(table)]
+        for name, channel in _channels(table, index, columns, found, origin_s).items():
             if name in channels:
                 msg = f"{found}: table {table.file}: channel {name!r} of {vehicle} is given twice"
                 raise RecordingError(msg)
             channels[name] = channel
-        left_out.setdefault(vehicle, {}).update(dict.fromkeys(loaded[_rows_of(table)].left_out))
+            if table.hold_s is not None and name.startswith("command."):
+                held.setdefault(vehicle, {})[name] = table.hold_s
+        left_out.setdefault(vehicle, {}).update(dict.fromkeys(columns.left_out))
+        if SCAN in table.channels:
+            if vehicle in scans:
+                msg = f"{found}: table {table.file}: {vehicle} has the scans of another table too"
+                raise RecordingError(msg)
+            t, keep = _rows_kept(table, columns, f"{found}: table {table.file}", origin_s)
+            scans[vehicle] = read_scans(folder / table.file, table.topic, t, keep)
     return [
-        Recording(found, vehicle, channels, names[vehicle], left_out=tuple(left_out[vehicle]))
+        Recording(
+            path=found,
+            vehicle=vehicle,
+            channels=_held(channels, held.get(vehicle, {})),
+            name=names[vehicle],
+            left_out=tuple(left_out[vehicle]),
+            scans=scans.get(vehicle),
+        )
         for vehicle, channels in by_vehicle.items()
     ]
+
+
+def _held(channels: dict[str, Channel], hold_s: Mapping[str, float]) -> dict[str, Channel]:
+    """Return channels with a row at each moment of the poses at which a held command is silent."""
+    moments = channels["pose.x"].t if "pose.x" in channels else np.empty(0)
+    return {
+        name: _in_force(channel, hold_s[name], moments) if name in hold_s else channel
+        for name, channel in channels.items()
+    }
+
+
+def _in_force(command: Channel, hold_s: float, moments: Floats) -> Channel:
+    """Return a command with rows that say what the car obeys in silence: it, and then nothing.
+
+    Args:
+        command: As recorded.
+        hold_s: How long the car obeys a command that no other follows [s].
+        moments: At which something else is known of the car, (n,) [s].
+    """
+    order = np.argsort(command.t, kind="stable")
+    t = command.t[order]
+    ends = (t + hold_s)[t + hold_s < np.append(t[1:], np.inf)]
+    moments = np.union1d(moments[moments > t[0]], ends[ends < moments.max(initial=-np.inf)])
+    last = order[np.searchsorted(t, moments, side="right") - 1]
+    since = moments - command.t[last]
+    silent = since > min(SILENCE_S, 0.5 * hold_s)
+    moments, last = moments[silent], last[silent]
+    obeyed = np.where(since[silent] < hold_s - TINY_S, command.values[last], 0.0)
+    return replace(
+        command,
+        t=np.insert(command.t, last + 1, moments),
+        values=np.insert(command.values, last + 1, obeyed),
+    )
 
 
 def _rows_of(table: Table) -> RowsOf:
@@ -171,6 +228,7 @@ def _loaded(tables: Sequence[Table], folder: Path, path: Path) -> dict[RowsOf, C
                 names |= columns_of(source.expression, f"{path}: table {table.file}: {name}")
             else:
                 names.add(str(source.column))
+        names |= {one.variance for one in table.channels.values() if one.variance is not None}
         if table.where is not None:
             names |= columns_of(table.where, f"{path}: table {table.file}: where")
     return {
@@ -220,25 +278,41 @@ def _channels(
 ) -> dict[str, Channel]:
     """Return the channels of one table in SI, times counted from `origin_s`."""
     where = f"{path}: table {table.file}"
-    keep: Bools = np.ones(columns.rows, dtype=np.bool_)
-    if table.where is not None:
-        keep = evaluate(table.where, columns, columns.rows, f"{where}: where") > 0.0
-    t = _times(table, columns, f"{where}: time", origin_s)[keep]
-    _refuse_no_rows(t, where)
+    t, keep = _rows_kept(table, columns, where, origin_s)
     source = Source(
         table=f"{table.file} {table.topic}" if table.topic else table.file,
         index=index,
         rows=columns.rows,
-        excluded=columns.rows - len(t),
+        excluded=columns.rows - int(keep.sum()),
         numbers=np.flatnonzero(keep) + 1,
         time_unit=str(table.time.unit),
     )
-    return {
-        name: _channel(
-            name, channel, t, _values(channel, columns, f"{where}: {name}")[keep], where, source
-        )
-        for name, channel in table.channels.items()
-    }
+    found = {}
+    for name, channel in table.channels.items():
+        if name == SCAN:
+            continue
+        at = f"{where}: {name}"
+        raw = _values(channel, columns, at)[keep]
+        std = channel.std if channel.variance is None else _std(columns, channel.variance, at, keep)
+        found[name] = _channel(name, channel, t[keep], raw, std, where, source)
+    return found
+
+
+def _rows_kept(table: Table, columns: Columns, where: str, origin_s: int) -> tuple[Floats, Bools]:
+    """Return the time of every row of a table, and which rows its `where` keeps."""
+    keep: Bools = np.ones(columns.rows, dtype=np.bool_)
+    if table.where is not None:
+        keep = evaluate(table.where, columns, columns.rows, f"{where}: where") > 0.0
+    t = _times(table, columns, f"{where}: time", origin_s)
+    _refuse_no_rows(t[keep], where)
+    return t, keep
+
+
+def _std(columns: Columns, variance: str, at: str, keep: Bools) -> float | None:
+    """Return the noise that rows usually give as its variance, or None where they know of none."""
+    given = _column(columns, variance, at)[keep]
+    known = given[(given > 0.0) & (given < LARGEST_VARIANCE)]
+    return float(np.sqrt(np.median(known))) if len(known) else None
 
 
 def _times(table: Table, columns: Columns, at: str, origin_s: int) -> Floats:
@@ -255,15 +329,25 @@ def _values(source: TimeColumn | ChannelColumn, columns: Columns, at: str) -> Fl
     """Return what a column or an expression gives for every row."""
     if source.expression is not None:
         return evaluate(source.expression, columns, columns.rows, at)
+    return _column(columns, str(source.column), at)
+
+
+def _column(columns: Columns, name: str, at: str) -> Floats:
     try:
-        return columns[str(source.column)]
+        return columns[name]
     except RecordingError as cause:
         msg = f"{at}: {cause}"
         raise RecordingError(msg) from cause
 
 
 def _channel(
-    name: str, channel: ChannelColumn, t: Floats, raw: Floats, where: str, source: Source
+    name: str,
+    channel: ChannelColumn,
+    t: Floats,
+    raw: Floats,
+    std: float | None,
+    where: str,
+    source: Source,
 ) -> Channel:
     at, unit = f"{where}: {name}", str(channel.unit)
     to_si = factor(unit, dimensions_of(name, where), at)
@@ -276,7 +360,7 @@ def _channel(
     return Channel(
         t=t,
         values=values,
-        std=None if channel.std is None else channel.std * to_si,
+        std=None if std is None else std * to_si,
         point=channel.point or (0.0, 0.0),
         dimension=UNITS[unit][0],
         source=source,

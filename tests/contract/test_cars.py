@@ -72,3 +72,19 @@ def test_the_kernel_page_says_every_law_of_the_car(name):
     for term in car.terms:
         named = term.sets or term.name
         assert re.search(rf"\b{named} = |\b{term.name}_", page), term.name
+
+
+def test_the_measured_nigel_has_the_numbers_of_its_builders():
+    car = load_car("nigel_measured")
+    builders = {
+        "body.mass_kg": 2.68, "body.yaw_inertia_kgm2": 0.01944, "body.wheelbase_m": 0.14155,
+        "body.track_m": 0.14724, "body.cog_to_rear_axle_m": 0.07929, "body.cog_height_m": 0.0993,
+        "wheel.radius_m": 0.0325, "tyre.force_extremum": 0.4, "tyre.lateral_force_extremum": 0.4,
+    }  # fmt: skip
+    for key, value in builders.items():
+        assert car.value(key) == value, key
+    assert np.ptp(car.vector("body.footprint_x_m")) == pytest.approx(0.31847, abs=1e-3)
+    assert np.ptp(car.vector("body.footprint_y_m")) == pytest.approx(0.175)
+    load = car.value("body.mass_kg") * 9.80665 / 4.0
+    slope = 1.5 * car.value("tyre.lateral_force_extremum") / car.value("tyre.lateral_slip_extremum")
+    assert slope * load == pytest.approx(22.4768, rel=0.002)

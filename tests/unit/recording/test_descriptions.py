@@ -11,7 +11,10 @@ from scm.replay.free_run import free_run
 from scm.vehicles.car import load_car
 
 FOLDER = Path(__file__).parents[3] / "recordings"
-ALL = sorted(FOLDER.glob("*/*.yaml"))
+SAMPLE = FOLDER / "sample"
+ALL = sorted(FOLDER.rglob("*.yaml"))
+NIGEL = sorted((FOLDER / "nigel_real").glob("*.yaml"))
+LARGEST_SAMPLE_BYTES = 300_000
 REPLAYED = {  # name: most error of 1 s of free run with the car as its authors know it, median [m]
     "cpm_ucar/b": 0.08,
     "cpm_ucar/feb2019": 0.11,
@@ -26,12 +29,16 @@ REPLAYED = {  # name: most error of 1 s of free run with the car as its authors 
     "f1tenth_frictionmaps/ds5": 0.4,
     "genesis/rfs_path1": 0.16,
     "iac_av21/putnam": 0.2,
+    "las_rccar/train_2": 0.6,
+    "nigel_real/straight": 0.09,
+    "sample/recording": 0.01,
 }
 
 
 def recording_of(path: Path, shared: Path) -> Recording:
     """Read a description, or skip where one of its files is not here."""
-    data = shared / "recordings" / path.parent.name
+    own = path.stem if path.parent == FOLDER else path.parent.name
+    data = SAMPLE if path.parent == SAMPLE else shared / "recordings" / own
     for table in read_description(path).tables:
         if not (data / table.file).is_file():
             pytest.skip(f"{data / table.file} is not here: it is other people's data")
@@ -58,4 +65,46 @@ def test_a_described_recording_replays(name: str, shared: Path) -> None:
 def test_every_real_set_has_descriptions() -> None:
     assert {path.parent.name for path in ALL} >= {
         "cpm_ucar", "dart", "f1tenth_frictionmaps", "f1tenth_optitrack", "genesis", "iac_av21",
+        "las_rccar", "nigel_real",
     }  # fmt: skip
+
+
+def test_every_description_of_other_people_s_data_names_where_it_is_from() -> None:
+    for path in ALL:
+        assert path.parent == SAMPLE or read_description(path).source, path
+
+
+def test_the_sample_comes_with_the_repository_and_is_small() -> None:
+    (recording,) = read_recordings(SAMPLE)
+    assert np.ptp(recording.channel("pose.x").t) == pytest.approx(60.0, abs=0.5)
+    assert sum(file.stat().st_size for file in SAMPLE.iterdir()) < LARGEST_SAMPLE_BYTES
+
+
+@pytest.mark.parametrize("path", NIGEL, ids=lambda path: path.stem)
+def test_the_real_nigel_has_scans_and_odometry_of_the_same_stamps(path: Path, shared: Path) -> None:
+    recording = recording_of(path, shared)
+    scans, odometry = recording.scans, recording.channel("pose.x")
+    assert scans is not None
+    assert scans.ranges.shape == (len(scans.t), 1147)
+    assert np.isin(odometry.t, scans.t).mean() > 0.97, "a scan or two came before the bag began"
+    turn_s = scans.time_increment * (scans.ranges.shape[1] - 1)
+    assert np.all((turn_s > 0.13) & (turn_s < 0.15))
+
+
+@pytest.mark.parametrize("path", NIGEL, ids=lambda path: path.stem)
+def test_the_real_nigel_stops_when_the_serial_line_has_carried_the_last_command(
+    path: Path, shared: Path
+) -> None:
+    recording = recording_of(path, shared)
+    throttle, x = recording.channel("command.throttle"), recording.channel("pose.x")
+    stopped_s = x.t[np.flatnonzero(np.abs(x.values - x.values[-1]) > 0.03)[-1]]
+    zero_s = throttle.t[np.flatnonzero(throttle.values > 0.0)[-1] + 1]
+    assert -0.1 < zero_s - stopped_s < 0.5
+    assert throttle.t[-1] == pytest.approx(x.t[-1]), "the last command holds: there is no watchdog"
+
+
+@pytest.mark.parametrize("path", NIGEL, ids=lambda path: path.stem)
+def test_the_real_nigel_drives_forwards(path: Path, shared: Path) -> None:
+    recording = recording_of(path, shared)
+    assert np.percentile(recording.channel("speed").values, 90) > 0.3
+    assert recording.channel("pose.x").values[-1] > 1.5

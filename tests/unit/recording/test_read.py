@@ -272,3 +272,25 @@ def test_a_function_wants_its_number_of_inputs(tmp_path: Path) -> None:
     table = POSE_TABLE.replace("column: x, unit: mm", 'expression: "atan2(x)", unit: mm')
     with pytest.raises(RecordingError, match="is not arithmetic"):
         read_recordings(write(tmp_path, table))
+
+
+def test_a_file_without_times_counts_its_rows(tmp_path: Path) -> None:
+    table = POSE_TABLE.replace("column: t, unit: ms", "expression: row / 30, unit: s")
+    table = table.replace("    channels", '    where: "x > 100"\n    channels')
+    assert_allclose(read_one(write(tmp_path, table)).channel("pose.x").t, [1 / 30, 2 / 30])
+
+
+def test_a_column_named_row_comes_before_the_count(tmp_path: Path) -> None:
+    table = POSE_TABLE.replace("column: t,", "column: row,")
+    recording = read_one(write(tmp_path, table, POSE_CSV.replace("t,", "row,", 1)))
+    assert_allclose(recording.channel("pose.x").t, [0.0, 0.05, 0.1])
+
+
+def test_min_and_max_compare_row_by_row(tmp_path: Path) -> None:
+    table = POSE_TABLE.replace("column: t,", 'expression: "max(t, 40 + 2 * row) + min(y, 5)",')
+    assert_allclose(read_one(write(tmp_path, table)).channel("pose.x").t, [0.04, 0.05, 0.105])
+
+
+def test_a_column_of_variances_gives_the_noise(tmp_path: Path) -> None:
+    table = POSE_TABLE.replace("unit: mm, std: 2", "unit: mm, variance: ok")
+    assert read_one(write(tmp_path, table)).channel("pose.x").std == pytest.approx(0.001)
