@@ -1,0 +1,22 @@
+"""The recording that comes with the repository: README's line finds what it conceals."""
+
+from pathlib import Path
+
+import pytest
+
+from scm.mismatch.diagnose import diagnose
+
+CONCEALED_RAD = 0.0628  # as docs/make/sample.py prints
+BUDGET_S = 240.0  # twice the usual: other tests take the processor too
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(400)
+def test_the_sample_s_steering_trim_is_found(root: Path) -> None:
+    found = diagnose([root / "recordings" / "sample"], budget_s=BUDGET_S).diagnosis
+    assert [effect.name for effect in found.effects] == ["steer_trim"]
+    trim = found.effects[0].parameters["offset_rad"]
+    assert trim.low <= CONCEALED_RAD <= trim.high
+    assert found.fit is not None
+    confirm = found.fit.confirm
+    assert confirm.after["position_m"] < 0.1 * confirm.before["position_m"]
