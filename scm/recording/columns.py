@@ -71,7 +71,8 @@ class Selection:
 class Columns(Mapping[str, Floats]):
     """The columns of one file, each of shape `(rows,)`; an empty cell is NaN.
 
-    `row` counts the rows from 0, unless the file has a column of that name.
+    `row` counts the rows from 0, unless the file has a column of that name; a row that is left out
+    counts too.
 
     Asking for a column raises a `RecordingError` when there is none of that name, when its name
     stands twice, or, with the line, when its cells are not numbers. A few that are not are NaN, and
@@ -171,9 +172,17 @@ class Columns(Mapping[str, Floats]):
         more = f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
         return nearest(name, known) or f"; it has {', '.join(known[:MOST_NAMED])}{more}"
 
+    def _row_count(self) -> Floats:
+        """Count the rows from 0; a line that was left out counts too, or later ones would shift."""
+        count = np.arange(self.rows, dtype=np.float64)
+        if len(self._lines) != self.rows:
+            return count
+        lost = sorted({one.line for one in self._left_out if one.line}.difference(self._lines))
+        return count + np.searchsorted(lost, np.asarray(self._lines))
+
     def _read(self, name: str) -> Floats:
         if name == ROW and name not in self._known:
-            return np.arange(self.rows, dtype=np.float64)
+            return self._row_count()
         if name not in self._cells:
             msg = f"{self._path}: no column {name!r}{self._hint(name)}"
             raise RecordingError(msg)

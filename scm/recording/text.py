@@ -157,9 +157,12 @@ class _Table:
         self._left_out.sort(key=lambda one: one.line or 0)
         texts = [self._texts[i] for i in rows]
         numbers = self._numbers(texts, width, picked) if picked else []
+        places = [self._places[i] for i in rows] if self._left_out or numbers is None else ()
         if numbers is not None:
-            return Columns(self._path, chosen, numbers, known=names, left_out=self._left_out)
-        words, places = self._words(texts, picked), [self._places[i] for i in rows]
+            return Columns(
+                self._path, chosen, numbers, places, known=names, left_out=self._left_out
+            )
+        words = self._words(texts, picked)
         return Columns(self._path, chosen, words, places, known=names, left_out=self._left_out)
 
     def _leave_out(self, line: Line, why: str) -> None:

@@ -294,3 +294,14 @@ def test_min_and_max_compare_row_by_row(tmp_path: Path) -> None:
 def test_a_column_of_variances_gives_the_noise(tmp_path: Path) -> None:
     table = POSE_TABLE.replace("unit: mm, std: 2", "unit: mm, variance: ok")
     assert read_one(write(tmp_path, table)).channel("pose.x").std == pytest.approx(0.001)
+
+
+def test_a_broken_line_does_not_shift_the_count_of_the_rows_after_it(tmp_path: Path) -> None:
+    table = POSE_TABLE.replace("column: t, unit: ms", "expression: row / 30, unit: s")
+    lines = [f"{k},{k},0,90,1" for k in range(200)]
+    lines[10] = "10,oh"
+    csv = "\n".join(("t,x,y,head ing,ok", *lines)) + "\n"
+    recording = read_one(write(tmp_path, table, csv))
+    assert len(recording.left_out) == 1
+    channel = recording.channel("pose.x")
+    assert_allclose(channel.t, channel.values * 1000.0 / 30.0)
