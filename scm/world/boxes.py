@@ -59,9 +59,12 @@ class Boxes:
         self.motion[:, 2] = math.pi - np.mod(math.pi - self.motion[:, 2], 2.0 * math.pi)
 
     def push(self, dv: Floats, shift: Floats) -> None:
-        """Change velocities (k, 3) and places (k, 2); what is next to no velocity becomes none."""
+        """Change velocities (k, 3) and places (k, 2) or poses (k, 3).
+
+        What is next to no velocity becomes none.
+        """
         self.motion[:, 3:] += dv
-        self.motion[:, :2] += shift
+        self.motion[:, : shift.shape[1]] += shift
         self.motion[is_still(self.motion[:, 3:]), 3:] = 0.0
 
     def outline(self) -> Floats:

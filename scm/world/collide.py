@@ -56,7 +56,9 @@ def touched_lately(world: World, slot: int, now_ns: int) -> tuple[str, ...]:
 
 def _tell(world: World, slots: Ints, touches: Touches, t_ns: int) -> None:
     """Hand out what was done, fleet by fleet, then to remote cars; rows are as in `everybody`."""
-    changed: Bools = np.asarray(np.hstack((touches.dv, touches.shift)).any(axis=1))
+    changed: Bools = np.asarray(
+        np.hstack((touches.dv, touches.shift, touches.turn[:, None])).any(axis=1)
+    )
     begin = 0
     for name, fleet in world.garage.fleets.items():
         rows = world.garage.rows(name)
@@ -69,7 +71,8 @@ def _tell(world: World, slots: Ints, touches: Touches, t_ns: int) -> None:
         world.blows.add(against.name(row), touches.dv[row], against.of(row))
     for row, car in enumerate(world.remote.values(), start=begin):
         if changed[row]:
-            car.hit(touches.dv[row], touches.shift[row], against.of(row), t_ns)
+            moved = np.array([*touches.shift[row], touches.turn[row]])
+            car.hit(touches.dv[row], moved, against.of(row), t_ns)
     notable = np.hypot(touches.dv[:, 0], touches.dv[:, 1]) >= NOTABLE_MPS
     for row in np.flatnonzero(notable).tolist():
         _report(world, against, row, touches.dv[row], t_ns)
@@ -77,8 +80,7 @@ def _tell(world: World, slots: Ints, touches: Touches, t_ns: int) -> None:
 
 def _push(world: World, fleet: Fleet, rows: Ints, touches: Touches, struck: Ints) -> None:
     """Change the motion of some rows of a fleet: those that stand at `struck` in `touches`."""
-    dv, shift = touches.dv[struck], touches.shift[struck]
-    turn = np.zeros((len(rows), 1))
+    dv, shift, turn = touches.dv[struck], touches.shift[struck], touches.turn[struck, None]
     fleet.push_rows(rows, np.hstack((dv, shift, turn)))
     world.impacts.add(fleet, rows, dv)
 

@@ -30,6 +30,8 @@ STEP_S = 0.005
 OVERLAP_KEPT = 2e-4
 SHARE_CORRECTED = 0.2
 ITERATIONS = 30
+MAX_ITERATIONS = 300  # where bodies were stopped: a light one between heavy ones takes many
+MAX_SPEED_GAIN = 2.0  # one hit gives a free box at most 1 + restitution of the car's speed
 KEPT_STEPS = 40
 WALL, FIRST_BOX = -1, -2
 
@@ -55,13 +57,15 @@ class Touches:
 
     Attributes:
         dv: (n, 3) change of the centre of gravity's velocity x, y and of the yaw rate.
-        shift: (n, 2) way out of the overlap [m].
+        shift: (n, 2) way out of the overlap, or back to where the car was stopped [m].
+        turn: (n,) change of the yaw to what it was where the car was stopped.
         touched: (n,) whether the car touched anything.
         pairs: (k, 2) rows that touched each other; -1 stands for a wall, -2 - i for box i.
     """
 
     dv: Floats
     shift: Floats
+    turn: Floats
     touched: Bools
     pairs: Ints
 
@@ -76,15 +80,16 @@ class Contacts:
     def __init__(self, city_map: CityMap) -> None:
         self.boxes = Boxes(city_map.boxes)
         self._near = Near(obstacles_of(obstacle_boxes(city_map)))
+        self._cores = obstacle_boxes(city_map, round_ends=False)
         self._ring = _Ring(city_map, self.boxes)
-        rows = [(0.0, 0.0, a, b, np.hypot(a, b)) for a, b in self.boxes.sizes.tolist()]
-        self._outlines: Floats = np.array(rows, dtype=float).reshape(-1, 5)
+        rows = [(0.0, 0.0, a, b, np.hypot(a, b), 1.0) for a, b in self.boxes.sizes.tolist()]
+        self._outlines: Floats = np.array(rows, dtype=float).reshape(-1, 6)
 
     def add(self, slot: int, hull: Hull) -> None:
         """Give a car a body under a number of the caller's; its motion comes with every step."""
         key = slot + len(self.boxes)
         if key >= len(self._outlines):
-            more = np.zeros((max(64, 2 * key) - len(self._outlines), 5))
+            more = np.zeros((max(64, 2 * key) - len(self._outlines), 6))
             self._outlines = np.concatenate((self._outlines, more))
         self._outlines[key] = outline_of(hull)
         self._ring.known[key] = hull
@@ -95,10 +100,12 @@ class Contacts:
 
     def warm(self) -> None:
         """Compile or load now what `step` needs, not when the first cars meet."""
-        outlines = np.full((2, 5), 0.1)
-        near = Near(obstacles_of(np.array([[5.0, 0.0, 1.0, 0.0, 1.0, 0.1]])))
+        outlines, walls = np.full((2, 6), 0.1), np.array([[5.0, 0.0, 1.0, 0.0, 1.0, 0.1]])
+        near = Near(obstacles_of(walls))
         for _ in range(2):  # at the second step it looks who has strayed
-            near.touching(np.arange(2), np.zeros((2, 6)), outlines, 1)
+            marks = near.touching(np.arange(2), np.zeros((2, 6)), outlines, 1)
+        for marked in (np.zeros(2, np.bool_), marks):
+            near.shares(np.zeros((2, 3)), np.zeros((2, 3)), outlines, walls, marked)
 
     def step(self, slots: Ints, motion: Floats) -> Touches:
         """Solve the contacts of this instant.
@@ -113,23 +120,69 @@ class Contacts:
             self.boxes.slide(STEP_S)
             keys = np.concatenate((keys, np.arange(count)))
             motion = np.concatenate((motion, self.boxes.motion))
-        marks = self._near.touching(keys, motion, self._outlines[keys], n)
+        outlines = self._outlines[keys]
+        marks = self._near.touching(keys, motion, outlines, n)
+        moves = STEP_S * motion[:, 3:]
+        back = self._excess(motion[:, :3] - moves, moves, outlines, marks)
+        stopped = np.zeros(len(keys), np.bool_)
+        if back is not None:
+            stopped |= back.any(axis=1)
+            motion = np.hstack((motion[:, :3] - back, motion[:, 3:]))
+            marks = self._near.touching(keys, motion, outlines, n)
         rows = np.flatnonzero(marks)
-        if not len(rows):
+        if not len(rows) and back is None:
             return _nothing(n)
-        dv, shift, pairs = self._ring.solve(keys, motion, rows)
+        dv, shift, pairs = self._ring.solve(keys, motion, rows, stopped)
+        turn = np.zeros(len(keys))
+        if back is not None:
+            out = np.column_stack((shift, turn))
+            too_far = self._excess(motion[:, :3], out, outlines, marks)
+            out -= back if too_far is None else back + too_far
+            shift, turn = out[:, :2], out[:, 2]
         if count:
-            self.boxes.push(dv[n:], shift[n:])
+            self._limit_speed(dv, motion, outlines, marks)
+            self.boxes.push(dv[n:], np.column_stack((shift[n:], turn[n:])))
         touched = np.zeros(n, np.bool_)
         touched[pairs[(pairs >= 0) & (pairs < n)]] = True
         pairs = np.where(pairs >= n, FIRST_BOX - (pairs - n), pairs)
         met = (pairs >= 0).any(axis=1)
-        return Touches(dv[:n], shift[:n], touched, pairs[met])
+        return Touches(dv[:n], shift[:n], turn[:n], touched, pairs[met])
+
+    def _excess(
+        self, starts: Floats, moves: Floats, outlines: Floats, marks: Bools
+    ) -> Floats | None:
+        """Return what of the moves (n, 3) would bring bodies through each other; None: nothing."""
+        shares = self._near.shares(starts, moves, outlines, self._cores, marks)
+        return None if shares is None else (1.0 - shares)[:, None] * moves
+
+    def _limit_speed(self, dv: Floats, motion: Floats, outlines: Floats, marks: Bools) -> None:
+        """Lower the changes (n, 3) of boxes that shoot out of a wedge far faster than any car."""
+        boxes = slice(len(motion) - len(self.boxes), None)
+        points = np.where(marks, _speeds(motion[:, 3:], outlines[:, 4]).sum(axis=0), 0.0)
+        fastest_car = points[: boxes.start].max(initial=0.0)
+        limit = max(MAX_SPEED_GAIN * fastest_car, points[boxes].max())
+        velocity = motion[boxes, 3:] + dv[boxes]
+        middle, edge = _speeds(velocity, outlines[boxes, 4])
+        # Of a box that was hit off its middle the edge is up to sqrt(3) times faster than what hit.
+        speed = np.maximum(middle, 0.5 * edge)
+        fast = speed > limit
+        slower = velocity[fast] * (limit / speed[fast])[:, None]
+        dv[boxes][fast] = slower - motion[boxes, 3:][fast]
+
+
+def _speeds(velocity: Floats, reach: Floats) -> Floats:
+    """Return the speed of the middle and what turning adds to it at most, (2, n) [m/s]."""
+    middle = np.hypot(velocity[:, 0], velocity[:, 1])
+    return np.stack((middle, reach * np.abs(velocity[:, 2])))
 
 
 def _nothing(n: int) -> Touches:
     return Touches(
-        np.zeros((n, 3)), np.zeros((n, 2)), np.zeros(n, np.bool_), np.empty((0, 2), np.int64)
+        dv=np.zeros((n, 3)),
+        shift=np.zeros((n, 2)),
+        turn=np.zeros(n),
+        touched=np.zeros(n, np.bool_),
+        pairs=np.empty((0, 2), np.int64),
     )
 
 
@@ -166,14 +219,22 @@ class _Ring:
             self._leave([key])
         self._bodies.pop(key, None)
 
-    def solve(self, keys: Ints, motion: Floats, rows: Ints) -> tuple[Floats, Floats, Ints]:
+    def solve(
+        self, keys: Ints, motion: Floats, rows: Ints, stopped: Bools
+    ) -> tuple[Floats, Floats, Ints]:
         """Return changes of velocity (n, 3), shifts (n, 2) and pairs (k, 2) of rows; -1: a wall.
 
         Args:
             keys: (n,) who is in which row.
             motion: (n, 6).
             rows: Those that touch something.
+            stopped: (n,) those that could not make all of their last move.
         """
+        # They come in anew: pymunk begins with the impulses of its last step, and those that were
+        # stopped need not touch all that they touched then.
+        if again := [key for key in keys[stopped].tolist() if key in self._left]:
+            self._leave(again)
+        self._space.iterations = MAX_ITERATIONS if stopped.any() else ITERATIONS
         self._let_in(keys[rows].tolist(), motion[rows, :3].tolist())
         row_of = np.empty(int(keys.max()) + 1, np.int64)
         row_of[keys] = np.arange(len(keys))

@@ -24,6 +24,7 @@ def hull_of(car: Car, *, movable: bool = True) -> Hull:
         left=left,
         restitution=car.value("body.bounce_restitution"),
         friction=car.value("body.contact_friction"),
+        movable=movable,
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.vehicles.jit import array_kernel, law
+from scm.world.sweep import is_any_fast, share_moves
 
 LEEWAY_M = 0.025
 LOOK_AHEAD_S = 0.1
@@ -107,6 +108,20 @@ class Near:
         marks = np.zeros(len(motion), np.bool_)
         mark(marks, self._pairs, self._walls, motion, outlines, self._obstacles.boxes, first_box)
         return marks
+
+    def shares(
+        self, starts: Floats, moves: Floats, outlines: Floats, boxes: Floats, marks: Bools
+    ) -> Floats | None:
+        """Return what share of its move each body can make, (n,); None where all make all of it.
+
+        The rows are those that `touching` was called with last; the arguments are `share_moves`'s.
+        """
+        fast = is_any_fast(moves, outlines)
+        if not (fast or marks.any()):
+            return None
+        shares = np.ones(len(moves))
+        share_moves(shares, self._pairs, self._walls, starts, moves, outlines, boxes, marks, fast)
+        return shares if (shares < 1.0).any() else None
 
     def _list_anew(self, order: Ints, motion: Floats, outlines: Floats) -> None:
         self._order, self._from = order.copy(), motion[:, :2].copy()

@@ -161,11 +161,10 @@ class RemoteCar:
         return row
 
     def hit(self, dv: Floats, shift: Floats, against: set[str], now_ns: int) -> None:
-        """Note what one contact step did to it."""
-        whole = np.array([*shift, 0.0])
-        self._echo.append(Echo(self._told + 1, now_ns, dv, whole))
+        """Note what one contact step did to it: both changes are (3,), as in `Echo`."""
+        self._echo.append(Echo(self._told + 1, now_ns, dv, shift))
         self._dv += dv
-        self._shift += whole
+        self._shift += shift
         self._against |= against
 
     def contact(self, now_ns: int) -> Contact | None:

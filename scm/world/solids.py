@@ -27,13 +27,18 @@ class Hull(NamedTuple):
     left: float
     restitution: float
     friction: float
+    movable: bool = True
 
 
-def outline_of(hull: Hull) -> tuple[float, float, float, float, float]:
-    """Return middle ahead and left of the centre of gravity, half length, half width, reach."""
+def outline_of(hull: Hull) -> tuple[float, float, float, float, float, float]:
+    """Return middle ahead and left of the centre of gravity, half length, half width, reach.
+
+    The last is 1, or 0 for one that nobody moves.
+    """
     ahead, left = 0.5 * (hull.front + hull.rear), 0.5 * (hull.left + hull.right)
     reach = math.hypot(max(hull.front, -hull.rear), max(hull.left, -hull.right))
-    return ahead, left, 0.5 * (hull.front - hull.rear), 0.5 * (hull.left - hull.right), reach
+    length, width = hull.front - hull.rear, hull.left - hull.right
+    return ahead, left, 0.5 * length, 0.5 * width, reach, float(hull.movable)
 
 
 def car_body(hull: Hull) -> pymunk.Body:
@@ -101,15 +106,21 @@ def solids(static: pymunk.Body, city_map: CityMap) -> Iterator[pymunk.Shape]:
             yield _solid(pymunk.Poly(static, corners))
 
 
-def obstacle_boxes(city_map: CityMap) -> Floats:
-    """Return all that never moves as boxes (m, 6): x, y, cos, sin of yaw, half length and width."""
+def obstacle_boxes(city_map: CityMap, *, round_ends: bool = True) -> Floats:
+    """Return all that never moves as boxes (m, 6): x, y, cos, sin of yaw, half length and width.
+
+    Args:
+        city_map: The city.
+        round_ends: Whether the boxes of walls hold the round ends of their pieces.
+    """
     found = []
     for wall in city_map.walls:
         half = 0.5 * wall.thickness_m
         for (x0, y0), (x1, y1) in _runs(wall):
             length = math.hypot(x1 - x0, y1 - y0)
             c, s = ((x1 - x0) / length, (y1 - y0) / length) if length else (1.0, 0.0)
-            found.append((0.5 * (x0 + x1), 0.5 * (y0 + y1), c, s, 0.5 * length + half, half))
+            end = half if round_ends else 0.0
+            found.append((0.5 * (x0 + x1), 0.5 * (y0 + y1), c, s, 0.5 * length + end, half))
     found += [
         (b.x_m, b.y_m, math.cos(b.yaw_rad), math.sin(b.yaw_rad), 0.5 * b.length_m, 0.5 * b.width_m)
         for b in city_map.boxes
