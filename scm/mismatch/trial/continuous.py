@@ -1,8 +1,8 @@
 """Free runs that never forget: one drive through all commands, carried to the measured pose.
 
-`scm.replay` starts each window anew, so an effect of time, or one that warms up, begins again with
-every window. Here the car drives through the whole recording; where a window begins, only its pose
-is set to the measured one, and how far its wheels have turned; its motion and actuators stay.
+A window of `scm replay` begins in the measured motion. Here the car drives through the whole
+recording, and where a window begins only its pose is set to the measured one, and how far its
+wheels have turned; its motion and actuators stay.
 """
 
 import math
