@@ -6,7 +6,7 @@ named; refused with the reason; and what must not be: wrong without a word, slow
 of another library's.
 """
 
-import sys
+import argparse
 import tempfile
 import time
 from collections import Counter
@@ -352,7 +352,14 @@ def tried(seed: int) -> Outcome:
 
 def main() -> None:
     """Print how many of how many were right, and every one that was not."""
-    count, seed, *_ = (*map(int, sys.argv[1:3]), *(2000, 0)[len(sys.argv[1:3]) :])
+    parser = argparse.ArgumentParser(
+        prog="python -m bench recording_faults", description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument("count", nargs="?", type=int, default=2000)
+    parser.add_argument("seed", nargs="?", type=int, default=0, help="of the first draw")
+    arguments = parser.parse_args()
+    count, seed = arguments.count, arguments.seed
     kinds, wrong = Counter[str](), Counter[tuple[str, tuple[str, ...]]]()
     for k in range(count):
         outcome = tried(seed + k)

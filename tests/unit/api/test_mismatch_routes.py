@@ -382,7 +382,7 @@ def test_a_search_again_of_one_of_several_cars_is_of_that_car(call, shelves, ran
 
 def test_an_upload_becomes_a_recording_for_a_search(call, shelves, ran):
     body = packed({"tuesday/recording.yaml": DESCRIPTION, "tuesday/commands.csv": COMMANDS,
-                   "tuesday/notes.txt": "left out"})  # fmt: skip
+                   "tuesday/notes.md": "left out"})  # fmt: skip
     answer = call("POST", f"{API}/uploads?name=My%20drive", content=body)
     assert answer.status_code == 201, answer.text
     upload = answer.json()["upload"]

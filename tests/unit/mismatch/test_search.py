@@ -212,7 +212,7 @@ def test_an_effect_stays_where_its_gain_holds_on_an_unseen_part(
     best, others = losing(seen, unseen, where, shows)
     part = np.zeros(len(best.e))
     part[1:3] = 1.0
-    fake = SimpleNamespace(settled=np.ones(len(best.e)))
+    fake = SimpleNamespace(settled=np.ones(len(best.e)), prior=np.eye(len(best.z)))
     search = Search.__new__(Search)
     search.model, search.events, search.listed = fake, 8, best.effects
     search.fitter = Fitter(fake, 1.0 - part)
