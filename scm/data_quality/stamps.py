@@ -102,7 +102,8 @@ def _table(recording: Recording, names: tuple[str, ...]) -> Table:
     channels = [recording.channels[name] for name in names]
     source = channels[0].source
     every = [channel.row_numbers for channel in channels]
-    if all(np.array_equal(numbers, every[0]) for numbers in every[1:]):
+    rising = len(every[0]) < 2 or bool(np.diff(every[0]).min() > 0)  # sorted rows may stand anyhow
+    if rising and all(np.array_equal(numbers, every[0]) for numbers in every[1:]):
         return Table(names, every[0], channels[0].t, source)
     numbers, first = np.unique(np.concatenate(every), return_index=True)
     t = np.concatenate([channel.t for channel in channels])[first]
