@@ -1,7 +1,6 @@
 """What a report says of a car is true of the car file beside it: `scm replay --report` agrees."""
 
 import json
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,26 +9,13 @@ import pytest
 from scm.clock import WallClock
 from scm.mismatch import budget, sample
 from scm.mismatch import diagnose as module
-from scm.mismatch.budget import Budget
 from scm.mismatch.check_report import check_report
 from scm.mismatch.diagnose import diagnose_car, write
 from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import made_drive, nigel
+from tests.unit.mismatch.test_budget import Batches
 
 TRIM = (("steering.trim_rad", 0.06),)
-
-
-class Batches(Budget):
-    """Is over after so many batches of simulated cars: interrupts a search in its midst."""
-
-    left = math.inf
-
-    def is_over(self):
-        return self.left <= 0
-
-    def check(self):
-        self.left -= 1
-        super().check()
 
 
 def interrupted_after(batches):
