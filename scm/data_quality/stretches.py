@@ -85,7 +85,8 @@ def between(recording: Recording, first: float, last: float) -> Recording:
             rows |= _leading(channel.t, first)
         if rows.any():
             channels[name] = replace(channel, t=channel.t[rows], values=channel.values[rows])
-    return replace(recording, channels=channels)
+    scans = recording.scans and recording.scans.between(first, last)
+    return replace(recording, channels=channels, scans=scans)
 
 
 def _rows(t: Floats, first: float, last: float) -> Bools:

@@ -2,7 +2,7 @@
 
 import importlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +39,11 @@ class Scans:
     time_increment: Floats
     range_min: Floats
     range_max: Floats
+
+    def between(self, first: float, last: float) -> "Scans":
+        """Return the scans whose stamps lie between two moments."""
+        rows = (self.t >= first) & (self.t <= last)
+        return Scans(**{one.name: getattr(self, one.name)[rows] for one in fields(self)})
 
 
 def read_scans(path: Path, topic: str | None, t: Floats, keep: Bools) -> Scans:

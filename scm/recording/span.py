@@ -41,7 +41,8 @@ def part_of(recording: Recording, from_s: float | None, to_s: float | None) -> R
         msg = f"{recording.path}: {span}: nothing{of} was recorded there that can be driven again; "
         msg += f"there is from {starts - begin_s:.1f} s to {ends - begin_s:.1f} s"
         raise RecordingError(msg)
-    return replace(recording, channels=channels)
+    scans = recording.scans and recording.scans.between(first, last)
+    return replace(recording, channels=channels, scans=scans)
 
 
 def _begin_s(t: Floats) -> float:

@@ -94,6 +94,7 @@ class RemoteCar:
     lost_ns: int | None = None
     dead: bool = False
     missed_ns: int = 0
+    _motion: tuple[VehicleState | None, Floats] | None = None  # reported, for all contact steps
     _echo: deque[Echo] = field(default_factory=deque)
     _told: int = 0
     _dv: Floats = field(default_factory=lambda: np.zeros(3))
@@ -144,14 +145,9 @@ class RemoteCar:
 
     def motion(self, now_ns: int) -> Floats:
         """Return x, y, yaw, vx, vy, yaw rate of the centre of gravity, (6,), map frame."""
-        state = self.state
-        speeds = (0.0, 0.0, 0.0)
-        if state is not None and self.alive:
-            speeds = (state.speed_mps, state.lateral_speed_mps, state.yaw_rate_radps)
-        row: Floats = cog_motion(self.car, np.array([[*self.pose, *speeds]]))[0]
-        age = seconds(min(self.age_ns(now_ns), STALE_NS))
-        row[:3] += row[3:] * age
-        patience_ns = ANSWER_NS if state is not None and state.contacts else ECHO_NS
+        row = self._reported()
+        row[:3] += row[3:] * seconds(min(self.age_ns(now_ns), STALE_NS))
+        patience_ns = ANSWER_NS if self.state is not None and self.state.contacts else ECHO_NS
         while self._echo and self.heard_ns - self._echo[0].hit_ns > patience_ns:
             self._echo.popleft()
         for echo in self._echo:
@@ -159,6 +155,16 @@ class RemoteCar:
             row[3:] += echo.dv
             row[:3] += echo.dv * since + echo.shift
         return row
+
+    def _reported(self) -> Floats:
+        """Return the motion as last reported, (6,), as in `motion`; one that is lost stands."""
+        basis = self.state if self.alive else None
+        if self._motion is None or self._motion[0] is not basis:
+            speeds = (0.0, 0.0, 0.0)
+            if basis is not None:
+                speeds = (basis.speed_mps, basis.lateral_speed_mps, basis.yaw_rate_radps)
+            self._motion = basis, cog_motion(self.car, np.array([[*self.pose, *speeds]]))[0]
+        return self._motion[1].copy()
 
     def hit(self, dv: Floats, shift: Floats, against: set[str], now_ns: int) -> None:
         """Note what one contact step did to it: both changes are (3,), as in `Echo`."""

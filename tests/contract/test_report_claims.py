@@ -11,6 +11,7 @@ from scm.mismatch import budget, sample
 from scm.mismatch import diagnose as module
 from scm.mismatch.check_report import check_report
 from scm.mismatch.diagnose import diagnose_car, write
+from scm.mismatch.listed import candidates
 from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import made_drive, nigel
 from tests.unit.mismatch.test_budget import Batches
@@ -28,15 +29,15 @@ def interrupted_after(batches):
 
 
 def late(name, _t, values):
-    """Poses stamped in a unit that is slightly wrong: the camera's metre is 1.05 of a metre."""
+    """Poses in a unit that is slightly wrong: the camera's metre is 1.05 of a metre."""
     return 1.05 * values if name in ("pose.x", "pose.y") else values
 
 
+FEW = ("steer_trim", "pose_scale")  # what there is to choose from: all takes half a minute
 CASES = {
     "no time at all": (TRIM, None, {"budget_s": 0.0}),
     "5 s": (TRIM, None, {"budget_s": 5.0}),
-    "an effect of the car": (TRIM, None, {}),
-    "a fault of the camera": ((), late, {}),
+    "a fault of the camera": ((), late, {"finds": "pose_scale"}),
     "interrupted at once": (TRIM, None, {"batches": 3}),
     "interrupted in a round": (TRIM, None, {"batches": 40}),
 }
@@ -49,8 +50,14 @@ def test_every_figure_of_a_report_is_that_of_its_car_file(case, tmp_path, monkey
     recording = made_drive(numbers, seconds=20.0, **more)
     if "batches" in how:
         monkeypatch.setattr(module, "Budget", interrupted_after(how["batches"]))
+    if "finds" in how:
+        few = [effect for effect in candidates(nigel()) if effect.name in FEW]
+        monkeypatch.setattr(module, "candidates", lambda _car: few)
+        monkeypatch.setattr(module.Lawful, "decide", lambda _laws, best: (best, None))
     found = diagnose_car([recording], nigel(), budget_s=how.get("budget_s", 600.0),
                          clock=WallClock())  # fmt: skip
+    if "finds" in how:
+        assert [effect.name for effect in found.diagnosis.effects] == [how["finds"]]
     write(found, tmp_path)
     figures = check_report(tmp_path, [recording])
     assert {figure.part for figure in figures} == {"fit", "choose", "confirm"}

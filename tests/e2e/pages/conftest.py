@@ -48,12 +48,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
     """`scm up driving_school`: four hosted cars, two agents, signals, Eye and recorder.
 
-    The Eye looks half as often as it does there: it takes the most time of all parts.
+    The Eye looks a fifth as often as it does there: it takes the most time of all parts.
     """
     text = (MAPS_DIR / "driving_school.toml").read_text("utf-8")
     assert text.count("rate_hz = 10.0") == 1
     path = tmp_path_factory.mktemp("map") / "driving_school.toml"
-    path.write_text(text.replace("rate_hz = 10.0", "rate_hz = 5.0"), "utf-8")
+    path.write_text(text.replace("rate_hz = 10.0", "rate_hz = 2.0"), "utf-8")
     with city(tmp_path_factory.mktemp("pages"), city_map=str(path)) as process:
         wait_for(lambda: len(process.get("/vehicles")["vehicles"]) == 6, 90.0, "six cars are there")
         yield process

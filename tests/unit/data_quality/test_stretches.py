@@ -14,6 +14,7 @@ from scm.data_quality.stretches import stretches
 from scm.data_quality.suspicion import Quality
 from scm.data_quality.track import grid, long_gaps, track
 from scm.recording.read import Recording
+from scm.recording.scans import Scans
 from scm.recording.span import part_of
 from scm.vehicles.car import Car
 
@@ -67,6 +68,19 @@ def test_a_pause_of_all_tables_cuts_them_together(drive: Drive, nigel: Car, paus
     assert problem.name == "gap"
     assert "2 stretches" in problem.said
     assert "Left out" not in problem.said
+
+
+def test_scans_are_cut_with_the_rest(drive: Drive, nigel: Car) -> None:
+    recording = paused(drive(), 6.0, 600.0)
+    t = recording.channel("pose.x").t
+    one = np.ones(len(t))
+    scans = Scans(t=t, ranges=t[:, None], angle_min=one, angle_increment=one, time_increment=one,
+                  range_min=one, range_max=one)  # fmt: skip
+    parts = stretches(replace(recording, scans=scans), nigel).recordings
+    assert [part.scans.t.tolist() for part in parts if part.scans] == [
+        part.channel("pose.x").t.tolist() for part in parts
+    ]
+    assert len(parts) == 2
 
 
 def test_a_pause_of_less_than_two_seconds_is_bridged(drive: Drive, nigel: Car) -> None:

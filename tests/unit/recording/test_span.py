@@ -8,6 +8,7 @@ import pytest
 
 from scm.errors import RecordingError
 from scm.recording.read import Channel, Recording
+from scm.recording.scans import Scans
 from scm.recording.span import part_of
 
 
@@ -32,6 +33,18 @@ def test_an_open_end_is_the_recordings_own(recording):
     assert part_of(recording, None, None) is recording
     assert part_of(recording, 18.0, None).channel("pose.x").t.tolist() == [118, 119]
     assert len(part_of(recording, None, 2.0).channel("pose.x").t) == 3
+
+
+def test_the_scans_of_other_times_are_left_out(recording):
+    one = np.ones(20)
+    scans = Scans(
+        t=np.arange(100.0, 120.0), ranges=np.arange(40.0).reshape(20, 2), angle_min=one,
+        angle_increment=one, time_increment=one, range_min=one, range_max=one,
+    )  # fmt: skip
+    part = part_of(replace(recording, scans=scans), 4.0, 6.0).scans
+    assert part.t.tolist() == [104, 105, 106]
+    assert part.ranges.tolist() == [[8, 9], [10, 11], [12, 13]]
+    assert part.range_max.shape == (3,)
 
 
 def test_a_channel_that_has_nothing_there_is_left_out(recording):
