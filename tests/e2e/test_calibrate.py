@@ -17,6 +17,7 @@ MOVED = Emulated(trim=0.04, gain=0.9, drive=0.9)
 LONGEST_S = 100.0
 NOT_DRIVEN = "calibration: got a drive of"
 STDS = 3.0  # of each number: one run in 75 of five right ones would miss by more
+BUSY = 0.01  # of each number: what a computer that is late with its commands adds
 
 
 @pytest.fixture
@@ -42,7 +43,8 @@ def test_a_real_nigel_is_calibrated_inside_its_rectangle(stage):
     assert code == 0, said
     car = load_car(stage.out / "car.toml")
     for key, truth in MOVED.numbers.items():
-        assert abs(car.value(key) - truth) < STDS * car.quantity(key).std, f"{key}\n{said}"
+        unsure = STDS * car.quantity(key).std + BUSY * abs(truth)
+        assert abs(car.value(key) - truth) < unsure, f"{key}\n{said}"
     before, after = map(float, re.findall(r"by ([\d.]+) mm with th", said))
     assert after < 0.5 * before  # a fifth, where the computer has time
     poses = np.loadtxt(stage.out / "drive" / "pose.csv", delimiter=",", skiprows=1)
