@@ -24,6 +24,7 @@ OTHERWISE = math.log(30.0)
 EPOCH = 100.0  # times its own length from zero: a clock that counts from 1970
 PAUSE_S, PAUSE_STEPS = 1.0, 50.0  # what is farther from the row before is another block of rows
 STRAY_ROWS = 5  # a block of more rows is a part of the drive
+MOST = 0.5  # of the rows are in such blocks, or no block says what is stray
 ALONE_S, ALONE_SPANS = 60.0, 10.0  # a first or last row so far from all others
 HOLE = 1.5  # usual steps: a row that was written late is missing where it belongs
 JITTER = 0.5  # of the usual step: the stamps are wrong, not the order
@@ -246,7 +247,7 @@ def _strays(table: Table) -> Bools:
         return found
     starts, ends = np.append(0, edges), np.append(edges, len(t))
     large = np.flatnonzero(ends - starts > STRAY_ROWS)
-    if len(large) == 0:
+    if (ends - starts)[large].sum() < MOST * len(t):  # sparse, or of rows in any order
         return _alone(table)
     in_order = np.sort(np.concatenate([t[starts[b] : ends[b]] for b in large]))
     for b in np.setdiff1d(np.arange(len(starts)), large):
