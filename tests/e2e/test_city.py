@@ -33,7 +33,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
 @pytest.fixture(scope="module")
 def begun(running: CityProcess) -> dict[str, Any]:
     """Where the six cars were at first; red lights let some of them begin much later."""
-    wait_for(lambda: len(cars_of(running)) == 6, 20.0, "six cars are on the map")
+    wait_for(lambda: len(cars_of(running)) == 6, 90.0, "six cars are on the map")
     return cars_of(running)
 
 
@@ -102,8 +102,8 @@ def detail_of_camera(running: CityProcess) -> str:
 
 def test_a_city_pictures_what_is_watched_and_nothing_else(running: CityProcess) -> None:
     idle = lambda: detail_of_camera(running) == "nobody looks"  # noqa: E731
-    wait_for(idle, 20.0, "the camera part tells of itself")
-    wait_for(lambda: {"n1", "n5"} <= cars_of(running).keys(), 20.0, "both are on the map")
+    wait_for(idle, 90.0, "the camera part tells of itself")
+    wait_for(lambda: {"n1", "n5"} <= cars_of(running).keys(), 90.0, "both are on the map")
     for car in ("n1", "n5"):
         answer = running.web.get(f"/vehicles/{car}/camera/front.jpg", timeout=20.0)
         assert answer.status_code == 200, answer.text
@@ -118,8 +118,8 @@ def test_a_city_pictures_what_is_watched_and_nothing_else(running: CityProcess) 
             parts += piece
             if parts.count(b"Content-Type: image/jpeg") >= 5:
                 break
-        wait_for(lambda: "1 camera," in detail_of_camera(running), 10.0, "one camera is pictured")
-    wait_for(idle, 10.0, "rendering ends with the film")
+        wait_for(lambda: "1 camera," in detail_of_camera(running), 60.0, "one camera is pictured")
+    wait_for(idle, 60.0, "rendering ends with the film")
     assert running.get("/vehicles/n1/camera") == {"cameras": ["front", "rear"], "watched": []}
 
 
@@ -141,12 +141,12 @@ def test_a_car_plays_a_written_drive_is_recorded_and_goes_back_to_its_driver(
         "t_s,throttle,steering\n0,0,0\n1,0.5,0\n3,0,0\n4,0,0\n", encoding="utf-8"
     )
     (tmp_path / "drive.yaml").write_text("drive: 1\ncommands: a.csv\n", encoding="utf-8")
-    wait_for(lambda: "n1" in cars_of(running), 20.0, "n1 is on the map")
+    wait_for(lambda: "n1" in cars_of(running), 90.0, "n1 is on the map")
     arguments = ["play", str(tmp_path / "drive.yaml"), "--connect", running.endpoint]
     assert main([*arguments, "--vehicle", "n1", "--out", str(tmp_path / "out")]) == 0
     assert main([*arguments, "--vehicle", "n99", "--out", str(tmp_path / "no")]) == 2
     home = lambda: cars_of(running)["n1"]["owner"] == "world"  # noqa: E731
-    wait_for(home, 5.0, "the city has its car again")
+    wait_for(home, 120.0, "the city has its car again")
     (recording,) = read_recordings(tmp_path / "out")
     throttle, x, y = (recording.channel(n) for n in ("command.throttle", "pose.x", "pose.y"))
     began = x.t[0]
@@ -161,7 +161,7 @@ def test_a_car_plays_a_written_drive_is_recorded_and_goes_back_to_its_driver(
 def test_another_car_joins_and_leaves_cleanly(running: CityProcess) -> None:
     agent = join(running, "n7")
     try:
-        wait_for(lambda: "n7" in cars_of(running), 40.0, "n7 is on the map")
+        wait_for(lambda: "n7" in cars_of(running), 120.0, "n7 is on the map")
         began = time.monotonic()
         agent.send_signal(signal.SIGINT)
         assert agent.wait(timeout=5.0) == 0
@@ -176,7 +176,7 @@ def test_another_car_joins_and_leaves_cleanly(running: CityProcess) -> None:
 def test_a_killed_car_is_noticed_within_one_and_a_half_seconds(running: CityProcess) -> None:
     agent = join(running, "n8")
     try:
-        wait_for(lambda: "n8" in cars_of(running), 40.0, "n8 is on the map")
+        wait_for(lambda: "n8" in cars_of(running), 120.0, "n8 is on the map")
         os.kill(agent.pid, signal.SIGKILL)
         noticed = "the city shows n8 as lost"
         wait_for(lambda: not cars_of(running).get("n8", {"alive": False})["alive"], 1.5, noticed)
@@ -190,11 +190,11 @@ def test_a_part_that_dies_is_started_again(running: CityProcess) -> None:
         rows = running.get("/stations")["stations"]
         return next((r["session"] for r in rows if r["name"] == "eye" and r["alive"]), None)
 
-    before = wait_for(session_of_eye, 20.0, "the eye is there")
+    before = wait_for(session_of_eye, 90.0, "the eye is there")
     found = (re.fullmatch(r" *eye .* pid (\d+)", line) for line in running.lines)
     pid = next(int(match.group(1)) for match in found if match)
     os.kill(pid, signal.SIGKILL)
-    wait_for(lambda: session_of_eye() not in (None, before), 20.0, "another eye is there")
+    wait_for(lambda: session_of_eye() not in (None, before), 90.0, "another eye is there")
 
 
 def test_ctrl_c_ends_everything_within_two_seconds_and_leaves_a_recording(

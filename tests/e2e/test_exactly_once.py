@@ -74,7 +74,7 @@ def cars_now(bus):
     """Return the names of the cars in the newest snapshot."""
     snapshots = Mailbox(1)
     bus.subscribe(WorldSnapshot, {}, snapshots)
-    (item,) = wait_for(snapshots.drain, 20.0, "a snapshot of the world")
+    (item,) = wait_for(snapshots.drain, 90.0, "a snapshot of the world")
     bus.unsubscribe(snapshots)
     return {car.vehicle for car in item.message.vehicles}
 

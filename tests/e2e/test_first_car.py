@@ -28,7 +28,7 @@ def test_every_car_file_is_compiled_before_the_world_opens(tmp_path: Path) -> No
             bus.subscribe(PartStatus, {"station": "world"}, statuses)
             for car in car_names():
                 assert isinstance(ask(bus, SpawnRequest(car=car)), SpawnReply), car
-            told = wait_for(statuses.drain, 5.0, "the world's status")
+            told = wait_for(statuses.drain, 120.0, "the world's status")
         finally:
             world.terminate()
             world.wait(timeout=5.0)

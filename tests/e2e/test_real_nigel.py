@@ -45,9 +45,9 @@ class Street(EmulatedStage):
 
     def error_m(self):
         """Return how far from the truth the newest state is."""
-        state = wait_for(self.states.drain, 5.0, "the agent reports")[-1].message
+        state = wait_for(self.states.drain, 120.0, "the agent reports")[-1].message
         assert (state.vehicle, state.source) == ("r1", "eye")
-        wait_for(lambda: (p := self.pose()) and p.t_ns > state.t_ns, 5.0, "the truth is later")
+        wait_for(lambda: (p := self.pose()) and p.t_ns > state.t_ns, 120.0, "the truth is later")
         near = min(self.way, key=lambda pose: abs(pose.t_ns - state.t_ns))
         return math.hypot(near.x_m - state.x_m, near.y_m - state.y_m)
 

@@ -224,10 +224,11 @@ def test_a_recording_of_ones_own_is_sent_and_searched(visit, shelf, running, tmp
     page.wait_for_selector(".jobs li:has-text('short-drive')")
 
     def report():
+        running.hasten()
         rows = running.get("/mismatch/reports")["items"]
         return next((row for row in rows if row["name"].startswith("short-drive")), None)
 
-    row = wait_for(report, SEARCH_S, "the report of what was sent")
+    row = wait_for(report, SEARCH_S, "the report of what was sent", every_s=0.5)
     assert "does not allow a verdict" in row["said"]
     page.click(f".reports a[href='/mismatch/{row['name']}']")
     page.wait_for_selector(".head >> text=No verdict")
@@ -239,10 +240,11 @@ def test_a_recording_of_ones_own_is_sent_and_searched(visit, shelf, running, tmp
 
 def test_a_real_search_ends_in_a_report_that_can_be_read(visit, shelf, running, searching):
     def ended():
+        running.hasten()
         row = running.get(f"/operations/{searching}")
         return row if row["state"] not in ("waiting", "running") else None
 
-    row = wait_for(ended, SEARCH_S, "the search ends")
+    row = wait_for(ended, SEARCH_S, "the search ends", every_s=0.5)
     assert row["state"] == "done", row
     assert row["result"].startswith("/mismatch/turns-")
     page = visit(row["result"]).page

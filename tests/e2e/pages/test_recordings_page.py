@@ -233,6 +233,22 @@ def test_it_plays_pauses_steps_and_jumps_by_mouse_and_keyboard(visit, drive, las
     assert visited.complaints == []
 
 
+def test_a_pause_of_a_day_is_skipped_and_the_page_says_so(visit, running, drive):
+    path = write_run(running.folder / "paused.mcap", pause_s=86_400.0)
+    visited = visit("/recordings/paused?t=10")
+    page = visited.page
+    page.click(".play")
+    page.wait_for_selector("[role=status] >> text=Skipped 23 h 59 min 52 s")
+    page.wait_for_selector(READY)  # what comes next is there
+    said = page.locator("[role=status]", has_text="Skipped")
+    assert said.is_visible()
+    photograph(visited, "recordings_pause_skipped")
+    page.locator("input[type=range]").fill("1")
+    said.wait_for(state="detached")
+    path.unlink()
+    assert visited.complaints == []
+
+
 def test_a_recording_that_is_being_written_grows_while_it_is_looked_at(visit, running):
     rows = running.get("/recordings")["items"]
     live = next(row["name"] for row in rows if row["state"] == "being written")
@@ -331,6 +347,7 @@ def test_a_refusal_is_said_within_the_dialog_that_asked(visit, drive):
     visited = visit(AT)
     page = visited.page
     page.click("text=Mismatch job")
+    visited.wait("document.querySelectorAll('dialog select[name=car] option').length > 1")  # all
     gone = "(car) => { car.selectedOptions[0].value = 'no_such_car' }"  # as a file that was removed
     page.locator("dialog select[name=car]").evaluate(gone)
     page.locator("dialog select[name=car]").dispatch_event("change")

@@ -91,7 +91,7 @@ def test_a_hold_is_asked_for_by_keyboard_shown_and_taken_back(visit, running):
             assert wide <= SIZES[size][0]  # whatever people write
     finally:
         page.click(".held li button")
-        wait_for(lambda: not running.get("/signals/crossing/wishes")["items"], 20.0, "taken back")
+        wait_for(lambda: not running.get("/signals/crossing/wishes")["items"], 90.0, "taken back")
     page.wait_for_selector(".wishes .empty >> text=No wish is in force")
 
 
@@ -192,7 +192,7 @@ def test_flash_is_shown_at_once_with_its_letter_and_ended_with_a_reason(visit, r
                 assert line.evaluate("line => line.scrollWidth <= line.clientWidth")
     finally:
         answer("End flash…", "done")
-        wait_for(lambda: running.get("/signals/crossing")["mode"] != "flash", 20.0, "it goes on")
+        wait_for(lambda: running.get("/signals/crossing")["mode"] != "flash", 90.0, "it goes on")
     page.wait_for_selector('.runs:not([data-mode="flash"])')
 
 
@@ -207,7 +207,7 @@ def test_a_fault_of_the_monitor_is_shown_kept_and_cleared_with_a_reason(visit, r
         page.wait_for_selector('.monitor[data-state="fault"]')
         page.wait_for_selector(".runs[data-mode=unheard]")
     visited.until(lambda: fault() == "stale", "the fault is latched")
-    wait_for(lambda: running.get("/signals/crossing")["fresh"], 20.0, "the controller is back")
+    wait_for(lambda: running.get("/signals/crossing")["fresh"], 90.0, "the controller is back")
     page.click(".monitor .danger")
     page.fill("dialog input[name=reason]", "it was frozen by a test")
     page.keyboard.press("Enter")

@@ -112,7 +112,7 @@ def tired(running, throttle=0.0):
     finally:
         stop.set()
         thread.join(10.0)
-        wait_for(lambda: len(running.get("/vehicles")["vehicles"]) == 6, 10.0, "it left")
+        wait_for(lambda: len(running.get("/vehicles")["vehicles"]) == 6, 60.0, "it left")
 
 
 def looks_right(visited, name):
@@ -231,7 +231,7 @@ def test_a_held_key_drives_and_a_released_one_stops_within_half_a_second(visit, 
 def stands_within(running, seconds):
     """The car rests by its own clock so long after the newest command that was none."""
     began_ns = running.get("/vehicles")["t_ns"]
-    wait_for(lambda: abs(speed(running)) < 0.01, 10.0, "it stands")
+    wait_for(lambda: abs(speed(running)) < 0.01, 60.0, "it stands")
     assert running.get("/vehicles")["t_ns"] - began_ns < 1e9 * (seconds + 0.5), "and slack to ask"
 
 
@@ -291,7 +291,7 @@ def test_a_wheel_on_a_dead_line_says_so_and_is_given_back(visit, running):
         page.wait_for_selector(".notice >> text=The city did not answer in time.")
     running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
     page.wait_for_selector('.page[data-link="live"]')
-    wait_for(lambda: row(running)["lease_left_ms"] is None, 20.0, "its lease has ended")
+    wait_for(lambda: row(running)["lease_left_ms"] is None, 90.0, "its lease has ended")
     page.click("text=Let it drive")
     drives_by_itself(running)
 

@@ -10,7 +10,7 @@ SIZES = {"wide": (1440, 900), "narrow": (390, 844)}
 THEMES = ("light", "dark")
 LOOKS = tuple(zip(SIZES, THEMES, strict=True))
 """The sizes and themes in which a page is opened; it is shown in the other theme after."""
-PATIENCE_MS = 30_000
+PATIENCE_MS = 90_000
 SERIOUS = {"serious", "critical"}
 
 

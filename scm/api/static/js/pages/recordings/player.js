@@ -1,6 +1,7 @@
 /** What plays a recording: where it is, how fast, and the frames about that moment. */
 import { signal } from "@preact/signals";
 import { read } from "scm/pages/recordings/reading.js";
+import { spoken } from "scm/pages/recordings/words.js";
 
 const STRETCH_S = 10; // of one answer of the server
 const HZ = 10; // drawn smoothly between
@@ -9,6 +10,7 @@ const KEPT = 40; // stretches: a few minutes either way
 const TOLD_MS = 100; // how often the page's words follow
 const GAP_S = 1.5; // a silence longer than this is shown as one
 const GROWS_MS = 2000;
+const SKIP_SHOWN_S = 5; // of what is played after it
 
 export const SPEEDS = [0.25, 0.5, 1, 2, 4, 8];
 
@@ -22,6 +24,8 @@ export class Player {
     this.speed = signal(1);
     this.loop = signal(false);
     this.trouble = signal("");
+    /** The pause that was skipped last: `{words, from_s, to_s}`, the span in which it is named. */
+    this.skipped = signal(null);
     /** Where it is [s], ten times a second; `t_s` is the same for every picture. */
     this.at = signal(0);
     this.t_s = 0;
@@ -53,6 +57,8 @@ export class Player {
     this.last_ms = ms;
     if (this.playing.value && this.has(this.t_s)) this.go(this.t_s + passed_s * this.speed.value);
     if (this.playing.value) this.skipPause();
+    const skipped = this.skipped.value;
+    if (skipped && (this.t_s < skipped.from_s || this.t_s > skipped.to_s)) this.skipped.value = null;
     if (ms - this.told_ms > TOLD_MS && this.at.value !== this.t_s) {
       this.told_ms = ms;
       this.at.value = this.t_s;
@@ -75,9 +81,9 @@ export class Player {
   skipPause() {
     const next_s = this.stretchAt(this.t_s)?.next_s ?? null;
     if (next_s === null || next_s <= this.t_s) return;
-    const words = `Skipped ${Math.round(next_s - this.t_s)} s in which the world was silent.`;
+    const words = `Skipped ${spoken(next_s - this.t_s)} in which the world was silent.`;
     this.seek(next_s);
-    this.trouble.value = words;
+    this.skipped.value = { words, from_s: next_s, to_s: next_s + SKIP_SHOWN_S };
   }
 
   seek(t_s) {

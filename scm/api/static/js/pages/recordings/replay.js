@@ -102,6 +102,7 @@ function Played({ player, summary, events, more, onChanged }) {
       <${Banner} recording=${recording} map=${summary.map_title} />
       <section class="panel stage" aria-label="Replay">
         <${ReplayMap} player=${player} summary=${summary} chosen=${chosen} onChoose=${setChosen} />
+        ${player.skipped.value && html`<p class="hint" role="status">${player.skipped.value.words}</p>`}
         ${player.trouble.value && html`<p class="trouble" role="alert">${player.trouble.value}</p>`}
         <${Timeline} player=${player} events=${events} begin_ns=${recording.begin_ns} />
       </section>

@@ -10,9 +10,11 @@ export function minutes(seconds, tenths = false) {
   return hours ? `${hours}:${String(minute).padStart(2, "0")}:${tail}` : `${minute}:${tail}`;
 }
 
+/** 3683.4 s is `1 h 1 min 23 s`. */
 export function spoken(seconds) {
-  const minute = Math.floor(seconds / 60);
-  return `${minute ? `${minute} min ` : ""}${Math.round(seconds % 60)} s`;
+  const whole = Math.round(seconds);
+  const [hours, minute] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60];
+  return `${hours ? `${hours} h ` : ""}${hours || minute ? `${minute} min ` : ""}${whole % 60} s`;
 }
 
 export function size(bytes) {
