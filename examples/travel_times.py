@@ -26,12 +26,20 @@ with open_city("driving_school", connect=arguments.connect if arguments.live els
         trips = [car.drive(*arguments.via) for car in cars]
         city.wait(trips, timeout_s=300.0)
         for trip in trips:
-            length_m, time_s = trip.length_m, trip.travel_time_s
-            print(f"{plan:>6} {trip.vehicle:>4} {length_m:6.2f} m in {time_s:5.1f} s", flush=True)
-        # A trip starts where its car happens to be: compare speeds, not times.
-        speeds[plan] = sum(t.length_m for t in trips) / sum(t.travel_time_s for t in trips)
-        print(f"{plan:>6} plan: {speeds[plan]:.3f} m/s on average")
+            length_m, time_s = trip.length_m, trip.duration_s
+            void = f"  void: {'; '.join(trip.void)}" if trip.void else ""
+            print(f"{plan:>6} {trip.vehicle:>4} {length_m:6.2f} m in {time_s:5.1f} s{void}",
+                  flush=True)  # fmt: skip
+        counted = [trip for trip in trips if not trip.void]
+        if counted:
+            # A trip starts where its car happens to be: compare speeds, not times.
+            length_m = sum(trip.length_m for trip in counted)
+            speeds[plan] = length_m / sum(trip.travel_time_s for trip in counted)
+            print(f"{plan:>6} plan: {speeds[plan]:.3f} m/s on average")
     city_s, elapsed_s = city.time_s - start_s, time.perf_counter() - began
 first, last = arguments.plans[0], arguments.plans[-1]
-print(f"{last} against {first}: {speeds[last] / speeds[first] - 1.0:+.0%} average speed")
+if first in speeds and last in speeds:
+    print(f"{last} against {first}: {speeds[last] / speeds[first] - 1.0:+.0%} average speed")
+else:
+    print(f"{last} against {first}: not compared, all trips of a plan are void")
 print(f"{city_s:.0f} s of city in {elapsed_s:.1f} s: {city_s / elapsed_s:.1f} x real time")

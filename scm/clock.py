@@ -36,6 +36,18 @@ def processor_s() -> float:
     return time.process_time()
 
 
+def waited_ns() -> int:
+    """Return how long this thread has waited for a processor so far [ns]; 0: not known.
+
+    Linux counts it per thread: the time in which it could have run, and another one did.
+    """
+    try:
+        with open("/proc/thread-self/schedstat", encoding="ascii") as told:  # noqa: PTH123 often
+            return int(told.read().split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0
+
+
 class Clock(Protocol):
     """What a part's runner needs of time."""
 

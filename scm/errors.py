@@ -12,7 +12,8 @@
     ├── StoreError    (OSError)          state that must survive, and cannot be read or written
     ├── AccessError   (PermissionError)  credentials, and what somebody may not do
     ├── LeaseError    (PermissionError)  driving a car that somebody else owns
-    └── RunError      (RuntimeError)     a city that cannot start or go on
+    ├── RunError      (RuntimeError)     a city that cannot start or go on
+    └── VoidError     (RuntimeError)     a measurement that something in the city made void
 
 A message says what was wrong, where (file and key), what was got and what was expected.
 """
@@ -74,6 +75,10 @@ class LeaseError(ScmError, PermissionError):
 
 class RunError(ScmError, RuntimeError):
     """A city that cannot start or cannot go on."""
+
+
+class VoidError(ScmError, RuntimeError):
+    """A measurement that says nothing of the city: signals flashed, a part was lost, time was."""
 
 
 def nearest(name: str, valid: Sequence[str]) -> str:

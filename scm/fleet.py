@@ -5,6 +5,9 @@
 
 The script is the same: in lockstep waiting moves a stepped clock and takes no longer than the
 computation; live it waits for the real city.
+
+A travel time during which signals flashed, a part of the city was lost or the computer was too slow
+is void: reading it raises `VoidError` with the reasons.
 """
 
 import itertools
@@ -19,7 +22,8 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 from scm.clock import WallClock, seconds
-from scm.errors import RunError, ScmError, nearest
+from scm.disturbances import HEARS, Disturbance, Disturbances
+from scm.errors import RunError, ScmError, VoidError, nearest
 from scm.lockstep import Lockstep
 from scm.log import event
 from scm.maps.load import load_map
@@ -156,15 +160,43 @@ class Journey:
     Attributes:
         route: The lanes it follows.
         length_m: Of the route; None: it has no end.
-        travel_time_s: From start to arrival; None while under way, as far as the script knows: it
-            learns of arrivals whenever it lets the city go on or asks it for something.
+        started_ns, arrived_ns: On the city's clock; None while under way, as far as the script
+            knows: it learns of arrivals whenever it lets the city go on or asks it for something.
     """
 
     vehicle: str
     trip_id: str
+    disturbances: Disturbances = field(repr=False)
     route: tuple[str, ...] = ()
     length_m: float | None = None
-    travel_time_s: float | None = None
+    started_ns: int | None = None
+    arrived_ns: int | None = None
+
+    @property
+    def void(self) -> tuple[str, ...]:
+        """Why its travel time says nothing of the city; empty: it counts, or is under way."""
+        if self.started_ns is None or self.arrived_ns is None:
+            return ()
+        return self.disturbances.void_reasons(self.started_ns, self.arrived_ns)
+
+    @property
+    def duration_s(self) -> float | None:
+        """From start to arrival, void or not; None while under way."""
+        if self.started_ns is None or self.arrived_ns is None:
+            return None
+        return seconds(self.arrived_ns - self.started_ns)
+
+    @property
+    def travel_time_s(self) -> float | None:
+        """From start to arrival; None while under way.
+
+        Raises:
+            VoidError: with the reasons, see `void`.
+        """
+        if reasons := self.void:
+            msg = f"the trip of {self.vehicle} is void: {'; '.join(reasons)}"
+            raise VoidError(msg)
+        return self.duration_s
 
 
 @dataclass(eq=False)
@@ -213,6 +245,9 @@ class City:
         self._trip_numbers = itertools.count(1)
         self._may_arrive: dict[str, tuple[Journey, ...]] = {}  # by car: its last two journeys
         self._arrivals = link.hear(Hears(Trip), self._is_arrival)
+        self._disturbances = Disturbances()
+        for kind in HEARS:
+            link.hear(Hears(kind), self._watch)
         self.cars: list[FleetCar] = []
 
     @property
@@ -234,13 +269,34 @@ class City:
         request = PlanRequest(junction=junction, plan=plan, by="script", reason=reason)
         return self.request(request, PlanReply)
 
+    @property
+    def disturbances(self) -> tuple[Disturbance, ...]:
+        """What makes measurements void at this moment, the oldest first; none: all is well."""
+        self._disturbances.look(self._link.now_ns)
+        return self._disturbances.now()
+
+    def wait_for_disturbance(self, timeout_s: float = 120.0) -> Disturbance | None:
+        """Let the city go on until something makes measurements void; None: nothing did."""
+        return self.disturbances[0] if self._run_until(self._is_disturbed, timeout_s) else None
+
+    def wait_for_calm(self, timeout_s: float = 120.0) -> None:
+        """Let the city go on until nothing makes measurements void any more.
+
+        Raises:
+            RunError: saying what still does when the time is over.
+        """
+        if not self._run_until(lambda: not self._is_disturbed(), timeout_s):
+            still = "; ".join(one.text for one in self.disturbances)
+            msg = f"after {timeout_s:g} s the city is still disturbed: {still}"
+            raise RunError(msg)
+
     def run_for(self, duration_s: float) -> None:
         """Let the city go on for a while."""
         end = self._link.now_ns + round(duration_s * 1e9)
         self._run_until(lambda: self._link.now_ns >= end, duration_s + 1.0)
 
     def wait(self, journeys: Sequence[Journey], timeout_s: float = 120.0) -> None:
-        """Let the city go on until all journeys have arrived.
+        """Let the city go on until all journeys have arrived, void or not.
 
         Raises:
             RunError: naming those that had not when the time was over, or never will: cars that
@@ -248,7 +304,7 @@ class City:
         """
         here = {car.name for car in self.cars}
         for journey in journeys:
-            if journey.travel_time_s is None and (
+            if journey.arrived_ns is None and (
                 journey.length_m is None or journey.vehicle not in here
             ):
                 why = "it was removed" if journey.vehicle not in here else "it circulates"
@@ -256,7 +312,7 @@ class City:
                 raise RunError(msg)
 
         def late() -> list[str]:
-            return [journey.vehicle for journey in journeys if journey.travel_time_s is None]
+            return [journey.vehicle for journey in journeys if journey.arrived_ns is None]
 
         if self._run_until(lambda: not late(), timeout_s):
             return
@@ -289,7 +345,7 @@ class City:
         Raises:
             ScmError: with the sentence of whoever refused.
         """
-        journey = Journey(request.vehicle, request.request_id)
+        journey = Journey(request.vehicle, request.request_id, self._disturbances)
         before = self._may_arrive.get(request.vehicle, ())
         # The trip before may have ended already, and be on its way to us.
         self._may_arrive[request.vehicle] = (*before[-1:], journey)
@@ -322,6 +378,14 @@ class City:
 
         return self._link.run_until(is_done, timeout_s)
 
+    def _is_disturbed(self) -> bool:
+        return bool(self.disturbances)
+
+    def _watch(self, item: Incoming) -> bool:
+        """Note what disturbs the city, as it comes; nothing of it is kept for later."""
+        self._disturbances.hear(item)
+        return False
+
     def _is_arrival(self, item: Incoming) -> bool:
         """Return whether a message ends one of the script's journeys; on the bus's thread, live."""
         trip = item.message
@@ -337,7 +401,7 @@ class City:
             if isinstance(trip, Trip) and trip.arrived_ns is not None:
                 journey = self._of(trip)
                 if journey is not None:
-                    journey.travel_time_s = seconds(trip.arrived_ns - trip.started_ns)
+                    journey.started_ns, journey.arrived_ns = trip.started_ns, trip.arrived_ns
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from scm.clock import NS_PER_MS, WallClock, seconds
 from scm.crew import Crew, Job, Say
+from scm.disturbances import HEARS, Disturbance, Disturbances
 from scm.errors import RunError
 from scm.eye.station import eye_station
 from scm.live import stop_on_signal
@@ -176,22 +177,36 @@ def _make_folder(folder: Path) -> None:
 def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
     """Keep all processes of the city alive until told to stop."""
     clock, heard = WallClock(), Mailbox(1000)
-    crew = Crew([*_parts(plan), *_agents(plan)], clock, say)
+    crew, disturbances = Crew([*_parts(plan), *_agents(plan)], clock, say), Disturbances()
     stop = stop_on_signal()
-    bus.subscribe(Presence, {}, heard)
-    told = False
+    for kind in HEARS:
+        bus.subscribe(kind, {}, heard)
+    is_ready = False
     try:
         while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, stop):
             crew.look()
             for item in heard.drain():
+                disturbances.hear(item)
                 if isinstance(item.message, Presence):
                     crew.heard(item.message)
-            if crew.settled and not told:
-                told = True
+            disturbances.look(clock.now_ns())
+            for one in disturbances.news():
+                if is_ready:  # parts that start are late, and are not all there
+                    _say_disturbance(one, say)
+            if crew.settled and not is_ready:
+                is_ready = True
                 _tell_next(plan, say)
     finally:
         say("stopping")
         crew.stop()
+
+
+def _say_disturbance(one: Disturbance, say: Say) -> None:
+    if one.end_ns is None:
+        say(f"  {'warning':<12} {one.text}: trips meanwhile are void")
+    else:
+        lasted_s = seconds(one.end_ns - one.start_ns)
+        say(f"  {'over':<12} after {lasted_s:.1f} s: {one.text}")
 
 
 def _parts(plan: _Plan) -> list[Job]:

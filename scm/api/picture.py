@@ -8,6 +8,7 @@ from typing import Generic, TypeVar
 from scm.api.residual import Residual
 from scm.api.stations import StationRow
 from scm.clock import seconds
+from scm.disturbances import Disturbances
 from scm.v2x.message import Message
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
@@ -69,6 +70,7 @@ class Picture:
         tags_seen: By (camera, tag id), all of the last minute.
         poses: By (camera, vehicle).
         stations: Everybody who is there, and who was lost lately.
+        disturbances: What makes measurements void; it goes on with the city.
         event_seq: Number of the newest event in the log; 0: none yet.
     """
 
@@ -89,6 +91,7 @@ class Picture:
     eye_statuses: dict[str, Held[EyeStatus]] = field(default_factory=dict)
     poses: dict[tuple[str, str], SeenPose] = field(default_factory=dict)
     stations: tuple[StationRow, ...] = ()
+    disturbances: Disturbances = field(default_factory=Disturbances)
     event_seq: int = 0
 
 

@@ -17,6 +17,7 @@ from scm.api.routes.boxes import boxes_of
 from scm.api.routes.stop import stop_of
 from scm.api.signal_rows import junction_rows, status_rows
 from scm.api.vehicle_rows import vehicles_topic
+from scm.disturbances import Disturbance
 
 EVENTS = "events"
 """The one topic that is no state: its entries come one by one, and never twice."""
@@ -39,6 +40,7 @@ class Pulse(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         moving: How many of its vehicles move: after a stop, those that do not stand yet.
         silent_signals: Junctions whose controller was heard once, and not for `LOST_S`, by name.
+        disturbances: What makes measurements void at this moment.
     """
 
     t_ns: int | None
@@ -48,6 +50,7 @@ class Pulse(msgspec.Struct, kw_only=True, frozen=True):
     vehicles: int
     moving: int
     silent_signals: tuple[str, ...]
+    disturbances: tuple[Disturbance, ...]
 
 
 def pulse_of(picture: Picture) -> Pulse:
@@ -55,10 +58,11 @@ def pulse_of(picture: Picture) -> Pulse:
     silent = tuple(
         sorted(name for name, spat in picture.spats.items() if spat.age_s(picture.now_ns) > LOST_S)
     )
+    disturbances = picture.disturbances.now()
     if picture.snapshot is None:
         return Pulse(
             t_ns=None, tick=None, real_time_factor=0.0, late_ticks=0, vehicles=0, moving=0,
-            silent_signals=silent,
+            silent_signals=silent, disturbances=disturbances,
         )  # fmt: skip
     told = picture.snapshot.message
     return Pulse(
@@ -69,6 +73,7 @@ def pulse_of(picture: Picture) -> Pulse:
         vehicles=len(told.vehicles),
         moving=sum(abs(car.speed_mps) > STANDS_MPS for car in told.vehicles),
         silent_signals=silent,
+        disturbances=disturbances,
     )
 
 

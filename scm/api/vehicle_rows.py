@@ -2,10 +2,9 @@
 
 import msgspec
 
-from scm.api.picture import Held, Picture, SeenPose, once_a_picture
+from scm.api.picture import Picture, SeenPose, once_a_picture
 from scm.api.residual import Residual
 from scm.camera.optics import fitted
-from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 POSE_SHOWN_S = 2.0
@@ -13,7 +12,11 @@ TRIP_SHOWN_S = 10.0
 
 
 class TripRow(msgspec.Struct, kw_only=True, frozen=True):
-    """Progress of a trip; `length_m` is None for a route without end."""
+    """Progress of a trip; `length_m` is None for a route without end.
+
+    Attributes:
+        void: Why its time so far says nothing of the city, in words; none: it counts.
+    """
 
     trip_id: str
     done_m: float
@@ -21,6 +24,7 @@ class TripRow(msgspec.Struct, kw_only=True, frozen=True):
     arrived: bool
     waiting_for: str | None
     route: tuple[str, ...]
+    void: tuple[str, ...]
 
 
 class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -89,7 +93,7 @@ def vehicles_topic(picture: Picture) -> VehiclesTopic:
         _row(
             car,
             since_ms,
-            _trip(picture.trips.get(car.vehicle), picture.now_ns),
+            _trip(picture, car.vehicle),
             residuals.get(car.vehicle),
         )
         for car in sorted(held.message.vehicles, key=lambda car: car.vehicle)
@@ -139,10 +143,12 @@ def _row(
     )
 
 
-def _trip(held: Held[Trip] | None, now_ns: int) -> TripRow | None:
-    if held is None or held.age_s(now_ns) > TRIP_SHOWN_S:
+def _trip(picture: Picture, vehicle: str) -> TripRow | None:
+    held = picture.trips.get(vehicle)
+    if held is None or held.age_s(picture.now_ns) > TRIP_SHOWN_S:
         return None
     trip = held.message
+    until_ns = trip.t_ns if trip.arrived_ns is None else trip.arrived_ns
     return TripRow(
         trip_id=trip.trip_id,
         done_m=round(trip.done_m, 2),
@@ -150,6 +156,7 @@ def _trip(held: Held[Trip] | None, now_ns: int) -> TripRow | None:
         arrived=trip.arrived_ns is not None,
         waiting_for=trip.waiting_for,
         route=trip.route,
+        void=picture.disturbances.void_reasons(trip.started_ns, until_ns),
     )
 
 

@@ -20,6 +20,7 @@ from scm.api.scan_watch import ScanWatch
 from scm.api.signal_history import History, PromiseScore, SignalHistory, Verdict
 from scm.api.stations import StationTable
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.disturbances import Disturbances
 from scm.geometry import Pose2
 from scm.part import Hears, Serves
 from scm.v2x.exchange import Incoming, Outgoing
@@ -95,6 +96,7 @@ class CityView:
         self._scores: Held[MisbehaviourScores] | None = None
         self._reports: dict[str, MisbehaviourReport] = {}
         self._stations = StationTable()
+        self._disturbances = Disturbances()
         self._log = EventLog()
         self._takers = self._always_heard()
         self._always = tuple(Hears(kind) for kind in self._takers)
@@ -136,6 +138,8 @@ class CityView:
                 taker = self._takers.get(type(incoming.message))
                 if taker is not None:
                     taker(incoming.message, incoming.t_ns)
+                self._disturbances.hear(incoming)
+            self._disturbances.look(now_ns)
             if now_ns >= self._next_forget_ns:
                 self._next_forget_ns = now_ns + NS_PER_S
                 self._forget(now_ns)
@@ -173,6 +177,7 @@ class CityView:
             eye_statuses=dict(self._eye_statuses),
             poses=dict(self._poses),
             stations=self._stations.rows(self._now_ns),
+            disturbances=self._disturbances,
             event_seq=self._log.newest_seq,
         )
 

@@ -49,6 +49,7 @@ WORDS: dict[str, tuple[str, object]] = {
     "detectors": ("What the detectors of groups see.", None),
     "digest": ("Hash of the newest entry, hexadecimal.", "0" * 64),
     "doing": ("The step it is at, in words.", "reads the recording"),
+    "disturbances": ("What makes measurements void.", None),
     "done_m": ("How far the car is on its way [m].", 2.31),
     "drawn": ("What its pictures draw.", {"said": "The car grips less than its file says."}),
     "drives": ("Names of the drives it suggests.", ["next_drive"]),
@@ -225,6 +226,10 @@ WORDS: dict[str, tuple[str, object]] = {
     "vehicles": ("Cars.", ["n1"]),
     "verb": ("What is wished.", "hold"),
     "verdict": ("What was found: `none`, `mismatch` or `undecided`.", "mismatch"),
+    "void": (
+        "Why a measurement says nothing of the city; none: it counts.",
+        ["the signals of crossing flash for 4.0 of 10.0 s"],
+    ),
     "waiting_for": ("What it waits for; null: nothing.", "crossing"),
     "watched": ("Whether somebody watches.", ["front_camera"]),
     "what": ("Of which thing, in words.", "runs/today.mcap, n1"),

@@ -12,6 +12,7 @@ from scm.client.nouns.audit import AuditNoun
 from scm.client.nouns.boxes import BoxesNoun
 from scm.client.nouns.cameras import CamerasNoun
 from scm.client.nouns.cities import CitiesNoun
+from scm.client.nouns.disturbances import DisturbancesNoun
 from scm.client.nouns.events import EventsNoun
 from scm.client.nouns.eye import EyeNoun
 from scm.client.nouns.health import HealthNoun
@@ -51,6 +52,7 @@ class Client:
         self.boxes = BoxesNoun(self.connection)
         self.cameras = CamerasNoun(self.connection)
         self.cities = CitiesNoun(self.connection)
+        self.disturbances = DisturbancesNoun(self.connection)
         self.events = EventsNoun(self.connection)
         self.eye = EyeNoun(self.connection)
         self.health = HealthNoun(self.connection)

@@ -11,6 +11,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from scm.clock import waited_ns
     from scm.maps.load import load_map
     from scm.store.records import FaultRecord, records
     from scm.traffic.monitor_part import MonitorPart
@@ -18,7 +19,7 @@ def _run(arguments: argparse.Namespace) -> int:
     with state_of(arguments) as state:
         stored = {} if state is None else records(state, "latches", "monitor", FaultRecord)
         faults = {junction: record.fault for junction, record in stored.items()}
-        part = MonitorPart(load_map(arguments.map), faults)
+        part = MonitorPart(load_map(arguments.map), faults, waited_ns)
         return run_part(part, arguments, state)
 
 

@@ -4,19 +4,21 @@
                                  0.1 s at 10 Hz; one sample alone may be a broken message
     short_green, short_yellow, short_clearance, skipped_yellow, sequence    at once
     stale                        no new sample for more than 500 ms; the same again is none
+    overload                     the same, while the monitor itself waited for a processor
     clock_jump                   time stamps that go back, or run ahead by more than 500 ms
 
 `dual` is two colours for one group, `dark` none or dark, `card` a group that is not on the card. A
 span is judged by the longest it can have been: from the sample before it began to the sample that
 ended it. So lost samples excuse, they never accuse. A fault stays until `reset`, whatever follows.
-The only fault that ends by itself is the first silence, of a controller that was never seen.
+Two end by themselves: the first silence, of a controller that was never seen; and an overload,
+after 5 s without another gap. A silence of 5 s is `stale` however busy the computer is.
 
 Pattern: conflict monitors of signal cabinets (NEMA TS 2), with times for this city: real ones must
 ignore 200 ms and must act at 450 ms because relays bounce; messages do not.
 """
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from scm.clock import NS_PER_MS
@@ -28,6 +30,10 @@ GRACE_NS = 5_000 * NS_PER_MS
 FORGET_NS = 666 * NS_PER_MS
 JUMP_NS = 500 * NS_PER_MS
 ASLEEP_NS = 300 * NS_PER_MS
+GIVE_UP_NS = 5_000 * NS_PER_MS
+REGULAR_NS = 5_000 * NS_PER_MS
+WAITED_SHARE = 0.1  # of a silence; of a computer with time to spare it is below 0.01
+OVERLOAD = "overload"
 
 _GOING = ("green", "yellow")
 _MAY_FOLLOW: dict[Colour, tuple[Colour, ...]] = {
@@ -57,14 +63,18 @@ class _Group:
 class Monitor:
     """Judges one junction by what it shows; has no clock of its own.
 
+    Args:
+        waited_ns: Returns how long this process has waited for a processor so far [ns].
+
     Attributes:
         fault: The name of the latched fault; None while all is well.
         detail: What was seen, in words.
         since_ns: Of the fault, or of the start or last reset.
     """
 
-    def __init__(self, card: Card, now_ns: int) -> None:
+    def __init__(self, card: Card, now_ns: int, waited_ns: Callable[[], int] = lambda: 0) -> None:
         self.card = card
+        self._waited_ns = waited_ns
         self._card = {group.name: group for group in card.groups}
         self._is_new = True
         self.reset(now_ns)
@@ -80,6 +90,8 @@ class Monitor:
         self._ahead_ns: deque[int] = deque(maxlen=20)
         self._heard_ns = now_ns
         self._ticked_ns = now_ns
+        self._waited_before_ns = self._waited_ns()
+        self._regular_ns = now_ns  # since when no sample was missed
 
     def keep(self, fault: str, now_ns: int) -> None:
         """Keep a fault that was latched before the monitor itself was started again."""
@@ -94,14 +106,28 @@ class Monitor:
         self._ticked_ns = now_ns
         silent_ns = now_ns - self._heard_ns
         if silent_ns > (GRACE_NS if self._is_new else STALE_NS):
-            self._latch("stale", f"no signal phase for {silent_ns // NS_PER_MS} ms", now_ns)
+            self._regular_ns = now_ns
+            self._judge_silence(silent_ns, now_ns)
+
+    def _judge_silence(self, silent_ns: int, now_ns: int) -> None:
+        """Tell a controller that froze from a computer on which nobody gets a processor in time."""
+        detail = f"no signal phase for {silent_ns // NS_PER_MS} ms"
+        waited_ns = self._waited_ns() - self._waited_before_ns
+        is_busy = self.fault == OVERLOAD or waited_ns >= WAITED_SHARE * silent_ns
+        if silent_ns > GIVE_UP_NS or not is_busy:
+            self._latch("stale", detail, now_ns)
+        elif self.fault is None:
+            why = f"the monitor itself waited {waited_ns // NS_PER_MS} ms for a processor"
+            self._latch(OVERLOAD, f"{detail}: this computer is too busy, {why}", now_ns)
 
     def see(self, spat: Spat, arrived_ns: int) -> None:
         """Judge one sample that arrived at `arrived_ns` on the monitor's own clock."""
         if spat.t_ns == self._stamp_ns:
             return  # nothing new: an output that hangs says the same for ever
         self._heard_ns = max(self._heard_ns, arrived_ns)
-        if self._is_new and self.fault == "stale":
+        self._waited_before_ns = self._waited_ns()
+        is_over = self.fault == OVERLOAD and arrived_ns - self._regular_ns >= REGULAR_NS
+        if is_over or (self._is_new and self.fault == "stale"):
             self.fault, self.detail, self.since_ns = None, "", arrived_ns
         self._is_new = False
         self._judge_clock(spat.t_ns, arrived_ns)
@@ -110,7 +136,7 @@ class Monitor:
         self._stamp_ns = spat.t_ns
 
     def _latch(self, fault: str, detail: str, now_ns: int) -> None:
-        if self.fault is None:
+        if self.fault in (None, OVERLOAD):
             self.fault, self.detail, self.since_ns = fault, detail, now_ns
 
     def _judge_clock(self, stamp_ns: int, arrived_ns: int) -> None:

@@ -5,7 +5,7 @@ resets it and says why.
 """
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 from scm.clock import NS_PER_MS
@@ -14,8 +14,8 @@ from scm.log import event
 from scm.maps.model import CityMap
 from scm.part import Hears, Serves
 from scm.store.records import FaultRecord
-from scm.traffic.card import Card, card_hash, card_of
-from scm.traffic.monitor import Monitor
+from scm.traffic.card import card_hash, card_of
+from scm.traffic.monitor import OVERLOAD, Monitor
 from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.city_event import CityEvent
@@ -26,14 +26,25 @@ from scm.v2x.messages.spat import Spat
 STATUS_EVERY_NS = 500 * NS_PER_MS
 PERIOD_NS = 50 * NS_PER_MS
 
+Severity = Literal["info", "warning", "error"]
+
 _log = logging.getLogger(__name__)
 
 
 class MonitorPart:
-    """Watches all junctions of a map; see `scm.part.Part`."""
+    """Watches all junctions of a map; see `scm.part.Part`.
 
-    def __init__(self, city_map: CityMap, faults: Mapping[str, str] | None = None) -> None:
-        """Take the map, and the faults by junction that a monitor before this one had latched."""
+    Args:
+        faults: By junction, what a monitor before this one had latched.
+        waited_ns: Returns how long this process has waited for a processor so far [ns].
+    """
+
+    def __init__(
+        self,
+        city_map: CityMap,
+        faults: Mapping[str, str] | None = None,
+        waited_ns: Callable[[], int] = lambda: 0,
+    ) -> None:
         self.name = "monitor"
         self.role = "part"
         self.period_ns = PERIOD_NS
@@ -42,12 +53,15 @@ class MonitorPart:
         self._cards = [card_of(city_map, junction) for junction in city_map.junctions]
         self._watches: dict[str, _Watch] = {}
         self._faults = dict(faults or {})
+        self._waited_ns = waited_ns
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Judge what arrived and what did not, answer resets, tell verdicts."""
         if not self._watches:
             self._watches = {
-                card.junction: _Watch(card, now_ns, self._faults.get(card.junction))
+                card.junction: _Watch(
+                    Monitor(card, now_ns, self._waited_ns), self._faults.get(card.junction), now_ns
+                )
                 for card in self._cards
             }
         outbox: list[Outgoing] = []
@@ -86,8 +100,8 @@ class MonitorPart:
 class _Watch:
     """One junction's monitor and what was last told of it."""
 
-    def __init__(self, card: Card, now_ns: int, fault: str | None) -> None:
-        self.monitor = Monitor(card, now_ns)
+    def __init__(self, monitor: Monitor, fault: str | None, now_ns: int) -> None:
+        card, self.monitor = monitor.card, monitor
         if fault is not None:
             self.monitor.keep(fault, now_ns)
         self._hash = card_hash(card)
@@ -118,7 +132,8 @@ class _Watch:
         news: list[Outgoing] = []
         fault = self.monitor.fault
         if fault != self._told:
-            record = None if fault is None else FaultRecord(fault=fault)
+            ends_by_itself = fault in (None, OVERLOAD)
+            record = None if ends_by_itself else FaultRecord(fault=str(fault))
             news.append(Keep("latches", self.monitor.card.junction, record))
             news += self._event_of(fault, now_ns)
         due = self._told_ns is None or now_ns - self._told_ns >= STATUS_EVERY_NS - PERIOD_NS // 2
@@ -132,10 +147,9 @@ class _Watch:
         if fault is None:
             return [_event("info", "monitor_clear", f"{where}: signals are believed", now_ns)]
         text = f"{where}: {fault}, {self.monitor.detail}"
-        return [_event("error", "monitor_fault", text, now_ns)]
+        severity: Severity = "warning" if fault == OVERLOAD else "error"
+        return [_event(severity, "monitor_fault", text, now_ns)]
 
 
-def _event(
-    severity: Literal["info", "warning", "error"], name: str, text: str, t_ns: int
-) -> Message:
+def _event(severity: Severity, name: str, text: str, t_ns: int) -> Message:
     return CityEvent(severity=severity, source="monitor", t_ns=t_ns, name=name, text=text)

@@ -11,7 +11,7 @@ from typing import TypedDict
 import numpy as np
 
 from scm.arrays import Ints
-from scm.clock import NS_PER_MS, NS_PER_S
+from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.v2x.message import Message
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.vehicle_state import VehicleState
@@ -207,5 +207,6 @@ def _each_second(world: World, now_ns: int) -> list[Message]:
     count = len(world.hosted) + len(world.remote)
     lost = world.pace.lost_ns // NS_PER_MS
     detail = f"{count} car{'s' * (count != 1)}" + (f", {lost} ms of time lost" if lost else "")
-    status = PartStatus(station=NAME, t_ns=now_ns, detail=detail)
+    lost_s = seconds(world.pace.lost_ns)
+    status = PartStatus(station=NAME, t_ns=now_ns, detail=detail, lost_s=lost_s)
     return [status, world.stop] if world.stop.engaged else [status]

@@ -209,7 +209,8 @@ class MonitorStatus(msgspec.Struct, kw_only=True, frozen=True):
         junction: Name of a junction.
         t_ns: When it was true, by the clock of who tells it [ns].
         fault: None while all is well; else `conflict`, `dark`, `short_yellow`, `short_clearance`,
-            `short_green`, `skipped_yellow`, `stale`, `clock_jump`.
+            `short_green`, `skipped_yellow`, `stale`, `clock_jump`; or `overload`, which ends by
+            itself.
         detail: What was seen, in words.
         since_ns: Of the fault, or of the last reset.
     """

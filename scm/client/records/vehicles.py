@@ -20,6 +20,7 @@ class TripRow(msgspec.Struct, kw_only=True, frozen=True):
         arrived: Whether the car is at its goal.
         waiting_for: What it waits for; null: nothing.
         route: Lanes to pass, in this order.
+        void: Why its time so far says nothing of the city, in words; none: it counts.
     """
 
     trip_id: str
@@ -28,6 +29,7 @@ class TripRow(msgspec.Struct, kw_only=True, frozen=True):
     arrived: bool
     waiting_for: str | None
     route: tuple[str, ...]
+    void: tuple[str, ...]
 
 
 class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):

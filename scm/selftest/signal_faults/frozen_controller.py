@@ -4,4 +4,4 @@ from signal import SIGSTOP
 
 from scm.selftest.signal_fault import SignalFault
 
-FAULT = SignalFault(what="frozen controller", expects=("stale",), process=SIGSTOP)
+FAULT = SignalFault(what="frozen controller", expects=("stale", "overload"), process=SIGSTOP)

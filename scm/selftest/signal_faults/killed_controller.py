@@ -5,5 +5,7 @@ from signal import SIGKILL
 from scm.selftest.signal_fault import SignalFault
 
 FAULT = SignalFault(
-    what="killed controller", expects=("stale", "skipped_yellow", "sequence"), process=SIGKILL
+    what="killed controller",
+    expects=("stale", "overload", "skipped_yellow", "sequence"),
+    process=SIGKILL,
 )

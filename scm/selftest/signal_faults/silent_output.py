@@ -15,4 +15,4 @@ def _bends(card: Card) -> Bend:
     return bend
 
 
-FAULT = SignalFault(what="silent output", expects=("stale",), bends=_bends)
+FAULT = SignalFault(what="silent output", expects=("stale", "overload"), bends=_bends)

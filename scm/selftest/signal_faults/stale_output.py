@@ -16,4 +16,4 @@ def _bends(card: Card) -> Bend:
     return bend
 
 
-FAULT = SignalFault(what="stale output, sent again", expects=("stale",), bends=_bends)
+FAULT = SignalFault(what="stale output, sent again", expects=("stale", "overload"), bends=_bends)

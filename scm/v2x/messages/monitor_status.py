@@ -10,7 +10,8 @@ class MonitorStatus(Message, kw_only=True, frozen=True):
 
     Attributes:
         fault: None while all is well; else `conflict`, `dark`, `short_yellow`, `short_clearance`,
-            `short_green`, `skipped_yellow`, `stale`, `clock_jump`.
+            `short_green`, `skipped_yellow`, `stale`, `clock_jump`; or `overload`, which ends
+            by itself.
         detail: What was seen, in words.
         since_ns: Of the fault, or of the last reset.
     """

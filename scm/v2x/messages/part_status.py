@@ -12,6 +12,7 @@ class PartStatus(Message, kw_only=True, frozen=True):
         detail: One line for a person: `6 cars`, `plan calm`, `7 tags`.
         late_steps: Steps that began later than one period after they were due.
         dropped: Messages its mailboxes had to drop.
+        lost_s: Of the world: time that passed without being simulated, since its start.
     """
 
     KEY: ClassVar[str] = "part/{station}/status"
@@ -23,6 +24,7 @@ class PartStatus(Message, kw_only=True, frozen=True):
     step_ms: float = 0.0
     late_steps: int = 0
     dropped: int = 0
+    lost_s: float = 0.0
 
 
 MESSAGE = PartStatus

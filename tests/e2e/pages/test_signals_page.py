@@ -206,7 +206,7 @@ def test_a_fault_of_the_monitor_is_shown_kept_and_cleared_with_a_reason(visit, r
     with running.frozen("traffic"):
         page.wait_for_selector('.monitor[data-state="fault"]')
         page.wait_for_selector(".runs[data-mode=unheard]")
-    visited.until(lambda: fault() == "stale", "the fault is latched")
+        visited.until(lambda: fault() == "stale", "the fault is latched")
     wait_for(lambda: running.get("/signals/crossing")["fresh"], 90.0, "the controller is back")
     page.click(".monitor .danger")
     page.fill("dialog input[name=reason]", "it was frozen by a test")

@@ -157,6 +157,62 @@ def test_silence_of_more_than_500_ms_is_stale():
     assert watch(stream("rr    rr", "rrrrrrrr")).fault is None
 
 
+def busy(share):
+    """Return a monitor whose process waits for a processor for a share of the time."""
+    now = {"ms": 0}
+    return Monitor(CARD, 0, lambda: round(share * now["ms"] * MS)), now
+
+
+def drive(monitor, now, first_ms, last_ms, *, heard):
+    for ms in range(first_ms, last_ms, 50):
+        now["ms"] = ms
+        if heard and ms % 100 == 0:
+            monitor.see(spat(ms, ("a", "r"), ("b", "r")), ms * MS)
+        monitor.tick(ms * MS)
+
+
+def test_a_busy_computer_is_told_from_a_controller_that_froze_and_recovers():
+    monitor, now = busy(0.3)
+    drive(monitor, now, 0, 1000, heard=True)
+    drive(monitor, now, 1000, 1700, heard=False)
+    assert monitor.fault == "overload"
+    assert "no signal phase for 550 ms: this computer is too busy" in monitor.detail
+    assert "waited 165 ms for a processor" in monitor.detail
+    drive(monitor, now, 1700, 6600, heard=True)
+    assert monitor.fault == "overload"
+    drive(monitor, now, 6600, 6900, heard=True)
+    assert monitor.fault is None
+
+
+def test_a_silence_of_five_seconds_is_stale_however_busy_the_computer_is():
+    monitor, now = busy(0.3)
+    drive(monitor, now, 0, 1000, heard=True)
+    drive(monitor, now, 1000, 5800, heard=False)
+    assert monitor.fault == "overload"
+    drive(monitor, now, 5800, 6100, heard=False)
+    assert monitor.fault == "stale"
+    drive(monitor, now, 6100, 20_000, heard=True)
+    assert monitor.fault == "stale"
+
+
+def test_on_a_computer_with_time_to_spare_the_same_silence_is_stale():
+    monitor, now = busy(0.01)
+    drive(monitor, now, 0, 1000, heard=True)
+    drive(monitor, now, 1000, 1700, heard=False)
+    assert monitor.fault == "stale"
+    drive(monitor, now, 1700, 20_000, heard=True)
+    assert monitor.fault == "stale"
+
+
+def test_an_overload_hides_no_other_fault():
+    monitor, now = busy(0.3)
+    drive(monitor, now, 0, 1000, heard=True)
+    drive(monitor, now, 1000, 1700, heard=False)
+    for ms in (1700, 1800):
+        monitor.see(spat(ms, ("a", "g"), ("b", "g")), ms * MS)
+    assert monitor.fault == "conflict"
+
+
 def test_an_output_that_hangs_and_says_the_same_again_and_again_is_stale():
     before = [spat(100 * k, ("a", "r"), ("b", "r")) for k in range(3)]
     assert watch([*before, *[before[-1]] * 5]).fault is None

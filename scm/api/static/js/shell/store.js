@@ -57,7 +57,7 @@ export function toldAt(name) {
 export const pulse = computed(
   () =>
     topic("pulse").value ??
-    { t_ns: null, tick: null, real_time_factor: 0, late_ticks: 0, vehicles: 0, moving: 0, silent_signals: [] },
+    { t_ns: null, tick: null, real_time_factor: 0, late_ticks: 0, vehicles: 0, moving: 0, silent_signals: [], disturbances: [] },
 );
 export const stop = computed(() => topic("stop").value ?? { engaged: false, by: "", reason: "" });
 export const signals = computed(() => topic("signals").value ?? []);

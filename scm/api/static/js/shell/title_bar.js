@@ -177,8 +177,33 @@ export function Banners() {
       <b>The signals of ${pulse.value.silent_signals.map(spaced).join(", ")} are silent</b>
       <span>What they show is not known here. Lights that nobody runs flash red by themselves.</span>
     </div>`}
+    ${link.value === "live" && html`<${DisturbanceBanner} />`}
   `;
 }
+
+/** What makes measurements void at this moment; silent signals have a banner of their own. */
+function DisturbanceBanner() {
+  const shown = pulse.value.disturbances.filter(({ kind }) => kind !== "silent");
+  if (!shown.length) return null;
+  const since_ns = Math.min(...shown.map(({ start_ns }) => start_ns));
+  const isBusy = shown.some(({ kind, text }) => kind === "late" || text.includes("too busy"));
+  const hint = isBusy
+    ? "Run fewer cars, cameras or parts, or take a faster computer."
+    : shown.some(({ kind }) => kind === "monitor")
+      ? "A person resets a monitor, on the signals page."
+      : "";
+  return html`
+    <div class="banner lost" role="status">
+      <b>Measurements are void</b>
+      <span>
+        ${capital(shown.map(({ text }) => text).join("; "))}, since ${clock(since_ns)}. Trips meanwhile say nothing
+        of the city. ${hint}
+      </span>
+    </div>
+  `;
+}
+
+const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 
 /** What became of the stop, as far as that is known now. */
 function obeyed() {

@@ -45,7 +45,7 @@ function Said() {
     <${Dialog} title="What the monitor said" onClose=${close}>
       <p>
         Another process watches every colour with a card of its own. A fault makes the junction flash
-        red, and is kept until a person resets it.
+        red until a person resets it; an overload of this computer ends by itself.
       </p>
       <ul class="said">
         ${verdicts.value.map(

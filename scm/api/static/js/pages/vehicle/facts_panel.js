@@ -79,7 +79,11 @@ function commandOf(car) {
 
 function tripOf(trip) {
   if (!trip) return "none";
-  if (trip.arrived) return "arrived";
+  const done = trip.arrived ? "arrived" : underWay(trip);
+  return trip.void.length ? `${done}; its time is void: ${trip.void.join("; ")}` : done;
+}
+
+function underWay(trip) {
   const way = trip.length_m === null ? `circulates, ${fixed(trip.done_m, 1)} m so far` : `${fixed(trip.done_m, 1)} of ${fixed(trip.length_m, 1)} m`;
   return trip.waiting_for ? `${way}; waits for ${trip.waiting_for}` : way;
 }

@@ -87,6 +87,10 @@ function Row({ car }) {
 
 function tripOf(car) {
   if (!car.trip) return UNKNOWN;
+  return car.trip.void.length ? html`${wayOf(car)} <small title=${car.trip.void.join("; ")}>void</small>` : wayOf(car);
+}
+
+function wayOf(car) {
   if (car.trip.waiting_for) return `waits for ${car.trip.waiting_for}`;
   if (car.trip.arrived) return "arrived";
   if (car.trip.length_m === null) return "circulates";
