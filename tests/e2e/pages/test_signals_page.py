@@ -185,6 +185,10 @@ def test_flash_is_shown_at_once_with_its_letter_and_ended_with_a_reason(visit, r
         assert running.get("/signals/crossing")["mode"] == "flash"
         assert set(page.locator('.lamps i[data-lit="true"]').all_inner_texts()) == {"F"}
         assert "until somebody ends it" in page.inner_text(".runs")
+        page.wait_for_selector(".banner >> text=The signals of crossing flash, since")
+        lately = running.get("/disturbances")["disturbances"]
+        assert [one["end_ns"] for one in lately if one["kind"] == "flash"][-1] is None
+        photograph(visited, "signals_disturbed")
         assert page.locator(".head >> text=stop, look, go in turn").count() == 2
         for width in (1920, 1440, 390):  # no words run under the buttons beside them
             page.set_viewport_size({"width": width, "height": 900})

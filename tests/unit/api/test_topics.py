@@ -9,6 +9,8 @@ from scm.api.city import City
 from scm.api.encoding import encode
 from scm.api.shelves import Shelves, shelves_in
 from scm.api.topics import EVENTS, pulse_of, topics_of
+from scm.clock import NS_PER_S
+from scm.v2x.messages.trip import Trip
 
 
 @pytest.fixture
@@ -68,3 +70,33 @@ def test_all_shelves_lie_in_one_folder():
     assert len(set(folders)) == 4
     assert all(folder.parent == Path("runs") for folder in folders)
     assert Shelves().recordings is None
+
+
+def test_pulse_trips_and_a_list_say_what_makes_measurements_void(
+    client, view, hear, snapshot, spat
+):
+    under_way = Trip(
+        vehicle="n1",
+        trip_id="n1-1",
+        t_ns=12 * NS_PER_S,
+        route=("east_loop",),
+        done_m=1.0,
+        length_m=5.0,
+        started_ns=2 * NS_PER_S,
+    )
+    hear(2.0, snapshot(n1=(0, 0, 0)), spat(at_s=2.0))
+    for at_s in range(20, 120):
+        hear(at_s / 10, spat(at_s=at_s / 10, mode="flash" if at_s >= 80 else "plan"))
+    hear(12.0, snapshot(at_s=12.0, n1=(0, 0, 0)), under_way)
+    (one,) = pulse_of(view.picture()).disturbances
+    assert (one.kind, one.source, one.text) == (
+        "flash",
+        "crossing",
+        "the signals of crossing flash",
+    )
+    (row,) = client("GET", "/api/v1/vehicles").json()["vehicles"]
+    assert row["trip"]["void"] == ["the signals of crossing flash for 4.0 of 10.0 s"]
+    hear(12.1, spat(at_s=12.1))
+    assert pulse_of(view.picture()).disturbances == ()
+    (over,) = client("GET", "/api/v1/disturbances").json()["disturbances"]
+    assert (over["start_ns"], over["end_ns"]) == (8 * NS_PER_S, round(12.1 * NS_PER_S))
