@@ -55,6 +55,7 @@ class Wanted:
         state: Store of what must outlive a part's process, and this city when it is named; None: a
             new file beside the recording.
         keys: Store of API keys; None: everybody on this machine.
+        trust_proxy: Proxies whose X-Forwarded-For the server believes.
         ros2: Whether ROS 2 nodes shall see the city.
         demand: Table of who wants to drive from where to where; None: nobody else comes.
         radio: What the air does in the place of what the map says, `key=value` each.
@@ -74,6 +75,7 @@ class Wanted:
     fleet: Path | None = None
     state: str | None = None
     keys: str | None = None
+    trust_proxy: tuple[str, ...] = ()
     ros2: bool = False
     demand: Path | None = None
     radio: tuple[str, ...] = ()
@@ -236,7 +238,9 @@ def _parts(plan: _Plan) -> list[Job]:
     data = ("--data", str(plan.wanted.record_dir))
     own = plan.guard.files.get(SCRIPT)
     scripts = ("--script-credentials", str(own)) if own is not None else ()
-    web = ("--host", plan.wanted.host, "--port", str(plan.port), *keys, *data, *kept, *scripts)
+    proxies = [word for address in plan.wanted.trust_proxy for word in ("--trust-proxy", address)]
+    at = ("--host", plan.wanted.host, "--port", str(plan.port), *proxies)
+    web = (*at, *keys, *data, *kept, *scripts)
 
     air = [word for setting in plan.wanted.radio for word in ("--radio", setting)]
 

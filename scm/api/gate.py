@@ -179,10 +179,6 @@ class Gate:
         if not path.startswith(GUARDED) or path in OPEN:
             return None
         key = _key_of(headers, with_cookie=is_safe) or _key_offered(scope)
-        address = _address(scope)
-        if key and self._brake.wait_s(address, key) > 0.0:
-            detail = f"this key was wrong too often from {address}; wait a little"
-            return HTTPStatus.TOO_MANY_REQUESTS, "too_many", detail
         try:
             known = await self._known(self._keys, key, path)
         except StoreError as failure:
@@ -191,13 +187,24 @@ class Gate:
             return HTTPStatus.SERVICE_UNAVAILABLE, "offline", detail
         record = known.record
         if record is None:
-            if key:
-                self._brake.note_wrong(address, key)
-            detail = "this needs an API key: send `Authorization: Bearer <key>`"
-            return HTTPStatus.UNAUTHORIZED, "unauthorised", detail
+            return self._refuse_key(_address(scope), key, path)
         scope.update(scm_role=record.role, scm_owner=record.owner, scm_key=key)
         scope["scm_is_sure"] = known.is_sure
         return None
+
+    def _refuse_key(self, address: str, key: str, path: str) -> _Refusal:
+        """Refuse who has no key, or a wrong one: after many of these, to wait.
+
+        A right key never comes here: whoever guesses with its public part, which is no secret, must
+        not keep its owner out. Nobody who presses the red stop is asked to wait.
+        """
+        if key and self._brake.wait_s(address, key) > 0.0 and path != STOP:
+            detail = f"this key was wrong too often from {address}; wait a little"
+            return HTTPStatus.TOO_MANY_REQUESTS, "too_many", detail
+        if key:
+            self._brake.note_wrong(address, key)
+        detail = "this needs an API key: send `Authorization: Bearer <key>`"
+        return HTTPStatus.UNAUTHORIZED, "unauthorised", detail
 
     @staticmethod
     async def _known(keys: KnownKeys, key: str, path: str) -> Known:

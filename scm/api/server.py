@@ -7,7 +7,7 @@ import resource
 import socket
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import h11
 import uvicorn
@@ -103,6 +103,7 @@ def serve(
     port: int,
     stop_event: threading.Event,
     *,
+    proxies: Sequence[str] = (),
     on_ready: Callable[[str], None] | None = None,
 ) -> None:
     """Serve until `stop_event` is set, then end all streams and return within a second.
@@ -112,6 +113,7 @@ def serve(
         host: Loopback, unless the application has API keys.
         port: 0 takes a free one.
         stop_event: Set by anybody, from any thread.
+        proxies: Addresses or networks of proxies that are believed for whom they call.
         on_ready: Called once with the address (`http://127.0.0.1:8000`) when pages are served.
 
     Raises:
@@ -124,7 +126,8 @@ def serve(
         app,
         http=_Impatient,
         backlog=BACKLOG,
-        proxy_headers=app.state.keys is not None,  # without keys only this machine calls
+        proxy_headers=bool(proxies),  # whoever else sends X-Forwarded-For may say what he likes
+        forwarded_allow_ips=list(proxies),
         ws="websockets-sansio",
         ws_max_size=LONGEST_PACKET,
         ws_per_message_deflate=False,

@@ -7,6 +7,18 @@ from pathlib import Path
 from scm.command import Command, credentials_of, part_arguments
 
 
+def proxy_argument(parser: argparse.ArgumentParser) -> None:
+    """Add which proxies are believed."""
+    parser.add_argument(
+        "--trust-proxy",
+        action="append",
+        default=[],
+        metavar="ADDRESS",
+        help="a proxy, or a network of them (10.0.0.0/8), whose X-Forwarded-For is believed; "
+        "without, the address that calls is the address that is noted and braked",
+    )
+
+
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
     parser.add_argument("--host", default="127.0.0.1", help="address to bind (%(default)s)")
@@ -17,6 +29,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="API keys of `scm key add`, sqlite:PATH or postgresql://...: needed to bind any "
         "address but this machine's own",
     )
+    proxy_argument(parser)
     parser.add_argument(
         "--state",
         metavar="STORE",
@@ -98,7 +111,7 @@ def _run(arguments: argparse.Namespace) -> int:
         hearing = threading.Thread(target=hear, name="view")
         hearing.start()
         try:
-            serve(app, arguments.host, arguments.port, stop)
+            serve(app, arguments.host, arguments.port, stop, proxies=arguments.trust_proxy)
         finally:
             stop.set()
             hearing.join()

@@ -10,6 +10,7 @@ from fastapi.dependencies import utils
 
 from scm.api.acknowledgements import Acknowledgements
 from scm.api.app import create_app
+from scm.api.keys import KeyRing
 from scm.api.view import CityView
 from scm.clock import NS_PER_S, StepClock
 from scm.maps.load import load_map
@@ -17,7 +18,9 @@ from scm.store.memory import MemoryStore
 from scm.v2x.exchange import Incoming
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 HERE = "http://127.0.0.1:8000"
@@ -170,3 +173,25 @@ def event():
         return CityEvent(severity=severity, source="world", t_ns=1, name="told", text=text)
 
     return build
+
+
+@pytest.fixture
+def ring():
+    return KeyRing(MemoryStore())
+
+
+@pytest.fixture
+def key_of(ring):
+    """Make a key of a role."""
+    return lambda role: ring.add("anna", role, 1)
+
+
+@pytest.fixture
+def keyed_app(view, fake_city, city_map, ring):
+    fake_city.answers[StopRequest] = CityStop(t_ns=1, engaged=True)
+    return create_app(view, fake_city.ask, city_map, keys=ring)
+
+
+def bearer(key):
+    """Return the header that carries a key."""
+    return {"Authorization": f"Bearer {key}"}

@@ -413,7 +413,11 @@ def test_an_upload_becomes_a_recording_for_a_search(call, shelves, ran):
             {"recording.yaml": f"source: &a x\nnote: *a\n{DESCRIPTION}", "commands.csv": COMMANDS},
             "alias",
         ),
-        ({"recording.yaml": "a: " + "[" * 100_000, "commands.csv": COMMANDS}, "20 deep"),
+        ({"recording.yaml": "a: " + "[" * 100, "commands.csv": COMMANDS}, "20 deep"),
+        (
+            {"recording.yaml": DESCRIPTION + "".join(f"k{i}: 1\n" for i in range(24_000))},
+            "unknown field `k0`",
+        ),
         ({"a.csv": COMMANDS, "a.csv/b.csv": COMMANDS}, "cannot be read: File exists"),
     ],
 )
@@ -423,6 +427,17 @@ def test_an_upload_that_asks_for_what_lies_outside_is_refused(call, shelves, fil
     assert why in answer.json()["detail"]
     assert str(shelves.reports) not in answer.json()["detail"]
     assert list((shelves.reports / "uploads").iterdir()) == []
+
+
+def test_a_description_that_takes_too_long_to_read_is_refused(call, monkeypatch):
+    monkeypatch.setattr(uploads, "MOST_READING_S", 0)
+    answer = call(
+        "POST",
+        f"{API}/uploads",
+        content=packed({"recording.yaml": DESCRIPTION, "commands.csv": COMMANDS}),
+    )
+    assert answer.status_code == 422
+    assert "to read it takes more than 0 s and 1024 MiB" in answer.json()["detail"]
 
 
 def test_an_upload_that_is_no_zip_or_unpacks_to_too_much_is_refused(call, shelves, monkeypatch):

@@ -11,12 +11,13 @@ from scm.api import server
 from scm.api.app import create_app
 from scm.api.server import _Impatient, serve
 from scm.errors import RunError
+from tests.unit.api.conftest import bearer
 
 PATIENCE_S = 60.0
 
 
 @contextmanager
-def served(app):
+def served(app, proxies=()):
     ready, stop, urls = threading.Event(), threading.Event(), []
 
     def note(url):
@@ -31,7 +32,7 @@ def served(app):
             0,
             stop,
         ),
-        kwargs={"on_ready": note},
+        kwargs={"on_ready": note, "proxies": proxies},
     )
     thread.start()
     try:
@@ -175,12 +176,20 @@ def test_who_asks_and_asks_again_is_not_let_go(app, monkeypatch):
         assert any(asks(client) for _ in range(10))
 
 
-def test_nobody_calls_in_the_name_of_another_address(app, client_of):
-    with served(app) as (url, _, _):
-        named = {"X-Forwarded-For": "10.9.8.7"}
+@pytest.mark.parametrize(
+    ("proxies", "noted"),
+    [((), "127.0.0.1"), (("10.0.0.0/8",), "127.0.0.1"), (("127.0.0.1",), "10.9.8.7")],
+)
+@pytest.mark.parametrize("is_keyed", [False, True])
+def test_nobody_calls_in_the_name_of_another_address_but_a_trusted_proxy(
+    app, keyed_app, key_of, client_of, proxies, noted, is_keyed
+):
+    asked, who = (keyed_app, bearer(key_of("admin"))) if is_keyed else (app, {})
+    with served(asked, proxies) as (url, _, _):
+        named = {"X-Forwarded-For": "10.9.8.7", **who}
         httpx.post(f"{url}/api/v1/boxes/reset", headers=named, timeout=PATIENCE_S)
-    (deed,) = client_of(app)("GET", "/api/v1/audit").json()["items"]
-    assert deed["request"]["address"] == "127.0.0.1"
+    (deed,) = client_of(asked)("GET", "/api/v1/audit", headers=who).json()["items"]
+    assert deed["request"]["address"] == noted
 
 
 def address_of(url):
