@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
+from scm.api.based import check_base
 from scm.clock import NS_PER_MS, WallClock, seconds
 from scm.crew import Crew, Job, Say
 from scm.disturbances import HEARS, Disturbance, Disturbances
@@ -55,6 +56,8 @@ class Wanted:
         state: Store of what must outlive a part's process, and this city when it is named; None: a
             new file beside the recording.
         keys: Store of API keys; None: everybody on this machine.
+        base: Path below which a proxy shows the dashboard.
+        origin: Where people find it, if a proxy calls it by another name.
         trust_proxy: Proxies whose X-Forwarded-For the server believes.
         ros2: Whether ROS 2 nodes shall see the city.
         demand: Table of who wants to drive from where to where; None: nobody else comes.
@@ -75,6 +78,8 @@ class Wanted:
     fleet: Path | None = None
     state: str | None = None
     keys: str | None = None
+    base: str = ""
+    origin: tuple[str, ...] = ()
     trust_proxy: tuple[str, ...] = ()
     ros2: bool = False
     demand: Path | None = None
@@ -126,6 +131,7 @@ def _settled(wanted: Wanted) -> _Plan:
         raise RunError(msg)
     city_map = with_radio(load_map(wanted.map_name), wanted.radio)
     _check_counts(wanted, len(city_map.spawns))
+    check_base(wanted.base)
     if wanted.demand is not None:
         DemandPart(city_map, load_demand(wanted.demand))
     for url in (wanted.state, wanted.keys):
@@ -238,7 +244,9 @@ def _parts(plan: _Plan) -> list[Job]:
     data = ("--data", str(plan.wanted.record_dir))
     own = plan.guard.files.get(SCRIPT)
     scripts = ("--script-credentials", str(own)) if own is not None else ()
-    proxies = [word for address in plan.wanted.trust_proxy for word in ("--trust-proxy", address)]
+    proxies = [word for one in plan.wanted.trust_proxy for word in ("--trust-proxy", one)]
+    proxies += [word for one in plan.wanted.origin for word in ("--origin", one)]
+    proxies += ["--base", plan.wanted.base] if plan.wanted.base else []
     at = ("--host", plan.wanted.host, "--port", str(plan.port), *proxies)
     web = (*at, *keys, *data, *kept, *scripts)
 
@@ -297,7 +305,7 @@ def _tell_next(plan: _Plan, say: Say) -> None:
     if programs.is_relative_to(Path.cwd()):
         programs = programs.relative_to(Path.cwd())
     car = f"n{plan.wanted.hosted + len(plan.agents) + 1}"
-    say(f"dashboard: http://{plan.wanted.host}:{plan.port}")
+    say(f"dashboard: http://{plan.wanted.host}:{plan.port}{plan.wanted.base.rstrip('/')}")
     if plan.wanted.fleet is None:
         say("try next, in another shell:")
         say(f"  {programs}/vehicle-agent join --name {car} {at}      another car")

@@ -25,12 +25,11 @@ from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from scm.api import problem
+from scm.api.based import PAGES
 from scm.api.etag import etag_of, has_tag
 
 STATIC_DIR = Path(__file__).parent / "static"
 INDEX = STATIC_DIR / "index.html"
-PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
-"""First part of the address of each page of the dashboard; what follows is the page's own."""
 NEEDS, FRAME = "<!-- needs -->", "<main></main>"
 """What a page fills in, in `index.html`."""
 
@@ -41,6 +40,7 @@ _READS = frozenset({"GET", "HEAD"})
 _IMPORT = re.compile(r'(?:\bfrom|^import)\s*"([\w@./-]+)"', re.MULTILINE)
 _LOADS = re.compile(r'name: "([a-z]+)".*import\("([^"]+)"\)')
 _MAPPING = re.compile(r'<script type="importmap">(.*?)</script>', re.DOTALL)
+_ADDRESS_IN = re.compile(r'((?:href|src)="|: ")/')
 _Version = tuple[int, int]
 
 
@@ -72,10 +72,14 @@ class Dashboard:
     """ASGI middleware behind the gate: pages and their files; all else is passed on.
 
     An edited file is seen at the next visit; a new one, a frame or an import at the next start.
+
+    Args:
+        base: Path below which the server stands, see `scm.api.based`.
     """
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, base: str = "") -> None:
         self._app = app
+        self._base = base
         self._files = {
             f"/static/{path.relative_to(STATIC_DIR).as_posix()}": path
             for path in STATIC_DIR.rglob("*")
@@ -84,7 +88,7 @@ class Dashboard:
         for path in self._files.values():
             _file(path, _version(path))
         for page in PAGES:
-            _page(page, _version(INDEX))
+            _page(page, base, _version(INDEX))
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer with a file, or pass a request on."""
@@ -113,19 +117,19 @@ class Dashboard:
             return _file(file, _version(file)), _STATIC, {"file": path.removeprefix("/static/")}
         if path == "/docs":
             file = STATIC_DIR / "docs.html"
-            return _file(file, _version(file)), _Place(path), {}
+            return _document(file, self._base, _version(file)), _Place(path), {}
         first = path.split("/")[1]
         name = first or PAGES[0]
         if name not in PAGES or (not first and path != "/"):
             return None
-        return _page(name, _version(INDEX)), _Place(f"/{first}"), {}
+        return _page(name, self._base, _version(INDEX)), _Place(f"/{first}"), {}
 
 
 async def astray(request: Request, error: Exception) -> Response:
     """Show who mistyped an address the dashboard, which says so; programs get a problem."""
     is_read = request.method == "GET" and "text/html" in request.headers.get("accept", "")
     if is_read and not request.url.path.startswith(NO_PAGES):
-        text = INDEX.read_text("utf-8").replace(NEEDS, "")
+        text = index_text(request.app.state.base).replace(NEEDS, "")
         return HTMLResponse(text, HTTPStatus.NOT_FOUND, {"Cache-Control": "no-cache"})
     return await problem.on_http(request, error)
 
@@ -142,8 +146,13 @@ def _file(path: Path, _version: _Version) -> _File:
 
 
 @functools.cache
-def _page(name: str, _version: _Version) -> _File:
-    return _made(page_text(name).encode(), "text/html")
+def _page(name: str, base: str, _version: _Version) -> _File:
+    return _made(page_text(name, base).encode(), "text/html")
+
+
+@functools.cache
+def _document(path: Path, base: str, _version: _Version) -> _File:
+    return _made(_placed(path.read_text("utf-8"), base).encode(), "text/html")
 
 
 def _made(data: bytes, media: str) -> _File:
@@ -168,18 +177,32 @@ def _body(data: bytes, media: str, *more: tuple[bytes, bytes]) -> _Body:
     return _Body(data, headers, etag)
 
 
-def page_text(name: str) -> str:
+def index_text(base: str = "") -> str:
+    """Return the document of all pages, with addresses below a base path."""
+    return _placed(INDEX.read_text("utf-8"), base)
+
+
+def _placed(document: str, base: str) -> str:
+    """Put a base path before all addresses of a document, and tell its modules of it."""
+    if not base:
+        return document
+    document = _ADDRESS_IN.sub(rf"\g<1>{base}/", document)
+    return document.replace('<html lang="en">', f'<html lang="en" data-base="{base}">')
+
+
+def page_text(name: str, base: str = "") -> str:
     """Return the document of a page: what is seen before its modules run, and what they are."""
     frame = STATIC_DIR / "frames" / f"{name}.html"
     inside = frame.read_text("utf-8") if frame.is_file() else ""
     needs = [f'<link rel="stylesheet" href="/static/css/pages/{name}.css">']
     needs += [f'<link rel="modulepreload" href="{address}">' for address in modules_of(name)]
-    return (
-        INDEX.read_text("utf-8")
+    text = (
+        index_text()
         .replace(NEEDS, "\n".join(needs))
         .replace(f'<a href="/{name}">', f'<a href="/{name}" aria-current="page">')
         .replace(FRAME, f'<main class="at-{name}">\n{inside}</main>')
     )
+    return _placed(text, base)
 
 
 @functools.cache
@@ -210,5 +233,5 @@ def _address(specifier: str) -> str:
 
 @functools.cache
 def _import_map() -> dict[str, str]:
-    (mapping,) = _MAPPING.findall(INDEX.read_text("utf-8"))
+    (mapping,) = _MAPPING.findall(index_text())
     return dict(json.loads(mapping)["imports"])

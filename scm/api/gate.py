@@ -4,8 +4,9 @@ Without keys the interface is for this machine only, and whoever calls is its ad
 address must be loopback, and the Host header must name it, so that a web page elsewhere cannot
 reach it by renaming itself (DNS rebinding). With keys, everything below `/api` and `/ngsi-ld`, and
 `/metrics`, needs one. Changes must come from our own pages or from programs: a browser tells its
-origin; and they must carry their key in the header: the cookie, which pages have for streams and
-pictures, is for reading.
+origin, which has to be our host or one that may; a page that sends a key in the header may be
+anywhere, for none elsewhere can without our consent. With keys a change must carry its key in the
+header: the cookie, which pages have for streams and pictures, is for reading.
 A WebSocket is a change from its first byte. Pages cannot give it a header, nor may a key stand in
 an address, which is logged: they offer it as the subprotocol `scm.key.<key>`, which is not chosen.
 What is endless asks again as it goes: a key that ends takes its streams with it.
@@ -16,6 +17,7 @@ import hashlib
 import logging
 import math
 import re
+from collections.abc import Collection
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import urlsplit
@@ -94,11 +96,13 @@ class Gate:
         *,
         keys: KnownKeys | None,
         policy: str,
+        origins: Collection[str] = (),
         brake: Brake | None = None,
         clock: Clock | None = None,
     ) -> None:
         self._app = app
         self._keys = keys
+        self._sites = frozenset(filter(None, map(_site_of, origins)))
         self._clock = clock or WallClock()
         self._brake = brake or Brake(self._clock)
         self._headers = {
@@ -163,8 +167,11 @@ class Gate:
             return HTTPStatus.FORBIDDEN, "host", detail
         if is_safe and not _is_embedded_elsewhere(headers):
             return None
+        if self._keys is not None and "authorization" in headers:
+            return None  # no page elsewhere can send that without our consent, which none gets
         origin = headers.get("origin")
-        foreign = origin is not None and _site_of(origin) != host
+        site = None if origin is None else _site_of(origin)
+        foreign = site not in (None, host) and site not in self._sites
         if is_safe or foreign or headers.get("sec-fetch-site") == "cross-site":
             detail = f"Origin: got {origin!r}, expected this site ({host}) or none"
             return HTTPStatus.FORBIDDEN, "origin", detail

@@ -31,7 +31,12 @@ def install(app: FastAPI) -> None:
     def openapi() -> Schema:
         if app.openapi_schema is None:
             app.openapi_schema = described(
-                get_openapi(title=app.title, version=app.version, routes=app.routes)
+                get_openapi(
+                    title=app.title,
+                    version=app.version,
+                    routes=app.routes,
+                    servers=app.servers or None,
+                )
             )
         return app.openapi_schema
 

@@ -7,8 +7,22 @@ from pathlib import Path
 from scm.command import Command, credentials_of, part_arguments
 
 
-def proxy_argument(parser: argparse.ArgumentParser) -> None:
-    """Add which proxies are believed."""
+def proxy_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add where people find the server behind a proxy, and which proxies are believed."""
+    parser.add_argument(
+        "--base",
+        default="",
+        metavar="PATH",
+        help="path below which a proxy shows the dashboard, /city; it may take it off or leave it",
+    )
+    parser.add_argument(
+        "--origin",
+        action="append",
+        default=[],
+        metavar="URL",
+        help="https://lab.example: where people find the dashboard, if a proxy calls it by another "
+        "name; without, changes from there are refused unless they carry an API key",
+    )
     parser.add_argument(
         "--trust-proxy",
         action="append",
@@ -29,7 +43,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="API keys of `scm key add`, sqlite:PATH or postgresql://...: needed to bind any "
         "address but this machine's own",
     )
-    proxy_argument(parser)
+    proxy_arguments(parser)
     parser.add_argument(
         "--state",
         metavar="STORE",
@@ -98,6 +112,8 @@ def _run(arguments: argparse.Namespace) -> int:
                 map_file=arguments.map,
             ),
             plans={one.name: shipped for one in city_map.junctions},
+            base=arguments.base,
+            origins=arguments.origin,
         )
 
         def hear() -> None:

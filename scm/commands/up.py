@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scm.command import Command
-from scm.commands.api import proxy_argument
+from scm.commands.api import proxy_arguments
 from scm.commands.record import camera_arguments
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keys", metavar="STORE", help="API keys of `scm key add`; needed for another --host"
     )
-    proxy_argument(parser)
+    proxy_arguments(parser)
     parser.add_argument(
         "--demand", type=Path, metavar="TABLE", help="who wants to drive from where to where"
     )
@@ -68,7 +68,9 @@ def wanted_of(arguments: argparse.Namespace) -> "Wanted":
     from scm.up import Wanted
 
     settings = {**vars(arguments), "map_name": arguments.map}
-    settings |= {name: tuple(settings[name]) for name in ("radio", "cameras_of", "trust_proxy")}
+    settings |= {
+        name: tuple(settings[name]) for name in ("radio", "cameras_of", "trust_proxy", "origin")
+    }
     return Wanted(**{field.name: settings[field.name] for field in fields(Wanted)})
 
 

@@ -1,8 +1,11 @@
 """What every page has: the bar, the red stop, stale data, colours, keyboard, small windows."""
 
+from urllib.parse import urlsplit
+
 import pytest
 
-from tests.e2e.pages.visiting import judge, photograph
+from tests.e2e.pages.town import town
+from tests.e2e.pages.visiting import Visit, judge, photograph
 
 PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
 
@@ -318,3 +321,28 @@ def test_the_keyboard_skips_the_bar(visit):
     page.keyboard.press("Tab")
     page.keyboard.press("Enter")
     assert page.evaluate("() => document.activeElement.id") == "main"
+
+
+def test_below_a_path_every_page_opens_and_the_red_stop_gets_through(browser, tmp_path):
+    with town("driving_school", tmp_path, base="/city") as running:
+        page = browser.new_context().new_page()
+        visited = Visit(page)
+        page.goto(f"{running.url}/city/")
+        page.wait_for_selector('.link-state[data-link="live"]')
+        page.wait_for_selector(".cars tbody tr >> text=n1")
+        for name in (*PAGES[1:], "map"):
+            page.click(f'nav a[href="/city/{name}"]')
+            page.wait_for_selector(f"main.at-{name} > *")
+            assert urlsplit(page.url).path == f"/city/{name}"
+        page.go_back()
+        page.wait_for_selector("main.at-events > *")
+        page.reload()
+        page.wait_for_selector("main.at-events > *")
+        page.click("#city-stop")
+        page.wait_for_selector(".banner.stopped")
+        asked = page.evaluate(
+            "() => performance.getEntriesByType('resource').map(({name}) => name)"
+        )
+        assert {urlsplit(address).path.split("/")[1] for address in asked} == {"city"}
+        page.context.close()
+    assert visited.complaints == []

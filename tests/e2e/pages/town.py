@@ -33,7 +33,7 @@ BEGIN_NS = 1_800_000_000_000_000_000
 class Town:
     """Signals, monitor, world and pages of a map."""
 
-    def __init__(self, map_name: str, folder: Path, cars: int) -> None:
+    def __init__(self, map_name: str, folder: Path, cars: int, base: str) -> None:
         city_map, view = load_map(map_name), CityView()
         self._lock = threading.Lock()
         self._stop = threading.Event()
@@ -44,7 +44,8 @@ class Town:
         hosted = tuple((f"n{number}", "nigel") for number in range(1, cars + 1))
         self.city.add(WorldPart(city_map, hosted=hosted))
         plans = {junction.name: names("scm.traffic.plans") for junction in city_map.junctions}
-        app = create_app(view, self._ask, city_map, shelves=shelves_in(folder), plans=plans)
+        shelves = shelves_in(folder)
+        app = create_app(view, self._ask, city_map, shelves=shelves, plans=plans, base=base)
         self._threads = [
             threading.Thread(target=self._drive),
             threading.Thread(
@@ -90,9 +91,9 @@ class Town:
 
 
 @contextmanager
-def town(map_name: str, folder: Path, cars: int = 2) -> Iterator[Town]:
-    """Run a town for tests."""
-    running = Town(map_name, folder, cars)
+def town(map_name: str, folder: Path, cars: int = 2, base: str = "") -> Iterator[Town]:
+    """Run a town for tests, its pages below the path `base`."""
+    running = Town(map_name, folder, cars, base)
     try:
         yield running
     finally:

@@ -1,6 +1,7 @@
 /** Lists the routes of openapi.json, without anything from elsewhere. */
 import { render } from "preact";
 import { html } from "scm/shared/html.js";
+import { placed } from "scm/shared/base.js";
 
 function Route({ path, method, route, schemas }) {
   const body = route.requestBody?.content?.["application/json"]?.schema;
@@ -38,5 +39,5 @@ function Routes({ spec }) {
   );
 }
 
-const spec = await (await fetch("/api/v1/openapi.json")).json();
+const spec = await (await fetch(placed("/api/v1/openapi.json"))).json();
 render(html`<${Routes} spec=${spec} />`, document.getElementById("routes"));

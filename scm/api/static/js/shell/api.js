@@ -1,5 +1,6 @@
 /** Changes go through here: REST with an idempotency key, problems as sentences, the API key kept for the tab. */
 import { signal } from "@preact/signals";
+import { placed } from "scm/shared/base.js";
 
 const KEY = "scm-api-key";
 const REFUSALS = [401, 403, 429]; // of a key; what else goes wrong is not its fault
@@ -47,7 +48,7 @@ async function send(method, path, body, own, patience_ms) {
   if (key) headers.Authorization = `Bearer ${key}`;
   const isFile = body instanceof Blob;
   if (body !== undefined) headers["Content-Type"] = isFile ? body.type : "application/json";
-  const response = await fetch(`/api/v1${path}`, {
+  const response = await fetch(placed(`/api/v1${path}`), {
     method,
     headers,
     body: body === undefined || isFile ? body : JSON.stringify(body),
@@ -77,11 +78,11 @@ export function enter() {
 let entering = null;
 
 async function knock() {
-  while ((await fetch("/api/v1/session")).status === 401) {
+  while ((await fetch(placed("/api/v1/session"))).status === 401) {
     const key = sessionStorage.getItem(KEY);
     if (!key && (declined || !(await askForKey()))) return false;
     const headers = { Authorization: `Bearer ${sessionStorage.getItem(KEY)}` };
-    const reply = await fetch("/api/v1/session", { method: "PUT", headers });
+    const reply = await fetch(placed("/api/v1/session"), { method: "PUT", headers });
     if (REFUSALS.includes(reply.status)) {
       sessionStorage.removeItem(KEY);
       notify("error", "The city does not take this key.");

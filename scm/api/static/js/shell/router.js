@@ -1,7 +1,8 @@
 /** Which page is shown: its address, links that change it without a reload, and the browser's back. */
 import { computed, signal } from "@preact/signals";
+import { placed, unplaced } from "scm/shared/base.js";
 
-const here = signal(location.pathname + location.search);
+const here = signal(unplaced(location.pathname) + location.search);
 
 /** The address that was asked for; the page at it is drawn after the bar has shown that it was heard. */
 const asked = signal(here.value);
@@ -32,11 +33,11 @@ function decoded(part) {
 /** Show another address; `replace`: without a step for the browser's back. */
 export function go(path, { replace = false } = {}) {
   if (path === asked.value) return;
-  history[replace ? "replaceState" : "pushState"](null, "", path);
+  history[replace ? "replaceState" : "pushState"](null, "", placed(path));
   follow(path);
 }
 
-window.addEventListener("popstate", () => follow(location.pathname + location.search));
+window.addEventListener("popstate", () => follow(unplaced(location.pathname) + location.search));
 
 function pageAt(path) {
   return new URL(path, location.origin).pathname.split("/").filter(Boolean)[0] ?? "map";
@@ -55,10 +56,11 @@ document.addEventListener("click", (event) => {
   const plain = event.button === 0 && !(event.metaKey || event.ctrlKey || event.shiftKey || event.altKey);
   if (!link || !plain || event.defaultPrevented || link.target || link.hasAttribute("download")) return;
   const url = new URL(link.href);
-  if (url.origin !== location.origin || !isPage(url.pathname)) return;
+  const path = unplaced(url.pathname);
+  if (url.origin !== location.origin || !isPage(path)) return;
   if (url.hash) return; // a place on this page: the browser knows best
   event.preventDefault();
-  go(url.pathname + url.search);
+  go(path + url.search);
 });
 
 let names = new Set();

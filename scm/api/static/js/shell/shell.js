@@ -1,6 +1,7 @@
 /** The frame of every page: title bar, banners, the page itself, notices. */
 import { signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
+import { placed } from "scm/shared/base.js";
 import { html } from "scm/shared/html.js";
 import { PAGES } from "scm/pages/index.js";
 import { KeyDialog } from "scm/shell/key_dialog.js";
@@ -33,7 +34,7 @@ export async function load(page) {
 
 /** A page's style sheet, before the page is drawn; the first page's came with the document. */
 function style(name) {
-  const href = `/static/css/pages/${name}.css`;
+  const href = placed(`/static/css/pages/${name}.css`);
   if (document.querySelector(`link[href="${href}"]`)?.sheet) return undefined;
   return new Promise((resolve, reject) => {
     const sheet = document.createElement("link");

@@ -8,6 +8,7 @@ import { batch, computed, signal, useComputed } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { enter } from "scm/shell/api.js";
 import { hear, RANKS, renew } from "scm/shell/streams.js";
+import { placed } from "scm/shared/base.js";
 
 const EVENTS_KEPT = 200;
 const STALE_MS = 500;
@@ -249,7 +250,7 @@ function keepTime() {
 /** Read the map; a page of another city's begins anew. */
 async function readCity() {
   for (;;) {
-    const reply = await fetch("/api/v1/map").catch(() => null);
+    const reply = await fetch(placed("/api/v1/map")).catch(() => null);
     const told = reply?.ok ? await reply.text().catch(() => "") : "";
     if (told && mapText && told !== mapText) location.reload();
     if (told && !mapText) city.value = JSON.parse((mapText = told));

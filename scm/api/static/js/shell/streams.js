@@ -4,6 +4,7 @@
  */
 import { signal } from "@preact/signals";
 import { enter } from "scm/shell/api.js";
+import { placed } from "scm/shared/base.js";
 
 /** What a stream is for, what matters most first. */
 export const RANKS = { city: 0, car: 1, view: 2 };
@@ -61,7 +62,7 @@ export function hear(address, heard, rank, onOpen = () => {}) {
     let source = null;
     let timer = null;
     const open = () => {
-      source = new EventSource(address);
+      source = new EventSource(placed(address));
       for (const [name, take] of Object.entries(heard)) {
         source.addEventListener(name, (message) => take(JSON.parse(message.data)));
       }

@@ -5,6 +5,7 @@ import { moment } from "scm/shared/format.js";
 import { folded, said } from "scm/pages/events/deeds.js";
 import { Export } from "scm/pages/events/event_log.js";
 import { useRested, useRows } from "scm/pages/events/rows.js";
+import { placed } from "scm/shared/base.js";
 
 const STATIONS = ["api", "world", "traffic", "monitor"];
 
@@ -100,7 +101,7 @@ function Chain() {
   const check = async () => {
     setVerdict({ words: "checking" });
     try {
-      const response = await fetch("/api/v1/audit/verdict");
+      const response = await fetch(placed("/api/v1/audit/verdict"));
       const body = await response.json();
       if (!response.ok) throw new Error(body.detail || body.title);
       const words = body.whole ? `whole: ${body.entries} entries` : body.error;

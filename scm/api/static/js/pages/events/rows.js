@@ -1,5 +1,6 @@
 /** Rows of a long list: the first page by REST, more on demand, and what went wrong in words. */
 import { useEffect, useRef, useState } from "preact/hooks";
+import { placed } from "scm/shared/base.js";
 
 const PAGE = 200;
 
@@ -19,7 +20,7 @@ export function useRows(path, query) {
     setState((state) => ({ ...state, loading: true, error: "" }));
     const more = cursor ? `&cursor=${encodeURIComponent(cursor)}` : "";
     try {
-      const response = await fetch(`/api/v1${path}?limit=${PAGE}&${asked}${more}`);
+      const response = await fetch(placed(`/api/v1${path}?limit=${PAGE}&${asked}${more}`));
       const body = await response.json();
       if (own !== turn.current) return; // another filter was chosen meanwhile
       if (!response.ok) throw new Error(body.detail || body.title);

@@ -1,9 +1,10 @@
 /** Reading from the interface: once, again and again, and until an operation is over. */
 import { useEffect, useState } from "preact/hooks";
+import { placed } from "scm/shared/base.js";
 
 /** @returns the body; throws a sentence where the city says no. */
 export async function read(path) {
-  const response = await fetch(`/api/v1${path}`).catch(() => {
+  const response = await fetch(placed(`/api/v1${path}`)).catch(() => {
     throw new Error("The city's server does not answer; it is asked again.");
   });
   const body = await response.json().catch(() => ({}));

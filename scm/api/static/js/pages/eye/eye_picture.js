@@ -1,5 +1,6 @@
 /** The picture of an overhead camera on its canvas: the newest one, with the tags found in it. */
 import { drawTag } from "scm/pages/eye/tag_shape.js";
+import { placed } from "scm/shared/base.js";
 
 const TAGS_KEPT = 16; // frames: three seconds
 const AHEAD_NS = 5_000_000_000n; // what was fetched is never so much newer than what was named
@@ -111,7 +112,7 @@ export class EyePicture {
   }
 
   async #fetchNewest() {
-    const response = await fetch(`/api/v1/eye/cameras/${this.#camera}/frame.jpg`);
+    const response = await fetch(placed(`/api/v1/eye/cameras/${this.#camera}/frame.jpg`));
     if (!response.ok) return;
     const t_ns = response.headers.get("X-Time-Ns");
     const image = await createImageBitmap(await response.blob());

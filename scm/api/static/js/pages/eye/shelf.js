@@ -7,6 +7,7 @@ import { Sure } from "scm/shared/sure.js";
 import { read } from "scm/pages/eye/asking.js";
 import { named } from "scm/pages/eye/in_force.js";
 import { change } from "scm/shell/api.js";
+import { placed } from "scm/shared/base.js";
 
 export function Shelf({ camera, kept, known, changed, put }) {
   const [open, setOpen] = useState(null);
@@ -48,7 +49,7 @@ const isInForce = (camera, one) => camera.in_force?.now[one.kind] === one.name;
 
 async function remove({ name }) {
   const path = `/eye/calibrations/${name}`;
-  const tag = await fetch(`/api/v1${path}`).then((response) => response.headers.get("ETag"));
+  const tag = await fetch(placed(`/api/v1${path}`)).then((response) => response.headers.get("ETag"));
   await change("DELETE", path, undefined, () => `${name} is gone.`, { "If-Match": tag ?? "*" });
 }
 

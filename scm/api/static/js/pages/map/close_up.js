@@ -4,6 +4,7 @@ import { selected } from "scm/shared/selection.js";
 import { hear, RANKS } from "scm/shell/streams.js";
 import { fleet } from "scm/pages/map/fleet.js";
 import { layers } from "scm/pages/map/layers.js";
+import { placed } from "scm/shared/base.js";
 
 const PATH_MS = 700;
 
@@ -36,7 +37,7 @@ function askPaths(vehicle) {
   let ended = false;
   const ask = async () => {
     if (!fleet.rows.has(vehicle)) return; // it left
-    const response = await fetch(`/api/v1/vehicles/${vehicle}/path`).catch(() => null);
+    const response = await fetch(placed(`/api/v1/vehicles/${vehicle}/path`)).catch(() => null);
     const path = response?.ok ? await response.json().catch(() => null) : null;
     if (!ended) closeUp.path = path;
   };

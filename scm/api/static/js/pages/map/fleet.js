@@ -9,8 +9,9 @@ import { useEffect } from "preact/hooks";
 import { byName } from "scm/shared/format.js";
 import { enter } from "scm/shell/api.js";
 import { RANKS, whileSeen } from "scm/shell/streams.js";
+import { placed } from "scm/shared/base.js";
 
-const ADDRESS = "/api/v1/vehicles.bin";
+const ADDRESS = placed("/api/v1/vehicles.bin");
 const VERSION = 1;
 const NAMES = 1;
 const HEAD_BYTES = 8;

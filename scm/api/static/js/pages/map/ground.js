@@ -1,5 +1,6 @@
 /** The roads: the server's drawing, kept as a picture of what is on the screen and a rim around it. */
 import { readBox } from "scm/shared/drawing.js";
+import { placed } from "scm/shared/base.js";
 
 const RIM = 0.3; // of the screen, on every side
 const REST_MS = 140; // after the last zoom, before all is drawn sharply again
@@ -8,7 +9,7 @@ const DARK = "brightness(0.72) saturate(0.85)";
 /** Read the drawing, and the box that it shows: map metres, x right; its y counts down. */
 export async function readGround(address) {
   const image = new Image();
-  image.src = address;
+  image.src = placed(address);
   const [box] = await Promise.all([readBox(address), image.decode()]);
   return { image, box };
 }

@@ -1,5 +1,6 @@
 /** What the server tells: read once, or again and again while somebody looks. */
 import { useCallback, useEffect, useState } from "preact/hooks";
+import { placed } from "scm/shared/base.js";
 
 /** @returns `{body, error, again}`: null until it came, and a function that reads it anew. */
 export function useFetched(path, every_ms = 0) {
@@ -28,7 +29,7 @@ export function useFetched(path, every_ms = 0) {
 }
 
 async function read(path, signal) {
-  const response = await fetch(`/api/v1${path}`, { signal });
+  const response = await fetch(placed(`/api/v1${path}`), { signal });
   const body = await response.json().catch(() => ({}));
   if (response.ok) return body;
   throw new Error(body.detail || body.title || `${path}: ${response.status}`);

@@ -2,6 +2,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { minutes } from "scm/pages/recordings/words.js";
+import { placed } from "scm/shared/base.js";
 
 const OLD_S = 2; // one a second is recorded; a busy machine makes fewer
 
@@ -36,7 +37,7 @@ function named({ vehicle, camera }) {
 
 function address(recording, { vehicle, camera }) {
   const of = vehicle ? `vehicles/${encodeURIComponent(vehicle)}/camera` : "eye";
-  return `/api/v1/recordings/${encodeURIComponent(recording)}/${of}/${encodeURIComponent(camera)}.jpg`;
+  return placed(`/api/v1/recordings/${encodeURIComponent(recording)}/${of}/${encodeURIComponent(camera)}.jpg`);
 }
 
 function Picture({ player, one }) {

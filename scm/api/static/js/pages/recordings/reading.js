@@ -1,9 +1,10 @@
 /** Reading from the server, again and again where a page shows what changes. */
 import { useEffect, useState } from "preact/hooks";
+import { placed } from "scm/shared/base.js";
 
 /** @returns {Promise<{body, etag}>} a resource; rejects with the server's sentence. */
 export async function read(path) {
-  const response = await fetch(`/api/v1${path}`);
+  const response = await fetch(placed(`/api/v1${path}`));
   const body = await response.json().catch(() => ({}));
   if (!response.ok) throw new Error(body.detail || body.title || `${path}: ${response.status}`);
   return { body, etag: response.headers.get("ETag") };

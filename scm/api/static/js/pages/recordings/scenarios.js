@@ -8,6 +8,7 @@ import { change } from "scm/shell/api.js";
 import { go, route } from "scm/shell/router.js";
 import { Halves } from "scm/pages/recordings/halves.js";
 import { read, useReading } from "scm/pages/recordings/reading.js";
+import { BASE } from "scm/shared/base.js";
 
 const LOOK_MS = 1000;
 const LIVE = "--live --connect {connect}";
@@ -99,7 +100,7 @@ function NameDialog({ title, text, onClose, onKept }) {
 /** Arguments that lead a script to this city, where it takes such: without them it looks at the usual port. */
 function offered(text) {
   if (text.includes('"--live"')) return LIVE;
-  return text.includes('"--url"') ? `--url ${location.origin}` : "";
+  return text.includes('"--url"') ? `--url ${location.origin}${BASE}` : "";
 }
 
 function Script({ name, again, seen }) {

@@ -4,6 +4,7 @@ import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { seconds, SpanFields, WHOLE } from "scm/pages/recordings/span_fields.js";
 import { size } from "scm/pages/recordings/words.js";
+import { placed } from "scm/shared/base.js";
 
 export function TakeHomeDialog({ recording, cars, player, onClose }) {
   const at = `/api/v1/recordings/${encodeURIComponent(recording.name)}`;
@@ -64,7 +65,7 @@ function CarsAsTable({ at, recording, cars, player }) {
 async function downloaded(path) {
   const asking = new AbortController();
   try {
-    const answer = await fetch(path, { signal: asking.signal });
+    const answer = await fetch(placed(path), { signal: asking.signal });
     if (!answer.ok) return (await answer.json()).detail;
   } catch (error) {
     return `The server does not answer: ${error.message}`;

@@ -2,6 +2,7 @@
 import { effect, signal } from "@preact/signals";
 import { notify } from "scm/shell/api.js";
 import { link, signals, signalsAt, topic } from "scm/shell/store.js";
+import { placed } from "scm/shared/base.js";
 
 /** The junction that is looked at, by name; null before any is known. */
 export const junction = signal(null);
@@ -38,7 +39,7 @@ export function clockNow() {
 }
 
 export async function read(path) {
-  const response = await fetch(`/api/v1${path}`);
+  const response = await fetch(placed(`/api/v1${path}`));
   const body = await response.json();
   if (!response.ok) throw Object.assign(new Error(body.detail || body.title), { status: response.status });
   return { body, tag: response.headers.get("ETag") };

@@ -6,6 +6,7 @@ import { span } from "scm/shared/format.js";
 import { isOld, now } from "scm/shell/store.js";
 import { isCrowded } from "scm/shell/streams.js";
 import { watch } from "scm/pages/vehicle/film.js";
+import { placed } from "scm/shared/base.js";
 
 const CROWDED = "Other windows of this browser are open, and it grants no more connections.";
 
@@ -13,7 +14,7 @@ const camera = signal("front");
 
 export function CameraPanel({ car }) {
   const shown = car.cameras.includes(camera.value) ? camera.value : car.cameras[0];
-  const film = `/api/v1/vehicles/${car.vehicle}/camera/${shown}/film`;
+  const film = placed(`/api/v1/vehicles/${car.vehicle}/camera/${shown}/film`);
   return html`
     <section class="panel camera" aria-label="Camera">
       <div class="panel-head">

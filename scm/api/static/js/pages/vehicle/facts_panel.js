@@ -7,6 +7,7 @@ import { since_ms } from "scm/shell/store.js";
 import { Battery } from "scm/pages/vehicle/battery.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
 import { doubtOf, misbehaviour, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
+import { placed } from "scm/shared/base.js";
 
 const LINK_MS = 1000;
 const STALE_MS = 500;
@@ -48,7 +49,7 @@ function useLink(vehicle) {
     let ended = false;
     const ask = async () => {
       if (document.hidden) return;
-      const reply = await fetch(`/api/v1/vehicles/${vehicle}/link`).catch(() => null);
+      const reply = await fetch(placed(`/api/v1/vehicles/${vehicle}/link`)).catch(() => null);
       const body = await reply?.json().catch(() => null);
       if (ended || !reply) return;
       setLink(

@@ -1,6 +1,7 @@
 /** What is held against each station on the air: asked every two seconds while a page shows it. */
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
+import { placed } from "scm/shared/base.js";
 
 const EVERY_MS = 2000;
 
@@ -11,7 +12,7 @@ export function useMisbehaviour() {
   useEffect(() => {
     let ended = false;
     const ask = async () => {
-      const reply = await fetch("/api/v1/misbehaviour").catch(() => null);
+      const reply = await fetch(placed("/api/v1/misbehaviour")).catch(() => null);
       if (!ended && reply?.ok) misbehaviour.value = await reply.json();
     };
     ask();

@@ -2,6 +2,7 @@
 import { signal } from "@preact/signals";
 import { isConnected } from "scm/shell/store.js";
 import { hands } from "scm/pages/vehicle/hands.js";
+import { BASE } from "scm/shared/base.js";
 
 const PROTOCOL = "scm.drive.v1";
 const KEY = "scm-api-key";
@@ -41,7 +42,7 @@ export function take(vehicle, reason = "") {
   wheel.value = { ...FREE, state: "asking", vehicle };
   const key = sessionStorage.getItem(KEY);
   const own = new WebSocket(
-    `${location.origin.replace(/^http/, "ws")}/api/v1/vehicles/${vehicle}/drive`,
+    `${location.origin.replace(/^http/, "ws")}${BASE}/api/v1/vehicles/${vehicle}/drive`,
     key ? [PROTOCOL, `scm.key.${key}`] : [PROTOCOL],
   );
   socket = own;
