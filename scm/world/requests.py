@@ -193,8 +193,9 @@ def _check_new(world: World, name: str, car_file: str) -> None:
         raise _RefusedError("owned", f"vehicle: there is already one named {name!r}")
     if car_file not in car_names():  # no paths: whoever asks may be far away
         known = ", ".join(car_names())
-        detail = f"car: got {car_file!r}, expected one of {known}{nearest(car_file, car_names())}"
-        raise _RefusedError("invalid", detail)
+        wanted = f"expected one of {known}{nearest(car_file, car_names())}"
+        own = "a car of your own: start the city with SCM_CARS=FOLDER of its file"
+        raise _RefusedError("invalid", f"car: got {car_file!r}, {wanted}; {own}")
 
 
 def _check_tag(world: World, tag_id: int | None) -> None:

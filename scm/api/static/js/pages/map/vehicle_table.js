@@ -6,6 +6,7 @@ import { age, fixed } from "scm/shared/format.js";
 import { selected } from "scm/shared/selection.js";
 import { ageOf, fleet, fleetBeat, isAlive, modeOf } from "scm/pages/map/fleet.js";
 import { AddCar } from "scm/pages/map/add_car.js";
+import { pulse } from "scm/shell/store.js";
 
 const STALE_MS = 500;
 const ROW_PX = 28; // as the style sheet has it
@@ -104,7 +105,7 @@ function Rows({ rows: all }) {
           ${last < rows.length && html`<tr class="spacer" key="below" style=${{ height: `${(rows.length - last) * ROW_PX}px` }}></tr>`}
         </tbody>
       </table>
-      ${!rows.length && html`<p class="empty">${fleet.count ? "No vehicle is like that." : "No vehicle is on the map."}</p>`}
+      ${!rows.length && html`<p class="empty">${fleet.count ? "No vehicle is like that." : pulse.value.t_ns === null ? "The world is starting." : "No vehicle is on the map."}</p>`}
     </div>
   `;
 }

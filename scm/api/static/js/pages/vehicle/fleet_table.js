@@ -3,7 +3,7 @@ import { signal } from "@preact/signals";
 import { modeOf, stuckBy } from "scm/shared/condition.js";
 import { html } from "scm/shared/html.js";
 import { age, byName, fixed, UNKNOWN } from "scm/shared/format.js";
-import { since_ms, world } from "scm/shell/store.js";
+import { pulse, since_ms, world } from "scm/shell/store.js";
 import { batteryState, batteryWord, BatterySign, percent } from "scm/pages/vehicle/battery.js";
 import { doubtOf, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
@@ -54,10 +54,14 @@ export function FleetTable() {
           </thead>
           <tbody>${shown.map((car) => html`<${Row} key=${car.vehicle} car=${car} />`)}</tbody>
         </table>
-        ${!shown.length && html`<p class="empty">${all.length ? "No vehicle is like that." : "No vehicle is in the city. Add one on the map."}</p>`}
+        ${!shown.length && html`<p class="empty">${all.length ? "No vehicle is like that." : nobody()}</p>`}
       </div>
     </section>
   `;
+}
+
+function nobody() {
+  return pulse.value.t_ns === null ? "The world is starting." : "No vehicle is in the city. Add one on the map.";
 }
 
 function Row({ car }) {
