@@ -13,7 +13,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import MapError, RunError
 from scm.log import event
 from scm.maps.model import CityMap
-from scm.part import Hears, Serves
+from scm.part import Hears, IsWanted, Serves
 from scm.v2x.exchange import Answer, Incoming, Outgoing
 from scm.v2x.key import check_name
 from scm.v2x.message import Message, Refused
@@ -31,6 +31,7 @@ from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.radio_status import RadioStatus
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spatem_rx import SpatemRx
+from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.world_definition import WorldDefinition
 from vehicle_agent.body import BodyKind, Wiring
 from vehicle_agent.link import Link
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 
 BODIES = "vehicle_agent.bodies"
 HARDEST = 100.0
+ASK_EVERY_NS = 100 * NS_PER_MS
 
 _log = logging.getLogger(__name__)
 
@@ -92,6 +94,8 @@ class AgentPart:
         self._stopped = False
         self._faults: dict[str, MonitorStatus] = {}
         self._status_ns: int | None = None
+        self._is_wanted: IsWanted | None = None
+        self._sensed, self._asked_ns = True, -ASK_EVERY_NS
         self._on: dict[type[Message], Callable[[Incoming], list[Outgoing]]] = {
             WorldDefinition: self._on_definition,
             Presence: self._on_presence,
@@ -114,6 +118,10 @@ class AgentPart:
             Serves(kind, own) for kind in (RouteRequest, LightRequest, EchoRequest)
         )
 
+    def learn_wishes(self, is_wanted: IsWanted) -> None:
+        """Let no sensor be simulated from now on that nobody subscribes to."""
+        self._is_wanted = is_wanted
+
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Hear, drive, report; a failure lets go of the body before anybody is told of it."""
         try:
@@ -134,11 +142,18 @@ class AgentPart:
             outbox += self._link.due(now_ns)
         if self._stay is not None:
             own = self._link.epoch if self._link.standing == "own" else None
-            outbox += self._stay.step(now_ns, own)
+            outbox += self._stay.step(now_ns, own, sensed=self._is_sensed(now_ns))
         elif self._is_real:  # its port is opened at once, and it rests from the first second
             self._body.advance(now_ns)
             self._body.command(0.0, 0.0)
         return outbox + self._status(now_ns)
+
+    def _is_sensed(self, now_ns: int) -> bool:
+        """Return whether anybody subscribes to the sensors, as found out 100 ms ago at most."""
+        if self._is_wanted is not None and now_ns - self._asked_ns >= ASK_EVERY_NS:
+            self._asked_ns = now_ns
+            self._sensed = self._is_wanted(VehicleSensors, {"vehicle": self.name})
+        return self._sensed
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """Leave the city, at rest."""

@@ -103,8 +103,16 @@ class Body(Protocol):
         """Return how it moves now."""
         ...
 
-    def sensors(self, vehicle: str, now_ns: int) -> Sequence[VehicleSensors | LidarScan]:
-        """Return what its own sensors have read since the last time."""
+    def sensors(
+        self, vehicle: str, now_ns: int, *, wanted: bool = True
+    ) -> Sequence[VehicleSensors | LidarScan]:
+        """Return what its own sensors have read since the last time.
+
+        Args:
+            vehicle: Whose they are.
+            now_ns: The present time [ns].
+            wanted: Whether anybody subscribes to them: simulated ones need not read for nobody.
+        """
         ...
 
     def close(self) -> None:

@@ -108,12 +108,13 @@ class Stay:
         self.switches = self.switches.told(headlights, indicators)
         return self.switches
 
-    def step(self, now_ns: int, epoch: int | None) -> list[Outgoing]:
+    def step(self, now_ns: int, epoch: int | None, *, sensed: bool = True) -> list[Outgoing]:
         """Drive and report.
 
         Args:
             now_ns: The present time [ns].
             epoch: Under which the car's own driver commands; None: it must not.
+            sensed: Whether anybody subscribes to what the sensors read.
         """
         self._body.advance(now_ns)
         self._begin_anew_if_lifted(now_ns)
@@ -123,7 +124,7 @@ class Stay:
         self._body.show(self._shown(hazard=self.guard.lost))
         guarded = self.last_word.pass_on(self.guard.output(now_ns), self.astray, now_ns)
         self._commanded = guarded.throttle, guarded.steering
-        return self._reports(guarded, led_here, now_ns)
+        return self._reports(guarded, led_here, now_ns, sensed=sensed)
 
     def _begin_anew_if_lifted(self, now_ns: int) -> None:
         """Look for the lane again where the car was put down, until it stands on one."""
@@ -165,10 +166,11 @@ class Stay:
         )
 
     def _reports(
-        self, guarded: Guarded, led_here: tuple[float, float], now_ns: int
+        self, guarded: Guarded, led_here: tuple[float, float], now_ns: int, *, sensed: bool
     ) -> list[Outgoing]:
         state = self._state(guarded, led_here, now_ns)
-        outbox: list[Outgoing] = [state, *self._body.sensors(self._vehicle, now_ns)]
+        sensors = self._body.sensors(self._vehicle, now_ns, wanted=sensed)
+        outbox: list[Outgoing] = [state, *sensors]
         if self._cam.due(state, now_ns, self.air.gap_ns(now_ns)):
             self.air.hear("cam", now_ns)
             limits = self._body.limits

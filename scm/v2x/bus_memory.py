@@ -92,6 +92,7 @@ class MemoryNetwork:
         self.offers: list[_Offer] = []
         self.asked: list[_Asked] = []
         self._routes: dict[str, list[_Wish]] = {}
+        self._wished: dict[str, bool] = {}
         self._opened = 0
         self._late: list[tuple[int, int, Callable[[], None]]] = []
         self._sent = 0
@@ -162,7 +163,7 @@ class MemoryNetwork:
         """Remember a wish, and deliver what others kept for late joiners."""
         with self.lock:
             self.wishes.append(wish)
-            self._routes.clear()
+            self._forget_routes()
             if wish.keeps:
                 kept = [s for bus in self.buses for s in bus.kept(wish.expression)]
                 now_ns = self.clock.now_ns()
@@ -173,12 +174,21 @@ class MemoryNetwork:
         """Forget what was to come into a mailbox."""
         with self.lock:
             self.wishes = [w for w in self.wishes if w.mailbox is not mailbox]
-            self._routes.clear()
+            self._forget_routes()
 
     def is_wished(self, expression: str) -> bool:
         """Return whether anybody wishes something that matches."""
         with self.lock:
-            return any(intersects(wish.expression, expression) for wish in self.wishes)
+            known = self._wished.get(expression)
+            if known is None:
+                known = any(intersects(wish.expression, expression) for wish in self.wishes)
+                self._wished[expression] = known
+            return known
+
+    def _forget_routes(self) -> None:
+        """Find out anew who subscribes to what, since that has changed."""
+        self._routes.clear()
+        self._wished.clear()
 
     def leave(self, bus: "MemoryBus") -> None:
         """Forget a bus and everything it wished, offered, kept and asked."""
@@ -186,7 +196,7 @@ class MemoryNetwork:
             self.buses.remove(bus)
             self.wishes = [w for w in self.wishes if w.owner is not bus]
             self.offers = [o for o in self.offers if o.owner is not bus]
-            self._routes.clear()
+            self._forget_routes()
             left_alone = [a for a in self.asked if bus in a.open]
             self.asked = [a for a in self.asked if a.by is not bus]
             for asked in left_alone:

@@ -41,14 +41,13 @@ def outline(car: Car, poses: Floats) -> Floats:
     return faces.reshape(-1, 4)
 
 
-def cog_motion(car: Car, motion: Floats) -> Floats:
+def cog_motion(ahead: float, motion: Floats) -> Floats:
     """Return the motion of the centres of gravity, (n, 6) x, y, yaw, vx, vy, yaw rate, map frame.
 
     Args:
-        car: Says how far ahead of the rear axle they are.
+        ahead: How far ahead of the rear axle they are [m].
         motion: (n, 6) of the rear axles: x, y, yaw, speed along and across the body, yaw rate.
     """
-    ahead = shape_of(car).cog_to_rear_axle
     x, y, yaw, speed, lateral, rate = motion.T
     c, s = np.cos(yaw), np.sin(yaw)
     across = lateral + ahead * rate

@@ -18,6 +18,7 @@ from scm.geometry import Pose2
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import Car
+from scm.vehicles.shape import shape_of
 from scm.world.hull import cog_motion
 from scm.world.lease import Lease
 from scm.world.pace import LONGEST_TICK_NS
@@ -94,12 +95,16 @@ class RemoteCar:
     lost_ns: int | None = None
     dead: bool = False
     missed_ns: int = 0
+    _ahead: float = field(init=False)  # from the rear axle to the centre of gravity [m]
     _motion: tuple[VehicleState | None, Floats] | None = None  # reported, for all contact steps
     _echo: deque[Echo] = field(default_factory=deque)
     _told: int = 0
     _dv: Floats = field(default_factory=lambda: np.zeros(3))
     _shift: Floats = field(default_factory=lambda: np.zeros(3))
     _against: set[str] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self._ahead = shape_of(self.car).cog_to_rear_axle
 
     @property
     def alive(self) -> bool:
@@ -163,7 +168,7 @@ class RemoteCar:
             speeds = (0.0, 0.0, 0.0)
             if basis is not None:
                 speeds = (basis.speed_mps, basis.lateral_speed_mps, basis.yaw_rate_radps)
-            self._motion = basis, cog_motion(self.car, np.array([[*self.pose, *speeds]]))[0]
+            self._motion = basis, cog_motion(self._ahead, np.array([[*self.pose, *speeds]]))[0]
         return self._motion[1].copy()
 
     def hit(self, dv: Floats, shift: Floats, against: set[str], now_ns: int) -> None:

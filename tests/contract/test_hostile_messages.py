@@ -3,6 +3,8 @@
 Every class is sent with the ends of what its fields can hold, into a city whose parts all run.
 """
 
+from functools import cache
+
 import msgspec
 import pytest
 from msgspec import inspect
@@ -95,8 +97,13 @@ MAKERS = {
 
 
 def fields(kind, turn):
-    shape = inspect.type_info(kind)
+    shape = shape_of(kind)
     return {f.name: extreme(f.type, f.name, turn + i * 3) for i, f in enumerate(shape.fields)}
+
+
+@cache
+def shape_of(kind):
+    return inspect.type_info(kind)
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """Every message of `scm/v2x/messages`: what each of them must keep to, whoever adds one."""
 
 import importlib
+from functools import cache
 from string import ascii_lowercase, digits
 from types import NoneType, UnionType
 from typing import Annotated, Literal, Union, get_args, get_origin
@@ -145,7 +146,9 @@ def annotated(of, meta):
     return st.text(characters, min_size=meta.min_length or 0, max_size=meta.max_length)
 
 
+@cache
 def structs(kind):
+    """Return a strategy for messages of a class, one for all tests: hypothesis prepares it once."""
     in_key = variables(kind) if issubclass(kind, Message) else []
     fields = {}
     for field in msgspec.structs.fields(kind):

@@ -154,7 +154,9 @@ class NigelBody:
             battery_charge=None if volts is None else self._charge(volts, speed),
         )
 
-    def sensors(self, vehicle: str, now_ns: int) -> Sequence[VehicleSensors | LidarScan]:
+    def sensors(
+        self, vehicle: str, now_ns: int, *, wanted: bool = True
+    ) -> Sequence[VehicleSensors | LidarScan]:
         """Return the scanner's turns, and the newest telemetry of a firmware that has some."""
         scans = [] if self._lidar is None else self._lidar.step(vehicle, now_ns)
         return [*scans, *self._telemetry(vehicle, now_ns)]

@@ -139,7 +139,7 @@ class SimulatedBody:
             battery_charge=None if math.isnan(charge) else charge,
         )
 
-    def sensors(self, vehicle: str, now_ns: int) -> list[VehicleSensors]:
+    def sensors(self, vehicle: str, now_ns: int, *, wanted: bool = True) -> list[VehicleSensors]:
         """Return a message for each new reading of the encoders, with the newest of the others."""
         if not self._banks:
             self._banks = [Bank(registry.load(SENSORS, kind, "SENSOR", Sensor), self._seed, 1)
@@ -148,10 +148,13 @@ class SimulatedBody:
                 bank.fit(0, vehicle, self._fleet.car, self._fleet, self._row, now_ns)
         counted: list[int] = []
         for bank in self._banks:
+            bank.wanted[0] = wanted
             for readings in bank.step(now_ns):
                 self._newest[bank.sensor.name] = readings.values[0]
                 if bank.sensor.name == ENCODERS:
                     counted.append(readings.t_ns)
+        if not wanted:
+            self._newest.clear()
         fleet, row = self._fleet, self._row
         fleet.impact_x[row] = fleet.impact_y[row] = fleet.impact_yaw[row] = 0.0
         said = [sensors_message(vehicle, t_ns, self._newest) for t_ns in counted[-1:]]

@@ -49,7 +49,9 @@ def test_the_contact_body_stands_where_the_car_stands(fleet):
 
 
 def test_a_reported_motion_is_moved_to_the_true_centre_of_gravity(fleet):
-    moved = cog_motion(LADEN, np.array([[1.0, 2.0, 0.6, 0.0, 0.0, 0.0]]))[0]
+    moved = cog_motion(
+        shape_of(LADEN).cog_to_rear_axle, np.array([[1.0, 2.0, 0.6, 0.0, 0.0, 0.0]])
+    )[0]
     assert_allclose(moved, fleet.planar_cog(0), atol=1e-9)
 
 

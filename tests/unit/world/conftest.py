@@ -9,19 +9,27 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.join_request import JoinRequest
 from scm.v2x.messages.lease_request import LeaseRequest
+from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.world.part import WorldPart
 
 MAP = load_map("driving_school")
 TICK = 20 * NS_PER_MS
+SENSED = (LidarScan, VehicleSensors)
 
 
 class City:
-    """A world without a bus: what it is told goes into the next step, what it says is kept."""
+    """A world without a bus: what it is told goes into the next step, what it says is kept.
 
-    def __init__(self, **given):
+    Readings of the cars' sensors are simulated only where `sensed`: they take half of the time.
+    """
+
+    def __init__(self, *, sensed=False, **given):
         self.part = WorldPart(MAP, **given)
+        if not sensed:
+            self.part.learn_wishes(lambda kind, _where: kind not in SENSED)
         self.world = self.part.world
         self.now = 0
         self.said = []

@@ -120,7 +120,8 @@ def test_a_car_that_comes_later_knows_of_the_fault_too(city):
     assert city.heard(Trip)[-1].waiting_for == "signal"
 
 
-def test_a_remote_car_gets_scans_of_walls_and_cars_but_not_of_itself(city):
+def test_a_remote_car_gets_scans_of_walls_and_cars_but_not_of_itself(make_city):
+    city = make_city(sensed=True)
     city.join()
     city.run_for(0.5)
     scan = next(s for s in city.heard(LidarScan) if s.vehicle == "n7")
@@ -144,7 +145,8 @@ def test_a_real_car_is_not_pushed_but_pushes(city):
     assert np.hypot(pose.x - start.x, pose.y - start.y) > 0.001
 
 
-def test_a_car_file_without_sensors_still_drives(city):
+def test_a_car_file_without_sensors_still_drives(make_city):
+    city = make_city(sensed=True)
     city.ask(SpawnRequest(vehicle="d1", car="dart", spawn="a"))
     city.run_for(0.5)
     assert city.heard(LidarScan) == []

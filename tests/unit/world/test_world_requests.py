@@ -378,7 +378,7 @@ def test_nobody_is_put_before_a_car_that_comes(make_city):
 
 def test_the_same_seed_gives_the_same_run_bit_for_bit(make_city):
     def run():
-        city = make_city(seed=4, hosted=(("n1", "nigel"), ("n2", "nigel")))
+        city = make_city(sensed=True, seed=4, hosted=(("n1", "nigel"), ("n2", "nigel")))
         city.run_for(3.0)
         return [out for out in city.said if not isinstance(out, Answer)]
 
@@ -387,7 +387,7 @@ def test_the_same_seed_gives_the_same_run_bit_for_bit(make_city):
 
 def test_another_seed_gives_other_noise(make_city):
     def scans(seed):
-        city = make_city(seed=seed, hosted=(("n1", "nigel"),))
+        city = make_city(sensed=True, seed=seed, hosted=(("n1", "nigel"),))
         city.run_for(0.5)
         return [out for out in city.said if type(out).__name__ == "LidarScan"]
 
