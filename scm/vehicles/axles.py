@@ -5,13 +5,12 @@ so: `front` is 1 or 0, and what follows from that number is worked out before a 
 """
 
 import ast
-import copy
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from scm.vehicles.inline import Line
+from scm.vehicles.inline import Line, copied
 
 
 class Axle(NamedTuple):
@@ -42,7 +41,7 @@ class Known:
 
     def _fold(self, lines: Iterable[Line]) -> Iterator[Line]:
         for name, value in lines:
-            left = _Fold(self.numbers).visit(copy.deepcopy(value))
+            left = _Fold(self.numbers).visit(copied(value))
             number = number_of(left)
             if number is not None and self.counts[name] <= 1:
                 self.numbers[name] = number
@@ -58,7 +57,7 @@ class Known:
 
 def fold_body(lines: Iterable[Line], numbers: dict[str, float]) -> list[Line]:
     """Return lines of the whole car with what is known of its wheels put in."""
-    return [(name, _Fold(numbers).visit(copy.deepcopy(value))) for name, value in lines]
+    return [(name, _Fold(numbers).visit(copied(value))) for name, value in lines]
 
 
 def number_of(node: ast.expr) -> float | None:

@@ -6,13 +6,12 @@ empty is driven without them.
 """
 
 import ast
-import copy
 import re
 from collections.abc import Mapping, Sequence
 from textwrap import indent
 
 from scm.vehicles import body14
-from scm.vehicles.inline import Line
+from scm.vehicles.inline import Line, copied
 from scm.vehicles.lanes import LANES, WIDTH
 from scm.vehicles.past import COMMANDS
 from scm.vehicles.program import Program, Stage, names_in
@@ -256,8 +255,8 @@ def _named_rows(names: Sequence[str]) -> str:
 def print_line(line: Line, *, branches: bool = False) -> str:
     """Return a line as text; without branches its selects become `where`."""
     name, value = line
-    spelled = _Spell(branches).visit(copy.deepcopy(value))
-    return f"{name} = {ast.unparse(ast.fix_missing_locations(spelled))}"
+    spelled = _Spell(branches).visit(copied(value))
+    return f"{name} = {ast.unparse(spelled)}"
 
 
 class _Spell(ast.NodeTransformer):

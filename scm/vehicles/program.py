@@ -147,11 +147,11 @@ class Program:
     def _drop_unread(self) -> None:
         needed, before = set(self.kept), -1
         groups = [*(stage.lines for stage in self._stages()), *self.prepared.values()]
+        reads = [(name, set(leaves(value))) for lines in groups for name, value in lines]
         while len(needed) != before:
             before = len(needed)
-            for lines in groups:
-                for name, value in lines:
-                    needed |= set(leaves(value)) if name in needed else set()
+            for name, read in reads:
+                needed |= read if name in needed else set()
         for lines in groups:
             lines[:] = [line for line in lines if line[0] in needed]
 

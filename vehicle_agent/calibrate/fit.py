@@ -14,9 +14,7 @@ both actuators: the delays found are sums, and `eye_delay_s` of them is taken of
 """
 
 from collections.abc import Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -25,6 +23,7 @@ from scm.errors import RecordingError
 from scm.geometry import Pose2
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
+from scm.vehicles.lanes import LANES
 
 TERMS = ("steer_trim", "steer_gain", "drive_deadband", "drive_gain")
 STEP_S = 0.001  # a servo at its rate moves by when it is told: coarser steps shift its delay
@@ -162,7 +161,11 @@ class _Model:
         ]  # fmt: skip
         self.silent = len(whole) - len(self.windows)
         self.stds = np.array([POSITION_STD_M, POSITION_STD_M, YAW_STD_RAD])
-        self._fleets: dict[int, Fleet] = {}
+        row = np.searchsorted(self._kept, t, side="right") - 1
+        self._row = np.clip(row, 0, len(self._kept) - 2)
+        since = (t - self._kept[self._row]) / (KEPT * STEP_S)
+        self._since = np.clip(since, 0.0, 1.0)[:, None]
+        self._fleet = Fleet(self._car, LANES)
 
     def values(self, z: Floats) -> Floats:
         """Return the numbers of the car file for numbers in units of their steps."""
@@ -170,15 +173,21 @@ class _Model:
         scaled = [n.start + n.step * each for n, each in zip(NUMBERS, z, strict=True)]
         return np.asarray(np.array(scaled) * np.array(own))
 
-    def residuals(self, sets: Sequence[Floats]) -> list[list[Floats]]:
-        """Return the residuals of each set, window by window, in standard deviations."""
-        driven = self._drive(np.array([self.values(z) for z in sets]))
-        t = self._poses[:, 0]
-        out = []
-        for row in range(len(sets)):
-            path = np.column_stack([np.interp(t, self._kept, each[:, row]) for each in driven])
-            out.append([self._left(path[part], self._poses[part, 1:]) for part in self.windows])
-        return out
+    def residuals(
+        self, sets: Sequence[Floats], commands: Sequence[Floats] = ()
+    ) -> list[list[Floats]]:
+        """Return the residuals of each set, window by window, in standard deviations.
+
+        Args:
+            sets: Numbers in units of their steps, LANES sets at most.
+            commands: Of each set; empty: all obey those of the drive.
+        """
+        values = np.array([self.values(z) for z in sets])
+        driven = self._drive(values, commands or [self.commands] * len(sets))
+        i = self._row
+        paths = np.stack([each[i] + self._since * (each[i + 1] - each[i]) for each in driven], -1)
+        left = [self._left(paths[part], self._poses[part, None, 1:]) for part in self.windows]
+        return [[window[:, row] for window in left] for row in range(len(sets))]
 
     def again(self, z: Floats) -> Again:
         """Return the drive as seen, by the file's own numbers, and by these."""
@@ -193,62 +202,71 @@ class _Model:
         paths = np.array([seen, *(seen - self.stds * each for each in left)])
         return Again(self.commands, self._poses[which, 0], paths)
 
-    def rounded(self, offset: float) -> Self:
-        """Return the drive as a firmware would obey that cuts off behind each of its steps.
+    def rounded(self, offset: float) -> Floats:
+        """Return the commands as a firmware obeys them that cuts off behind each of its steps.
 
         Args:
             offset: Of its steps from the commands, 0 to 1 of one; the mean is put back.
         """
-        other = copy(self)
         told = self.commands[:, 1:]
         cut = STEPS * (np.floor(told / STEPS + offset) + 0.5 - offset)
         rests = (told == 0.0) & np.array([True, False])
-        other.commands = np.column_stack([self.commands[:, 0], np.where(rests, 0.0, cut)])
-        return other
+        return np.column_stack([self.commands[:, 0], np.where(rests, 0.0, cut)])
 
-    def _drive(self, values: Floats) -> list[Floats]:
-        if len(values) not in self._fleets:
-            self._fleets[len(values)] = Fleet(self._car, len(values))
-        fleet = self._fleets[len(values)]
+    def _drive(self, values: Floats, commands: Sequence[Floats]) -> list[Floats]:
+        """Return x, y and yaw of each row's car at the times that are kept, (kept, rows)."""
+        fleet, rows = self._fleet, len(values)
         at = {n.key: i for i, n in enumerate(NUMBERS)}
         start = Pose2(*self._poses[0, 1:])
-        commands = []
+        late = []
         for column, key in enumerate(DELAYS, start=1):
-            late = [self._late(column, float(each)) for each in values[:, at[key]]]
-            commands.append(np.column_stack(late))
-        for row in range(len(values)):
-            if fleet.alive[row]:
-                fleet.remove(row)
-        for row in range(len(values)):
+            late.append(np.zeros((len(self._edges) - 1, LANES)))
+            known = dict[tuple[int, float], Floats]()
+            for row, told in enumerate(commands):
+                which = id(told), float(values[row, at[key]])
+                if which not in known:
+                    known[which] = self._late(told, column, which[1])
+                late[-1][:, row] = known[which]
+        for row in range(LANES):
+            fleet.remove(row)
+        for row in range(rows):
             fleet.add(start)
             for key in at.keys() - set(DELAYS):
                 fleet.set_parameter(row, key, float(values[row, at[key]]))
-        done = fleet.rollout(commands[0], commands[1], STEP_S, ("x", "y", "yaw"))
+        done = fleet.rollout(late[0], late[1], STEP_S, ("x", "y", "yaw"))
         x, y, yaw = (
-            np.vstack([np.full((1, len(values)), at_start), done[name][KEPT - 1 :: KEPT]])
+            np.vstack([np.full((1, rows), at_start), done[name][KEPT - 1 :: KEPT, :rows]])
             for name, at_start in zip(("x", "y", "yaw"), start, strict=True)
         )
         return [x, y, np.unwrap(yaw, axis=0)]
 
-    def _late(self, column: int, delay_s: float) -> Floats:
+    def _late(self, commands: Floats, column: int, delay_s: float) -> Floats:
         """Return the mean of a command over each step, so much later, (steps,)."""
-        t, held = self.commands[:, 0], self.commands[:-1, column]
+        t, held = commands[:, 0], commands[:-1, column]
         whole = np.concatenate([[0.0], np.cumsum(held * np.diff(t))])
         return np.asarray(np.diff(np.interp(self._edges - delay_s, t, whole)) / STEP_S)
 
-    def _left(self, path: Floats, seen: Floats) -> Floats:
-        """Return what is left over once the path lies where it fits best, (n, 3)."""
-        middle, there = path[:, :2].mean(axis=0), seen[:, :2].mean(axis=0)
-        turn = float((seen[:, 2] - path[:, 2]).mean())
+    def _left(self, paths: Floats, seen: Floats) -> Floats:
+        """Return what is left over once each path lies where it fits best, (n, paths, 3).
+
+        Args:
+            paths: (n, paths, 3).
+            seen: What each is to lie on, (n, 1, 3).
+        """
+        away = paths[..., :2] - paths[..., :2].mean(axis=0)
+        there = seen[..., :2] - seen[..., :2].mean(axis=0)
+        turned = seen[..., 2] - paths[..., 2]
+        turn = turned.mean(axis=0)
         for _ in range(3):
             c, s = np.cos(turn), np.sin(turn)
-            xy = (path[:, :2] - middle) @ np.array([[c, s], [-s, c]])
-            yaw = seen[:, 2] - path[:, 2] - turn
-            rest = np.column_stack([seen[:, :2] - there - xy, yaw]) / self.stds
-            lever = np.column_stack([-xy[:, 1], xy[:, 0], np.ones(len(xy))]) / self.stds
-            slip = float((lever * rest).sum() / (lever * lever).sum())
-            turn += slip
-        return np.asarray(rest - slip * lever)
+            x = c * away[..., 0] - s * away[..., 1]
+            y = s * away[..., 0] + c * away[..., 1]
+            rest = np.stack([there[..., 0] - x, there[..., 1] - y, turned - turn], axis=-1)
+            lever = np.stack([-y, x, np.ones_like(x)], axis=-1) / self.stds
+            rest /= self.stds
+            slip = (lever * rest).sum(axis=(0, 2)) / (lever * lever).sum(axis=(0, 2))
+            turn = turn + slip
+        return np.asarray(rest - slip[:, None] * lever)
 
 
 def fit(car: Car, commands: Floats, poses: Floats, eye_delay_s: float = 0.0) -> Fit:
@@ -353,9 +371,10 @@ def _rounding(model: _Model, z: Floats, left: Sequence[Floats], slopes: Sequence
     weight = 1.0 / (1.0 + np.concatenate([rest.ravel() for rest in left]) ** 2 / TAIL)
     normal = np.eye(len(z)) / PRIOR**2 + (slope * weight[:, None]).T @ slope
     before = np.concatenate([rest.ravel() for rest in left])
+    offsets = (np.arange(FIRMWARES) + 0.5) / FIRMWARES
+    firmwares = [model.rounded(float(offset)) for offset in offsets]
     shifts = []
-    for offset in (np.arange(FIRMWARES) + 0.5) / FIRMWARES:
-        after = model.rounded(float(offset)).residuals([z])[0]
+    for after in model.residuals([z] * FIRMWARES, firmwares):
         moved = np.concatenate([rest.ravel() for rest in after]) - before
         shifts.append(np.linalg.solve(normal, slope.T @ (weight * moved)))
     return np.asarray(np.sqrt(np.mean(np.square(shifts), axis=0)))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scm.clock import NS_PER_MS, seconds
+from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.geometry import Pose2, wrap_angle
 from scm.v2x.exchange import Incoming
 from scm.vehicles.car import load_car
@@ -90,11 +90,16 @@ class HiddenBody:
 
     def advance(self, now_ns):
         while self._now_ns is not None and self._now_ns < now_ns:
+            until_ns = now_ns
             for actuator, delay_s, told in self._obeyed:
-                while told and seconds(self._now_ns - told[0][0]) >= delay_s - 1e-6:
+                late_ns = round(delay_s * NS_PER_S)
+                while told and told[0][0] + late_ns <= self._now_ns:
                     actuator[0] = told.popleft()[1]
-            self.fleet.advance(seconds(EXACT_NS))
-            self._now_ns += EXACT_NS
+                if told:
+                    until_ns = min(until_ns, told[0][0] + late_ns)
+            steps = -(-(until_ns - self._now_ns) // EXACT_NS)
+            self.fleet.advance(steps * seconds(EXACT_NS))
+            self._now_ns += steps * EXACT_NS
         self._now_ns = now_ns
 
     def see(self, track, now_ns):

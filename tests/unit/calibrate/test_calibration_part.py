@@ -8,6 +8,7 @@ from tests.unit.calibrate.rig import LIMITS, START, STEP_NS, T0, Eye, Hidden, Hi
 from tests.unit.test_real_guard import track
 from vehicle_agent.body import Obeyed
 from vehicle_agent.calibrate.part import CalibrationPart
+from vehicle_agent.calibrate.pattern import SHORT
 
 
 class Wheels:
@@ -137,7 +138,7 @@ def test_an_eye_that_is_blind_for_a_while_holds_it_up_for_as_long():
     took = {}
     for blind in ((), (20, 21, 22)):
         body = HiddenBody(hidden, START)
-        part = CalibrationPart("n7", body, LIMITS)
+        part = CalibrationPart("n7", body, LIMITS, plan=SHORT)
         took[blind], farthest = drive(part, body, Eye(hidden), LIMITS, blind)
         assert farthest < 0.0
     assert 2.0 < took[20, 21, 22] - took[()] < 4.0
