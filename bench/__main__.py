@@ -17,6 +17,7 @@ BENCHMARKS = (
     "camera",
     "lidar",
     "recordings",
+    "scans",
     "sensors",
     "signals",
     "signing",

@@ -17,6 +17,9 @@ from scm.maps.occupancy import map_from_occupancy
 
 MAPS_DIR = Path(scm.__file__).parent.parent / "maps"
 
+_YAML = {".yaml", ".yml"}
+_PICTURES = {".pgm", ".png", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff"}
+
 _PATH = re.compile(r" - at `\$\.?(?P<path>.*)`$")
 _PLAIN = (
     (re.compile(r"^Expected `([^`]+)`, got `([^`]+)`$"), r"expected \1, got \2"),
@@ -56,8 +59,13 @@ def load_map(name_or_path: str | Path) -> CityMap:
     if made is not None:
         return made
     path = _find(name_or_path)
-    if path.suffix in {".yaml", ".yml"}:
+    suffix = path.suffix.lower()
+    if suffix in _YAML:
         return map_from_occupancy(path)
+    if suffix in _PICTURES:
+        raise MapError(
+            f"{path}: expected a map file, got a picture: give the .yaml that describes its cells"
+        )
     city_map = _with_pictures(_read(path), path)
     problems = problems_of(city_map)
     if problems:
@@ -74,7 +82,7 @@ def _find(name_or_path: str | Path) -> Path:
     known = MAPS_DIR / f"{name_or_path}.toml"
     if known.is_file():
         return known
-    if path.suffix in {".toml", ".yaml", ".yml"}:
+    if path.suffix.lower() in {".toml", *_YAML, *_PICTURES}:
         raise MapError(f"{path}: there is no such map file")
     names = map_names()
     raise MapError(

@@ -2,19 +2,18 @@
 
 import math
 from collections import Counter
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
-import yaml
 
-from scm.errors import RecordingError, reading
+from scm.errors import RecordingError
 from scm.recording.shortcuts import written_out
+from scm.yaml_file import read_yaml
 
 FILE_NAME = "recording.yaml"
 MAX_PROBLEMS = 20  # in one message: a screen of a terminal
-MAX_BYTES = 16 << 20  # longer than any description that people or programs write
 
 
 class TimeColumn(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -115,11 +114,7 @@ def read_description(path: Path) -> Description:
     Raises:
         RecordingError: naming the file, the key, what was expected and what was got.
     """
-    with reading(path, "a YAML file"):
-        if path.stat().st_size > MAX_BYTES:
-            msg = f"{path}: a description of more than {MAX_BYTES >> 20} MiB: is it the data?"
-            raise RecordingError(msg)
-        raw = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_Loader)
+    raw = read_yaml(path)
     if isinstance(raw, dict) and isinstance(raw.get("tables"), list):
         raw = {**raw, "tables": [written_out(table, path) for table in raw["tables"]]}
     try:
@@ -133,22 +128,6 @@ def read_description(path: Path) -> Description:
         problems = problems[:MAX_PROBLEMS] + ([f"and {more} problems more"] if more > 0 else [])
         raise RecordingError("\n".join(f"{path}: {problem}" for problem in problems))
     return description
-
-
-class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """Plain YAML, but a key that stands twice is refused: the first one would be lost silently."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        """Return a mapping of distinct keys."""
-        seen: set[str] = set()
-        for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode):
-                if key.value in seen:
-                    msg = f"line {key.start_mark.line + 1}: the key {key.value!r} stands twice"
-                    raise yaml.YAMLError(msg)
-                seen.add(key.value)
-        mapping: dict[Hashable, Any] = super().construct_mapping(node, deep)
-        return mapping
 
 
 def _guilty_channel(raw: Any) -> str:

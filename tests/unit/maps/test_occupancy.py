@@ -1,14 +1,14 @@
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 import scm
-from scm.errors import MapError
 from scm.geometry import Pose2
 from scm.maps.grid import OccupancyGrid, load_occupancy
 from scm.maps.load import load_map
-from scm.maps.occupancy import map_from_occupancy, walls_of
+from scm.maps.occupancy import room_of, start_of, walls_of
 from scm.maps.segments import wall_segments
 
 SCANS = Path(scm.__file__).parent.parent.parent / "shared" / "data" / "slam_maps"
@@ -21,22 +21,6 @@ def grid_of(rows, cell_m=1.0, origin=Pose2(0.0, 0.0, 0.0)):  # noqa: B008  a tup
     """Return a grid from text, top row first: # occupied, . free, anything else unknown."""
     cells = np.array([list(row) for row in rows])[::-1]
     return OccupancyGrid("text", cells == ".", cells == "#", cell_m, origin)
-
-
-def scan(tmp_path, pgm, **changes):
-    keys = {
-        "image": "room.pgm",
-        "resolution": 0.05,
-        "origin": [0.0, 0.0, 0.0],
-        "negate": 0,
-        "occupied_thresh": 0.65,
-        "free_thresh": 0.196,
-    } | changes
-    (tmp_path / "room.pgm").write_bytes(pgm)
-    path = tmp_path / "room.yaml"
-    lines = [f"{key}: {value}\n" for key, value in keys.items() if value is not None]
-    path.write_text("".join(lines), encoding="utf-8")
-    return path
 
 
 def test_a_room_becomes_one_closed_wall_with_four_corners():
@@ -58,12 +42,6 @@ def test_the_unknown_is_no_wall():
     assert len(wall.points) == 4
 
 
-def test_only_the_largest_room_counts():
-    walls = walls_of(grid_of(["########", "#....#.#", "########"]))
-    assert len(walls) == 1
-    assert max(x for x, _ in walls[0].points) == 5.0
-
-
 def test_a_wall_aslant_is_straightened():
     rows = ["." * 40 for _ in range(8)]
     slope = ["".join("#" if x // 10 + 2 == y else "." for x in range(40)) for y in range(8)]
@@ -79,36 +57,63 @@ def test_the_frame_of_the_scan_is_kept():
     assert (4.0, 1.0) in wall.points
 
 
-@pytest.mark.parametrize("kind", ["P5", "P2"])
-def test_binary_and_text_pictures_are_read(tmp_path, kind):
-    body = bytes([0, 254, 205, 0]) if kind == "P5" else b"0 254\n205 0\n"
-    grid = load_occupancy(scan(tmp_path, kind.encode() + b"\n# made by hand\n2 2\n255\n" + body))
-    assert grid.occupied.tolist() == [[False, True], [True, False]]
-    assert grid.free.tolist() == [[False, False], [False, True]]
-
-
-def test_negate_swaps_black_and_white(tmp_path):
-    grid = load_occupancy(scan(tmp_path, b"P5 1 1 255\n\xff", negate=1))
-    assert grid.occupied.all()
+def scanned_room(outside, origin):
+    """Return a walled room of 3.61 m² in a picture of 30 m²; `outside` is what lies around it."""
+    cells = np.full((100, 120), outside)
+    cells[30:70, 40:80] = "#"
+    cells[31:69, 41:79] = "."
+    return OccupancyGrid("room", cells == ".", cells == "#", 0.05, Pose2(*origin))
 
 
 @pytest.mark.parametrize(
-    ("pgm", "changes", "words"),
+    ("origin", "side_cells", "why"),
     [
-        (b"P6 1 1 255\n\xff", {}, "expected a PGM picture"),
-        (b"P5 3 3 255\n\xff", {}, "expected 3 x 3 pixels, got 1"),
-        (b"P5 1 1 255\n\xff", {"resolution": "fine"}, "resolution: expected a finite number"),
-        (b"P5 1 1 255\n\xff", {"resolution": 0}, "resolution: expected more than 0"),
-        (b"P5 1 1 255\n\xff", {"origin": "[0, 0]"}, r"origin: expected \[x, y, yaw\]"),
-        (b"P5 1 1 255\n\xff", {"origin": None}, "key origin is missing"),
-        (b"P5 1 1 255\n\xff", {"image": "none.pgm"}, "none.pgm: cannot be read"),
-        (b"P5 1 1 255\n\xff", {"mode": "raw"}, "mode: expected trinary, got 'raw'"),
-        (b"P5 1 1 255\n\x00", {}, "expected free cells, got none"),
+        ((-3.0, -2.5, 0.0), 38, "the one that holds the origin, 3.61 m²; left out: 1 other free"),
+        ((-2.5, 3.0, -np.pi / 2), 38, "the one that holds the origin, 3.61 m²"),
+        ((0.0, 0.0, 0.0), 100, "the one that holds the origin, 26 m²"),
+        # On the wall, with the room on the one side and all else on the other.
+        ((-2.02, -2.5, 0.0), 100, "the largest within 0.25 m of the origin, whose cell is not"),
+        ((9.0, 9.0, 0.0), 100, "the largest: no free cell is near the origin"),
     ],
 )
-def test_a_bad_scan_is_refused(tmp_path, pgm, changes, words):
-    with pytest.raises(MapError, match=words):
-        map_from_occupancy(scan(tmp_path, pgm, **changes))
+def test_the_room_is_the_one_that_holds_the_origin(origin, side_cells, why):
+    found = room_of(scanned_room(".", origin))
+    assert found.rows[1] - found.rows[0] == side_cells
+    assert found.chosen.startswith(f"the room is {why}")
+
+
+def test_a_map_says_which_room_it_is_and_starts_at_the_origin(tmp_path):
+    cells = np.full((100, 120), 205, np.uint8)
+    cells[30:70, 40:80] = 0
+    cells[31:69, 41:79] = 254
+    cv2.imwrite(str(tmp_path / "room.png"), cells)
+    (tmp_path / "room.yaml").write_text(
+        "image: room.png\nmode: trinary\nresolution: 0.05\norigin: [-3.0, -2.5, 0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n",
+        encoding="utf-8",
+    )
+    city_map = load_map(tmp_path / "room.yaml")
+    assert (city_map.floor.x_m, city_map.floor.y_m) == ((-1.0, 1.0), (-1.0, 1.0))
+    assert city_map.spawns[0].pose == (-0.025, -0.025, 0.0)
+    assert "the one that holds the origin, 3.61 m²; 10400 cells of grey 205" in city_map.source
+
+
+def test_the_start_is_as_clear_as_a_car_needs_and_as_near_the_origin_as_can_be():
+    grid = scanned_room("?", (-2.05, -2.5, 0.0))  # the room begins at x = 0
+    (start,) = start_of(grid, room_of(grid))
+    # Five cells of 0.05 m lie between its own and the wall's.
+    assert start.pose == pytest.approx((0.275, -0.025, 0.0))
+    narrow = grid_of(["######", "......", "######"], cell_m=0.2)
+    assert start_of(narrow, room_of(narrow)) == ()
+
+
+def test_thousands_of_specks_become_a_wall_each():
+    free = np.zeros((242, 242), np.bool_)
+    free[1:-1, 1:-1] = True
+    free[3:-3:4, 3:-3:4] = False
+    walls = walls_of(OccupancyGrid("specks", free, ~free, 0.05, Pose2(-6.0, -6.0, 0.0)))
+    assert [len(wall.points) for wall in walls] == [4] * (1 + 59 * 59)
+    assert all(wall.closed for wall in walls)
 
 
 @needs_scans
@@ -142,7 +147,7 @@ def test_real_scans_become_compact_walls_and_a_place_to_start(name):
     # Fewer than half as many faces as occupied cells.
     assert 3 < len(wall_segments(city_map)) < grid.occupied.sum() / 2
     (start,) = city_map.spawns
-    assert grid.is_free(start.pose[0], start.pose[1])
+    assert grid.free[grid.cell_at(*start.pose[:2])]
 
 
 @needs_scans
