@@ -7,6 +7,7 @@ While no script is there the city is asked for no scans, pictures or measurement
 leased. Of everything only the newest is held.
 """
 
+import itertools
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -109,7 +110,7 @@ class DevkitPart:
         self._wheels = {car: Wheel(car, name) for car in wanted.cars}
         placed = wanted.cars if wanted.cosim else ()
         self._placed = {car: CosimCar(car, wanted.car, session) for car in placed}
-        self._spawns = _Spawns(wanted)
+        self._spawns = _Spawns(wanted, f"{name}-{session}")
         self._said: tuple[Wishes, int] | None = None
         self._resets: set[str] = set()
         self._resetting = [False] * len(wanted.cars)
@@ -301,10 +302,21 @@ class DevkitPart:
 
 
 class _Spawns:
-    """The cars that a bridge brings, and puts back to their places."""
+    """The cars that a bridge brings, and puts back to their places.
 
-    def __init__(self, wanted: Wanted) -> None:
+    A request whose answer does not come is asked again under its id until it is answered: the car
+    may be on the map already. What was never answered is taken away with the rest at the end.
+
+    Args:
+        wanted: What the bridge does.
+        run: Which bridge this is, and which run of it.
+    """
+
+    def __init__(self, wanted: Wanted, run: str) -> None:
         self._car = wanted.car
+        self._run = run
+        self._numbers = itertools.count(1)
+        self._asking: dict[str, str] = {}  # by car: the request id
         self._places: dict[str, str] = {}
         self._asked_ns: int | None = None
         self._here: set[str] = set()
@@ -327,13 +339,20 @@ class _Spawns:
         if not missing or not due:
             return []
         self._asked_ns = now_ns
-        return [
-            Call(SpawnRequest(vehicle=car, car=self._car, spawn=self._places[car]), SPAWN_S)
-            for car in missing
-        ]
+        return [Call(self._request(car), SPAWN_S) for car in missing]
+
+    def _request(self, car: str) -> SpawnRequest:
+        if car not in self._asking:
+            self._asking[car] = f"{self._run}-{car}-{next(self._numbers)}"
+        return SpawnRequest(
+            request_id=self._asking[car], vehicle=car, car=self._car, spawn=self._places[car]
+        )
 
     def spawned(self, asked: SpawnRequest, reply: Message) -> None:
         """Hear what became of bringing a car; one that is there already is driven, not ours."""
+        is_open = isinstance(reply, Refused) and reply.code in ("timeout", "offline")
+        if not is_open and self._asking.get(asked.vehicle) == asked.request_id:
+            del self._asking[asked.vehicle]
         if isinstance(reply, SpawnReply):
             self._ours.add(asked.vehicle)
             self._here.add(asked.vehicle)
@@ -357,8 +376,10 @@ class _Spawns:
         self._asked_ns = None
 
     def leave(self) -> list[Call]:
-        """Return what takes away all that were brought."""
-        return [Call(RemoveRequest(vehicle=car), ASK_S) for car in sorted(self._ours)]
+        """Return what takes away all that were brought, or may have been."""
+        return [
+            Call(RemoveRequest(vehicle=car), ASK_S) for car in sorted({*self._ours, *self._asking})
+        ]
 
     def _forget(self, car: str) -> None:
         self._ours.discard(car)

@@ -5,7 +5,8 @@
     2 yellow   nothing: yellow comes by itself between the two
     0          no wish: what was wished is taken back
 
-Heads of one group are one wish, red before green. A wish is renewed while the script keeps to it,
+Heads of one group are one wish, red before green; a script that sets them against each other is
+warned once. A wish is renewed while the script keeps to it,
 lapses by itself within half a minute when it does not, and is taken back when the script goes.
 What the junction refuses is told once, in its words.
 """
@@ -56,7 +57,15 @@ class Heads:
         """
         wished: dict[tuple[str, str], int] = {}
         for head, state in zip(self._heads, states, strict=False):
-            if state in _VERBS and wished.get(head) != RED:
+            if state not in _VERBS:
+                continue
+            if wished.get(head, state) != state:
+                junction, group = head
+                self._warn(
+                    f"lights of group {group} of {junction} are set to red and to green: they are "
+                    "one group and show the same, so the red counts"
+                )
+            if wished.get(head) != RED:
                 wished[head] = state
         changed = wished != self._wished
         if not changed and (not wished or now_ns < self._renew_ns):
@@ -76,9 +85,14 @@ class Heads:
 
     def replied(self, request: SignalRequest, reply: Message) -> None:
         """Hear what became of a wish."""
-        if isinstance(reply, Refused) and reply.detail not in self._told and len(self._told) < 100:
-            self._told.add(reply.detail)
-            event(_log, "devkit_light", level=logging.WARNING, why=repr(reply.detail))
+        if isinstance(reply, Refused):
+            self._warn(reply.detail)
+
+    def _warn(self, why: str) -> None:
+        """Warn of something once."""
+        if why not in self._told and len(self._told) < 100:
+            self._told.add(why)
+            event(_log, "devkit_light", level=logging.WARNING, why=repr(why))
 
     def _clears(self, wished: dict[tuple[str, str], int]) -> list[Call]:
         by_junction: dict[str, list[str]] = {}

@@ -19,14 +19,17 @@ from scm.v2x.messages.join_request import JoinReply
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.signal_request import SignalRequest
 from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.world.part import WorldPart
 from vehicle_agent.devkit.bridge import DevkitPart, Wanted
 from vehicle_agent.devkit.heads import Heads
 
+S = 1_000_000_000
 CITY = load_map("driving_school")
 ROTATION = {"PosZ": "0", "RotX": "0", "RotY": "0", "RotZ": "0", "RotW": "1"}
 
@@ -234,6 +237,26 @@ def test_a_car_can_be_brought_and_is_taken_away_again(stage):
     assert car is None
 
 
+def requests_of(calls, kind):
+    return [call for call in calls if isinstance(call, Call) and isinstance(call.request, kind)]
+
+
+def test_a_spawn_that_answers_late_is_asked_again_under_its_id_and_leaves_no_car_behind():
+    part = DevkitPart("d", Wanted(("v1",), spawns=()), "run")
+    (first,) = requests_of(part.step(0, []), SpawnRequest)
+    late = Refused(code="timeout", detail="no answer within 10 s")
+    (again,) = requests_of(part.step(11 * S, [Incoming(late, 11 * S, first)]), SpawnRequest)
+    assert again.request.request_id == first.request.request_id != ""
+    (gone,) = requests_of(part.finish(12 * S), RemoveRequest)
+    assert gone.request.vehicle == "v1"
+    full = Refused(code="full", detail="no place is free")
+    (other,) = requests_of(part.step(13 * S, [Incoming(full, 13 * S, again)]), SpawnRequest)
+    assert other.request.request_id != first.request.request_id
+    there = Refused(code="owned", detail="there is already one named 'v1'")
+    assert not requests_of(part.step(14 * S, [Incoming(there, 14 * S, other)]), SpawnRequest)
+    assert not requests_of(part.finish(15 * S), RemoveRequest)
+
+
 @pytest.mark.parametrize("stage", [(Wanted(("v1",), spawns=()), 0)], indirect=True)
 def test_reset_puts_a_car_back_to_where_it_began_once_for_each_rise(stage):
     stage.wait(0.5)
@@ -373,3 +396,14 @@ def test_cosim_of_a_car_that_is_driven_is_refused_in_words(stage, caplog):
     keys = {f"V1_{key}": value for key, value in ROTATION.items()}
     stage.say(0.5, V1_Throttle=0, V1_Steering=0, V1_CoSim=1, V1_PosX=0, V1_PosY=0, **keys)
     assert caplog.text.count("start the bridge with --cosim") == 1
+
+
+def test_heads_of_one_group_that_are_set_against_each_other_are_warned_of_once(caplog):
+    heads = Heads("script")
+    heads.learn([("crossing", "a"), ("crossing", "a"), ("crossing", "b")])
+    for now_ns in (0, S, 2 * S):
+        calls = heads.step(now_ns, [3, 1, 3])
+    assert not calls
+    assert caplog.text.count("lights of group a of crossing are set to red and to green") == 1
+    heads.step(3 * S, [3, 3, 1])
+    assert "group b" not in caplog.text
