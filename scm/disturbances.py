@@ -154,10 +154,10 @@ class Disturbances:
     def _hear_world(self, status: PartStatus) -> None:
         """Note how much time the world did not simulate since its last report."""
         before, self._reported = self._reported, status
-        if before is None or status.t_ns <= before.t_ns or status.lost_s < before.lost_s:
+        if before is None or status.t_ns <= before.t_ns or not status.lost_s >= before.lost_s:
             return  # the first, or of another world
         passed_ns = status.t_ns - before.t_ns
-        lost_ns = round((status.lost_s - before.lost_s) * NS_PER_S)
+        lost_ns = round(min(1.0, (status.lost_s - before.lost_s) / seconds(passed_ns)) * passed_ns)
         if lost_ns:
             self._lost.append((before.t_ns, status.t_ns, lost_ns))
             self._calm_since_ns = max(self._calm_since_ns, status.t_ns)

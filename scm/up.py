@@ -8,7 +8,6 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
-from scm.api.based import check_base
 from scm.clock import NS_PER_MS, WallClock, seconds
 from scm.crew import Crew, Job, Say
 from scm.disturbances import HEARS, Disturbance, Disturbances
@@ -131,7 +130,6 @@ def _settled(wanted: Wanted) -> _Plan:
         raise RunError(msg)
     city_map = with_radio(load_map(wanted.map_name), wanted.radio)
     _check_counts(wanted, len(city_map.spawns))
-    check_base(wanted.base)
     if wanted.demand is not None:
         DemandPart(city_map, load_demand(wanted.demand))
     for url in (wanted.state, wanted.keys):
@@ -240,16 +238,6 @@ def _parts(plan: _Plan) -> list[Job]:
 
     cars = f"cars, walls, sensors, radio; {plan.wanted.hosted} hosted"
     kept = ("--state", plan.state)
-    keys = () if plan.wanted.keys is None else ("--keys", plan.wanted.keys)
-    data = ("--data", str(plan.wanted.record_dir))
-    own = plan.guard.files.get(SCRIPT)
-    scripts = ("--script-credentials", str(own)) if own is not None else ()
-    proxies = [word for one in plan.wanted.trust_proxy for word in ("--trust-proxy", one)]
-    proxies += [word for one in plan.wanted.origin for word in ("--origin", one)]
-    proxies += ["--base", plan.wanted.base] if plan.wanted.base else []
-    at = ("--host", plan.wanted.host, "--port", str(plan.port), *proxies)
-    web = (*at, *keys, *data, *kept, *scripts)
-
     air = [word for setting in plan.wanted.radio for word in ("--radio", setting)]
 
     def demand(table: Path) -> Job:
@@ -271,13 +259,24 @@ def _parts(plan: _Plan) -> list[Job]:
         part("camera", "cars' own cameras, rendered while somebody looks"),
         part("observer", "counts, delays, and who breaks the rules"),
         part("misbehaviour", "doubts what cars claim on the air"),
-        part("api", "REST, event stream, dashboard", *web),
+        part("api", "REST, event stream, dashboard", *_web(plan), *kept),
     ]
     if plan.wanted.demand is not None:
         jobs.append(demand(plan.wanted.demand))
     if plan.wanted.ros2:
         jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))
     return jobs
+
+
+def _web(plan: _Plan) -> Sequence[str]:
+    """Return where the server is found, who may call it, and what it shows."""
+    wanted, own = plan.wanted, plan.guard.files.get(SCRIPT)
+    words = ["--host", wanted.host, "--port", str(plan.port), "--data", str(wanted.record_dir)]
+    words += ["--base", wanted.base] if wanted.base else []
+    words += [word for one in wanted.trust_proxy for word in ("--trust-proxy", one)]
+    words += [word for one in wanted.origin for word in ("--origin", one)]
+    words += ["--keys", wanted.keys] if wanted.keys is not None else []
+    return [*words, *(("--script-credentials", str(own)) if own is not None else ())]
 
 
 def _at_bus(plan: _Plan, station: str) -> Sequence[str]:

@@ -2,7 +2,7 @@
 
 import asyncio
 import uuid
-from collections.abc import AsyncIterator, Collection, Mapping, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from http import HTTPStatus
 
@@ -11,7 +11,7 @@ from fastapi import APIRouter, FastAPI
 from scm.api import openapi, problem, uploads
 from scm.api.acknowledgements import Acknowledgements
 from scm.api.audit_trail import Audited
-from scm.api.based import Based, check_base
+from scm.api.based import HERE, Based, Site, check_base
 from scm.api.body_limit import Bounded
 from scm.api.calibration_desk import LARGEST_PICTURE
 from scm.api.city import Ask, City, Link
@@ -88,8 +88,7 @@ def create_app(
     shelves: Shelves | None = None,
     link: Link | None = None,
     state: Repository | None = None,
-    base: str = "",
-    origins: Collection[str] = (),
+    site: Site = HERE,
 ) -> FastAPI:
     """Build the application.
 
@@ -103,14 +102,12 @@ def create_app(
         shelves: Folders of recordings, reports and the like; None: the city offers none.
         link: What is known of the connection to the bus.
         state: The city's store, with its audit log; None: a new one in memory.
-        base: Path below which people find the server, `/city`; see `scm.api.based`.
-        origins: Of pages that may change things besides our own host's: `https://lab.example`,
-            where a proxy calls us by another name.
+        site: Where people find the server.
 
     Raises:
-        RunError: when there can be no such base.
+        RunError: when it can have no such base.
     """
-    base = check_base(base)
+    site = site._replace(base=check_base(site.base))
     clock = WallClock()
     desk = _Desk(
         city=City(view, ask, city_map, plans or {}, shelves or Shelves(), link or Link()),
@@ -126,15 +123,15 @@ def create_app(
         openapi_url="/api/v1/openapi.json",
         generate_unique_id_function=openapi.operation_id,
         lifespan=desk.lifespan,
-        servers=[{"url": base}] if base else None,
+        servers=[{"url": site.base}] if site.base else None,
     )
-    app.state.base = base
+    app.state.base = site.base
     app.state.stream = desk.stream
     app.state.frames = desk.frames
     app.state.keys = keys
     problem.install(app)
     openapi.install(app)
-    _add_layers(app, desk, clock, base, origins)
+    _add_layers(app, desk, clock, site)
     for noun in (*desk.of_the_city(), *desk.live(), *desk.of_the_server()):
         app.include_router(noun, prefix="/api/v1", responses=problem.RESPONSES)
     for noun in (health.router(desk.city), ngsi.router(desk.city), metrics.router(desk.metrics)):
@@ -219,18 +216,16 @@ class _Desk:
         await asyncio.gather(*tasks)
 
 
-def _add_layers(
-    app: FastAPI, desk: _Desk, clock: WallClock, base: str, origins: Collection[str]
-) -> None:
-    policy = content_policy(index_text(base))
+def _add_layers(app: FastAPI, desk: _Desk, clock: WallClock, site: Site) -> None:
+    policy = content_policy(index_text(site.base))
     app.add_middleware(Headed)  # what is added later sees a request earlier
     app.add_middleware(Idempotent, clock=clock)
     app.add_middleware(Bounded, larger=FILES)
     app.add_middleware(Audited, store=desk.store, clock=clock)
     app.add_middleware(Limited, clock=clock)  # what is asked too often fills no log
-    app.add_middleware(Dashboard, base=base)
-    app.add_middleware(Gate, keys=desk.known, policy=policy, origins=origins)
+    app.add_middleware(Dashboard, base=site.base)
+    app.add_middleware(Gate, keys=desk.known, policy=policy, origins=site.origins)
     app.add_middleware(Measured, metrics=desk.metrics, clock=clock)
     app.add_middleware(Traced)
-    app.add_middleware(Based, base=base)
+    app.add_middleware(Based, base=site.base)
     app.add_exception_handler(HTTPStatus.NOT_FOUND, astray)

@@ -5,6 +5,8 @@ and places that answers point to have it always: that is where a browser finds t
 """
 
 import re
+from collections.abc import Collection
+from typing import NamedTuple
 
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -19,6 +21,22 @@ _COOKIE_PATH = re.compile(r"(?i)(;\s*path=)/")
 PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
 """First part of the address of each page of the dashboard; what follows is the page's own."""
 TAKEN = (*PAGES, "api", "static", "docs", "ngsi-ld", "metrics")
+
+
+class Site(NamedTuple):
+    """Where people find a server.
+
+    Attributes:
+        base: The path below its host, `/city`; empty: the host itself.
+        origins: Of pages that may change things besides our own host's: `https://lab.example`,
+            where a proxy calls us by another name.
+    """
+
+    base: str = ""
+    origins: Collection[str] = ()
+
+
+HERE = Site()
 
 
 def check_base(base: str) -> str:

@@ -178,8 +178,8 @@ def _check(folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:
         program, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=PATIENCE_S
     )
     if reading.returncode != 0:
-        most = f"{MOST_READING_S} s and {MOST_READING_BYTES // 2**20} MiB"
-        raise _refused(f"{FILE_NAME}: to read it takes more than {most}: send a simpler one")
+        limits = f"{MOST_READING_S} s and {MOST_READING_BYTES // 2**20} MiB"
+        raise _refused(f"{FILE_NAME}: to read it takes more than {limits}: send a simpler one")
     read = msgspec.json.decode(reading.stdout, type=_Read)
     if read.refusal:
         raise _refused(read.refusal)

@@ -72,6 +72,7 @@ def _at_bus(arguments: argparse.Namespace) -> list[str]:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.api.app import create_app
+    from scm.api.based import Site
     from scm.api.city import Link
     from scm.api.gate import check_bind
     from scm.api.keys import KeyRing
@@ -112,8 +113,7 @@ def _run(arguments: argparse.Namespace) -> int:
                 map_file=arguments.map,
             ),
             plans={one.name: shipped for one in city_map.junctions},
-            base=arguments.base,
-            origins=arguments.origin,
+            site=Site(arguments.base, arguments.origin),
         )
 
         def hear() -> None:

@@ -75,8 +75,10 @@ def wanted_of(arguments: argparse.Namespace) -> "Wanted":
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from scm.api.based import check_base
     from scm.up import run_city
 
+    check_base(arguments.base)
     return run_city(wanted_of(arguments))
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import httpx
 
 from scm.api.app import create_app
+from scm.api.based import Site
 from scm.api.server import serve
 from scm.api.shelves import shelves_in
 from scm.api.view import CityView
@@ -44,8 +45,8 @@ class Town:
         hosted = tuple((f"n{number}", "nigel") for number in range(1, cars + 1))
         self.city.add(WorldPart(city_map, hosted=hosted))
         plans = {junction.name: names("scm.traffic.plans") for junction in city_map.junctions}
-        shelves = shelves_in(folder)
-        app = create_app(view, self._ask, city_map, shelves=shelves, plans=plans, base=base)
+        shelves, site = shelves_in(folder), Site(base)
+        app = create_app(view, self._ask, city_map, shelves=shelves, plans=plans, site=site)
         self._threads = [
             threading.Thread(target=self._drive),
             threading.Thread(

@@ -5,6 +5,7 @@ import re
 import pytest
 
 from scm.api.app import create_app
+from scm.api.based import Site
 from scm.errors import RunError
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
@@ -20,8 +21,8 @@ def client(view, fake_city, city_map, client_of):
     fake_city.answers[SpawnRequest] = SpawnReply(
         vehicle="n7", tag_id=7, x_m=0.0, y_m=0.0, yaw_rad=0.0
     )
-    options = {"base": "/city/", "origins": ["https://lab.example"]}
-    return client_of(create_app(view, fake_city.ask, city_map, **options))
+    site = Site("/city/", ["https://lab.example"])
+    return client_of(create_app(view, fake_city.ask, city_map, site=site))
 
 
 @pytest.mark.parametrize("before", ["/city", ""])
@@ -44,7 +45,7 @@ def test_places_and_cookies_lie_below_the_base(client, keyed_app, view, fake_cit
     made = client("POST", "/city/api/v1/vehicles", json={"vehicle": "n7"}, headers=LAB)
     assert made.headers["location"] == "/city/api/v1/vehicles/n7"
     assert client("GET", "/api/v1/openapi.json").json()["servers"] == [{"url": "/city"}]
-    keyed = client_of(create_app(view, fake_city.ask, city_map, keys=ring, base="/city"))
+    keyed = client_of(create_app(view, fake_city.ask, city_map, keys=ring, site=Site("/city")))
     begun = keyed("PUT", "/city/api/v1/session", headers=bearer(key_of("operator")))
     assert "Path=/city/api;" in begun.headers["set-cookie"] + ";"
 
@@ -66,4 +67,4 @@ def test_a_key_in_the_header_gets_the_red_stop_through_any_proxy(keyed_app, key_
 @pytest.mark.parametrize("base", ["city", "/map", "/api", "/a b", "//x", '/a"b', "/../x"])
 def test_a_base_that_cannot_be_is_refused(view, fake_city, city_map, base):
     with pytest.raises(RunError, match="base: got"):
-        create_app(view, fake_city.ask, city_map, base=base)
+        create_app(view, fake_city.ask, city_map, site=Site(base))

@@ -325,7 +325,7 @@ def test_zeros_within_280_ms_once_the_bus_is_broken_and_it_drives_when_it_is_bac
 def test_a_step_that_raises_lets_go_of_the_cable_before_anybody_is_told(desk, monkeypatch):
     desk.see_for(2.0)
 
-    def fails(now_ns, epoch):
+    def fails(now_ns, epoch, **_):
         raise ZeroDivisionError
 
     monkeypatch.setattr(desk.part._stay, "step", fails)

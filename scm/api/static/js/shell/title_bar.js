@@ -193,7 +193,7 @@ function DisturbanceBanner() {
       ? "A person resets a monitor, on the signals page."
       : "";
   return html`
-    <div class="banner lost" role="status">
+    <div class="banner void" role="status">
       <b>Measurements are void</b>
       <span>
         ${capital(shown.map(({ text }) => text).join("; "))}, since ${clock(since_ns)}. Trips meanwhile say nothing
