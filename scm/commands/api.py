@@ -3,8 +3,14 @@
 import argparse
 import threading
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scm.command import Command, credentials_of, part_arguments
+
+if TYPE_CHECKING:
+    from scm.api.city import Link
+    from scm.api.wire import BusWire
+    from scm.v2x.bus_zenoh import ZenohBus
 
 
 def proxy_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,10 +76,26 @@ def _at_bus(arguments: argparse.Namespace) -> list[str]:
     return words + (["--credentials", str(arguments.credentials)] if arguments.credentials else [])
 
 
+def _link(arguments: argparse.Namespace, bus: "ZenohBus", wire: "BusWire") -> "Link":
+    from scm.api.city import Link
+    from scm.clock import WallClock
+
+    return Link(
+        city=arguments.city,
+        is_connected=lambda: bus.connected,
+        rejected=lambda: bus.rejected,
+        clock=WallClock(),
+        wire=wire,
+        connect=arguments.connect,
+        script_credentials=arguments.script_credentials,
+        words=_at_bus(arguments),
+        map_file=arguments.map,
+    )
+
+
 def _run(arguments: argparse.Namespace) -> int:
     from scm.api.app import create_app
     from scm.api.based import Site
-    from scm.api.city import Link
     from scm.api.gate import check_bind
     from scm.api.keys import KeyRing
     from scm.api.server import serve
@@ -101,17 +123,7 @@ def _run(arguments: argparse.Namespace) -> int:
             keys=keys,
             state=open_store(arguments.state) if arguments.state else None,
             shelves=shelves_in(arguments.data) if arguments.data else None,
-            link=Link(
-                city=arguments.city,
-                is_connected=lambda: bus.connected,
-                rejected=lambda: bus.rejected,
-                clock=WallClock(),
-                wire=wire,
-                connect=arguments.connect,
-                script_credentials=arguments.script_credentials,
-                words=_at_bus(arguments),
-                map_file=arguments.map,
-            ),
+            link=_link(arguments, bus, wire),
             plans={one.name: shipped for one in city_map.junctions},
             site=Site(arguments.base, arguments.origin),
         )

@@ -321,6 +321,7 @@ class _Spawns:
         self._asked_ns: int | None = None
         self._here: set[str] = set()
         self._ours: set[str] = set()
+        self._others: set[str] = set()  # those that were there before
         self._going: set[str] = set()
         self._why = ""
         if wanted.spawns is not None and not wanted.cosim:
@@ -358,6 +359,7 @@ class _Spawns:
             self._here.add(asked.vehicle)
         elif isinstance(reply, Refused) and reply.code == "owned":
             self._here.add(asked.vehicle)
+            self._others.add(asked.vehicle)
         elif isinstance(reply, Refused) and reply.detail != self._why:
             self._why = reply.detail
             event(_log, "devkit_spawn", level=logging.WARNING, why=repr(reply.detail))
@@ -377,9 +379,8 @@ class _Spawns:
 
     def leave(self) -> list[Call]:
         """Return what takes away all that were brought, or may have been."""
-        return [
-            Call(RemoveRequest(vehicle=car), ASK_S) for car in sorted({*self._ours, *self._asking})
-        ]
+        cars = self._ours | (self._asking.keys() - self._others)
+        return [Call(RemoveRequest(vehicle=car), ASK_S) for car in sorted(cars)]
 
     def _forget(self, car: str) -> None:
         self._ours.discard(car)

@@ -45,12 +45,12 @@ def test_an_old_wish_is_repeated_each_50_ms_and_loses_its_throttle_after_a_secon
     assert (late.throttle, late.steering) == (0.0, -0.25)
 
 
-def test_the_lease_is_renewed_three_times_in_its_life(wheel):
+def test_the_lease_is_renewed_five_times_in_its_life(wheel):
     times = range(0, 2000, 10)
     asked = [one for t in times for one in wheel.step(t * NS_PER_MS, WISH, t)]
     renewals = [one.request for one in asked if not isinstance(one, DriveCommand)]
     assert {(request.verb, request.epoch) for request in renewals} == {("renew", 4)}
-    assert len(renewals) == 2 * NS_PER_S // RENEW_NS - 1 == 5
+    assert len(renewals) == 2 * NS_PER_S // RENEW_NS - 1 == 9
 
 
 def test_a_refusal_is_said_once_and_another_one_anew(caplog):
