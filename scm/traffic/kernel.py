@@ -26,6 +26,8 @@ class Phase(Enum):
     CLEARANCE = "clearance"
     FLASH = "flash"
 
+    __hash__ = object.__hash__  # that of `Enum` is written in Python, and proofs hash millions
+
 
 class GroupTimes(NamedTuple):
     """The least times of one group, in the unit of `step`'s `dt`."""

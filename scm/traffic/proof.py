@@ -9,6 +9,7 @@ state, a group that alone is wished for must get its green.
 
 import math
 from collections.abc import Collection, Sequence
+from functools import cache
 from itertools import chain, combinations
 from typing import NamedTuple, Protocol
 
@@ -115,26 +116,35 @@ def first_memory(state: State) -> Memory:
 
 
 def _of(group: tuple[Phase, int]) -> str:
-    return _COLOUR[group[0].name]
+    return _shown(group[0])
+
+
+@cache
+def _shown(phase: Phase) -> str:
+    return _COLOUR[phase.name]
 
 
 def watch(
     program: Program, memory: Memory, state: State, wishes: Collection[str], dt: int
 ) -> Memory:
     """Return the observer's memory after a step that it finds no fault with."""
-    after = [
-        _Seen(
-            colour := _of(group),
-            before.age + dt if colour == before.colour else 0,
-            0 if before.colour in _GOING else before.quiet + dt,
-        )
-        for before, group in zip(memory, state, strict=True)
-    ]
+    after = [_look(before, _of(group), dt) for before, group in zip(memory, state, strict=True)]
     for index, before in enumerate(memory):
-        _judge(program, index, before, after, wishes, before.age + dt)
+        if after[index].colour != before.colour:
+            _judge(program, index, before, after, wishes, before.age + dt)
     return tuple(map(_forget, after, program.times))
 
 
+@cache
+def _look(before: _Seen, colour: str, dt: int) -> _Seen:
+    return _Seen(
+        colour,
+        before.age + dt if colour == before.colour else 0,
+        0 if before.colour in _GOING else before.quiet + dt,
+    )
+
+
+@cache
 def _forget(seen: _Seen, times: GroupTimes) -> _Seen:
     """Count no further than anybody asks: that keeps the search finite."""
     if seen.colour in _GOING:

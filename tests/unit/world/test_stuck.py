@@ -40,7 +40,7 @@ def test_a_car_that_pushes_against_a_wall_is_stuck_once_until_it_moves(city):
     lease = city.lease(ttl_ms=60_000)
     seq = push(city, lease, PATIENCE_S - 0.5, 0.5, 1)
     assert (told(city), city.shown("n1").stuck) == ([], None)
-    seq = push(city, lease, 10.0, 0.5, seq)
+    seq = push(city, lease, 1.5 + PATIENCE_S, 0.5, seq)
     assert told(city) == ["n1 is stuck: it pushes against a wall and stays"]
     assert city.shown("n1").stuck == ("wall",)
     seq = push(city, lease, 1.0, 0.0, seq)
@@ -63,7 +63,7 @@ def test_two_cars_nose_to_nose_name_each_other(city):
     put(city, "n1", Pose2(1.0, 0.6, 0.0))
     put(city, "n2", Pose2(1.0 + 2 * FRONT_M + 0.005, 0.6, math.pi))
     leases = [city.lease(name, ttl_ms=60_000) for name in ("n1", "n2")]
-    for seq in range(1, 500):
+    for seq in range(1, round(50 * (1.0 + PATIENCE_S))):
         city.run(1, *(city.command(lease, seq, 0.3) for lease in leases))
     assert sorted(told(city)) == [
         "n1 is stuck: it pushes against n2 and stays",
@@ -74,13 +74,13 @@ def test_two_cars_nose_to_nose_name_each_other(city):
 @pytest.mark.parametrize("throttle", [0.0, 0.9 * LEAST_THROTTLE])
 def test_a_car_that_is_hardly_told_to_drive_is_not_stuck(city, throttle):
     put(city, "n1", AT_WALL)
-    push(city, city.lease(ttl_ms=60_000), 3 * PATIENCE_S, throttle, 1)
+    push(city, city.lease(ttl_ms=60_000), 1.5 * PATIENCE_S, throttle, 1)
     assert told(city) == []
 
 
 def test_the_least_throttle_moves_a_free_car_far_enough(city):
     put(city, "n1", Pose2(1.0, 0.6, 0.0))
-    push(city, city.lease(ttl_ms=60_000), 3 * PATIENCE_S, LEAST_THROTTLE, 1)
+    push(city, city.lease(ttl_ms=60_000), 2 * PATIENCE_S, LEAST_THROTTLE, 1)
     assert told(city) == []
 
 
@@ -137,7 +137,7 @@ def test_a_driver_lets_go_of_a_stuck_car_and_tries_again_once_in_a_while(city, b
 
 def test_a_queue_before_a_red_light_is_not_stuck(make_city):
     city = make_city(hosted=tuple((f"n{i}", "nigel") for i in range(1, 7)))
-    city.run_for(20.0 + 3 * PATIENCE_S)
+    city.run_for(8.0 + 1.5 * PATIENCE_S)
     assert city.world.slots.speed.max() < 0.02, "all wait at the dark light by now"
     assert told(city) == []
 
