@@ -6,7 +6,7 @@ The walls are the faces between free and occupied cells, few and straight.
 import math
 from array import array
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,13 +92,16 @@ def room_of(grid: OccupancyGrid) -> Room:
     low = facts[label, [cv2.CC_STAT_TOP, cv2.CC_STAT_LEFT]]
     high = low + facts[label, [cv2.CC_STAT_HEIGHT, cv2.CC_STAT_WIDTH]]
     rows, columns = zip(low.tolist(), high.tolist(), strict=True)
-    cell_m2 = grid.cell_m**2
-    chosen = f"the room is {why}, {areas[label] * cell_m2:.3g} m²"
+    chosen = f"the room is {why}, {_area(grid, areas[label])}"
     if others := len(areas) - 2:
-        rest = (int(areas.sum()) - int(areas[label])) * cell_m2
-        area = "1 other free area" if others == 1 else f"{others} other free areas"
-        chosen += f"; left out: {area}, {rest:.3g} m²"
+        rest = _area(grid, areas.sum() - areas[label])
+        chosen += f"; left out: {others} other free area{'s' * (others > 1)}, {rest}"
     return Room(labels == label, rows, columns, chosen)
+
+
+def _area(grid: OccupancyGrid, cells: np.integer[Any]) -> str:
+    area_m2 = int(cells) * grid.cell_m**2
+    return f"{area_m2:.0f} m²" if area_m2 >= 100.0 else f"{area_m2:.3g} m²"
 
 
 def _chosen(
