@@ -2,10 +2,17 @@
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from textwrap import indent
+from typing import TYPE_CHECKING
 
 from scm.command import Command
+
+if TYPE_CHECKING:
+    from scm.maps.model import CityMap
+
+Row = tuple[str, ...]
 
 _MAP_KINDS = {
     "lanes": "lane",
@@ -52,14 +59,53 @@ def _map(arguments: argparse.Namespace) -> str:
         return "\n".join(map_names())
     city_map = load_map(arguments.name)
     out: Path = arguments.out or Path(f"{city_map.name}.svg")
-    out.write_text(draw_svg(city_map), encoding="utf-8")
+    out.write_text(draw_svg(city_map, names=True, spawns=True), encoding="utf-8")
     counts = ", ".join(
         f"{count} {singular if count == 1 else plural}"
         for plural, singular in _MAP_KINDS.items()
         if (count := len(getattr(city_map, plural)))
     )
     slopes = "" if city_map.floor.is_level else _SLOPES
-    return f"{city_map.title}: {counts}\n{slopes}drawn in {out}"
+    names = "".join(f"{head}\n{indent(_columns(rows), '  ')}\n" for head, rows in _named(city_map))
+    return f"{city_map.title}: {counts}\nfrom: {city_map.source}\n{slopes}{names}drawn in {out}"
+
+
+def _named(city_map: "CityMap") -> Iterator[tuple[str, list[Row]]]:
+    """Return what scripts and pages call by name, kind by kind: a heading and its rows."""
+    from scm.maps.route import Roads
+
+    roads = Roads(city_map)
+    lanes: list[Row] = [
+        (name, f"{roads.length_of(name):.2f} m", f"{roads.definition(name).speed_limit_mps:g} m/s",
+         ", ".join(roads.successors(name)) or "nothing")
+        for name in roads.lanes
+    ]  # fmt: skip
+    junctions: list[Row] = [
+        (junction.name, ", ".join(group.name for group in junction.groups))
+        for junction in city_map.junctions
+    ]
+    crossings: list[Row] = [
+        (crossing.name, ", ".join(approach.name for approach in crossing.approaches))
+        for crossing in city_map.crossings
+    ]
+    spawns: list[Row] = [
+        (spawn.name, f"lane {spawn.lane} at {spawn.at_m or 0.0:.2f} m" if spawn.lane else "",
+         "x {:.2f} m, y {:.2f} m, yaw {:.2f} rad".format(*roads.spawn_pose(spawn.name)))
+        for spawn in city_map.spawns
+    ]  # fmt: skip
+    kinds = {
+        "lanes: length, speed limit, leads to": lanes,
+        "junctions: signal groups": junctions,
+        "crossings without signals: approaches": crossings,
+        "spawn places": spawns,
+    }
+    return ((heading, rows) for heading, rows in kinds.items() if rows)
+
+
+def _columns(rows: Sequence[Row]) -> str:
+    """Return rows as text, their columns one below the other."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join("  ".join(map(str.ljust, row, [*widths[:-1], 0])).rstrip() for row in rows)
 
 
 def _car(arguments: argparse.Namespace) -> str:
@@ -107,11 +153,7 @@ def _messages(arguments: argparse.Namespace) -> str:
         rate = f"{kind.RATE_HZ:g} Hz" if kind.RATE_HZ else ""
         about = (kind.__doc__ or "").partition("\n")[0]
         rows.append((kind.__name__ + reply, kind.KEY, kind.DELIVERY.value, rate, about))
-    widths = [max(len(row[i]) for row in rows) for i in range(4)]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, [*widths, 0], strict=True)).rstrip()
-        for row in rows
-    )
+    return _columns(rows)
 
 
 COMMAND = Command(

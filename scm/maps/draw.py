@@ -15,6 +15,7 @@ from scm.geometry import Pose2
 from scm.maps import furniture
 from scm.maps.floor_draw import floor_layers, wind_arrow
 from scm.maps.model import Approach, CityMap, Crosswalk, Wall
+from scm.maps.names_draw import SPAWN_NAME_AT_M, SPAWN_NAME_M, name_layers
 from scm.maps.route import LanePath, Roads
 from scm.maps.segments import box_outline, wall_outlines
 from scm.maps.signs import precedence_at
@@ -26,6 +27,7 @@ EDGE_M = 0.011
 STRIPE_M = 0.022
 ARROW_EVERY_M = 0.42
 BLOCK_M = 0.2
+GREY = "#7f8792"
 
 ASPHALT, PAINT, INK = "#474b53", "#f4f3ee", "#23272e"
 WALL, WALL_EDGE, BOX, BOX_EDGE = "#cfc6b4", "#9c9280", "#d9904a", "#8d5a28"
@@ -33,12 +35,15 @@ WALL, WALL_EDGE, BOX, BOX_EDGE = "#cfc6b4", "#9c9280", "#d9904a", "#8d5a28"
 CAR_OUTLINE = ((-0.07, -0.0875), (0.23, -0.0875), (0.23, 0.0875), (-0.07, 0.0875))
 
 
-def draw_svg(city_map: CityMap, *, spawns: bool = False, movable: bool = True) -> str:
+def draw_svg(
+    city_map: CityMap, *, names: bool = False, spawns: bool = False, movable: bool = True
+) -> str:
     """Return the map as one self-contained SVG whose units are map metres, y negated.
 
     Args:
         city_map: The map.
-        spawns: Also draw the places where cars may be put.
+        names: Also write the names of lanes, junctions and crossings.
+        spawns: Also draw the places where cars may be put, with their names.
         movable: Also draw boxes that can be pushed, where the map has them.
     """
     x_low, y_low, x_high, y_high = bounds(city_map)
@@ -55,6 +60,7 @@ def draw_svg(city_map: CityMap, *, spawns: bool = False, movable: bool = True) -
         layer("spawns", _spawns(city_map, roads) if spawns else ()),
         layer("signs", map(furniture.sign, city_map.signs)),
         layer("lights", map(furniture.light, city_map.lights)),
+        name_layers(city_map, roads) if names else "",
         _scale(city_map, x_low, x_high, y_low),
         wind_arrow(city_map, x_high - 1.2, y_low - MARGIN_M / 2.0 - STRIP_M / 2.0),
     ]
@@ -360,8 +366,8 @@ def _spawns(city_map: CityMap, roads: Roads) -> list[str]:
             stroke_dasharray="0.025 0.015",
             transform=placed(pose),
         )
-        x, y = pose.apply(0.08, 0.0)
-        name = label(spawn.name, x, y, 0.07, fill="#d8eeff", font_weight="600")
+        x, y = pose.apply(SPAWN_NAME_AT_M, 0.0)
+        name = label(spawn.name, x, y, SPAWN_NAME_M, fill="#d8eeff", font_weight="600")
         drawn.append(element("g", body, name, id=f"spawn-{spawn.name}", class_="spawn"))
     return drawn
 
@@ -371,7 +377,7 @@ def _scale(city_map: CityMap, x_low: float, x_high: float, y_low: float) -> str:
     long_m = 0.5 if x_high - x_low < 6.0 else 1.0
     y = y_low - MARGIN_M / 2.0 - STRIP_M / 2.0
     left, middle = x_high - long_m, x_high - long_m / 2.0
-    half = element("rect", x=left, y=-y, width=long_m / 2.0, height=0.022, fill="#7f8792")
+    half = element("rect", x=left, y=-y, width=long_m / 2.0, height=0.022, fill=GREY)
     bar = element(
         "rect",
         x=left,
@@ -379,15 +385,14 @@ def _scale(city_map: CityMap, x_low: float, x_high: float, y_low: float) -> str:
         width=long_m,
         height=0.022,
         fill="none",
-        stroke="#7f8792",
+        stroke=GREY,
         stroke_width=0.006,
     )
-    grey = {"fill": "#7f8792"}
     return element(
         "g",
         half,
         bar,
-        label(f"{long_m:g} m", middle, y + 0.045, 0.055, **grey),
-        label(city_map.title, x_low, y, 0.075, text_anchor="start", font_weight="600", **grey),
+        label(f"{long_m:g} m", middle, y + 0.045, 0.055, fill=GREY),
+        label(city_map.title, x_low, y, 0.075, text_anchor="start", font_weight="600", fill=GREY),
         class_="scale",
     )

@@ -34,7 +34,7 @@ class FrictionMap(Record, kw_only=True, frozen=True):
     """A grey picture of how the floor holds: between black and white it is interpolated.
 
     Attributes:
-        image: PNG or PGM file beside the map file.
+        image: Grey picture (PNG, PGM ...) beside the map file.
         x_m: What the whole picture covers; likewise `y_m`. Around it the floor's own values hold.
         grip: Factor on the tyres' friction where it is black, and where it is white.
         rolling: Likewise, coefficient of rolling resistance on top of the tyres' own.
@@ -52,7 +52,7 @@ class HeightMap(Record, kw_only=True, frozen=True):
     """A picture of hills and hollows; around it the floor is level, so its rim must be at 0.
 
     Attributes:
-        image: PNG, PGM (8 or 16 bit) or NPY file beside the map file.
+        image: Grey picture of 8 or 16 bits (PNG, PGM ...) or NPY file beside the map file.
         m_per_grey: Height of one grey value, or of a value of 1 in an NPY file.
         zero_grey: The value at height 0.
     """

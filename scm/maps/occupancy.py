@@ -6,7 +6,7 @@ The walls are the faces between free and occupied cells, few and straight.
 import math
 from array import array
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,22 +83,26 @@ def room_of(grid: OccupancyGrid) -> Room:
     """
     import cv2  # noqa: PLC0415  see scm.maps.grey
 
-    _, labels, facts, _ = cv2.connectedComponentsWithStats(
+    _, found, found_facts, _ = cv2.connectedComponentsWithStats(
         grid.free.view(np.uint8), connectivity=4, ltype=cv2.CV_32S
     )
+    labels, facts = np.asarray(found, np.int32), np.asarray(found_facts, np.int32)
     areas = facts[:, cv2.CC_STAT_AREA].copy()
     areas[0] = 0  # of what is not free
     label, why = _chosen(grid, labels, areas)
     low = facts[label, [cv2.CC_STAT_TOP, cv2.CC_STAT_LEFT]]
     high = low + facts[label, [cv2.CC_STAT_HEIGHT, cv2.CC_STAT_WIDTH]]
     rows, columns = zip(low.tolist(), high.tolist(), strict=True)
-    cell_m2 = grid.cell_m**2
-    chosen = f"the room is {why}, {areas[label] * cell_m2:.3g} m²"
+    chosen = f"the room is {why}, {_area(grid, areas[label])}"
     if others := len(areas) - 2:
-        rest = (int(areas.sum()) - int(areas[label])) * cell_m2
-        area = "1 other free area" if others == 1 else f"{others} other free areas"
-        chosen += f"; left out: {area}, {rest:.3g} m²"
+        rest = _area(grid, areas.sum() - areas[label])
+        chosen += f"; left out: {others} other free area{'s' * (others > 1)}, {rest}"
     return Room(labels == label, rows, columns, chosen)
+
+
+def _area(grid: OccupancyGrid, cells: np.integer[Any]) -> str:
+    area_m2 = int(cells) * grid.cell_m**2
+    return f"{area_m2:.0f} m²" if area_m2 >= 100.0 else f"{area_m2:.3g} m²"
 
 
 def _chosen(
@@ -197,7 +201,7 @@ def _faces(room: Bools, occupied: Bools) -> _Faces:
     """Return the faces of a room."""
     inside, wall = np.pad(room, 1), np.pad(occupied, 1)
     width = room.shape[1] + 1
-    starts, ends, ways = [], [], []
+    starts, ends, ways = list[Ints](), list[Ints](), list[Ints]()
     for way, side in enumerate(((-1, 0), (0, 1), (1, 0), (0, -1))):
         beside = inside[1:-1, 1:-1] & wall[1 + side[0] :, 1 + side[1] :][: len(room), : width - 1]
         lines, lows, highs = _runs(beside.T if way in {1, 3} else beside)
@@ -229,7 +233,7 @@ def _chains(faces: _Faces) -> tuple[Ints, Ints]:
     is_first = np.ones(len(following), np.bool_)
     is_first[following[following >= 0]] = False
     is_left = bytearray(b"\1") * len(following)
-    start, end, after = (memoryview(numbers) for numbers in (faces.start, faces.end, following))
+    start, end, after = (numbers.data for numbers in (faces.start, faces.end, following))
     numbers, begins = array("q"), array("q")
     for first in (*np.flatnonzero(is_first).tolist(), *range(len(following))):
         if not is_left[first]:
@@ -291,4 +295,5 @@ def _distances(corners: Ints, index: Ints, low: Ints, high: Ints) -> Floats:
     across, along = (corners[index] - corners[low]).T, (corners[high] - corners[low]).T
     length = np.hypot(*along)
     area = np.abs(along[0] * across[1] - along[1] * across[0])
-    return np.where(length > 0.0, area / np.maximum(length, 1.0), np.hypot(*across))
+    from_line: Floats = area / np.maximum(length, 1.0)
+    return np.asarray(np.where(length > 0.0, from_line, np.hypot(*across)), np.float64)

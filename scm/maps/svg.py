@@ -47,10 +47,13 @@ def placed(pose: Pose2) -> str:
     return f"translate({number(pose.x)} {number(-pose.y)}) rotate({turn})"
 
 
-def label(text: str, x: float, y: float, height: float, **attributes: str | float) -> str:
+def label(
+    text: str, x: float, y: float, height: float, *, yaw_rad: float = 0.0, **attributes: str | float
+) -> str:
     """Return text about its middle; drawn large and shrunk, for browsers refuse tiny fonts."""
     anchor = {"text_anchor": "middle", **attributes}
-    where = f"translate({number(x)} {number(-y)}) scale(0.001)"
+    turn = f" rotate({number(-math.degrees(yaw_rad))})" if yaw_rad else ""
+    where = f"translate({number(x)} {number(-y)}){turn} scale(0.001)"
     return element(
         "text",
         escape(text),

@@ -48,6 +48,20 @@ def test_each_way_to_fail_has_its_code_and_sentence(
     assert "Traceback" not in err
 
 
+def test_a_map_is_shown_with_what_scripts_and_pages_call_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "town.svg"
+    assert main(["show", "map", "driving_school", "--out", str(out)]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert shown[0].startswith("Driving School: 4 lanes, 1 junction")
+    assert "  east_loop            2.07 m  0.25 m/s  crossing_south_west" in shown
+    assert "  crossing  south_east, south_west" in shown
+    assert "  c  lane east_loop at 1.52 m  x 2.54 m, y 0.94 m, yaw 2.17 rad" in shown
+    assert shown[-1] == f"drawn in {out}"
+    assert all(f">{name}</text>" in out.read_text("utf-8") for name in ("east_loop", "crossing"))
+
+
 @pytest.mark.parametrize("failing", [KeyError("x")], indirect=True)
 def test_the_traceback_is_shown_to_who_debugs(
     failing: None, caplog: pytest.LogCaptureFixture

@@ -167,6 +167,27 @@ def test_layers_are_chosen_and_kept_for_the_next_visit(visit):
     assert visited.complaints == []
 
 
+def test_names_of_lanes_junctions_and_places_are_a_layer(visit, look_around):
+    visited = visit("/map")
+    page = visited.page
+    names = f"async () => (await import('{SCENE}')).drawn.road_names"
+    visited.wait(f"async () => (await import('{SCENE}')).drawn.frames > 0")
+    assert page.evaluate(names) == 0  # off until one chooses it
+    page.click('button:text("Layers")')
+    page.check("input[name=roads]")
+    page.keyboard.press("Escape")
+    page.reload()  # kept for this browser
+    # A junction, its four lanes and ten spawn places; where two would cover each other, one waits.
+    visited.until(lambda: 11 <= page.evaluate(names) <= 15, "names are drawn")
+    look_around(visited, ".map", "map_names")
+    visited.until(lambda: 4 <= page.evaluate(names) < 15, "a small map shows what has room")
+    page.focus(".sheet")
+    for _ in range(6):
+        page.keyboard.press("+")
+    visited.until(lambda: page.evaluate(names) < 4, "only names that are in sight are drawn")
+    assert visited.complaints == []
+
+
 def test_the_table_is_searched_filtered_sorted_and_walked_by_keyboard(visit):
     visited = visit("/map")
     page = visited.page

@@ -1,6 +1,8 @@
+import re
 import xml.etree.ElementTree as ET
 
 import msgspec
+import numpy as np
 import pytest
 
 from scm.maps.draw import bounds, draw_svg
@@ -54,6 +56,38 @@ def test_a_head_tells_its_junction_and_group_and_stands_in_its_place(picture):
 def test_spawns_are_drawn_on_request_only(city_map):
     assert 'id="spawn-a"' not in draw_svg(city_map)
     assert 'id="spawn-a"' in draw_svg(city_map, spawns=True)
+
+
+def texts(picture, layer):
+    """Return the texts of a layer, and the turn of each [deg], + = against the clock."""
+    (group,) = (node for node in picture.iter(f"{SVG}g") if node.get("class") == layer)
+    turns = [re.search(r"rotate\((\S+)\)", node.get("transform")) for node in group]
+    return {
+        node.text: -float(turn[1]) if turn else 0.0 for node, turn in zip(group, turns, strict=True)
+    }
+
+
+def test_names_of_lanes_and_junctions_are_written_on_request_along_their_lanes(city_map):
+    named = ET.fromstring(draw_svg(city_map, names=True))
+    lanes = texts(named, "lane-names")
+    assert list(lanes) == [lane.name for lane in city_map.lanes]
+    # One straight runs south east and the other south west: both are read from the left.
+    assert lanes["crossing_south_east"] == pytest.approx(-45.0, abs=10.0)
+    assert lanes["crossing_south_west"] == pytest.approx(45.0, abs=10.0)
+    assert texts(named, "junction-names") == {"crossing": 0.0}
+    assert "lane-names" not in draw_svg(city_map)
+
+
+def test_names_keep_clear_of_each_other_and_of_spawn_places():
+    named = ET.fromstring(draw_svg(load_map("market_town"), names=True, spawns=True))
+    centres = []
+    for node in named.iter(f"{SVG}text"):
+        if node.get("paint-order") or node.get("fill") == "#d8eeff":
+            found = re.match(r"translate\((\S+) (\S+)\)", node.get("transform"))
+            centres.append([float(found[1]), float(found[2])])
+    away = np.hypot(*(np.array(centres)[:, None] - np.array(centres)).transpose(2, 0, 1))
+    assert len(centres) == 18 + 2 + 12
+    assert away[np.triu_indices(len(away), 1)].min() > 0.07
 
 
 def test_a_strict_content_policy_may_show_it(picture):

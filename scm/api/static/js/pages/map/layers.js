@@ -6,6 +6,7 @@ const KEPT = "scm-map-layers";
 /** Name to title, in the order of the menu; the last two are of the chosen car. */
 export const LAYERS = {
   names: "Names of cars",
+  roads: "Names of lanes, junctions, places",
   times: "Time to change of signals",
   trails: "Trails",
   heat: "Heat map of speed",
@@ -13,7 +14,7 @@ export const LAYERS = {
   lidar: "LIDAR of the chosen car",
 };
 
-const FIRST = { names: true, times: true, trails: false, heat: false, path: true, lidar: false };
+const FIRST = { names: true, roads: false, times: true, trails: false, heat: false, path: true, lidar: false };
 
 /** Name to whether it is shown. */
 export const layers = signal({ ...FIRST, ...read() });

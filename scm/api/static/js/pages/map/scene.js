@@ -1,4 +1,4 @@
-/** One frame of the map: roads, heat, path, scan, trails, boxes, cars, names, signals, from below to above. */
+/** One frame of the map, from below to above: roads, heat, path, scan, trails, boxes, cars, names, signals. */
 import { drawBoxes } from "scm/shared/box_shape.js";
 import { drawCar, drawHalo, drawLabel, footprint } from "scm/shared/car_shape.js";
 import { drawLight } from "scm/shared/light_shape.js";
@@ -11,6 +11,7 @@ import { carAt, fleet } from "scm/pages/map/fleet.js";
 import { Ground } from "scm/pages/map/ground.js";
 import { Heat } from "scm/pages/map/heat.js";
 import { followed, layers } from "scm/pages/map/layers.js";
+import { RoadNames } from "scm/pages/map/road_names.js";
 import { timeToChange } from "scm/pages/map/signal_times.js";
 import { drawSprites } from "scm/pages/map/sprites.js";
 import { Trails } from "scm/pages/map/trails.js";
@@ -24,8 +25,8 @@ const PICK_PX = 22;
 const RING_PX = 14;
 const SCAN_SHOWN_MS = 1000;
 
-/** How many frames were drawn, and how long the last took: for measurements. */
-export const drawn = { frames: 0, cars: 0, took_ms: 0 };
+/** How many frames were drawn, what the last one held and how long it took: for measurements. */
+export const drawn = { frames: 0, cars: 0, road_names: 0, took_ms: 0 };
 
 export class Scene {
   constructor(canvas, ground, view) {
@@ -36,6 +37,7 @@ export class Scene {
     this.glide = new Glide();
     this.trails = new Trails();
     this.heat = new Heat(ground.box);
+    this.roadNames = new RoadNames();
     this.due = -Infinity;
     this.size = [canvas.clientWidth, canvas.clientHeight];
     this.backdrop = null; // its colour, and of which theme
@@ -82,6 +84,7 @@ export class Scene {
     }
     drawBoxes(paper, view, boxes.peek(), city.peek()?.boxes ?? []);
     this.#drawCars(on);
+    drawn.road_names = on.roads ? this.roadNames.draw(paper, view, now) : 0;
     // Signals last: no car's name may hide a colour.
     this.#drawSignals(on, now);
   }
