@@ -3,9 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scm.arrays import Bools, Floats
 from scm.data_quality.track import FEWEST, Grid
+
+Spectrum = NDArray[np.complex128]
 
 STEP_S = 0.02
 WIDTH_S = 0.12
@@ -116,17 +119,18 @@ def _correlations(first: Floats, second: Floats, reach: int) -> Floats:
     """Return the correlation for delays of -reach..reach steps, each over what overlaps."""
     n = len(first)
     size = 1 << (2 * n).bit_length()
-    a, b, one = first - first.mean(), second - second.mean(), np.ones(n)
+    a, b = first - first.mean(), second - second.mean()
+    one_, a_, b_, a2_, b2_ = (np.fft.rfft(x, size) for x in (np.ones(n), a, b, a * a, b * b))
 
-    def against(x: Floats, y: Floats) -> Floats:
-        product = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+    def against(x: Spectrum, y: Spectrum) -> Floats:
+        product = np.fft.irfft(x * np.conj(y), size)
         return np.concatenate((product[size - reach :], product[: reach + 1]))
 
-    count = against(one, one)
-    mean_a, mean_b = against(a, one) / count, against(one, b) / count
-    spread_a = against(a * a, one) / count - mean_a**2
-    spread_b = against(one, b * b) / count - mean_b**2
-    joint = against(a, b) / count - mean_a * mean_b
+    count = against(one_, one_)
+    mean_a, mean_b = against(a_, one_) / count, against(one_, b_) / count
+    spread_a = against(a2_, one_) / count - mean_a**2
+    spread_b = against(one_, b2_) / count - mean_b**2
+    joint = against(a_, b_) / count - mean_a * mean_b
     least = 1e-6 * float(np.sqrt((a * a).mean() * (b * b).mean())) + 1e-30
     return joint / np.maximum(np.sqrt(np.maximum(spread_a * spread_b, 0.0)), least)
 

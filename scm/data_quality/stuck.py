@@ -101,10 +101,10 @@ def frozen_spans(channel: Series, witness: Series | None) -> tuple[Span, ...]:
     fast = np.percentile(np.abs(witness.values), 98) * MOVING
     starts, ends = runs(channel.values, channel.t)
     usual = OUTLASTS * float(np.percentile(ends - starts, 95))
+    long = ends - starts >= max(FEWEST_FROZEN, usual)
+    long &= channel.t[ends - 1] - channel.t[starts] >= FROZEN_S
     spans = []
-    for i, j in zip(starts, ends, strict=True):
-        if j - i < max(FEWEST_FROZEN, usual) or channel.t[j - 1] - channel.t[i] < FROZEN_S:
-            continue
+    for i, j in zip(starts[long], ends[long], strict=True):
         inside = (witness.t >= channel.t[i]) & (witness.t <= channel.t[j - 1])
         moving = np.abs(witness.values[inside]) > fast
         if fast > 0.0 and moving.size and moving.mean() > 0.5:

@@ -8,15 +8,12 @@ of the classical ones and those of sums over blocks, which forgive what is left 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scm.arrays import Floats
-
-Spectrum = NDArray[np.complex128]
+from scm.vehicles.jit import array_kernel
 
 THETAS = (0.0, 0.2, 0.4, 0.6, 0.75, 0.85, 0.9, 0.94, 0.965, 0.98, 0.99, 0.995)
 BLOCKS = 40
@@ -88,20 +85,20 @@ def whiten(values: Floats, theta: float, parts: Sequence[slice]) -> Floats:
     result = np.zeros_like(values)
     for part in parts:
         n = part.stop - part.start
-        steps = np.diff(values[part], axis=0, prepend=0.0)
-        spectrum = np.fft.rfft(steps, 1 << (2 * n - 1).bit_length(), axis=0)
-        response = _response(theta, n).reshape(-1, *(1,) * (values.ndim - 1))
-        e = np.fft.irfft(spectrum * response, axis=0)[:n]
+        e = np.ascontiguousarray(np.diff(values[part], axis=0, prepend=0.0).reshape(n, -1))
+        _filter(e, theta)
         start = theta ** np.arange(n)
-        level = np.tensordot(start, e, axes=1) / (start @ start)
-        result[part] = e - start.reshape(-1, *(1,) * (values.ndim - 1)) * level
+        level = start @ e / (start @ start)
+        result[part] = (e - np.outer(start, level)).reshape(n, *values.shape[1:])
     return result
 
 
-@lru_cache(maxsize=64)
-def _response(theta: float, n: int) -> Spectrum:
-    size = 1 << (2 * n - 1).bit_length()
-    return np.asarray(np.fft.rfft(theta ** np.arange(n), size))
+@array_kernel
+def _filter(e: Floats, theta: float) -> None:
+    """Add to each row so much of the one before, which has become its own, (n, columns)."""
+    for i in range(1, e.shape[0]):
+        for j in range(e.shape[1]):
+            e[i, j] += theta * e[i - 1, j]
 
 
 def _solve(

@@ -35,7 +35,6 @@ def late(name, _t, values):
 
 FEW = ("steer_trim", "pose_scale")  # what there is to choose from: all takes half a minute
 CASES = {
-    "no time at all": (TRIM, None, {"budget_s": 0.0}),
     "5 s": (TRIM, None, {"budget_s": 5.0}),
     "a fault of the camera": ((), late, {"finds": "pose_scale"}),
     "interrupted at once": (TRIM, None, {"batches": 3}),
@@ -58,11 +57,19 @@ def test_every_figure_of_a_report_is_that_of_its_car_file(case, tmp_path, monkey
                          clock=WallClock())  # fmt: skip
     if "finds" in how:
         assert [effect.name for effect in found.diagnosis.effects] == [how["finds"]]
-    write(found, tmp_path)
-    figures = check_report(tmp_path, [recording])
-    assert {figure.part for figure in figures} == {"fit", "choose", "confirm"}
-    assert [figure for figure in figures if not figure.agrees] == []
-    assert_numbers_are_the_file_s(tmp_path)
+    assert_figures_are_the_car_file_s(found, recording, tmp_path)
+
+
+@pytest.fixture(scope="module")
+def untimed():
+    """A drive, and what is found in it in no time."""
+    recording = made_drive(TRIM, seconds=20.0)
+    return recording, diagnose_car([recording], nigel(), budget_s=0.0, clock=WallClock())
+
+
+def test_every_figure_of_a_report_made_in_no_time_is_that_of_its_car_file(untimed, tmp_path):
+    recording, found = untimed
+    assert_figures_are_the_car_file_s(found, recording, tmp_path)
 
 
 def test_every_figure_of_a_recording_with_a_pause_of_a_day_is_that_of_its_car_file(tmp_path):
@@ -90,8 +97,12 @@ def test_every_figure_of_pieces_that_a_budget_allows_is_that_of_its_car_file(tmp
     assert [figure for figure in figures if not figure.agrees] == []
 
 
-def assert_numbers_are_the_file_s(folder):
-    """Check every number that the report shows against the file beside it."""
+def assert_figures_are_the_car_file_s(found, recording, folder):
+    """Check every figure and every number that the report shows against the file beside it."""
+    write(found, folder)
+    figures = check_report(folder, [recording])
+    assert {figure.part for figure in figures} == {"fit", "choose", "confirm"}
+    assert [figure for figure in figures if not figure.agrees] == []
     drawn = json.loads((folder / "drawn.json").read_text(encoding="utf-8"))
     car = load_car(folder / "car.toml")
     shown = [one for one in drawn["numbers"] if car.has(one["key"])]
@@ -100,9 +111,9 @@ def assert_numbers_are_the_file_s(folder):
         assert car.value(one["key"]) == pytest.approx(one["found"]["value"], rel=1e-3, abs=1e-9)
 
 
-def test_a_figure_of_another_car_is_found_out(tmp_path):
-    recording = made_drive(TRIM, seconds=20.0)
-    write(diagnose_car([recording], nigel(), budget_s=0.0, clock=WallClock()), tmp_path)
+def test_a_figure_of_another_car_is_found_out(untimed, tmp_path):
+    recording, found = untimed
+    write(found, tmp_path)
     text = (tmp_path / "given.toml").read_text(encoding="utf-8")
     (tmp_path / "car.toml").write_text(text, encoding="utf-8")
     figures = check_report(tmp_path, [recording])

@@ -16,7 +16,7 @@ from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
 
 def test_what_was_taken_is_shown_with_the_gain_for_which_it_was_taken():
-    made = made_drive(seconds=12.0)
+    made = made_drive(seconds=8.0)
     sent = made.channels["command.steering"]
     early = {**made.channels, "command.steering": replace(sent, t=sent.t - 0.06)}
     model = Likelihood([Drive(replace(made, channels=early), big_nigel())], big_nigel())

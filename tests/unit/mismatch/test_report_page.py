@@ -26,6 +26,19 @@ def written(folder, case):
     return (folder / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.fixture(scope="module")
+def page_of(tmp_path_factory):
+    """The page of a case, written when it is first asked for."""
+    pages = {}
+
+    def page(name):
+        if name not in pages:
+            pages[name] = written(tmp_path_factory.mktemp(name), made_up.CASES[name]())
+        return pages[name]
+
+    return page
+
+
 class Balanced(HTMLParser):
     """Complains where an element is not closed, or another one is."""
 
@@ -48,21 +61,21 @@ class Balanced(HTMLParser):
 
 
 @pytest.mark.parametrize("name", made_up.CASES)
-def test_the_page_asks_nobody_for_anything(tmp_path, name):
-    page = written(tmp_path, made_up.CASES[name]())
+def test_the_page_asks_nobody_for_anything(page_of, name):
+    page = page_of(name)
     assert not ADDRESS.findall(page.replace(NAMESPACE, ""))
 
 
 @pytest.mark.parametrize("name", made_up.CASES)
-def test_every_element_of_the_page_is_closed(tmp_path, name):
+def test_every_element_of_the_page_is_closed(page_of, name):
     parser = Balanced()
-    parser.feed(written(tmp_path, made_up.CASES[name]()))
+    parser.feed(page_of(name))
     assert parser.open == []
 
 
 @pytest.mark.parametrize("name", made_up.CASES)
-def test_no_number_of_the_page_is_nan(tmp_path, name):
-    page = written(tmp_path, made_up.CASES[name]())
+def test_no_number_of_the_page_is_nan(page_of, name):
+    page = page_of(name)
     assert not re.search(r"\b(nan|inf)\b", page, re.IGNORECASE)
 
 
@@ -166,8 +179,8 @@ VERDICTS = {
 
 
 @pytest.mark.parametrize(("name", "sentence"), VERDICTS.items())
-def test_the_page_opens_with_the_verdict_in_plain_words(tmp_path, name, sentence):
-    page = written(tmp_path, made_up.CASES[name]())
+def test_the_page_opens_with_the_verdict_in_plain_words(page_of, name, sentence):
+    page = page_of(name)
     assert sentence in re.search(r"<h1>(.*?)</h1>", page)[1]
 
 
@@ -176,15 +189,15 @@ def test_the_command_line_says_the_same_verdict(tmp_path, name, sentence):
     assert sentence in summary(made_up.CASES[name]()[0], tmp_path)
 
 
-def test_page_and_command_line_say_what_there_was_no_time_for(tmp_path):
+def test_page_and_command_line_say_what_there_was_no_time_for(page_of, tmp_path):
     case = made_up.cut_short()
-    page, lines = written(tmp_path, case), summary(case[0], tmp_path).splitlines()
+    page, lines = page_of("cut_short"), summary(case[0], tmp_path).splitlines()
     for question in case[0].unasked:
         assert question.said.partition(":")[0] in page
         assert f"  left unasked: {question.said}" in lines
     assert "What was checked" not in page
     assert "Time ran out" in page
-    assert "Time ran out" not in written(tmp_path, made_up.none())
+    assert "Time ran out" not in page_of("none")
 
 
 @pytest.mark.parametrize(("share", "said"), [(0.31, True), (1.7, False), (None, False)])
@@ -213,26 +226,26 @@ def test_a_fault_of_measuring_is_not_blamed_on_the_simulator(tmp_path):
     assert "<h1>Not the car, its measuring is off: gyro bias.</h1>" in page
 
 
-def test_problems_that_stop_the_verdict_stand_on_the_first_screen(tmp_path):
-    first, _, _ = written(tmp_path, made_up.bad_data()).partition("<nav>")
+def test_problems_that_stop_the_verdict_stand_on_the_first_screen(page_of):
+    first, _, _ = page_of("bad_data").partition("<nav>")
     assert "The recording holds no throttle command." in first
     assert "Keep the tag in the camera" in first
 
 
-def test_what_to_do_stands_on_the_first_screen(tmp_path):
-    first, _, _ = written(tmp_path, made_up.one_effect()).partition("<nav>")
+def test_what_to_do_stands_on_the_first_screen(page_of):
+    first, _, _ = page_of("one_effect").partition("<nav>")
     assert "Look for a soft start" in first
 
 
-def test_the_first_screen_says_how_much_better_it_got(tmp_path):
-    first, _, _ = written(tmp_path, made_up.one_effect()).partition("<nav>")
+def test_the_first_screen_says_how_much_better_it_got(page_of):
+    first, _, _ = page_of("one_effect").partition("<nav>")
     assert "after 3&nbsp;s of driving by the recorded commands alone" in first
     assert "the simulator is 36.1&nbsp;cm off" in first
     assert "with what was found and its own numbers refitted, 4.2&nbsp;cm." in first
 
 
-def test_an_undecided_page_says_what_to_drive(tmp_path):
-    first, _, _ = written(tmp_path, made_up.undecided()).partition("<nav>")
+def test_an_undecided_page_says_what_to_drive(page_of):
+    first, _, _ = page_of("undecided").partition("<nav>")
     assert "Put a known mass of 0.5&nbsp;kg on the car" in first
 
 

@@ -29,7 +29,7 @@ from tests.unit.mismatch.made_fit import candidate
 
 @pytest.fixture(scope="module")
 def model():
-    return Likelihood([driven(seconds=12.0)], big_nigel())
+    return Likelihood([driven(seconds=8.0)], big_nigel())
 
 
 def a_search(model, *names):

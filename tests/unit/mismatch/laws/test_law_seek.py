@@ -27,29 +27,22 @@ def test_no_law_is_worth_its_price_on_a_healthy_drive():
 
 @pytest.mark.parametrize(("by_far", "ends"), [(100.0, True), (1e4, False)])
 def test_only_a_law_that_is_better_by_far_ends_a_search(by_far, ends, monkeypatch):
-    seeks = []
+    search, laws = made_law.asked()
+    monkeypatch.setattr(decide, "seek", None)  # what was sought already is not sought again
     monkeypatch.setattr(decide, "BY_FAR", by_far)
-    monkeypatch.setattr(
-        decide, "seek", lambda *given: (seeks.append(1), made_law.seek_once(*given))[1]
-    )
-    search, unseen = made_law.searched(made_law.gusty_drive())
-    laws, listed = Lawful(search, unseen), search.retuned
-    noise = search.model.noise
+    listed, noise = search.retuned, search.model.noise
     assert laws.explains_all(listed) is ends
     assert search.model.noise == noise
     found, sought = laws.decide(listed)
     assert found.names == (made_law.GUST_NAME,)
     assert sought is not None
-    assert len(seeks) == 1
 
 
 def test_a_law_that_leaves_something_to_a_listed_effect_does_not_end_a_search(monkeypatch):
+    search, laws = made_law.asked()
     monkeypatch.setattr(decide, "BY_FAR", 100.0)
-    monkeypatch.setattr(decide, "seek", made_law.seek_once)
-    search, unseen = made_law.searched(made_law.gusty_drive())
-    listed = search.retuned
     monkeypatch.setattr(decide, "_price", lambda _, fitted: -float(len(fitted.effects)))
-    assert not Lawful(search, unseen).explains_all(listed)
+    assert not laws.explains_all(search.retuned)
 
 
 def test_laws_that_were_sought_in_vain_are_not_sought_again(monkeypatch):

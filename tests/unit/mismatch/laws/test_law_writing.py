@@ -80,7 +80,7 @@ def test_a_file_says_its_equation_and_what_was_found(tmp_path):
     as_term(made_law.gust(), made_law.GUST, tmp_path)
     text = (tmp_path / "floor_force_against_time.py").read_text()
     assert "force_x += force_n * g * cos(yaw - toward_rad)" in text
-    assert "0.8 N towards 0.9 rad * sin(2 pi t / 4 s + 0.5 rad)" in text
+    assert "1 N towards 0.9 rad * sin(2 pi t / 4 s + 0.5 rad)" in text
 
 
 def test_a_file_of_another_name_is_refused(tmp_path):
