@@ -290,4 +290,4 @@ def _shade(sheet: FloorSheet, city_map: CityMap, daylight: Daylight) -> None:
     soft = cv2.GaussianBlur(mask, (reach, reach), 0.0)
     keep = 1.0 - (1.0 - SHADE) * (1.0 - daylight.ambient) * 1.2 * (soft / 255.0)
     fine = cv2.resize(keep.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
-    sheet.picture[:] = (sheet.picture * fine[..., None]).astype(np.uint8)
+    sheet.lighten(np.asarray(fine, dtype=np.float32))

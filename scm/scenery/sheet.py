@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from scm.arrays import Floats, Image
 from scm.geometry import Pose2
@@ -22,6 +23,7 @@ PAINT: Colour = (222, 226, 228)
 CARD: Colour = (104, 148, 178)
 BRICK: Colour = (150, 176, 192)
 EDGE_LINE_M = 0.009
+BAND = 16  # rows: so many floats stay near the processor
 INK, PAPER = 26, 236
 """Grey of a print's black and white."""
 
@@ -50,7 +52,8 @@ class FloorSheet:
         self.left, self.upper, self.texels_per_m = left, upper, texels_per_m
         width, height = (math.ceil(float(side) * texels_per_m) + 2 for side in extent)
         self.picture: Image = np.empty((height, width, 3), dtype=np.uint8)
-        self.picture[:] = TABLE
+        self.picture[0] = TABLE
+        self.picture[1:] = self.picture[0]  # to copy rows is much quicker than single texels
         self._rng = rng
 
     def polygon(self, points: Floats, colour: Colour) -> None:
@@ -63,13 +66,22 @@ class FloorSheet:
         """Roughen everything painted so far: pairs of blotch size [texels] and strength."""
         height, width = self.picture.shape[:2]
         total = np.zeros((height, width), dtype=np.float32)
+        blown = np.empty_like(total)
         for size, strength in strengths:
             shape = height // size + 2, width // size + 2
             coarse = self._rng.standard_normal(shape, dtype=np.float32)
-            blown = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
-            total += np.float32(strength) * blown
-        rough = self.picture * (1.0 + total)[..., None]
-        self.picture = np.clip(rough, 0.0, 255.0).astype(np.uint8)
+            cv2.resize(coarse, (width, height), blown, interpolation=cv2.INTER_CUBIC)
+            blown *= np.float32(strength)
+            total += blown
+        total += 1.0
+        self.lighten(total)
+
+    def lighten(self, factors: NDArray[np.float32]) -> None:
+        """Multiply every texel by a factor of its own, (height, width)."""
+        for top in range(0, len(self.picture), BAND):
+            rows = slice(top, top + BAND)
+            lit = self.picture[rows] * factors[rows, :, None]
+            self.picture[rows] = np.clip(lit, 0.0, 255.0, out=lit)
 
 
 def paint_floor(

@@ -45,6 +45,8 @@ class Queue(Generic[T]):
 
     def take(self) -> list[tuple[int, Callable[[], T | None]]]:
         """Return and forget everything that waits, unmade, each with its order of arrival."""
+        if not self._items:
+            return []
         with self._lock:
             items = list(self._items)
             self._items.clear()

@@ -99,11 +99,7 @@ class Near:
                 length, half width, and radius of the circle.
             first_box: Rows from here on are boxes: two of them at rest do not count as touching.
         """
-        if (
-            len(order) != len(self._order)
-            or not np.array_equal(order, self._order)
-            or has_strayed(self._from, self._leeway, motion)
-        ):
+        if has_strayed(order, self._order, self._from, self._leeway, motion):
             self._list_anew(order, motion, outlines)
         marks = np.zeros(len(motion), np.bool_)
         mark(marks, self._pairs, self._walls, motion, outlines, self._obstacles.boxes, first_box)
@@ -153,9 +149,13 @@ def _buckets(n: int) -> int:
 
 
 @array_kernel
-def has_strayed(begun: Floats, leeway: Floats, motion: Floats) -> bool:
-    """Return whether any body is further from where it was listed than its leeway."""
-    for i in range(leeway.shape[0]):
+def has_strayed(order: Ints, listed: Ints, begun: Floats, leeway: Floats, motion: Floats) -> bool:
+    """Return whether others were listed, or any body is further from there than its leeway."""
+    if order.shape[0] != listed.shape[0]:
+        return True
+    for i in range(listed.shape[0]):
+        if order[i] != listed[i]:
+            return True
         dx, dy = motion[i, 0] - begun[i, 0], motion[i, 1] - begun[i, 1]
         if not dx * dx + dy * dy <= leeway[i] * leeway[i]:
             return True

@@ -79,7 +79,7 @@ def test_spat_keeps_its_promises_on_the_bus_while_plans_change(city_map):
     dice = random.Random(4)
     with Lockstep([TrafficPart(city_map)]) as city:
         spats, spatems = city.hear(Hears(Spat)), city.hear(Hears(SpatemTx))
-        for _ in range(60):
+        for _ in range(30):
             city.run_for(dice.uniform(1.0, 40.0))
             junction, plan = dice.choice(city_map.junctions).name, dice.choice(plan_names())
             city.call(PlanRequest(junction=junction, plan=plan, by="test"))

@@ -50,12 +50,12 @@ def test_no_promise_is_broken_in_hours_of_random_plan_changes(late_ms):
     dice = random.Random(late_ms)
     controller = Controller("x", CROSSING, "calm")
     promises, plans = Promises(), set()
-    for spat in run(controller, 60_000, jitter=lambda: dice.randrange(late_ms + 1) * 10**6):
+    for spat in run(controller, 24_000, jitter=lambda: dice.randrange(late_ms + 1) * 10**6):
         promises.check(spat)
         plans.add(spat.plan)
         if dice.random() < 0.005:
             controller.ask(dice.choice(["calm", "brisk"]))
-    assert promises.kept > 1000
+    assert promises.kept > 500
     assert plans == {"calm", "brisk"}
     assert controller.late_steps == 0
 

@@ -1,7 +1,9 @@
 """The misbehaviour part in a city on a stepped clock, with cars that lie and cars that do not."""
 
 import itertools
+import logging
 import random
+from dataclasses import dataclass
 
 import pytest
 
@@ -66,28 +68,56 @@ def run_starved(attacks):
     parts = [Starved(one) for one in (world, TrafficPart(MAP), agent, MisbehaviourPart(MAP))]
     with Lockstep(parts, start_ns=START_NS) as city:
         reports = city.hear(Hears(MisbehaviourReport))
-        city.run_for(40.0)
+        city.run_for(25.0)
         suspects = {item.message.suspect for item in reports.drain()}
     return suspects, seconds(hosted.world.pace.lost_ns), parts[-1].detector.memories.values()
 
 
+class Log(logging.Handler):
+    """Keeps the text of every record."""
+
+    def __init__(self):
+        super().__init__()
+        self.texts = []
+
+    def emit(self, record):
+        self.texts.append(record.getMessage())
+
+
+@dataclass(frozen=True, slots=True)
+class Lying:
+    """A city in which n2 says that it stands: what it said of itself, and what was found out."""
+
+    reports: list
+    scores: MisbehaviourScores
+    events: list
+    cams: list
+    lines: list
+    log: list
+
+
 @pytest.fixture(scope="module")
 def lying():
-    return run({"n2": "zero_speed"})
+    log, lines = Log(), []
+    logging.getLogger().addHandler(log)
+    try:
+        found = run({"n2": "zero_speed"}, say=lines.append)
+    finally:
+        logging.getLogger().removeHandler(log)
+    return Lying(*found, lines, log.texts)
 
 
 def test_a_liar_is_reported_and_nobody_else(lying):
-    reports, scores, _, _ = lying
-    assert {report.suspect for report in reports} == {"n2"}
-    rows = {row.station: row for row in scores.stations}
+    assert {report.suspect for report in lying.reports} == {"n2"}
+    rows = {row.station: row for row in lying.scores.stations}
     assert rows["n2"].suspected
     assert not rows["n1"].suspected
     assert rows["n1"].score < 2.0
-    assert not scores.witness
+    assert not lying.scores.witness
 
 
 def test_a_report_names_class_check_and_plausibility(lying):
-    first = lying[0][0]
+    first = lying.reports[0]
     assert first.suspect_id == station_id("n2")
     assert "speed" in {one.kind for one in first.observations}
     assert first.observations[0].plausibility < 0.01
@@ -96,9 +126,8 @@ def test_a_report_names_class_check_and_plausibility(lying):
 
 
 def test_its_evidence_is_the_cams_that_were_sent(lying):
-    reports, _, _, cams = lying
-    sent = {(cam.t_ns, cam.body) for cam in cams if cam.station == "n2"}
-    evidence = reports[0].evidence
+    sent = {(cam.t_ns, cam.body) for cam in lying.cams if cam.station == "n2"}
+    evidence = lying.reports[0].evidence
     assert len(evidence) >= 2
     assert {(one.t_ns, one.body) for one in evidence} <= sent
     assert [one.t_ns for one in evidence] == sorted(one.t_ns for one in evidence)
@@ -106,11 +135,26 @@ def test_its_evidence_is_the_cams_that_were_sent(lying):
 
 
 def test_people_are_told_once_though_reports_go_on(lying):
-    reports, _, events, _ = lying
-    assert len(reports) >= 2
-    assert [one.vehicle for one in events] == ["n2"]
-    gaps = [b.t_ns - a.t_ns for a, b in itertools.pairwise(reports)]
+    assert len(lying.reports) >= 2
+    assert [one.vehicle for one in lying.events] == ["n2"]
+    gaps = [b.t_ns - a.t_ns for a, b in itertools.pairwise(lying.reports)]
     assert min(gaps) >= 10_000_000_000
+
+
+def test_whoever_watches_an_attack_is_told_of_the_first_lie_the_report_and_the_end(lying):
+    first, found, last = lying.lines
+    report = lying.reports[0]
+    assert first == "n2 lies from now on: a speed of zero while driving"
+    assert f"score {report.score:.1f}: {report.observations[0].check}" in found
+    assert 0.0 < float(found.split(" s after")[0].rpartition(" ")[2]) < 20.0
+    count = sum(cam.station == "n2" for cam in lying.cams)
+    assert last.startswith(f"n2 leaves: {count} CAMs, ")
+    assert last.endswith("of them lies, reported")
+
+
+def test_the_log_names_a_suspect_once(lying):
+    (line,) = [one for one in lying.log if one.startswith("station_suspected")]
+    assert "station=n2" in line
 
 
 def test_an_honest_city_is_left_in_peace():
@@ -161,18 +205,6 @@ def test_a_car_that_joins_and_lies_is_a_station_of_its_own():
     assert {one.station for one in cams} >= {"n1", "n9"}
 
 
-def test_whoever_watches_an_attack_is_told_of_the_first_lie_the_report_and_the_end():
-    lines = []
-    reports, _, _, cams = run({"n2": "zero_speed"}, 20.0, say=lines.append)
-    first, found, last = lines
-    assert first == "n2 lies from now on: a speed of zero while driving"
-    assert f"score {reports[0].score:.1f}: {reports[0].observations[0].check}" in found
-    assert 0.0 < float(found.split(" s after")[0].rpartition(" ")[2]) < 20.0
-    count = sum(cam.station == "n2" for cam in cams)
-    assert last.startswith(f"n2 leaves: {count} CAMs, ")
-    assert last.endswith("of them lies, reported")
-
-
 def test_an_attack_that_nobody_finds_ends_without_a_report():
     lines = []
     world = Attacker(WorldPart(MAP, 1, hosted=CARS), {"n2": "zero_speed"}, MAP, say=lines.append)
@@ -186,9 +218,3 @@ def test_a_liar_that_was_never_let_in_said_nothing():
     lines = []
     Attacker(AgentPart("n9"), {"n9": "zero_speed"}, MAP, say=lines.append).finish(START_NS)
     assert lines == ["n9 leaves: it was never in the city"]
-
-
-def test_the_log_names_a_suspect_once(caplog):
-    run({"n2": "zero_speed"}, 20.0)
-    (line,) = [one for one in caplog.messages if one.startswith("station_suspected")]
-    assert "station=n2" in line

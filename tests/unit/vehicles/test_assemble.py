@@ -1,8 +1,5 @@
 import importlib
-import os
 import re
-import subprocess
-import sys
 from dataclasses import replace
 
 import pytest
@@ -15,6 +12,7 @@ from scm.vehicles.kernel_file import compile_kernel
 from scm.vehicles.param import Param
 from scm.vehicles.signals import SIGNALS, Per, Role
 from scm.vehicles.term import Term
+from tests.unit.vehicles.fresh import Compiling, nigel_after_a_second
 
 STANDARD = [all_terms()[name] for name in STANDARD_TERMS]
 
@@ -160,25 +158,8 @@ def test_cars_of_the_same_effects_share_one_kernel():
 
 @pytest.mark.slow
 def test_processes_that_compile_at_the_same_time_all_get_a_kernel(tmp_path):
-    script = (
-        "from scm.vehicles.car import load_car\n"
-        "from scm.vehicles.fleet import Fleet\n"
-        "from scm.geometry import Pose2\n"
-        "fleet = Fleet(load_car('nigel'), 1)\n"
-        "fleet.throttle[fleet.add(Pose2(0.0, 0.0, 0.0))] = 1.0\n"
-        "fleet.advance(1.0)\n"
-        "print(fleet.x[0].hex())\n"
-    )
-    environment = {**os.environ, "SCM_CACHE_DIR": str(tmp_path)}
-    processes = [
-        subprocess.Popen(
-            [sys.executable, "-c", script], env=environment, stdout=subprocess.PIPE, text=True
-        )
-        for _ in range(3)
-    ]
-    answers = {process.communicate(timeout=120)[0] for process in processes}
-    assert [process.returncode for process in processes] == [0, 0, 0]
-    assert len(answers) == 1
+    processes = [Compiling(nigel_after_a_second, tmp_path) for _ in range(2)]
+    assert len({process.result() for process in processes}) == 1
     assert len(list(tmp_path.glob("*.py"))) == 1
     assert not list(tmp_path.glob("*.tmp"))
 

@@ -1,29 +1,13 @@
 """The kept kernels: made of the code that is loaded, and made anew where they are damaged."""
 
-import os
 import shutil
-import subprocess
-import sys
 
 import pytest
 
+from tests.unit.vehicles.fresh import Compiling, small_kernel
+
 pytestmark = pytest.mark.slow  # each run compiles in a process of its own
 
-SMALL = """
-import sys
-from pathlib import Path
-sys.path.insert(0, sys.argv[1])
-from scm.vehicles.car import all_terms
-from scm.vehicles.kernel_file import compile_kernel
-from scm.vehicles.signals import Per
-from scm.vehicles.term import Term
-import calm
-if len(sys.argv) > 2:
-    Path(sys.argv[1], "calm.py").write_text(sys.argv[2])
-names = ("suspension_spring", "tyre_contact")
-terms = [*(all_terms()[name] for name in names), Term(calm.calm, per=Per.BODY, adds="force_x")]
-print(compile_kernel(terms).__name__)
-"""
 CURVE = "from scm.vehicles.jit import law\n\n\n@law\ndef curve(vx):\n    return {slope} * vx\n"
 LAW = (
     "from curve import curve\nfrom scm.vehicles.jit import law\n\n\n"
@@ -31,18 +15,9 @@ LAW = (
 )
 
 
-def compiled(folder, *arguments):
+def compiled(folder, calm_after=None):
     """Compile a small car in a process of its own; return the generated module's name."""
-    done = subprocess.run(
-        [sys.executable, "-B", "-c", SMALL, str(folder), *arguments],
-        env={**os.environ, "SCM_CACHE_DIR": str(folder / "cache")},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return Compiling(small_kernel, folder / "cache", folder, calm_after).result()
 
 
 @pytest.fixture(scope="module")
