@@ -38,7 +38,8 @@ class FaultyProxy:
         for writer in list(self._writers):
             if reset:
                 link = writer.get_extra_info("socket")
-                link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                with contextlib.suppress(OSError):  # its other side has ended it already
+                    link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
             writer.transport.abort()
 
     def _run(self) -> None:

@@ -347,7 +347,7 @@ def test_a_refusal_is_said_within_the_dialog_that_asked(visit, drive):
     visited = visit(AT)
     page = visited.page
     page.click("text=Mismatch job")
-    visited.wait("document.querySelectorAll('dialog select[name=car] option').length > 1")  # all
+    visited.wait("() => document.querySelectorAll('dialog select[name=car] option').length > 1")
     gone = "(car) => { car.selectedOptions[0].value = 'no_such_car' }"  # as a file that was removed
     page.locator("dialog select[name=car]").evaluate(gone)
     page.locator("dialog select[name=car]").dispatch_event("change")
