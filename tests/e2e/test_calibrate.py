@@ -30,7 +30,6 @@ def stage(tmp_path):
             made.close()
 
 
-@pytest.mark.timeout(350)
 def test_a_real_nigel_is_calibrated_inside_its_rectangle(stage):
     code, said = stage.calibrate("--short", longest_s=LONGEST_S)
     if AGAIN in said or NOT_DRIVEN in said:  # the computer was too busy, and it says so

@@ -12,7 +12,7 @@ BUDGET_S = 240.0  # twice the usual: other tests take the processor too
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(400)
+@pytest.mark.timeout(900)
 def test_the_sample_s_steering_trim_is_found_and_its_report_is_true(
     root: Path, tmp_path: Path
 ) -> None:
