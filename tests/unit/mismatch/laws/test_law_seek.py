@@ -41,7 +41,9 @@ def test_only_a_law_that_is_better_by_far_ends_a_search(by_far, ends, monkeypatc
 def test_a_law_that_leaves_something_to_a_listed_effect_does_not_end_a_search(monkeypatch):
     search, laws = made_law.asked()
     monkeypatch.setattr(decide, "BY_FAR", 100.0)
-    monkeypatch.setattr(decide, "_price", lambda _, fitted: -float(len(fitted.effects)))
+    price = decide._price
+    worth = lambda search, fitted: price(search, fitted) - 1e4 * (len(fitted.effects) > 1)  # noqa: E731
+    monkeypatch.setattr(decide, "_price", worth)
     assert not laws.explains_all(search.retuned)
 
 
