@@ -61,7 +61,12 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
 
 @pytest.fixture(autouse=True)
 def in_order(running: CityProcess) -> None:
-    """Begin each test in a city that drives: a starved machine makes the monitor latch a fault."""
+    """Begin each test in a city that drives, whatever the one before it left.
+
+    A starved machine makes the monitor latch a fault; a test that failed may leave the stop engaged.
+    """
+    if running.get("/stop")["engaged"]:
+        running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
     for row in running.get("/signals")["signals"]:
         if row["monitor"] is not None and row["monitor"]["fault"]:
             body = {"by": "tests", "reason": "the machine was busy"}

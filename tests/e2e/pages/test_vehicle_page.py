@@ -57,7 +57,7 @@ def drives_by_itself(running, name=CAR):
         car = row(running, name)
         return car["lease_left_ms"] is None and car["mode"] == "drive" and car["trip"]
 
-    wait_for(drives, 20.0, f"{name} drives by itself again")
+    wait_for(drives, 60.0, f"{name} drives by itself again")
 
 
 class Tired:
@@ -289,6 +289,7 @@ def test_a_wheel_on_a_dead_line_says_so_and_is_given_back(visit, running):
         page.click("#city-stop")
         page.wait_for_selector(".banner.lost >> text=The stop is not confirmed")
         page.wait_for_selector(".notice >> text=The city did not answer in time.")
+    wait_for(lambda: running.get("/stop")["engaged"], 60.0, "the late stop has arrived")
     running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
     page.wait_for_selector('.page[data-link="live"]')
     wait_for(lambda: row(running)["lease_left_ms"] is None, 90.0, "its lease has ended")
