@@ -14,7 +14,7 @@ from scm.disturbances import HEARS, Disturbance, Disturbances
 from scm.errors import RunError
 from scm.eye.station import eye_station
 from scm.live import stop_on_signal
-from scm.maps.load import load_map
+from scm.maps.load import is_scan, load_map
 from scm.maps.radio import with_radio
 from scm.store.open import open_store
 from scm.traffic.demand import DemandPart
@@ -93,6 +93,7 @@ class _Plan:
         port: One that is free.
         agents: The names of their cars.
         eyes: Cameras by the station that looks through each.
+        scan: How a scanned map was read; empty: it is none.
     """
 
     wanted: Wanted
@@ -102,6 +103,7 @@ class _Plan:
     recording: Path
     state: str
     eyes: Mapping[str, str]
+    scan: str
 
 
 def run_city(wanted: Wanted, say: Say = _say_now) -> int:
@@ -117,6 +119,8 @@ def run_city(wanted: Wanted, say: Say = _say_now) -> int:
         ZenohBus(wanted.city, "up", guard.connect, credentials=guard.credentials("up")) as bus,
     ):
         say(f"scm: city {wanted.city!r} on map {wanted.map_name!r}, bus {router.listen}")
+        if plan.scan:
+            say(f"  {plan.scan}")
         _watch(plan, bus, say)
     if plan.recording.exists():
         say(f"recorded in {plan.recording}")
@@ -152,6 +156,7 @@ def _settled(wanted: Wanted) -> _Plan:
         recording=recording,
         state=wanted.state or f"sqlite:{recording.with_suffix('.db')}",
         eyes=eyes,
+        scan=city_map.source if is_scan(wanted.map_name) else "",
     )
 
 

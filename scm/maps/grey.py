@@ -120,16 +120,18 @@ def _decoded(path: Path, data: bytes) -> NDArray[Any]:
     level = log.getLogLevel()
     log.setLogLevel(log.LOG_LEVEL_SILENT)  # it would write to the terminal beside our error
     try:
-        with reading(path, "a picture", MapError):
-            buffer = np.frombuffer(data, np.uint8)
-            pixels = cv2.imdecode(buffer, cv2.IMREAD_UNCHANGED) if data else None
+        buffer = np.frombuffer(data, np.uint8)
+        pixels = cv2.imdecode(buffer, cv2.IMREAD_UNCHANGED) if data else None
+    except cv2.error:  # a size that it refuses
+        pixels = None
     finally:
         log.setLogLevel(level)
-    if pixels is not None:
-        return np.asarray(pixels)
-    if data.startswith(_PNG):
-        raise MapError(f"{path}: the PNG picture is damaged: copy or save it anew")
-    raise MapError(f"{path}: expected a picture such as PNG or PGM, got {data[:8]!r}")
+    if pixels is None:
+        raise MapError(
+            f"{path}: expected a picture such as PNG or PGM that is whole, got one that cannot be "
+            f"read and begins with {data[:8]!r}: save it anew"
+        )
+    return np.asarray(pixels)
 
 
 def read_grey(path: Path) -> Samples:

@@ -221,7 +221,7 @@ class _Reader(NamedTuple):
         value = self.info["image"]
         if isinstance(value, bool) or not isinstance(value, str | int) or not str(value).strip():
             raise self.refusal("image", "the name of a picture file", value)
-        return str(value)
+        return str(value).strip()
 
     def origin(self) -> Pose2:
         value = self.info["origin"]

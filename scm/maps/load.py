@@ -59,10 +59,9 @@ def load_map(name_or_path: str | Path) -> CityMap:
     if made is not None:
         return made
     path = _find(name_or_path)
-    suffix = path.suffix.lower()
-    if suffix in _YAML:
+    if is_scan(path):
         return map_from_occupancy(path)
-    if suffix in _PICTURES:
+    if path.suffix.lower() in _PICTURES:
         raise MapError(
             f"{path}: expected a map file, got a picture: give the .yaml that describes its cells"
         )
@@ -72,6 +71,11 @@ def load_map(name_or_path: str | Path) -> CityMap:
         listed = "".join(f"\n  {problem}" for problem in problems)
         raise MapError(f"{path}: {len(problems)} problem(s){listed}")
     return city_map
+
+
+def is_scan(name_or_path: str | Path) -> bool:
+    """Return whether a map is a scanned grid, by the ending of its file's name."""
+    return Path(name_or_path).suffix.lower() in _YAML
 
 
 def _find(name_or_path: str | Path) -> Path:

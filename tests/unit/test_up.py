@@ -64,6 +64,20 @@ def test_the_radio_goes_to_the_world_and_to_no_other_part(tmp_path):
     assert [name for name, command in told.items() if "--radio" in command] == ["world"]
 
 
+def test_a_scanned_map_is_introduced_by_the_room_that_was_read(tmp_path):
+    (tmp_path / "a.pgm").write_bytes(b"P2 3 3 255\n0 0 0 0 254 0 0 0 0\n")
+    scan = tmp_path / "a.yaml"
+    scan.write_text(
+        "image: a.pgm\nresolution: 1.0\norigin: [-1.5, -1.5, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.25\n",
+        encoding="utf-8",
+    )
+    wanted = Wanted(
+        map_name=str(scan), hosted=1, port=0, listen="tcp/127.0.0.1:0", record_dir=tmp_path
+    )
+    assert "the room is the one that holds the origin, 1 m²" in _settled(wanted).scan
+
+
 def test_the_recorder_is_told_of_which_cars_it_keeps_pictures(tmp_path):
     words = ["up", "--port", "0", "--listen", "tcp/127.0.0.1:0", "--record-dir", str(tmp_path)]
     words += ["--cameras-hz", "2", "--cameras-of", "n1", "--cameras-of", "n3"]

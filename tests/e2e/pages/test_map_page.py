@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from tests.e2e.pages.visiting import LOOKS, in_both_themes
+from tests.e2e.pages.visiting import LOOKS, SIZES, in_both_themes, photograph
 
 SCENE = "/static/js/pages/map/scene.js"
 FLEET = "/static/js/pages/map/fleet.js"
@@ -167,7 +167,7 @@ def test_layers_are_chosen_and_kept_for_the_next_visit(visit):
     assert visited.complaints == []
 
 
-def test_names_of_lanes_junctions_and_places_are_a_layer(visit, look_around):
+def test_names_of_lanes_junctions_and_places_are_a_layer(visit):
     visited = visit("/map")
     page = visited.page
     names = f"async () => (await import('{SCENE}')).drawn.road_names"
@@ -179,12 +179,16 @@ def test_names_of_lanes_junctions_and_places_are_a_layer(visit, look_around):
     page.reload()  # kept for this browser
     # A junction, its four lanes and ten spawn places; where two would cover each other, one waits.
     visited.until(lambda: 11 <= page.evaluate(names) <= 15, "names are drawn")
-    look_around(visited, ".map", "map_names")
-    visited.until(lambda: 4 <= page.evaluate(names) < 15, "a small map shows what has room")
+    photograph(visited, "map_names_wide_light")
+    width, height = SIZES["narrow"]
+    page.set_viewport_size({"width": width, "height": height})
+    page.emulate_media(color_scheme="dark")
+    visited.until(lambda: 3 <= page.evaluate(names) < 11, "a small map shows what has room")
+    photograph(visited, "map_names_narrow_dark")
     page.focus(".sheet")
     for _ in range(6):
         page.keyboard.press("+")
-    visited.until(lambda: page.evaluate(names) < 4, "only names that are in sight are drawn")
+    visited.until(lambda: page.evaluate(names) < 3, "only names that are in sight are drawn")
     assert visited.complaints == []
 
 

@@ -165,9 +165,10 @@ def test_keys_that_mean_nothing_are_reported(tmp_path):
 @pytest.mark.parametrize(
     ("picture", "changes", "words"),
     [
-        (b"", {}, "expected a picture such as PNG or PGM, got b''"),
-        (b"hello world", {}, "expected a picture such as PNG or PGM, got b'hello wo'"),
-        (b"\x89PNG\r\n\x1a\n", {}, "the PNG picture is damaged"),
+        (b"", {}, "expected a picture such as PNG or PGM that is whole, got one that cannot be"),
+        (b"hello world", {}, "begins with b'hello wo': save it anew"),
+        (b"\x89PNG\r\n\x1a\n", {}, "begins with b'\\x89PNG"),
+        (b"BM" + 24 * b"\x7f", {}, "begins with b'BM"),
         (b"P5 3 3 255\n\xff", {}, "expected 3 x 3 pixels, got 1"),
         (b"P5 0 3 255\n", {}, "expected 0 x 3 pixels, got 0"),
         (b"P5 1 1 0\n\x00", {}, "expected a largest grey value of 1 to 65535, got 0"),
