@@ -13,6 +13,7 @@ COMPILE := PYTHONDONTWRITEBYTECODE= $(VENV)/bin/python -c 'import importlib, pkg
 .PHONY: run test bench clean
 
 run: $(RUNS)
+	@echo "starting the city on $(MAP)"
 	@$(VENV)/bin/scm up $(MAP) $(UP_ARGS)
 
 test: $(TESTS)  # hundreds of processes are started: they share what the first compiled
@@ -29,7 +30,7 @@ $(VENV)/bin/python:
 $(RUNS): pyproject.toml | $(VENV)/bin/python
 	@echo "installing into $(VENV), 1 GB (once; half a minute to some minutes)"
 	@$(INSTALL) -e '.[formats,postgres,ros2,sumo,v2x]'
-	@echo "compiling its Python"
+	@echo "compiling its Python (once; up to a minute)"
 	@$(COMPILE)
 	@touch $@
 

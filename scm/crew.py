@@ -22,7 +22,7 @@ RESTARTS_A_MINUTE = 5
 FIRST_PAUSE_NS = 250 * NS_PER_MS
 STOP_NS = 1500 * NS_PER_MS
 LAST_STOP_NS = 1000 * NS_PER_MS
-SLOW_NS = 4 * NS_PER_S
+SLOW_NS, SLOW_AGAIN_NS = 4 * NS_PER_S, 15 * NS_PER_S
 SILENT_NS = 500 * NS_PER_MS
 BAD_INPUT = 2
 
@@ -61,7 +61,6 @@ class Member:
     died_ns: deque[int] = field(default_factory=lambda: deque(maxlen=RESTARTS_A_MINUTE + 1))
     silent_ns: int | None = None
     was_up: bool = False
-    told_slow: bool = False
     told_gone: bool = False
 
     @property
@@ -82,6 +81,7 @@ class Crew:
         self.members = {job.name: Member(job) for job in jobs}
         self._clock = clock
         self._say = say
+        self._slow_said_ns = -SLOW_AGAIN_NS
 
     @property
     def settled(self) -> bool:
@@ -124,6 +124,7 @@ class Crew:
                     self._tell_trouble(member, now_ns)
             elif member.due_ns is not None and now_ns >= member.due_ns and self._may_start(member):
                 self._start(member, now_ns)
+        self._tell_slow(now_ns)
 
     def _may_start(self, member: Member) -> bool:
         before = self.members.get(member.job.after)
@@ -144,9 +145,21 @@ class Crew:
         if member.silent_ns is not None and now_ns > member.silent_ns + SILENT_NS:
             member.silent_ns, member.told_gone = None, True
             self._say(f"  {name:<12} is silent: it runs, but gives no sign of life on the bus")
-        if not (member.was_up or member.told_slow) and now_ns > member.started_ns + SLOW_NS:
-            member.told_slow = True
-            self._say(f"  {name:<12} is still starting (a first start compiles and takes longer)")
+
+    def _tell_slow(self, now_ns: int) -> None:
+        """Name, now and then, whose first start takes long."""
+        slow = [
+            m for m in self.members.values()
+            if m.process is not None and not m.was_up and now_ns > m.started_ns + SLOW_NS
+        ]  # fmt: skip
+        if not slow or now_ns < self._slow_said_ns + SLOW_AGAIN_NS:
+            return
+        self._slow_said_ns = now_ns
+        names = ", ".join(m.job.name for m in slow)
+        waited_s = seconds(now_ns - min(m.started_ns for m in slow))
+        first = "; a first start compiles the physics, for a minute or more"
+        why = first if any(m.job.name == "world" for m in slow) else ""
+        self._say(f"  {waited_s:3.0f} s: still starting: {names}{why}")
 
     def _ended(self, member: Member, code: int, now_ns: int) -> None:
         name = member.job.name

@@ -4,6 +4,7 @@ import argparse
 import json
 import math
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,10 +60,12 @@ def _run(arguments: argparse.Namespace) -> int:
     import msgspec
     import numpy as np
 
+    from scm.clock import WallClock
     from scm.eye.render.scene import camera_over, camera_toml
     from scm.eye.render.shots import Studio
     from scm.eye.render.traffic import tours
     from scm.maps.load import load_map
+    from scm.progress import Progress
 
     _refuse(arguments)
     city_map = load_map(arguments.map)
@@ -86,16 +89,16 @@ def _run(arguments: argparse.Namespace) -> int:
     (arguments.out / CAMERA).write_text(camera_toml(camera), encoding="utf-8")
     kind = "png" if arguments.jpeg is None else "jpg"
     how = [] if arguments.jpeg is None else [cv2.IMWRITE_JPEG_QUALITY, arguments.jpeg]
-    with (arguments.out / TRUTH).open("w", encoding="utf-8") as truth:
+    progress = Progress(sys.stderr, WallClock())
+    with closing(progress), (arguments.out / TRUTH).open("w", encoding="utf-8") as truth:
         for number in range(arguments.frames):
+            progress.step("rendering frames", number, arguments.frames)
             t_ns = round(number * 1e9 / arguments.rate_hz)
             shot = studio.shoot([car.at(t_ns * 1e-9) for car in cars], t_ns)
             path = arguments.out / f"{number:06}.{kind}"
             _, packed = cv2.imencode(f".{kind}", shot.image, how)
             path.write_bytes(packed.tobytes())
             truth.write(json.dumps({"image": path.name, **_truth(shot)}) + "\n")
-            _progress(number + 1, arguments.frames)
-    _progress(None, arguments.frames)
     print(f"{arguments.frames} frames, {TRUTH} and {CAMERA} in {arguments.out}")
     return 0
 
@@ -167,13 +170,6 @@ def _truth(shot: "Shot") -> dict[str, Any]:
         for tag_id, truth in shot.tags.items()
     ]  # fmt: skip
     return {"t_ns": shot.t_ns, "cars": cars, "tags": tags}
-
-
-def _progress(done: int | None, of: int) -> None:
-    """Count frames on a terminal; None wipes the line."""
-    if sys.stderr.isatty():
-        line = " " * 24 if done is None else f"{done} of {of} frames"
-        print(f"\r{line}", end="\r" if done is None else "", file=sys.stderr, flush=True)
 
 
 COMMAND = Command(

@@ -2,11 +2,14 @@
 
 import argparse
 import sys
+from contextlib import closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scm.command import Command
 
-BAR = 30
+if TYPE_CHECKING:
+    from scm.progress import Progress
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,41 +43,40 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from scm.mismatch.trial import run
-    from scm.mismatch.trial.blind import by_engine
-    from scm.mismatch.trial.reality import Wish
+    from scm.clock import WallClock
+    from scm.progress import Progress
 
     out = arguments.out or Path("runs") / f"trial-{_title(arguments)}"
-    if arguments.kept:
-        lines = run.judged_again(out, arguments.trials)
-    elif arguments.trials:
-        only = [name for name in arguments.only.split(",") if name]
-        lines = run.on_shipped_cases(
-            arguments.trials, out, by_engine, only, workers=arguments.workers, say=_say
-        )
-    else:
-        low, high = arguments.strength
-        wish = Wish(
-            seed=arguments.seed, cases=arguments.cases, kind=arguments.kind,
-            engine=arguments.engine, strength=(low, high),
-        )  # fmt: skip
-        lines = run.on_own_cases(wish, out, by_engine, workers=arguments.workers, say=_say)
+    with closing(Progress(sys.stderr, WallClock())) as progress:
+        lines = _table(arguments, out, progress)
     print("\n".join(lines))
     print(f"\nkept in {out}: recordings, labels and their seals, each diagnosis, this table")
     return 0
 
 
+def _table(arguments: argparse.Namespace, out: Path, progress: "Progress") -> list[str]:
+    from scm.mismatch.trial import run
+    from scm.mismatch.trial.blind import by_engine
+    from scm.mismatch.trial.reality import Wish
+
+    workers, say = arguments.workers, progress.step
+    if arguments.kept:
+        return run.judged_again(out, arguments.trials)
+    if arguments.trials:
+        only = [name for name in arguments.only.split(",") if name]
+        return run.on_shipped_cases(
+            arguments.trials, out, by_engine, only, workers=workers, say=say
+        )
+    low, high = arguments.strength
+    wish = Wish(
+        seed=arguments.seed, cases=arguments.cases, kind=arguments.kind,
+        engine=arguments.engine, strength=(low, high),
+    )  # fmt: skip
+    return run.on_own_cases(wish, out, by_engine, workers=workers, say=say)
+
+
 def _title(arguments: argparse.Namespace) -> str:
     return str(arguments.trials.resolve().name if arguments.trials else arguments.seed)
-
-
-def _say(what: str, done: int, of: int) -> None:
-    """Draw a progress bar on the terminal, if there is one."""
-    if sys.stderr.isatty():
-        filled = BAR * done // max(of, 1)
-        bar = "#" * filled + "." * (BAR - filled)
-        end = "\n" if done == of else ""
-        print(f"\r{what:<14}[{bar}] {done} of {of}", end=end, file=sys.stderr, flush=True)
 
 
 COMMAND = Command(

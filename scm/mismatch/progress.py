@@ -1,4 +1,4 @@
-"""How far a diagnosis is: a bar on a terminal that is drawn anew twice a second, elsewhere lines.
+"""How far a diagnosis is.
 
 The share done is an estimate: each thing that is tried has a usual place in the whole, measured on
 drives of 90 s, and between two of them the bar creeps.
@@ -9,10 +9,9 @@ import threading
 from typing import TextIO
 
 from scm.clock import Clock, seconds
+from scm.progress import ProgressLine, bar
 
-BAR, WIDTH = 24, 100
-CLEARED = "\r\033[K"
-REDRAWN_S = 0.5
+WIDTH = 100
 CREEP_S = 12.0
 # What a step's words begin with, and the usual share of the work that is done when it begins.
 STEPS = (
@@ -27,7 +26,7 @@ class Progress:
     """Shows what is being tried, for how long, and about how much is done.
 
     Args:
-        stream: Where to; a bar if it is a terminal.
+        stream: Where to; with a bar if it is a terminal.
         clock: For the seconds.
     """
 
@@ -36,11 +35,8 @@ class Progress:
         self._began_ns = self._step_ns = clock.now_ns()
         self._share, self._next, self._shown, self._text = 0.0, STEPS[1][1], 0.0, ""
         self._of, self._from, self._part = "", 0.0, 1.0
-        self._lock, self._over = threading.Lock(), threading.Event()
-        self._drawing: threading.Thread | None = None
-        if stream.isatty():
-            self._drawing = threading.Thread(target=self._redraw, daemon=True)
-            self._drawing.start()
+        self._lock = threading.Lock()
+        self._shown_line = ProgressLine(stream, self.line, self._written)
 
     def turn(self, name: str, number: int, count: int) -> None:
         """Begin with one of several cars, or with what is done after them all.
@@ -63,26 +59,24 @@ class Progress:
             after = min((s for _, s in STEPS if s > self._share + 0.005), default=1.0)
             self._next = min(after, self._share + ANOTHER_EFFECT)
             self._text, self._step_ns = self._of + text, self._clock.now_ns()
-        if self._drawing is None:
-            share = 100.0 * (self._from + self._part * self._share)
-            self._write(f"{self._elapsed_s():5.0f} s  {share:3.0f} %  {self._of}{text}\n")
-        else:
-            self._draw()
+        self._shown_line.show()
 
     def close(self) -> None:
         """Take the bar away."""
-        self._over.set()
-        if self._drawing is not None:
-            self._drawing.join()
-            self._write(CLEARED)
+        self._shown_line.close()
 
     def line(self) -> str:
         """Return the bar as it is now."""
+        done, text = self._now()
+        return f"{bar(done)} {100.0 * done:3.0f} %  {self._elapsed_s():3.0f} s  {text}"[:WIDTH]
+
+    def _written(self) -> str:
+        done, text = self._now()
+        return f"{self._elapsed_s():5.0f} s  {100.0 * done:3.0f} %  {text}"
+
+    def _now(self) -> tuple[float, str]:
         with self._lock:
-            done, text = self._from + self._part * self._done(), self._text
-        filled = round(BAR * done)
-        bar = "#" * filled + "." * (BAR - filled)
-        return f"[{bar}] {100.0 * done:3.0f} %  {self._elapsed_s():3.0f} s  {text}"[:WIDTH]
+            return self._from + self._part * self._done(), self._text
 
     def _done(self) -> float:
         """Return the share done, never less than was shown before."""
@@ -92,17 +86,6 @@ class Progress:
 
     def _elapsed_s(self) -> float:
         return seconds(self._clock.now_ns() - self._began_ns)
-
-    def _draw(self) -> None:
-        self._write(CLEARED + self.line())
-
-    def _write(self, text: str) -> None:
-        self._stream.write(text)
-        self._stream.flush()
-
-    def _redraw(self) -> None:
-        while not self._over.wait(REDRAWN_S):
-            self._draw()
 
 
 def _share(text: str, before: float) -> float:

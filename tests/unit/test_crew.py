@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from scm.clock import WallClock
+from scm.clock import NS_PER_S, StepClock, WallClock
 from scm.crew import Crew, Job
 from scm.v2x.messages.presence import Presence
 
@@ -50,3 +50,24 @@ def test_a_link_that_was_lost_for_a_moment_is_no_news():
     crew.members["x"].process.wait(timeout=60.0)
     assert len(said) == 1
     assert "does it" in said[0]
+
+
+def test_whose_start_takes_long_is_named_in_one_line_now_and_then():
+    sleeps = [sys.executable, "-c", "import time; time.sleep(60)"]
+    said, clock = [], StepClock()
+    jobs = [Job(name, "part", "does it", lambda: sleeps) for name in ("world", "eye")]
+    crew = Crew(jobs, clock, said.append)
+    try:
+        for at_s in (0, 3, 5, 15):
+            clock.set_ns(at_s * NS_PER_S)
+            crew.look()
+        assert len(said) == 1
+        assert "5 s: still starting: world, eye; a first start compiles the physics" in said[0]
+        crew.heard(Presence(role="part", station="world", session="1", alive=True))
+        clock.set_ns(20 * NS_PER_S)
+        crew.look()
+        assert said[-1].strip() == "20 s: still starting: eye"
+    finally:
+        for member in crew.members.values():
+            member.process.kill()
+            member.process.wait(timeout=60.0)

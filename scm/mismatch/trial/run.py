@@ -31,6 +31,7 @@ def on_own_cases(
     if (out / labels.SEALED).exists():
         msg = f"{out}: holds a trial already; give another --out, or none"
         raise RecordingError(msg)
+    say("making cases", 0, wish.cases)
     make_cases(wish, out, lambda done: say("making cases", done, wish.cases))
     seals = labels.read_seals(out)
     cases = labels.find_cases(out)
@@ -76,6 +77,7 @@ def _answers(
     cases: Sequence[labels.Case], out: Path, diagnose: Diagnose, workers: int, say: Say
 ) -> list[Answer]:
     answers: list[Answer] = []
+    say("diagnosing", 0, len(cases))
     for answer in answer_all(cases, out / FOUND, diagnose, workers):
         answers.append(answer)
         say("diagnosing", len(answers), len(cases))

@@ -46,6 +46,8 @@ def made(tmp_path_factory):
 def test_a_trial_makes_diagnoses_and_judges_its_cases(made):
     out, lines, heard = made
     assert any(line.startswith("none") and "100 %" in line for line in lines)
+    assert heard[0] == ("making cases", 0, 2)
+    assert ("diagnosing", 0, 2) in heard
     assert heard[-1] == ("diagnosing", 2, 2)
     assert (out / "found" / "case_001" / "diagnosis.json").is_file()
     assert (out / "table.txt").read_text().splitlines() == lines
