@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 from textwrap import indent
 from typing import TYPE_CHECKING
@@ -126,17 +127,17 @@ def _terms(arguments: argparse.Namespace) -> str:
 
 
 def _manual(folder: Path, name: str | None) -> str:
+    from scm.clock import WallClock
+    from scm.progress import Progress
     from scm.vehicles.manual.folder import chosen_effects, write_manual
 
     chosen = chosen_effects(name)
     count = len(chosen)
-
-    def tell(done: int, effect: str) -> None:
-        bar = "#" * (30 * done // count)
-        print(f"\r[{bar:<30}] {done}/{count} {effect:<24}", end="", file=sys.stderr, flush=True)
-
-    write_manual(folder, chosen, tell, index=name is None)
-    print(f"\r{'':<66}\r", end="", file=sys.stderr)
+    with closing(Progress(sys.stderr, WallClock())) as progress:
+        write_manual(
+            folder, chosen, lambda done, _: progress.step("writing pages", done, count),
+            index=name is None,
+        )  # fmt: skip
     return f"{count} page{'s' * (count > 1)} with pictures in {folder}"
 
 

@@ -3,11 +3,14 @@
 Times of several recordings follow one another; the first keeps its own.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from scm.arrays import Floats, Ints
 from scm.mismatch.findings import Estimate
+
+_MOVED_STDS, _AT_STDS = 0.5, 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +79,7 @@ class Ordinary:
 
     Attributes:
         found_std: Of what was found; None: as its interval says, which ends at physical bounds.
+        bounds: Lowest and highest value that makes physical sense.
     """
 
     key: str
@@ -83,6 +87,14 @@ class Ordinary:
     given_std: float
     found: Estimate
     found_std: float | None = None
+    bounds: tuple[float, float] = (-math.inf, math.inf)
+
+    @property
+    def limit(self) -> float | None:
+        """The bound that the number was moved to; None: it was not moved to one."""
+        has_moved = abs(self.found.value - self.given) > _MOVED_STDS * self.given_std
+        near = (b for b in self.bounds if abs(self.found.value - b) <= _AT_STDS * self.given_std)
+        return next(near, None) if has_moved else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -30,7 +30,11 @@ WHY = {
 }
 WIDER = 1.3  # intervals from curvature alone are too narrow for what any model leaves out
 LAW = 0.03  # of an effect's size: no equation of an effect is exactly that of the car
-SHARES = {"slope", "difference", "fraction", "fraction_per_min"}
+SHARES = {
+    "slope", "difference", "fraction", "fraction_per_min", "gain", "scale", "left", "right",
+    "threshold",
+}  # fmt: skip
+"""Numbers that a sentence holds in percent."""
 OPPOSITE: Mapping[str, str] = {
     "to the left": "to the right", "left": "right", "ahead": "behind", "too much.": "too little.",
     "further forward": "further back", "higher": "lower",
@@ -60,7 +64,14 @@ def ordinary_of(model: Likelihood, best: Fitted, car: Car) -> tuple[Ordinary, ..
         )  # fmt: skip
         given = car.value(own.key) if car.has(own.key) else own.mean
         found.append(
-            Ordinary(key=own.key, given=given, given_std=own.std, found=estimate, found_std=std)
+            Ordinary(
+                key=own.key,
+                given=given,
+                given_std=own.std,
+                found=estimate,
+                found_std=std,
+                bounds=own.bounds,
+            )
         )
     return tuple(found)
 
@@ -220,6 +231,8 @@ def said(candidate: Candidate, estimates: dict[str, Estimate]) -> str:
     """Return an effect's sentence with its numbers, shares in percent, amounts without signs."""
     sentence = candidate.said
     words = {name: _number(name, e.value, e.unit) for name, e in estimates.items()}
+    if "scale" in estimates:
+        words["scale_cm"] = f"{quantity(100.0 * estimates['scale'].value, '1')} cm"
     for name, estimate in estimates.items():
         turned = _turned(sentence, name) if estimate.value < 0.0 else ""
         if turned:

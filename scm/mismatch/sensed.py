@@ -19,7 +19,10 @@ from scm.replay.numbers import NEUTRAL, Numbers
 
 BIN_S = 0.5
 MOST = 3  # residuals drawn
-_WORDS = {"imu.accel_x": "accelerometer x", "imu.accel_y": "accelerometer y"}
+_WORDS = {
+    "imu.accel_x": "forward acceleration (IMU)",
+    "imu.accel_y": "sideways acceleration (IMU)",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +88,12 @@ def _lines(drive: Drive, residuals: Sequence[Floats], wanted: Sequence[str]) -> 
             rates = [_rate(drive, name, streams[name]) for name in names]
             t, std = rates[0][0], rates[0][2] * metre / np.sqrt(len(names))
             mean = metre * np.mean([rate[1] for rate in rates], axis=0)
-            yield _Line("encoder speed", "m/s", t, (mean[0], mean[1]), std)
+            yield _Line("wheel speed (encoders)", "m/s", t, (mean[0], mean[1]), std)
         else:
             t, mean, std = _means(drive, kind, streams[kind])
             unit = "m/s^2" if "accel" in kind else "rad/s"
             unit = "m/s" if kind in ("speed", "velocity.x", "velocity.y") else unit
-            word = "gyro" if unit == "rad/s" else _WORDS.get(kind, kind)
+            word = "yaw rate (gyro)" if unit == "rad/s" else _WORDS.get(kind, kind)
             yield _Line(word, unit, t, (mean[0], mean[1]), std)
 
 
@@ -100,8 +103,8 @@ def _poses(drive: Drive, x: Floats, y: Floats) -> Iterator[_Line]:
     yaw = drive.smoothed["pose.yaw"].at(t)
     c, s = np.cos(yaw), np.sin(yaw)
     along, across = c * vx + s * vy, c * vy - s * vx
-    yield _Line("pose speed along", "m/s", t, (along[0], along[1]), std)
-    yield _Line("pose speed across", "m/s", t, (across[0], across[1]), std)
+    yield _Line("forward speed (poses)", "m/s", t, (along[0], along[1]), std)
+    yield _Line("sideways speed (poses)", "m/s", t, (across[0], across[1]), std)
 
 
 def _means(drive: Drive, name: str, residual: Floats) -> tuple[Floats, Floats, Floats]:

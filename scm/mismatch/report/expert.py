@@ -54,10 +54,10 @@ _PART_NAMES = {
 _NOTHING = 1e-4
 _ERROR_NAMES = {
     "yaw": "heading",
-    "gyro": "turn, gyro",
-    "wheel": "way, wheels",
-    "accel_x": "speed along, accelerometer",
-    "accel_y": "speed across, accelerometer",
+    "gyro": "yaw rate, gyro",
+    "wheel": "distance, wheels",
+    "accel_x": "forward acceleration, IMU",
+    "accel_y": "sideways acceleration, IMU",
 }
 _ERROR_UNITS = {"m": "m", "rad": "rad", "mps": "m/s", "s": "s"}
 

@@ -59,6 +59,7 @@ def first_screen(diagnosis: Diagnosis, evidence: Evidence) -> str:
 def cards_of(diagnosis: Diagnosis, evidence: Evidence) -> list[Card]:
     """Return what is to be known at first sight: effects, questions, problems of the recording."""
     cards = [*_effect_cards(diagnosis), *_undecided_cards(diagnosis), *_located_card(diagnosis)]
+    cards += _limit_card(evidence)
     if diagnosis.unasked:
         cards.append(_unasked_card(diagnosis))
     elif diagnosis.verdict is Verdict.NONE and can_judge(diagnosis):
@@ -203,6 +204,26 @@ def _then(question: Undecided, folder: str) -> str:
         f"They differ by {apart:.1f} standard deviations; {_ENOUGH_STDS:g} are enough to be sure. "
         f"The drive's files lie in `{folder}` beside this page, for `scm play`."
     )
+
+
+def _limit_card(evidence: Evidence) -> Iterator[Card]:
+    """Yield which of the car's own numbers were moved to a physical bound."""
+    at_limit = [(own, own.limit) for own in evidence.ordinary if own.limit is not None]
+    if not at_limit:
+        return
+    moved = [
+        f"`{own.key}` moved from {quantity(own.given, own.found.unit)} to "
+        f"{quantity(limit, own.found.unit)}, "
+        f"the {'least' if limit < own.given else 'most'} that is physically possible."
+        for own, limit in at_limit
+    ]
+    rows = [
+        ("What", "\n".join(moved)),
+        ("What to do", "Measure it on the car. If it is far from its limit, it stands in for "
+                       "something else that the simulator leaves out: do not rely on it."),
+    ]  # fmt: skip
+    title = "A number at its limit" if len(at_limit) == 1 else "Numbers at their limits"
+    yield Card("question", "Car file", title, rows)
 
 
 def _unasked_card(diagnosis: Diagnosis) -> Card:

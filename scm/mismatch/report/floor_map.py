@@ -21,7 +21,7 @@ from scm.mismatch.report.plot import (
     span_of,
     text,
 )
-from scm.mismatch.report.wording import capital, short, unit_text
+from scm.mismatch.report.wording import short, unit_text
 
 WIDTH = 440.0
 _LOWEST, _HIGHEST = 130.0, 400.0  # of the floor in the picture
@@ -48,7 +48,7 @@ def floor_map(residual: Residual, located: Sequence[Located], number: int) -> Pi
     ]
     return Picture(
         name=f"floor_{number}",
-        title=f"{capital(residual.channel)} left over",
+        title=f"Unexplained {residual.channel}",
         said="",
         svg=picture_svg(WIDTH, height, parts, f"Floor map of {residual.channel}"),
     )

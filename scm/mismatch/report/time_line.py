@@ -113,7 +113,7 @@ def _panel(room: Frame, residual: Residual, spans: Sequence[Span]) -> Iterator[s
     yield text(
         room.left + 4,
         room.top - 7,
-        f"{residual.channel} [{unit_text(residual.unit)}]",
+        f"unexplained {residual.channel} [{unit_text(residual.unit)}]",
         kind="title",
     )
 

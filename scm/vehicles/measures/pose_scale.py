@@ -1,4 +1,4 @@
-"""Pose scale: the tracking system's metre is longer or shorter than a metre.
+"""Pose scale: the tracking system shows distances too long or too short.
 
     measured = scale * true    (x and y, from the world's origin)    [m]
 

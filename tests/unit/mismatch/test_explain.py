@@ -71,6 +71,9 @@ def test_the_interval_of_a_direction_does_not_end_where_the_angle_wraps():
          "The tracked point lies 3.1 cm ahead and 11.6 cm right of where it is said to be."),
         ("drive_asymmetry", {"difference": (-0.0812, "1")},
          "The left motor pulls 8.12 % less than nominal, the right one as much more."),
+        ("pose_scale", {"scale": (1.03, "1")},
+         "The camera shows 103 cm for every 100 cm on the floor."),
+        ("steer_gain", {"gain": (0.9, "1")}, "The wheels turn by 90 % of the commanded angle."),
         ("gyro_bias", {"bias_rad_s": (-0.02, "rad/s")}, "The gyro reads 0.02 rad/s too little."),
     ],
 )  # fmt: skip

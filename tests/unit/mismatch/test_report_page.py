@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scm.data_quality.problem import DataProblem
-from scm.mismatch.evidence import Evidence, Residual
-from scm.mismatch.findings import Effect, Equation, Located, Verdict
+from scm.mismatch.evidence import Evidence, Ordinary, Residual
+from scm.mismatch.findings import Effect, Equation, Estimate, Located, Verdict
 from scm.mismatch.report.summary import summary
 from scm.mismatch.report.verdict_text import verdict_sentence
 from scm.mismatch.report.write import write_report
@@ -230,6 +230,22 @@ def test_problems_that_stop_the_verdict_stand_on_the_first_screen(page_of):
     first, _, _ = page_of("bad_data").partition("<nav>")
     assert "The recording holds no throttle command." in first
     assert "Keep the tag in the camera" in first
+
+
+@pytest.mark.parametrize(
+    ("given", "found", "is_shown"),
+    [(0.5, 1.0, True), (0.5, 0.9, False), (1.0, 1.0, False)],
+    ids=["moved to its bound", "moved to near it", "was there before"],
+)
+def test_a_number_at_its_bound_stands_on_the_first_screen(tmp_path, given, found, is_shown):
+    diagnosis, evidence, *cars = made_up.none()
+    lock = Ordinary(
+        key="drive.axle_lock", given=given, given_std=0.5, bounds=(0.0, 1.0),
+        found=Estimate(value=found, low=0.8, high=1.0, unit="1"),
+    )  # fmt: skip
+    page = written(tmp_path, (diagnosis, replace(evidence, ordinary=(lock,)), *cars))
+    said = "moved from 0.5 to 1, the most that is physically possible"
+    assert (said in page[: page.index("<section")]) == is_shown
 
 
 def test_what_to_do_stands_on_the_first_screen(page_of):

@@ -25,7 +25,7 @@ export function WhereWhen({ drawn }) {
           <button class="small" aria-pressed=${side === "after"} onClick=${() => setSide("after")}>After</button>
         </div>
       </div>
-      <div class="tabs" role="group" aria-label="What is left over">
+      <div class="tabs" role="group" aria-label="What is unexplained">
         ${drawn.residuals.map(
           (one, i) => html`
             <button key=${one.channel} class="small" aria-pressed=${i === chosen} onClick=${() => choose(i)}>
@@ -75,7 +75,7 @@ function FloorMap({ drawn, residual, side, bound, at, setAt }) {
           width=${width}
           height=${room.height}
           role="img"
-          aria-label="Floor map of the ${residual.channel} left over"
+          aria-label="Floor map of the unexplained ${residual.channel}"
           onPointerMove=${onMove}
           onPointerDown=${onMove}
         >
@@ -202,7 +202,7 @@ function TimeLine({ drawn, residual, side, at, setAt }) {
         width=${width}
         height=${height}
         role="img"
-        aria-label="${residual.channel} left over against time, ${side}"
+        aria-label="Unexplained ${residual.channel} against time, ${side}"
         onPointerMove=${onMove}
         onPointerDown=${onMove}
       >
@@ -227,7 +227,7 @@ function lines(drawn, residual, side, { x, y, two }, box, spans) {
   const { t_s, channel, unit } = residual;
   const low = two.map((value) => (value === null ? null : -value));
   const clock = drawn.start_s ? `time since ${drawn.start_s} s [s]` : "time [s]";
-  const up = `${channel} left over [${unitText(unit)}]`;
+  const up = `unexplained ${channel} [${unitText(unit)}]`;
   const other = side === "before" ? "after" : "before";
   return html`
     ${spans.map(
