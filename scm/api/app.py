@@ -196,7 +196,7 @@ class _Desk:
             events.router(city, self.seen),
             audit.router(self.store),
             operations.router(self.work),
-            recordings.router(city),
+            recordings.router(city, self.work),
             scenarios.router(city, self.work, self.keys),
             eye_calibration.router(city, self.work),
             eye_in_force.router(city),

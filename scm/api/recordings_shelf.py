@@ -92,6 +92,18 @@ class RecordingsShelf:
                 return path
         raise not_found("recording", name)
 
+    def free_path(self, name: str) -> Path:
+        """Return a file for a new recording; one of that name gets a number behind it.
+
+        Raises:
+            RefusedError: when this city keeps no recordings.
+        """
+        if self._folder is None:
+            raise not_found("recording", name)
+        ends = ("", *(f"-{number}" for number in range(2, 1000)))
+        paths = (self._folder / f"{name}{end}{SUFFIX}" for end in ends)
+        return next(path for path in paths if not path.exists())
+
     def index(self, name: str) -> RunIndex:
         """Return what a recording holds now.
 

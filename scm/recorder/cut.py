@@ -37,7 +37,8 @@ def cut(run: Path, part: Path, from_s: float = 0.0, to_s: float | None = None) -
     Args:
         run: The recording; it is not changed, and may be cut off or still growing.
         part: The new file.
-        from_s, to_s: Since the run began [s]; None: to its end.
+        from_s: Since the run began [s].
+        to_s: Likewise; None: to its end.
 
     Raises:
         RecordingError: when nothing was recorded then, the run cannot be read, or `part` is there

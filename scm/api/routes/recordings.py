@@ -15,9 +15,11 @@ from scm.api import replay
 from scm.api.city import City, IdempotencyKey, json_response, not_found
 from scm.api.city import Name as BusName
 from scm.api.etag import Matching, tagged
+from scm.api.operations import Operation, Operations, Teller, accepted
 from scm.api.paging import Cursor, Limit, Page, page_of, page_response
 from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
+from scm.api.programs import run_scm
 from scm.api.ranged import send_file
 from scm.api.recordings_shelf import (
     NAME,
@@ -30,6 +32,7 @@ from scm.api.recordings_shelf import (
 )
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
 from scm.api.schemas import answer, answer_file, answer_nothing, answer_page
+from scm.clock import NS_PER_S
 from scm.errors import RecordingError
 from scm.maps.draw import draw_svg
 from scm.maps.model import Box, Light
@@ -79,6 +82,19 @@ class NotesBody(BaseModel):
     )
 
 
+class PartBody(BaseModel):
+    """From when to when of a recording shall be one of its own."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    from_s: float = Field(
+        0.0, ge=0.0, le=1e7, description="seconds since the recording began", examples=[60.0]
+    )
+    to_s: float | None = Field(
+        None, ge=0.0, le=1e7, description="likewise; without: to the end", examples=[180.0]
+    )
+
+
 class Summary(msgspec.Struct, kw_only=True, frozen=True):
     """What is known of a recording before any of it is shown.
 
@@ -100,7 +116,7 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
     car_cameras: tuple[replay.CarCamera, ...]
 
 
-def router(city: City) -> APIRouter:
+def router(city: City, work: Operations) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/recordings", tags=["recordings"], dependencies=[VIEWER])
     shelf = RecordingsShelf(city.shelves.recordings)
@@ -108,6 +124,7 @@ def router(city: City) -> APIRouter:
     _add_moments(routes, shelf)
     _add_pictures(routes, shelf, city)
     _add_notes(routes, shelf)
+    _add_parts(routes, shelf, work)
 
     @routes.get(
         "",
@@ -307,6 +324,42 @@ def _add_notes(routes: APIRouter, shelf: RecordingsShelf) -> None:
             condition.check(shelf.notes(name))
             shelf.write_notes(name, fresh)
         return tagged(request, fresh)
+
+
+def _add_parts(routes: APIRouter, shelf: RecordingsShelf, work: Operations) -> None:
+    @routes.post(
+        "/{name}/parts",
+        summary="Copy a part of it into a recording of its own",
+        status_code=202,
+        dependencies=[OPERATOR],
+        responses=answer(Operation, 202),
+    )
+    def cut(request: Request, name: Name, body: PartBody, key: IdempotencyKey = "") -> Response:
+        del key  # the same key gets the same operation
+        index = _readable(shelf, name)
+        length_s = (index.end_ns - index.begin_ns) / NS_PER_S
+        to_s = min(length_s if body.to_s is None else body.to_s, length_s)
+        if not body.from_s < to_s:
+            detail = f"from_s, to_s: got {body.from_s:g} to {to_s:g} s, expected a part of "
+            detail += f"the {length_s:.1f} s of {name}"
+            raise RefusedError(Refused(code="invalid", detail=detail))
+
+        def do(tell: Teller) -> str:
+            target = shelf.free_path(f"{name[:80]}{_span(body.from_s, to_s)}")
+            partial = target.with_name(f".{target.name}")  # in no list until it is whole
+            words = ["cut", str(index.path), "--out", str(partial)]
+            words += ["--from-s", f"{body.from_s!r}", "--to-s", f"{to_s!r}"]
+            try:
+                tell("copies it")
+                run_scm(words, tell, lambda _: None)
+                partial.rename(target)
+            finally:
+                partial.unlink(missing_ok=True)
+            return f"/recordings/{target.stem}"
+
+        what = f"{body.from_s:g} to {to_s:g} s of {name}"
+        owner = str(request.scope["scm_owner"])
+        return accepted(work.start("cut", what, do, owner=owner))
 
 
 def _rows(shelf: RecordingsShelf, names: tuple[str, ...]) -> tuple[RecordingRow, ...]:

@@ -19,6 +19,7 @@ from scm.api.routes.recordings import _converted
 from scm.api.shelves import shelves_in
 from scm.recorder import run_index
 from scm.recorder.run_index import read_index
+from tests.e2e.city_process import wait_for
 from tests.unit.recorder.short_run import BEGIN_NS, PICTURE, STUCK_S, write_run
 
 
@@ -381,3 +382,30 @@ def test_an_export_holds_its_turn_until_its_reader_goes_away(folder):
         return held, turns.locked()
 
     assert asyncio.run(hold()) == (True, False)
+
+
+def test_a_part_becomes_a_recording_of_its_own(ask, client, folder):
+    write_run(folder / "drive.mcap")
+    for name in ("drive-2-4s", "drive-2-4s-2"):
+        row = ask("/drive/parts", 202, "POST", json={"from_s": 2.0, "to_s": 4.0})
+        assert row["what"] == "2 to 4 s of drive"
+        wait_for(lambda at=row["id"]: over(client, at), 120.0, "it is cut")
+        assert over(client, row["id"])["result"] == f"/recordings/{name}"
+        part = ask(f"/{name}")
+        assert (part["state"], part["length_s"], part["cars"]) == ("complete", 2.0, ["n1", "n10"])
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "drive-2-4s-2.mcap", "drive-2-4s.mcap", "drive.mcap",
+    ]  # fmt: skip
+
+
+def over(client, operation):
+    row = client("GET", f"/api/v1/operations/{operation}").json()
+    assert row["state"] != "failed", row["error"]
+    return row if row["state"] == "done" else None
+
+
+@pytest.mark.parametrize("span", [{"from_s": 5.0}, {"from_s": 3.0, "to_s": 3.0}, {"from_s": 90}])
+def test_a_part_outside_the_recording_is_refused(ask, folder, span):
+    write_run(folder / "drive.mcap")
+    refused = ask("/drive/parts", 422, "POST", json=span)
+    assert "expected a part of the 5.0 s of drive" in refused["detail"]

@@ -104,7 +104,7 @@ def test_a_band_is_never_narrower_than_what_is_left():
 def test_a_sensor_s_fault_is_drawn_as_what_the_sensor_reads_too_much():
     _, residuals = locate(*made_fit.biased())
     gyro = residuals[0]
-    assert (gyro.channel, gyro.unit) == ("gyro", "rad/s")
+    assert (gyro.channel, gyro.unit) == ("yaw rate (gyro)", "rad/s")
     assert np.nanmean(gyro.before) == pytest.approx(0.05, abs=0.01)
     assert abs(np.nanmean(gyro.after)) < 0.005
 

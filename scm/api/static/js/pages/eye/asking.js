@@ -1,6 +1,7 @@
-/** Reading from the interface: once, again and again, and until an operation is over. */
+/** Reading from the interface, once, and again and again. */
 import { useEffect, useState } from "preact/hooks";
 import { placed } from "scm/shared/base.js";
+import { isOver } from "scm/shared/operation.js";
 
 /** @returns the body; throws a sentence where the city says no. */
 export async function read(path) {
@@ -37,32 +38,13 @@ export function usePolled(path, period_ms) {
   return { ...told, again: () => setTurn((before) => before + 1) };
 }
 
-const OVER = ["done", "failed", "cancelled"];
-
-/** Look at an operation until it is over; `tell` hears each state. */
-export async function finished(operation, tell) {
-  let row = operation;
-  tell(row);
-  while (!OVER.includes(row.state)) {
-    await new Promise((resolve) => setTimeout(resolve, 250));
-    row = await read(`/operations/${row.id}`).catch((error) => lost(row, error));
-    tell(row);
-  }
-  return row;
-}
-
-/** The link may break: it is asked again. A server that began anew knows nothing of it any more. */
-function lost(row, error) {
-  return error.status === 404 ? { ...row, state: "failed", error: "The server was started anew: ask again." } : row;
-}
-
 /** Follow what still runs of this when the page is opened: whoever asked may have come back. */
 export function useUnfinished(titles, follow) {
   useEffect(() => {
     let over = false;
     read("/operations?limit=100").then(
       ({ items }) => {
-        const row = items.find((one) => one.kind === "calibration" && titles.includes(one.what) && !OVER.includes(one.state));
+        const row = items.find((one) => one.kind === "calibration" && titles.includes(one.what) && !isOver(one));
         if (row && !over) follow(row);
       },
       () => {},

@@ -2,7 +2,8 @@
 import { useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
-import { finished, keptBy, read, useUnfinished } from "scm/pages/eye/asking.js";
+import { keptBy, read, useUnfinished } from "scm/pages/eye/asking.js";
+import { finished } from "scm/shared/operation.js";
 import { filledIn, freeName, Progress, useKept } from "scm/pages/eye/progress.js";
 import { change, notify } from "scm/shell/api.js";
 

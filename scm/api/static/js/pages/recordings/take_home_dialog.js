@@ -1,9 +1,12 @@
-/** Files to take home: the recording itself, its cars as CSV, and what Foxglove draws. */
+/** Files to take home: the recording itself or a part of it, its cars as CSV, and what Foxglove draws. */
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { seconds, SpanFields, WHOLE } from "scm/pages/recordings/span_fields.js";
 import { size } from "scm/pages/recordings/words.js";
+import { finished, isOver } from "scm/shared/operation.js";
+import { change } from "scm/shell/api.js";
+import { go } from "scm/shell/router.js";
 import { placed } from "scm/shared/base.js";
 
 export function TakeHomeDialog({ recording, cars, player, onClose }) {
@@ -15,6 +18,10 @@ export function TakeHomeDialog({ recording, cars, player, onClose }) {
           <dt>The recording <small>MCAP, ${size(recording.size_bytes)}</small></dt>
           <dd>Every message of the bus, for <code>scm replay</code>, <code>scm mismatch</code> and other MCAP tools.</dd>
           <dd><a class="file" href="${at}.mcap" download data-first>${recording.name}.mcap</a></dd>
+        </div>
+        <div>
+          <dt>A part of it <small>a recording of its own in the list, MCAP</small></dt>
+          <dd><${Part} recording=${recording} player=${player} /></dd>
         </div>
         <div>
           <dt>Its cars as a table <small>CSV, SI units</small></dt>
@@ -34,6 +41,29 @@ export function TakeHomeDialog({ recording, cars, player, onClose }) {
       </dl>
       <div class="actions"><button onClick=${onClose}>Close</button></div>
     <//>
+  `;
+}
+
+/** A part becomes a recording of its own, which is opened once it is there. */
+function Part({ recording, player }) {
+  const [span, setSpan] = useState(WHOLE);
+  const [row, setRow] = useState(null);
+  const isBusy = row !== null && !isOver(row);
+  const submit = async (event) => {
+    event.preventDefault();
+    const { from_s, to_s } = seconds(span);
+    const path = `/recordings/${encodeURIComponent(recording.name)}/parts`;
+    const begun = await change("POST", path, { from_s: from_s ?? 0, to_s });
+    if (!begun) return;
+    const ended = await finished(begun, setRow);
+    if (ended.state === "done") go(ended.result);
+  };
+  return html`
+    <form class="fields two-by-two" onSubmit=${submit} onInput=${() => setRow(null)}>
+      <${SpanFields} recording=${recording} player=${player} span=${span} onChange=${setSpan} />
+      ${row?.error && html`<p class="trouble" role="alert">${row.error}</p>`}
+      <button disabled=${isBusy}>${isBusy ? "Cutting…" : "Cut"}</button>
+    </form>
   `;
 }
 

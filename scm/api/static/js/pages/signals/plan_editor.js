@@ -3,6 +3,7 @@ import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { change, notify } from "scm/shell/api.js";
 import { clock } from "scm/shared/format.js";
+import { finished } from "scm/shared/operation.js";
 import { prose } from "scm/shell/prose.js";
 import { changeOf, cycleOf, goingOn, PlanStrip, splitOf } from "scm/pages/signals/plan_strip.js";
 import { junction, plans, read, readPlans, site } from "scm/pages/signals/store.js";
@@ -10,7 +11,6 @@ import { plain, secs } from "scm/pages/signals/words.js";
 
 const LONGEST_CYCLE_S = 300;
 const MOST_STAGES = 24;
-const LOOK_MS = 400;
 const NAME = /^[a-z][a-z0-9_-]{0,31}$/;
 
 /**
@@ -324,12 +324,8 @@ async function prove(draft) {
   const plan = NAME.test(draft.plan) ? draft.plan : "draft";
   const begun = await change("POST", `/signals/${junction.value}/proofs`, { plan, stages: draft.stages });
   if (!begun) return tell("failed", "The search did not begin.");
-  let row = begun;
   try {
-    while (row.state === "waiting" || row.state === "running") {
-      await new Promise((resolve) => setTimeout(resolve, LOOK_MS));
-      row = (await read(`/operations/${begun.id}`)).body;
-    }
+    const row = await finished(begun);
     if (row.state !== "done") return tell("failed", `Not proven: ${row.error || row.state}`);
     const { body } = await read(row.result.replace("/api/v1", ""));
     return tell("proven", proofWords(body));
