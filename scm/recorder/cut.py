@@ -52,7 +52,7 @@ def cut(run: Path, part: Path, from_s: float = 0.0, to_s: float | None = None) -
         raise RecordingError(msg)
     begin_ns, end_ns = (index.begin_ns + nanoseconds(at) for at in (from_s, end_s))
     damage: list[str] = []
-    with RunFile(part, _city(index)) as file:
+    with RunFile(part, index.city) as file:
         for one in _still_true(index, begin_ns, damage):
             file.write(RawSample(one.key, one.body, None, begin_ns))
         last_ns = begin_ns
@@ -62,14 +62,9 @@ def cut(run: Path, part: Path, from_s: float = 0.0, to_s: float | None = None) -
     return Cut(part, file.messages, (last_ns - begin_ns) / NS_PER_S, tuple(dict.fromkeys(damage)))
 
 
-def _city(index: RunIndex) -> str:
-    """Return whose keys were recorded: `scm/@v1/<city>/...`."""
-    return next(key.split("/")[2] for key in index.topics.values() if key.count("/") > 2)
-
-
 def _still_true(index: RunIndex, begin_ns: int, damage: list[str]) -> list[Recorded]:
     """Return the last events of each key before a time, in their order."""
-    schemas = SchemaTable(_city(index))
+    schemas = SchemaTable(index.city)
     most = {
         key: kind.KEEP
         for key in index.topics.values()

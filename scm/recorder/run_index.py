@@ -69,6 +69,12 @@ class RunIndex:
         object.__setattr__(self, "begin_ns", begin_ns)
         object.__setattr__(self, "end_ns", end_ns)
 
+    @property
+    def city(self) -> str:
+        """Whose keys were recorded, `scm/@v1/<city>/...`; empty where nothing was."""
+        found = (key.split("/") for key in self.topics.values())
+        return next((chunks[2] for chunks in found if len(chunks) > 3), "")
+
     def read(
         self,
         begin_ns: int,

@@ -21,6 +21,7 @@ from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
 from scm.api.programs import run_scm
 from scm.api.ranged import send_file
+from scm.api.recorded_disturbances import RecordedDisturbances, disturbances_of
 from scm.api.recordings_shelf import (
     NAME,
     Notes,
@@ -122,6 +123,7 @@ def router(city: City, work: Operations) -> APIRouter:
     shelf = RecordingsShelf(city.shelves.recordings)
     _add_downloads(routes, shelf)
     _add_moments(routes, shelf)
+    _add_disturbances(routes, shelf)
     _add_pictures(routes, shelf, city)
     _add_notes(routes, shelf)
     _add_parts(routes, shelf, work)
@@ -265,6 +267,16 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf) -> None:
         rows = replay.events_of(_readable(shelf, name))
         page = page_of(rows, lambda row: str(row.number), limit=limit, cursor=cursor)
         return page_response(request, page)
+
+
+def _add_disturbances(routes: APIRouter, shelf: RecordingsShelf) -> None:
+    @routes.get(
+        "/{name}/disturbances",
+        summary="What made measurements void while it was recorded",
+        responses=answer(RecordedDisturbances),
+    )
+    def disturbances(name: Name) -> Response:
+        return json_response(disturbances_of(_readable(shelf, name)))
 
 
 def _add_pictures(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:

@@ -8,8 +8,20 @@ from fastapi import APIRouter, Query, Response
 from scm.api.city import City, json_response, not_found
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer
+from scm.clock import nanoseconds
 from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.violation import Violation
+
+
+class Counts(TrafficCounts, kw_only=True, frozen=True):
+    """Counts of the observer.
+
+    Attributes:
+        void: Why the window's counts, delays and queues say nothing of plans, in words; none: they
+            do.
+    """
+
+    void: tuple[str, ...] = ()
 
 
 class Violations(msgspec.Struct, kw_only=True, frozen=True):
@@ -26,14 +38,15 @@ def router(city: City) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/traffic", tags=["traffic"], dependencies=[VIEWER])
 
-    @routes.get(
-        "", summary="Counts, delays, queues and level of service", responses=answer(TrafficCounts)
-    )
+    @routes.get("", summary="Counts, delays, queues and level of service", responses=answer(Counts))
     async def counts() -> Response:
-        held = city.view.picture().traffic
-        if held is None:
+        picture = city.view.picture()
+        if picture.traffic is None:
             raise not_found("station", "observer")
-        return json_response(held.message)
+        counted = picture.traffic.message
+        begin_ns = counted.t_ns - nanoseconds(counted.window_s)
+        void = picture.disturbances.void_reasons(begin_ns, counted.t_ns)
+        return json_response(Counts(**msgspec.structs.asdict(counted), void=void))
 
     @routes.get(
         "/violations",

@@ -409,3 +409,13 @@ def test_a_part_outside_the_recording_is_refused(ask, folder, span):
     write_run(folder / "drive.mcap")
     refused = ask("/drive/parts", 422, "POST", json=span)
     assert "expected a part of the 5.0 s of drive" in refused["detail"]
+
+
+def test_a_recording_says_what_made_its_measurements_void(ask, folder):
+    write_run(folder / "calm.mcap")
+    assert ask("/calm/disturbances") == {"disturbances": [], "void": []}
+    write_run(folder / "flashed.mcap", flash_s=(1.0, 3.0))
+    found = ask("/flashed/disturbances")
+    (one,) = found["disturbances"]
+    assert (one["kind"], one["source"], one["start_s"], one["end_s"]) == ("flash", "crossing", 1, 3)
+    assert found["void"] == ["the signals of crossing flash for 2.0 of 5.0 s"]

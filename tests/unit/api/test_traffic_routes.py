@@ -1,3 +1,4 @@
+from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.traffic_counts import ApproachCount, TrafficCounts
 from scm.v2x.messages.violation import Violation
 
@@ -20,6 +21,17 @@ def test_counts_are_the_newest_that_the_observer_told(client, hear):
         hear(1.0, TrafficCounts(t_ns=passed, window_s=10.0, approaches=(approach,)))
     body = client("GET", f"{API}/traffic").json()
     assert (body["approaches"][0]["passed"], body["approaches"][0]["level"]) == (2, "B")
+
+
+def test_counts_of_a_window_in_which_signals_flashed_are_void(client, hear):
+    seconds = 1_000_000_000
+    for at_s in range(93, 111):
+        mode = "flash" if 104 <= at_s < 108 else "plan"
+        spat = Spat(junction="x", t_ns=at_s * seconds, seq=1, mode=mode, plan="calm", groups=())
+        hear(float(at_s), spat)
+    for end_s, void in ((103, []), (110, ["the signals of x flash for 4.0 of 10.0 s"])):
+        hear(110.0, TrafficCounts(t_ns=end_s * seconds, window_s=10.0, approaches=()))
+        assert client("GET", f"{API}/traffic").json()["void"] == void
 
 
 def test_violations_are_listed_newest_first_and_by_car(client, hear):

@@ -26,12 +26,13 @@ RANGES_M = (1.0, 2.0, float("inf"), 0.5)  # ahead, left, a miss behind, right
 
 def write_run(
     path, seconds=5.0, *, finish=True, leaves_s=float("inf"), picture=PICTURE, of_n1=None,
-    pause_s=0.0,
+    pause_s=0.0, flash_s=None,
 ):  # fmt: skip
     """Write the run, a chunk each quarter of a second; without `finish` as a kill leaves it.
 
-    From `leaves_s` on the world tells of n10 no more. `of_n1` holds pictures of its front camera by
-    their times [s]. With `pause_s` nothing is recorded for so long after 2 s.
+    Within `flash_s` the junction flashes. From `leaves_s` on the world tells of n10 no more.
+    `of_n1` holds pictures of its front camera by their times [s]. With `pause_s` nothing is recorded
+    for so long after 2 s.
     """
     file = RunFile(path, "city")
     file.write(_sample(0.0, "world/def", _definition()))
@@ -42,7 +43,7 @@ def write_run(
             file.write(_sample(at_s, f"v/{name}/state", _state(name, at_s, x_m, tick)))
         file.write(_sample(at_s, "world/snapshot", _snapshot(at_s, tick, leaves_s)))
         if tick % 2 == 0:
-            file.write(_sample(at_s, "tl/crossing/spat", _spat(at_s)))
+            file.write(_sample(at_s, "tl/crossing/spat", _spat(at_s, flash_s)))
         if tick == 3 * HZ:
             file.write(_sample(at_s, "event/warning/world", _event("warning", "n1 hit a wall")))
             file.write(_picture(at_s, "eye/overhead/frame", picture, camera="overhead"))
@@ -126,7 +127,9 @@ def _snapshot(at_s, tick, leaves_s):
     return WorldSnapshot(t_ns=BEGIN_NS, tick=tick, vehicles=cars, boxes=boxes)
 
 
-def _spat(at_s):
+def _spat(at_s, flash_s):
     colour = "red" if at_s < GREEN_S else "green"
     group = SignalGroup(group="south_east", colour=colour, since_ns=0, min_end_ns=0)
-    return Spat(junction="crossing", t_ns=0, seq=1, mode="plan", plan="calm", groups=(group,))
+    mode = "flash" if flash_s and flash_s[0] <= at_s < flash_s[1] else "plan"
+    t_ns = BEGIN_NS + round(at_s * NS_PER_S)
+    return Spat(junction="crossing", t_ns=t_ns, seq=1, mode=mode, plan="calm", groups=(group,))

@@ -19,6 +19,7 @@ import { prose } from "scm/shell/prose.js";
 import { windowTitle } from "scm/shell/store.js";
 
 const EVENTS = 500;
+const NOTHING = { disturbances: [], void: [] };
 
 /** The open dialog: `notes`, `delete`, `take`, `mismatch` or null. */
 const asking = signal(null);
@@ -96,6 +97,7 @@ function Played({ player, summary, events, more, onChanged }) {
   const [chosen, setChosen] = useState(null);
   const { recording } = summary;
   const close = () => (asking.value = null);
+  const { disturbances, void: reasons } = useReading(`${address(recording.name)}/disturbances`).body ?? NOTHING;
   const { cars, eye_cameras: eye, car_cameras: own } = summary;
   return html`
     <div class="replay">
@@ -104,7 +106,8 @@ function Played({ player, summary, events, more, onChanged }) {
         <${ReplayMap} player=${player} summary=${summary} chosen=${chosen} onChoose=${setChosen} />
         ${player.skipped.value && html`<p class="hint" role="status">${player.skipped.value.words}</p>`}
         ${player.trouble.value && html`<p class="trouble" role="alert">${player.trouble.value}</p>`}
-        <${Timeline} player=${player} events=${events} begin_ns=${recording.begin_ns} />
+        <${Timeline} player=${player} events=${events} disturbances=${disturbances} begin_ns=${recording.begin_ns} />
+        ${reasons.length > 0 && html`<p class="trouble void">Measurements are void: ${reasons.join("; ")}.</p>`}
       </section>
       <${Cars} player=${player} chosen=${chosen} onChoose=${setChosen} />
       ${eye.length + own.length > 0 && html`<${EyeThen} player=${player} eye=${eye} own=${own} chosen=${chosen} />`}

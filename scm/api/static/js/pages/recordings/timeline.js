@@ -8,7 +8,7 @@ const STEP_S = 0.1;
 const SMALL_S = 1;
 const LARGE_S = 10;
 
-export function Timeline({ player, events, begin_ns }) {
+export function Timeline({ player, events, disturbances, begin_ns }) {
   useEffect(() => {
     const onKey = (event) => press(event, player, events);
     window.addEventListener("keydown", onKey);
@@ -21,6 +21,16 @@ export function Timeline({ player, events, begin_ns }) {
       <div class="slide">
         <div class="marks" aria-hidden="true">
           ${player.first_s > 1 && html`<i class="before" style=${{ width: share(player.first_s, length_s) }}></i>`}
+          ${disturbances.map(
+            ({ start_s, end_s, text }) => html`
+              <i
+                key=${`${start_s} ${text}`}
+                class="void"
+                title=${text}
+                style=${{ left: share(start_s, length_s), width: share(end_s - start_s, length_s) }}
+              ></i>
+            `,
+          )}
           ${events.map(
             (event) => html`
               <i

@@ -1,0 +1,66 @@
+"""What made measurements void while a run was recorded, as far as its messages tell."""
+
+import msgspec
+
+from scm.api.replay import read
+from scm.clock import NS_PER_S
+from scm.disturbances import HEARS, Disturbance, Disturbances
+from scm.recorder.mcap_file import SchemaTable
+from scm.recorder.run_index import RunIndex
+from scm.v2x.exchange import Incoming
+
+
+class RecordedDisturbance(msgspec.Struct, kw_only=True, frozen=True):
+    """One of them, from when to when since the recording began; see `/disturbances`."""
+
+    kind: str
+    source: str
+    text: str
+    start_s: float
+    end_s: float
+
+
+class RecordedDisturbances(msgspec.Struct, kw_only=True, frozen=True):
+    """What of a recording is void.
+
+    Attributes:
+        disturbances: The oldest first.
+        void: What that means for the recording as a whole, in words; none: all of it counts.
+    """
+
+    disturbances: tuple[RecordedDisturbance, ...]
+    void: tuple[str, ...]
+
+
+def disturbances_of(index: RunIndex) -> RecordedDisturbances:
+    """Watch a run for disturbances as the server does a city.
+
+    Raises:
+        RecordingError: when the file cannot be opened any more.
+    """
+    watch, schemas = Disturbances(), SchemaTable(index.city)
+    kinds = {
+        key: kind
+        for key in index.topics.values()
+        if (kind := schemas.kind_of(key)) is not None and kind in HEARS
+    }
+    for one in index.read(0, index.end_ns, kinds.__contains__):
+        message = read(one, kinds[one.key])
+        if message is not None:
+            watch.hear(Incoming(message, one.t_ns))
+    watch.look(index.end_ns)
+    return RecordedDisturbances(
+        disturbances=tuple(_since_begin(one, index) for one in watch.lately(index.begin_ns)),
+        void=watch.void_reasons(index.begin_ns, index.end_ns),
+    )
+
+
+def _since_begin(one: Disturbance, index: RunIndex) -> RecordedDisturbance:
+    last_ns = index.end_ns if one.end_ns is None else one.end_ns
+    start_s, end_s = (
+        round(max(0, min(t_ns, index.end_ns) - index.begin_ns) / NS_PER_S, 3)
+        for t_ns in (one.start_ns, last_ns)
+    )
+    return RecordedDisturbance(
+        kind=one.kind, source=one.source, text=one.text, start_s=start_s, end_s=end_s
+    )
