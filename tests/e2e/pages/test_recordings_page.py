@@ -19,6 +19,7 @@ from tests.unit.recorder.short_run import STUCK_S, write_run
 NAME = "morning_drive"
 AT = f"/recordings/{NAME}"
 DRIVEN_S = 12.0
+PART, TABLE = 'dialog form[name="part"]', 'dialog form[name="table"]'
 READY = '.sheet[data-shown="cars"]'
 ALL_SHOWN = "() => document.querySelectorAll('.cars tbody tr').length === 6"
 IN_REACH = """words => {
@@ -290,9 +291,9 @@ def test_a_table_of_a_span_is_taken_home_and_what_is_wrong_with_it_is_said(
     page.wait_for_function(ALL_SHOWN)
     page.click("text=Download")
     page.select_option("dialog select", "n2")
-    page.focus("dialog input[name=start]")
+    page.focus(f"{TABLE} input[name=start]")
     page.keyboard.type(f"{last_s - 1.5:.1f}")
-    page.click("dialog .with-button button >> nth=1")
+    page.click(f"{TABLE} .with-button button >> nth=1")
     with page.expect_download() as waiting:
         page.keyboard.press("Shift+Tab")
         page.keyboard.press("Enter")  # in the field: the form is sent
@@ -302,13 +303,13 @@ def test_a_table_of_a_span_is_taken_home_and_what_is_wrong_with_it_is_said(
         times_s = [float(row["t_s"]) for row in csv.DictReader(stream)]
     assert last_s - 1.5 <= times_s[0] < times_s[-1] <= last_s
 
-    page.fill("dialog input[name=stop]", "0.5")
+    page.fill(f"{TABLE} input[name=stop]", "0.5")
     page.keyboard.press("Enter")
     page.wait_for_selector("input[name=stop]:focus:invalid")
-    told = page.evaluate("document.querySelector('[name=stop]').validationMessage")
+    told = page.evaluate("document.forms.table.stop.validationMessage")
     assert told == f"It has to end after {last_s - 1.5:g} s, where it begins."
-    page.fill("dialog input[name=start]", "0")
-    page.fill("dialog input[name=stop]", "0.000001")
+    page.fill(f"{TABLE} input[name=start]", "0")
+    page.fill(f"{TABLE} input[name=stop]", "0.000001")
     page.keyboard.press("Enter")
     page.wait_for_selector("dialog [role=alert] >> text=no row of n2 from 0 s to 1e-06 s")
     assert len(visited.complaints) == 1  # the browser's own, of the answer 404
@@ -316,6 +317,21 @@ def test_a_table_of_a_span_is_taken_home_and_what_is_wrong_with_it_is_said(
     for size, theme in in_each_look(visited):
         judge(visited)
         photograph(visited, f"recordings_download_{size}_{theme}")
+
+
+def test_a_part_is_cut_out_and_opened(visit, running, drive, last_s):
+    visited = visit(f"{AT}?t={last_s}")
+    page = visited.page
+    page.wait_for_function(ALL_SHOWN)
+    page.click("text=Download")
+    page.fill(f"{PART} input[name=start]", "1")
+    page.fill(f"{PART} input[name=stop]", "6")
+    page.click(f"{PART} >> text=Cut")
+    visited.until(lambda: running.hasten() or page.url.endswith("-1-6s"), "the part is opened")
+    page.wait_for_function(ALL_SHOWN)
+    part = running.get(f"/recordings/{NAME}-1-6s")
+    assert part["length_s"] == pytest.approx(5.0, abs=0.5)
+    running.web.delete(f"/recordings/{NAME}-1-6s").raise_for_status()
 
 
 def test_a_mismatch_job_is_asked_for_the_car_and_the_span_that_are_shown(

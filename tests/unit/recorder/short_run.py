@@ -31,8 +31,8 @@ def write_run(
     """Write the run, a chunk each quarter of a second; without `finish` as a kill leaves it.
 
     Within `flash_s` the junction flashes. From `leaves_s` on the world tells of n10 no more.
-    `of_n1` holds pictures of its front camera by their times [s]. With `pause_s` nothing is recorded
-    for so long after 2 s.
+    `of_n1` holds pictures of its front camera by their times [s]. With `pause_s` nothing is
+    recorded for so long after 2 s.
     """
     file = RunFile(path, "city")
     file.write(_sample(0.0, "world/def", _definition()))

@@ -59,7 +59,7 @@ function Part({ recording, player }) {
     if (ended.state === "done") go(ended.result);
   };
   return html`
-    <form class="fields two-by-two" onSubmit=${submit} onInput=${() => setRow(null)}>
+    <form name="part" class="fields two-by-two" onSubmit=${submit} onInput=${() => setRow(null)}>
       <${SpanFields} recording=${recording} player=${player} span=${span} onChange=${setSpan} />
       ${row?.error && html`<p class="trouble" role="alert">${row.error}</p>`}
       <button disabled=${isBusy}>${isBusy ? "Cutting…" : "Cut"}</button>
@@ -79,7 +79,7 @@ function CarsAsTable({ at, recording, cars, player }) {
     setTrouble(await downloaded(`${at}/csv?${query}`));
   };
   return html`
-    <form class="fields two-by-two" onSubmit=${submit} onInput=${() => setTrouble("")}>
+    <form name="table" class="fields two-by-two" onSubmit=${submit} onInput=${() => setTrouble("")}>
       <select aria-label="Cars in the table" value=${vehicle} onChange=${(event) => setVehicle(event.target.value)}>
         <option value="">all cars, as the world saw them</option>
         ${cars.map((car) => html`<option value=${car.vehicle}>${car.vehicle}: its own reports</option>`)}
