@@ -24,12 +24,12 @@ const LINK_WORDS = { connecting: "Connecting", live: "Live", stale: "Stale", los
 const THEMES = { system: ["◐", "as the system"], light: ["☀", "light"], dark: ["☾", "dark"] };
 
 export function TitleBar({ pages, here }) {
-  const { t_ns, real_time_factor, late_ticks } = pulse.value;
+  const { t_ns, real_time_factor } = pulse.value;
   const nav = useRef(null);
   useEffect(() => showHere(nav.current), [here]);
   const heard = t_ns !== null;
   const vitals = heard
-    ? `real-time factor ${fixed(real_time_factor, 2)}, ${late_ticks} late ticks`
+    ? `real-time factor ${fixed(real_time_factor, 2)}: ${fixed(real_time_factor, 2)} s of each second are simulated`
     : "the world was not heard yet";
   return html`
     <header class="title-bar">
