@@ -266,9 +266,7 @@ class City:
         self.cars.append(spawned)
         return spawned
 
-    def use_plan(
-        self, plan: str, *, junction: str = "crossing", reason: str = ""
-    ) -> PlanReply:
+    def use_plan(self, plan: str, *, junction: str = "crossing", reason: str = "") -> PlanReply:
         """Ask for a signal plan; the kernel takes it at the next safe moment."""
         request = PlanRequest(junction=junction, plan=plan, by=program_name(), reason=reason)
         return self.request(request, PlanReply)

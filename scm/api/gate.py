@@ -90,7 +90,8 @@ class Gate:
     """ASGI middleware: host, origin and key on the way in, security headers on the way out.
 
     A route finds in the scope whose request it is: `scm_role`, `scm_owner`, `scm_key`, and who
-    calls, in words: `scm_actor`; the stop also whether the store of keys said so just now: `scm_is_sure`.
+    calls, in words: `scm_actor`; the stop also whether the store of keys said so just now:
+    `scm_is_sure`.
     """
 
     def __init__(

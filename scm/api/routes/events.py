@@ -145,9 +145,7 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
         responses=answer(Acknowledged),
         dependencies=[OPERATOR],
     )
-    def acknowledge(
-        body: AcknowledgeBody, signer: Signer, key: IdempotencyKey = ""
-    ) -> Response:
+    def acknowledge(body: AcknowledgeBody, signer: Signer, key: IdempotencyKey = "") -> Response:
         acknowledged = seen.add(body.events, signer(body.by), body.note)
         return json_response(Acknowledged(acknowledgements=acknowledged))
 

@@ -41,7 +41,12 @@ _VERBS: dict[str, tuple[Verb, str]] = {
     "omits": ("omit", "Omit groups: they are not begun"),
     "preempts": ("preempt", "Pre-empt for one group: it comes next and stays"),
 }
-By = Annotated[str, Field(max_length=64, description="who asks, for the log; empty: whoever calls", examples=["ada"])]
+By = Annotated[
+    str,
+    Field(
+        max_length=64, description="who asks, for the log; empty: whoever calls", examples=["ada"]
+    ),
+]
 Reason = Annotated[str, Field(max_length=500, description="why", examples=["school is out"])]
 ExpiresS = Annotated[
     float,

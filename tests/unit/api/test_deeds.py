@@ -12,7 +12,7 @@ from scm.clock import StepClock
 from scm.part import Serves
 from scm.registry import names
 from scm.station import Station
-from scm.store.audit import AuditLog, Deed
+from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.exchange import Answer, Call
@@ -47,7 +47,9 @@ EXAMPLES = {
 
 
 def test_every_request_that_has_an_effect_is_said_in_words():
-    modules = [importlib.import_module(f"scm.v2x.messages.{one}") for one in names("scm.v2x.messages")]
+    modules = [
+        importlib.import_module(f"scm.v2x.messages.{one}") for one in names("scm.v2x.messages")
+    ]
     kinds = [module.MESSAGE for module in modules if issubclass(module.MESSAGE, Request)]
     assert {kind.__name__ for kind in kinds if kind.HAS_EFFECT} == set(EXAMPLES)
     words = Words({})
@@ -138,8 +140,15 @@ def test_a_part_notes_who_sent_a_request_not_whom_it_concerns(store, request_, b
     network = MemoryNetwork(StepClock(0))
     station = Station(Door(), network.bus("city", "world"), Keeper(store, "world", "s"))
     network.bus("city", "api").call(Call(request_), print)
-    station.send(Answer(item, CityStop(t_ns=1, engaged=True) if isinstance(request_, StopRequest)
-                        else RemoveReply(vehicle="n9")) for item in station.inbox())
+    station.send(
+        Answer(
+            item,
+            CityStop(t_ns=1, engaged=True)
+            if isinstance(request_, StopRequest)
+            else RemoveReply(vehicle="n9"),
+        )
+        for item in station.inbox()
+    )
     assert asked_by(store) == [by]
 
 

@@ -32,8 +32,9 @@ def folded(tmp_path_factory):
         told = json.dumps(sorted(events, key=lambda one: -one["t_ns"]))
         command = [NODE, "--input-type=module", "-e", ASK + SHOW]
         return json.loads(
-            subprocess.run(command, cwd=folder, input=told, capture_output=True, check=True, text=True)
-            .stdout
+            subprocess.run(
+                command, cwd=folder, input=told, capture_output=True, check=True, text=True
+            ).stdout
         )
 
     return fold
