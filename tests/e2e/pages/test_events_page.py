@@ -130,7 +130,7 @@ def test_the_audit_names_who_did_what_and_its_chain_is_whole(visit, running):
     page.select_option("select[aria-label='Done by']", "")
     refused = running.web.put("/stop", json={"engaged": "perhaps"})
     page.fill("input[aria-label='Find in deeds']", refused.headers["trace-id"])
-    page.wait_for_selector(".at-events [data-deed]:has-text('engage or release') .warn >> text=422 in")
+    page.wait_for_selector(".at-events [data-deed]:has-text('engage or') .warn >> text=422 in")
     page.click("text=Check the chain")
     page.wait_for_selector(".chain >> text=whole:")
 
