@@ -1,4 +1,4 @@
-"""Events of one kind are one row on the events page; nothing is dropped, no error is hidden."""
+"""What the pages' scripts work out: which events are one row, and where names stand beside cars."""
 
 import json
 import shutil
@@ -7,12 +7,11 @@ import subprocess
 import pytest
 
 from scm.api.dashboard import STATIC_DIR
+from scm.scenery.bodies import PAINT
 
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(NODE is None, reason="it runs the page's own script in Node.js")
-FOLDING = STATIC_DIR / "js/pages/events/folding.js"
-ASK = "import { folded } from './folding.mjs'; import { readFileSync } from 'node:fs';"
-SHOW = "console.log(JSON.stringify(folded(JSON.parse(readFileSync(0, 'utf8')))));"
+JS = STATIC_DIR / "js"
 
 
 def event(t_s, name="hard_braking", vehicle="n1", severity="warning", text="", source="observer"):
@@ -24,18 +23,29 @@ def event(t_s, name="hard_braking", vehicle="n1", severity="warning", text="", s
 
 
 @pytest.fixture(scope="module")
-def folded(tmp_path_factory):
+def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("script")
-    shutil.copy(FOLDING, folder / "folding.mjs")
 
-    def fold(events):
-        told = json.dumps(sorted(events, key=lambda one: -one["t_ns"]))
-        command = [NODE, "--input-type=module", "-e", ASK + SHOW]
-        return json.loads(
-            subprocess.run(
-                command, cwd=folder, input=told, capture_output=True, check=True, text=True
-            ).stdout
+    def run(script, function, *arguments):
+        """Return what a function of a page's script makes of its arguments."""
+        shutil.copy(JS / script, folder / "script.mjs")
+        ask = f"import {{ {function} }} from './script.mjs'; import {{ readFileSync }} from 'node:fs';"
+        show = f"console.log(JSON.stringify({function}(...JSON.parse(readFileSync(0, 'utf8')))));"
+        command = [NODE, "--input-type=module", "-e", ask + show]
+        given = json.dumps(arguments)
+        done = subprocess.run(
+            command, cwd=folder, input=given, capture_output=True, check=True, text=True
         )
+        return json.loads(done.stdout)
+
+    return run
+
+
+@pytest.fixture
+def folded(run):
+    def fold(events):
+        newest_first = sorted(events, key=lambda one: -one["t_ns"])
+        return run("pages/events/folding.js", "folded", newest_first)
 
     return fold
 
@@ -67,3 +77,24 @@ def test_what_is_about_no_car_is_folded_only_while_the_same_is_said(folded):
     assert [(group["newest"]["text"], len(group["events"])) for group in groups] == [
         ("stop", 1), ("go", 1), ("stop", 2),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("lamps", "place"),
+    [
+        ([], [100, 70]),
+        ([[95, 60, 110, 75]], [100, 130]),
+        ([[95, 60, 110, 75], [60, 120, 140, 140]], [150, 100]),
+        ([[0, 0, 200, 200]], [100, 70]),
+    ],
+)
+def test_a_name_stands_where_no_lamp_hides_it(run, lamps, place):
+    found = run("shared/car_shape.js", "placeOf", [100, 100], [50, 30], [20, 9], lamps)
+    assert found == place
+
+
+def test_a_car_has_one_colour_on_the_map_and_in_the_eyes_picture(run):
+    for kind, (blue, green, red) in PAINT.items():
+        light, _dark = run("shared/car_shape.js", "paintOf", kind, True)
+        assert light == f"#{red:02x}{green:02x}{blue:02x}"
+    assert run("shared/car_shape.js", "paintOf", "real", False)[0] == "#8a929c"
