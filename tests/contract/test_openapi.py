@@ -66,6 +66,10 @@ def test_the_audit_log_says_every_change_in_words(document):
         assert words.of(where, {}).startswith(summary[0].lower() + summary[1:]), where
 
 
+def test_it_does_not_name_the_map_to_who_has_no_key(document):
+    assert document["info"]["title"] == "Smart City Manager"
+
+
 def test_every_application_of_a_process_describes_itself_alike(document):
     assert described_anew() == document
 
