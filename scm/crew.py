@@ -1,16 +1,16 @@
 """Processes that should be there: started, watched by their presence on the bus, restarted.
 
-A member is up when its presence appears. What dies is started again, later each time, until it has
-died too often; what ends by itself without complaint (exit code 0) or says that its input is bad
-(exit code 2) is left alone. A part that was up had good input: what it found bad later, a full
-disk, may be mended. Nothing here prints: what a person should know goes through `say`.
+A member is up when its presence appears. What dies is started again, after a pause that doubles
+with each death in a row, up to half a minute, for as long as the city runs: what kills a recorder
+ten times, a full disk, may be repaired. What ends by itself without complaint (exit code 0) or says
+at its first start that its input is bad (exit code 2) is left alone. Nothing here prints: what a
+person should know goes through `say`.
 """
 
 import os
 import signal
 import subprocess
 import threading
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -18,8 +18,10 @@ from scm.clock import NS_PER_MS, NS_PER_S, Clock, seconds
 from scm.parent_watch import with_parent
 from scm.v2x.messages.presence import Presence
 
-RESTARTS_A_MINUTE = 5
 FIRST_PAUSE_NS = 250 * NS_PER_MS
+LONGEST_PAUSE_NS = 30 * NS_PER_S
+STEADY_NS = 60 * NS_PER_S  # who ran so long did not die in a row
+MANY_DEATHS = 5  # in a row: the city is called settled without that member
 STOP_NS = 1500 * NS_PER_MS
 LAST_STOP_NS = 1000 * NS_PER_MS
 SLOW_NS, SLOW_AGAIN_NS = 4 * NS_PER_S, 15 * NS_PER_S
@@ -51,14 +53,14 @@ class Job:
 
 @dataclass
 class Member:
-    """A job and the process that does it now."""
+    """A job and the process that does it now; `deaths` counts those in a row."""
 
     job: Job
     process: subprocess.Popen[bytes] | None = None
     sessions: set[str] = field(default_factory=set)
     started_ns: int = 0
     due_ns: int | None = 0
-    died_ns: deque[int] = field(default_factory=lambda: deque(maxlen=RESTARTS_A_MINUTE + 1))
+    deaths: int = 0
     silent_ns: int | None = None
     was_up: bool = False
     told_gone: bool = False
@@ -85,8 +87,8 @@ class Crew:
 
     @property
     def settled(self) -> bool:
-        """Whether everybody is up, or given up."""
-        return all(m.is_up or m.is_done for m in self.members.values())
+        """Whether nobody is waited for any more: all are up, done, or die again and again."""
+        return all(m.is_up or m.is_done or m.deaths > MANY_DEATHS for m in self.members.values())
 
     def heard(self, presence: Presence) -> None:
         """Note that a station came or went."""
@@ -170,16 +172,14 @@ class Crew:
             self._say(f"  {name:<12} left")
             return
         how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        member.died_ns.append(now_ns)
-        recent = sum(now_ns - t < 60 * NS_PER_S for t in member.died_ns)
-        is_bad = code == BAD_INPUT and not (member.was_up and member.job.role == "part")
-        if is_bad or recent > RESTARTS_A_MINUTE:
-            why = "its input is bad" if is_bad else f"{recent} times within a minute"
-            self._say(f"  {name:<12} died {how}: {why}; it is not started again")
+        member.deaths = 1 if now_ns - member.started_ns > STEADY_NS else member.deaths + 1
+        if code == BAD_INPUT and not (member.was_up and member.job.role == "part"):
+            self._say(f"  {name:<12} died {how}: its input is bad; it is not started again")
             return
-        pause_ns = FIRST_PAUSE_NS * 2 ** (recent - 1)
+        pause_ns = min(FIRST_PAUSE_NS * 2 ** min(member.deaths - 1, 10), LONGEST_PAUSE_NS)
         member.due_ns = now_ns + pause_ns
-        self._say(f"  {name:<12} died {how}: starts again in {seconds(pause_ns):g} s")
+        often = f", {member.deaths} times in a row" if member.deaths > 1 else ""
+        self._say(f"  {name:<12} died {how}{often}: starts again in {seconds(pause_ns):g} s")
 
     def stop(self) -> None:
         """Ask everybody to stop, the last ones last, and end what is left after 1.5 s."""

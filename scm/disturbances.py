@@ -30,6 +30,9 @@ LATE_AFTER, CALM_AFTER = 3, 5  # reports in a row: a second alone is no news
 VOID_SHARE = 0.01  # of a trip's time
 NEEDED = ("world", "traffic", "monitor")
 DEPTH = 1000
+OVERLOAD = "overload"  # the monitor's word for a computer that is too busy
+RESET = "A person resets the monitor, on the signals page."
+COSTLY = ("eye", "camera", "record")  # parts that a city can do without, the costliest first
 
 Kind = Literal["flash", "monitor", "silent", "part_lost", "late"]
 
@@ -42,6 +45,7 @@ class Disturbance(msgspec.Struct, kw_only=True, frozen=True):
         start_ns: When it began, on the clock of whoever reports it.
         end_ns: When it was over; None: it lasts.
         text: What is wrong, as a clause: `the signals of crossing flash`.
+        advice: What a person can do, in a sentence; empty: nothing.
     """
 
     kind: Kind
@@ -49,6 +53,7 @@ class Disturbance(msgspec.Struct, kw_only=True, frozen=True):
     start_ns: int
     end_ns: int | None = None
     text: str
+    advice: str = ""
 
     def within_ns(self, start_ns: int, end_ns: int) -> int:
         """Return how long it lasted within a span [ns]."""
@@ -149,7 +154,8 @@ class Disturbances:
         else:
             why = f"{status.fault}: {status.detail}"
             text = f"the monitor of {status.junction} reports {why}"
-            self._begin("monitor", status.junction, status.since_ns, text)
+            advice = _for_a_slow_computer() if status.fault == OVERLOAD else RESET
+            self._begin("monitor", status.junction, status.since_ns, text, advice)
 
     def _hear_world(self, status: PartStatus) -> None:
         """Note how much time the world did not simulate since its last report."""
@@ -172,8 +178,18 @@ class Disturbances:
             self._end("late", "world", self._since_ns)
         elif not is_known and self._in_a_row >= LATE_AFTER:
             self._in_a_row = 0
-            text = f"this computer simulates {1.0 - lost_ns / passed_ns:.2f} s of each second"
-            self._begin("late", "world", self._since_ns, text)
+            share = 1.0 - lost_ns / passed_ns
+            cars = f"{status.cars} cars" if status.cars != 1 else "1 car"
+            text = (
+                f"this computer is too slow for {cars}: it simulates {share:.2f} s of each second"
+            )
+            self._begin(
+                "late",
+                "world",
+                self._since_ns,
+                text,
+                _for_a_slow_computer(int(share * status.cars)),
+            )
 
     def _hear_presence(self, presence: Presence, arrived_ns: int) -> None:
         station = presence.station
@@ -189,9 +205,9 @@ class Disturbances:
         else:
             self._begin("part_lost", station, arrived_ns, f"the part {station} is gone")
 
-    def _begin(self, kind: Kind, source: str, start_ns: int, text: str) -> None:
+    def _begin(self, kind: Kind, source: str, start_ns: int, text: str, advice: str = "") -> None:
         if (kind, source) not in self._open:
-            one = Disturbance(kind=kind, source=source, start_ns=start_ns, text=text)
+            one = Disturbance(kind=kind, source=source, start_ns=start_ns, text=text, advice=advice)
             self._open[kind, source] = one
             self._news.append(one)
 
@@ -202,6 +218,13 @@ class Disturbances:
             self._over.append(over)
             self._calm_since_ns = max(self._calm_since_ns, end_ns)
             self._news.append(over)
+
+
+def _for_a_slow_computer(cars: int = 0) -> str:
+    """Return what to do on a slow computer; `cars`: how many it may manage, 0: unknown."""
+    fewer = f"with at most {cars} cars" if cars else "with fewer cars"
+    parts = f"without parts that cost much (`scm up --without {','.join(COSTLY)}`)"
+    return f"Start the city again {fewer} (`--hosted`, `--agents`), or {parts}."
 
 
 def _overlap_ns(first_ns: int, last_ns: int, start_ns: int, end_ns: int) -> int:

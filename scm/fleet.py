@@ -21,6 +21,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+import msgspec
+
+from scm.caller import program_name
 from scm.clock import WallClock, seconds
 from scm.disturbances import HEARS, Disturbance, Disturbances
 from scm.errors import RunError, ScmError, VoidError, nearest
@@ -130,7 +133,8 @@ class LiveLink:
 
     def ask(self, request: Request) -> Message:
         """Wait for the reply."""
-        return ask(self._bus, request, ASK_S)
+        signed = msgspec.structs.replace(request, actor=request.actor or program_name())
+        return ask(self._bus, signed, ASK_S)
 
     def hear(self, hears: Hears, keep: Keep | None = None) -> Mailbox:
         """Return a mailbox subscribed on the bus."""
@@ -262,11 +266,9 @@ class City:
         self.cars.append(spawned)
         return spawned
 
-    def use_plan(
-        self, plan: str, *, junction: str = "crossing", reason: str = "script"
-    ) -> PlanReply:
+    def use_plan(self, plan: str, *, junction: str = "crossing", reason: str = "") -> PlanReply:
         """Ask for a signal plan; the kernel takes it at the next safe moment."""
-        request = PlanRequest(junction=junction, plan=plan, by="script", reason=reason)
+        request = PlanRequest(junction=junction, plan=plan, by=program_name(), reason=reason)
         return self.request(request, PlanReply)
 
     @property
@@ -359,7 +361,7 @@ class City:
 
     def remove(self, car: FleetCar) -> None:
         """Take a car that the script has spawned off the map."""
-        self.request(RemoveRequest(vehicle=car.name, reason="script"), Message)
+        self.request(RemoveRequest(vehicle=car.name, reason=f"{program_name()} is done"), Message)
         self.cars.remove(car)
         self._may_arrive.pop(car.name, None)
 

@@ -86,6 +86,7 @@ class _Loop:
         self._clock = clock
         self.due_ns = begin_ns
         self._status_due_ns = self.due_ns + NS_PER_S
+        self._steps = 0
         self._late_steps = 0
         self._slowest_ns = 0
         self._is_first = True
@@ -102,6 +103,7 @@ class _Loop:
             gc.collect()
             gc.freeze()  # what is there by now stays: to walk over it again makes steps late
         overdue = (began_ns - self.due_ns) // self._part.period_ns
+        self._steps += 1
         self._late_steps += overdue
         self.due_ns += (overdue + 1) * self._part.period_ns
 
@@ -118,6 +120,7 @@ class _Loop:
         status = msgspec.structs.replace(
             status,
             step_ms=self._slowest_ns / NS_PER_MS,
+            steps=self._steps,
             late_steps=self._late_steps,
             dropped=self._station.dropped,
         )

@@ -8,6 +8,7 @@ the audit log are stored.
 
 import logging
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import cast
 
 import msgspec
@@ -31,6 +32,7 @@ DEPTH = {
     Delivery.PRESENCE: 1024,
 }
 RAW_DEPTH = 16384
+MAX_ACTOR = 128  # characters of a sender's name that the audit log keeps
 
 _log = logging.getLogger(__name__)
 
@@ -121,7 +123,7 @@ class Station:
         answers: list[Answer] = []
         for item in outgoing:
             if isinstance(item, Call):
-                self._bus.call(item, self._replies.put)
+                self._bus.call(self._signed(item), self._replies.put)
             elif isinstance(item, Answer):
                 self._log_traced(item)
                 if self._keeper is None:
@@ -171,6 +173,13 @@ class Station:
             for answer in answers:
                 self._settle(answer)
 
+    def _signed(self, call: Call) -> Call:
+        """Return a call whose request says who asks, this part where it names nobody itself."""
+        request = call.request
+        if not request.HAS_EFFECT or request.actor or _named(request):
+            return call
+        return replace(call, request=msgspec.structs.replace(request, actor=self._part.name))
+
     def _log_traced(self, answer: Answer) -> None:
         """Say in the log what became of a request that somebody traces."""
         request = cast("Request", answer.to.message)
@@ -180,12 +189,11 @@ class Station:
 
     def _deed(self, answer: Answer) -> Deed:
         request = cast("Request", answer.to.message)
-        by = getattr(request, "by", "") or getattr(request, "owner", "")
         return Deed(
             t_ns=answer.to.t_ns,
             station=self._part.name,
             kind=type(request).__name__,
-            by=str(by),
+            by=_asked_by(request),
             request_id=request.request_id,
             request=msgspec.Raw(encode(request)[0]),
             reply=msgspec.Raw(encode(answer.reply)[0]),
@@ -205,6 +213,19 @@ class Station:
 
 def _is_request(item: Incoming) -> bool:
     return isinstance(item.message, Request) and item.call is None
+
+
+def _named(request: Request) -> str:
+    """Return who asks in the request's own words; empty: it does not say."""
+    return str(getattr(request, "by", "") or getattr(request, "owner", ""))
+
+
+def _asked_by(request: Request) -> str:
+    """Return who asks, for the audit: whom the request names, and who sent it if that differs."""
+    named, actor = _named(request), request.actor[:MAX_ACTOR]
+    if not (named and actor):
+        return named or actor
+    return actor if named in actor else f"{named} ({actor})"
 
 
 def _has_effect(item: Incoming) -> bool:

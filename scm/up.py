@@ -11,7 +11,7 @@ from pathlib import Path
 from scm.clock import NS_PER_MS, WallClock, seconds
 from scm.crew import Crew, Job, Say
 from scm.disturbances import HEARS, Disturbance, Disturbances
-from scm.errors import RunError
+from scm.errors import RunError, nearest
 from scm.eye.station import eye_station
 from scm.live import stop_on_signal
 from scm.maps.load import is_scan, load_map
@@ -29,6 +29,14 @@ from scm.v2x.router import DEFAULT_ENDPOINT, Router, free_endpoint
 HOST = "127.0.0.1"
 SCM = (sys.executable, "-m", "scm")
 MOST_RECORDED = 50  # hosted cars whose own messages are recorded: more would be nearly all of it
+OPTIONAL = {
+    "eye": "no poses from overhead cameras: real cars stand, and it checks no claims",
+    "camera": "no pictures from cars' own cameras",
+    "record": "no recording: nothing to replay or to search for a mismatch",
+    "observer": "no traffic counts, no delays, no list of who breaks the rules",
+    "misbehaviour": "nobody checks what cars claim on the air",
+}
+"""Parts that a city can do without, and what is missing then."""
 LOOK_EVERY_NS = 50 * NS_PER_MS
 
 _say_now: Say = partial(print, flush=True)
@@ -60,6 +68,7 @@ class Wanted:
         trust_proxy: Proxies whose X-Forwarded-For the server believes.
         ros2: Whether ROS 2 nodes shall see the city.
         demand: Table of who wants to drive from where to where; None: nobody else comes.
+        without: Parts to leave out, of `OPTIONAL`.
         radio: What the air does in the place of what the map says, `key=value` each.
     """
 
@@ -82,6 +91,7 @@ class Wanted:
     trust_proxy: tuple[str, ...] = ()
     ros2: bool = False
     demand: Path | None = None
+    without: tuple[str, ...] = ()
     radio: tuple[str, ...] = ()
 
 
@@ -121,6 +131,8 @@ def run_city(wanted: Wanted, say: Say = _say_now) -> int:
         say(f"scm: city {wanted.city!r} on map {wanted.map_name!r}, bus {router.listen}")
         if plan.scan:
             say(f"  {plan.scan}")
+        for name in wanted.without:
+            say(f"  {name:<12} left out: {OPTIONAL[name]}")
         _watch(plan, bus, say)
     if plan.recording.exists():
         say(f"recorded in {plan.recording}")
@@ -175,6 +187,14 @@ def _check_counts(wanted: Wanted, places: int) -> None:
         raise RunError(msg)
     for name in cars:
         check_name(name, "cameras_of")
+    for name in wanted.without:
+        if name not in OPTIONAL:
+            expected = f"expected any of {', '.join(OPTIONAL)}{nearest(name, OPTIONAL)}"
+            msg = f"without: got {name!r}, {expected}; every other part is needed"
+            raise RunError(msg)
+    if hz and "record" in wanted.without:
+        msg = "without: got record with --cameras-hz, which records pictures; expected one of both"
+        raise RunError(msg)
 
 
 def _make_folder(folder: Path) -> None:
@@ -192,7 +212,7 @@ def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
     stop = stop_on_signal()
     for kind in HEARS:
         bus.subscribe(kind, {}, heard)
-    is_ready = False
+    is_ready, advised = False, set[str]()
     try:
         while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, stop):
             crew.look()
@@ -203,7 +223,7 @@ def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
             disturbances.look(clock.now_ns())
             for one in disturbances.news():
                 if is_ready:  # parts that start are late, and are not all there
-                    _say_disturbance(one, say)
+                    _say_disturbance(one, say, advised)
             if crew.settled and not is_ready:
                 is_ready = True
                 _tell_next(plan, say)
@@ -212,9 +232,13 @@ def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
         crew.stop()
 
 
-def _say_disturbance(one: Disturbance, say: Say) -> None:
+def _say_disturbance(one: Disturbance, say: Say, advised: set[str]) -> None:
+    """Say what began or is over; what to do is said once for each kind of it."""
     if one.end_ns is None:
         say(f"  {'warning':<12} {one.text}: trips meanwhile are void")
+        if one.advice and one.kind not in advised:
+            advised.add(one.kind)
+            say(f"  {'do this':<12} {one.advice}")
     else:
         lasted_s = seconds(one.end_ns - one.start_ns)
         say(f"  {'over':<12} after {lasted_s:.1f} s: {one.text}")
@@ -264,22 +288,25 @@ def _parts(plan: _Plan) -> list[Job]:
         part("camera", "cars' own cameras, rendered while somebody looks"),
         part("observer", "counts, delays, and who breaks the rules"),
         part("misbehaviour", "doubts what cars claim on the air"),
-        part("api", "REST, event stream, dashboard", *_web(plan), *kept),
     ]
     if plan.wanted.demand is not None:
         jobs.append(demand(plan.wanted.demand))
     if plan.wanted.ros2:
         jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))
-    return jobs
+    left = plan.wanted.without
+    jobs = [job for job in jobs if ("eye" if job.name in plan.eyes else job.name) not in left]
+    web = _web(plan, [job.name for job in jobs])
+    return [*jobs, part("api", "REST, event stream, dashboard", *web, *kept)]
 
 
-def _web(plan: _Plan) -> Sequence[str]:
-    """Return where the server is found, who may call it, and what it shows."""
+def _web(plan: _Plan, parts: Sequence[str]) -> Sequence[str]:
+    """Return where the server is found, who may call it, what it shows, and who should be there."""
     wanted, own = plan.wanted, plan.guard.files.get(SCRIPT)
     words = ["--host", wanted.host, "--port", str(plan.port), "--data", str(wanted.record_dir)]
     words += ["--base", wanted.base] if wanted.base else []
     words += [word for one in wanted.trust_proxy for word in ("--trust-proxy", one)]
     words += [word for one in wanted.origin for word in ("--origin", one)]
+    words += [word for name in parts for word in ("--expects", name)]
     words += ["--keys", wanted.keys] if wanted.keys is not None else []
     return [*words, *(("--script-credentials", str(own)) if own is not None else ())]
 

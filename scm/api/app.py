@@ -16,6 +16,7 @@ from scm.api.body_limit import Bounded
 from scm.api.calibration_desk import LARGEST_PICTURE
 from scm.api.city import Ask, City, Link
 from scm.api.dashboard import Dashboard, astray, index_text
+from scm.api.deeds import Words
 from scm.api.gate import Gate, content_policy
 from scm.api.head import Headed
 from scm.api.idempotency import Idempotent
@@ -116,7 +117,7 @@ def create_app(
         clock=clock,
     )
     app = FastAPI(
-        title=f"scm {city_map.name}",
+        title="Smart City Manager",  # who has no key reads this: it does not name the map
         version="1",
         docs_url=None,  # its page loads from a CDN: ours is static/docs.html
         redoc_url=None,
@@ -132,10 +133,15 @@ def create_app(
     problem.install(app)
     openapi.install(app)
     _add_layers(app, desk, clock, site)
-    for noun in (*desk.of_the_city(), *desk.live(), *desk.of_the_server()):
-        app.include_router(noun, prefix="/api/v1", responses=problem.RESPONSES)
-    for noun in (health.router(desk.city), ngsi.router(desk.city), metrics.router(desk.metrics)):
-        app.include_router(noun, responses=problem.RESPONSES)
+    city = desk.city
+    nouns = {
+        "/api/v1": (*desk.of_the_city(), *desk.live(), *desk.of_the_server()),
+        "": (health.router(city), ngsi.router(city), metrics.router(desk.metrics)),
+    }
+    for prefix, routers in nouns.items():
+        for noun in routers:
+            app.include_router(noun, prefix=prefix, responses=problem.RESPONSES)
+    app.state.words = Words(nouns)
     return app
 
 

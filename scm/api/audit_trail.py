@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from scm.api.deeds import Words
 from scm.api.event_log import as_read
 from scm.api.idempotency import CHANGES
 from scm.api.trace import trace_id
@@ -38,7 +39,8 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
         station: Who did it: `world`, `traffic`, `api`.
         kind: The request's class, or method and path of a call of the web; `unreadable`: what
             stands there is no entry.
-        by: Who asked.
+        text: What was done, in words.
+        by: Who asked: the owner of the API key, the program that called, the part.
         request_id: Id of the request; empty: it had none.
         trace_id: Of what led to it: the call of the web and what the city did for it have the same;
             empty: nobody traced it.
@@ -49,6 +51,7 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
     t_ns: int
     station: str
     kind: str
+    text: str
     by: str
     request_id: str
     trace_id: str
@@ -81,7 +84,7 @@ class AuditFilter(msgspec.Struct, kw_only=True, frozen=True):
         )
 
 
-def newest_first(store: Repository) -> Iterator[AuditRow]:
+def newest_first(store: Repository, words: Words) -> Iterator[AuditRow]:
     """Yield deeds newest first, at most `MOST_LOOKED_AT`."""
     log = AuditLog(store)
     last = log.head().number
@@ -92,7 +95,7 @@ def newest_first(store: Repository) -> Iterator[AuditRow]:
         for at, deed in log.deeds(start):
             if at > last:
                 break
-            block.append(_row(at, deed))
+            block.append(_row(at, deed, words))
         yield from reversed(block)
         last = start
 
@@ -157,7 +160,7 @@ def _deed(scope: Scope, status: int, received: int, began_ns: int, ended_ns: int
         t_ns=began_ns,
         station=STATION,
         kind=f"{scope['method']} {scope['path']}"[:300],
-        by=str(scope.get("scm_owner", "")),
+        by=str(scope.get("scm_actor", "")),
         request_id=headers.get(b"idempotency-key", b"").decode("latin-1")[:128],
         request=_raw(asked),
         reply=_raw(done),
@@ -168,19 +171,25 @@ def _raw(body: object) -> msgspec.Raw:
     return msgspec.Raw(msgspec.json.encode(body))
 
 
-def _row(number: int, deed: Deed) -> AuditRow:
+def _row(number: int, deed: Deed, words: Words) -> AuditRow:
     request = _object(deed.request)
     return AuditRow(
         number=number,
         t_ns=deed.t_ns,
         station=deed.station,
         kind=deed.kind,
-        by=deed.by,
+        text=words.of(deed.kind, request),
+        by=deed.by or _self_named(deed.kind, request),
         request_id=deed.request_id,
         trace_id=str(request.get("trace_id", "")),
         request=request,
         reply=_object(deed.reply),
     )
+
+
+def _self_named(kind: str, request: dict[str, Any]) -> str:
+    """Return who asked where an older city noted nobody: a car that joins asks for itself."""
+    return str(request.get("vehicle", "")) if kind == "JoinRequest" else ""
 
 
 def _object(raw: msgspec.Raw) -> dict[str, Any]:

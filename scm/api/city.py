@@ -48,6 +48,7 @@ class Link:
         script_credentials: File of who those scripts are; None: the city asks nobody.
         words: What tells a program of ours where the bus is and who it is there; empty: such a
             program cannot reach the city.
+        parts: Those that should be there, by name.
         map_file: Name or path of the map, as other programs are told it; empty: its own name.
     """
 
@@ -59,6 +60,7 @@ class Link:
     connect: str = ""
     script_credentials: FilePath | None = None
     words: Sequence[str] = ()
+    parts: Sequence[str] = ()
     map_file: str = ""
 
 

@@ -29,6 +29,7 @@ from scm.api.brake import REFILL_PER_S, Brake
 from scm.api.keys import KeyRing
 from scm.api.known_keys import Known, KnownKeys
 from scm.api.problem import problem
+from scm.api.trace import acting
 from scm.clock import NS_PER_S, Clock, WallClock
 from scm.errors import RunError, StoreError
 from scm.log import event
@@ -42,6 +43,8 @@ OPEN = frozenset({"/api/v1/openapi.json"})
 STOP = "/api/v1/stop"
 RETRY_S = str(math.ceil(1.0 / REFILL_PER_S))
 KEY_LOOKED_NS = NS_PER_S
+DASHBOARD = "dashboard"
+MAX_PROGRAM = 64  # characters of a program's name
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _INLINE_SCRIPT = re.compile(r"<script(?![^>]*\bsrc=)[^>]*>(.*?)</script>", re.DOTALL)
 
@@ -86,8 +89,9 @@ def content_policy(page: str) -> str:
 class Gate:
     """ASGI middleware: host, origin and key on the way in, security headers on the way out.
 
-    A route finds in the scope whose request it is: `scm_role`, `scm_owner`, `scm_key`; the stop
-    also whether the store of keys said so just now: `scm_is_sure`.
+    A route finds in the scope whose request it is: `scm_role`, `scm_owner`, `scm_key`, and who
+    calls, in words: `scm_actor`; the stop also whether the store of keys said so just now:
+    `scm_is_sure`.
     """
 
     def __init__(
@@ -139,6 +143,11 @@ class Gate:
 
     async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request in; end an answer without end when its key ends."""
+        scope["scm_actor"] = _actor_of(scope)
+        with acting(scope["scm_actor"]):
+            await self._pass_while_known(scope, receive, send)
+
+    async def _pass_while_known(self, scope: Scope, receive: Receive, send: Send) -> None:
         key = str(scope.get("scm_key", ""))
         if self._keys is None or scope["type"] != "http" or not key:
             await self._app(scope, receive, send)
@@ -242,6 +251,23 @@ def caller_of(scope: Scope) -> str:
     """Return what tells a caller from others: the public part of its key, or its address."""
     key = str(scope.get("scm_key", ""))
     return key.split("_")[1] if key.count("_") > 1 else _address(scope)
+
+
+def _actor_of(scope: Scope) -> str:
+    """Return who calls, for the audit: the owner of its key and its program, where that is known.
+
+    A page of ours is the `dashboard`; a program is called as it calls itself in `User-Agent`.
+    """
+    headers = Headers(scope=scope)
+    if "origin" in headers or "sec-fetch-mode" in headers:
+        program = DASHBOARD
+    else:
+        given = re.split(r"[/ ]", headers.get("user-agent", ""), maxsplit=1)[0]
+        program = re.sub(r"[^\w.+-]", "_", given)[:MAX_PROGRAM] or "an unnamed program"
+    if not scope.get("scm_key"):
+        return program
+    owner = str(scope["scm_owner"])
+    return owner if program == DASHBOARD else f"{owner} ({program})"
 
 
 def _key_of(headers: Headers, *, with_cookie: bool) -> str:

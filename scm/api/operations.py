@@ -6,6 +6,7 @@ kind runs one at a time, in the order of asking.
 
 import itertools
 import logging
+import re
 import threading
 from collections import OrderedDict, deque
 from collections.abc import Callable
@@ -25,6 +26,11 @@ _LOGGER = logging.getLogger(__name__)
 KEPT = 200
 MOST_WAITING = 20
 
+# A quoted path may hold spaces. `km/h` and `http://host/x` are no paths, `/api/...` is an address.
+_PATH = re.compile(
+    r"""(?<=')/(?!api/)(?:[^/'\n]+/)*(?P<quoted>[^/'\n]*)(?=')"""
+    r"""|(?<![\w/.:~-])/(?!api/)(?:[^\s/'",;:()]+/)+(?P<plain>[^\s/'",;:()]*)"""
+)
 State = Literal["waiting", "running", "done", "failed", "cancelled"]
 
 
@@ -155,7 +161,9 @@ class Operations:
         return self.find(name)
 
     def change(self, name: str, **changes: object) -> None:
-        """Change what is told of an operation."""
+        """Change what is told of an operation; where files lie on the server is not told."""
+        texts = {key: without_paths(str(changes[key])) for key in ("doing", "error") if key in changes}
+        changes |= texts
         with self._lock:
             row = self._rows.get(name)
             if row is not None:
@@ -205,6 +213,14 @@ class Operations:
                 return
             del self._rows[name]
             del self._cancels[name]
+
+
+def without_paths(text: str) -> str:
+    """Return a text whose absolute paths are the names of their files alone, but for our addresses.
+
+    Whoever may look at a job need not know how the server's folders are called: its log says that.
+    """
+    return _PATH.sub(lambda match: match["quoted"] or match["plain"] or "a folder", text)
 
 
 def accepted(row: Operation) -> Response:

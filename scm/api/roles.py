@@ -68,9 +68,11 @@ ADMIN = _at_least("admin")
 
 
 async def _signer(connection: HTTPConnection) -> Callable[[str], str]:
-    owner = str(connection.scope["scm_owner"]) if connection.scope["scm_key"] else ""
-    return lambda named: owner or named
+    scope = connection.scope
+    owner = str(scope["scm_owner"]) if scope["scm_key"] else ""
+    return lambda named: owner or named.strip() or str(scope["scm_actor"])
 
 
 Signer = Annotated[Callable[[str], str], Depends(_signer)]
-"""Who signs a deed, by whom its body names: with keys the key's owner, whatever the body says."""
+"""Who signs a deed, by whom its body names: with keys the key's owner, whatever the body says; else
+whom it names, or the program that calls."""

@@ -1,5 +1,7 @@
 """The table of stations: who is there, who was lost lately, and how each one says it does."""
 
+from collections import deque
+
 import msgspec
 
 from scm.clock import NS_PER_S, seconds
@@ -7,6 +9,7 @@ from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
 
 LOST_SHOWN_NS = 60 * NS_PER_S
+LATELY_NS = 60 * NS_PER_S
 _Key = tuple[str, str, str]
 
 
@@ -17,6 +20,10 @@ class StationRow(msgspec.Struct, kw_only=True, frozen=True):
         since_ns: When it was first seen here.
         lost_ns: When it left or died; None while it is there.
         age_s: Since its last status; None: it never sent one.
+        late_steps: Steps that were due and left out, since its start.
+        late_share: The same as a share of the steps due in the last minute; None: not known.
+        dropped: Messages that its mailboxes had to drop, since its start.
+        dropped_lately: The same within the last minute.
     """
 
     role: str
@@ -29,7 +36,9 @@ class StationRow(msgspec.Struct, kw_only=True, frozen=True):
     detail: str = ""
     step_ms: float = 0.0
     late_steps: int = 0
+    late_share: float | None = None
     dropped: int = 0
+    dropped_lately: int = 0
 
 
 class StationTable:
@@ -37,7 +46,7 @@ class StationTable:
 
     def __init__(self) -> None:
         self._rows: dict[_Key, StationRow] = {}
-        self._status: dict[str, tuple[PartStatus, int]] = {}
+        self._status: dict[str, deque[tuple[PartStatus, int]]] = {}
 
     def presence(self, seen: Presence, now_ns: int) -> None:
         """Note that a station came, or went."""
@@ -57,7 +66,12 @@ class StationTable:
 
     def status(self, status: PartStatus, now_ns: int) -> None:
         """Note what a station says of itself."""
-        self._status[status.station] = (status, now_ns)
+        told = self._status.setdefault(status.station, deque())
+        if told and (status.steps, status.dropped) < (told[-1][0].steps, told[-1][0].dropped):
+            told.clear()  # it was started again, and counts from nought
+        told.append((status, now_ns))
+        while len(told) > 2 and told[1][1] <= now_ns - LATELY_NS:
+            told.popleft()
 
     def forget(self, now_ns: int) -> None:
         """Drop those lost for more than 60 s, and what was last heard from them."""
@@ -65,8 +79,8 @@ class StationTable:
             if row.lost_ns is not None and now_ns - row.lost_ns > LOST_SHOWN_NS:
                 del self._rows[key]
         names = {row.name for row in self._rows.values()}
-        for name, (_, arrived_ns) in list(self._status.items()):
-            if name not in names and now_ns - arrived_ns > LOST_SHOWN_NS:
+        for name, told in list(self._status.items()):
+            if name not in names and now_ns - told[-1][1] > LOST_SHOWN_NS:
                 del self._status[name]
 
     def rows(self, now_ns: int) -> tuple[StationRow, ...]:
@@ -79,12 +93,20 @@ class StationTable:
     def _with_status(self, row: StationRow, now_ns: int) -> StationRow:
         if row.name not in self._status:
             return row
-        status, arrived_ns = self._status[row.name]
+        (first, _), (status, arrived_ns) = self._status[row.name][0], self._status[row.name][-1]
         return msgspec.structs.replace(
             row,
             age_s=round(seconds(now_ns - arrived_ns), 1),
             detail=status.detail,
             step_ms=round(status.step_ms, 2),
             late_steps=status.late_steps,
+            late_share=_late_share(first, status),
             dropped=status.dropped,
+            dropped_lately=status.dropped - first.dropped,
         )
+
+
+def _late_share(first: PartStatus, last: PartStatus) -> float | None:
+    """Return the share of the steps due between two reports that was left out."""
+    made, late = last.steps - first.steps, last.late_steps - first.late_steps
+    return round(late / (made + late), 3) if made > 0 and late >= 0 else None

@@ -9,6 +9,8 @@ in log and audit.
 import logging
 import re
 import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TypeVar
 from urllib.parse import quote
@@ -25,6 +27,7 @@ HEADER = "Trace-Id"
 _PARENT = re.compile(r"(?!ff)[0-9a-f]{2}-(?!0{32})([0-9a-f]{32})-(?!0{16})[0-9a-f]{16}-[0-9a-f]{2}")
 _LOGGER = logging.getLogger(__name__)
 _current: ContextVar[str] = ContextVar("trace_id", default="")
+_actor: ContextVar[str] = ContextVar("actor", default="")
 
 
 def trace_id() -> str:
@@ -39,8 +42,18 @@ def trace_id_of(traceparent: str) -> str:
 
 
 def traced(request: R) -> R:
-    """Return a request to the city with the trace of what is being answered."""
-    return msgspec.structs.replace(request, trace_id=trace_id())
+    """Return a request to the city with the trace of what is being answered, and its caller."""
+    return msgspec.structs.replace(request, trace_id=trace_id(), actor=_actor.get())
+
+
+@contextmanager
+def acting(actor: str) -> Iterator[None]:
+    """Note who calls, for all that is asked of the city meanwhile."""
+    token = _actor.set(actor)
+    try:
+        yield
+    finally:
+        _actor.reset(token)
 
 
 class Traced:

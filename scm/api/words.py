@@ -102,7 +102,7 @@ WORDS: dict[str, tuple[str, object]] = {
     "kind": ("Of which sort it is.", "hosted"),
     "lane": ("Name of a lane.", "east_loop"),
     "lanes": ("Lanes.", None),
-    "late_steps": ("Steps that began later than a period after they were due.", 0),
+    "late_steps": ("Steps that were due and left out, since its start.", 0),
     "late_ticks": ("Ticks of the world that ended after the next was due, since its start.", 0),
     "latency_ms": ("From exposure to being taken up [ms].", 41.5),
     "latitude": ("Of the enlarged city [1e-7 degree].", 823),

@@ -4,6 +4,7 @@ What only looks, and changes that carry an `Idempotency-Key`, are asked again wh
 lost or the server is busy: under one key an effect happens once.
 """
 
+import re
 import threading
 import uuid
 from collections.abc import Callable, Iterator, Mapping
@@ -17,6 +18,7 @@ from websockets.exceptions import InvalidHandshake, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from scm.caller import program_name
 from scm.client.key import key_of_environment
 from scm.client.stream import Lines, LiveEvent, events_of
 from scm.errors import LinkError, MessageError, ScmError
@@ -27,6 +29,7 @@ LONGEST_PAUSE_S = 5.0
 SILENT_S = 5.0
 AGAIN = frozenset({429, 502, 503, 504})
 CONFLICT = 409
+_PRODUCT = re.compile(r"[^\x21-\x2e\x30-\x7e]")  # what a product's name in a header cannot hold
 
 T = TypeVar("T")
 Values = Mapping[str, Any]
@@ -79,7 +82,8 @@ class Connection:
         transport: httpx.BaseTransport | None = None,
     ) -> None:
         given = key or key_of_environment()
-        headers = {"Authorization": f"Bearer {given}"} if given else {}
+        headers = {"User-Agent": f"{_PRODUCT.sub('_', program_name())} scm-client"}
+        headers |= {"Authorization": f"Bearer {given}"} if given else {}
         self._http = httpx.Client(
             base_url=url, headers=headers, timeout=timeout_s, transport=transport
         )
@@ -192,14 +196,16 @@ class Connection:
             ProblemError: when the city says no.
             LinkError: when it cannot be reached.
         """
-        url, key = self._http.base_url, self._http.headers.get("Authorization")
+        url, own = self._http.base_url, self._http.headers
+        headers = {name: own[name] for name in ("User-Agent", "Authorization") if name in own}
         address = url.copy_with(scheme={"https": "wss"}.get(url.scheme, "ws"))
         with ExitStack() as opened:
             try:
                 opening = connect(
                     str(address).rstrip("/") + path,
                     subprotocols=[Subprotocol(protocol)],
-                    additional_headers={"Authorization": key} if key else None,
+                    additional_headers=headers,
+                    user_agent_header=None,
                     open_timeout=self._timeout_s,
                     close_timeout=PAUSE_S,
                     max_queue=None,

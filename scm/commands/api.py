@@ -63,6 +63,13 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="folder of recordings; reports, scenarios, calibrations and plans lie below it",
     )
     parser.add_argument(
+        "--expects",
+        action="append",
+        default=[],
+        metavar="PART",
+        help="a part that should be there: /readyz says which are not",
+    )
+    parser.add_argument(
         "--script-credentials",
         metavar="FILE",
         type=Path,
@@ -90,6 +97,7 @@ def _link(arguments: argparse.Namespace, bus: "ZenohBus", wire: "BusWire") -> "L
         script_credentials=arguments.script_credentials,
         words=_at_bus(arguments),
         map_file=arguments.map,
+        parts=arguments.expects,
     )
 
 

@@ -60,6 +60,14 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="what the air does, instead of what the map says: loss=0.3; see docs/radio.md",
     )
+    parser.add_argument(
+        "--without",
+        type=lambda text: tuple(filter(None, text.split(","))),
+        default=(),
+        metavar="PARTS",
+        help="leave out parts, comma between, where the computer is too slow: "
+        "eye, camera, record, observer, misbehaviour; see docs/performance.md",
+    )
     parser.add_argument("--ros2", action="store_true", help="let ROS 2 nodes see the city")
 
 

@@ -23,6 +23,8 @@ from scm.recording.columns import Columns
 Table = Columns | Mapping[str, Floats]
 
 LONGEST = 1000
+SHOWN = 40  # characters of an expression that is refused for its size
+DEEPEST = 100  # levels: each costs Python some of its stack
 
 _BINARY: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
@@ -110,7 +112,26 @@ def _parsed(text: str, where: str) -> tuple[ast.expr, dict[str, str]]:
     except (SyntaxError, ValueError, MemoryError, RecursionError) as cause:
         msg = f"{where}: cannot read {text!r}: {getattr(cause, 'msg', None) or 'too deep'}"
         raise RecordingError(msg) from cause
+    if _is_deeper(tree.body, DEEPEST):
+        start = text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+        msg = (
+            f"{where}: {start!r} is nested more than {DEEPEST} levels deep (signs, brackets, terms "
+            f"of a sum); expected at most {DEEPEST}: split it over columns of the table"
+        )
+        raise RecordingError(msg)
     return tree.body, quoted
+
+
+def _is_deeper(tree: ast.expr, most: int) -> bool:
+    """Return whether a tree has more levels; level by level, so that no depth can break it."""
+    level: list[ast.AST] = [tree]
+    for _ in range(most):
+        level = [
+            part for node in level for part in ast.iter_child_nodes(node) if isinstance(part, ast.expr)
+        ]
+        if not level:
+            return False
+    return True
 
 
 def _name(node: ast.AST, quoted: dict[str, str]) -> str | None:

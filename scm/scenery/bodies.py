@@ -13,11 +13,12 @@ from scm.scenery.canvas import Colour, colour_of
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 from scm.vehicles.car_files import car_files
 
-PALETTE = tuple(
-    colour_of(text)
-    for text in ("#c23b32", "#2f6db3", "#d9a520", "#3d8b57", "#d2691e", "#7a4fa3", "#b8bec4",
-                 "#2a9d9a")
-)  # fmt: skip
+PAINT = {
+    kind: colour_of(text)
+    for kind, text in (("hosted", "#4c8df0"), ("remote", "#a97bf2"), ("real", "#f0a13c"))
+}
+"""Paint by kind of car, the same as on the dashboard's map (`car_shape.js`)."""
+LOST = colour_of("#8a929c")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +78,8 @@ def _value(values: dict[str, Any], key: str) -> Any:
 
 
 def colour_of_car(car: SnapshotVehicle) -> Colour:
-    """Return the paint of a car: its tag chooses it."""
-    return PALETTE[(car.tag_id - 1) % len(PALETTE)]
+    """Return the paint of a car: that of its kind; grey once it is lost."""
+    return PAINT.get(car.kind, PAINT["hosted"]) if car.alive else LOST
 
 
 def car_rotation(car: SnapshotVehicle) -> Floats:

@@ -33,6 +33,11 @@ MONITOR_SILENT_NS = 3_000 * NS_PER_MS
 SPATEM_EVERY_NS = 500 * NS_PER_MS
 MAPEM_EVERY_NS = 1_000 * NS_PER_MS
 EARLY_NS = STEP_NS // 2
+ENDS = {
+    "monitor": "the monitor reports no fault any more",
+    "silence": "the monitor is back",
+}
+"""Why a junction stops flashing, by what made it flash; a person says so."""
 
 Severity = Literal["info", "warning"]
 
@@ -183,7 +188,10 @@ class JunctionSignals:
     def _flash(self, reason: str, why: str, *, on: bool) -> None:
         if on and not self.controller.is_flashing:
             self._why_flash, self._why_restart = why, ""
+        was_flashing = self.controller.is_flashing
         self.controller.flash(reason, on=on)
+        if was_flashing and not self.controller.is_flashing:
+            self._why_restart = ENDS.get(reason, self._why_restart)
 
     def _on_air(self, spat: Spat) -> list[Outgoing]:
         station, now_ns = roadside_station(spat.junction), spat.t_ns

@@ -164,7 +164,7 @@ def key_of(request: Request) -> str:
 
 
 def _digest(request: Request) -> str:
-    untraced = msgspec.structs.replace(request, trace_id="")
+    untraced = msgspec.structs.replace(request, trace_id="", actor="")
     return hashlib.blake2b(encode(untraced)[0], digest_size=16).hexdigest()
 
 

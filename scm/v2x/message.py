@@ -56,6 +56,8 @@ class Request(Message, kw_only=True, frozen=True):
         request_id: Same id, same effect, once: a retry gets the stored answer. Empty: not retried.
         trace_id: W3C trace id of what led to it, a click perhaps; whoever does it notes that. It
             makes no difference to what is asked. Empty: nobody traces it.
+        actor: Who sends it, for the audit log: a station, a program, the owner of an API key. It
+            makes no difference to what is asked either. Empty: the request does not say.
         SERVER: Who answers it, for people; `{field}` words are fields of the message.
         HAS_EFFECT: Whether it changes anything: what does not is in no audit log.
     """
@@ -67,6 +69,7 @@ class Request(Message, kw_only=True, frozen=True):
 
     request_id: str = ""
     trace_id: str = ""
+    actor: str = ""
 
     @property
     def server(self) -> str:

@@ -65,6 +65,10 @@ def _verdict(world: World, status: MonitorStatus, now_ns: int) -> None:
 
 
 def _presence(world: World, presence: Presence, now_ns: int) -> None:
+    if presence.alive:
+        world.sessions[presence.session] = presence.station
+    else:
+        world.sessions.pop(presence.session, None)
     car = world.remote.get(presence.station)
     if car is None or presence.session != car.session:
         return

@@ -208,5 +208,5 @@ def _each_second(world: World, now_ns: int) -> list[Message]:
     lost = world.pace.lost_ns // NS_PER_MS
     detail = f"{count} car{'s' * (count != 1)}" + (f", {lost} ms of time lost" if lost else "")
     lost_s = seconds(world.pace.lost_ns)
-    status = PartStatus(station=NAME, t_ns=now_ns, detail=detail, lost_s=lost_s)
+    status = PartStatus(station=NAME, t_ns=now_ns, detail=detail, cars=count, lost_s=lost_s)
     return [status, world.stop] if world.stop.engaged else [status]

@@ -71,6 +71,10 @@ def _join(world: World, request: JoinRequest, now_ns: int) -> JoinReply:
     name, before = request.vehicle, world.remote.get(request.vehicle)
     if request.kind not in KINDS:
         raise _RefusedError("invalid", f"kind: got {request.kind!r}, expected remote or real")
+    owner = world.sessions.get(request.session, name)
+    if owner != name:
+        detail = f"session {request.session!r} is that of {owner}, expected that of {name}'s agent"
+        raise _RefusedError("owned", detail)
     if before is not None and before.session == request.session and before.alive:
         return _welcome(before, now_ns)
     if before is not None and not before.alive:

@@ -86,6 +86,7 @@ class World:
         impacts: What contacts add to the cars' accelerations in this tick.
         blows: What contacts did to hosted cars in this tick, for who watches.
         hosted: Cars simulated here, by name, in the order they came; likewise `remote`.
+        sessions: Of agents that are on the bus: the station of each.
         leased: Those of the hosted that somebody else drives.
         crowd: The drivers of the hosted cars, and what they hear over the radio.
         errands: Where these were sent.
@@ -151,6 +152,7 @@ class World:
         self.wishes = Wishes()
         self.hosted: dict[str, HostedCar] = {}
         self.remote: dict[str, RemoteCar] = {}
+        self.sessions: dict[str, str] = {}
         self.leased: dict[str, HostedCar] = {}
         self.pace = Pace(PERIOD_NS)
         self.every = {name: Every(rate_hz) for name, rate_hz in RATES_HZ.items()}

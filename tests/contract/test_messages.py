@@ -24,6 +24,8 @@ PLAIN_NUMBERS = {
     "tick": "a count",
     "late_ticks": "a count",
     "late_steps": "a count",
+    "steps": "a count",
+    "cars": "a count",
     "dropped": "a count",
     "beams": "a count",
     "laps": "a count",

@@ -12,9 +12,12 @@ SUCCESS = ("200", "201", "202", "204", "206")
 REFERENCE = "#/components/schemas/"
 
 
+def application():
+    return create_app(CityView(), lambda _request, _timeout_s: None, load_map("driving_school"))
+
+
 def described_anew():
-    app = create_app(CityView(), lambda _request, _timeout_s: None, load_map("driving_school"))
-    return app.openapi()
+    return application().openapi()
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +55,19 @@ def test_every_operation_says_what_it_does_and_whose_noun_it_is(document):
         if not (operation.get("summary") and len(operation.get("tags", ())) == 1)
     ]
     assert not wrong, said(wrong)
+
+
+def test_the_audit_log_says_every_change_in_words(document):
+    words = application().state.words
+    changes = [item for item in operations_of(document) if item[0].startswith(CHANGES)]
+    assert len(changes) > 40
+    for where, operation in changes:
+        summary = operation["summary"]
+        assert words.of(where, {}).startswith(summary[0].lower() + summary[1:]), where
+
+
+def test_it_does_not_name_the_map_to_who_has_no_key(document):
+    assert document["info"]["title"] == "Smart City Manager"
 
 
 def test_every_application_of_a_process_describes_itself_alike(document):

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from scm.clock import NS_PER_S, StepClock, WallClock, seconds
-from scm.crew import FIRST_PAUSE_NS, Crew, Job
+from scm.clock import NS_PER_S, WallClock, seconds
+from scm.crew import Crew, Job
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.city_event import CityEvent
@@ -223,21 +223,6 @@ def test_a_member_that_leaves_by_itself_is_let_go(supervise):
     toys = supervise(a="exit0")
     toys.until(lambda: toys.crew.settled)
     assert toys.said == ["  a            left"]
-
-
-def test_a_crew_gives_up_on_what_dies_again_and_again(supervise):
-    clock = StepClock()
-    toys = supervise(clock, a="exit1")
-
-    def look():
-        """Look, and let time go on only while nobody runs: the pauses cost none."""
-        toys.look()
-        if not toys.pids():
-            clock.set_ns(clock.now_ns() + FIRST_PAUSE_NS)
-
-    until(lambda: toys.crew.settled, 60.0, also=look)
-    assert len([line for line in toys.said if "starts again" in line]) == 5
-    assert "6 times within a minute; it is not started again" in toys.said[-1]
 
 
 def test_a_crew_is_stopped_within_two_seconds_even_if_one_does_not_listen(supervise):

@@ -41,6 +41,27 @@ def test_what_crashed_is_started_again_and_what_left_is_not():
         assert words in until_it_died(crew_of("part", code, said), said, up=False)
 
 
+def test_who_dies_again_and_again_comes_back_after_pauses_that_grow_to_half_a_minute():
+    said, clock = [], StepClock(0)
+    command = [sys.executable, "-c", "import signal; signal.raise_signal(signal.SIGKILL)"]
+    crew = Crew([Job("record", "part", "records", lambda: command)], clock, said.append)
+    pauses = []
+    for _ in range(10):
+        crew.look()
+        crew.members["record"].process.wait(timeout=60.0)
+        crew.look()
+        clock.set_ns(crew.members["record"].due_ns)
+        pauses.append(float(said[-1].split("again in ")[1].removesuffix(" s")))
+    assert pauses == [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0, 30.0]
+    assert "died by SIGKILL, 10 times in a row" in said[-1]
+    assert crew.settled, "the others need not wait for it"
+    crew.look()
+    crew.members["record"].process.wait(timeout=60.0)
+    clock.set_ns(clock.now_ns() + 61 * NS_PER_S)
+    crew.look()
+    assert said[-1].endswith("died by SIGKILL: starts again in 0.25 s"), "it had run for a minute"
+
+
 def test_a_link_that_was_lost_for_a_moment_is_no_news():
     said = []
     crew = crew_of("part", 0, said)

@@ -27,7 +27,7 @@ def spat(time_s, mode="plan"):
 
 
 def world(time_s, lost_s):
-    return PartStatus(station="world", t_ns=ns(time_s), lost_s=lost_s)
+    return PartStatus(station="world", t_ns=ns(time_s), cars=6, lost_s=lost_s)
 
 
 def heard(*messages, look_s=None):
@@ -116,7 +116,12 @@ def test_a_world_that_is_late_voids_by_how_much_of_the_trip_was_lost():
     assert watch.void_reasons(ns(2), ns(10)) == ()
     assert watch.void_reasons(ns(2), ns(52)) == ()  # 0.8 % of it
     watch.hear(Incoming(world(13, 0.6), ns(13)))
-    assert texts(watch) == ["this computer simulates 0.80 s of each second"]
+    assert texts(watch) == [
+        "this computer is too slow for 6 cars: it simulates 0.80 s of each second"
+    ]
+    advice = watch.now()[0].advice
+    assert "with at most 4 cars (`--hosted`, `--agents`)" in advice
+    assert "`scm up --without eye,camera,record`" in advice
     assert watch.now()[0].start_ns == ns(10)
     for t in range(14, 18):
         watch.hear(Incoming(world(t, 0.6), ns(t)))

@@ -7,8 +7,9 @@ import pytest
 
 from scm.__main__ import parse
 from scm.commands.up import wanted_of
+from scm.disturbances import COSTLY, Disturbance
 from scm.errors import MapError, RunError, ScmError
-from scm.up import Wanted, _parts, _settled, run_city
+from scm.up import OPTIONAL, Wanted, _parts, _say_disturbance, _settled, run_city
 from scm.v2x.router import Router, free_endpoint
 
 
@@ -88,9 +89,23 @@ def test_the_recorder_is_told_of_which_cars_it_keeps_pictures(tmp_path):
     assert (Wanted(map_name="x").cameras_hz, Wanted(map_name="x").cameras_of) == (0.0, ())
 
 
+def test_parts_may_be_left_out_and_the_server_knows_which_should_be_there(tmp_path):
+    words = ["up", "--port", "0", "--listen", "tcp/127.0.0.1:0", "--record-dir", str(tmp_path)]
+    jobs = _parts(_settled(wanted_of(parse([*words, "--without", "eye,record"]))))
+    there = ["traffic", "monitor", "world", "camera", "observer", "misbehaviour"]
+    assert [job.name for job in jobs] == [*there, "api"]
+    assert parse(jobs[-1].command()[3:]).expects == there
+    whole = {job.name for job in _parts(_settled(wanted_of(parse(words))))}
+    assert whole >= {"eye", "record"}
+    assert set(OPTIONAL) >= set(COSTLY)
+
+
 @pytest.mark.parametrize(
     ("facts", "said"),
     [
+        ({"without": ("recorder",)}, "without: got 'recorder', .*did you mean 'record'"),
+        ({"without": ("monitor",)}, "without: got 'monitor', .*every other part is needed"),
+        ({"without": ("record",), "cameras_hz": 1.0}, "without: got record with --cameras-hz"),
         ({"hosted": -1}, "hosted: got -1"),
         ({"hosted": 11}, "hosted: got 11 cars, expected 0 to 10: so many places has map"),
         ({"cameras_hz": float("nan")}, "cameras_hz: got nan"),
@@ -112,3 +127,14 @@ def test_a_file_is_no_folder_for_recordings(start, tmp_path):
     (tmp_path / "runs").write_text("")
     with pytest.raises(RunError, match="expected a folder"):
         start()
+
+
+def test_what_to_do_for_a_slow_computer_is_said_once():
+    said, advised = [], set()
+    late = Disturbance(
+        kind="late", source="world", start_ns=0, text="it is slow", advice="Do that."
+    )
+    for _ in range(2):
+        _say_disturbance(late, said.append, advised)
+    assert [line.split()[0] for line in said] == ["warning", "do", "warning"]
+    assert said[1].endswith("Do that.")

@@ -61,7 +61,7 @@ def router(store: Repository) -> APIRouter:
     def deeds(
         request: Request, wanted: Wanted, limit: Limit = 100, cursor: Cursor = ""
     ) -> Response:
-        rows = (row for row in newest_first(store) if wanted.passes(row))
+        rows = (row for row in newest_first(store, request.app.state.words) if wanted.passes(row))
         return page_response(
             request, page_of(rows, lambda row: str(row.number), limit=limit, cursor=cursor)
         )
@@ -72,8 +72,8 @@ def router(store: Repository) -> APIRouter:
         responses=answer_file("text/csv"),
         response_class=Response,
     )
-    def export(form: Form, wanted: Wanted) -> Response:
-        rows = (row for row in newest_first(store) if wanted.passes(row))
+    def export(request: Request, form: Form, wanted: Wanted) -> Response:
+        rows = (row for row in newest_first(store, request.app.state.words) if wanted.passes(row))
         return table_response(rows, AuditRow, form, "audit")
 
     @routes.get("/verdict", summary="Check the whole chain", responses=answer(ChainVerdict))

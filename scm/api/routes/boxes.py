@@ -5,7 +5,7 @@ from fastapi import APIRouter, Response
 
 from scm.api.city import City, IdempotencyKey, json_response
 from scm.api.picture import Picture
-from scm.api.roles import OPERATOR, VIEWER
+from scm.api.roles import OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer
 from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
 from scm.v2x.messages.world_snapshot import SnapshotBox
@@ -36,7 +36,7 @@ def router(city: City) -> APIRouter:
         dependencies=[OPERATOR],
         responses=answer(BoxesReply),
     )
-    def reset(key: IdempotencyKey = "") -> Response:
-        return json_response(city.ask(BoxesRequest(request_id=key, by="api"), BoxesReply))
+    def reset(signer: Signer, key: IdempotencyKey = "") -> Response:
+        return json_response(city.ask(BoxesRequest(request_id=key, by=signer("")), BoxesReply))
 
     return routes

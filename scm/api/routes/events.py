@@ -52,7 +52,7 @@ class AcknowledgeBody(BaseModel):
         description="ids of the events",
         examples=[["9f3a51c07be2d418"]],
     )
-    by: str = Field("", max_length=64, description="who; empty: the key's owner", examples=["ada"])
+    by: str = Field("", max_length=64, description="who; empty: whoever calls", examples=["ada"])
     note: str = Field(
         "", max_length=500, description="what there is to say", examples=["tyre put back on"]
     )
@@ -145,11 +145,9 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
         responses=answer(Acknowledged),
         dependencies=[OPERATOR],
     )
-    def acknowledge(
-        body: AcknowledgeBody, request: Request, signer: Signer, key: IdempotencyKey = ""
-    ) -> Response:
-        by = signer(body.by) or str(request.scope["scm_owner"])
-        return json_response(Acknowledged(acknowledgements=seen.add(body.events, by, body.note)))
+    def acknowledge(body: AcknowledgeBody, signer: Signer, key: IdempotencyKey = "") -> Response:
+        acknowledged = seen.add(body.events, signer(body.by), body.note)
+        return json_response(Acknowledged(acknowledgements=acknowledged))
 
     @routes.delete(
         "/acknowledgements/{name}",

@@ -15,7 +15,7 @@ from scm.v2x.messages.calibration_request import CalibrationReply, CalibrationRe
 
 By = Annotated[
     str,
-    Field(max_length=64, description="who asks; with API keys the key's owner", examples=["ada"]),
+    Field(max_length=64, description="who asks; empty: whoever calls", examples=["ada"]),
 ]
 
 
@@ -24,7 +24,7 @@ class BackBody(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    by: By = "api"
+    by: By = ""
     reason: str = Field(
         min_length=1, max_length=200, description="why", examples=["the camera was moved"]
     )

@@ -34,8 +34,9 @@ class Check(msgspec.Struct, kw_only=True, frozen=True):
     """One thing that the server needs.
 
     Attributes:
-        name: `router`: its connection to the bus; `world`: snapshots come; `disk`: there is room on
-            the shelves for recordings, reports and the like.
+        name: `router`: its connection to the bus; `world`: snapshots come; `parts`: every part of
+            the city that should be there is; `disk`: there is room on the shelves for recordings,
+            reports and the like.
         good: Whether it is there.
         detail: What was found, in words.
     """
@@ -70,11 +71,11 @@ def router(city: City) -> APIRouter:
 
     @routes.get(
         "/readyz",
-        summary="The router, the world and the disk are there",
+        summary="The router, the world, all parts and the disk are there",
         responses=answer(Ready),
     )
     def readyz() -> Response:
-        checks = (_router(city), _world(city), disk.check())
+        checks = (_router(city), _world(city), _parts(city), disk.check())
         wrong = [f"{check.name}: {check.detail}" for check in checks if not check.good]
         if wrong:
             return problem(503, "not_ready", "; ".join(wrong))
@@ -97,6 +98,17 @@ def _world(city: City) -> Check:
         return Check(name="world", good=False, detail="no snapshot of the world has arrived yet")
     detail = f"the newest snapshot is {age_s:.1f} s old, expected at most {READY_S} s"
     return Check(name="world", good=age_s <= READY_S, detail=detail)
+
+
+def _parts(city: City) -> Check:
+    """Look for parts that died, were given up, or never came."""
+    here = {row.name for row in city.view.picture().stations if row.alive and row.role == "part"}
+    missing = [name for name in city.link.parts if name not in here]
+    if missing:
+        detail = f"{', '.join(missing)} not there: the terminal of `scm up` says why"
+        return Check(name="parts", good=False, detail=detail)
+    detail = "all there" if city.link.parts else "nobody said which there should be"
+    return Check(name="parts", good=True, detail=detail)
 
 
 def _age_s(city: City) -> float | None:

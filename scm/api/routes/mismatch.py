@@ -288,7 +288,7 @@ def _add_drives(routes: APIRouter, jobs: MismatchJobs) -> None:
 
     @routes.post(
         "/reports/{name}/drives/{drive}/play",
-        summary="Let a car of the city drive it",
+        summary="Let a car of the city play a drive of a report",
         status_code=202,
         dependencies=[OPERATOR],
         responses=answer(Operation, 202),

@@ -27,7 +27,7 @@ def router(operations: Operations) -> APIRouter:
 
     @routes.delete(
         "/{name}",
-        summary="Call work off",
+        summary="Cancel long work",
         status_code=202,
         dependencies=[OPERATOR],
         responses=answer(Operation, 202, "It ends at its next word about itself; look again."),

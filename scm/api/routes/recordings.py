@@ -319,7 +319,7 @@ def _add_notes(routes: APIRouter, shelf: RecordingsShelf) -> None:
 
     @routes.put(
         "/{name}/notes",
-        summary="Name it and note something",
+        summary="Name a recording and note something on it",
         dependencies=[OPERATOR],
         responses=answer(Notes),
     )

@@ -26,7 +26,10 @@ def router(city: City, stream: Stream) -> APIRouter:
 
     @routes.get("/{name}/scan", summary="The next turn of a car's LIDAR", responses=answer(ScanRow))
     async def one(name: Name) -> Response:
-        scanner = _check(city, name)
+        scanner = _scanner(city, name)
+        if scanner is None:
+            detail = f"{name} has no LIDAR: its car file names none"
+            raise RefusedError(Refused(code="not_found", detail=detail))
         with city.view.watching_scan(name):
             for _ in range(round(PATIENCE_S / LOOK_S)):
                 row = _newest(city, name, scanner)
@@ -38,11 +41,11 @@ def router(city: City, stream: Stream) -> APIRouter:
     @routes.get(
         "/{name}/scan/stream",
         summary="Every turn, as server-sent events",
-        responses=answer_file("text/event-stream", "A `ScanRow` in each event `scan`."),
+        responses=answer_file("text/event-stream", "A `ScanRow` in each event `scan`; null: no LIDAR."),
         response_class=Response,
     )
     async def every(name: Name) -> Response:
-        scanner = _check(city, name)
+        scanner = _scanner(city, name)
         return StreamingResponse(
             _turns(city, stream, name, scanner),
             media_type="text/event-stream",
@@ -53,7 +56,7 @@ def router(city: City, stream: Stream) -> APIRouter:
 
 
 async def _turns(
-    city: City, stream: Stream, name: str, scanner: tuple[float, float]
+    city: City, stream: Stream, name: str, scanner: tuple[float, float] | None
 ) -> AsyncIterator[bytes]:
     """Yield every new scan until the page goes away or the server ends."""
     turns, silent = Turns(city, name, scanner), 0
@@ -92,15 +95,11 @@ def _newest(city: City, name: str, scanner: tuple[float, float]) -> ScanRow | No
     return None if found is None else scan_row(*found, scanner, city.view.now_ns)
 
 
-def _check(city: City, name: str) -> tuple[float, float]:
-    """Return where the car's scanner sits; refuse a car that is not there or has none."""
+def _scanner(city: City, name: str) -> tuple[float, float] | None:
+    """Return where the car's scanner sits, None: it has none; refuse a car that is not there."""
     held = city.view.snapshot
     cars = () if held is None else held.message.vehicles
     car = next((car for car in cars if car.vehicle == name), None)
     if car is None:
         raise not_found("car", name)
-    scanner = scanner_of(car.car)
-    if scanner is None:
-        detail = f"there is no LIDAR on {name}: a car of the kind {car.car} has none"
-        raise RefusedError(Refused(code="not_found", detail=detail))
-    return scanner
+    return scanner_of(car.car)

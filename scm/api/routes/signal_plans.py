@@ -74,7 +74,7 @@ class PlanBody(BaseModel):
     about: str = Field(
         "", max_length=200, description="what it is for", examples=["more green for the north"]
     )
-    by: By = "api"
+    by: By = ""
     reason: Reason = ""
     stages: list[StageBody] = Field(
         min_length=1,

@@ -41,7 +41,12 @@ _VERBS: dict[str, tuple[Verb, str]] = {
     "omits": ("omit", "Omit groups: they are not begun"),
     "preempts": ("preempt", "Pre-empt for one group: it comes next and stays"),
 }
-By = Annotated[str, Field(max_length=64, description="who asks; told in the log", examples=["ada"])]
+By = Annotated[
+    str,
+    Field(
+        max_length=64, description="who asks, for the log; empty: whoever calls", examples=["ada"]
+    ),
+]
 Reason = Annotated[str, Field(max_length=500, description="why", examples=["school is out"])]
 ExpiresS = Annotated[
     float,
@@ -52,7 +57,7 @@ ExpiresS = Annotated[
 class _Body(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
-    by: By = "api"
+    by: By = ""
     reason: Reason = ""
 
 
@@ -111,7 +116,7 @@ class ResetBody(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    by: By = "api"
+    by: By = ""
     reason: str = Field(
         min_length=1, max_length=500, description="why it is over", examples=["lamp replaced"]
     )
@@ -250,7 +255,7 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
 
     @routes.post(
         "/{name}/clear",
-        summary="Take wishes back",
+        summary="Take back what was asked of groups",
         dependencies=[OPERATOR],
         responses=answer(SignalReply),
     )
@@ -294,7 +299,7 @@ def _add_verb(routes: APIRouter, city: City, noun: str, verb: Verb, summary: str
 def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
     @routes.put(
         "/{name}/plan",
-        summary="Wish for another plan",
+        summary="Run another plan",
         dependencies=[OPERATOR],
         responses=answer(PlanReply),
     )

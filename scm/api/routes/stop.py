@@ -26,7 +26,9 @@ class StopBody(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     engaged: bool = Field(description="true: stop every car", examples=[True])
-    by: str = Field("api", max_length=64, description="who wishes it", examples=["ada"])
+    by: str = Field(
+        "", max_length=64, description="who wishes it; empty: whoever calls", examples=["ada"]
+    )
     reason: str = Field(
         "", max_length=500, description="why, for the log", examples=["a hand on the floor"]
     )

@@ -111,7 +111,7 @@ class EventsNoun:
 
         Args:
             events: ids of the events
-            by: who; empty: the key's owner
+            by: who; empty: whoever calls
             note: what there is to say
             idempotency_key: Same key, same effect, once; empty: a new one.
         """

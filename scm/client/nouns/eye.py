@@ -320,19 +320,13 @@ class EyeNoun:
         return self._connection.pieces(f"/api/v1/eye/calibrations/{part(name)}/file.toml")
 
     def use(
-        self,
-        name: str,
-        *,
-        by: str = "api",
-        reason: str,
-        calibration: str,
-        idempotency_key: str = "",
+        self, name: str, *, by: str = "", reason: str, calibration: str, idempotency_key: str = ""
     ) -> CalibrationReply:
         """See by a calibration from the next frame on.
 
         Args:
             name: a name on the bus
-            by: who asks; with API keys the key's owner
+            by: who asks; empty: whoever calls
             reason: why
             calibration: a calibration on the shelf
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -346,13 +340,13 @@ class EyeNoun:
         )
 
     def back(
-        self, name: str, *, by: str = "api", reason: str, idempotency_key: str = ""
+        self, name: str, *, by: str = "", reason: str, idempotency_key: str = ""
     ) -> CalibrationReply:
         """Put back what the camera saw by before.
 
         Args:
             name: a name on the bus
-            by: who asks; with API keys the key's owner
+            by: who asks; empty: whoever calls
             reason: why
             idempotency_key: Same key, same effect, once; empty: a new one.
         """

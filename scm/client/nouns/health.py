@@ -18,7 +18,7 @@ class HealthNoun:
         return self._connection.ask("GET", "/healthz", Alive)
 
     def readyz(self) -> Ready:
-        """The router, the world and the disk are there."""
+        """The router, the world, all parts and the disk are there."""
         return self._connection.ask("GET", "/readyz", Ready)
 
     def all_metrics(self) -> bytes:

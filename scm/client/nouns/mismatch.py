@@ -137,7 +137,7 @@ class MismatchNoun:
     def play(
         self, name: str, drive: str, *, vehicle: str, part_: int = 1, idempotency_key: str = ""
     ) -> Operation:
-        """Let a car of the city drive it.
+        """Let a car of the city play a drive of a report.
 
         Args:
             name: a report's name

@@ -34,7 +34,7 @@ class OperationsNoun:
         return self._connection.ask("GET", f"/api/v1/operations/{part(name)}", Operation)
 
     def cancel(self, name: str, *, idempotency_key: str = "") -> Operation:
-        """Call work off.
+        """Cancel long work.
 
         Args:
             name: a name on the bus

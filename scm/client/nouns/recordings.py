@@ -147,7 +147,7 @@ class RecordingsNoun:
         notes: str = "",
         idempotency_key: str = "",
     ) -> Notes:
-        """Name it and note something.
+        """Name a recording and note something on it.
 
         Args:
             name: a recording: its file without .mcap

@@ -92,7 +92,7 @@ class SignalsNoun:
         self,
         name: str,
         *,
-        by: str = "api",
+        by: str = "",
         reason: str = "",
         groups: tuple[str, ...],
         expires_s: float = 60.0,
@@ -102,7 +102,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks; told in the log
+            by: who asks, for the log; empty: whoever calls
             reason: why
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -120,7 +120,7 @@ class SignalsNoun:
         self,
         name: str,
         *,
-        by: str = "api",
+        by: str = "",
         reason: str = "",
         groups: tuple[str, ...],
         expires_s: float = 60.0,
@@ -130,7 +130,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks; told in the log
+            by: who asks, for the log; empty: whoever calls
             reason: why
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -148,7 +148,7 @@ class SignalsNoun:
         self,
         name: str,
         *,
-        by: str = "api",
+        by: str = "",
         reason: str = "",
         groups: tuple[str, ...],
         expires_s: float = 60.0,
@@ -158,7 +158,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks; told in the log
+            by: who asks, for the log; empty: whoever calls
             reason: why
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -176,7 +176,7 @@ class SignalsNoun:
         self,
         name: str,
         *,
-        by: str = "api",
+        by: str = "",
         reason: str = "",
         groups: tuple[str, ...],
         expires_s: float = 60.0,
@@ -186,7 +186,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks; told in the log
+            by: who asks, for the log; empty: whoever calls
             reason: why
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -204,7 +204,7 @@ class SignalsNoun:
         self,
         name: str,
         *,
-        by: str = "api",
+        by: str = "",
         reason: str = "",
         groups: tuple[str, ...],
         expires_s: float = 60.0,
@@ -214,7 +214,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks; told in the log
+            by: who asks, for the log; empty: whoever calls
             reason: why
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -232,17 +232,17 @@ class SignalsNoun:
         self,
         name: str,
         *,
-        by: str = "api",
+        by: str = "",
         reason: str = "",
         groups: tuple[str, ...] | None = None,
         verb: Literal["", "call", "hold", "force_off", "omit", "preempt", "policy"] = "",
         idempotency_key: str = "",
     ) -> SignalReply:
-        """Take wishes back.
+        """Take back what was asked of groups.
 
         Args:
             name: a name on the bus
-            by: who asks; told in the log
+            by: who asks, for the log; empty: whoever calls
             reason: why
             groups: wishes for any of these groups; empty: whatever they are for
             verb: wishes of this kind; empty: of any
@@ -257,13 +257,13 @@ class SignalsNoun:
         )
 
     def plan(
-        self, name: str, *, by: str = "api", reason: str = "", plan: str, idempotency_key: str = ""
+        self, name: str, *, by: str = "", reason: str = "", plan: str, idempotency_key: str = ""
     ) -> PlanReply:
-        """Wish for another plan.
+        """Run another plan.
 
         Args:
             name: a name on the bus
-            by: who asks; told in the log
+            by: who asks, for the log; empty: whoever calls
             reason: why
             plan: a plan by name (shipped, the map's own, or saved), a policy, or `flash`
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -280,7 +280,7 @@ class SignalsNoun:
         self,
         name: str,
         *,
-        by: str = "api",
+        by: str = "",
         reason: str = "",
         policy: str,
         expires_s: float = 300.0,
@@ -290,7 +290,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks; told in the log
+            by: who asks, for the log; empty: whoever calls
             reason: why
             policy: its name
             expires_s: seconds until it lapses by itself
@@ -308,7 +308,7 @@ class SignalsNoun:
         self,
         name: str,
         *,
-        by: str = "api",
+        by: str = "",
         reason: str = "",
         engaged: bool,
         expires_s: float | None = None,
@@ -318,7 +318,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks; told in the log
+            by: who asks, for the log; empty: whoever calls
             reason: why
             engaged: true: flash; false: go on, all red first
             expires_s: seconds until it ends by itself; null: not by itself
@@ -348,13 +348,13 @@ class SignalsNoun:
         )
 
     def reset(
-        self, name: str, *, by: str = "api", reason: str, idempotency_key: str = ""
+        self, name: str, *, by: str = "", reason: str, idempotency_key: str = ""
     ) -> MonitorStatus:
         """Clear a latched fault of the monitor.
 
         Args:
             name: a name on the bus
-            by: who asks; told in the log
+            by: who asks, for the log; empty: whoever calls
             reason: why it is over
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
@@ -400,7 +400,7 @@ class SignalsNoun:
         if_match: str | None = None,
         if_none_match: str | None = None,
         about: str = "",
-        by: str = "api",
+        by: str = "",
         reason: str = "",
         stages: tuple[StageBody, ...],
         offset_s: float | None = None,
@@ -414,7 +414,7 @@ class SignalsNoun:
             if_match: ETag of the state that was edited; `*`: whichever there is
             if_none_match: `*`: only where there is none yet
             about: what it is for
-            by: who asks; told in the log
+            by: who asks, for the log; empty: whoever calls
             reason: why
             stages: in the order of the cycle
             offset_s: when its cycle begins, after a time that is a whole number of cycles on the

@@ -18,13 +18,13 @@ class StopNoun:
         return self._connection.ask("GET", "/api/v1/stop", CityStop)
 
     def set_stop(
-        self, *, engaged: bool, by: str = "api", reason: str = "", idempotency_key: str = ""
+        self, *, engaged: bool, by: str = "", reason: str = "", idempotency_key: str = ""
     ) -> CityStop:
         """Engage or release the city-wide stop.
 
         Args:
             engaged: true: stop every car
-            by: who wishes it
+            by: who wishes it; empty: whoever calls
             reason: why, for the log
             idempotency_key: Same key, same effect, once; empty: a new one.
         """

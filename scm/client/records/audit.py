@@ -17,7 +17,8 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
         station: Who did it: `world`, `traffic`, `api`.
         kind: The request's class, or method and path of a call of the web; `unreadable`: what
             stands there is no entry.
-        by: Who asked.
+        text: What was done, in words.
+        by: Who asked: the owner of the API key, the program that called, the part.
         request_id: Id of the request; empty: it had none.
         trace_id: Of what led to it: the call of the web and what the city did for it have the
             same; empty: nobody traced it.
@@ -29,6 +30,7 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
     t_ns: int
     station: str
     kind: str
+    text: str
     by: str
     request_id: str
     trace_id: str

@@ -17,6 +17,7 @@ class Disturbance(msgspec.Struct, kw_only=True, frozen=True):
         start_ns: When it began, on the clock of whoever reports it.
         end_ns: When it was over; None: it lasts.
         text: What is wrong, as a clause: `the signals of crossing flash`.
+        advice: What a person can do, in a sentence; empty: nothing.
     """
 
     kind: Literal["flash", "late", "monitor", "part_lost", "silent"]
@@ -24,6 +25,7 @@ class Disturbance(msgspec.Struct, kw_only=True, frozen=True):
     start_ns: int
     end_ns: int | None = None
     text: str
+    advice: str = ""
 
 
 class DisturbanceList(msgspec.Struct, kw_only=True, frozen=True):

@@ -20,8 +20,9 @@ class Check(msgspec.Struct, kw_only=True, frozen=True):
     """One thing that the server needs.
 
     Attributes:
-        name: `router`: its connection to the bus; `world`: snapshots come; `disk`: there is room
-            on the shelves for recordings, reports and the like.
+        name: `router`: its connection to the bus; `world`: snapshots come; `parts`: every part of
+            the city that should be there is; `disk`: there is room on the shelves for recordings,
+            reports and the like.
         good: Whether it is there.
         detail: What was found, in words.
     """

@@ -21,8 +21,10 @@ class StationRow(msgspec.Struct, kw_only=True, frozen=True):
         age_s: Since its last status; None: it never sent one.
         detail: What it says of itself, or what was seen, in words.
         step_ms: Its slowest step of the last second [ms].
-        late_steps: Steps that began later than a period after they were due.
+        late_steps: Steps that were due and left out, since its start.
+        late_share: The same as a share of the steps due in the last minute; None: not known.
         dropped: Messages that its mailboxes had to drop, since its start.
+        dropped_lately: The same within the last minute.
     """
 
     role: str
@@ -35,7 +37,9 @@ class StationRow(msgspec.Struct, kw_only=True, frozen=True):
     detail: str = ""
     step_ms: float = 0.0
     late_steps: int = 0
+    late_share: float | None = None
     dropped: int = 0
+    dropped_lately: int = 0
 
 
 class Residual(msgspec.Struct, kw_only=True, frozen=True):

@@ -10,8 +10,10 @@ class PartStatus(Message, kw_only=True, frozen=True):
 
     Attributes:
         detail: One line for a person: `6 cars`, `plan calm`, `7 tags`.
-        late_steps: Steps that began later than one period after they were due.
+        steps: Steps that were made, since its start; 0: not told.
+        late_steps: Steps that were due and left out, for the one before them took too long.
         dropped: Messages its mailboxes had to drop.
+        cars: Of the world: how many are on the map.
         lost_s: Of the world: time that passed without being simulated, since its start.
     """
 
@@ -22,8 +24,10 @@ class PartStatus(Message, kw_only=True, frozen=True):
     t_ns: int
     detail: str = ""
     step_ms: float = 0.0
+    steps: int = 0
     late_steps: int = 0
     dropped: int = 0
+    cars: int = 0
     lost_s: float = 0.0
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-SIZES = {"wide": (1440, 900), "narrow": (390, 844)}
+SIZES = {"wide": (1440, 900), "narrow": (360, 780)}
 THEMES = ("light", "dark")
 LOOKS = tuple(zip(SIZES, THEMES, strict=True))
 """The sizes and themes in which a page is opened; it is shown in the other theme after."""

@@ -65,7 +65,17 @@ class TestReady:
         answer = ready()
         assert answer.status_code == 200
         checks = {check["name"]: check["good"] for check in answer.json()["checks"]}
-        assert checks == {"router": True, "world": True, "disk": True}
+        assert checks == {"router": True, "world": True, "parts": True, "disk": True}
+
+    def test_a_part_that_is_gone_for_good_or_never_came_is_named(self, ready, heard, hear):
+        for alive in (True, False):
+            hear(2.0, Presence(role="part", station="record", session="r", alive=alive))
+        hear(2.0, Presence(role="v", station="observer", session="o", alive=True))
+        answer = ready(parts=("world", "record", "observer"))
+        assert (answer.status_code, answer.json()["code"]) == (503, "not_ready")
+        assert answer.json()["detail"].startswith("parts: record, observer not there")
+        hear(2.0, Presence(role="part", station="record", session="r2", alive=True))
+        assert ready(parts=("world", "record")).status_code == 200
 
     def test_without_the_router_it_is_not_ready(self, ready, heard):
         answer = ready(is_connected=lambda: False)

@@ -131,11 +131,11 @@ class TestAcknowledging:
             found += ids
         assert found == [id_of(event) for event in reversed(LOG)]
 
-    def test_without_a_name_it_was_the_keys_owner(self, client, hear):
+    def test_without_a_name_it_was_the_program_that_called(self, client, hear):
         hear(1.0, *LOG)
         body = {"events": [id_of(LOG[0])]}
         answer = client("POST", f"{API}/events/acknowledgements", json=body).json()
-        assert answer["acknowledgements"][0]["by"] == "this machine"
+        assert answer["acknowledgements"][0]["by"] == "python-httpx"
 
     @pytest.mark.parametrize("body", [{"events": []}, {"events": ["x"]}, {"events": ["0" * 15]}])
     def test_what_is_no_id_is_refused(self, client, body):
@@ -204,7 +204,7 @@ class TestAudit:
             ("PUT /api/v1/stop", 200),
         ]
         assert rows[1]["request_id"] == "k1"
-        assert (rows[1]["by"], rows[1]["request"]["role"]) == ("this machine", "admin")
+        assert (rows[1]["by"], rows[1]["request"]["role"]) == ("python-httpx", "admin")
 
     def test_deeds_of_all_stations_are_told_newest_first_page_by_page(self, own_client, store):
         log = AuditLog(store)

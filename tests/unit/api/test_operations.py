@@ -206,3 +206,26 @@ def test_the_answer_is_202_with_an_address(work):
     assert answer.status_code == 202
     assert answer.headers["location"] == f"/api/v1/operations/{row.id}"
     finish(row)
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ("/srv/scm/runs/today.mcap: it holds no car", "today.mcap: it holds no car"),
+        ("[Errno 13] denied: '/var/lib/my scm/job 7'", "[Errno 13] denied: 'job 7'"),
+        ("reads /tmp/x/, then (/home/ada/a.csv)", "reads a folder, then (a.csv)"),
+        ("0.3 km/h at http://127.0.0.1:8000/eye", "0.3 km/h at http://127.0.0.1:8000/eye"),
+        ("see /api/v1/mismatch/reports/m-7", "see /api/v1/mismatch/reports/m-7"),
+        ("runs/today.mcap: n1", "runs/today.mcap: n1"),
+    ],
+)
+def test_a_jobs_words_do_not_say_where_files_lie_on_the_server(work, said, told):
+    def fail(tell):
+        tell(said)
+        seen.append(work.rows()[0].doing)
+        raise RunError(said)
+
+    seen = []
+    row = work.start("mismatch", "n1", fail)
+    finish(row)
+    assert (seen, work.find(row.id).error) == ([told], told)

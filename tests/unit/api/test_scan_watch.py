@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from scm.api.city import City
+from scm.api.routes import scan as routes
 from scm.api.routes.scan import _turns
 from scm.api.scan_watch import scanner_of
 from scm.api.stream import Stream
@@ -68,6 +69,22 @@ def test_no_car_and_no_scanner_are_said_in_words(client, hear, snapshot):
     hear(1.0, snapshot(n1=(0.0, 0.0, 0.0)))
     assert client("GET", f"{API}/vehicles/n9/scan").status_code == 404
     assert client("GET", f"{API}/vehicles/n9/scan/stream").status_code == 404
+
+
+def test_a_stream_of_a_car_without_a_scanner_says_so_once_instead_of_being_refused(
+    view, hear, snapshot, fake_city, city_map, seen, client, monkeypatch
+):
+    monkeypatch.setattr(routes, "scanner_of", lambda _car: None)
+    hear(1.0, snapshot(n1=(0.0, 0.0, 0.0)))
+    city = City(view, fake_city.ask, city_map)
+    scanner = routes._scanner(city, "n1")
+
+    async def first_two():
+        told = _turns(city, Stream(city, "run", seen), "n1", scanner)
+        return [await anext(told) for _ in range(2)]
+
+    assert asyncio.run(first_two())[1] == b"event: scan\ndata: null\n\n"
+    assert "has no LIDAR" in client("GET", f"{API}/vehicles/n1/scan").json()["detail"]
 
 
 def test_a_stream_tells_each_turn_once_and_stops_listening_with_its_page(

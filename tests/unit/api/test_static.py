@@ -8,6 +8,9 @@ import pytest
 
 from scm.api import dashboard
 from scm.api.dashboard import PAGES, STATIC_DIR, page_text
+from scm.api.routes.eye_in_force import BackBody
+from scm.api.routes.signals import FlashBody, ResetBody
+from scm.api.routes.signals import PlanBody as SignalPlanBody
 
 OURS = sorted((STATIC_DIR / "js").rglob("*.js"))
 STYLES = sorted((STATIC_DIR / "css").rglob("*.css"))
@@ -76,6 +79,19 @@ def test_a_page_names_every_module_that_it_will_import(page, place):
             for target in IMPORTED.findall(path.read_text("utf-8")):
                 assert place(target) in files, f"{path.name} imports {target}"
     assert STATIC_DIR / "vendor/signals-core.mjs" in files  # only another vendored one imports it
+
+
+def test_a_page_asks_for_a_reason_where_rest_needs_one_and_nowhere_else():
+    needs = {"pages/eye/in_force.js": BackBody, "pages/signals/monitor.js": ResetBody}
+    offers = {"pages/signals/plans.js": SignalPlanBody, "pages/signals/wishes.js": FlashBody}
+    field = re.compile(r'<input[^>]*name="reason"[^>]*>', re.DOTALL)
+    for place, body in (needs | offers).items():
+        fields = field.findall((STATIC_DIR / "js" / place).read_text("utf-8"))
+        is_needed = body.model_fields["reason"].is_required()
+        assert is_needed == (place in needs)
+        assert fields, place
+        assert all(("required" in one) == is_needed for one in fields), place
+        assert all(("optional" in one) != is_needed for one in fields), place
 
 
 def test_every_page_of_the_bar_has_an_address_and_a_style_sheet():

@@ -64,3 +64,33 @@ def test_a_station_that_never_told_has_no_age():
     table = StationTable()
     table.presence(presence("eye"), 0)
     assert table.rows(NS_PER_S)[0].age_s is None
+
+
+def told_each_second(table, seconds, *, late_a_second, steps_a_second=20, from_s=0):
+    for n in range(seconds):
+        t_ns = (from_s + n) * NS_PER_S
+        counts = {"steps": n * steps_a_second, "late_steps": n * late_a_second, "dropped": n}
+        table.status(PartStatus(station="eye", t_ns=t_ns, **counts), t_ns)
+
+
+def test_lateness_is_a_share_of_the_last_minute_not_a_count_since_the_start():
+    table = StationTable()
+    table.presence(presence("eye"), 0)
+    told_each_second(table, 600, late_a_second=20)
+    (row,) = table.rows(599 * NS_PER_S)
+    assert (row.late_steps, row.late_share, row.dropped_lately) == (599 * 20, 0.5, 60)
+    for n in range(61):  # it recovers: a minute later nothing of it is left
+        t_ns = (600 + n) * NS_PER_S
+        counts = {"steps": 12_000 + 20 * n, "late_steps": 599 * 20, "dropped": 599}
+        table.status(PartStatus(station="eye", t_ns=t_ns, **counts), t_ns)
+    (row,) = table.rows(660 * NS_PER_S)
+    assert (row.late_steps, row.late_share, row.dropped_lately) == (599 * 20, 0.0, 0)
+
+
+def test_a_part_that_was_started_again_is_not_judged_by_its_counts_before():
+    table = StationTable()
+    table.presence(presence("eye"), 0)
+    told_each_second(table, 10, late_a_second=5)
+    told_each_second(table, 3, late_a_second=0, from_s=10)
+    (row,) = table.rows(12 * NS_PER_S)
+    assert (row.late_share, row.dropped_lately) == (0.0, 2)

@@ -113,11 +113,15 @@ def test_a_fault_stays_when_the_signals_are_well_again_until_a_person_resets_it(
     city.run_for(30.0)
     assert {status.fault for status in messages(box)} == {"stale"}
     assert messages(spats)[-1].mode == "flash"
+    city.call(PlanRequest(junction="crossing", plan="brisk", by="travel_times.py"))
     assert reset(city, reason="cable fixed").fault is None
     city.run_for(0.2)
     assert messages(spats)[-1].mode == "start"
-    names = [event.name for event in messages(events)]
+    told = messages(events)
+    names = [event.name for event in told]
     assert names[-3:] == ["monitor_reset", "monitor_clear", "signals_restart"]
+    said = "junction crossing restarts all red (the monitor reports no fault any more)"
+    assert told[-1].text == said, "and not whoever asked for a plan meanwhile"
     city.run_for(60.0)
     assert messages(box)[-1].fault is None
     assert "plan" in {spat.mode for spat in messages(spats)}

@@ -70,6 +70,18 @@ def test_the_agent_that_asks_again_after_its_death_gets_its_tag_again(city):
     assert city.ask(JoinRequest(vehicle="r1", session="s2", tag_id=9)).tag_id == 9
 
 
+def test_nobody_joins_by_the_session_of_another_agent(city):
+    city.run(1, Presence(role="v", station="n7", session="s7", alive=True))
+    for before in (None, city.join("n7", "s7")):
+        refused = city.ask(JoinRequest(vehicle="n9", session="s7"))
+        assert isinstance(refused, Refused), before
+        assert refused.code == "owned"
+        assert refused.detail == "session 's7' is that of n7, expected that of n9's agent"
+    assert city.join("n7", "s7").vehicle == "n7", "its own agent may ask again"
+    city.run(1, Presence(role="v", station="n7", session="s7", alive=False))
+    assert city.join("n9", "s7").vehicle == "n9", "nobody has it any more"
+
+
 def test_a_car_of_ones_own_folder_comes_by_its_name(make_city, monkeypatch):
     monkeypatch.setenv("SCM_CARS", "examples/own_car")
     city = make_city()

@@ -33,7 +33,7 @@ export function footprint(car) {
 }
 
 /** Draw a car; a chosen or lost one always with its name, others when there is room: `named`. */
-export function drawCar(paper, view, car, chosen, named = true) {
+export function drawCar(paper, view, car, chosen, named = true, lamps = []) {
   const shape = footprint(car.car);
   const paint = paintOf(car.kind, car.alive);
   paper.save();
@@ -48,7 +48,7 @@ export function drawCar(paper, view, car, chosen, named = true) {
   lamps(paper, shape, on);
   if (!car.alive) cross(paper, shape);
   paper.restore();
-  if (named || chosen || !car.alive) drawLabel(paper, view, car, chosen);
+  if (named || chosen || !car.alive) drawLabel(paper, view, car, chosen, lamps);
 }
 
 /** The ring about a chosen car. */
@@ -171,14 +171,14 @@ function cross(paper, { rear, front, half }) {
   paper.stroke();
 }
 
-/** The name beside the car, outside its outline whatever its heading. */
-export function drawLabel(paper, view, car, chosen) {
+/**
+ * The name beside the car, outside its outline whatever its heading, where no lamp would hide it.
+ * @param lamps what is drawn over names: `[left, top, right, bottom]` in pixels
+ */
+export function drawLabel(paper, view, car, chosen, lamps = []) {
   const { middle, front, rear, half } = footprint(car.car);
   const [colour] = paintOf(car.kind, car.alive);
   const [c, s] = [Math.cos(car.yaw_rad), Math.sin(car.yaw_rad)];
-  const x = view.x(car.x_m + middle * c);
-  const reach = (Math.abs(s) * (front - rear)) / 2 + Math.abs(c) * half;
-  const y = view.y(car.y_m + middle * s) - reach * view.scale - 12;
   const small = view.scale < SMALL_PX_PER_M;
   paper.font = `600 ${small ? 10 : 12}px system-ui, sans-serif`;
   paper.textAlign = "left";
@@ -187,6 +187,14 @@ export function drawLabel(paper, view, car, chosen) {
   const lead = small ? 5 : 17; // the dot stands before the name where there is room
   const width = paper.measureText(text).width + lead + (small ? 5 : 7);
   const half_px = small ? 7 : 9;
+  const across = (Math.abs(c) * (front - rear)) / 2 + Math.abs(s) * half;
+  const along = (Math.abs(s) * (front - rear)) / 2 + Math.abs(c) * half;
+  const [x, y] = placeOf(
+    [view.x(car.x_m + middle * c), view.y(car.y_m + middle * s)],
+    [across * view.scale + width / 2 + 4, along * view.scale + 12],
+    [width / 2, half_px],
+    lamps,
+  );
   paper.beginPath();
   paper.roundRect(x - width / 2, y - half_px, width, 2 * half_px, half_px);
   paper.fillStyle = chosen ? "#ffffff" : "rgba(13, 18, 24, 0.88)";
@@ -194,4 +202,15 @@ export function drawLabel(paper, view, car, chosen) {
   if (!small) dot(paper, x - width / 2 + 10, y, 3.5, colour);
   paper.fillStyle = chosen ? "#10151b" : "#f1f4f8";
   paper.fillText(text, x - width / 2 + lead, y + 0.5);
+}
+
+/** The middle of a name: above the car, below it, right or left of it, as the first of these is free of lamps. */
+export function placeOf([x, y], [aside, above], [halfWide, halfHigh], lamps) {
+  const places = [[x, y - above], [x, y + above], [x + aside, y], [x - aside, y]];
+  const isFree = ([px, py]) =>
+    lamps.every(
+      ([left, top, right, bottom]) =>
+        px + halfWide < left || px - halfWide > right || py + halfHigh < top || py - halfHigh > bottom,
+    );
+  return places.find(isFree) ?? places[0];
 }

@@ -18,11 +18,25 @@ const MOST_PX = 13;
 const SIZE_M = 0.05;
 const LETTER_PX = 6.5; // smaller ones would be a blur
 const TIME_PX = 8;
+const TIME_ROOM_PX = 10; // from the lamp to the middle of the time below it
+const TIME_HALF_PX = 18;
+
+/** What a head covers on the canvas, with the time beside it: left, top, right, bottom. */
+export function coveredBy(view, light, isTimed) {
+  const [x, y] = [view.x(light.x_m), view.y(light.y_m)];
+  const size = sizeOf(view);
+  const reach = 1.32 * size;
+  const hasTime = isTimed && size >= TIME_PX;
+  const wide = hasTime ? Math.max(reach, TIME_HALF_PX) : reach;
+  return [x - wide, y - reach, x + wide, y + reach + (hasTime ? 2 * TIME_ROOM_PX : 0)];
+}
+
+const sizeOf = (view) => Math.max(LEAST_PX, Math.min(MOST_PX, SIZE_M * view.scale));
 
 /** Draw a head; `time` is what to write beside it, or nothing. */
 export function drawLight(paper, view, light, colour, time = "") {
   const [x, y] = [view.x(light.x_m), view.y(light.y_m)];
-  const size = Math.max(LEAST_PX, Math.min(MOST_PX, SIZE_M * view.scale));
+  const size = sizeOf(view);
   const off = colour === "flashing_red" && Math.floor(performance.now() / FLASH_MS) % 2;
   const lit = colour && colour !== "dark" && !off;
   paper.beginPath();
@@ -41,7 +55,7 @@ export function drawLight(paper, view, light, colour, time = "") {
     paper.textBaseline = "middle";
     paper.fillText(LETTERS[colour] ?? "?", x, y + 0.5);
   }
-  if (time && size >= TIME_PX) label(paper, x, y + 1.32 * size + 10, time);
+  if (time && size >= TIME_PX) label(paper, x, y + 1.32 * size + TIME_ROOM_PX, time);
 }
 
 function outline(paper, colour, x, y, size) {

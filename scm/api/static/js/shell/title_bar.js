@@ -3,6 +3,7 @@ import { signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { change, notify } from "scm/shell/api.js";
+import { prose } from "scm/shell/prose.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { clock, fixed, spaced, span, UNKNOWN } from "scm/shared/format.js";
 import { city, isConnected, link, pulse, quiet_s, stop } from "scm/shell/store.js";
@@ -24,12 +25,12 @@ const LINK_WORDS = { connecting: "Connecting", live: "Live", stale: "Stale", los
 const THEMES = { system: ["◐", "as the system"], light: ["☀", "light"], dark: ["☾", "dark"] };
 
 export function TitleBar({ pages, here }) {
-  const { t_ns, real_time_factor, late_ticks } = pulse.value;
+  const { t_ns, real_time_factor } = pulse.value;
   const nav = useRef(null);
   useEffect(() => showHere(nav.current), [here]);
   const heard = t_ns !== null;
   const vitals = heard
-    ? `real-time factor ${fixed(real_time_factor, 2)}, ${late_ticks} late ticks`
+    ? `real-time factor ${fixed(real_time_factor, 2)}: ${fixed(real_time_factor, 2)} s of each second are simulated`
     : "the world was not heard yet";
   return html`
     <header class="title-bar">
@@ -186,18 +187,14 @@ function DisturbanceBanner() {
   const shown = pulse.value.disturbances.filter(({ kind }) => kind !== "silent");
   if (!shown.length) return null;
   const since_ns = Math.min(...shown.map(({ start_ns }) => start_ns));
-  const isBusy = shown.some(({ kind, text }) => kind === "late" || text.includes("too busy"));
-  const hint = isBusy
-    ? "Run fewer cars, cameras or parts, or take a faster computer."
-    : shown.some(({ kind }) => kind === "monitor")
-      ? "A person resets a monitor, on the signals page."
-      : "";
+  const [late] = shown.filter(({ kind }) => kind === "late"); // where the world is late, the monitor is too
+  const advice = late?.advice ?? [...new Set(shown.map((one) => one.advice).filter(Boolean))].join(" ");
   return html`
     <div class="banner void" role="status">
       <b>Measurements are void</b>
       <span>
         ${capital(shown.map(({ text }) => text).join("; "))}, since ${clock(since_ns)}. Trips meanwhile say nothing
-        of the city. ${hint}
+        of the city. ${prose(advice)}
       </span>
     </div>
   `;

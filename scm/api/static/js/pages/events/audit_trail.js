@@ -2,7 +2,7 @@
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { moment } from "scm/shared/format.js";
-import { folded, said } from "scm/pages/events/deeds.js";
+import { folded } from "scm/pages/events/deeds.js";
 import { Export } from "scm/pages/events/event_log.js";
 import { useRested, useRows } from "scm/pages/events/rows.js";
 import { placed } from "scm/shared/base.js";
@@ -56,17 +56,16 @@ function Deed({ row, call, onTrace }) {
   const [whole, setWhole] = useState(false);
   const { ended, bad } = outcome(row);
   const isRead = row.kind !== "unreadable";
-  const by = row.by || row.request.by || row.request.vehicle || "";
   const entries = call ? [row, call] : [row];
   return html`
     <tr data-deed=${row.number}>
       <td class="number">${entries.map(({ number }) => number).join(", ")}</td>
       <td class="when">${isRead && html`<time>${moment(row.t_ns)}</time>`}</td>
       <td class="what">
-        <button class="name" aria-expanded=${whole} onClick=${() => setWhole(!whole)}>${said(row)}</button>
+        <button class="name" aria-expanded=${whole} onClick=${() => setWhole(!whole)}>${row.text}</button>
         ${row.request.reason && html` <small>${row.request.reason}</small>`}
       </td>
-      <td class="by">${by}${call && call.by !== by && html` <small>${call.by}</small>`}</td>
+      <td class="by">${row.by}${call && !row.by.includes(call.by) && html` <small>${call.by}</small>`}</td>
       <td class="station">${entries.map(({ station }) => station).join(", ")}</td>
       <td class="answer ${bad ? "warn" : ""}">${ended}${call && html` <small>${outcome(call).ended}</small>`}</td>
     </tr>

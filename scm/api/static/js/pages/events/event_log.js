@@ -6,7 +6,7 @@ import { change } from "scm/shell/api.js";
 import { prose } from "scm/shell/prose.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { stations, topic, useTopics } from "scm/shell/store.js";
-import { folded } from "scm/pages/events/folding.js";
+import { folded, single } from "scm/pages/events/folding.js";
 import { acknowledgedBy, useHeard } from "scm/pages/events/heard.js";
 import { useRested, useRows } from "scm/pages/events/rows.js";
 
@@ -15,6 +15,7 @@ const SEVERITIES = [
   ["warning", "Warnings", "▲"],
   ["info", "Information", "●"],
 ];
+const CARS_NAMED = 3; // of a row that many cars share
 const SIGNS = Object.fromEntries(SEVERITIES.map(([name, , sign]) => [name, sign]));
 
 export function EventLog() {
@@ -23,6 +24,7 @@ export function EventLog() {
   const [source, setSource] = useState("");
   const [text, setText] = useState("");
   const [open, setOpen] = useState(false);
+  const [foldsRepeats, setFolds] = useState(true);
   const [pausedAt, setPausedAt] = useState(null);
   const [asking, setAsking] = useState(null);
   const wanted = { severity, source, text: useRested(text) };
@@ -36,7 +38,7 @@ export function EventLog() {
     [topic("acknowledgements").value],
   );
   const rows = merged(list.rows, heard.rows, wanted, acknowledged, open, pausedAt);
-  const groups = folded(rows);
+  const groups = foldsRepeats ? folded(rows) : single(rows);
   const waiting = rows.filter((row) => !row.acknowledged_by);
   return html`
     <div class="filters" role="search" aria-label="Filter of events">
@@ -67,6 +69,10 @@ export function EventLog() {
       <label class="tick">
         <input type="checkbox" checked=${open} onChange=${(event) => setOpen(event.target.checked)} />
         Not acknowledged
+      </label>
+      <label class="tick" title="Events of one kind as one row with their number; errors always stand alone">
+        <input type="checkbox" checked=${foldsRepeats} onChange=${(event) => setFolds(event.target.checked)} />
+        Fold repeats
       </label>
       <span class="room"></span>
       <button class="small" aria-pressed=${pausedAt !== null} onClick=${() =>
@@ -130,11 +136,10 @@ function empty({ severity, source, text }, open) {
 
 function Group({ group, onAcknowledge }) {
   const [whole, setWhole] = useState(false);
-  const { newest, events } = group;
+  const { newest, oldest, events, vehicles } = group;
   const open = events.filter((event) => !event.acknowledged_by);
-  const [first, last] = [events.at(-1), newest];
   return html`
-    <li data-severity=${newest.severity} data-open=${open.length > 0} data-name=${newest.name}>
+    <li data-severity=${newest.severity} data-open=${open.length > 0} data-name=${newest.name} data-count=${events.length}>
       <time>${moment(newest.t_ns)}</time>
       <i class="sign" role="img" aria-label=${newest.severity}>${SIGNS[newest.severity]}</i>
       <span class="said">
@@ -142,13 +147,15 @@ function Group({ group, onAcknowledge }) {
         ${events.length > 1 &&
         html`
           <button class="small repeats" aria-expanded=${whole} onClick=${() => setWhole(!whole)}>
-            ${events.length} times in ${span((last.t_ns - first.t_ns) / 1e9)}
+            ${events.length} times in ${span((newest.t_ns - oldest.t_ns) / 1e9)}, since ${moment(oldest.t_ns)}
           </button>
         `}
       </span>
       <span class="about">
         <span>${newest.source}</span>
-        ${newest.vehicle && html`<a href="/vehicles/${newest.vehicle}">${newest.vehicle}</a>`}
+        ${vehicles.slice(0, CARS_NAMED).map((name) => html`<a key=${name} href="/vehicles/${name}">${name}</a>`)}
+        ${vehicles.length > CARS_NAMED &&
+        html`<span title=${vehicles.toSorted(byName).join(", ")}>+${vehicles.length - CARS_NAMED}</span>`}
       </span>
       <span class="mark">
         ${open.length

@@ -1,26 +1,42 @@
-/** Repeats folded: a car that scrapes along a wall is one row with a count, not forty rows. */
+/** Repeats folded: a hundred hard brakings of a busy city are one row with a count, not a hundred rows. */
 
-const GAP_NS = 10e9;
+const GAP_NS = 300e9;
 
 /**
+ * Group events of a kind, that is of one source, name and severity: about any car, each within five minutes of
+ * the next; about no car, while the source says the same again and nothing else between. Errors stand alone.
  * @param events newest first
- * @returns groups newest first: `{key, newest, events}`, all of one source, name, vehicle and severity,
- *   each within ten seconds of the next; what another event of that kind interrupts stays apart.
+ * @returns groups newest first: `{key, newest, oldest, events, vehicles}`; vehicles newest first, each once
  */
 export function folded(events) {
   const groups = [];
   const open = new Map();
   for (const event of events) {
-    const kind = [event.severity, event.source, event.name, event.vehicle].join("/");
-    const group = event.vehicle === null ? undefined : open.get(kind);
-    const oldest = group?.events.at(-1);
-    if (group && oldest.t_ns - event.t_ns <= GAP_NS) {
+    const { severity, source, name, vehicle, text } = event;
+    const isOfCar = vehicle !== null && vehicle !== undefined;
+    const slot = isOfCar ? [severity, source, name].join("/") : source;
+    const group = severity === "error" ? undefined : open.get(slot);
+    const isAgain = isOfCar || (group?.newest.text === text && group?.newest.severity === severity);
+    if (group && isAgain && group.oldest.t_ns - event.t_ns <= GAP_NS) {
       group.events.push(event);
+      group.oldest = event;
+      if (isOfCar && !group.vehicles.includes(vehicle)) group.vehicles.push(vehicle);
       continue;
     }
-    const begun = { key: event.id, newest: event, events: [event] };
+    const vehicles = isOfCar ? [vehicle] : [];
+    const begun = { key: event.id, newest: event, oldest: event, events: [event], vehicles };
     groups.push(begun);
-    open.set(kind, begun);
+    open.set(slot, begun);
   }
   return groups;
 }
+
+/** Each event as a group of its own: nothing is folded. */
+export const single = (events) =>
+  events.map((event) => ({
+    key: event.id,
+    newest: event,
+    oldest: event,
+    events: [event],
+    vehicles: event.vehicle ? [event.vehicle] : [],
+  }));

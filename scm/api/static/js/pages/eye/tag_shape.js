@@ -1,5 +1,8 @@
 /** A tag in the picture: its outline, its axes, and a label with its id and whose it is. */
 
+import { paintOf } from "scm/shared/car_shape.js";
+import { live } from "scm/shell/store.js";
+
 const COLOURS = { car: "#38e8b0", map: "#ffd166", other: "#ff8fa3" };
 const FORWARD = "#ff5d5d";
 const LEFT = "#5da8ff";
@@ -12,7 +15,7 @@ const LEFT = "#5da8ff";
  */
 export function drawTag(paper, tag, known, at, layers, ratio, chosen) {
   const corners = tag.corners_px.map(at);
-  const colour = COLOURS[known?.what ?? "other"];
+  const colour = colourOf(known);
   if (layers.outline || chosen) {
     path(paper, corners);
     stroke(paper, "rgba(0, 12, 10, 0.7)", (chosen ? 7 : 4) * ratio);
@@ -21,6 +24,13 @@ export function drawTag(paper, tag, known, at, layers, ratio, chosen) {
   if (layers.axes) drawAxes(paper, corners, at(tag.centre_px), ratio);
   const text = [layers.id && `${tag.tag_id}`, layers.name && nameOf(known)].filter(Boolean).join(" · ");
   if (text) drawLabel(paper, corners, text, colour, ratio);
+}
+
+/** A car has the colour that it has on the map; one that is not on the map, that of any car. */
+function colourOf(known) {
+  const what = known?.what ?? "other";
+  const car = what === "car" ? live.vehicles.find(({ vehicle }) => vehicle === known.vehicle) : null;
+  return car ? paintOf(car.kind, car.alive)[0] : COLOURS[what];
 }
 
 function nameOf(known) {

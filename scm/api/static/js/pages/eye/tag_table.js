@@ -51,10 +51,10 @@ function Row({ tag }) {
         </button>
       </td>
       <td>${whose(tag)}</td>
-      <td class="number">${fixed(tag.margin, 0)}</td>
-      <td class="number ${tag.hamming ? "warn" : ""}">${tag.hamming ?? UNKNOWN}</td>
-      <td class="number">${fixed(tag.size_px, 1, " px")}</td>
-      <td class="number">${tag.x_m === null ? UNKNOWN : `${fixed(tag.x_m, 2)}, ${fixed(tag.y_m, 2)} m`}</td>
+      <td class="number more" data-what="margin">${fixed(tag.margin, 0)}</td>
+      <td class="number more ${tag.hamming ? "warn" : ""}" data-what="bits">${tag.hamming ?? UNKNOWN}</td>
+      <td class="number more" data-what="size">${fixed(tag.size_px, 1, " px")}</td>
+      <td class="number place">${tag.x_m === null ? UNKNOWN : `${fixed(tag.x_m, 2)}, ${fixed(tag.y_m, 2)} m`}</td>
       <td class="number">${tag.yaw_rad === null ? UNKNOWN : fixed((tag.yaw_rad * 180) / Math.PI, 0, "°")}</td>
       <td class="number ${tag.seen_s > LATE_S ? "warn" : ""}">${span(tag.seen_s)}</td>
     </tr>

@@ -58,11 +58,14 @@ function Acts({ name }) {
   const toggle = (layer, title) => html`
     <button class="small" aria-pressed=${layers.value[layer]} onClick=${() => show(layer, !layers.value[layer])}>${title}</button>
   `;
+  const lidar = blind.value === name
+    ? html`<button class="small" disabled aria-pressed="false" title="${name} has no LIDAR">No LIDAR</button>`
+    : toggle("lidar", "LIDAR");
   const follow = () => (followed.value = followed.value === name ? null : name);
   return html`
     <div class="acts">
       <button class="small" aria-pressed=${followed.value === name} onClick=${follow}>Follow</button>
-      ${toggle("path", "Path")} ${toggle("lidar", "LIDAR")}
+      ${toggle("path", "Path")} ${lidar}
       <a href="/vehicles/${name}">Open</a>
       <button class="small" onClick=${() => (removing.value = name)}>Take off</button>
     </div>

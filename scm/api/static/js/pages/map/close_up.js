@@ -1,5 +1,5 @@
 /** What the chosen car sees and means to do: its LIDAR's scans and its way ahead, heard while they are shown. */
-import { effect } from "@preact/signals";
+import { effect, signal } from "@preact/signals";
 import { selected } from "scm/shared/selection.js";
 import { hear, RANKS } from "scm/shell/streams.js";
 import { fleet } from "scm/pages/map/fleet.js";
@@ -10,6 +10,9 @@ const PATH_MS = 700;
 
 /** The newest of each; null: none. `scan` and `path` are bodies of the REST resources of these names. */
 export const closeUp = { scan: null, scanAt: -Infinity, path: null };
+
+/** The chosen car, once it is known that it has no LIDAR; else null. */
+export const blind = signal(null);
 
 /** Begin to hear what the layers ask for; returns what ends it. */
 export function hearCloseUp() {
@@ -25,11 +28,14 @@ export function hearCloseUp() {
 }
 
 function hearScans(vehicle) {
-  const take = (scan) => Object.assign(closeUp, { scan, scanAt: performance.now() });
+  const take = (scan) => {
+    Object.assign(closeUp, { scan, scanAt: performance.now() });
+    blind.value = scan ? null : vehicle;
+  };
   const end = hear(`/api/v1/vehicles/${vehicle}/scan/stream`, { scan: take }, RANKS.view);
   return () => {
     end();
-    closeUp.scan = null;
+    closeUp.scan = blind.value = null;
   };
 }
 

@@ -1,7 +1,7 @@
 /** One frame of the map, from below to above: roads, heat, path, scan, trails, boxes, cars, names, signals. */
 import { drawBoxes } from "scm/shared/box_shape.js";
 import { drawCar, drawHalo, drawLabel, footprint } from "scm/shared/car_shape.js";
-import { drawLight } from "scm/shared/light_shape.js";
+import { coveredBy, drawLight } from "scm/shared/light_shape.js";
 import { Glide } from "scm/shared/motion.js";
 import { selected } from "scm/shared/selection.js";
 import { boxes, city, signals, signalsAt } from "scm/shell/store.js";
@@ -146,9 +146,10 @@ export class Scene {
     const chosen = fleet.rows.get(selected.peek());
     drawn.cars = rows.length;
     const named = on.names && rows.length <= MOST_NAMES;
+    const lamps = (city.peek()?.lights ?? []).map((light) => coveredBy(view, light, on.times));
     if (rows.length <= MOST_DETAILED && 0.3 * view.scale >= DETAIL_PX) {
       const cars = rows.map((row) => this.#carAt(row));
-      for (const car of cars) drawCar(paper, view, car, car.vehicle === selected.peek(), named);
+      for (const car of cars) drawCar(paper, view, car, car.vehicle === selected.peek(), named, lamps);
       return;
     }
     drawSprites(paper, view, this.ratio, fleet, glide, rows);
@@ -156,7 +157,7 @@ export class Scene {
       if (row !== chosen && !named) continue;
       const car = this.#carAt(row);
       if (row === chosen) this.#drawRing(car);
-      drawLabel(paper, view, car, row === chosen);
+      drawLabel(paper, view, car, row === chosen, lamps);
     }
   }
 

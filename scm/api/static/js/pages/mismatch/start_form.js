@@ -1,6 +1,7 @@
 /** Start a search: of a run of this city, or of a recording of one's own that is sent first. */
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
+import { asked, question, SearchFields } from "scm/shared/search_fields.js";
 import { change, notify } from "scm/shell/api.js";
 import { useFetched } from "scm/pages/mismatch/fetched.js";
 import { zipOf } from "scm/pages/mismatch/zip.js";
@@ -10,11 +11,12 @@ const KNOWN = /\.(ya?ml|csv|csv\.gz|npz|mat|parquet|bag|db3|mcap)$/i;
 export function StartForm({ onStarted }) {
   const offers = useFetched("/mismatch/offers").body;
   const [from, setFrom] = useState("city");
+  const [wanted, setWanted] = useState(question());
   const [busy, setBusy] = useState("");
   const start = async (event) => {
     event.preventDefault();
     const form = new FormData(event.target);
-    const body = wish(form);
+    const body = asked(wanted);
     if (from === "own") {
       setBusy("Sending …");
       const upload = await send(form, offers.most_upload_bytes).finally(() => setBusy(""));
@@ -42,7 +44,9 @@ export function StartForm({ onStarted }) {
                 </button>
               </div>
               ${from === "city" ? html`<${OfCity} names=${offers.recordings} />` : html`<${OfOwn} />`}
-              <${Which} cars=${offers.cars} />
+              <div class="fields">
+                <${SearchFields} value=${wanted} onChange=${setWanted} files=${offers.cars} />
+              </div>
               <button class="primary" disabled=${Boolean(busy) || (from === "city" && !offers.recordings.length)}>
                 ${busy || "Search"}
               </button>
@@ -76,46 +80,6 @@ function OfOwn() {
       Tables of commands and poses, and beside them a <code>recording.yaml</code> that says what stands where.
     </p>
   `;
-}
-
-function Which({ cars }) {
-  return html`
-    <div class="fields">
-      <label>
-        Car
-        <input name="vehicle" placeholder="all" pattern="[A-Za-z0-9_\\-]*" maxlength="64" autocomplete="off" />
-      </label>
-      <label>
-        Car file
-        <select name="car">
-          <option value="">the recording's</option>
-          ${cars.map((name) => html`<option key=${name}>${name}</option>`)}
-        </select>
-      </label>
-      <label>From [s] <input name="from_s" type="number" min="0" step="any" placeholder="start" /></label>
-      <label>To [s] <input name="to_s" type="number" min="0" step="any" placeholder="end" /></label>
-      <label class="long">
-        Time for it
-        <select name="budget_s">
-          <option value="30">half a minute</option>
-          <option value="120">two minutes</option>
-          <option value="600">ten minutes</option>
-          <option value="1800" selected>as it needs, half an hour at most</option>
-        </select>
-      </label>
-    </div>
-  `;
-}
-
-function wish(form) {
-  const number = (name) => (form.get(name) === "" ? null : Number(form.get(name)));
-  return {
-    vehicle: form.get("vehicle"),
-    car: form.get("car"),
-    budget_s: Number(form.get("budget_s")),
-    from_s: number("from_s"),
-    to_s: number("to_s"),
-  };
 }
 
 /** @returns the id of what was sent; null when there is nothing to send, or it was refused. */

@@ -2,7 +2,7 @@
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
-import { seconds, SpanFields, WHOLE } from "scm/pages/recordings/span_fields.js";
+import { seconds, SpanFields, WHOLE } from "scm/shared/span_fields.js";
 import { size } from "scm/pages/recordings/words.js";
 import { finished, isOver } from "scm/shared/operation.js";
 import { change } from "scm/shell/api.js";
@@ -84,7 +84,7 @@ function CarsAsTable({ at, recording, cars, player }) {
         <option value="">all cars, as the world saw them</option>
         ${cars.map((car) => html`<option value=${car.vehicle}>${car.vehicle}: its own reports</option>`)}
       </select>
-      <${SpanFields} recording=${recording} player=${player} span=${span} onChange=${setSpan} />
+      <${SpanFields} most_s=${recording.length_s} player=${player} span=${span} onChange=${setSpan} />
       ${trouble && html`<p class="trouble" role="alert">${trouble}</p>`}
       <button>${vehicle || "all cars"}.csv</button>
     </form>

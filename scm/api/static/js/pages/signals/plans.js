@@ -126,7 +126,7 @@ function Run({ junction, wanted }) {
         within two cycles.
       </p>
       <form onSubmit=${submit}>
-        <input name="reason" required maxlength="200" placeholder="Reason (needed)" aria-label="Reason" />
+        <input name="reason" maxlength="500" placeholder="Reason (optional)" aria-label="Reason" />
         <div class="actions">
           <button type="button" onClick=${close}>Cancel</button>
           <button class="primary">Run ${plain(name)}</button>

@@ -143,7 +143,7 @@ function Form({ junction, mode, names }) {
       </label>
       <label class="why">
         <span>Why</span>
-        <input id="wish-reason" name="reason" required maxlength="200" placeholder="Reason (needed)" />
+        <input id="wish-reason" name="reason" maxlength="500" placeholder="Reason (optional)" />
       </label>
       <button class="primary">Ask</button>
       <p class="means">${MEANS[verb.value]}${mode === "plan" && LEAVES_PLAN.has(verb.value) ? WAITS : ""}</p>
@@ -229,7 +229,7 @@ function Flash({ junction, on }) {
           : "All lights go red for the longest clearance, then the plan begins. A fault of the monitor keeps it flashing."}
       </p>
       <form onSubmit=${submit}>
-        <input name="reason" required maxlength="200" placeholder="Reason (needed)" aria-label="Reason" />
+        <input name="reason" maxlength="500" placeholder="Reason (optional)" aria-label="Reason" />
         ${on &&
         html`
           <label class="lasts">

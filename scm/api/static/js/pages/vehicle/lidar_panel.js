@@ -23,11 +23,14 @@ export function LidarPanel({ car }) {
     <section class="panel lidar" aria-label="LIDAR">
       <div class="panel-head">
         <h2>LIDAR ${told && html`<small>nearest ${fixed(nearest, 2, " m")}</small>`}</h2>
-        <div class="choices" role="group" aria-label="Reach">
-          ${REACHES_M.map(
-            (metres) => html`<button class="small" aria-pressed=${reach === metres} onClick=${() => setReach(metres)}>${metres} m</button>`,
-          )}
-        </div>
+        ${told !== false &&
+        html`
+          <div class="choices" role="group" aria-label="Reach">
+            ${REACHES_M.map(
+              (metres) => html`<button class="small" aria-pressed=${reach === metres} onClick=${() => setReach(metres)}>${metres} m</button>`,
+            )}
+          </div>
+        `}
       </div>
       ${!told
         ? html`<p class="empty">${told === false ? "This car has no LIDAR." : "Waiting for a scan."}</p>`

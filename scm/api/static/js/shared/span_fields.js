@@ -1,7 +1,6 @@
-/** From when to when of a recording: two fields in seconds, each with a button for the moment that is shown. */
+/** From when to when of a recording: two fields in seconds, where it is played each with a button for its moment. */
 import { useLayoutEffect, useRef } from "preact/hooks";
 import { html } from "scm/shared/html.js";
-import { minutes } from "scm/pages/recordings/words.js";
 
 /** All of it. */
 export const WHOLE = { start: "", stop: "" };
@@ -11,8 +10,12 @@ export function seconds({ start, stop }) {
   return { from_s: start === "" ? null : Number(start), to_s: stop === "" ? null : Number(stop) };
 }
 
-/** The browser says what is wrong with them before their form is sent. */
-export function SpanFields({ recording, player, span, onChange }) {
+/**
+ * The browser says what is wrong with them before their form is sent.
+ * @param most_s length of the recording, null: not known here
+ * @param player what plays it, null: nothing does
+ */
+export function SpanFields({ most_s = null, player = null, span, onChange }) {
   const stop = useRef(null);
   const { from_s, to_s } = seconds(span);
   useLayoutEffect(() => {
@@ -28,22 +31,25 @@ export function SpanFields({ recording, player, span, onChange }) {
           name=${end}
           type="number"
           min="0"
-          max=${Math.ceil(recording.length_s)}
+          max=${most_s === null ? null : Math.ceil(most_s)}
           step="any"
           placeholder=${empty}
           value=${span[end]}
           onInput=${(event) => onChange({ ...span, [end]: event.target.value })}
         />
-        <button
-          type="button"
-          onClick=${() => onChange({ ...span, [end]: player.t_s.toFixed(1) })}
-          aria-label="${title}: the moment that is shown, ${player.t_s.toFixed(1)} s"
-          title="The moment that is shown"
-        >
-          ${minutes(player.t_s, true)}
-        </button>
+        ${player &&
+        html`
+          <button
+            type="button"
+            onClick=${() => onChange({ ...span, [end]: player.t_s.toFixed(1) })}
+            aria-label="${title}: the moment that is shown, ${player.t_s.toFixed(1)} s"
+            title="The moment that is shown"
+          >
+            ${player.t_s.toFixed(1)} s
+          </button>
+        `}
       </span>
     </label>
   `;
-  return html`${field("start", "From [s]", "begin")}${field("stop", "To [s]", "end", stop)}`;
+  return html`${field("start", "From [s]", "start")}${field("stop", "To [s]", "end", stop)}`;
 }
