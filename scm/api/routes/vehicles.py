@@ -32,7 +32,10 @@ class SpawnBody(BaseModel):
         "nigel", pattern=_NAME_OR_EMPTY, description="name of its car file", examples=["nigel"]
     )
     spawn: str = Field(
-        "", max_length=64, description="a spawn place; empty: any free one", examples=["north_1"]
+        "",
+        max_length=64,
+        description="a spawn place, or X,Y,DEG (metres, degrees, map frame); empty: any free one",
+        examples=["north_1", "1.384,0.655,315"],
     )
 
 
