@@ -54,6 +54,9 @@ class RouteBody(BaseModel):
     speed_mps: float | None = Field(
         None, gt=0.0, le=10.0, description="wished on free road; null: the limits", examples=[0.3]
     )
+    then: Literal["stop", "circulate"] = Field(
+        "stop", description="at the end of the last lane: stand, or drive on without end"
+    )
 
 
 class LightsBody(BaseModel):
@@ -127,6 +130,7 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
             via=tuple(body.via),
             laps=body.laps,
             speed_mps=body.speed_mps,
+            then=body.then,
         )
         return json_response(city.ask(request, RouteReply))
 
