@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scm.errors import MapError
 from scm.part import Part
 from scm.store.repository import Repository
 from scm.v2x.router import DEFAULT_ENDPOINT
@@ -56,6 +57,28 @@ def credentials_of(
     from scm.v2x.credentials import read_credentials
 
     return read_credentials(arguments.credentials, station)
+
+
+def place(text: str) -> str:
+    """Return a spawn place's name, or coordinates, as an argument of the command line."""
+    from scm.maps.coordinates import checked_place
+
+    try:
+        return checked_place(text)
+    except MapError as wrong:
+        raise argparse.ArgumentTypeError(str(wrong)) from wrong
+
+
+def spawn_argument(parser: argparse.ArgumentParser) -> None:
+    """Add where a car is put down."""
+    parser.add_argument(
+        "--spawn",
+        type=place,
+        default="",
+        metavar="PLACE",
+        help="a spawn place of the map, or X,Y,DEG: metres and degrees in the map frame "
+        "(--spawn=-1,0,90 where X is below 0); default: any free place",
+    )
 
 
 def part_arguments(parser: argparse.ArgumentParser) -> None:

@@ -260,7 +260,7 @@ class City:
         return seconds(self._link.now_ns)
 
     def spawn(self, car: str = "nigel", *, at: str = "", name: str = "") -> FleetCar:
-        """Put a car onto a spawn place of the map: `at`, or the first free one."""
+        """Put a car to `at`, a spawn place of the map or `X,Y,DEG`, or to the first free place."""
         reply = self.request(SpawnRequest(vehicle=name, car=car, spawn=at), SpawnReply)
         spawned = FleetCar(reply.vehicle, self)
         self.cars.append(spawned)

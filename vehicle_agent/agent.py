@@ -75,7 +75,7 @@ class AgentPart:
         Args:
             name: Of the vehicle.
             car: Car file's name.
-            spawn: Wished spawn place; empty: any free one.
+            spawn: Spawn place or `X,Y,DEG`; empty: any free one.
             session: Of the agent's bus; empty: learned from its own presence on the bus.
             seed: Of the sensors' noise.
             body: Kind of body: a file of `vehicle_agent/bodies`.
@@ -306,14 +306,16 @@ class AgentPart:
     def _route(self, request: RouteRequest, now_ns: int) -> Message:
         if self._stay is None:
             return Refused(code="offline", detail=f"{self.name} is not in the city")
-        if self._link.standing == "foreign":
-            if self._stay.guard.output(now_ns).mode in ("drive", "hold"):
-                return Refused(code="owned", detail=f"{self.name} is driven by somebody else")
-            self._link.regain()
+        is_foreign = self._link.standing == "foreign"
+        if is_foreign and self._stay.guard.output(now_ns).mode in ("drive", "hold"):
+            return Refused(code="owned", detail=f"{self.name} is driven by somebody else")
         try:
-            return self._stay.begin(request, now_ns)
+            reply = self._stay.begin(request, now_ns)
         except MapError as error:
             return Refused(code="invalid", detail=str(error))
+        if is_foreign:
+            self._link.regain()  # a car that is refused its route stands
+        return reply
 
     def _on_lights(self, item: Incoming) -> list[Outgoing]:
         request = item.message

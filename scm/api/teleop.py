@@ -277,7 +277,7 @@ class Seat:
             if not isinstance(answer, Refused):
                 return f"{self._vehicle} goes on by itself"
             if answer.code != "owned" or self._clock.now_ns() >= until_ns:
-                return f"{self._vehicle} stands: {answer.detail}"
+                return f"{self._vehicle} stands: {answer.detail.removeprefix(f'{self._vehicle}: ')}"
             await asyncio.sleep(RESUME_PAUSE_S)
 
     def _ask_route(self, request: RouteRequest) -> Message:

@@ -10,6 +10,7 @@ import numpy as np
 from scm.arrays import Floats
 from scm.errors import MapError, nearest
 from scm.geometry import Pose2, wrap_angle
+from scm.maps.coordinates import EXAMPLE, are_coordinates, pose_at
 from scm.maps.model import Approach, CityMap, Conflict, Lane, Spawn, StopLine
 from scm.maps.polyline import Polyline, advance, extent, join, sample
 from scm.maps.signs import SPEED_LIMIT, Held, allowed_next, is_obeyed, looks_along
@@ -176,12 +177,31 @@ class Roads:
         return limits
 
     def spawn_pose(self, name: str) -> Pose2:
-        """Return the pose of a spawn place (rear axle of the car put there)."""
+        """Return the pose of the rear axle of a car put to a spawn place, or to `X,Y,DEG`.
+
+        Raises:
+            MapError: when there is no such place, or the coordinates lie off the floor.
+        """
+        if are_coordinates(name):
+            return self._on_floor(name)
         spawn = self._spawns.get(name)
         if spawn is None:
             known = nearest(name, list(self._spawns))
-            raise MapError(f"map {self.city_map.name}: no spawn {name!r}{known}")
+            expected = (
+                f"expected one of {', '.join(self._spawns) or 'none'}, or X,Y,DEG as {EXAMPLE}"
+            )
+            raise MapError(f"map {self.city_map.name}: no spawn {name!r}{known}; {expected}")
         return self._pose_of(spawn)
+
+    def _on_floor(self, coordinates: str) -> Pose2:
+        pose, floor = pose_at(coordinates), self.city_map.floor
+        for axis, value, (low, high) in (("x", pose.x, floor.x_m), ("y", pose.y, floor.y_m)):
+            if not low <= value <= high:
+                msg = (
+                    f"spawn: {axis} of {coordinates!r} is {value:g} m, expected {low:g} to {high:g}"
+                )
+                raise MapError(f"{msg}: the floor of map {self.city_map.name}")
+        return pose
 
     def route(self, start_lane: str, via: tuple[str, ...] = (), laps: int = 1) -> tuple[str, ...]:
         """Return the lanes of the shortest way from a lane through others, in driving order.

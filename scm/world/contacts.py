@@ -20,6 +20,7 @@ import pymunk
 from pymunk import batch
 
 from scm.arrays import Bools, Floats, Ints
+from scm.geometry import Pose2
 from scm.maps.model import CityMap
 from scm.world.boxes import Boxes, is_still
 from scm.world.near import Near, obstacles_of
@@ -79,7 +80,8 @@ class Contacts:
 
     def __init__(self, city_map: CityMap) -> None:
         self.boxes = Boxes(city_map.boxes)
-        self._near = Near(obstacles_of(obstacle_boxes(city_map)))
+        self._obstacles = obstacles_of(obstacle_boxes(city_map))
+        self._near = Near(self._obstacles)
         self._cores = obstacle_boxes(city_map, round_ends=False)
         self._ring = _Ring(city_map, self.boxes)
         rows = [(0.0, 0.0, a, b, np.hypot(a, b), 1.0) for a, b in self.boxes.sizes.tolist()]
@@ -97,6 +99,13 @@ class Contacts:
     def remove(self, slot: int) -> None:
         """Take a car's body away."""
         self._ring.forget(slot + len(self.boxes))
+
+    def is_free(self, hull: Hull, pose: Pose2) -> bool:
+        """Return whether a car with its centre of gravity at a pose touches no wall and no box."""
+        motion = np.vstack(([*pose, 0.0, 0.0, 0.0], self.boxes.motion))
+        outlines = np.vstack((outline_of(hull), self._outlines[: len(self.boxes)]))
+        marks = Near(self._obstacles).touching(np.arange(len(motion)), motion, outlines, 1)
+        return not marks[0]
 
     def warm(self) -> None:
         """Compile or load now what `step` needs, not when the first cars meet."""

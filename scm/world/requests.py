@@ -8,6 +8,7 @@ from typing import Any
 
 from scm.errors import LeaseError, RunError, ScmError, nearest
 from scm.geometry import Pose2
+from scm.maps.coordinates import are_coordinates
 from scm.maps.room import AHEAD_S, CLEARANCE_M
 from scm.part import Serves
 from scm.store.records import StopRecord
@@ -59,7 +60,7 @@ def reply_to(world: World, request: Request, now_ns: int) -> Message:
 def _spawn(world: World, request: SpawnRequest, now_ns: int) -> SpawnReply:
     name = request.vehicle or world.free_name()
     _check_new(world, name, request.car)
-    car = world.host(name, request.car, _place(world, request.spawn), now_ns)
+    car = world.host(name, request.car, _place(world, request.spawn, request.car), now_ns)
     world.say(
         "info", "vehicle_spawned", f"{name}, a {request.car}, stands on the map", now_ns, name
     )
@@ -81,7 +82,7 @@ def _join(world: World, request: JoinRequest, now_ns: int) -> JoinReply:
         world.remove(name)
     _check_new(world, name, request.car)
     _check_tag(world, request.tag_id)
-    pose = _place(world, request.spawn)
+    pose = _place(world, request.spawn, request.car)
     car = world.admit(
         name, request.kind, request.session, request.car, pose, now_ns, request.tag_id
     )
@@ -217,11 +218,14 @@ def _check_tag(world: World, tag_id: int | None) -> None:
         raise _RefusedError("owned", detail + "map's first_vehicle_tag_id")
 
 
-def _place(world: World, spawn: str) -> Pose2:
-    """Return a free place to stand: the wished one, or the first."""
+def _place(world: World, spawn: str, car_file: str) -> Pose2:
+    """Return a free place to stand: that by name or coordinates, or the first of the map."""
     roads = world.roads
     if spawn:
         pose = roads.spawn_pose(spawn)
+        if are_coordinates(spawn) and not world.has_room(car_file, pose):
+            detail = f"spawn: a {car_file} at {spawn!r} would touch a wall or a box, or stand over "
+            raise _RefusedError("occupied", f"{detail}the floor's edge; expected a place with room")
         if not is_free(world, pose):
             raise _RefusedError("occupied", f"spawn: a car stands at {spawn!r}")
         return pose

@@ -42,6 +42,7 @@ from scm.world.contacts import Contacts
 from scm.world.dangers import Dangers
 from scm.world.garage import Garage
 from scm.world.hosted import HostedCar
+from scm.world.hull import outline
 from scm.world.impacts import Impacts
 from scm.world.late import Late
 from scm.world.pace import Every, Pace
@@ -360,6 +361,24 @@ class World:
         bank.fit(0, "nobody", model, Placed(1), 0, 0)
         nowhere = Scene(self.wall_grid, np.zeros((0, 4)), np.zeros(0, np.int64))
         bank.step(0, lambda: nowhere)
+
+    def has_room(self, car_name: str, pose: Pose2) -> bool:
+        """Return whether a car would stand there on the floor and touch no wall and no box.
+
+        Raises:
+            CarError: when there is no such car file.
+        """
+        car, hull, floor = (
+            self.garage.car(car_name),
+            self.garage.hull(car_name),
+            self.city_map.floor,
+        )
+        corners = outline(car, np.array([[*pose]]))[:, :2]
+        low, high = zip(floor.x_m, floor.y_m, strict=True)
+        if (corners < low).any() or (corners > high).any():
+            return False
+        ahead = car.vector("body.footprint_x_m")[1] - hull.front
+        return self.contacts.is_free(hull, Pose2(*pose.apply(ahead, 0.0), pose.yaw))
 
     def _take(
         self, name: str, car_name: str, pose: Pose2, *, hosted: bool, movable: bool = True

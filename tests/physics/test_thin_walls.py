@@ -166,6 +166,42 @@ def test_a_box_that_is_pushed_into_a_corner_stays_in_it(yaw):
     assert (drive.contacts.boxes.motion[0, :2] < 1.0).all()
 
 
+def room(rng, reach):
+    """Return a closed wall of 3 to 6 corners, the angles of these, and its distance [m]."""
+    corners = int(rng.integers(3, 7))
+    radius = 8.0 * reach / math.cos(math.pi / corners)
+    angles = rng.uniform(0.0, math.tau) + math.tau * np.arange(corners) / corners
+    points = tuple((radius * math.cos(a), radius * math.sin(a)) for a in angles.tolist())
+    thick = float(rng.choice([0.0, rng.uniform(0.0, 0.05)]))
+    return Wall(points=points, thickness_m=thick, closed=True), angles, 8.0 * reach
+
+
+@pytest.mark.parametrize("car", CARS, ids=lambda car: Path(car).stem)
+def test_no_car_and_no_box_gets_out_of_a_room_of_any_walls(car):
+    rng, hull = np.random.default_rng(CARS.index(car)), hull_of(load_car(car))
+    reach = math.hypot(hull.front, hull.left)
+    for _ in range(2):
+        wall, angles, inner = room(rng, reach)
+        speed, heads = TOP_MPS[car], rng.uniform(0.0, math.tau) + np.array([0.0, math.pi])
+        ways = np.column_stack((np.cos(heads), np.sin(heads)))
+        starts = [
+            [*(6.0 * reach * way), yaw, *(speed * way), 0.0]
+            for yaw, way in zip(heads.tolist(), ways, strict=True)
+        ]
+        boxes = [  # before the cars' noses, light and small
+            box(*(rng.uniform(7.1, 7.6) * reach * way + rng.uniform(-0.1, 0.1, 2) * reach),
+                size=rng.uniform(0.02, 0.1), mass=rng.uniform(0.01, 0.2), name=f"{k}{i}")
+            for i, way in enumerate(ways) for k in range(2)
+        ]  # fmt: skip
+        drive = Drive(city(*boxes, walls=(wall,)), [hull, hull], starts, speed)
+        drive.run(min(0.5, 0.2 + 2.0 * reach / speed))
+        places = np.vstack((drive.motion, drive.contacts.boxes.motion))[:, :2]
+        normals = angles + 0.5 * (angles[1] - angles[0])
+        out = places @ np.stack((np.cos(normals), np.sin(normals)))
+        assert out.max() < inner
+        assert drive.through == []
+
+
 def test_boxes_that_fly_stop_at_walls_and_at_each_other():
     there = city(box(0.7, name="a"), box(0.0, name="b"), walls=(upright(0.0),))
     drive = Drive(there, [], [], 0.0)

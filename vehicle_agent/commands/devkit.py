@@ -5,7 +5,7 @@ import gc
 import threading
 from typing import TYPE_CHECKING
 
-from scm.command import Command, credentials_argument, credentials_of
+from scm.command import Command, credentials_argument, credentials_of, place
 
 if TYPE_CHECKING:
     from scm.v2x.credentials import Credentials
@@ -63,8 +63,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     brought = parser.add_mutually_exclusive_group()
     brought.add_argument(
-        "--spawn", nargs="*", metavar="PLACE",
-        help="bring the cars, to these places of the map or to free ones, and take them away after",
+        "--spawn", nargs="*", action="extend", type=place, metavar="PLACE",
+        help="bring the cars, to these places of the map, to X,Y,DEG (--spawn=-1,0,90 where X is "
+        "below 0), or to free places, and take them away after",
     )  # fmt: skip
     brought.add_argument(
         "--cosim", action="store_true", help="the script places the cars itself, by PosX ... RotW"

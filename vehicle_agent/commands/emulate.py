@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scm.clock import NS_PER_MS
-from scm.command import Command, credentials_argument, credentials_of
+from scm.command import Command, credentials_argument, credentials_of, spawn_argument
 from vehicle_agent.emulate.sketches import DEADBAND, SKETCHES, Sketch
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     credentials_argument(parser)
     parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
     parser.add_argument("--car", default="nigel", help="car file (%(default)s)")
-    parser.add_argument("--spawn", default="", help="place to start at; default: any free one")
+    spawn_argument(parser)
     parser.add_argument(
         "--tag", type=int, metavar="ID", help="on its roof; default: as the city gives it"
     )

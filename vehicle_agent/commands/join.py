@@ -4,7 +4,7 @@ import argparse
 import gc
 import threading
 
-from scm.command import Command, credentials_argument, credentials_of
+from scm.command import Command, credentials_argument, credentials_of, spawn_argument
 
 TAG_KEY = "ips.tag_id"
 
@@ -15,7 +15,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     credentials_argument(parser)
     parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
     parser.add_argument("--car", default="nigel", help="car file (%(default)s)")
-    parser.add_argument("--spawn", default="", help="place to start at; default: any free one")
+    spawn_argument(parser)
     parser.add_argument(
         "--tag", type=int, metavar="ID",
         help="glued onto its roof; default: as its --calibration says, else as the city gives it",

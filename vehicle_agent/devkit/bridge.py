@@ -41,6 +41,7 @@ from vehicle_agent.devkit.telemetry import CAMERAS, Telemetry, Version
 from vehicle_agent.devkit.wheel import Wheel
 
 ABSENT_NS = 2 * NS_PER_S
+PICTURE_NS = 10 * NS_PER_S  # a renderer that is asked for its first picture loads its car first
 SPAWN_AGAIN_NS = NS_PER_S
 SPAWN_S = 10.0
 ASK_S = 1.0
@@ -69,7 +70,8 @@ class Wanted:
         cars: Vehicles, in the order of V1, V2...
         lights: Ids of lights, in the order of TL1, TL2...; empty: all, in the map's order.
         sign: Which way a steering of +1 turns.
-        cameras: Which of `front` and `rear` are pictured; the others stay black.
+        cameras: Which of `front` and `rear` are pictured; the others stay black. No packet goes
+            before the first picture of each, for 10 s at most.
         spawns: Whether the bridge brings the cars: None: they are there; else the places where
             they begin, in the order of the cars, any free one for those beyond.
         cosim: Whether the script places the cars itself.
@@ -116,6 +118,8 @@ class DevkitPart:
         self._resetting = [False] * len(wanted.cars)
         self._script: Script | None = None
         self._was_open = False
+        self._asked_ns = 0
+        self._may_be_dark = False
         self._heard_ns: dict[str, int] = {}
         self._told: set[str] = set()
         self._replies = 0
@@ -137,7 +141,9 @@ class DevkitPart:
         self._script = script
 
     def packet(self) -> Packet | None:
-        """Return the newest telemetry; called on the script's thread."""
+        """Return the newest telemetry, None while there is none; called on the script's thread."""
+        if not self._was_open or (not self._may_be_dark and self._unpictured):
+            return None
         return self._telemetry.packet()
 
     def said(self, data: Any, t_ns: int) -> None:
@@ -158,7 +164,9 @@ class DevkitPart:
             raise self._script.failure
         is_open = self._script is not None and self._script.is_open
         if is_open != self._was_open:
-            self._open(is_open)
+            self._open(is_open, now_ns)
+        if is_open and not self._may_be_dark:
+            self._wait_for_pictures(now_ns)
         out: list[Outgoing] = [*self._spawns.step(now_ns, self._absent(now_ns))]
         for placed in self._placed.values():
             out += self._placed_now(placed, now_ns)
@@ -227,11 +235,26 @@ class DevkitPart:
         self._heads.learn(heads)
         self._commands.lights = len(heads)
 
-    def _open(self, is_open: bool) -> None:
+    @property
+    def _unpictured(self) -> list[str]:
+        return self._telemetry.unpictured(self._wanted.cameras)
+
+    def _wait_for_pictures(self, now_ns: int) -> None:
+        """Let packets go without first pictures once these are late; count from the last car on."""
+        if self._telemetry.unknown:
+            self._asked_ns = now_ns
+        if now_ns - self._asked_ns < PICTURE_NS:
+            return
+        self._may_be_dark = True
+        for one in self._unpictured:
+            self._tell(f"{one}: no picture for 10 s, black until one comes; does `scm camera` run?")
+
+    def _open(self, is_open: bool, now_ns: int) -> None:
         """A script came or went: hear what it needs, or no more of it; forget what was said."""
-        self._was_open = is_open
-        self._said = None
         self._telemetry.forget_views()
+        self._asked_ns, self._said = now_ns, None
+        self._may_be_dark = self._wanted.cosim  # its script places a car before anything sees it
+        self._was_open = is_open
         self.hears = (*self._always, *self._needed()) if is_open else self._always
 
     def _needed(self) -> list[Hears]:
@@ -293,8 +316,9 @@ class DevkitPart:
             return []
         rate_hz, self._replies, self._status_ns = self._replies / seconds(since_ns), 0, now_ns
         script = "no script" if self._script is None else self._script.detail
-        unknown = self._telemetry.unknown
-        waits = f", waits for {', '.join(unknown)}" if unknown else ""
+        dark = [] if self._may_be_dark else self._unpictured
+        awaited = [*self._telemetry.unknown, *(f"a picture of {one}" for one in dark)]
+        waits = f", waits for {', '.join(awaited)}" if awaited else ""
         drivers = self._placed or self._wheels
         cars = ", ".join(driver.detail for driver in drivers.values())
         detail = f"{script}{waits}; {cars}, {rate_hz:.0f} replies/s" if self._was_open else script

@@ -10,7 +10,7 @@
     V1 Linear Acceleration       of the IMU without gravity [m/s^2]
     V1 LIDAR ...                 rate [Hz]; 360 ranges [m] from straight ahead, counter-clockwise; a
                                  scanner of part of a circle: its own beams, from the right
-    V1 Front, Rear Camera Image  JPEG in base64; a black one before there is one
+    V1 Front, Rear Camera Image  JPEG in base64; a black one where none comes
     TL1 State                    0 off, 1 red, 2 yellow, 3 green
 
 Of the simulator's versions 0.1 has keys without `V1` and tells of no lights; the newest packs the
@@ -32,6 +32,7 @@ from typing import Literal
 import cv2
 import numpy as np
 
+from scm.camera.optics import cameras_of
 from scm.clock import NS_PER_MS
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame
@@ -75,7 +76,7 @@ class CarTelemetry:
 
     def __init__(self, prefix: str, car: Car, *, is_packed: bool = False) -> None:
         self._prefix, self._is_packed = prefix, is_packed
-        self._car = car
+        self._car, self._fitted = car, cameras_of(car)
         self._turn = 2.0 * math.pi / _number(car, "encoder.counts_per_revolution", 1920.0)
         self._radius_m = _number(car, "wheel.radius_m", 0.0325)
         self._rate_hz = _number(car, "lidar.rate_hz", 7.0)
@@ -91,6 +92,11 @@ class CarTelemetry:
         """Forget the scan and the pictures: nothing keeps them new from now on."""
         self._scan = _Kept()
         self._cameras = {camera: _Kept() for camera in CAMERAS}
+
+    def unpictured(self, cameras: Sequence[str]) -> list[str]:
+        """Return those of some cameras that the car has and that sent no picture yet."""
+        own = (camera for camera in self._fitted if camera in cameras)
+        return [camera for camera in own if self._cameras[camera].message is None]
 
     def hear(self, message: Message) -> None:
         """Take what the city says of the car; from any one thread."""
@@ -215,6 +221,15 @@ class Telemetry:
         car = self._cars.get(str(getattr(message, "vehicle", "")))
         if car is not None:
             car.hear(message)
+
+    def unpictured(self, cameras: Sequence[str]) -> list[str]:
+        """Return "n1 front" and so on: those of some cameras that sent no picture yet."""
+        return [
+            f"{name} {camera}"
+            for name in self._names
+            if name in self._cars
+            for camera in self._cars[name].unpictured(cameras)
+        ]
 
     @property
     def unknown(self) -> list[str]:

@@ -36,10 +36,10 @@ def station_of(vehicle: str) -> str:
 
 
 def place_of(city_map: CityMap, spawn: str) -> Pose2:
-    """Return where the car is put down: at a spawn place, the map's first if none is named.
+    """Return where the car is put down: at a spawn place or `X,Y,DEG`, else at the map's first.
 
     Raises:
-        MapError: when the map has none of that name.
+        MapError: when the map has none of that name, or the coordinates lie off its floor.
     """
     return Roads(city_map).spawn_pose(spawn or city_map.spawns[0].name)
 
@@ -71,7 +71,7 @@ class EmulatorPart:
             vehicle: Whose car this is.
             device: Its board and cable.
             wheels: What the board moves.
-            spawn: Spawn place; empty: the first at which no other car stands.
+            spawn: Spawn place or `X,Y,DEG`; empty: the first at which no other car stands.
             car: Car file's name.
             tag_id: Printed on its roof; None: the one that the city gives to the vehicle.
         """

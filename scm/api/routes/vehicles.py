@@ -32,7 +32,10 @@ class SpawnBody(BaseModel):
         "nigel", pattern=_NAME_OR_EMPTY, description="name of its car file", examples=["nigel"]
     )
     spawn: str = Field(
-        "", max_length=64, description="a spawn place; empty: any free one", examples=["north_1"]
+        "",
+        max_length=64,
+        description="a spawn place, or X,Y,DEG (metres, degrees, map frame); empty: any free one",
+        examples=["north_1", "1.384,0.655,315"],
     )
 
 
@@ -50,6 +53,9 @@ class RouteBody(BaseModel):
     laps: int = Field(1, ge=1, le=10_000, description="how often to pass them", examples=[2])
     speed_mps: float | None = Field(
         None, gt=0.0, le=10.0, description="wished on free road; null: the limits", examples=[0.3]
+    )
+    then: Literal["stop", "circulate"] = Field(
+        "stop", description="at the end of the last lane: stand, or drive on without end"
     )
 
 
@@ -124,6 +130,7 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
             via=tuple(body.via),
             laps=body.laps,
             speed_mps=body.speed_mps,
+            then=body.then,
         )
         return json_response(city.ask(request, RouteReply))
 

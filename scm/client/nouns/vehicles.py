@@ -38,7 +38,7 @@ class VehiclesNoun:
         Args:
             vehicle: its name; empty: the world names it
             car: name of its car file
-            spawn: a spawn place; empty: any free one
+            spawn: a spawn place, or X,Y,DEG (metres, degrees, map frame); empty: any free one
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
@@ -80,6 +80,7 @@ class VehiclesNoun:
         via: tuple[str, ...] | None = None,
         laps: int = 1,
         speed_mps: float | None = None,
+        then: Literal["stop", "circulate"] = "stop",
         idempotency_key: str = "",
     ) -> RouteReply:
         """Send a car on a route.
@@ -89,13 +90,14 @@ class VehiclesNoun:
             via: lanes to pass, in this order
             laps: how often to pass them
             speed_mps: wished on free road; null: the limits
+            then: at the end of the last lane: stand, or drive on without end
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
             "POST",
             f"/api/v1/vehicles/{part(name)}/route",
             RouteReply,
-            body={"via": via, "laps": laps, "speed_mps": speed_mps},
+            body={"via": via, "laps": laps, "speed_mps": speed_mps, "then": then},
             key=idempotency_key,
         )
 

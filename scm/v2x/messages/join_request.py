@@ -34,7 +34,7 @@ class JoinRequest(Request, kw_only=True, frozen=True):
         session: The agent's bus session; its disappearance ends the stay.
         kind: `remote` (own dynamics) or `real`.
         car: Car file's name: what the city draws and lets others collide with.
-        spawn: Wished spawn place; empty: the first free one.
+        spawn: Spawn place, or `X,Y,DEG`; empty: the first free one.
         tag_id: The AprilTag that is glued onto its roof; None: it gets the lowest free one.
     """
 

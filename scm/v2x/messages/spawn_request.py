@@ -18,12 +18,13 @@ class SpawnReply(Message, kw_only=True, frozen=True):
 
 
 class SpawnRequest(Request, kw_only=True, frozen=True):
-    """Spawn a hosted car at a named place, or at any free one.
+    """Spawn a hosted car at a named place, at coordinates, or at any free place.
 
     Attributes:
         vehicle: Its name; empty: the world chooses one.
         car: Car file's name.
-        spawn: Name of a spawn place of the map; empty: the first free one.
+        spawn: Name of a spawn place of the map, or `X,Y,DEG`: metres in the map frame and degrees;
+            empty: the first free one.
     """
 
     KEY: ClassVar[str] = "world/spawn"

@@ -11,6 +11,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import MapError
+from scm.geometry import Pose2
 from scm.maps.model import RadioChannel
 from scm.maps.segments import wall_segments
 from scm.v2x.etsi import SpatemBody
@@ -28,6 +29,7 @@ from scm.vehicles.drivers.stations import find_cells, hear_cams, nobody
 from scm.vehicles.drivers.streets import Streets
 from scm.vehicles.drivers.warned import Warnings
 from scm.vehicles.drivers.way import look_from
+from scm.vehicles.drivers.way_back import FARTHEST_M, FREE, free_way, walls_near
 
 PACKED_FROM = 4096
 WORTH_THREADS = 256
@@ -59,8 +61,9 @@ class Crowd:
         self._seed = seed
         self._memory = m.empty_memory(capacity)
         radio = radio or RadioChannel()
+        self._walls = wall_segments(city_map)
         self.channel = channel_of(
-            radio, radio.range_m or city_map.radio_range_m, capacity, wall_segments(city_map)
+            radio, radio.range_m or city_map.radio_range_m, capacity, self._walls
         )
         kept = frames_kept(radio)
         self._heard = nobody(city_map, capacity, kept, self.channel)
@@ -96,6 +99,10 @@ class Crowd:
         if self.capacity and self.streets.names:
             look_from(self.streets.ways, self._memory, 0, 0)
             self._memory.sight[0] = -1
+            kinds = np.zeros((1, m.SPEEDS + m.MOST_SPEEDS))
+            alone = m.empty_memory(1)._replace(kinds=kinds, routes=np.zeros(1, np.int64))
+            alone.sight[0, m.HERE] = 0
+            free_way(self.streets.ways, alone, self._rooms[0], np.zeros((0, 4)), 0.0, 0.0, 0.0)
 
     @property
     def lane(self) -> Ints:
@@ -205,6 +212,37 @@ class Crowd:
         floats[m.TOLD] = np.inf if speed is None else speed
         look_from(self.streets.ways, self._memory, slot, numbers[first])
         self._sent[slot] = True
+
+    def wall_ahead(
+        self,
+        slot: int,
+        lanes: Sequence[str],
+        s: float,
+        pose: Pose2,
+        after: str = "stop",
+        speed: float | None = None,
+    ) -> float | None:
+        """Return how far a car would get before it hits a wall beside its lane [m]; None: it won't.
+
+        Nothing changes; the arguments are those of `send`, and the pose of the car's rear axle.
+
+        Raises:
+            MapError: when there is no such lane.
+        """
+        numbers = [self._number(name) for name in lanes]
+        memory, route = m.empty_memory(1), np.array(numbers, np.int64)
+        memory = memory._replace(kinds=self._memory.kinds, routes=route)
+        memory.ints[0], memory.floats[0] = self._memory.ints[slot], self._memory.floats[slot]
+        ints, floats = memory.ints[0], memory.floats[0]
+        ints[m.ROUTE], ints[m.COUNT], ints[m.INDEX] = 0, len(numbers), 0
+        ints[m.AFTER] = m.AFTERS.index(after)
+        floats[m.S], floats[m.TOLD] = s, np.inf if speed is None else speed
+        look_from(self.streets.ways, memory, 0, numbers[0])
+        x, y, yaw = pose
+        kind = memory.kinds[ints[m.KIND]]
+        walls = walls_near(self._walls, x, y, FARTHEST_M + kind[m.FRONT] + kind[m.REAR])
+        gone = free_way(self.streets.ways, memory, self._rooms[0], walls, x, y, yaw)
+        return None if gone == FREE else gone
 
     def circulate(
         self, slot: int, lane: str, s: float, speed: float | None = None

@@ -22,6 +22,7 @@ from scm.vehicles.drivers.memory import WAITING_FOR
 
 REPORT_NS = NS_PER_S // 2
 SPREAD = 0.618034
+BY_HAND = "drive it there by hand, or take it off the map and spawn it again"
 _SOON = -(2**62)
 
 
@@ -61,9 +62,11 @@ class Errands:
         """Send a car round without end, from where it stands; return the lanes it takes first.
 
         Raises:
-            MapError: when it stands beside all lanes, or on one that leads nowhere.
+            MapError: when it stands beside all lanes, or on one that leads nowhere, or would hit a
+                wall on its way to its lane.
         """
         place = self._place(vehicle, pose)
+        self._check_way(slot, vehicle, (place.lane,), place, pose, "circulate")
         route = self._crowd.circulate(slot, place.lane, place.s)
         self._note(slot, vehicle, route, None, now_ns, "")
         return route
@@ -74,18 +77,22 @@ class Errands:
         """Send a car on a trip from where it is; a trip under way ends without arrival.
 
         Raises:
-            MapError: when the lanes do not exist or cannot be reached.
+            MapError: when the lanes do not exist or cannot be reached, or the car would hit a wall
+                on its way to its lane.
         """
         place, roads = self._place(vehicle, pose), self._crowd.streets.roads
         length_m: float | None = None
         passes: tuple[tuple[str, float], ...] = ()
         if request.via:
             route = roads.route(place.lane, request.via, request.laps)
+            self._check_way(slot, vehicle, route, place, pose, request.then, request.speed_mps)
             self._crowd.send(slot, route, place.s, request.then, request.speed_mps)
             ends_m = [m - place.s for m in accumulate(map(roads.length_of, route))]
             length_m, passes = ends_m[-1], _passes(request, route, ends_m)
         else:
-            route = self._crowd.circulate(slot, place.lane, place.s, request.speed_mps)
+            lane, speed_mps = (place.lane,), request.speed_mps
+            self._check_way(slot, vehicle, lane, place, pose, "circulate", speed_mps)
+            route = self._crowd.circulate(slot, place.lane, place.s, speed_mps)
         errand = self._note(slot, vehicle, route, length_m, now_ns, request.request_id)
         errand.passes, errand.speed_mps, errand.then = passes, request.speed_mps, request.then
         return RouteReply(vehicle=vehicle, trip_id=errand.trip_id, route=route, length_m=length_m)
@@ -171,9 +178,25 @@ class Errands:
     def _place(self, vehicle: str, pose: Pose2) -> OnLane:
         place = self._crowd.streets.roads.nearest(pose)
         if place is None:
-            msg = f"{vehicle}: no lane runs its way at ({pose.x:.2f}, {pose.y:.2f}) m"
+            msg = f"{vehicle}: no lane runs its way at ({pose.x:.2f}, {pose.y:.2f}) m; {BY_HAND}"
             raise MapError(msg)
         return place
+
+    def _check_way(
+        self,
+        slot: int,
+        vehicle: str,
+        route: Sequence[str],
+        place: OnLane,
+        pose: Pose2,
+        after: str,
+        speed: float | None = None,
+    ) -> None:
+        """Refuse a route where the car would hit a wall before it is on its lane."""
+        gone = self._crowd.wall_ahead(slot, route, place.s, pose, after, speed)
+        if gone is not None:
+            msg = f"{vehicle}: it would hit a wall {gone:.2f} m ahead, on its way to lane "
+            raise MapError(f"{msg}{place.lane}; {BY_HAND}")
 
 
 def _passes(

@@ -4,6 +4,8 @@ import itertools
 
 import pytest
 
+from scm.maps.load import load_map
+from scm.maps.route import Roads
 from tests.e2e.pages.visiting import LOOKS, SIZES, in_both_themes, photograph
 
 SCENE = "/static/js/pages/map/scene.js"
@@ -104,6 +106,17 @@ def test_the_map_is_zoomed_and_panned_by_mouse_and_keyboard(visit):
     assert visited.complaints == []
 
 
+def click_on(page, x_m, y_m):
+    """Click on a place of the whole map."""
+    box = page.locator(".sheet").bounding_box()
+    left, top, width, height = (-0.376, -1.665, 3.52, 2.19)
+    scale = min(box["width"] / width, box["height"] / height)
+    x = box["width"] / 2 + scale * (x_m - left - width / 2)
+    y = box["height"] / 2 - scale * (y_m + top + height / 2)
+    page.mouse.click(box["x"] + x, box["y"] + y)
+    page.wait_for_timeout(100)
+
+
 def test_a_car_is_chosen_on_the_map_followed_and_let_go(visit):
     visited = visit("/map")
     page = visited.page
@@ -116,14 +129,7 @@ def test_a_car_is_chosen_on_the_map_followed_and_let_go(visit):
     page.focus(".sheet")
 
     def click_on_it():
-        box = page.locator(".sheet").bounding_box()
-        x_m, y_m = page.evaluate(place)
-        left, top, width, height = (-0.376, -1.665, 3.52, 2.19)
-        scale = min(box["width"] / width, box["height"] / height)
-        x = box["width"] / 2 + scale * (x_m - left - width / 2)
-        y = box["height"] / 2 - scale * (y_m + top + height / 2)
-        page.mouse.click(box["x"] + x, box["y"] + y)
-        page.wait_for_timeout(100)
+        click_on(page, *page.evaluate(place))
         return page.locator('tr[data-car="n5"].chosen').count()
 
     visited.until(click_on_it, "n5 is chosen by a click on it")
@@ -134,6 +140,34 @@ def test_a_car_is_chosen_on_the_map_followed_and_let_go(visit):
     page.wait_for_selector(".chip", state="detached")
     page.keyboard.press("Escape")
     page.wait_for_selector(".chosen-car", state="detached")
+
+
+def test_the_chosen_car_is_sent_to_a_lane_by_a_click_on_it_or_by_its_name(visit):
+    visited = visit("/map?vehicle=n5")
+    page = visited.page
+    page.wait_for_selector('tr[data-car="n5"].chosen')
+    roads = Roads(load_map("driving_school"))
+
+    def is_offered():
+        for lane, share in itertools.product(("west_loop", "east_loop"), (0.3, 0.5, 0.7)):
+            at = roads.lane(lane).at(share * roads.length_of(lane))
+            click_on(page, at.x, at.y)
+            if page.locator(f'.chip:text-is("Send n5 to {lane}")').count():
+                return lane
+            page.click('tr[data-car="n5"]')  # a car stood there and was chosen
+        return None
+
+    lane = visited.until(is_offered, "a click on a lane offers it")
+    page.click(f'.chip:text-is("Send n5 to {lane}")')
+    page.wait_for_selector('.notice:has-text("n5 drives to ")')
+    page.wait_for_selector(".chip", state="detached")
+    click_on(page, 1.384, 1.3)  # between the loops: no lane
+    page.wait_for_selector(".chosen-car", state="detached")
+    page.click('tr[data-car="n5"]')
+    page.click('.chosen-car button:text-is("Send to…")')
+    page.fill('dialog [name="lane"]', "nowhere")
+    page.click('dialog button:text-is("Send it")')
+    page.wait_for_selector('.notice:has-text("no lane")')
 
 
 def test_the_lidar_is_heard_only_while_it_is_shown(visit):

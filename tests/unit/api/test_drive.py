@@ -203,6 +203,20 @@ def test_the_car_goes_on_where_it_was_going(connect, fake_city, hear, snapshot, 
     )
 
 
+def test_a_car_that_cannot_go_on_stands_and_the_person_reads_why(
+    connect, fake_city, hear, snapshot
+):
+    trip = Trip(vehicle="n1", trip_id="t1", t_ns=1, route=("a",), done_m=0.1, length_m=None,
+                started_ns=0)  # fmt: skip
+    fake_city.answers[RouteRequest] = Refused(code="invalid", detail="n1: a wall is ahead")
+    hear(1.0, snapshot(n1=(0.0, 0.0, 0.0)), trip)
+    with connect() as socket:
+        say(socket, TAKE)
+        until(socket, "taken")
+        say(socket, {"type": "give_back"})
+        assert until(socket, "over")["detail"] == "n1 stands: a wall is ahead"
+
+
 def test_it_goes_on_from_where_it_was_taken_and_not_from_what_was_last_told_before(
     connect, fake_city, hear, snapshot
 ):

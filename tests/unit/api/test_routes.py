@@ -73,15 +73,23 @@ class TestCars:
         fake_city.answers[RouteRequest] = RouteReply(
             vehicle="n5", trip_id="t1", route=("a", "b"), length_m=3.0
         )
-        body = {"via": ["a", "b"], "laps": 2, "speed_mps": 0.2}
+        body = {"via": ["a", "b"], "laps": 2, "speed_mps": 0.2, "then": "circulate"}
         response = client("POST", f"{API}/vehicles/n5/route", json=body)
         assert response.json()["route"] == ["a", "b"]
         assert fake_city.asked == [
-            RouteRequest(vehicle="n5", via=("a", "b"), laps=2, speed_mps=0.2)
+            RouteRequest(vehicle="n5", via=("a", "b"), laps=2, speed_mps=0.2, then="circulate")
         ]
 
     @pytest.mark.parametrize(
-        "body", [{"laps": 0}, {"speed_mps": -1}, {"via": "a"}, {"vias": ["a"]}, {"laps": "two"}]
+        "body",
+        [
+            {"laps": 0},
+            {"then": "fly"},
+            {"speed_mps": -1},
+            {"via": "a"},
+            {"vias": ["a"]},
+            {"laps": "two"},
+        ],
     )
     def test_a_wrong_route_is_refused_before_anybody_is_asked(self, client, fake_city, body):
         problem = is_problem(client("POST", f"{API}/vehicles/n5/route", json=body), 422, "invalid")

@@ -1,5 +1,6 @@
 """The bridge beside a real world on a stepped clock; the script is what the test says."""
 
+import base64
 import json
 import math
 
@@ -26,7 +27,7 @@ from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.world.part import WorldPart
-from vehicle_agent.devkit.bridge import DevkitPart, Wanted
+from vehicle_agent.devkit.bridge import PICTURE_NS, DevkitPart, Wanted
 from vehicle_agent.devkit.heads import Heads
 
 S = 1_000_000_000
@@ -178,7 +179,7 @@ def test_a_lease_that_lapsed_is_asked_for_again(stage):
     assert stage.say(1.0, V1_Throttle=0.6, V1_Steering=0).owner == "devkit-4567"
 
 
-@pytest.mark.parametrize("stage", [(Wanted(("n2", "n1")), 2)], indirect=True)
+@pytest.mark.parametrize("stage", [(Wanted(("n2", "n1"), cameras=()), 2)], indirect=True)
 def test_two_cars_are_v1_and_v2_in_the_order_of_the_options(stage):
     keys = {"V1_Throttle": 0.8, "V2_Throttle": 0.0, "V1_Steering": 1, "V2_Steering": 0}
     stage.say(1.0, **keys)
@@ -190,6 +191,7 @@ def test_two_cars_are_v1_and_v2_in_the_order_of_the_options(stage):
         assert math.hypot(x - stage.car(name).x_m, y - stage.car(name).y_m) < 0.02
 
 
+@pytest.mark.parametrize("stage", [(Wanted(("n1",), cameras=()),)], indirect=True)
 def test_the_packet_is_what_the_car_says(stage):
     stage.wait(0.5)
     data = json.loads(stage.part.packet().text(1)[3:])[1]
@@ -201,6 +203,30 @@ def test_the_packet_is_what_the_car_says(stage):
     assert all(b > a + 500 for a, b in zip(before, after, strict=True))
     ranges = [float(word) for word in data["V1 LIDAR Range Array"].split()]
     assert sum(map(math.isfinite, ranges)) > 300
+
+
+def test_the_first_packet_has_a_picture_of_each_camera(stage):
+    stage.wait(1.0)
+    assert stage.part.packet() is None
+    assert "a picture of n1 rear" in stage.statuses.drain()[-1].message.detail
+    for camera, payload in (("front", b"first"), ("rear", b"second")):
+        assert stage.part.packet() is None
+        size = {"width_px": 4, "height_px": 3}
+        frame = CameraFrame(vehicle="n1", camera=camera, t_ns=0, payload=payload, **size)
+        stage.part.step(stage.lockstep.now_ns, [Incoming(frame, stage.lockstep.now_ns)])
+    data = json.loads(stage.part.packet().text(1)[3:])[1]
+    seen = [base64.b64decode(data[f"V1 {name} Camera Image"]) for name in ("Front", "Rear")]
+    assert seen == [b"first", b"second"]
+
+
+@pytest.mark.parametrize("stage", [(Wanted(("n1",), cameras=("front",)),)], indirect=True)
+def test_without_any_picture_packets_are_black_in_the_end_and_the_bridge_says_so(stage, caplog):
+    stage.wait(0.5)
+    assert stage.part.packet() is None
+    stage.part.step(stage.lockstep.now_ns + PICTURE_NS, [])
+    assert "V1 Front Camera Image" in stage.part.packet().text(1)
+    assert "n1 front: no picture for 10 s" in caplog.text
+    assert "rear" not in caplog.text
 
 
 def test_nothing_costly_is_heard_while_no_script_is_there(stage):

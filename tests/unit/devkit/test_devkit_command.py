@@ -26,3 +26,12 @@ def test_a_placed_car_needs_the_rights_of_that_very_vehicle(
 def test_the_oldest_packet_is_of_one_car(capsys):
     assert main([*DEVKIT, "--car", "p2", "--packet", "0.1"]) == 2
     assert "one car only" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "command", [DEVKIT, ("join", "--name", "j1", "--connect", "tcp/127.0.0.1:1")]
+)
+def test_coordinates_that_are_none_are_refused_before_anybody_is_asked(capsys, command):
+    with pytest.raises(SystemExit, match="2"):
+        main([*command, "--spawn=-1,2"])
+    assert "got '-1,2', expected X,Y,DEG" in capsys.readouterr().err

@@ -1,5 +1,6 @@
 import itertools
 import math
+import re
 
 import numpy as np
 import pytest
@@ -129,6 +130,25 @@ def test_a_path_over_a_crossing_is_followed_by_its_hint(roads):
         pose = path.at(0.01 * k)
         s, _ = path.project(pose.x, pose.y, s)
     assert s == pytest.approx(14.99, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        ("1,2", "expected X,Y,DEG"),
+        ("1,2,3,4", "expected X,Y,DEG"),
+        ("1,2,east", "expected X,Y,DEG"),
+        ("1,inf,0", "finite"),
+        ("9.5,0.5,0", "x of '9.5,0.5,0' is 9.5 m, expected -0.116 to 2.884"),
+    ],
+)
+def test_coordinates_that_are_no_place_are_refused_in_words(roads, place, words):
+    with pytest.raises(MapError, match=re.escape(words)):
+        roads.spawn_pose(place)
+
+
+def test_coordinates_are_metres_and_degrees(roads):
+    assert roads.spawn_pose(" 1.384, .655,315") == pytest.approx((1.384, 0.655, -math.pi / 4))
 
 
 def test_an_unknown_spawn_is_refused(roads):

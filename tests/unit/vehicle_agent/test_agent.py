@@ -251,6 +251,16 @@ def test_while_another_drives_a_route_is_refused(inside):
     assert answer.reply.code == "owned"
 
 
+def test_given_back_before_a_wall_it_stands_and_says_why(inside):
+    inside.step(command(EPOCH + 1, throttle=0.0))
+    inside.steps(1.5)
+    inside.part._body.place(Pose2(0.328, 1.134, 1.152), inside.now_ns)
+    answer = one(inside.step(RouteRequest(vehicle="n7")), Answer)
+    assert (answer.reply.code, "wall" in answer.reply.detail) == ("invalid", True)
+    assert inside.part._link.standing == "foreign"
+    assert inside.steps(1.0).throttle == 0.0
+
+
 def test_a_route_is_taken_with_its_lanes(inside):
     request = RouteRequest(vehicle="n7", via=("west_loop",))
     answer = one(inside.step(request), Answer)

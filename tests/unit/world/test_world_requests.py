@@ -25,9 +25,15 @@ from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.vehicles.car import load_car
-from scm.world.requests import is_free
+from scm.world.requests import is_free, reply_to
+from scm.world.world import World
 
 MAP = load_map("driving_school")
+
+
+@pytest.fixture(scope="module")
+def room():
+    return World(load_map("parking_school_obstacles"), capacity=2)
 
 
 def test_the_first_step_tells_what_the_city_is(city):
@@ -47,6 +53,27 @@ def test_a_spawned_car_stands_at_the_wished_place_with_the_lowest_free_tag(city)
     wished = city.world.roads.spawn_pose("b")
     assert (reply.x_m, reply.y_m) == pytest.approx((wished.x, wished.y), abs=1e-3)
     assert reply.tag_id == MAP.first_vehicle_tag_id
+
+
+@pytest.mark.parametrize("x_m", ["1.384", "-0.0"])
+def test_a_car_can_be_put_to_coordinates(city, x_m):
+    reply = city.ask(SpawnRequest(spawn=f"{x_m},0.655,315"))
+    assert (reply.x_m, reply.y_m) == pytest.approx((float(x_m), 0.655), abs=1e-3)
+    assert reply.yaw_rad == pytest.approx(-math.pi / 4)
+    assert city.ask(SpawnRequest(spawn=f"{x_m},0.655,315")).code == "occupied"
+
+
+@pytest.mark.parametrize(
+    ("place", "has_room"),
+    [("-0.7,0.3,0", True), ("0.86,0.31,0", False), ("0.5,0.31,0", False), ("0.5,0.05,0", True)],
+)
+def test_no_car_is_put_onto_a_box(room, place, has_room):
+    reply = reply_to(room, SpawnRequest(spawn=place), 0)
+    assert getattr(reply, "code", None) == (None if has_room else "occupied")
+    if has_room:
+        room.remove(reply.vehicle)
+    else:
+        assert "a wall or a box" in reply.detail
 
 
 def test_a_tag_is_given_again_after_its_car_left(city):
@@ -106,6 +133,15 @@ def test_cars_without_a_name_get_one_each(city):
         (SpawnRequest(car="/etc/passwd.toml"), "invalid", "expected one of"),
         (SpawnRequest(spawn="zz"), "invalid", "zz"),
         (SpawnRequest(spawn="a"), "occupied", "'a'"),
+        (SpawnRequest(spawn="1,2"), "invalid", "expected X,Y,DEG"),
+        (SpawnRequest(spawn="1,nan,0"), "invalid", "finite"),
+        (SpawnRequest(spawn="1.4,9.5,0"), "invalid", "expected -0.095 to 1.405"),
+        (SpawnRequest(spawn="2.86,0.65,0"), "occupied", "floor's edge"),
+        (
+            JoinRequest(vehicle="n9", session="s", spawn="2.86,0.65,0"),
+            "occupied",
+            "a wall or a box",
+        ),
         (JoinRequest(vehicle="n1", session="s"), "owned", "n1"),
         (JoinRequest(vehicle="world", session="s"), "owned", "world"),
         (JoinRequest(vehicle="n9", session="s", kind="ghost"), "invalid", "ghost"),
@@ -443,3 +479,32 @@ def test_a_trip_taken_away_is_told_a_last_time_with_what_is_left_of_it(city):
     city.lease()
     (last,) = city.heard(Trip)[before:]
     assert (last.via, last.speed_mps) == (("west_loop", "west_loop"), 0.1)
+
+
+@pytest.mark.parametrize(("x_m", "y_m", "yaw_rad"), [(0.328, 1.134, 1.152), (2.568, 0.539, 0.562)])
+def test_a_car_given_back_before_a_wall_stands_and_says_why(city, x_m, y_m, yaw_rad):
+    city.ask(SpawnRequest(vehicle="n1", spawn="a"))
+    lease, car = city.lease(), city.world.hosted["n1"]
+    car.fleet.place(car.row, Pose2(x_m, y_m, yaw_rad), 0.0)
+    city.ask(LeaseRequest(vehicle="n1", owner="ann", verb="release", epoch=lease.epoch))
+    reply = city.ask(RouteRequest(vehicle="n1"))
+    city.run_for(2.0)
+    assert "contact" not in city.events()
+    assert car.speed == pytest.approx(0.0, abs=1e-3)
+    assert (reply.code, "wall" in reply.detail, "by hand" in reply.detail) == (
+        "invalid",
+        True,
+        True,
+    )
+
+
+def test_a_car_given_back_beside_its_lane_drives_there_where_no_wall_is(city):
+    city.ask(SpawnRequest(vehicle="n1", spawn="a"))
+    car, start = city.world.hosted["n1"], city.world.roads.spawn_pose("a")
+    beside = Pose2(*start.apply(0.0, 0.1), start.yaw + 0.5)
+    car.fleet.place(car.row, beside, 0.0)
+    city.world.locate()
+    city.ask(RouteRequest(vehicle="n1"))
+    city.run_for(8.0)
+    assert "contact" not in city.events()
+    assert abs(city.world.crowd.cross_track[car.slot]) < 0.02

@@ -7,6 +7,7 @@ import { selected } from "scm/shared/selection.js";
 import { change } from "scm/shell/api.js";
 import { carNamed, fleetBeat } from "scm/pages/map/fleet.js";
 import { followed, layers, show } from "scm/pages/map/layers.js";
+import { SendTo } from "scm/pages/map/send_to.js";
 
 const DEGREES = 180 / Math.PI;
 
@@ -66,6 +67,7 @@ function Acts({ name }) {
     <div class="acts">
       <button class="small" aria-pressed=${followed.value === name} onClick=${follow}>Follow</button>
       ${toggle("path", "Path")} ${lidar}
+      <${SendTo} name=${name} />
       <a href="/vehicles/${name}">Open</a>
       <button class="small" onClick=${() => (removing.value = name)}>Take off</button>
     </div>

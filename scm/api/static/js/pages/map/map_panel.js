@@ -10,6 +10,7 @@ import { LayersMenu } from "scm/pages/map/layers_menu.js";
 import { hearCloseUp } from "scm/pages/map/close_up.js";
 import { HeatKey, Kinds, ScaleBar } from "scm/pages/map/legend.js";
 import { Scene } from "scm/pages/map/scene.js";
+import { offer, SendChip, withdraw } from "scm/pages/map/send_to.js";
 import { Viewport, viewChanged } from "scm/pages/map/viewport.js";
 import { selected } from "scm/shared/selection.js";
 import { link, now } from "scm/shell/store.js";
@@ -47,7 +48,7 @@ export function MapPanel() {
     const seen = new Viewport(ground.box);
     const scene = new Scene(canvas.current, ground, seen);
     setView(seen);
-    const ends = [scene.run(), gestures(sheet.current, seen, (x, y) => choose(scene.pick(x, y))), hearCloseUp()];
+    const ends = [scene.run(), gestures(sheet.current, seen, (x, y) => choose(scene.pick(x, y), seen, x, y)), hearCloseUp()];
     return () => ends.forEach((end) => end());
   }, [ground]);
   if (ground instanceof Error) {
@@ -71,12 +72,15 @@ export function MapPanel() {
         ></canvas>
       </div>
       ${view && html`<${Controls} view=${view} />`}
-      <div class="corner"><${FollowChip} /><${HeatKey} /><${Kinds} />${view && html`<${ScaleBar} view=${view} />`}</div>
+      <div class="corner"><${SendChip} /><${FollowChip} /><${HeatKey} /><${Kinds} />${view && html`<${ScaleBar} view=${view} />`}</div>
     </section>
   `;
 }
 
-function choose(vehicle) {
+/** A click: on a car it is chosen, on a lane the chosen car may be sent there, elsewhere it is let go. */
+function choose(vehicle, view, x, y) {
+  if (vehicle) withdraw();
+  else if (offer(view, x, y)) return;
   selected.value = vehicle;
   if (followed.value) followed.value = vehicle;
 }
@@ -138,7 +142,10 @@ const KEYS = {
   ArrowDown: (view) => move(view, 0, -PAN_PX),
   f: () => (followed.value = followed.value ? null : selected.value),
   l: () => (layers.value = { ...layers.value, lidar: !layers.value.lidar }),
-  Escape: () => (followed.value = selected.value = null),
+  Escape: () => {
+    withdraw();
+    followed.value = selected.value = null;
+  },
 };
 
 function move(view, dx, dy) {

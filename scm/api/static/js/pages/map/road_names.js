@@ -4,6 +4,7 @@
  * A lane's name lies along it, where it covers no other; a name without room waits until one zooms in.
  */
 import { city } from "scm/shell/store.js";
+import { along, lengthOf, moved } from "scm/pages/map/lane_shape.js";
 
 const SHARES = [0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.15, 0.85]; // of a lane: where its name may stand
 const LONGER = 0.85; // the least length of a lane, of its name's
@@ -84,28 +85,6 @@ function namesOf(map, paper) {
     }),
   ];
   return names.map((name) => ({ ...name, half: halfOf(paper, name) }));
-}
-
-const lengthOf = ({ length_m, radius_m, angle_rad }) => length_m ?? radius_m * Math.abs(angle_rad);
-
-/** The pose on a lane's centre line, so far from its start [m]. */
-function along(lane, s) {
-  const [x, y, yaw] = lane.start;
-  let pose = { x, y, yaw };
-  for (const segment of lane.segments) {
-    const length = Math.min(lengthOf(segment), s);
-    pose = moved(pose, length, segment.radius_m ? Math.sign(segment.angle_rad) / segment.radius_m : 0);
-    s -= length;
-  }
-  return pose;
-}
-
-/** The pose after a way of constant curvature, + = left. */
-function moved({ x, y, yaw }, length, curvature) {
-  const turn = curvature * length;
-  const chord = turn ? (2 * Math.sin(turn / 2)) / curvature : length;
-  const way = yaw + turn / 2;
-  return { x: x + chord * Math.cos(way), y: y + chord * Math.sin(way), yaw: yaw + turn };
 }
 
 /**

@@ -12,6 +12,7 @@ import { Ground } from "scm/pages/map/ground.js";
 import { Heat } from "scm/pages/map/heat.js";
 import { followed, layers } from "scm/pages/map/layers.js";
 import { RoadNames } from "scm/pages/map/road_names.js";
+import { drawOffer } from "scm/pages/map/send_to.js";
 import { timeToChange } from "scm/pages/map/signal_times.js";
 import { drawSprites } from "scm/pages/map/sprites.js";
 import { Trails } from "scm/pages/map/trails.js";
@@ -77,6 +78,7 @@ export class Scene {
       this.heat.note(fleet);
       this.heat.draw(paper, view, now);
     }
+    drawOffer(paper, view);
     this.#drawChosenBelow(on, now);
     if (on.trails) {
       this.trails.note(fleet); // above the planned path, which on a circuit lies on all of them
