@@ -131,8 +131,9 @@ def drained(mailbox) -> Iterator:
 def noisy(frame: Frame, rng: random.Random) -> Frame:
     """Return a frame of a car that knows itself only so well."""
     told = read_cam(frame.body)
-    body = moved(frame.body, rng.gauss(told.x_m, OWN_M), rng.gauss(told.y_m, OWN_M))
-    accel = frame.body.motion.longitudinal_acceleration.value * 0.1 / 14.0
+    x_m, y_m = told.place or (math.nan, math.nan)  # cars of the city know where they are
+    body = moved(frame.body, rng.gauss(x_m, OWN_M), rng.gauss(y_m, OWN_M))
+    accel = frame.body.motion.longitudinal_acceleration.value * 0.1 / SCALE
     body = driven(
         body,
         speed_mps=rng.gauss(told.speed_mps or 0.0, OWN_MPS),

@@ -12,7 +12,7 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_MS
 from scm.v2x.etsi import CamBody
-from scm.v2x.etsi_convert import cam_of, read_cam
+from scm.v2x.etsi_convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, cam_of, read_cam
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.cpm_rx import CpmRx
@@ -157,10 +157,17 @@ def _tell_drivers(world: World, frame: Frame, now_ns: int) -> None:
 
 
 def _tell_of_car(world: World, slot: int, body: CamBody, now_ns: int) -> None:
+    """Let drivers hear a car's CAM; one without a place or a heading tells them nothing.
+
+    A speed or a turn that it does not tell is taken as none, a size as that of a Nigel.
+    """
     told = read_cam(body)
-    world.crowd.show(slot, told.length_m, told.width_m)
-    numbers = (told.x_m, told.y_m, told.yaw_rad, told.speed_mps, told.yaw_rate_radps)
-    columns = [np.array([number or 0.0]) for number in numbers]
+    if told.place is None or told.yaw_rad is None:
+        return
+    length_m, width_m = told.length_m or ASSUMED_LENGTH_M, told.width_m or ASSUMED_WIDTH_M
+    world.crowd.show(slot, length_m, width_m)
+    numbers = (*told.place, told.yaw_rad, told.speed_mps or 0.0, told.yaw_rate_radps or 0.0)
+    columns = [np.array([number]) for number in numbers]
     world.crowd.hear(np.array([slot]), now_ns, *columns)
 
 

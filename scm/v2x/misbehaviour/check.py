@@ -39,15 +39,21 @@ class Strayed:
     __slots__ = ("last_m", "over_s", "sum_m", "variance_m2")
 
     def __init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget what was."""
         self.last_m = self.sum_m = self.over_s = self.variance_m2 = 0.0
 
     def add(self, now: Claim, before: Claim, dt_s: float, front_share: float) -> None:
-        """Take the way from one claim to the next."""
+        """Take the way from one claim to the next; begin anew where a heading or speed lacks."""
         (x1, y1), (x0, y0) = now.rear(front_share), before.rear(front_share)
-        yaw0, yaw1 = before.yaw_rad or 0.0, now.yaw_rad or 0.0
+        yaw0, yaw1, v0, v1 = before.yaw_rad, now.yaw_rad, before.speed_mps, now.speed_mps
+        if yaw0 is None or yaw1 is None or v0 is None or v1 is None:
+            self.begin()
+            return
         yaw = yaw0 + wrap_angle(yaw1 - yaw0) / 2.0
         way = (x1 - x0) * math.cos(yaw) + (y1 - y0) * math.sin(yaw)
-        v0, v1 = before.speed_mps or 0.0, now.speed_mps or 0.0
         self.last_m = way - (v1 + v0) / 2.0 * dt_s
         fade = math.exp(-dt_s / self.WINDOW_S)
         width = (v1 - v0) * dt_s

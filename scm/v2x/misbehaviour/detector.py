@@ -12,7 +12,7 @@ from scm.clock import NS_PER_S, nanoseconds
 from scm.v2x.etsi import CamBody
 from scm.v2x.etsi_convert import station_id
 from scm.v2x.messages.eye_track import EyeTrack
-from scm.v2x.misbehaviour.check import CONFIRMED, Case, Check, Standing, Strayed, load_checks
+from scm.v2x.misbehaviour.check import CONFIRMED, Case, Check, Standing, load_checks
 from scm.v2x.misbehaviour.claim import Claim, claim_of
 from scm.v2x.misbehaviour.fusion import FREE, Memory
 from scm.v2x.misbehaviour.ground import Ground
@@ -83,7 +83,7 @@ class Detector:
     def hear(
         self, station: str, receiver: str, sent_ns: int, body: CamBody, lost_ns: int = 0
     ) -> Judged | None:
-        """Judge a CAM; None: it was heard before, through another receiver.
+        """Judge a CAM; None: it was heard before, through another receiver, or tells no place.
 
         `lost_ns` is that of `CamRx`: time in which the car was not moved.
         """
@@ -91,10 +91,12 @@ class Detector:
         newest = memory.newest
         if newest is not None and sent_ns <= newest.sent_ns:
             return None
+        claim = claim_of(station, receiver, sent_ns, body, self._limits, lost_ns)
+        if claim is None:
+            return None
         if self._began_ns is None or sent_ns - self._heard_ns > SILENT_NS:
             self._began_ns = sent_ns
         self._heard_ns = sent_ns
-        claim = claim_of(station, receiver, sent_ns, body, self._limits, lost_ns)
         case = self._case(claim, memory)
         doubts = self._ask(case)
         due = memory.add(claim, case.gap_s, doubts)
@@ -189,12 +191,16 @@ class Detector:
 
     def _filter(self, claim: Claim, memory: Memory, before: Claim | None, driven_s: float) -> None:
         x, y = claim.rear(self._limits.front_share)
-        yaw, speed = claim.yaw_rad or 0.0, claim.speed_mps or 0.0
-        vx, vy = speed * math.cos(yaw), speed * math.sin(yaw)
         kalman = memory.kalman
-        if before is None or driven_s <= 0.0:
+        if claim.yaw_rad is None or claim.speed_mps is None:
+            kalman.stop()
+            memory.strayed.begin()
+            return
+        yaw, speed = claim.yaw_rad, claim.speed_mps
+        vx, vy = speed * math.cos(yaw), speed * math.sin(yaw)
+        if before is None or driven_s <= 0.0 or not kalman.has_begun:
             kalman.begin(x, y, vx, vy)
-            memory.strayed = Strayed()
+            memory.strayed.begin()
         else:
             kalman.take(driven_s, x, y, vx, vy, claim.own_m, claim.own_mps)
             memory.strayed.add(claim, before, driven_s, self._limits.front_share)
@@ -223,11 +229,12 @@ class Detector:
         """Return whether the claimed car, a little larger, overlaps another one."""
         if claim.yaw_rad is None:
             return False
-        size = claim.length_m + TOUCH_M, claim.width_m + TOUCH_M
+        length_m, width_m = claim.size
+        size = length_m + TOUCH_M, width_m + TOUCH_M
         box: Box = (*claim.middle, claim.yaw_rad, *size)
         near_ns = 2 * FRESH_NS
         claimed = (
-            (*other.middle, other.yaw_rad, other.length_m + TOUCH_M, other.width_m + TOUCH_M)
+            (*other.middle, other.yaw_rad, other.size[0] + TOUCH_M, other.size[1] + TOUCH_M)
             for other in neighbours
             if other.yaw_rad is not None and abs(claim.t_ns - other.t_ns) <= near_ns
         )
@@ -239,7 +246,7 @@ class Detector:
 
         A doubtful track too: two cars that press against each other hide each other's tags.
         """
-        ahead = (self._limits.front_share - 0.5) * claim.length_m
+        ahead = (self._limits.front_share - 0.5) * claim.size[0]
         for who, track in self._tracks.items():
             if who != claim.who and abs(claim.t_ns - track.t_ns) <= FRESH_NS:
                 x = track.x_m + ahead * math.cos(track.yaw_rad)
@@ -285,7 +292,8 @@ def _driven_s(claim: Claim, before: Claim, front_share: float) -> float:
     lost_s = (claim.lost_ns - before.lost_ns) * 1e-9
     (x1, y1), (x0, y0) = claim.rear(front_share), before.rear(front_share)
     way_m = math.hypot(x1 - x0, y1 - y0)
-    speed_mps = abs((claim.speed_mps or 0.0) + (before.speed_mps or 0.0)) / 2.0
+    v1, v0 = claim.speed_mps, before.speed_mps
+    speed_mps = 0.0 if v1 is None or v0 is None else abs(v1 + v0) / 2.0
     needed_s = way_m / speed_mps if speed_mps > 0.0 else dt_s
     return min(dt_s, max(LEAST_S, dt_s - lost_s, needed_s))
 
@@ -304,9 +312,10 @@ def _idle(claim: Claim, before: Claim | None, gap_s: float, idle: int) -> int:
     """Return how many claims in a row came fast although the car had not moved."""
     if before is None or gap_s > IDLE_S:
         return 0
-    moved = max(
-        math.hypot(claim.x_m - before.x_m, claim.y_m - before.y_m) / MOVED_M,
-        abs((claim.speed_mps or 0.0) - (before.speed_mps or 0.0)) / MOVED_MPS,
-        abs(math.remainder((claim.yaw_rad or 0.0) - (before.yaw_rad or 0.0), math.tau)) / MOVED_RAD,
-    )
+    moved = math.hypot(claim.x_m - before.x_m, claim.y_m - before.y_m) / MOVED_M
+    if claim.speed_mps is not None and before.speed_mps is not None:
+        moved = max(moved, abs(claim.speed_mps - before.speed_mps) / MOVED_MPS)
+    if claim.yaw_rad is not None and before.yaw_rad is not None:
+        turned = math.remainder(claim.yaw_rad - before.yaw_rad, math.tau)
+        moved = max(moved, abs(turned) / MOVED_RAD)
     return 0 if moved > UNMOVED else idle + 1
