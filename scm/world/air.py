@@ -197,11 +197,10 @@ def _deliver(
     """Put frames (k,) that reach receivers (k, n) into the outbox, at once or when they arrive."""
     delays = iter(world.radio.delays(int(reached.sum())).tolist())
     for row, frame in enumerate(frames):
-        lost_ns = world.lost_ns(frame.station)
         if also_sent:
             world.outbox.append(frame)
         for i in np.flatnonzero(reached[row]).tolist():
-            heard = _received(receivers.names[i], frame, lost_ns)
+            heard = _received(world, receivers.names[i], frame)
             delay_ns = next(delays)
             if delay_ns:
                 world.late.put(now_ns + delay_ns, heard)
@@ -223,11 +222,14 @@ def _cam(world: World, state: VehicleState, now_ns: int) -> CamTx:
     return CamTx(station=state.vehicle, t_ns=now_ns, body=body)
 
 
-def _received(receiver: str, frame: Frame, lost_ns: int) -> Heard:
+def _received(world: World, receiver: str, frame: Frame) -> Heard:
     if isinstance(frame, CamTx):
+        car = world.car(frame.station)
         return CamRx(
             receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body,
-            signed=frame.signed, lost_ns=lost_ns,
+            signed=frame.signed, lost_ns=world.lost_ns(frame.station),
+            car="" if car is None else car.car_file,
+            by_hand=car is not None and not car.lease.is_at_home, stopped=world.stop.engaged,
         )  # fmt: skip
     kind = RECEIVED[type(frame)]
     return kind(receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body)  # type: ignore[arg-type]

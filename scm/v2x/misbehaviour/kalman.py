@@ -8,7 +8,7 @@ A claim gives position and velocity (speed along yaw).
 
 import math
 
-ACCEL_PSD = 0.08
+ACCEL_PSD, HARD_PSD = 0.08, 0.9
 
 
 class Kalman:
@@ -45,10 +45,11 @@ class Kalman:
         self.is_warm = self.has_begun = False
 
     def take(
-        self, dt: float, x: float, y: float, vx: float, vy: float, own_m: float, own_mps: float
-    ) -> None:
+        self, dt: float, x: float, y: float, vx: float, vy: float, own_m: float, own_mps: float,
+        psd: float = ACCEL_PSD,
+    ) -> None:  # fmt: skip
         """Forecast to a claim dt seconds on, note how far it lies off, and take it in."""
-        q = ACCEL_PSD * dt
+        q = psd * dt
         a = self._a + dt * (2.0 * self._b + dt * self._c) + q * dt * dt / 3.0
         b = self._b + dt * self._c + q * dt / 2.0
         c = self._c + q

@@ -6,7 +6,8 @@ An acceleration beyond the field's range, "16 m/s^2 or more", bounds r to one si
 
 Holds for claims that follow within NEAR_S of each other: later, anything may have come between.
 Acceleration is told of an instant, so it tells little: alone it needs many claims. While another
-car touches, an instant tells nothing at all, nor just after time passed without the car moving.
+car touches, an instant tells nothing at all, nor just after time passed without the car moving, nor
+by hand or in a stop of the city, when pedals change several times between two CAMs.
 """
 
 import math
@@ -21,7 +22,7 @@ SHARE = 0.5
 
 def _judge(case: Case) -> float | None:
     now, before, dt = case.now, case.before, case.dt_s
-    if before is None or not 0.0 < dt <= NEAR_S or case.since_lost_s <= NEAR_S:
+    if before is None or not 0.0 < dt <= NEAR_S or case.since_lost_s <= NEAR_S or case.is_hard:
         return None
     if now.speed_mps is None or before.speed_mps is None:
         return None
