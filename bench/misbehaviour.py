@@ -33,7 +33,8 @@ from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.v2x.misbehaviour.attack import Frame, Scene, Sent, attack_names, load_attack
-from scm.v2x.misbehaviour.detector import Detector
+from scm.v2x.misbehaviour.check import Sender
+from scm.v2x.misbehaviour.detector import UNKNOWN, Detector
 from scm.v2x.misbehaviour.forge import driven, moved
 from scm.v2x.misbehaviour.ground import Ground
 from scm.world.part import WorldPart
@@ -42,6 +43,7 @@ START_NS = 1_795_000_000_000_000_000
 OWN_M, OWN_MPS, OWN_RAD, OWN_MPS2 = 0.005, 0.005, math.radians(0.5), 0.03
 EYE_M, EYE_MPS, EYE_RAD, EYE_MISSES = 0.003, 0.015, math.radians(0.7), 0.02
 LOSS = 0.3
+CAR = "nigel"
 POSITION_AND_SPEED = (
     "constant_position_offset", "random_position_offset", "position_mirroring",
     "constant_speed_offset", "random_speed_offset", "zero_speed", "frozen_speed", "sudden_stop",
@@ -131,8 +133,9 @@ def drained(mailbox) -> Iterator:
 def noisy(frame: Frame, rng: random.Random) -> Frame:
     """Return a frame of a car that knows itself only so well."""
     told = read_cam(frame.body)
-    body = moved(frame.body, rng.gauss(told.x_m, OWN_M), rng.gauss(told.y_m, OWN_M))
-    accel = frame.body.motion.longitudinal_acceleration.value * 0.1 / 14.0
+    x_m, y_m = told.place or (math.nan, math.nan)  # cars of the city know where they are
+    body = moved(frame.body, rng.gauss(x_m, OWN_M), rng.gauss(y_m, OWN_M))
+    accel = frame.body.motion.longitudinal_acceleration.value * 0.1 / SCALE
     body = driven(
         body,
         speed_mps=rng.gauss(told.speed_mps or 0.0, OWN_MPS),
@@ -195,6 +198,7 @@ def judge(
     outcome = Outcome({}, {}, {}, defaultdict(float))
     receiver = next(iter(ground.receivers))
     tracks = deque(story.tracks if eye else ())
+    story_cars = {frame.station for frame in story.frames}
     for (station, t_ns, body), lies in air:
         while tracks and tracks[0].t_ns <= t_ns:
             detector.see(tracks.popleft())
@@ -202,7 +206,8 @@ def judge(
             outcome.lied_ns.setdefault(station, t_ns)
         if loss and rng.random() < loss:
             continue
-        found = detector.hear(station, receiver, t_ns, body)
+        sender = Sender(CAR) if station in story_cars else UNKNOWN  # a ghost is no car of the city
+        found = detector.hear(station, receiver, t_ns, body, sender=sender)
         if found is None:
             continue
         outcome.highest[station] = max(outcome.highest[station], found.memory.score)

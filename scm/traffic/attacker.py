@@ -13,6 +13,8 @@ import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from scm.clock import seconds
 from scm.maps.model import CityMap
 from scm.part import Hears, IsWanted, Part, Serves
@@ -163,9 +165,8 @@ class Attacker:
 def _as(copy: Cam, name: str, frame: Frame) -> Cam:
     if isinstance(copy, CamTx):
         return CamTx(station=name, t_ns=frame.t_ns, body=frame.body)
-    return CamRx(
-        receiver=copy.receiver, station=name, t_ns=frame.t_ns, body=frame.body, lost_ns=copy.lost_ns
-    )  # fmt: skip
+    car = copy.car if name == copy.station else ""  # a ghost is no car of the city
+    return replace(copy, station=name, t_ns=frame.t_ns, body=frame.body, signed="", car=car)
 
 
 def _nobody(line: str) -> None:

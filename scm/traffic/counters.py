@@ -23,7 +23,8 @@ from scm.maps.route import OnLane, Roads
 from scm.traffic.counters_level import level_of, share_below
 from scm.traffic.observer_belief import Belief
 from scm.traffic.observer_follow import Followed, Lines
-from scm.traffic.sightings import NIGEL_FRONT_M, NIGEL_LENGTH_M
+from scm.traffic.sightings import NIGEL_FRONT_M
+from scm.v2x.etsi_convert import ASSUMED_LENGTH_M
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.traffic_counts import ApproachCount, LaneCount, TrafficCounts
 
@@ -240,7 +241,7 @@ class Counters:
             level=level,
             stops=fmean(stops for _, _, stops in log.delays) if log.delays else 0.0,
             queue=len(queue),
-            queue_m=max(queue) + NIGEL_LENGTH_M if queue else 0.0,
+            queue_m=max(queue) + ASSUMED_LENGTH_M if queue else 0.0,
             queue_most=share_below([count for _, count in log.queues], 0.95),
             saturation_headway_s=headway,
             saturation=saturation,

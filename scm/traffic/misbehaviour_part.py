@@ -8,9 +8,11 @@ import logging
 from collections.abc import Sequence
 
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import CarError
 from scm.log import event
 from scm.maps.model import CityMap
 from scm.part import Hears, Serves
+from scm.scenery.bodies import car_body
 from scm.traffic.cars import facts_of
 from scm.v2x.etsi_convert import roadside_station
 from scm.v2x.exchange import Incoming, Outgoing
@@ -26,9 +28,10 @@ from scm.v2x.messages.misbehaviour_report import (
 )
 from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores, StationScore
 from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.misbehaviour.check import Sender
 from scm.v2x.misbehaviour.detector import EYE_WORKS_NS, Detector, Judged
 from scm.v2x.misbehaviour.ground import Ground, Sees
-from scm.v2x.misbehaviour.limits import Limits
+from scm.v2x.misbehaviour.limits import Limits, limits_of
 
 _log = logging.getLogger(__name__)
 
@@ -52,8 +55,8 @@ class MisbehaviourPart:
         units = [roadside_station(junction.name) for junction in city_map.junctions]
         at_units = (Hears(CamRx, {"receiver": unit}, once=True) for unit in units)
         self.hears: Sequence[Hears] = (*at_units, Hears(EyeTrack))
-        limits = Limits(speed_mps=facts_of(CAR).speed_mps)
-        self.detector = Detector(Ground(city_map, sees), limits)
+        self.detector = Detector(Ground(city_map, sees), limits_by_car)
+        self._unseen: set[str] = set()
         self._due_ns = 0
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -71,6 +74,7 @@ class MisbehaviourPart:
                     message.t_ns,
                     message.body,
                     message.lost_ns,
+                    Sender(message.car, message.by_hand, message.stopped),
                 )
                 if found is not None and found.is_reported:
                     outbox += self._tell(found, now_ns)
@@ -113,6 +117,7 @@ class MisbehaviourPart:
                 score=round(memory.score, 3),
                 worst=memory.worst,
                 suspected=memory.since_ns is not None,
+                tag_unseen=memory.is_tag_unseen,
             )
             for who, memory in memories[:MOST_TOLD]
         )
@@ -120,9 +125,38 @@ class MisbehaviourPart:
         witness = eye_ns is not None and now_ns - eye_ns <= EYE_WORKS_NS
         detail = f"{len(memories)} stations, {suspected} suspected"
         return [
+            *self._tell_unseen(now_ns),
             MisbehaviourScores(t_ns=now_ns, witness=witness, stations=rows),
             PartStatus(station=NAME, t_ns=now_ns, detail=detail),
         ]
+
+    def _tell_unseen(self, now_ns: int) -> list[Message]:
+        """Say once of each car that the Eye cannot see its tag; that is no accusation."""
+        unseen = {one.station for one in self.detector.memories.values() if one.is_tag_unseen}
+        news = [
+            CityEvent(
+                severity="info",
+                source=NAME,
+                t_ns=now_ns,
+                name="tag_unseen",
+                text=f"the Eye cannot see the tag of {station}: no camera confirms its place",
+                vehicle=station,
+            )
+            for station in sorted(unseen - self._unseen)
+        ]
+        self._unseen = unseen
+        return list(news)
+
+
+def limits_by_car(car: str) -> Limits:
+    """Return the limits of a car file by its name; of one that is not here, a Nigel's."""
+    try:
+        facts = facts_of(car or CAR)
+    except CarError:
+        facts = facts_of(CAR)
+    body = car_body(car or CAR)
+    rear, front = body.x_span
+    return limits_of(facts.speed_mps, front / (front - rear), has_tag=body.has_tag)
 
 
 def report_of(found: Judged, detector: Detector, now_ns: int) -> MisbehaviourReport:

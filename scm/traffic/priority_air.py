@@ -85,8 +85,8 @@ class PriorityDesk:
         return [SsemTx(station=roadside_station(self._junction.name), t_ns=now_ns, body=body)]
 
     def _group_of(self, wish: Wish) -> str:
-        known = 0 < wish.lane_in <= len(self._groups)
-        return self._groups[wish.lane_in - 1] if known else ""
+        known = wish.lane_in is not None and wish.lane_in <= len(self._groups)
+        return self._groups[wish.lane_in - 1] if known and wish.lane_in else ""
 
 
 def _role_of(wish: Wish) -> str:

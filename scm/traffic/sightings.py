@@ -8,12 +8,11 @@ import math
 
 from scm.clock import NS_PER_S
 from scm.traffic.detectors import Seen
-from scm.v2x.etsi_convert import generated_ns, read_cam, station_id
+from scm.v2x.etsi_convert import ASSUMED_LENGTH_M, generated_ns, read_cam, station_id
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.eye_track import EyeTrack
 
 NIGEL_FRONT_M = 0.23
-NIGEL_LENGTH_M = 0.30
 SAME_M = 0.2
 FRESH_NS = 2 * NS_PER_S
 NOBODY = "tag-"
@@ -26,18 +25,17 @@ class Sightings:
         self._spoke: dict[int, Seen] = {}
 
     def of_cam(self, heard: CamRx) -> Seen | None:
-        """Return the car that a CAM tells of; None when it does not say where it heads."""
+        """Return the car that a CAM tells of; None when it lacks a place, heading or speed."""
         told = read_cam(heard.body)
-        if told.yaw_rad is None:
+        if told.place is None or told.yaw_rad is None or told.speed_mps is None:
             return None
         seen = Seen(
             told.station_id,
             generated_ns(heard.body, heard.t_ns),
-            told.x_m,
-            told.y_m,
+            *told.place,
             told.yaw_rad,
-            told.speed_mps or 0.0,
-            told.length_m,
+            told.speed_mps,
+            told.length_m or ASSUMED_LENGTH_M,
         )
         self._spoke[seen.who] = seen
         return seen
@@ -56,7 +54,7 @@ class Sightings:
             track.y_m + front_m * math.sin(track.yaw_rad),
             track.yaw_rad,
             track.speed_mps,
-            NIGEL_LENGTH_M if spoken is None else spoken.length_m,
+            ASSUMED_LENGTH_M if spoken is None else spoken.length_m,
         )
         is_known = track.vehicle.startswith(NOBODY) and self._is_somebody(seen)
         return None if is_known else seen

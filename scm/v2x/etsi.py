@@ -16,8 +16,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from scm.v2x.etsi_codes import coded
 from scm.v2x.etsi_parts import (
     Byte,
+    DSecond,
     Heading,
     IntersectionId,
     MinuteOfYear,
@@ -25,8 +27,10 @@ from scm.v2x.etsi_parts import (
     PathPoint,
     ReferencePosition,
     Revision,
+    SignalGroupId,
     Speed,
     StationId,
+    StationType,
     Word,
 )
 
@@ -37,7 +41,7 @@ REFERENCE_LONGITUDE_DEG = 0.0
 CAM_ID = 2
 SPATEM_ID = 4
 PASSENGER_CAR, ROADSIDE_UNIT = 5, 15
-TIME_MARK_UNKNOWN = 36001
+TIME_MARK_FAR, TIME_MARK_UNKNOWN = 36000, 36001
 MOST_PATH_POINTS = 40
 
 PHASE_STATES = (
@@ -75,41 +79,46 @@ TIME_CONFIDENCES = (21, 36, 47, 56, 62, 68, 73, 77, 81, 85, 88, 91, 94, 96, 98, 
 """SAE J2735 TimeIntervalConfidence in percent; the place in the list is the number on the air."""
 
 # A value beyond the standard's range is refused when read: it comes from the air.
-_TimeMark = Annotated[int, Meta(ge=0, le=TIME_MARK_UNKNOWN)]
+_TimeMark = Annotated[
+    int,
+    coded(0, TIME_MARK_UNKNOWN, unavailable=TIME_MARK_UNKNOWN, out_of_range=(TIME_MARK_FAR,)),
+]
 
 
 class VehicleLength(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """0.1 m, 1023 unknown; confidence: 0 no trailer, 4 unknown."""
 
-    value: Annotated[int, Meta(ge=1, le=1023)]
-    confidence: Annotated[int, Meta(ge=0, le=4)] = 0
+    value: Annotated[int, coded(1, 1023, unavailable=1023, out_of_range=(1022,))]
+    confidence: Annotated[int, coded(0, 4, unavailable=4)] = 0
 
 
 class Acceleration(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """0.1 m/s^2, 161 unknown; confidence 0.1 m/s^2, 102 unknown."""
 
-    value: Annotated[int, Meta(ge=-160, le=161)] = 161
-    confidence: Annotated[int, Meta(ge=0, le=102)] = 102
+    value: Annotated[int, coded(-160, 161, unavailable=161, out_of_range=(-160, 160))] = 161
+    confidence: Annotated[int, coded(0, 102, unavailable=102, out_of_range=(101,))] = 102
 
 
 class Curvature(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """1e-4 1/m, + = left, 1023 unknown; confidence: a class, 7 unknown."""
 
-    value: Annotated[int, Meta(ge=-1023, le=1023)] = 1023
-    confidence: Annotated[int, Meta(ge=0, le=7)] = 7
+    value: Annotated[int, coded(-1023, 1023, unavailable=1023, out_of_range=(-1023, 1022))] = 1023
+    confidence: Annotated[int, coded(0, 7, unavailable=7, out_of_range=(6,))] = 7
 
 
 class YawRate(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """0.01 degree/s, + = left, 32767 unknown; confidence: a class, 8 unknown."""
 
-    value: Annotated[int, Meta(ge=-32_766, le=32_767)] = 32767
-    confidence: Annotated[int, Meta(ge=0, le=8)] = 8
+    value: Annotated[
+        int, coded(-32_766, 32_767, unavailable=32_767, out_of_range=(-32_766, 32_766))
+    ] = 32767
+    confidence: Annotated[int, coded(0, 8, unavailable=8, out_of_range=(7,))] = 8
 
 
 class BasicContainer(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """Who and where: the middle of the front bumper."""
 
-    station_type: Byte = PASSENGER_CAR
+    station_type: StationType = PASSENGER_CAR
     reference_position: ReferencePosition
 
 
@@ -124,12 +133,12 @@ class VehicleHighFrequency(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 
     heading: Heading
     speed: Speed
-    drive_direction: Annotated[int, Meta(ge=0, le=2)] = 0
+    drive_direction: Annotated[int, coded(0, 2, unavailable=2)] = 0
     vehicle_length: VehicleLength
-    vehicle_width: Annotated[int, Meta(ge=1, le=62)]
+    vehicle_width: Annotated[int, coded(1, 62, unavailable=62, out_of_range=(61,))]
     longitudinal_acceleration: Acceleration = Acceleration()
     curvature: Curvature = Curvature()
-    curvature_calculation_mode: Annotated[int, Meta(ge=0, le=2)] = 0
+    curvature_calculation_mode: Annotated[int, coded(0, 2, unavailable=2)] = 0
     yaw_rate: YawRate = YawRate()
 
 
@@ -155,7 +164,7 @@ class ExteriorLights(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 class VehicleLowFrequency(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     """What changes slowly; path_history: newest point first, each from the one before it."""
 
-    vehicle_role: Annotated[int, Meta(ge=0, le=15)] = 0
+    vehicle_role: Annotated[int, coded(0, 15)] = 0
     exterior_lights: ExteriorLights = ExteriorLights()
     path_history: Annotated[tuple[PathPoint, ...], Meta(max_length=MOST_PATH_POINTS)] = ()
 
@@ -202,21 +211,21 @@ class Timing(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     min_end_time: _TimeMark
     max_end_time: _TimeMark | None = None
     likely_time: _TimeMark | None = None
-    confidence: Annotated[int, Meta(ge=0, le=15)] | None = None
+    confidence: Annotated[int, coded(0, 15)] | None = None
     next_time: _TimeMark | None = None
 
 
 class MovementEvent(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """What a group shows now, by its place in `PHASE_STATES`."""
 
-    event_state: Annotated[int, Meta(ge=0, le=9)]
+    event_state: Annotated[int, coded(0, 9, unavailable=0)]
     timing: Timing | None = None
 
 
 class MovementState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """One signal group of a SPATEM; the first of `state_time_speed` is now."""
 
-    signal_group: Byte
+    signal_group: SignalGroupId
     state_time_speed: Annotated[tuple[MovementEvent, ...], Meta(min_length=1, max_length=16)]
 
     @property
@@ -266,7 +275,7 @@ class IntersectionState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults
     revision: Revision
     status: Annotated[str, Meta(pattern="^[01]{16}$")]
     moy: MinuteOfYear | None = None
-    timestamp: Word | None = None
+    timestamp: DSecond | None = None
     states: Annotated[tuple[MovementState, ...], Meta(min_length=1, max_length=255)]
 
 

@@ -12,8 +12,9 @@ from typing import Literal, NamedTuple
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.model import Junction
 from scm.v2x.etsi import SCALE
+from scm.v2x.etsi_codes import number_of, scaled
 from scm.v2x.etsi_convert import moment_of, position_of, roadside_station, station_id
-from scm.v2x.etsi_mapem import Position3d
+from scm.v2x.etsi_mapem import MOST_VELOCITY, Position3d
 from scm.v2x.etsi_parts import PROTOCOL_VERSION, IntersectionId
 from scm.v2x.etsi_priority import (
     CANCEL,
@@ -41,9 +42,9 @@ Verb = Literal["request", "update", "cancel"]
 
 _TYPES: dict[Verb, int] = {"request": REQUEST, "update": UPDATE, "cancel": CANCEL}
 _VERBS: dict[int, Verb] = {number: verb for verb, number in _TYPES.items()}
-_MOST_SPEED = 8190
 _MOST_LASTS_MS = 60_999
 _FORWARD, _REVERSE = 2, 3
+NO_LANE = 0
 _STANDSTILL_MPS = 0.02
 
 
@@ -54,7 +55,7 @@ class Wish(NamedTuple):
         station_id: Of the car, as in its CAMs.
         number: The car's own number of this wish, 0 to 255; an update or a cancellation keeps it.
         junction: The junction's number.
-        lane_in, lane_out: Numbers of MAPEM; 0: not told.
+        lane_in, lane_out: Numbers of MAPEM; None: not told.
         role: One of `ROLES`.
         arrives_ns: When the car expects to be at the stop line; None: not told.
         lasts_s: For how long after that; None: not told.
@@ -64,10 +65,10 @@ class Wish(NamedTuple):
     station_id: int
     number: int
     junction: int
-    lane_in: int
+    lane_in: int | None
     verb: Verb = "request"
     role: str = "basicVehicle"
-    lane_out: int = 0
+    lane_out: int | None = None
     arrives_ns: int | None = None
     lasts_s: float | None = None
     sequence: int = 0
@@ -94,7 +95,7 @@ def srem_of(wish: Wish, state: VehicleState) -> SremBody:
             id=IntersectionId(id=wish.junction),
             request_id=wish.number,
             request_type=_TYPES[wish.verb],
-            inbound_lane=AccessPoint(lane=wish.lane_in),
+            inbound_lane=AccessPoint(lane=wish.lane_in or NO_LANE),
             outbound_lane=AccessPoint(lane=wish.lane_out) if wish.lane_out else None,
         ),
         minute=None if arrives is None else arrives[0],
@@ -116,7 +117,7 @@ def srem_of(wish: Wish, state: VehicleState) -> SremBody:
 
 def _requestor(wish: Wish, state: VehicleState) -> Requestor:
     place = position_of(state.x_m, state.y_m)
-    speed = min(_MOST_SPEED, round(abs(state.speed_mps) * SCALE / 0.02))
+    speed = min(MOST_VELOCITY, round(abs(state.speed_mps) * SCALE / 0.02))
     return Requestor(
         id=wish.station_id,
         type=RequestorType(role=ROLES.index(wish.role)),
@@ -140,12 +141,16 @@ def wishes_of(body: SremBody, near_ns: int) -> tuple[Wish, ...]:
             station_id=body.requestor.id,
             number=package.request.request_id,
             junction=package.request.id.id,
-            lane_in=package.request.inbound_lane.lane,
+            lane_in=number_of(package.request.inbound_lane, "lane"),
             verb=_VERBS[package.request.request_type],
             role=ROLES[0 if kind is None else kind.role],
-            lane_out=package.request.outbound_lane.lane if package.request.outbound_lane else 0,
-            arrives_ns=_moment_ns(package.minute, package.second, near_ns),
-            lasts_s=None if package.duration is None else package.duration / 1e3,
+            lane_out=None
+            if package.request.outbound_lane is None
+            else number_of(package.request.outbound_lane, "lane"),
+            arrives_ns=_moment_ns(
+                number_of(package, "minute"), number_of(package, "second"), near_ns
+            ),
+            lasts_s=scaled(package, "duration", 1e-3),
             sequence=body.sequence_number or 0,
         )
         for package in body.requests or ()
@@ -200,7 +205,7 @@ def _package(answer: Answered) -> SignalStatusPackage:
             sequence_number=wish.sequence % COUNTS,
             role=ROLES.index(wish.role),
         ),
-        inbound_on=AccessPoint(lane=wish.lane_in),
+        inbound_on=AccessPoint(lane=wish.lane_in or NO_LANE),
         outbound_on=AccessPoint(lane=wish.lane_out) if wish.lane_out else None,
         minute=None if arrives is None else arrives[0],
         second=None if arrives is None else arrives[1],

@@ -5,7 +5,8 @@
     mark     = 0.1 s within the hour of UTC; 36000 is beyond it, 36001 is unknown
 
 Promises are rounded to the honest side: a minimum end down, a maximum end up. What does not fit a
-field is written as the field's largest value, what is not known as its own unknown value.
+field is written as the field's code for that, its largest value in most; what is not known as its
+own unknown value. What is read is a number or None: `scm.v2x.etsi_codes` has the codes.
 Field sets and values: EN 302 637-2 v1.4.1 with TS 102 894-2, TS 103 301 with SAE J2735.
 """
 
@@ -25,6 +26,7 @@ from scm.v2x.etsi import (
     SCALE,
     STATUS_BITS,
     TIME_CONFIDENCES,
+    TIME_MARK_FAR,
     TIME_MARK_UNKNOWN,
     Acceleration,
     BasicContainer,
@@ -41,8 +43,10 @@ from scm.v2x.etsi import (
     VehicleLength,
     YawRate,
 )
+from scm.v2x.etsi_codes import number_in, number_of, scaled
 from scm.v2x.etsi_parts import (
     PROTOCOL_VERSION,
+    UNKNOWN_POSITION,
     Heading,
     IntersectionId,
     ReferencePosition,
@@ -51,13 +55,14 @@ from scm.v2x.etsi_parts import (
 from scm.v2x.messages.spat import Colour, SignalGroup, Spat
 from scm.v2x.messages.vehicle_state import VehicleState
 
-TIME_MARK_FAR = 36000
-HEADING_UNKNOWN = 3601
-SPEED_MAX, SPEED_UNKNOWN = 16382, 16383
+SPEED_MAX = 16382
 LENGTH_MAX, WIDTH_MAX = 1022, 61
 ACCEL_MAX = 160
-CURVATURE_MAX, CURVATURE_UNKNOWN = 1022, 1023
-YAW_RATE_MAX, YAW_RATE_UNKNOWN = 32766, 32767
+CURVATURE_MAX, CURVATURE_MIN, CURVATURE_UNKNOWN = 1022, -1023, 1023
+YAW_RATE_MAX = 32766
+MOST_LATITUDE, MOST_LONGITUDE = 900_000_000, 1_800_000_000
+ASSUMED_LENGTH_M, ASSUMED_WIDTH_M = 0.30, 0.175
+"""Of a Nigel: what a receiver takes that must have a size where a CAM tells none."""
 REVISIONS = 128
 
 _ITS_EPOCH_MS = 1_072_915_200_000
@@ -99,17 +104,24 @@ _STATUS_LENGTH = 16
 class CamView(NamedTuple):
     """A CAM in metric units of the table: position of the front bumper's middle, map frame.
 
-    `speed_mps` is negative in reverse; None is unknown.
+    None: the CAM does not say, or that it is beyond the field's range. Without a latitude or a
+    longitude there is neither `x_m` nor `y_m`. `speed_mps` is negative in reverse, and None where
+    the CAM does not say which way a car moves.
     """
 
     station_id: int
-    x_m: float
-    y_m: float
+    x_m: float | None
+    y_m: float | None
     yaw_rad: float | None
     speed_mps: float | None
     yaw_rate_radps: float | None
-    length_m: float
-    width_m: float
+    length_m: float | None
+    width_m: float | None
+
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """Return x and y [m]; None: the CAM does not say where the car is."""
+        return None if self.x_m is None or self.y_m is None else (self.x_m, self.y_m)
 
 
 class Told(NamedTuple):
@@ -167,12 +179,15 @@ def _curvature(state: VehicleState) -> int:
     if abs(state.speed_mps) < _STANDSTILL_MPS:
         return CURVATURE_UNKNOWN
     curvature = state.yaw_rate_radps / state.speed_mps / SCALE
-    return _clamp(curvature * 1e4, -CURVATURE_MAX, CURVATURE_MAX)
+    return _clamp(curvature * 1e4, CURVATURE_MIN, CURVATURE_MAX)
 
 
 def position_of(x_m: float, y_m: float) -> ReferencePosition:
-    """Return a place of the map as a place on the earth."""
-    return ReferencePosition(latitude=latitude_of(y_m), longitude=longitude_of(x_m))
+    """Return a place of the map as a place on the earth; unavailable beyond its poles and dates."""
+    latitude, longitude = latitude_of(y_m), longitude_of(x_m)
+    if abs(latitude) > MOST_LATITUDE or abs(longitude) > MOST_LONGITUDE:
+        latitude, longitude = UNKNOWN_POSITION
+    return ReferencePosition(latitude=latitude, longitude=longitude)
 
 
 def latitude_of(y_m: float) -> int:
@@ -185,8 +200,13 @@ def longitude_of(x_m: float) -> int:
     return round((REFERENCE_LONGITUDE_DEG + x_m * SCALE / _EAST_M) * 1e7)
 
 
-def place_of(latitude: int, longitude: int) -> tuple[float, float]:
-    """Return map x and y [m] of a place on the earth."""
+def place_of(latitude: int, longitude: int) -> tuple[float, float] | None:
+    """Return map x and y [m] of a place on the earth; None: either is unavailable."""
+    if (
+        number_in(ReferencePosition, "latitude", latitude) is None
+        or number_in(ReferencePosition, "longitude", longitude) is None
+    ):
+        return None
     return (
         (longitude * 1e-7 - REFERENCE_LONGITUDE_DEG) * _EAST_M / SCALE,
         (latitude * 1e-7 - REFERENCE_LATITUDE_DEG) * _NORTH_M / SCALE,
@@ -233,25 +253,29 @@ def cam_of(
     )
 
 
-def _if_known(value: int, unknown: int, unit: float) -> float | None:
-    return None if value == unknown else value * unit
+def _speed_mps(motion: VehicleHighFrequency) -> float | None:
+    """Return the signed speed of the table; None: size or direction is not known."""
+    speed = scaled(motion.speed, "value", 0.01 / SCALE)
+    backward = number_of(motion, "drive_direction")
+    if not speed or backward is None:
+        return 0.0 if speed == 0.0 else None
+    return -speed if backward else speed
 
 
 def read_cam(body: CamBody) -> CamView:
     """Return a CAM in metres of the table; resolution 0.8 mm, 0.1 degree, 0.7 mm/s."""
     motion, position = body.motion, body.position
-    backward = -1.0 if motion.drive_direction == 1 else 1.0
-    heading = _if_known(motion.heading.value, HEADING_UNKNOWN, 0.1)
-    x_m, y_m = place_of(position.latitude, position.longitude)
+    heading = scaled(motion.heading, "value", 0.1)
+    x_m, y_m = place_of(position.latitude, position.longitude) or (None, None)
     return CamView(
         station_id=body.station_id,
         x_m=x_m,
         y_m=y_m,
         yaw_rad=None if heading is None else wrap_angle(math.radians(90.0 - heading)),
-        speed_mps=_if_known(motion.speed.value, SPEED_UNKNOWN, backward * 0.01 / SCALE),
-        yaw_rate_radps=_if_known(motion.yaw_rate.value, YAW_RATE_UNKNOWN, math.radians(0.01)),
-        length_m=motion.vehicle_length.value * 0.1 / SCALE,
-        width_m=motion.vehicle_width * 0.1 / SCALE,
+        speed_mps=_speed_mps(motion),
+        yaw_rate_radps=scaled(motion.yaw_rate, "value", math.radians(0.01)),
+        length_m=scaled(motion.vehicle_length, "value", 0.1 / SCALE),
+        width_m=scaled(motion, "vehicle_width", 0.1 / SCALE),
     )
 
 
@@ -321,10 +345,14 @@ def _bits(names: tuple[str, ...]) -> str:
     return "".join("1" if name in names else "0" for name in STATUS_BITS).ljust(_STATUS_LENGTH, "0")
 
 
-def _until_s(mark: int, state: IntersectionState) -> float | None:
-    if mark >= _MARKS_PER_HOUR or state.moy is None or state.timestamp is None:
+def _until_s(field: str, of: MovementState, state: IntersectionState) -> float | None:
+    """Return for how long from a SPATEM's own time stamp until a time mark of a group [s]."""
+    timing = of.state_time_speed[0].timing
+    mark = None if timing is None else number_of(timing, field)
+    minute, millisecond = number_of(state, "moy"), number_of(state, "timestamp")
+    if mark is None or minute is None or millisecond is None:
         return None
-    now_ms = state.moy % 60 * 60_000 + state.timestamp
+    now_ms = minute % 60 * 60_000 + millisecond
     ahead_ms = (mark * 100 - now_ms + _MARK_PAST_MS) % 3_600_000 - _MARK_PAST_MS
     return max(0.0, ahead_ms / 1000.0)
 
@@ -332,15 +360,22 @@ def _until_s(mark: int, state: IntersectionState) -> float | None:
 def colours_of(body: SpatemBody) -> dict[int, Told]:
     """Return what a SPATEM says of each group number: colour, and seconds to its ends.
 
-    Only a protected movement is green. Every state that we do not know counts as dark.
+    Only a protected movement is green. Every state that we do not know counts as dark. A group
+    whose number is not told is left out.
     """
     return {
-        state.signal_group: Told(
-            _COLOUR_OF.get(state.event_state, "dark"),
-            _until_s(state.min_end_time, body.intersections[0]),
-            _until_s(state.max_end_time, body.intersections[0]),
-            _until_s(state.likely_time, body.intersections[0]),
-            state.confidence,
-        )
+        state.signal_group: _told(state, body.intersections[0])
         for state in body.states
+        if number_of(state, "signal_group") is not None
     }
+
+
+def _told(state: MovementState, at: IntersectionState) -> Told:
+    likely_s = _until_s("likely_time", state, at)
+    return Told(
+        _COLOUR_OF.get(state.event_state, "dark"),
+        _until_s("min_end_time", state, at),
+        _until_s("max_end_time", state, at),
+        likely_s,
+        None if likely_s is None else state.confidence,
+    )

@@ -9,50 +9,62 @@ position; map x is east and map y is north.
 from typing import Annotated
 
 import msgspec
-from msgspec import Meta
 
-from scm.v2x.etsi_parts import Byte, ItsTime, ReferencePosition, StationId, Word
+from scm.v2x.etsi_codes import coded
+from scm.v2x.etsi_parts import (
+    NO_CONFIDENCE,
+    Byte,
+    Confidence,
+    HeadingValue,
+    ItsTime,
+    ReferencePosition,
+    StationId,
+    StationType,
+    Word,
+)
 
 MONOVIDEO = 3
 PASSENGER_CAR = 5
 MOST_OBJECTS = 255
 
-_Span = Annotated[int, Meta(ge=-2048, le=2047)]
+_Span = Annotated[int, coded(-2048, 2047)]
 
 
 class Coordinate(msgspec.Struct, kw_only=True, frozen=True):
     """0.01 m from the reference position; confidence: 0.01 m at 95 %, 4095 beyond, 4096 unknown."""
 
-    value: Annotated[int, Meta(ge=-131_072, le=131_071)]
-    confidence: Annotated[int, Meta(ge=1, le=4096)] = 4096
+    value: Annotated[int, coded(-131_072, 131_071, out_of_range=(-131_072, 131_071))]
+    confidence: Annotated[int, coded(1, 4096, unavailable=4096, out_of_range=(4095,))] = 4096
 
 
 class VelocityComponent(msgspec.Struct, kw_only=True, frozen=True):
     """0.01 m/s, 16383 unknown; confidence: 0.01 m/s at 95 %, 126 beyond, 127 unknown."""
 
-    value: Annotated[int, Meta(ge=-16_383, le=16_383)]
-    confidence: Annotated[int, Meta(ge=1, le=127)] = 127
+    value: Annotated[
+        int, coded(-16_383, 16_383, unavailable=16_383, out_of_range=(-16_383, 16_382))
+    ]
+    confidence: Confidence = NO_CONFIDENCE
 
 
 class Angle(msgspec.Struct, kw_only=True, frozen=True):
     """0.1 degree clockwise from north, 3601 unknown; confidence: 0.1 degree at 95 %, likewise."""
 
-    value: Annotated[int, Meta(ge=0, le=3601)]
-    confidence: Annotated[int, Meta(ge=1, le=127)] = 127
+    value: HeadingValue
+    confidence: Confidence = NO_CONFIDENCE
 
 
 class AngularVelocity(msgspec.Struct, kw_only=True, frozen=True):
     """1 degree/s, + = left, 256 unknown; confidence: a class from 0 (1 degree/s) to 7 (unknown)."""
 
-    value: Annotated[int, Meta(ge=-255, le=256)]
-    confidence: Annotated[int, Meta(ge=0, le=7)] = 7
+    value: Annotated[int, coded(-255, 256, unavailable=256, out_of_range=(-255, 255))]
+    confidence: Annotated[int, coded(0, 7, unavailable=7, out_of_range=(6,))] = 7
 
 
 class Dimension(msgspec.Struct, kw_only=True, frozen=True):
     """0.1 m, 256 unknown; confidence: 0.1 m, 32 unknown."""
 
-    value: Annotated[int, Meta(ge=1, le=256)]
-    confidence: Annotated[int, Meta(ge=1, le=32)] = 32
+    value: Annotated[int, coded(1, 256, unavailable=256, out_of_range=(255,))]
+    confidence: Annotated[int, coded(1, 32, unavailable=32, out_of_range=(31,))] = 32
 
 
 class Position(msgspec.Struct, kw_only=True, frozen=True):
@@ -84,14 +96,14 @@ class Angles(msgspec.Struct, kw_only=True, frozen=True):
 class ObjectClass(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """Kind of road vehicle: 5 a passenger car. None: no road vehicle, but a person, a group ..."""
 
-    vehicle: Byte | None = None
+    vehicle: StationType | None = None
 
 
 class Classification(msgspec.Struct, kw_only=True, frozen=True):
     """What an object is; confidence: percent, 101 unknown."""
 
     object_class: ObjectClass
-    confidence: Annotated[int, Meta(ge=1, le=101)] = 101
+    confidence: Annotated[int, coded(1, 101, unavailable=101)] = 101
 
 
 class PerceivedObject(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
@@ -126,7 +138,7 @@ class SensorInformation(msgspec.Struct, kw_only=True, frozen=True):
     """One camera; sensor_type 3 is a single video camera."""
 
     sensor_id: Byte
-    sensor_type: Annotated[int, Meta(ge=0, le=31)] = MONOVIDEO
+    sensor_type: Annotated[int, coded(0, 31, unavailable=0)] = MONOVIDEO
     shadowing_applies: bool = True
 
 

@@ -10,11 +10,14 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from scm.v2x.etsi_codes import coded
 from scm.v2x.etsi_parts import (
     NO_ALTITUDE,
     NO_ALTITUDE_CONFIDENCE,
     NO_ANGLE,
     NO_ELLIPSE,
+    AltitudeConfidence,
+    AltitudeValue,
     Bit,
     Byte,
     Heading,
@@ -23,8 +26,10 @@ from scm.v2x.etsi_parts import (
     Latitude,
     Longitude,
     PathPoint,
+    SemiAxis,
     Speed,
     StationId,
+    StationType,
     Word,
 )
 
@@ -32,8 +37,6 @@ DENM_ID = 1
 CANCELLATION, NEGATION = 0, 1
 DEFAULT_VALIDITY_S = 600
 MOST_TRACES = 7
-
-_SemiAxis = Annotated[int, Meta(ge=0, le=4095)]
 
 
 class ActionId(msgspec.Struct, kw_only=True, frozen=True):
@@ -46,15 +49,15 @@ class ActionId(msgspec.Struct, kw_only=True, frozen=True):
 class EventAltitude(msgspec.Struct, kw_only=True, frozen=True):
     """0.01 m, 800001 unknown; confidence: a class, 15 unknown."""
 
-    value: Annotated[int, Meta(ge=-100_000, le=800_001)] = NO_ALTITUDE
-    confidence: Annotated[int, Meta(ge=0, le=15)] = NO_ALTITUDE_CONFIDENCE
+    value: AltitudeValue = NO_ALTITUDE
+    confidence: AltitudeConfidence = NO_ALTITUDE_CONFIDENCE
 
 
 class EventEllipse(msgspec.Struct, kw_only=True, frozen=True):
     """0.01 m, 4095 unknown; 0.1 degree, 3601 unknown."""
 
-    semi_major_confidence: _SemiAxis = NO_ELLIPSE
-    semi_minor_confidence: _SemiAxis = NO_ELLIPSE
+    semi_major_confidence: SemiAxis = NO_ELLIPSE
+    semi_minor_confidence: SemiAxis = NO_ELLIPSE
     semi_major_orientation: HeadingValue = NO_ANGLE
 
 
@@ -86,24 +89,24 @@ class DenmManagement(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=Tr
     reference_time: ItsTime
     termination: Bit | None = None
     event_position: EventPosition
-    awareness_distance: Annotated[int, Meta(ge=0, le=7)] | None = None
-    relevance_traffic_direction: Annotated[int, Meta(ge=0, le=3)] | None = None
-    validity_duration: Annotated[int, Meta(ge=0, le=86_400)] = DEFAULT_VALIDITY_S
-    transmission_interval: Annotated[int, Meta(ge=1, le=10_000)] | None = None
-    station_type: Byte = 0
+    awareness_distance: Annotated[int, coded(0, 7)] | None = None
+    relevance_traffic_direction: Annotated[int, coded(0, 3)] | None = None
+    validity_duration: Annotated[int, coded(0, 86_400)] = DEFAULT_VALIDITY_S
+    transmission_interval: Annotated[int, coded(1, 10_000)] | None = None
+    station_type: StationType = 0
 
 
 class CauseCode(msgspec.Struct, kw_only=True, frozen=True):
     """What happened: 94 a stationary vehicle, 92 after a crash, 99 a dangerous situation ..."""
 
     cause: Byte
-    subcause: Byte = 0
+    subcause: Annotated[int, coded(0, 255, unavailable=0)] = 0
 
 
 class DenmSituation(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """What it is; information_quality: 0 unknown, 1 lowest, 7 highest."""
 
-    information_quality: Annotated[int, Meta(ge=0, le=7)]
+    information_quality: Annotated[int, coded(0, 7, unavailable=0)]
     event_type: CauseCode
     linked_cause: CauseCode | None = None
 

@@ -10,20 +10,25 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from scm.v2x.etsi_codes import coded
 from scm.v2x.etsi_parts import (
+    ApproachId,
     Byte,
     IntersectionId,
+    LaneId,
     Latitude,
     Longitude,
     MinuteOfYear,
     Name,
     Revision,
+    SignalGroupId,
     StationId,
 )
 
 MAPEM_ID = 5
 MOST_NODES, MOST_CONNECTIONS, MOST_APPROACHES, MOST_LANES = 63, 16, 15, 255
 FARTHEST_CM = 32_767
+MOST_LANE_WIDTH_CM = 32_767
 
 DIRECTIONS = ("ingressPath", "egressPath")
 """LaneDirection, first bit first; so are `SHARED` and `VEHICLE_LANE`."""
@@ -52,8 +57,9 @@ VEHICLE_LANE = (
 STRAIGHT, LEFT, RIGHT, U_TURN = range(4)
 """The first bits of a manoeuvre."""
 
-_Offset = Annotated[int, Meta(ge=-32_768, le=32_767)]
-_Approach = Annotated[int, Meta(ge=0, le=15)]
+_Offset = Annotated[int, coded(-32_768, 32_767)]
+MOST_VELOCITY = 8190
+Velocity = Annotated[int, coded(0, 8191, unavailable=8191, out_of_range=(MOST_VELOCITY,))]
 _Manoeuvres = Annotated[str, Meta(pattern="^[01]{12}$")]
 _Shared = Literal[
     "overlappingLaneDescriptionProvided",
@@ -110,14 +116,14 @@ class Position3d(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
 
     latitude: Latitude
     longitude: Longitude
-    elevation: Annotated[int, Meta(ge=-4096, le=61_439)] | None = None
+    elevation: Annotated[int, coded(-4096, 61_439, unavailable=-4096)] | None = None
 
 
 class SpeedLimit(msgspec.Struct, kw_only=True, frozen=True):
     """0.02 m/s."""
 
     type: _SpeedLimit = "vehicleMaxSpeed"
-    speed: Annotated[int, Meta(ge=0, le=8191)]
+    speed: Velocity
 
 
 class NodeXy(msgspec.Struct, kw_only=True, frozen=True):
@@ -164,7 +170,7 @@ class LaneAttributes(msgspec.Struct, kw_only=True, frozen=True):
 class ConnectingLane(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """The lane beyond the junction; maneuver: bits straight, left, right, U-turn ..."""
 
-    lane: Byte
+    lane: LaneId
     maneuver: _Manoeuvres | None = None
 
 
@@ -172,17 +178,17 @@ class Connection(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """A way over the junction, and the SPATEM group that releases it."""
 
     connecting_lane: ConnectingLane
-    signal_group: Byte | None = None
+    signal_group: SignalGroupId | None = None
     connection_id: Byte | None = None
 
 
 class MapLane(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """A lane that leads to the junction or away from it."""
 
-    lane_id: Byte
+    lane_id: LaneId
     name: Name | None = None
-    ingress_approach: _Approach | None = None
-    egress_approach: _Approach | None = None
+    ingress_approach: ApproachId | None = None
+    egress_approach: ApproachId | None = None
     lane_attributes: LaneAttributes
     maneuvers: _Manoeuvres | None = None
     node_list: NodeList
@@ -198,7 +204,7 @@ class IntersectionGeometry(msgspec.Struct, kw_only=True, frozen=True, omit_defau
     id: IntersectionId
     revision: Revision
     ref_point: Position3d
-    lane_width: Annotated[int, Meta(ge=0, le=32_767)] | None = None
+    lane_width: Annotated[int, coded(0, 32_767)] | None = None
     speed_limits: Annotated[tuple[SpeedLimit, ...], Meta(min_length=1, max_length=9)] | None = None
     lane_set: Annotated[tuple[MapLane, ...], Meta(min_length=1, max_length=MOST_LANES)]
 

@@ -9,15 +9,18 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from scm.v2x.etsi_mapem import Position3d
+from scm.v2x.etsi_codes import coded
+from scm.v2x.etsi_mapem import Position3d, Velocity
 from scm.v2x.etsi_parts import (
+    ApproachId,
     Byte,
+    DSecond,
     IntersectionId,
+    LaneId,
     MinuteOfYear,
     Name,
     Revision,
     StationId,
-    Word,
 )
 
 SREM_ID, SSEM_ID = 9, 10
@@ -62,14 +65,14 @@ ROLES = (
 )
 """SAE J2735 BasicVehicleRole, likewise."""
 
-_Role = Annotated[int, Meta(ge=0, le=23)]
+_Role = Annotated[int, coded(0, 23, unavailable=8)]
 
 
 class AccessPoint(msgspec.Struct, kw_only=True, frozen=True):
     """Where into or out of a junction. The schema wants all three; 0 is unknown."""
 
-    lane: Byte = 0
-    approach: Annotated[int, Meta(ge=0, le=15)] = 0
+    lane: LaneId = 0
+    approach: ApproachId = 0
     connection: Byte = 0
 
 
@@ -78,7 +81,7 @@ class SignalRequestRecord(msgspec.Struct, kw_only=True, frozen=True, omit_defaul
 
     id: IntersectionId
     request_id: Byte
-    request_type: Annotated[int, Meta(ge=0, le=3)]
+    request_type: Annotated[int, coded(0, 3, unavailable=0)]
     inbound_lane: AccessPoint
     outbound_lane: AccessPoint | None = None
 
@@ -88,29 +91,29 @@ class RequestPackage(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=Tr
 
     request: SignalRequestRecord
     minute: MinuteOfYear | None = None
-    second: Word | None = None
-    duration: Word | None = None
+    second: DSecond | None = None
+    duration: DSecond | None = None
 
 
 class RequestorType(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """By its place in `ROLES`; request: importance, 1 least to 14 most."""
 
     role: _Role
-    request: Annotated[int, Meta(ge=0, le=15)] | None = None
+    request: Annotated[int, coded(0, 15, unavailable=0)] | None = None
 
 
 class TransmissionAndSpeed(msgspec.Struct, kw_only=True, frozen=True):
     """transmission: 2 forward, 3 reverse, 7 unknown; speed 0.02 m/s, 8191 unknown."""
 
-    transmission: Annotated[int, Meta(ge=0, le=7)]
-    speed: Annotated[int, Meta(ge=0, le=8191)]
+    transmission: Annotated[int, coded(0, 7, unavailable=range(4, 8))]
+    speed: Velocity
 
 
 class RequestorPosition(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """Where the car is; heading 0.0125 degree clockwise from north."""
 
     position: Position3d
-    heading: Annotated[int, Meta(ge=0, le=NO_ANGLE_J2735)] | None = None
+    heading: Annotated[int, coded(0, NO_ANGLE_J2735, unavailable=NO_ANGLE_J2735)] | None = None
     speed: TransmissionAndSpeed | None = None
 
 
@@ -129,7 +132,7 @@ class SremBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     protocol_version: Byte
     station_id: StationId
     timestamp: MinuteOfYear | None = None
-    second: Word
+    second: DSecond
     sequence_number: Revision | None = None
     requests: Annotated[tuple[RequestPackage, ...], Meta(min_length=1, max_length=32)] | None = None
     requestor: Requestor
@@ -151,9 +154,9 @@ class SignalStatusPackage(msgspec.Struct, kw_only=True, frozen=True, omit_defaul
     inbound_on: AccessPoint
     outbound_on: AccessPoint | None = None
     minute: MinuteOfYear | None = None
-    second: Word | None = None
-    duration: Word | None = None
-    status: Annotated[int, Meta(ge=0, le=7)]
+    second: DSecond | None = None
+    duration: DSecond | None = None
+    status: Annotated[int, coded(0, 7, unavailable=0)]
 
 
 class SignalStatusRecord(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
@@ -170,6 +173,6 @@ class SsemBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     protocol_version: Byte
     station_id: StationId
     timestamp: MinuteOfYear | None = None
-    second: Word
+    second: DSecond
     sequence_number: Revision | None = None
     status: Annotated[tuple[SignalStatusRecord, ...], Meta(min_length=1, max_length=32)]

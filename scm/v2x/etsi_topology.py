@@ -22,8 +22,10 @@ from scm.v2x.etsi_mapem import (
     LEFT,
     MOST_APPROACHES,
     MOST_CONNECTIONS,
+    MOST_LANE_WIDTH_CM,
     MOST_LANES,
     MOST_NODES,
+    MOST_VELOCITY,
     RIGHT,
     STRAIGHT,
     U_TURN,
@@ -141,13 +143,13 @@ def mapem_of(roads: Roads, junction: Junction) -> MapemBody:
     middle = (sum(end.x for end in ends) / len(ends), sum(end.y for end in ends) / len(ends))
     place = position_of(*middle)
     lane = roads.definition(topology.lanes_in[0].lane)
-    limit = SpeedLimit(speed=round(lane.speed_limit_mps * _PER_SPEED_STEP))
+    limit = SpeedLimit(speed=min(MOST_VELOCITY, round(lane.speed_limit_mps * _PER_SPEED_STEP)))
     geometry = IntersectionGeometry(
         name=junction.name,
         id=IntersectionId(id=junction.number),
         revision=roads.city_map.revision % REVISIONS,
         ref_point=Position3d(latitude=place.latitude, longitude=place.longitude),
-        lane_width=round(lane.width_m * _CM),
+        lane_width=min(MOST_LANE_WIDTH_CM, round(lane.width_m * _CM)),
         speed_limits=(limit,),
         lane_set=tuple(
             _lane(roads, topology, number, middle) for number in range(1, len(stretches) + 1)

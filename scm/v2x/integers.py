@@ -37,6 +37,7 @@ def _check_of(kind: type[msgspec.Struct]) -> Check | None:
 
 def _check(info: inspect.Type) -> Check | None:
     """Return what to ask of values of a type; None: they can hold no long integer."""
+    info = info.type if isinstance(info, inspect.Metadata) else info
     match info:
         case inspect.IntType():
             return None if _is_bounded(info) else _is_short
@@ -80,8 +81,9 @@ def _of_union(info: inspect.UnionType) -> Check:
     """Return a check that looks at structs and integers; anything else is gone through whole."""
     checks: dict[type, Check | None] = {int: _is_short, type(None): None, float: None, str: None}
     for one in info.types:
-        if isinstance(one, inspect.StructType):
-            checks[one.cls] = _check(one)
+        plain = one.type if isinstance(one, inspect.Metadata) else one
+        if isinstance(plain, inspect.StructType):
+            checks[plain.cls] = _check(plain)
 
     def check_one(value: object) -> bool:
         check = checks.get(type(value), _of_any)

@@ -13,7 +13,8 @@ from typing import BinaryIO, NamedTuple
 
 from scm.clock import NS_PER_S
 from scm.v2x.etsi import PASSENGER_CAR, ROADSIDE_UNIT, CamBody
-from scm.v2x.etsi_convert import its_ms
+from scm.v2x.etsi_codes import number_of
+from scm.v2x.etsi_convert import its_ms, place_of
 from scm.v2x.etsi_denm import DenmBody
 from scm.v2x.etsi_json import Body
 from scm.v2x.etsi_mapem import MapemBody
@@ -108,7 +109,11 @@ def _accurate_speed(speed: int) -> int:
 
 
 class Positions:
-    """Where stations are, as far as their own messages told so far; (0, 0) until then."""
+    """Where stations are, as far as their own messages told so far; (0, 0) until then.
+
+    GeoNetworking has no code for an unknown place, speed or heading: a place that a message does
+    not tell leaves the last known one, a speed or heading is 0.
+    """
 
     def __init__(self) -> None:
         self._known: dict[int, Position] = {}
@@ -117,7 +122,7 @@ class Positions:
         """Return where the sender of a message is, and remember what the message says of it."""
         station = body.station_id
         told = _told(body)
-        if told is not None:
+        if told is not None and place_of(told.latitude, told.longitude) is not None:
             self._known[station] = told
         return self._known.get(station, Position(station, ROADSIDE_UNIT, 0, 0))
 
@@ -126,14 +131,14 @@ def _told(body: Body) -> Position | None:
     """Return what a message says of its own sender's place."""
     if isinstance(body, CamBody):
         place, motion = body.position, body.motion
-        backward = -1 if motion.drive_direction == 1 else 1
+        speed, backward = number_of(motion.speed, "value"), number_of(motion, "drive_direction")
         return Position(
             body.station_id,
             body.basic_container.station_type,
             place.latitude,
             place.longitude,
-            0 if motion.speed.value > SPEED_MOST - 1 else backward * motion.speed.value,
-            motion.heading.value % 3600 if motion.heading.value <= 3600 else 0,
+            0 if speed is None or backward is None else -speed if backward else speed,
+            (number_of(motion.heading, "value") or 0) % 3600,
         )
     if isinstance(body, MapemBody) and body.intersections:
         point = body.intersections[0].ref_point

@@ -12,7 +12,7 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_MS
 from scm.v2x.etsi import CamBody
-from scm.v2x.etsi_convert import cam_of, read_cam
+from scm.v2x.etsi_convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, cam_of, read_cam
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.cpm_rx import CpmRx
@@ -157,10 +157,17 @@ def _tell_drivers(world: World, frame: Frame, now_ns: int) -> None:
 
 
 def _tell_of_car(world: World, slot: int, body: CamBody, now_ns: int) -> None:
+    """Let drivers hear a car's CAM; one without a place or a heading tells them nothing.
+
+    A speed or a turn that it does not tell is taken as none, a size as that of a Nigel.
+    """
     told = read_cam(body)
-    world.crowd.show(slot, told.length_m, told.width_m)
-    numbers = (told.x_m, told.y_m, told.yaw_rad, told.speed_mps, told.yaw_rate_radps)
-    columns = [np.array([number or 0.0]) for number in numbers]
+    if told.place is None or told.yaw_rad is None:
+        return
+    length_m, width_m = told.length_m or ASSUMED_LENGTH_M, told.width_m or ASSUMED_WIDTH_M
+    world.crowd.show(slot, length_m, width_m)
+    numbers = (*told.place, told.yaw_rad, told.speed_mps or 0.0, told.yaw_rate_radps or 0.0)
+    columns = [np.array([number]) for number in numbers]
     world.crowd.hear(np.array([slot]), now_ns, *columns)
 
 
@@ -190,11 +197,10 @@ def _deliver(
     """Put frames (k,) that reach receivers (k, n) into the outbox, at once or when they arrive."""
     delays = iter(world.radio.delays(int(reached.sum())).tolist())
     for row, frame in enumerate(frames):
-        lost_ns = world.lost_ns(frame.station)
         if also_sent:
             world.outbox.append(frame)
         for i in np.flatnonzero(reached[row]).tolist():
-            heard = _received(receivers.names[i], frame, lost_ns)
+            heard = _received(world, receivers.names[i], frame)
             delay_ns = next(delays)
             if delay_ns:
                 world.late.put(now_ns + delay_ns, heard)
@@ -216,11 +222,14 @@ def _cam(world: World, state: VehicleState, now_ns: int) -> CamTx:
     return CamTx(station=state.vehicle, t_ns=now_ns, body=body)
 
 
-def _received(receiver: str, frame: Frame, lost_ns: int) -> Heard:
+def _received(world: World, receiver: str, frame: Frame) -> Heard:
     if isinstance(frame, CamTx):
+        car = world.car(frame.station)
         return CamRx(
             receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body,
-            signed=frame.signed, lost_ns=lost_ns,
+            signed=frame.signed, lost_ns=world.lost_ns(frame.station),
+            car="" if car is None else car.car_file,
+            by_hand=car is not None and not car.lease.is_at_home, stopped=world.stop.engaged,
         )  # fmt: skip
     kind = RECEIVED[type(frame)]
     return kind(receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body)  # type: ignore[arg-type]

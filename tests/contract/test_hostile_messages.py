@@ -84,6 +84,7 @@ MAKERS = {
     inspect.StrType: words,
     inspect.BytesType: lambda *_: b"\xff",
     inspect.NoneType: lambda *_: None,
+    inspect.Metadata: lambda of, turn: extreme(of.type, "", turn),
     inspect.LiteralType: lambda of, turn: of.values[turn % len(of.values)],
     inspect.UnionType: lambda of, turn: extreme(of.types[turn % len(of.types)], "", turn),
     inspect.StructType: lambda of, turn: fields(of.cls, turn),

@@ -33,8 +33,9 @@ from scm.v2x.messages.cpm_tx import CpmTx
 SURELY = 1.96
 """Deviations within which 95 % lie."""
 TURN_CLASSES_DEG = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-COORDINATE_MOST, COORDINATE_BEYOND = 131_071, 4095
-VELOCITY_MOST, BEYOND, TURN_MOST, LENGTH_MOST = 16_382, 126, 255, 255
+COORDINATE_LEAST, COORDINATE_MOST, COORDINATE_BEYOND = -131_072, 131_071, 4095
+VELOCITY_LEAST, VELOCITY_MOST = -16_383, 16_382
+BEYOND, TURN_MOST, LENGTH_MOST = 126, 255, 255
 
 
 def collective_perception(
@@ -112,13 +113,13 @@ def _within(value: float, low: int, high: int) -> int:
 
 
 def _coordinate(value_m: float, std_m: float) -> Coordinate:
-    value = _within(value_m * SCALE * 100.0, -COORDINATE_MOST, COORDINATE_MOST)
+    value = _within(value_m * SCALE * 100.0, COORDINATE_LEAST, COORDINATE_MOST)
     confidence = _within(SURELY * std_m * SCALE * 100.0, 1, COORDINATE_BEYOND)
     return Coordinate(value=value, confidence=confidence)
 
 
 def _velocity(value_mps: float, std_mps: float) -> VelocityComponent:
-    value = _within(value_mps * SCALE * 100.0, -VELOCITY_MOST, VELOCITY_MOST)
+    value = _within(value_mps * SCALE * 100.0, VELOCITY_LEAST, VELOCITY_MOST)
     confidence = _within(SURELY * std_mps * SCALE * 100.0, 1, BEYOND)
     return VelocityComponent(value=value, confidence=confidence)
 

@@ -15,7 +15,11 @@ class CamRx(Message, kw_only=True, frozen=True, omit_defaults=True):
         t_ns: When it was sent.
         signed: The sender's signature, see `CamTx`.
         lost_ns: How much time, since the sender came, has passed without its car being moved: the
-            computer that simulates it was too slow. By the world, which no sender can bid.
+            computer that simulates it was too slow. This and what follows is by the world, and no
+            sender can write it.
+        car: The sender's car file, with which it came; empty: it is no car of this city.
+        by_hand: Whether somebody else than its own driver or agent holds its lease.
+        stopped: Whether the city-wide stop is engaged.
     """
 
     KEY: ClassVar[str] = "v2x/rx/{receiver}/{station}/cam"
@@ -27,6 +31,9 @@ class CamRx(Message, kw_only=True, frozen=True, omit_defaults=True):
     body: CamBody
     signed: str = ""
     lost_ns: int = 0
+    car: str = ""
+    by_hand: bool = False
+    stopped: bool = False
 
 
 MESSAGE = CamRx

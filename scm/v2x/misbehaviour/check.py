@@ -19,6 +19,10 @@ from scm.v2x.misbehaviour.limits import Limits
 
 CHECKS = "scm.v2x.misbehaviour.checks"
 LOOKED_S, SETTLES_S = 0.2, 1.0
+GRACE_S = 3.0
+"""For how long a car is new that has come into the city: the Eye still looks for its tag."""
+HARD_S = 3.0
+"""For how long after it a car may still move as by hand, or as in a stop of the city."""
 CONFIRMED = 0.05
 """From this plausibility on, the Eye speaks for a place."""
 Class = Literal["beacon", "static", "security", "position", "speed", "longAcc"]
@@ -39,20 +43,34 @@ class Strayed:
     __slots__ = ("last_m", "over_s", "sum_m", "variance_m2")
 
     def __init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget what was."""
         self.last_m = self.sum_m = self.over_s = self.variance_m2 = 0.0
 
     def add(self, now: Claim, before: Claim, dt_s: float, front_share: float) -> None:
-        """Take the way from one claim to the next."""
+        """Take the way from one claim to the next; begin anew where a heading or speed lacks."""
         (x1, y1), (x0, y0) = now.rear(front_share), before.rear(front_share)
-        yaw0, yaw1 = before.yaw_rad or 0.0, now.yaw_rad or 0.0
+        yaw0, yaw1, v0, v1 = before.yaw_rad, now.yaw_rad, before.speed_mps, now.speed_mps
+        if yaw0 is None or yaw1 is None or v0 is None or v1 is None:
+            self.begin()
+            return
         yaw = yaw0 + wrap_angle(yaw1 - yaw0) / 2.0
         way = (x1 - x0) * math.cos(yaw) + (y1 - y0) * math.sin(yaw)
-        v0, v1 = before.speed_mps or 0.0, now.speed_mps or 0.0
         self.last_m = way - (v1 + v0) / 2.0 * dt_s
         fade = math.exp(-dt_s / self.WINDOW_S)
         width = (v1 - v0) * dt_s
         self.variance_m2 = self.variance_m2 * fade * fade + width * width / 12.0
         self.sum_m, self.over_s = self.sum_m * fade + self.last_m, self.over_s * fade + dt_s
+
+
+class Sender(NamedTuple):
+    """What the city itself knows of who sent a CAM, see `CamRx`; no sender can write it."""
+
+    car: str = ""
+    by_hand: bool = False
+    stopped: bool = False
 
 
 class Standing(NamedTuple):
@@ -78,6 +96,10 @@ class Case:
         strayed: The station's way beside its speeds, which has taken `now`.
         standings: By station number.
         track: The Eye's track of this very car, fresh; None: it has none.
+        is_tag_unseen: Whether it is a car of the city whose tag no camera has ever seen.
+        is_new: Whether it is a car of the city that came within `GRACE_S`.
+        is_hard: Whether it is driven by hand, or the city is stopped, now or within `HARD_S`: by
+            what the city knows. `limits` are the hard ones then.
         unseen_s: From when a camera last saw that car to the claim, either way.
         nearest_track_m: From the claimed rear axle to any fresh track; inf: there is none near.
         eye_sees: Whether the Eye works and overlooks the place.
@@ -101,6 +123,9 @@ class Case:
     strayed: Strayed = field(default_factory=Strayed)
     standings: dict[int, Standing] = field(default_factory=dict)
     track: EyeTrack | None = None
+    is_tag_unseen: bool = False
+    is_new: bool = False
+    is_hard: bool = False
     unseen_s: float = 0.0
     nearest_track_m: float = float("inf")
     eye_sees: bool = False

@@ -4,19 +4,29 @@ A CAM that several roadside units hear counts once. What comes from outside neve
 """
 
 import math
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache, partial
 from typing import NamedTuple
 
 from scm.clock import NS_PER_S, nanoseconds
 from scm.v2x.etsi import CamBody
 from scm.v2x.etsi_convert import station_id
 from scm.v2x.messages.eye_track import EyeTrack
-from scm.v2x.misbehaviour.check import CONFIRMED, Case, Check, Standing, Strayed, load_checks
+from scm.v2x.misbehaviour.check import (
+    CONFIRMED,
+    GRACE_S,
+    HARD_S,
+    Case,
+    Check,
+    Sender,
+    Standing,
+    load_checks,
+)
 from scm.v2x.misbehaviour.claim import Claim, claim_of
 from scm.v2x.misbehaviour.fusion import FREE, Memory
 from scm.v2x.misbehaviour.ground import Ground
-from scm.v2x.misbehaviour.likely import Box, overlap_m
+from scm.v2x.misbehaviour.kalman import ACCEL_PSD, HARD_PSD
+from scm.v2x.misbehaviour.likely import LEAST, Box, overlap_m
 from scm.v2x.misbehaviour.limits import REAPPEARS_S, Limits
 
 FRESH_NS = NS_PER_S // 3
@@ -33,6 +43,7 @@ ORDINARY = 10.0**-FREE
 IDLE_S, UNMOVED = 0.9, 0.5
 OLDEST_S = 60.0
 LEAST_S = 0.001
+UNKNOWN = Sender()
 MOVED_M, MOVED_MPS, MOVED_RAD = 4.0 / 14.0, 0.5 / 14.0, math.radians(4.0)
 
 
@@ -55,10 +66,20 @@ class Detector:
     """
 
     def __init__(
-        self, ground: Ground, limits: Limits | None = None, checks: Sequence[Check] | None = None
+        self,
+        ground: Ground,
+        limits_of: Callable[[str], Limits] | None = None,
+        checks: Sequence[Check] | None = None,
     ) -> None:
-        """Take the map's knowledge, what cars can do, and the checks; None: all there are."""
-        self._limits = limits or Limits()
+        """Take the map's knowledge, what cars can do by car file, and the checks.
+
+        Args:
+            ground: The map's knowledge.
+            limits_of: Returns the limits of a car file; None: all are Nigels.
+            checks: None: all there are.
+        """
+        nigel = Limits()
+        self._limits_of = cache(limits_of or (lambda _car: nigel))
         chosen = load_checks() if checks is None else checks
         # Those that a witness settles come after those by which it speaks.
         self._checks = sorted(chosen, key=lambda check: check.witnessed)
@@ -68,6 +89,7 @@ class Detector:
         self._numbers: dict[str, int] = {}
         self._cells: dict[tuple[int, int], dict[int, Claim]] = {}
         self._tracks: dict[int, EyeTrack] = {}
+        self._seen: set[int] = set()
         self.eye_ns: int | None = None
         self._standings: dict[int, Standing] = {}
         self._began_ns: int | None = None
@@ -75,27 +97,35 @@ class Detector:
 
     def see(self, track: EyeTrack) -> None:
         """Take a track of the Eye."""
-        self._tracks[self._number(track.vehicle)] = track
+        who = self._number(track.vehicle)
+        self._tracks[who] = track
+        if not track.stale and BAD_FLAGS.isdisjoint(track.flags):
+            self._seen.add(who)
         seen, before = seen_ns(track), self.eye_ns
         # Nobody saw anything after this was told: what came from the future is forgotten again.
         self.eye_ns = seen if before is None or before > track.t_ns else max(seen, before)
 
     def hear(
-        self, station: str, receiver: str, sent_ns: int, body: CamBody, lost_ns: int = 0
-    ) -> Judged | None:
-        """Judge a CAM; None: it was heard before, through another receiver.
+        self, station: str, receiver: str, sent_ns: int, body: CamBody, lost_ns: int = 0,
+        sender: Sender = UNKNOWN,
+    ) -> Judged | None:  # fmt: skip
+        """Judge a CAM; None: it was heard before, through another receiver, or tells no place.
 
-        `lost_ns` is that of `CamRx`: time in which the car was not moved.
+        `lost_ns` is that of `CamRx`: time in which the car was not moved; `sender` what the city
+        knows of it.
         """
         memory = self._memory(body.station_id, station, sent_ns)
         newest = memory.newest
         if newest is not None and sent_ns <= newest.sent_ns:
             return None
+        limits = self._limits_of(sender.car)
+        claim = claim_of(station, receiver, sent_ns, body, limits, lost_ns)
+        if claim is None:
+            return None
         if self._began_ns is None or sent_ns - self._heard_ns > SILENT_NS:
             self._began_ns = sent_ns
         self._heard_ns = sent_ns
-        claim = claim_of(station, receiver, sent_ns, body, self._limits, lost_ns)
-        case = self._case(claim, memory)
+        case = self._case(claim, memory, sender, limits)
         doubts = self._ask(case)
         due = memory.add(claim, case.gap_s, doubts)
         self._place(claim, newest)
@@ -116,6 +146,7 @@ class Detector:
                 self._cells.get(_cell(*newest.middle), {}).pop(who, None)
                 del self.memories[who]
                 self._standings.pop(who, None)
+                self._seen.discard(who)
         self._tracks = {w: t for w, t in self._tracks.items() if now_ns - t.t_ns < FORGET_NS}
 
     def _memory(self, who: int, station: str, sent_ns: int) -> Memory:
@@ -138,7 +169,7 @@ class Detector:
         doubts: list[tuple[Check, float]] = []
         confirmed = False
         for check in self._checks:
-            if confirmed and check.witnessed:
+            if (confirmed and check.witnessed) or (case.is_new and check.floor > LEAST):
                 continue
             plausibility = check.judge(case)
             if plausibility is None:
@@ -149,7 +180,7 @@ class Detector:
                 confirmed = plausibility >= CONFIRMED
         return doubts
 
-    def _case(self, claim: Claim, memory: Memory) -> Case:
+    def _case(self, claim: Claim, memory: Memory, sender: Sender, limits: Limits) -> Case:
         before = memory.newest
         gap_s = 0.0 if before is None else (claim.sent_ns - before.sent_ns) * 1e-9
         if gap_s > REAPPEARS_S:
@@ -157,16 +188,23 @@ class Detector:
         dt_s = 0.0 if before is None else (claim.t_ns - before.t_ns) * 1e-9
         driven_s = dt_s
         if before is not None and claim.lost_ns > before.lost_ns:
-            driven_s = _driven_s(claim, before, self._limits.front_share)
+            driven_s = _driven_s(claim, before, limits.front_share)
             memory.late_ns = claim.t_ns
         memory.idle = _idle(claim, before, gap_s, memory.idle)
-        self._filter(claim, memory, before, driven_s)
+        if sender.by_hand or sender.stopped:
+            memory.hard_ns = claim.sent_ns
+        is_hard = _since_s(claim.sent_ns, memory.hard_ns) <= HARD_S
+        limits = limits.hard if is_hard else limits
+        self._filter(claim, memory, before, driven_s, limits, HARD_PSD if is_hard else ACCEL_PSD)
         track = self._fresh(claim)
         eye_sees = self._eye_sees(claim)
+        is_new = bool(sender.car) and claim.sent_ns - memory.first_ns <= GRACE_S * NS_PER_S
+        unseen = bool(sender.car) and (claim.who not in self._seen or not limits.has_tag)
+        memory.is_tag_unseen = unseen and not is_new and (eye_sees or memory.is_tag_unseen)
         neighbours = self._around(claim)
         return Case(
             now=claim,
-            limits=self._limits,
+            limits=limits,
             ground=self._ground,
             before=before,
             dt_s=dt_s,
@@ -178,26 +216,38 @@ class Detector:
             strayed=memory.strayed,
             standings=self._standings,
             track=track,
+            is_tag_unseen=unseen,
+            is_new=is_new,
+            is_hard=is_hard,
             unseen_s=0.0 if track is None else abs(claim.t_ns - seen_ns(track)) * 1e-9,
-            nearest_track_m=self._nearest_m(claim) if eye_sees and track is None else math.inf,
+            nearest_track_m=self._nearest_m(claim, limits)
+            if eye_sees and track is None
+            else math.inf,
             eye_sees=eye_sees,
             since_start_s=(claim.sent_ns - (self._began_ns or claim.sent_ns)) * 1e-9,
             idle=memory.idle,
             is_own_number=self._number(claim.station) == claim.who,
-            touches=partial(self._touches, claim, neighbours),
+            touches=partial(self._touches, claim, neighbours, limits),
         )
 
-    def _filter(self, claim: Claim, memory: Memory, before: Claim | None, driven_s: float) -> None:
-        x, y = claim.rear(self._limits.front_share)
-        yaw, speed = claim.yaw_rad or 0.0, claim.speed_mps or 0.0
-        vx, vy = speed * math.cos(yaw), speed * math.sin(yaw)
+    def _filter(
+        self, claim: Claim, memory: Memory, before: Claim | None, driven_s: float,
+        limits: Limits, psd: float,
+    ) -> None:  # fmt: skip
+        x, y = claim.rear(limits.front_share)
         kalman = memory.kalman
-        if before is None or driven_s <= 0.0:
+        if claim.yaw_rad is None or claim.speed_mps is None:
+            kalman.stop()
+            memory.strayed.begin()
+            return
+        yaw, speed = claim.yaw_rad, claim.speed_mps
+        vx, vy = speed * math.cos(yaw), speed * math.sin(yaw)
+        if before is None or driven_s <= 0.0 or not kalman.has_begun:
             kalman.begin(x, y, vx, vy)
-            memory.strayed = Strayed()
+            memory.strayed.begin()
         else:
-            kalman.take(driven_s, x, y, vx, vy, claim.own_m, claim.own_mps)
-            memory.strayed.add(claim, before, driven_s, self._limits.front_share)
+            kalman.take(driven_s, x, y, vx, vy, claim.own_m, claim.own_mps, psd)
+            memory.strayed.add(claim, before, driven_s, limits.front_share)
 
     def _fresh(self, claim: Claim) -> EyeTrack | None:
         track = self._tracks.get(claim.who)
@@ -208,8 +258,8 @@ class Detector:
             return False
         return self._ground.sees(*claim.middle)
 
-    def _nearest_m(self, claim: Claim) -> float:
-        x, y = claim.rear(self._limits.front_share)
+    def _nearest_m(self, claim: Claim, limits: Limits) -> float:
+        x, y = claim.rear(limits.front_share)
         return min(
             (
                 math.hypot(x - track.x_m, y - track.y_m)
@@ -219,27 +269,30 @@ class Detector:
             default=math.inf,
         )
 
-    def _touches(self, claim: Claim, neighbours: tuple[Claim, ...]) -> bool:
+    def _touches(self, claim: Claim, neighbours: tuple[Claim, ...], limits: Limits) -> bool:
         """Return whether the claimed car, a little larger, overlaps another one."""
         if claim.yaw_rad is None:
             return False
-        size = claim.length_m + TOUCH_M, claim.width_m + TOUCH_M
+        length_m, width_m = claim.size
+        size = length_m + TOUCH_M, width_m + TOUCH_M
         box: Box = (*claim.middle, claim.yaw_rad, *size)
         near_ns = 2 * FRESH_NS
         claimed = (
-            (*other.middle, other.yaw_rad, other.length_m + TOUCH_M, other.width_m + TOUCH_M)
+            (*other.middle, other.yaw_rad, other.size[0] + TOUCH_M, other.size[1] + TOUCH_M)
             for other in neighbours
             if other.yaw_rad is not None and abs(claim.t_ns - other.t_ns) <= near_ns
         )
-        seen = self._seen_beside(claim, size)
+        seen = self._seen_beside(claim, size, limits)
         return any(overlap_m(box, other) > 0.0 for other in (*claimed, *seen))
 
-    def _seen_beside(self, claim: Claim, size: tuple[float, float]) -> Iterator[Box]:
+    def _seen_beside(
+        self, claim: Claim, size: tuple[float, float], limits: Limits
+    ) -> Iterator[Box]:
         """Yield the outlines of all other cars that the Eye told of, as large as this one.
 
         A doubtful track too: two cars that press against each other hide each other's tags.
         """
-        ahead = (self._limits.front_share - 0.5) * claim.length_m
+        ahead = (limits.front_share - 0.5) * claim.size[0]
         for who, track in self._tracks.items():
             if who != claim.who and abs(claim.t_ns - track.t_ns) <= FRESH_NS:
                 x = track.x_m + ahead * math.cos(track.yaw_rad)
@@ -285,7 +338,8 @@ def _driven_s(claim: Claim, before: Claim, front_share: float) -> float:
     lost_s = (claim.lost_ns - before.lost_ns) * 1e-9
     (x1, y1), (x0, y0) = claim.rear(front_share), before.rear(front_share)
     way_m = math.hypot(x1 - x0, y1 - y0)
-    speed_mps = abs((claim.speed_mps or 0.0) + (before.speed_mps or 0.0)) / 2.0
+    v1, v0 = claim.speed_mps, before.speed_mps
+    speed_mps = 0.0 if v1 is None or v0 is None else abs(v1 + v0) / 2.0
     needed_s = way_m / speed_mps if speed_mps > 0.0 else dt_s
     return min(dt_s, max(LEAST_S, dt_s - lost_s, needed_s))
 
@@ -304,9 +358,10 @@ def _idle(claim: Claim, before: Claim | None, gap_s: float, idle: int) -> int:
     """Return how many claims in a row came fast although the car had not moved."""
     if before is None or gap_s > IDLE_S:
         return 0
-    moved = max(
-        math.hypot(claim.x_m - before.x_m, claim.y_m - before.y_m) / MOVED_M,
-        abs((claim.speed_mps or 0.0) - (before.speed_mps or 0.0)) / MOVED_MPS,
-        abs(math.remainder((claim.yaw_rad or 0.0) - (before.yaw_rad or 0.0), math.tau)) / MOVED_RAD,
-    )
+    moved = math.hypot(claim.x_m - before.x_m, claim.y_m - before.y_m) / MOVED_M
+    if claim.speed_mps is not None and before.speed_mps is not None:
+        moved = max(moved, abs(claim.speed_mps - before.speed_mps) / MOVED_MPS)
+    if claim.yaw_rad is not None and before.yaw_rad is not None:
+        turned = math.remainder(claim.yaw_rad - before.yaw_rad, math.tau)
+        moved = max(moved, abs(turned) / MOVED_RAD)
     return 0 if moved > UNMOVED else idle + 1

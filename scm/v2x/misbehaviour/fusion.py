@@ -45,6 +45,8 @@ class Memory:
         newest: Its last claim.
         first_ns: Since when it is known.
         late_ns: When it last told of a time in which it was not moved; None: never.
+        hard_ns: When it was last driven by hand, or the city stopped; None: never.
+        is_tag_unseen: Whether it is a car whose tag the Eye should see and never saw.
         idle: Its claims in a row that came fast though nothing had changed.
         score: What is held against it.
         since_ns: Since when it is suspected; None: it is not.
@@ -55,7 +57,8 @@ class Memory:
     """
 
     __slots__ = (
-        "evidence", "first_ns", "idle", "is_news", "kalman", "late_ns", "newest", "noted", "score",
+        "evidence", "first_ns", "hard_ns", "idle", "is_news", "is_tag_unseen",
+        "kalman", "late_ns", "newest", "noted", "score",
         "since_ns", "station", "strayed", "told_ns", "worst",
     )  # fmt: skip
 
@@ -66,6 +69,8 @@ class Memory:
         self.newest: Claim | None = None
         self.kalman = Kalman()
         self.late_ns: int | None = None
+        self.hard_ns: int | None = None
+        self.is_tag_unseen = False
         self.idle = 0
         self.score = 0.0
         self.worst = ""

@@ -8,7 +8,7 @@ A claim gives position and velocity (speed along yaw).
 
 import math
 
-ACCEL_PSD = 0.08
+ACCEL_PSD, HARD_PSD = 0.08, 0.9
 
 
 class Kalman:
@@ -19,17 +19,18 @@ class Kalman:
         moved_mps: Likewise its velocity.
         position_std: Of that forecast and claim together, one axis [m]; `velocity_std` likewise.
         is_warm: Whether there was a forecast.
+        has_begun: Whether it has a claim to go on from.
     """
 
     __slots__ = (
         "_a", "_b", "_c", "_vx", "_vy", "_x", "_y",
-        "is_warm", "moved_m", "moved_mps", "position_std", "velocity_std",
+        "has_begun", "is_warm", "moved_m", "moved_mps", "position_std", "velocity_std",
     )  # fmt: skip
 
     def __init__(self) -> None:
         self._x = self._y = self._vx = self._vy = 0.0
         self._a = self._b = self._c = 0.0
-        self.is_warm = False
+        self.is_warm = self.has_begun = False
         self.moved_m = self.moved_mps = 0.0
         self.position_std = self.velocity_std = 1.0
 
@@ -37,12 +38,18 @@ class Kalman:
         """Start anew at a claim."""
         self._x, self._y, self._vx, self._vy = x, y, vx, vy
         self._a, self._b, self._c, self.is_warm = 1e-4, 0.0, 1e-4, False
+        self.has_begun = True
+
+    def stop(self) -> None:
+        """Forget the car: a claim without heading or speed leaves nothing to go on from."""
+        self.is_warm = self.has_begun = False
 
     def take(
-        self, dt: float, x: float, y: float, vx: float, vy: float, own_m: float, own_mps: float
-    ) -> None:
+        self, dt: float, x: float, y: float, vx: float, vy: float, own_m: float, own_mps: float,
+        psd: float = ACCEL_PSD,
+    ) -> None:  # fmt: skip
         """Forecast to a claim dt seconds on, note how far it lies off, and take it in."""
-        q = ACCEL_PSD * dt
+        q = psd * dt
         a = self._a + dt * (2.0 * self._b + dt * self._c) + q * dt * dt / 3.0
         b = self._b + dt * self._c + q * dt / 2.0
         c = self._c + q

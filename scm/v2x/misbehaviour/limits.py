@@ -7,15 +7,17 @@ a reappearance after 4.7 s are used as they are.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
+NIGEL_MPS = 0.267
 HEADING_RAD = math.radians(76.0)
 REAPPEARS_S = 4.7
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Limits:
-    """Of the fastest, strongest car that may be met.
+    """Of one kind of car.
 
     Attributes:
         speed_mps: Greatest speed.
@@ -26,9 +28,10 @@ class Limits:
         own_m: Standard deviation of a position whose CAM does not tell it; likewise the others.
         most_own_m: What a CAM may claim at most: who knows himself worse is judged by this.
         front_share: Of a car's length, what lies before its rear axle.
+        has_tag: Whether its car file has a tag on its roof.
     """
 
-    speed_mps: float = 0.267
+    speed_mps: float = NIGEL_MPS
     accel_mps2: float = 0.9
     decel_mps2: float = 1.5
     start_mps2: float = 2.3
@@ -42,3 +45,31 @@ class Limits:
     most_own_mps: float = 0.03
     most_own_rad: float = 0.1
     front_share: float = 0.767
+    has_tag: bool = True
+
+    @property
+    def faster(self) -> float:
+        """Return how many times faster than a Nigel it is, at least 1."""
+        return max(1.0, self.speed_mps / NIGEL_MPS)
+
+    @cached_property
+    def hard(self) -> "Limits":
+        """Return the same for who brakes with full throttle in reverse, as hands do."""
+        most = self.start_mps2 + self.stop_mps2
+        return replace(self, accel_mps2=most, decel_mps2=most, start_mps2=most, stop_mps2=most)
+
+
+def limits_of(speed_mps: float, front_share: float, *, has_tag: bool) -> Limits:
+    """Return the limits of a car by its top speed: who is faster speeds up and brakes harder."""
+    nigel = Limits()
+    times = max(1.0, speed_mps / NIGEL_MPS)
+    return replace(
+        nigel,
+        speed_mps=speed_mps,
+        accel_mps2=nigel.accel_mps2 * times,
+        decel_mps2=nigel.decel_mps2 * times,
+        start_mps2=nigel.start_mps2 * times,
+        stop_mps2=nigel.stop_mps2 * times,
+        front_share=front_share,
+        has_tag=has_tag,
+    )

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from scm.geometry import Pose2, wrap_angle
 from scm.v2x.etsi import SCALE, SpatemBody
+from scm.v2x.etsi_codes import number_of, scaled
 from scm.v2x.etsi_convert import Told, colours_of, place_of
 from scm.v2x.etsi_mapem import IntersectionGeometry, MapemBody, MapLane
 from scm.vehicles.driver import CarLimits
@@ -25,18 +26,19 @@ class Advice(NamedTuple):
     """How to come to the next lights.
 
     Attributes:
-        junction: Its number, as in MAPEM; `lane` the number of the lane that leads to it.
+        junction: Its number, as in MAPEM; `lane` the number of the lane that leads to it, None:
+            MAPEM does not tell it.
         distance_m: From the front bumper to the stop line.
-        speed_mps: To drive now, at most the lane's limit.
+        speed_mps: To drive now, at most the lane's limit; None: MAPEM tells no limit.
         earliest_s, latest_s, likely_s: When the lights change; None: not told.
         confidence: The share of such likely ends that come true; None: not told.
         is_green: What they are now.
     """
 
     junction: int
-    lane: int
+    lane: int | None
     distance_m: float
-    speed_mps: float
+    speed_mps: float | None
     earliest_s: float | None
     latest_s: float | None
     likely_s: float | None
@@ -93,7 +95,7 @@ class GreenAdvisor:
         age_s = 1e-9 * (now_ns - arrived_ns)
         if revision != self._maps[number].revision or not -FRESH_S <= age_s <= FRESH_S:
             return None
-        numbers = {way.signal_group for way in lane.connects_to or ()}
+        numbers = {number_of(way, "signal_group") for way in lane.connects_to or ()}
         told = [groups[n] for n in numbers if n is not None and n in groups]
         if not told:
             return None
@@ -105,15 +107,22 @@ class GreenAdvisor:
         )
 
     def _advice(self, distance: float, number: int, lane: MapLane, told: Told) -> Advice:
-        limits = self._maps[number].speed_limits
-        allowed = limits[0].speed * _SPEED_STEP if limits else math.inf
+        allowed = _limit_mps(self._maps[number])
         wait = (told.min_end_s or 0.0) if told.colour == "red" else 0.0
         room = distance - SHORT_OF_LINE
-        decel, floor = self._limits.decel, self._floor * allowed
-        speed = allowed if math.isinf(allowed) else _speed(room, wait, decel, allowed, floor)
+        speed = None
+        if allowed is not None:
+            speed = _speed(room, wait, self._limits.decel, allowed, self._floor * allowed)
         ends = told.min_end_s, told.max_end_s, told.likely_end_s, told.likely_confidence
         is_green = told.colour == "green"
-        return Advice(number, lane.lane_id, distance, speed, *ends, is_green)
+        return Advice(number, number_of(lane, "lane_id"), distance, speed, *ends, is_green)
+
+
+def _limit_mps(geometry: IntersectionGeometry) -> float | None:
+    """Return the speed limit of all vehicles at a junction [m/s]; None: it is not told."""
+    limits = geometry.speed_limits or ()
+    told = next((one for one in limits if one.type == "vehicleMaxSpeed"), None)
+    return None if told is None else scaled(told, "speed", _SPEED_STEP)
 
 
 def _later(end_s: float | None, age_s: float) -> float | None:
@@ -127,8 +136,10 @@ def _distance(
     attributes = lane.lane_attributes
     if "ingressPath" not in attributes.directional_use or attributes.lane_type.vehicle is None:
         return None
-    near_x, near_y = place_of(geometry.ref_point.latitude, geometry.ref_point.longitude)
-    half, begin = 0.5 * (geometry.lane_width or 0) / _CM, 0.0
+    reference = place_of(geometry.ref_point.latitude, geometry.ref_point.longitude)
+    if reference is None or geometry.lane_width is None:
+        return None
+    (near_x, near_y), half, begin = reference, 0.5 * geometry.lane_width / _CM, 0.0
     for place, node in enumerate(lane.node_list.nodes):
         delta = node.delta.node_xy
         dx, dy = delta.x / _CM, delta.y / _CM

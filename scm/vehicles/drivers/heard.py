@@ -6,7 +6,7 @@ from collections import deque
 from scm.clock import NS_PER_S, seconds
 from scm.geometry import Pose2
 from scm.v2x.etsi import CamBody
-from scm.v2x.etsi_convert import CamView, read_cam
+from scm.v2x.etsi_convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, CamView, read_cam
 from scm.vehicles.driver import Other
 from scm.vehicles.drivers.ahead import REACH
 from scm.vehicles.drivers.silence import ENOUGH, FRESH_NS
@@ -26,8 +26,13 @@ class HeardCars:
         self._arrivals: dict[int, deque[int]] = {}
 
     def hear(self, body: CamBody, arrived_ns: int) -> None:
-        """Take a CAM that arrived at `arrived_ns`, on the receiver's own clock."""
-        self._heard[body.station_id] = (read_cam(body), arrived_ns)
+        """Take a CAM that arrived at `arrived_ns`, on the receiver's own clock.
+
+        One that does not say where its car is leaves the last known place in force.
+        """
+        view = read_cam(body)
+        if view.place is not None:
+            self._heard[body.station_id] = (view, arrived_ns)
         arrivals = self._arrivals.setdefault(body.station_id, deque(maxlen=COUNTED))
         arrivals.append(arrived_ns)
 
@@ -65,21 +70,41 @@ class HeardCars:
 
 
 def _may_be_within_reach(view: CamView, near: Pose2) -> bool:
-    farthest = REACH + AROUND_M + view.length_m + LONGEST_GUESS_S * abs(view.speed_mps or 0.0)
-    dx, dy = view.x_m - near.x, view.y_m - near.y
+    length_m, (x_m, y_m) = view.length_m or ASSUMED_LENGTH_M, _place_of(view)
+    farthest = REACH + AROUND_M + length_m + LONGEST_GUESS_S * abs(view.speed_mps or 0.0)
+    dx, dy = x_m - near.x, y_m - near.y
     return dx * dx + dy * dy <= farthest * farthest
 
 
 def other_of(view: CamView, age_s: float) -> Other:
-    """Return a car moved on from its CAM; an unknown heading or speed is taken as zero."""
-    yaw, speed = view.yaw_rad or 0.0, view.speed_mps or 0.0
-    ahead = speed * min(age_s, LONGEST_GUESS_S) - 0.5 * view.length_m
+    """Return a car moved on from its CAM.
+
+    What a CAM does not tell is assumed so that the driver keeps clear: a size is a Nigel's, a car
+    of unknown speed stands, and one of unknown heading is a square around its front bumper that
+    holds it whichever way it points.
+
+    Raises:
+        ValueError: when the CAM does not say where the car is.
+    """
+    length, width = view.length_m or ASSUMED_LENGTH_M, view.width_m or ASSUMED_WIDTH_M
+    x, y = _place_of(view)
+    if view.yaw_rad is None:
+        return Other(x=x, y=y, yaw=0.0, speed=0.0, length=2.0 * length, width=2.0 * length)
+    yaw, speed = view.yaw_rad, view.speed_mps or 0.0
+    ahead = speed * min(age_s, LONGEST_GUESS_S) - 0.5 * length
     turned = (view.yaw_rate_radps or 0.0) * min(age_s, LONGEST_GUESS_S)
     return Other(
-        x=view.x_m + ahead * math.cos(yaw + 0.5 * turned),
-        y=view.y_m + ahead * math.sin(yaw + 0.5 * turned),
+        x=x + ahead * math.cos(yaw + 0.5 * turned),
+        y=y + ahead * math.sin(yaw + 0.5 * turned),
         yaw=yaw + turned,
         speed=speed,
-        length=view.length_m,
-        width=view.width_m,
+        length=length,
+        width=width,
     )
+
+
+def _place_of(view: CamView) -> tuple[float, float]:
+    if view.place is None:
+        msg = f"CAM of station {view.station_id}: expected a position, got unavailable"
+        raise ValueError(msg)
+    return view.place

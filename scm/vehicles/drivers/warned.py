@@ -63,10 +63,15 @@ class Warnings:
         )
 
     def hear(self, body: DenmBody, now_ns: int) -> None:
-        """Take a DENM that is on the air now; when all places are taken, the first to end goes."""
+        """Take a DENM that is on the air now; when all places are taken, the first to end goes.
+
+        A DENM that does not say where its event is warns no driver.
+        """
         found, warned = self._watch.hear(body, now_ns), self.warned
         action = body.management_container.action_id
-        if found == "ignored":
+        event = body.management_container.event_position
+        place = place_of(event.latitude, event.longitude)
+        if found == "ignored" or (found != "ended" and place is None):
             return
         if found == "ended":
             if action in self._rows:
@@ -76,8 +81,8 @@ class Warnings:
             row = int(np.argmin(warned.ends_ns))
             self._rows = {name: at for name, at in self._rows.items() if at != row}
             self._rows[action], warned.frames[row] = row, 0
-        row, place = self._rows[action], body.management_container.event_position
-        warned.at[row] = place_of(place.latitude, place.longitude)
+        row = self._rows[action]
+        warned.at[row] = place
         warned.frames[row] += 1
         warned.told_ns[row] = now_ns
         if found != "repetition":

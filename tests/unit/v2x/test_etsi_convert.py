@@ -119,7 +119,7 @@ def test_a_heading_just_west_of_north_wraps_to_zero_and_never_reaches_3600():
 
 def test_a_left_turn_has_positive_curvature_and_a_standing_car_unknown():
     assert a_cam(yaw_rate_radps=0.026).motion.curvature.value == round(0.1 / SCALE * 1e4)
-    assert a_cam(yaw_rate_radps=-5.0).motion.curvature.value == -1022
+    assert a_cam(yaw_rate_radps=-5.0).motion.curvature.value == -1023
     assert a_cam(speed_mps=0.0).motion.curvature.value == 1023
 
 

@@ -7,7 +7,7 @@ import random
 
 from scm.v2x.etsi import SCALE
 from scm.v2x.misbehaviour.attack import Attack, Frame, Scene, Sent, Transform
-from scm.v2x.misbehaviour.claim import ACCEL_UNKNOWN
+from scm.v2x.misbehaviour.claim import accel_of as told_of
 from scm.v2x.misbehaviour.forge import driven
 
 HARD_MPS2 = 0.5 / SCALE
@@ -15,9 +15,8 @@ LEAST, MOST = 2.0, 4.0
 
 
 def accel_of(frame: Frame) -> float | None:
-    """Return the acceleration that a frame tells [m/s^2]; None: it does not."""
-    value = frame.body.motion.longitudinal_acceleration.value
-    return None if value == ACCEL_UNKNOWN else value * 0.1 / SCALE
+    """Return the acceleration that a frame tells [m/s^2]; None: none, or beyond the field."""
+    return told_of(frame.body)[0]
 
 
 def _start(rng: random.Random, scene: Scene) -> Transform:

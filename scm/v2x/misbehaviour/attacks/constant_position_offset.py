@@ -23,8 +23,10 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     dx, dy = offset_m(rng), offset_m(rng)
 
     def send(frame: Frame) -> list[Sent]:
-        told = read_cam(frame.body)
-        body = moved(frame.body, told.x_m + dx, told.y_m + dy)
+        place = read_cam(frame.body).place
+        if place is None:
+            return [Sent(frame, lies=False)]
+        body = moved(frame.body, place[0] + dx, place[1] + dy)
         return [Sent(frame._replace(body=body), lies=True)]
 
     return send

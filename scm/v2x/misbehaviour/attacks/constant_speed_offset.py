@@ -18,10 +18,12 @@ def offset_mps(rng: random.Random) -> float:
     return rng.choice((-1.0, 1.0)) * rng.uniform(LEAST_MPS, MOST_MPS)
 
 
-def with_speed(frame: Frame, wished_mps: float) -> Sent:
+def faster(frame: Frame, by_mps: float) -> Sent:
     """Return a frame with another speed; it lies unless that is the speed it had."""
-    speed = read_cam(frame.body).speed_mps or 0.0
-    told = max(0.0, wished_mps)
+    speed = read_cam(frame.body).speed_mps
+    if speed is None:
+        return Sent(frame, lies=False)
+    told = max(0.0, speed + by_mps)
     body = driven(frame.body, speed_mps=told)
     return Sent(frame._replace(body=body), lies=abs(told - speed) > LEAST_MPS / 2.0)
 
@@ -31,7 +33,7 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     offset = offset_mps(rng)
 
     def send(frame: Frame) -> list[Sent]:
-        return [with_speed(frame, (read_cam(frame.body).speed_mps or 0.0) + offset)]
+        return [faster(frame, offset)]
 
     return send
 

@@ -22,11 +22,11 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     queue: list[Frame] = []
 
     def victims(frame: Frame) -> dict[str, list[Frame]]:
-        told = read_cam(frame.body)
+        here = read_cam(frame.body).place
         found: dict[str, list[Frame]] = {}
         for heard in scene.heard:
-            there = read_cam(heard.body)
-            near = math.hypot(there.x_m - told.x_m, there.y_m - told.y_m) <= NEAR_M
+            there = read_cam(heard.body).place
+            near = here is not None and there is not None and math.dist(here, there) <= NEAR_M
             if near and frame.t_ns - heard.t_ns <= WITHIN_NS and heard.station != frame.station:
                 found.setdefault(heard.station, []).append(heard)
         return found

@@ -18,10 +18,10 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
 
     def send(frame: Frame) -> list[Sent]:
         nonlocal frozen
-        speed = read_cam(frame.body).speed_mps or 0.0
+        speed = read_cam(frame.body).speed_mps
         if frozen is None and rng.random() < CHANCE:
             frozen = speed
-        if frozen is None:
+        if frozen is None or speed is None:
             return [Sent(frame, lies=False)]
         body = driven(frame.body, speed_mps=frozen)
         return [Sent(frame._replace(body=body), lies=abs(frozen - speed) > SLOW_MPS)]

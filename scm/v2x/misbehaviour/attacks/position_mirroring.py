@@ -15,15 +15,15 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     del rng
 
     def send(frame: Frame) -> list[Sent]:
-        told = read_cam(frame.body)
-        road = scene.ground.road_near(told.x_m, told.y_m)
-        if road is None:
+        place = read_cam(frame.body).place
+        road = None if place is None else scene.ground.road_near(*place)
+        if place is None or road is None:
             return [Sent(frame, lies=False)]
         x, y, yaw, half = road
         left = -math.sin(yaw), math.cos(yaw)
-        lateral = (told.x_m - x) * left[0] + (told.y_m - y) * left[1]
+        lateral = (place[0] - x) * left[0] + (place[1] - y) * left[1]
         way = 2.0 * (half - lateral)
-        body = moved(frame.body, told.x_m + way * left[0], told.y_m + way * left[1])
+        body = moved(frame.body, place[0] + way * left[0], place[1] + way * left[1])
         return [Sent(frame._replace(body=body), lies=True)]
 
     return send

@@ -15,8 +15,10 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     del scene
 
     def send(frame: Frame) -> list[Sent]:
-        told = read_cam(frame.body)
-        body = moved(frame.body, told.x_m + offset_m(rng), told.y_m + offset_m(rng))
+        place = read_cam(frame.body).place
+        if place is None:
+            return [Sent(frame, lies=False)]
+        body = moved(frame.body, place[0] + offset_m(rng), place[1] + offset_m(rng))
         return [Sent(frame._replace(body=body), lies=True)]
 
     return send

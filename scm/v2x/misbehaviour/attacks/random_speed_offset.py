@@ -5,16 +5,15 @@ v' = v + d, drawn anew for each CAM, sizes as in constant_speed_offset
 
 import random
 
-from scm.v2x.etsi_convert import read_cam
 from scm.v2x.misbehaviour.attack import Attack, Frame, Scene, Sent, Transform
-from scm.v2x.misbehaviour.attacks.constant_speed_offset import offset_mps, with_speed
+from scm.v2x.misbehaviour.attacks.constant_speed_offset import faster, offset_mps
 
 
 def _start(rng: random.Random, scene: Scene) -> Transform:
     del scene
 
     def send(frame: Frame) -> list[Sent]:
-        return [with_speed(frame, (read_cam(frame.body).speed_mps or 0.0) + offset_mps(rng))]
+        return [faster(frame, offset_mps(rng))]
 
     return send
 

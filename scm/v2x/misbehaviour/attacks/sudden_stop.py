@@ -24,13 +24,13 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
         nonlocal stop
         told = read_cam(frame.body)
         is_driving = abs(told.speed_mps or 0.0) > SLOW_MPS
-        if stop is None and is_driving and rng.random() < CHANCE:
+        if stop is None and is_driving and told.place is not None and rng.random() < CHANCE:
             stop = told
-        if stop is None:
+        if stop is None or stop.place is None or told.place is None:
             return [Sent(frame, lies=False)]
-        body = moved(frame.body, stop.x_m, stop.y_m)
+        body = moved(frame.body, *stop.place)
         body = driven(body, speed_mps=0.0, yaw_rad=stop.yaw_rad, accel_mps2=0.0)
-        away = math.hypot(told.x_m - stop.x_m, told.y_m - stop.y_m) >= AWAY_M
+        away = math.dist(told.place, stop.place) >= AWAY_M
         return [Sent(frame._replace(body=body), lies=is_driving or away)]
 
     return send

@@ -21,9 +21,10 @@ from scm.v2x.misbehaviour.forge import driven
 
 def drives(told: CamView, before: CamView | None) -> bool:
     """Return whether a car truly moves, by its speed and its way since the CAM before."""
-    if before is None or abs(told.speed_mps or 0.0) <= SLOW_MPS:
+    was = None if before is None else before.place
+    if was is None or told.place is None or abs(told.speed_mps or 0.0) <= SLOW_MPS:
         return False
-    return math.hypot(told.x_m - before.x_m, told.y_m - before.y_m) > STEP_M / 5.0
+    return math.dist(told.place, was) > STEP_M / 5.0
 
 
 def _start(rng: random.Random, scene: Scene) -> Transform:

@@ -12,11 +12,11 @@ from scm.v2x.misbehaviour.likely import at_most
 
 def _judge(case: Case) -> float | None:
     now, before = case.now, case.before
-    if now.accel_mps2 is None or before is None or before.accel_mps2 is None:
+    one, two = now.accel_range, None if before is None else before.accel_range
+    if one is None or two is None:
         return None
     sigma = case.limits.own_mps2
-    gain = min(now.accel_mps2, before.accel_mps2)
-    loss = -max(now.accel_mps2, before.accel_mps2)
+    gain, loss = min(one[0], two[0]), -max(one[1], two[1])
     p = min(
         at_most(gain, case.limits.accel_mps2, sigma), at_most(loss, case.limits.decel_mps2, sigma)
     )

@@ -3,7 +3,8 @@
     p = FLOOR where it sees no tag within NEAR_M of the claim
 
 A ghost is not seen. A car that is seen and does not speak is silent, which is no misbehaviour. A
-tag may be hidden for a while, so this needs several claims.
+tag may be hidden for a while, so this needs several claims. A car of the city whose tag no camera
+has ever seen, or that has none, is no ghost: that the Eye cannot see its tag is said as such.
 """
 
 from scm.v2x.misbehaviour.check import Case, Check
@@ -13,7 +14,7 @@ FLOOR = 0.1
 
 
 def _judge(case: Case) -> float | None:
-    if not case.eye_sees or case.track is not None:
+    if not case.eye_sees or case.track is not None or case.is_tag_unseen:
         return None
     return FLOOR if case.nearest_track_m > NEAR_M else 1.0
 

@@ -23,7 +23,7 @@ def _judge(case: Case) -> float | None:
     x = track.x_m + ahead * math.cos(track.yaw_rad)
     y = track.y_m + ahead * math.sin(track.yaw_rad)
     # The track's own heading: a claimed one may be the lie, and has a check of its own.
-    front = case.limits.front_share * now.length_m
+    front = case.limits.front_share * now.size[0]
     x += front * math.cos(track.yaw_rad)
     y += front * math.sin(track.yaw_rad)
     away = math.hypot(now.x_m - x, now.y_m - y)

@@ -2,7 +2,8 @@
 
 p = erfc of |v - v_eye| beyond the tolerance, sigma of both
 
-Holds while the Eye looks, see `Case.eye_may_deny`.
+Holds while the Eye looks, see `Case.eye_may_deny`, and not by hand or in a stop of the city: a car
+that stands within a tenth of a second is faster than the Eye's filter.
 """
 
 import math
@@ -15,7 +16,7 @@ TOLERANCE_MPS = 0.035
 
 def _judge(case: Case) -> float | None:
     track, now = case.track, case.now
-    if track is None or now.speed_mps is None or not case.eye_may_deny:
+    if track is None or now.speed_mps is None or not case.eye_may_deny or case.is_hard:
         return None
     sigma = math.hypot(now.own_mps, math.sqrt(track.covariance[3][3]))
     return of_number(now.speed_mps - track.speed_mps, TOLERANCE_MPS, sigma)

@@ -19,7 +19,7 @@ def _judge(case: Case) -> float | None:
     now = case.now
     if now.yaw_rad is None:
         return None
-    box: Box = (*now.middle, now.yaw_rad, now.length_m, now.width_m)
+    box: Box = (*now.middle, now.yaw_rad, *now.size)
     least = 1.0
     for other in case.neighbours:
         age_s = (now.t_ns - other.t_ns) * 1e-9
@@ -27,8 +27,9 @@ def _judge(case: Case) -> float | None:
             continue
         if _is_other(case, other):
             continue
-        there: Box = (*other.middle, other.yaw_rad, other.length_m, other.width_m)
-        moved = abs((other.speed_mps or 0.0) * age_s)
+        there: Box = (*other.middle, other.yaw_rad, *other.size)
+        speed = case.limits.speed_mps if other.speed_mps is None else other.speed_mps
+        moved = abs(speed * age_s)
         depth = overlap_m(box, there)
         least = min(least, at_most(depth, TOLERANCE_M + moved, now.own_m + other.own_m))
     return least

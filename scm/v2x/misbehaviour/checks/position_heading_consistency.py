@@ -25,9 +25,11 @@ def _judge(case: Case) -> float | None:
         return None
     turned = wrap_angle(now.yaw_rad - before.yaw_rad)
     heading = before.yaw_rad + turned / 2.0
-    if (now.speed_mps or 0.0) + (before.speed_mps or 0.0) < 0.0:
-        heading += math.pi
     off = abs(wrap_angle(math.atan2(dy, dx) - heading))
+    if now.speed_mps is None or before.speed_mps is None:
+        off = min(off, math.pi - off)  # whether it drives in reverse is not told
+    elif now.speed_mps + before.speed_mps < 0.0:
+        off = math.pi - off
     sigma = math.hypot(now.own_rad, (now.own_m + before.own_m) / way)
     return at_most(off, HEADING_RAD, sigma)
 

@@ -27,7 +27,8 @@ def _judge(case: Case) -> float | None:
     if before is None or dt <= 0.0 or now.speed_mps is None or before.speed_mps is None:
         return None
     spread = abs(now.speed_mps - before.speed_mps)
-    tolerance = TOLERANCE_M + (DRIFT_MPS + 0.25 * spread) * dt + 0.02 * dt * dt
+    faster = case.limits.faster
+    tolerance = TOLERANCE_M + (DRIFT_MPS * faster + 0.25 * spread) * dt + 0.02 * faster * dt * dt
     sigma = math.hypot(now.own_m + before.own_m, now.own_mps * dt)
     strayed = case.strayed
     p = of_number(strayed.last_m, tolerance, sigma)
@@ -36,7 +37,7 @@ def _judge(case: Case) -> float | None:
     mean = strayed.sum_m / strayed.over_s
     unsure_m = math.hypot(2.0 * now.own_m, math.sqrt(strayed.variance_m2))
     doubt = math.hypot(SIGMA_MPS, unsure_m / strayed.over_s)
-    return min(p, of_number(mean, MEAN_MPS, doubt))
+    return min(p, of_number(mean, MEAN_MPS * faster, doubt))
 
 
 CHECK = Check(_judge, "speed")

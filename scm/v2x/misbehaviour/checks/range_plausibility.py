@@ -16,7 +16,7 @@ def _judge(case: Case) -> float | None:
         return None
     away = math.hypot(now.x_m - receiver[0], now.y_m - receiver[1])
     # The antenna may sit a car's length behind the bumper that is told.
-    return at_most(away, case.ground.range_m + now.length_m, now.own_m)
+    return at_most(away, case.ground.range_m + now.size[0], now.own_m)
 
 
 CHECK = Check(_judge, "position")

@@ -4,7 +4,7 @@ p = erfc((|v| - v_max) / sigma)        v_max of the car itself, not VeReMi's 62 
 """
 
 from scm.v2x.misbehaviour.check import Case, Check
-from scm.v2x.misbehaviour.likely import at_most
+from scm.v2x.misbehaviour.likely import LEAST, at_most
 
 TOLERANCE = 1.1
 
@@ -12,7 +12,7 @@ TOLERANCE = 1.1
 def _judge(case: Case) -> float | None:
     speed = case.now.speed_mps
     if speed is None:
-        return None
+        return LEAST if case.now.is_beyond_speed else None
     return at_most(abs(speed), TOLERANCE * case.limits.speed_mps, case.now.own_mps)
 
 

@@ -1,4 +1,4 @@
-"""Static fields: a car keeps its length and width.
+"""Static fields: a car keeps its length and width, where it tells them.
 
 p = 1 within one step of the field, else the least
 """
@@ -14,8 +14,9 @@ def _judge(case: Case) -> float | None:
     now, before = case.now, case.before
     if before is None:
         return None
-    changed = max(abs(now.length_m - before.length_m), abs(now.width_m - before.width_m))
-    return 1.0 if changed <= STEP_M else LEAST
+    sizes = (now.length_m, before.length_m), (now.width_m, before.width_m)
+    changes = [abs(a - b) for a, b in sizes if a is not None and b is not None]
+    return 1.0 if max(changes, default=0.0) <= STEP_M else LEAST
 
 
 CHECK = Check(_judge, "static")
