@@ -63,7 +63,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
 def in_order(running: CityProcess) -> None:
     """Begin each test in a city that drives, whatever the one before it left.
 
-    A starved machine makes the monitor latch a fault; a test that failed may leave the stop engaged.
+    A starved machine makes the monitor latch a fault; a test that failed may leave it stopped.
     """
     if running.get("/stop")["engaged"]:
         running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
