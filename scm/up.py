@@ -189,7 +189,7 @@ def _check_counts(wanted: Wanted, places: int) -> None:
         check_name(name, "cameras_of")
     for name in wanted.without:
         if name not in OPTIONAL:
-            expected = f"expected any of {', '.join(OPTIONAL)}{nearest(name, OPTIONAL)}"
+            expected = f"expected any of {', '.join(OPTIONAL)}{nearest(name, tuple(OPTIONAL))}"
             msg = f"without: got {name!r}, {expected}; every other part is needed"
             raise RunError(msg)
     if hz and "record" in wanted.without:

@@ -133,11 +133,7 @@ def create_app(
     problem.install(app)
     openapi.install(app)
     _add_layers(app, desk, clock, site)
-    city = desk.city
-    nouns = {
-        "/api/v1": (*desk.of_the_city(), *desk.live(), *desk.of_the_server()),
-        "": (health.router(city), ngsi.router(city), metrics.router(desk.metrics)),
-    }
+    nouns = desk.by_prefix()
     for prefix, routers in nouns.items():
         for noun in routers:
             app.include_router(noun, prefix=prefix, responses=problem.RESPONSES)
@@ -162,6 +158,14 @@ class _Desk:
         self.stream = Stream(city, uuid.uuid4().hex[:8], self.seen)
         self.frames = VehicleFrames(city.view)
         self.metrics = Metrics(city, self.stream)
+
+    def by_prefix(self) -> dict[str, tuple[APIRouter, ...]]:
+        """Return all nouns, by the prefix of their addresses."""
+        city = self.city
+        return {
+            "/api/v1": (*self.of_the_city(), *self.live(), *self.of_the_server()),
+            "": (health.router(city), ngsi.router(city), metrics.router(self.metrics)),
+        }
 
     def of_the_city(self) -> tuple[APIRouter, ...]:
         """Return what is true of the city now, and what may be asked of it."""

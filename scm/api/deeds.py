@@ -95,7 +95,7 @@ class Words:
             for prefix, routers in nouns.items()
             for router in routers
             for route in router.routes
-            if isinstance(route, APIRoute) and route.methods & CHANGES
+            if isinstance(route, APIRoute) and CHANGES.intersection(route.methods or ())
         ]
 
     def of(self, kind: str, request: Facts) -> str:

@@ -162,8 +162,9 @@ class Operations:
 
     def change(self, name: str, **changes: object) -> None:
         """Change what is told of an operation; where files lie on the server is not told."""
-        texts = {key: without_paths(str(changes[key])) for key in ("doing", "error") if key in changes}
-        changes |= texts
+        for text in ("doing", "error"):
+            if text in changes:
+                changes[text] = without_paths(str(changes[text]))
         with self._lock:
             row = self._rows.get(name)
             if row is not None:

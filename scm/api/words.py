@@ -10,6 +10,7 @@ WORDS: dict[str, tuple[str, object]] = {
     "acknowledged_by": ("Who took note of it; null: nobody yet.", "ada"),
     "acknowledgements": ("Who took note of which event.", None),
     "against": ("What it happened with.", ["n2"]),
+    "advice": ("What a person can do; empty: nothing.", "Start the city again with fewer cars."),
     "age_s": ("How long ago it was heard last [s].", 0.2),
     "alive": ("Whether it is there; false: it left or died.", True),
     "answered_by": ("Who answered.", "world"),

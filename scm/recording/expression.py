@@ -126,9 +126,8 @@ def _is_deeper(tree: ast.expr, most: int) -> bool:
     """Return whether a tree has more levels; level by level, so that no depth can break it."""
     level: list[ast.AST] = [tree]
     for _ in range(most):
-        level = [
-            part for node in level for part in ast.iter_child_nodes(node) if isinstance(part, ast.expr)
-        ]
+        parts = (part for node in level for part in ast.iter_child_nodes(node))
+        level = [part for part in parts if isinstance(part, ast.expr)]
         if not level:
             return False
     return True

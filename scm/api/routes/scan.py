@@ -41,7 +41,7 @@ def router(city: City, stream: Stream) -> APIRouter:
     @routes.get(
         "/{name}/scan/stream",
         summary="Every turn, as server-sent events",
-        responses=answer_file("text/event-stream", "A `ScanRow` in each event `scan`; null: no LIDAR."),
+        responses=answer_file("text/event-stream", "Events `scan`: a `ScanRow`; null: no LIDAR."),
         response_class=Response,
     )
     async def every(name: Name) -> Response:

@@ -29,7 +29,8 @@ def run(tmp_path_factory):
     def run(script, function, *arguments):
         """Return what a function of a page's script makes of its arguments."""
         shutil.copy(JS / script, folder / "script.mjs")
-        ask = f"import {{ {function} }} from './script.mjs'; import {{ readFileSync }} from 'node:fs';"
+        ask = f"import {{ {function} }} from './script.mjs';"
+        ask += "import { readFileSync } from 'node:fs';"
         show = f"console.log(JSON.stringify({function}(...JSON.parse(readFileSync(0, 'utf8')))));"
         command = [NODE, "--input-type=module", "-e", ask + show]
         given = json.dumps(arguments)
