@@ -118,7 +118,7 @@ class DevkitPart:
         self._resetting = [False] * len(wanted.cars)
         self._script: Script | None = None
         self._was_open = False
-        self._asked_ns = 0
+        self._blind_since_ns = 0
         self._may_be_dark = False
         self._heard_ns: dict[str, int] = {}
         self._told: set[str] = set()
@@ -242,8 +242,8 @@ class DevkitPart:
     def _wait_for_pictures(self, now_ns: int) -> None:
         """Let packets go without first pictures once these are late; count from the last car on."""
         if self._telemetry.unknown:
-            self._asked_ns = now_ns
-        if now_ns - self._asked_ns < PICTURE_NS:
+            self._blind_since_ns = now_ns
+        if now_ns - self._blind_since_ns < PICTURE_NS:
             return
         self._may_be_dark = True
         for one in self._unpictured:
@@ -252,7 +252,7 @@ class DevkitPart:
     def _open(self, is_open: bool, now_ns: int) -> None:
         """A script came or went: hear what it needs, or no more of it; forget what was said."""
         self._telemetry.forget_views()
-        self._asked_ns, self._said = now_ns, None
+        self._blind_since_ns, self._said = now_ns, None
         self._may_be_dark = self._wanted.cosim  # its script places a car before anything sees it
         self._was_open = is_open
         self.hears = (*self._always, *self._needed()) if is_open else self._always

@@ -95,7 +95,7 @@ function Question({ name }) {
 }
 
 async function send(vehicle, lane, then) {
-  const told = ({ length_m }) => `${vehicle} drives to ${lane}: ${length_m.toFixed(1)} m to its end.`;
-  const reply = await change("POST", `/vehicles/${vehicle}/route`, { via: [lane], then }, told);
+  const notice = ({ length_m }) => `${vehicle} drives to ${lane}: ${length_m.toFixed(1)} m to its end.`;
+  const reply = await change("POST", `/vehicles/${vehicle}/route`, { via: [lane], then }, notice);
   if (reply) withdraw();
 }
