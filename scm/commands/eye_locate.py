@@ -42,6 +42,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.eye.calibration_files import read_calibration
     from scm.eye.camera import camera_of
     from scm.eye.detect import Settings, detect_tags
+    from scm.eye.find.causes import cause_of
     from scm.eye.picture import read_picture
     from scm.eye.source import grey_of
     from scm.maps.load import load_map
@@ -63,6 +64,8 @@ def _run(arguments: argparse.Namespace) -> int:
         raise EyeError(f"{arguments.image}: camera {camera.name!r} has {wanted}, got {got}")
     tags = known_tags(city_map, arguments.tags)
     seen = detect_tags(grey, Settings(quad_decimate=1.0))
+    if not seen and (cause := cause_of(grey)):
+        raise EyeError(f"{arguments.image}: no tag is found: {cause.said}")
     doubt = None if lens is None else lens.lens_covariance
     located = locate(camera, tags, seen, doubt)
     model = located.places[0].model

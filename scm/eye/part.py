@@ -22,6 +22,7 @@ from scm.eye.anchor import Anchor
 from scm.eye.calibration import Calibration
 from scm.eye.camera import CameraModel, camera_of
 from scm.eye.detect import Settings
+from scm.eye.find.causes import Causes
 from scm.eye.find.finder import TagFinder
 from scm.eye.overlay import jpeg, preview
 from scm.eye.pose import car_poses
@@ -114,7 +115,7 @@ class EyePart:
         self.tells_tracks = chosen is city_map.cameras[0]
         self.name = eye_station(self.camera, first=self.tells_tracks)
         self._finder = TagFinder(settings)
-        self._roof_sizes = RoofSizes()
+        self._roof_sizes, self._causes = RoofSizes(), Causes()
         self._source = source or _emulated(city_map, model, seed)
         self._is_awaited = source is not None
         self._came_ns = 0
@@ -210,6 +211,7 @@ class EyePart:
         tags = self._finder.find(grey, self._expected(frame.t_ns, bodies))
         corners = {tag.tag_id: np.array(tag.corners_px) for tag in reversed(tags)}
         self.watch.see(frame.t_ns, grey, corners)
+        self._causes.see(frame.t_ns, grey, missing=self._misses_tags(corners, known))
         flags = self.watch.flags(now_ns)
         sightings = [] if "frame_size" in flags else self._sightings(frame, tags, known, flags)
         self.tracks.see(sightings, now_ns)
@@ -217,7 +219,7 @@ class EyePart:
         late_ms = (now_ns - frame.t_ns) / NS_PER_MS
         seen = EyeTags(camera=self.camera, t_ns=frame.t_ns, tags=tags, latency_ms=late_ms)
         return [seen, *(pose_message(one, age_ms) for one in sightings),
-                *self._misprints(frame.t_ns, now_ns),
+                *self._news(frame.t_ns, now_ns),
                 *self._picture(frame, tags, known, now_ns)]  # fmt: skip
 
     def _expected(self, t_ns: int, bodies: dict[str, CarBody]) -> dict[int, Floats]:
@@ -251,13 +253,21 @@ class EyePart:
             if is_on_a_roof(tag.tag_id, vehicle, pose)
         ]
 
-    def _misprints(self, t_ns: int, now_ns: int) -> list[Outgoing]:
-        """Report once, as events and in the log, each roof tag of another size."""
-        told = self._roof_sizes.news(t_ns, float(self.watch.anchor.model.position[2]))
-        for vehicle, text in told:
-            facts = {"camera": self.camera, "vehicle": vehicle, "said": repr(text)}
-            event(LOGGER, ROOF_TAG_SIZE, level=logging.WARNING, **facts)
-        return [self._event(ROOF_TAG_SIZE, text, now_ns, "warning") for _, text in told]
+    def _misses_tags(
+        self, corners: Mapping[int, Floats], known: Mapping[int, tuple[str, CarBody]]
+    ) -> bool:
+        """Return whether no car's tag was found although cars are known, or no tag at all."""
+        ours = {tag.tag_id for tag in self.watch.anchor.map_tags}
+        return corners.keys() <= ours and (bool(known) or not corners)
+
+    def _news(self, t_ns: int, now_ns: int) -> list[Outgoing]:
+        """Report once, as events and in the log, roof tags of another size and why tags miss."""
+        height = float(self.watch.anchor.model.position[2])
+        sizes = [(ROOF_TAG_SIZE, text) for text in self._roof_sizes.news(t_ns, height)]
+        found = [*sizes, *((one.code, one.said) for one in self._causes.news())]
+        for name, text in found:
+            event(LOGGER, name, level=logging.WARNING, camera=self.camera, said=repr(text))
+        return [self._event(name, text, now_ns, "warning") for name, text in found]
 
     def _unrolled(
         self, t_ns: int, ids: Sequence[int], corners: Floats, bodies: dict[str, CarBody]
@@ -299,7 +309,8 @@ class EyePart:
     def _complaints(self, now_ns: int) -> tuple[Complaint, ...]:
         """Return what is wrong with the camera, and with roof tags that it sees."""
         height = float(self.watch.anchor.model.position[2])
-        return (*self.watch.complaints(now_ns), *self._roof_sizes.complaints(now_ns, height))
+        sizes = self._roof_sizes.complaints(now_ns, height)
+        return (*self.watch.complaints(now_ns), *self._causes.complaints(), *sizes)
 
     def _picture(
         self, frame: Frame, tags: Sequence[TagSeen], known: dict[int, tuple[str, CarBody]],

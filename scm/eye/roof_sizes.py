@@ -71,13 +71,13 @@ class RoofSizes:
             if abs(one.ratio - 1.0) > SIZE_TOLERANCE
         )
 
-    def news(self, t_ns: int, camera_height_m: float) -> tuple[tuple[str, str], ...]:
-        """Return vehicle and sentence of each tag that is off and was not reported before."""
+    def news(self, t_ns: int, camera_height_m: float) -> tuple[str, ...]:
+        """Return a sentence for each tag that is off and was not returned here before."""
         told = []
         for tag_id, one in sorted(self._roofs.items()):
             is_off = abs(one.ratio - 1.0) > SIZE_TOLERANCE and t_ns - one.seen_ns <= REMEMBERED_NS
             if is_off and not one.reported:
-                told.append((one.vehicle, _said(tag_id, one, camera_height_m)))
+                told.append(_said(tag_id, one, camera_height_m))
             one.reported = is_off
         return tuple(told)
 

@@ -217,6 +217,20 @@ def test_a_tag_of_nobody_has_a_pose_if_it_is_about_a_nigel_s_size(misprints):
     assert named == {"n7", "n8", "n9", "n10", "tag-12"}
 
 
+def test_a_mirrored_camera_says_so_within_three_seconds(eye):
+    camera = Given()
+    looking = EyePart(CITY, source=camera)
+    image = eye._source.render(light(200, CAR)).copy()[:, ::-1]
+    out = []
+    for half in range(7):
+        now = PERIOD_NS + half * 500_000_000
+        camera.frame = Frame(now, np.ascontiguousarray(image))
+        out += looking.step(now, [])
+    assert of(EyeTags, out)[-1].tags == ()
+    assert "mirrored" in [one.code for one in of(EyeStatus, out)[-1].complaints]
+    assert [one.name for one in of(CityEvent, out)] == ["mirrored"]
+
+
 def test_a_tag_that_belongs_to_nobody_is_named_after_itself():
     class Stranger:
         trouble = None
