@@ -447,3 +447,20 @@ class TestInForce:
             reply = client_of(app)("POST", f"{self.path}/back", json=WHY, headers=headers)
             assert reply.status_code == status
         assert [asked.by for asked in eye.asked] == ["eva"]
+
+
+def test_tags_of_the_cars_in_the_city_and_a_board_are_printed(client, hear, snapshot):
+    hear(1.0, snapshot(blue=(0.0, 0.0, 0.0)))
+    reply = client("GET", f"{EYE}/print/tags.pdf")
+    assert reply.headers["content-type"] == "application/pdf"
+    assert reply.content.startswith(b"%PDF")
+    assert b"floor of driving_school - tag 0" in reply.content
+    assert b"blue - tag 1" in reply.content  # as the city has it, whatever its name
+    named = client("GET", f"{EYE}/print/tags.pdf?vehicles=n5&map_tag=false").content
+    assert (b"n5 - tag 5" in named, b"floor of " in named) == (True, False)
+    refused = client("GET", f"{EYE}/print/tags.pdf?vehicles=red")
+    assert (refused.status_code, "no tag is bound" in refused.json()["detail"]) == (422, True)
+    board = client("GET", f"{EYE}/print/board.pdf?board=charuco").content
+    assert b"--board charuco --squares 9x6 --square-m 0.03 --marker-m 0.022" in board
+    large = client("GET", f"{EYE}/print/board.pdf?square_mm=60")
+    assert (large.status_code, "expected paper A2" in large.json()["detail"]) == (422, True)
