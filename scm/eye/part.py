@@ -28,7 +28,7 @@ from scm.eye.overlay import jpeg, preview
 from scm.eye.pose import car_poses
 from scm.eye.roof_sizes import RoofSizes, is_on_a_roof
 from scm.eye.roofs import at_middle_row, expected_tags
-from scm.eye.sight import SightRecord, Sights, said, started
+from scm.eye.sight import SightRecord, Sights, UnsureError, said, started
 from scm.eye.source import Frame, Listener, Source
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.eye.station import eye_station
@@ -181,7 +181,8 @@ class EyePart:
         try:
             self.watch = self._sights.serve(request, self.watch, now_ns)
         except EyeError as refusal:
-            return [Answer(item, Refused(code="invalid", detail=str(refusal)))]
+            code = "unsure" if isinstance(refusal, UnsureError) else "invalid"
+            return [Answer(item, Refused(code=code, detail=str(refusal)))]
         self._due_ns[EyeStatus] = now_ns
         told = self._sights.told()
         return [

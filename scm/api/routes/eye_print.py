@@ -31,7 +31,7 @@ def router(city: City) -> APIRouter:
         response_class=Response,
         responses=answer_file(PDF, "Pages with a ruler of 100 mm on each."),
     )
-    def tags(
+    def print_tags(
         vehicles: Annotated[
             str,
             Query(
@@ -58,7 +58,7 @@ def router(city: City) -> APIRouter:
         response_class=Response,
         responses=answer_file(PDF, "One page with a ruler of 100 mm."),
     )
-    def board(
+    def print_board(
         board: Annotated[
             Literal["chessboard", "charuco", "tags"], Query(description="what kind")
         ] = "chessboard",

@@ -409,6 +409,16 @@ class TestInForce:
         (asked,) = eye.asked
         assert (asked.camera, asked.verb, asked.reason) == ("overhead", "back", "it was moved")
 
+    def test_a_calibration_that_the_eye_would_not_trust_needs_an_explicit_yes(
+        self, client, shelf, eye
+    ):
+        shelf(lab=PLACE)
+        eye.answers[CalibrationRequest] = Refused(code="unsure", detail="good to 30 mm only")
+        refused = client("PUT", self.path, json={"calibration": "lab", **WHY})
+        assert (refused.status_code, refused.json()["code"]) == (409, "unsure")
+        client("PUT", self.path, json={"calibration": "lab", **WHY, "accept_unsure": True})
+        assert [one.accept_unsure for one in eye.asked] == [False, True]
+
     def test_nothing_is_asked_that_cannot_be(self, client, shelf, eye):
         shelf(lab=PLACE.replace("overhead", "south"))
         other = f"{EYE}/cameras/south/calibration"
