@@ -11,12 +11,12 @@ from scm.client.records.eye import (
     CalibrationFile,
     CalibrationReply,
     PageCalibrationRow,
-    PagePoseRow,
     Residuals,
+    TrackList,
     View,
     Views,
 )
-from scm.client.records.eye_parts import CameraState, EyeTags, Overhead, PageCameraRow
+from scm.client.records.eye_parts import CameraState, EyeTags, Overhead, PageCameraRow, PagePoseRow
 from scm.client.records.shared import Operation
 
 
@@ -78,6 +78,10 @@ class EyeNoun:
         return self._connection.ask(
             "GET", "/api/v1/eye/poses", PagePoseRow, query={"limit": limit, "cursor": cursor}
         )
+
+    def tracks(self) -> TrackList:
+        """Where each car is by all cameras together."""
+        return self._connection.ask("GET", "/api/v1/eye/tracks", TrackList)
 
     def residuals(
         self, name: str, *, window_s: float = 120.0, vehicle: str = "", most: int = 1000

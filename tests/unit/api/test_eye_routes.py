@@ -22,6 +22,7 @@ from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import Calibrated, EyeStatus, InForce
 from scm.v2x.messages.eye_tags import EyeTags, TagSeen
+from scm.v2x.messages.eye_track import EyeTrack
 
 API = "/api/v1"
 EYE = f"{API}/eye"
@@ -474,3 +475,29 @@ def test_tags_of_the_cars_in_the_city_and_a_board_are_printed(client, hear, snap
     assert b"--board charuco --squares 9x6 --square-m 0.03 --marker-m 0.022" in board
     large = client("GET", f"{EYE}/print/board.pdf?square_mm=60")
     assert (large.status_code, "expected paper A2" in large.json()["detail"]) == (422, True)
+
+
+def track(vehicle="n1", **more):
+    rows = tuple(tuple(4e-6 if i == j else 0.0 for j in range(6)) for i in range(6))
+    return EyeTrack(
+        vehicle=vehicle, tag_id=1, t_ns=7, x_m=1.23456, y_m=0.5, yaw_rad=0.1, speed_mps=0.2,
+        lateral_speed_mps=0.0, yaw_rate_radps=0.0, covariance=rows, age_s=0.05, stale=False, **more
+    )  # fmt: skip
+
+
+def test_tracks_of_all_cameras_are_heard_while_somebody_asks_for_them(client, view, hear):
+    def hears():
+        return EyeTrack in {one.kind for one in view.hears}
+
+    hear(1.0, track())
+    assert (hears(), client("GET", f"{EYE}/tracks").json()) == (False, {"tracks": []})
+    assert hears()
+    hear(1.5, track(flags=("roof_tag_size",), cameras=("overhead",)), track("n2"))
+    first, second = client("GET", f"{EYE}/tracks").json()["tracks"]
+    assert (first["vehicle"], second["vehicle"]) == ("n1", "n2")
+    assert (first["x_m"], first["std_x_m"], first["age_s"]) == (1.2346, 0.002, 0.05)
+    assert (first["flags"], first["cameras"]) == (["roof_tag_size"], ["overhead"])
+    hear(4.0)
+    assert client("GET", f"{EYE}/tracks").json() == {"tracks": []}  # the Eye fell silent
+    hear(9.5)
+    assert not hears()
