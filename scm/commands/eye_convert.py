@@ -3,10 +3,14 @@
 import argparse
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scm.command import Command
 
-_FORMATS = {".toml": "scm", ".yaml": "ros", ".yml": "opencv"}
+if TYPE_CHECKING:  # the command line starts without what reads lenses
+    from scm.eye.calibration_files import Format
+
+_FORMATS: "dict[str, Format]" = {".toml": "scm", ".yaml": "ros", ".yml": "opencv"}
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,7 +38,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.eye.calibrate.say import lens_lines
     from scm.eye.calibration_files import read_calibration, write_calibration
 
-    form = arguments.format or _FORMATS.get(arguments.out.suffix.lower())
+    form: Format | None = arguments.format or _FORMATS.get(arguments.out.suffix.lower())
     if form is None:
         raise EyeError(f"--out: expected .toml, .yaml or .yml, or --format, got {arguments.out}")
     lens, remarks = read_calibration(arguments.calibration, arguments.size)

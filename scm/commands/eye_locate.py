@@ -50,9 +50,8 @@ def _run(arguments: argparse.Namespace) -> int:
     city_map = load_map(arguments.map)
     grey = grey_of(read_picture(arguments.image))
     size_px = int(grey.shape[1]), int(grey.shape[0])
-    lens, remarks = None, ()
-    if arguments.calibration:
-        lens, remarks = read_calibration(arguments.calibration, size_px)
+    file = arguments.calibration
+    lens, remarks = read_calibration(file, size_px) if file else (None, tuple[str, ...]())
     if lens is not None and not city_map.cameras:
         camera = in_force = lens.camera(arguments.camera or "overhead")
     else:

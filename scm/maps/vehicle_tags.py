@@ -14,6 +14,11 @@ LAST_TAG_ID = 586
 _NUMBERED = re.compile(r"n([1-9][0-9]{0,2})")
 
 
+def reserved_tags(city_map: CityMap) -> set[int]:
+    """Return the tags that are given to no car but the one that the map says: also the floor's."""
+    return {city_map.tag.tag_id, *(one.tag_id for one in city_map.vehicle_tags)}
+
+
 def bound_tag(city_map: CityMap, vehicle: str) -> int | None:
     """Return the tag that belongs to a car of this name; None: its name has none."""
     bound = {one.vehicle: one.tag_id for one in city_map.vehicle_tags}
@@ -23,5 +28,4 @@ def bound_tag(city_map: CityMap, vehicle: str) -> int | None:
     if numbered is None:
         return None
     tag_id = city_map.first_vehicle_tag_id + int(numbered[1]) - 1
-    is_taken = tag_id == city_map.tag.tag_id or tag_id in bound.values()
-    return None if is_taken or tag_id > LAST_TAG_ID else tag_id
+    return None if tag_id in reserved_tags(city_map) or tag_id > LAST_TAG_ID else tag_id

@@ -17,7 +17,7 @@ from scm.geometry import Pose2
 from scm.maps.model import CityMap, Point
 from scm.maps.route import Roads
 from scm.maps.segments import wall_segments
-from scm.maps.vehicle_tags import bound_tag
+from scm.maps.vehicle_tags import bound_tag, reserved_tags
 from scm.store.records import CarRecord, EpochRecord
 from scm.v2x.exchange import Keep, Outgoing
 from scm.v2x.messages.city_event import CityEvent
@@ -163,10 +163,7 @@ class World:
         self.dangers = Dangers()
         self.batteries = Batteries()
         self.stuck = Stuck(capacity)
-        self._tags = Numbers(
-            city_map.first_vehicle_tag_id,
-            never={city_map.tag.tag_id, *(one.tag_id for one in city_map.vehicle_tags)},
-        )
+        self._tags = Numbers(city_map.first_vehicle_tag_id, never=reserved_tags(city_map))
         self._unnamed = 0
         self._came = 0
         self._receivers = Receivers(self.roadside)

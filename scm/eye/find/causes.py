@@ -151,10 +151,9 @@ def _finder(dictionary: int, border_cells: int = 1) -> Callable[[Image], Sequenc
         settings.maxErroneousBitsInBorderRate = 0.04
         settings.minMarkerPerimeterRate = 4.0 * LEAST_SIDE_PX / max(grey.shape)
         corners, ids, _ = cv2.aruco.ArucoDetector(family, settings).detectMarkers(grey)
-        if ids is None:
-            return []
+        numbers = np.ravel(ids) if corners else ()  # they are None where there are no corners
         return [
-            int(one) for one, square in zip(np.ravel(ids), corners, strict=True)
+            int(one) for one, square in zip(numbers, corners, strict=True)
             if _side(np.asarray(square, dtype=np.float64).reshape(4, 2)) >= LEAST_SIDE_PX
         ]  # fmt: skip
 
