@@ -190,7 +190,10 @@ def checked(toml: str) -> _Lens | Camera:
             return msgspec.convert(read, _Lens)
         place = msgspec.convert(read, _Place)
     except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
-        detail = f"toml: expected a lens or one [[cameras]] block: {error}"
+        detail = (
+            f"toml: expected a lens or one [[cameras]] block: {error}; `scm eye convert` makes one "
+            "of a lens of ROS or OpenCV"
+        )
         raise RefusedError(Refused(code="invalid", detail=detail)) from error
     if len(place.cameras) != 1:
         detail = f"toml: expected one [[cameras]] block, got {len(place.cameras)}"

@@ -14,6 +14,7 @@ from typing import Any
 from scm.api.close_up import CloseUps
 from scm.api.event_log import EventLog, LoggedEvent
 from scm.api.eye_residuals import ResidualLog, ResidualSample
+from scm.api.eye_tracks import TrackRow, TrackWatch
 from scm.api.picture import Held, Picture, SeenPose, TagSighting
 from scm.api.residual import residual_of, truth_at
 from scm.api.scan_watch import ScanWatch
@@ -32,6 +33,7 @@ from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags
+from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
@@ -90,6 +92,7 @@ class CityView:
         self._watched: Counter[tuple[str, str]] = Counter()
         self._camera_frames: dict[tuple[str, str], Held[CameraFrame]] = {}
         self._scans = ScanWatch()
+        self._tracks = TrackWatch()
         self._close_ups = CloseUps()
         self._poses: dict[tuple[str, str], SeenPose] = {}
         self._residuals = ResidualLog()
@@ -102,6 +105,7 @@ class CityView:
         self._always = tuple(Hears(kind) for kind in self._takers)
         self._takers[CameraFrame] = self._take_camera_frame
         self._takers[LidarScan] = self._scans.take
+        self._takers[EyeTrack] = self._tracks.take
         self._takers[VehicleState] = self._close_ups.take
         self.hears: Sequence[Hears] = self._always
 
@@ -258,6 +262,13 @@ class CityView:
                 return None
             return held, truth_at(self._truth, vehicle, held.message.t_ns)
 
+    def tracks(self) -> tuple[TrackRow, ...]:
+        """Return the Eye's tracks, and hear them for some seconds more; safe from any thread."""
+        with self._lock:
+            if self._tracks.ask(self._now_ns):
+                self._wish()
+            return self._tracks.rows(self._now_ns)
+
     @property
     def snapshot(self) -> Held[WorldSnapshot] | None:
         """What the world told last, and when; safe from any thread."""
@@ -312,7 +323,9 @@ class CityView:
             Hears(CameraFrame, {"vehicle": vehicle, "camera": camera})
             for vehicle, camera in self._watched
         )
-        self.hears = (*self._always, *cameras, *self._scans.hears(), *self._close_ups.hears())
+        watched = (self._scans, self._close_ups, self._tracks)
+        asked = (hears for one in watched for hears in one.hears())
+        self.hears = (*self._always, *cameras, *asked)
 
     def _take_camera_frame(self, frame: CameraFrame, t_ns: int) -> None:
         which = (frame.vehicle, frame.camera)
@@ -374,6 +387,8 @@ class CityView:
 
     def _forget(self, now_ns: int) -> None:
         self._stations.forget(now_ns)
+        if self._tracks.forget(now_ns):
+            self._wish()
         oldest_ns = now_ns - FORGET_NS
         for name in [n for n, trip in self._trips.items() if trip.arrived_ns < oldest_ns]:
             del self._trips[name]

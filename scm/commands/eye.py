@@ -28,7 +28,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--calibration",
         type=Path,
         metavar="FILE",
-        help="lens, by `scm eye calibrate`",
+        help="lens: of `scm eye calibrate`, a ROS camera_info YAML, or OpenCV's YAML or XML",
     )
     parser.add_argument(
         "--tags", type=Path, metavar="FILE", help="more tags on the floor, as for `scm eye locate`"
@@ -39,7 +39,7 @@ def _run(arguments: argparse.Namespace) -> int:
     import cv2
 
     from scm.eye.calibrate.locate import known_tags
-    from scm.eye.calibration import load_calibration
+    from scm.eye.calibration_files import load_calibration
     from scm.eye.camera import camera_of
     from scm.eye.part import EyePart
     from scm.eye.sight import SightRecord
@@ -58,7 +58,8 @@ def _run(arguments: argparse.Namespace) -> int:
         loop=arguments.loop,
         delay_s=arguments.delay_ms / 1e3,
     )
-    lens = load_calibration(arguments.calibration) if arguments.calibration else None
+    size_px = camera.width_px, camera.height_px
+    lens = load_calibration(arguments.calibration, size_px) if arguments.calibration else None
     more = known_tags(city_map, arguments.tags)
     more.pop(city_map.tag.tag_id)
     station = eye_station(camera.name, first=camera is city_map.cameras[0])

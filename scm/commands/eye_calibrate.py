@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from scm.command import Command
 
 if TYPE_CHECKING:  # the command line starts without what finds boards
-    from scm.eye.calibrate.board import Board
     from scm.eye.calibrate.gather import Gathered
     from scm.maps.model import Camera
+    from scm.scenery.board import Board
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +25,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="what was printed (%(default)s)",
     )  # fmt: skip
     parser.add_argument(
-        "--squares", type=_squares, required=True, metavar="9x6",
+        "--squares", type=squares, required=True, metavar="9x6",
         help="squares (not inner corners) across and down; or tags",
     )  # fmt: skip
     parser.add_argument(
@@ -74,8 +74,8 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _gathered(arguments: argparse.Namespace) -> "tuple[Board, Gathered]":
-    from scm.eye.calibrate.board import Board
     from scm.eye.calibrate.gather import from_camera, from_files
+    from scm.scenery.board import Board
 
     columns, rows = arguments.squares
     board = Board(
@@ -122,7 +122,8 @@ def _owner(arguments: argparse.Namespace) -> "Camera | None":
     return camera_of(load_map(arguments.map), arguments.camera_name) if arguments.map else None
 
 
-def _squares(text: str) -> tuple[int, int]:
+def squares(text: str) -> tuple[int, int]:
+    """Return the columns and rows of an argument as 9x6."""
     found = re.fullmatch(r"(\d{1,3})[xX](\d{1,3})", text)
     if found is None:
         raise argparse.ArgumentTypeError(f"expected two numbers as 9x6, got {text!r}")

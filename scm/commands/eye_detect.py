@@ -27,25 +27,30 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.eye.detect import detect_tags
+    from scm.eye.find.causes import cause_of
     from scm.eye.picture import read_picture
     from scm.eye.source import grey_of
 
     for path in arguments.image:
-        tags = detect_tags(grey_of(read_picture(path)))
-        print(_as_json(path, tags) if arguments.json else _as_text(path, tags))
+        grey = grey_of(read_picture(path))
+        tags = detect_tags(grey)
+        cause = None if tags else cause_of(grey)
+        why = "" if cause is None else cause.said
+        print(_as_json(path, tags, why) if arguments.json else _as_text(path, tags, why))
     return 0
 
 
-def _as_json(path: Path, tags: Sequence["TagSeen"]) -> str:
+def _as_json(path: Path, tags: Sequence["TagSeen"], why: str) -> str:
     found = [
         {"id": tag.tag_id, "corners_px": tag.corners_px, "decision_margin": tag.margin}
         for tag in tags
     ]
-    return json.dumps({"image": str(path), "tags": found})
+    cause = {"cause": why} if why else {}
+    return json.dumps({"image": str(path), "tags": found, **cause})
 
 
-def _as_text(path: Path, tags: Sequence["TagSeen"]) -> str:
-    lines = [f"{path}: {len(tags)} tag{'' if len(tags) == 1 else 's'}"]
+def _as_text(path: Path, tags: Sequence["TagSeen"], why: str) -> str:
+    lines = [f"{path}: {len(tags)} tag{'' if len(tags) == 1 else 's'}" + (why and f": {why}")]
     for tag in tags:
         corners = "  ".join(f"({x:.2f}, {y:.2f})" for x, y in tag.corners_px)
         lines.append(f"  id {tag.tag_id:3}  margin {tag.margin:5.1f}  {corners}")

@@ -15,7 +15,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("image", type=Path, metavar="IMAGE", help="a frame of the camera")
     parser.add_argument("--map", required=True, metavar="MAP", help="map name or file")
     parser.add_argument(
-        "--calibration", type=Path, metavar="FILE", help="of `scm eye calibrate`; else the map's"
+        "--calibration",
+        type=Path,
+        metavar="FILE",
+        help="of `scm eye calibrate`, ROS or OpenCV; else the map's",
     )
     parser.add_argument("--camera", metavar="NAME", help="which of the map; default: its first")
     parser.add_argument(
@@ -35,27 +38,33 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.errors import EyeError
     from scm.eye.calibrate.locate import known_tags, locate, off_px
     from scm.eye.calibrate.told import place_told, write_report
-    from scm.eye.calibration import calibrated, load_calibration
+    from scm.eye.calibration import calibrated
+    from scm.eye.calibration_files import read_calibration
     from scm.eye.camera import camera_of
     from scm.eye.detect import Settings, detect_tags
+    from scm.eye.find.causes import cause_of
     from scm.eye.picture import read_picture
     from scm.eye.source import grey_of
     from scm.maps.load import load_map
 
     city_map = load_map(arguments.map)
-    lens = load_calibration(arguments.calibration) if arguments.calibration else None
+    grey = grey_of(read_picture(arguments.image))
+    size_px = int(grey.shape[1]), int(grey.shape[0])
+    file = arguments.calibration
+    lens, remarks = read_calibration(file, size_px) if file else (None, tuple[str, ...]())
     if lens is not None and not city_map.cameras:
         camera = in_force = lens.camera(arguments.camera or "overhead")
     else:
         in_force = camera_of(city_map, arguments.camera)
         camera = in_force if lens is None else calibrated(in_force, lens)
-    grey = grey_of(read_picture(arguments.image))
-    if grey.shape != (camera.height_px, camera.width_px):
+    if size_px != (camera.width_px, camera.height_px):
         wanted = f"{camera.width_px} x {camera.height_px} px"
-        got = f"{grey.shape[1]} x {grey.shape[0]}"
+        got = f"{size_px[0]} x {size_px[1]}"
         raise EyeError(f"{arguments.image}: camera {camera.name!r} has {wanted}, got {got}")
     tags = known_tags(city_map, arguments.tags)
     seen = detect_tags(grey, Settings(quad_decimate=1.0))
+    if not seen and (cause := cause_of(grey)):
+        raise EyeError(f"{arguments.image}: no tag is found: {cause.said}")
     doubt = None if lens is None else lens.lens_covariance
     located = locate(camera, tags, seen, doubt)
     model = located.places[0].model
@@ -65,7 +74,7 @@ def _run(arguments: argparse.Namespace) -> int:
             left = float((off**2).sum(axis=1).mean()) ** 0.5
             note = "  left out: not where it was said to be" * (tag.tag_id in located.wrong)
             print(f"# tag {tag.tag_id}: {left:.3f} px off{note}")
-    print("\n".join(_said(located)))
+    print("\n".join((*_said(located), *(f"# the lens: {remark}" for remark in remarks))))
     if lens is None:
         print("# the lens is taken as exact: with --calibration its doubt is in the numbers below")
     block = _block(located.places[0])

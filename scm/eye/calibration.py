@@ -1,6 +1,5 @@
 """A lens as `scm eye calibrate` measured it: a small file, and the camera that looks through it."""
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -84,25 +83,6 @@ class Calibration(Record, kw_only=True, frozen=True):
             f"# of {', '.join(LENS_NAMES[self.lens])}\ncovariance = [\n{rows}\n]\n",
             encoding="utf-8",
         )
-
-
-def load_calibration(path: Path) -> Calibration:
-    """Return the calibration in a file.
-
-    Raises:
-        EyeError: There is no such file, or it is no calibration; with key, expected and got.
-    """
-    if not path.is_file():
-        raise EyeError(f"{path}: expected a calibration of `scm eye calibrate`, found no file")
-    try:
-        read = tomllib.loads(path.read_text(encoding="utf-8"))
-        calibration = msgspec.convert(read, Calibration)
-    except (ValueError, RecursionError, OSError) as error:
-        raise EyeError(f"{path}: expected a calibration of `scm eye calibrate`: {error}") from error
-    faults = covariance_faults(calibration.covariance)
-    if faults:
-        raise EyeError(f"{path}: covariance: {faults}")
-    return calibration
 
 
 def calibrated(camera: Camera, calibration: Calibration) -> Camera:

@@ -9,6 +9,7 @@ Each camera has a part of its own, which tells what it sees. The one of the map'
 the others and tells where cars are by all of them. Another calibration is put in force on request.
 """
 
+import logging
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
@@ -21,19 +22,22 @@ from scm.eye.anchor import Anchor
 from scm.eye.calibration import Calibration
 from scm.eye.camera import CameraModel, camera_of
 from scm.eye.detect import Settings
+from scm.eye.find.causes import Causes
 from scm.eye.find.finder import TagFinder
 from scm.eye.overlay import jpeg, preview
 from scm.eye.pose import car_poses
+from scm.eye.roof_sizes import RoofSizes, is_on_a_roof
 from scm.eye.roofs import at_middle_row, expected_tags
-from scm.eye.sight import SightRecord, Sights, said, started
+from scm.eye.sight import SightRecord, Sights, UnsureError, said, started
 from scm.eye.source import Frame, Listener, Source
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.eye.station import eye_station
 from scm.eye.telling import pose_message, sighting, sighting_of, track_message
 from scm.eye.track.perception import collective_perception
-from scm.eye.track.sighting import Sighting
+from scm.eye.track.sighting import ROOF_TAG_SIZE, Sighting
 from scm.eye.track.tracks import Tracks
 from scm.eye.watch import Watch
+from scm.log import event
 from scm.maps.model import CityMap, MapTag
 from scm.part import Hears, IsWanted, Serves
 from scm.scenery.bodies import NIGEL, CarBody, car_body
@@ -51,6 +55,7 @@ from scm.v2x.messages.eye_tags import EyeTags, TagSeen
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
+LOGGER = logging.getLogger(__name__)
 TRACKS_PERIOD_NS = NS_PER_S // 20
 FRAME_PERIOD_NS = NS_PER_S // 5
 STATUS_PERIOD_NS = NS_PER_S // 2
@@ -110,6 +115,7 @@ class EyePart:
         self.tells_tracks = chosen is city_map.cameras[0]
         self.name = eye_station(self.camera, first=self.tells_tracks)
         self._finder = TagFinder(settings)
+        self._roof_sizes, self._causes = RoofSizes(), Causes()
         self._source = source or _emulated(city_map, model, seed)
         self._is_awaited = source is not None
         self._came_ns = 0
@@ -175,7 +181,8 @@ class EyePart:
         try:
             self.watch = self._sights.serve(request, self.watch, now_ns)
         except EyeError as refusal:
-            return [Answer(item, Refused(code="invalid", detail=str(refusal)))]
+            code = "unsure" if isinstance(refusal, UnsureError) else "invalid"
+            return [Answer(item, Refused(code=code, detail=str(refusal)))]
         self._due_ns[EyeStatus] = now_ns
         told = self._sights.told()
         return [
@@ -205,6 +212,7 @@ class EyePart:
         tags = self._finder.find(grey, self._expected(frame.t_ns, bodies))
         corners = {tag.tag_id: np.array(tag.corners_px) for tag in reversed(tags)}
         self.watch.see(frame.t_ns, grey, corners)
+        self._causes.see(frame.t_ns, grey, missing=self._misses_tags(corners, known))
         flags = self.watch.flags(now_ns)
         sightings = [] if "frame_size" in flags else self._sightings(frame, tags, known, flags)
         self.tracks.see(sightings, now_ns)
@@ -212,6 +220,7 @@ class EyePart:
         late_ms = (now_ns - frame.t_ns) / NS_PER_MS
         seen = EyeTags(camera=self.camera, t_ns=frame.t_ns, tags=tags, latency_ms=late_ms)
         return [seen, *(pose_message(one, age_ms) for one in sightings),
+                *self._news(frame.t_ns, now_ns),
                 *self._picture(frame, tags, known, now_ns)]  # fmt: skip
 
     def _expected(self, t_ns: int, bodies: dict[str, CarBody]) -> dict[int, Floats]:
@@ -235,11 +244,31 @@ class EyePart:
         corners = np.array([tag.corners_px for tag in cars]).reshape(-1, 4, 2)
         corners = self._unrolled(frame.t_ns, [tag.tag_id for tag in cars], corners, dict(whose))
         found = car_poses(self.watch.anchor, [body for _, body in whose], corners)
-        return [
-            sighting(self.camera, frame.t_ns, tag.tag_id, vehicle, pose, flags)
-            for tag, (vehicle, _), pose in zip(cars, whose, found, strict=True)
-            if not pose.is_refused
+        sizes = [
+            self._roof_sizes.see(frame.t_ns, tag.tag_id, *one, pose)
+            for tag, one, pose in zip(cars, whose, found, strict=True)
         ]
+        return [
+            sighting(self.camera, frame.t_ns, tag.tag_id, vehicle, pose, (*flags, *more))
+            for tag, (vehicle, _), pose, more in zip(cars, whose, found, sizes, strict=True)
+            if is_on_a_roof(tag.tag_id, vehicle, pose)
+        ]
+
+    def _misses_tags(
+        self, corners: Mapping[int, Floats], known: Mapping[int, tuple[str, CarBody]]
+    ) -> bool:
+        """Return whether no car's tag was found although cars are known, or no tag at all."""
+        ours = {tag.tag_id for tag in self.watch.anchor.map_tags}
+        return corners.keys() <= ours and (bool(known) or not corners)
+
+    def _news(self, t_ns: int, now_ns: int) -> list[Outgoing]:
+        """Report once, as events and in the log, roof tags of another size and why tags miss."""
+        height = float(self.watch.anchor.model.position[2])
+        sizes = [(ROOF_TAG_SIZE, text) for text in self._roof_sizes.news(t_ns, height)]
+        found = [*sizes, *((one.code, one.said) for one in self._causes.news())]
+        for name, text in found:
+            event(LOGGER, name, level=logging.WARNING, camera=self.camera, said=repr(text))
+        return [self._event(name, text, now_ns, "warning") for name, text in found]
 
     def _unrolled(
         self, t_ns: int, ids: Sequence[int], corners: Floats, bodies: dict[str, CarBody]
@@ -266,7 +295,7 @@ class EyePart:
 
     def _status(self, now_ns: int) -> EyeStatus:
         trouble, spoiled = self._source.trouble, self.watch.flags(now_ns)
-        complaints = self.watch.complaints(now_ns)
+        complaints = self._complaints(now_ns)
         if trouble:
             complaints = (*complaints, Complaint(code=SOURCE, said=trouble))
         good = not trouble and not spoiled
@@ -277,6 +306,12 @@ class EyePart:
             complaints=complaints,
             in_force=self._sights.told(),
         )
+
+    def _complaints(self, now_ns: int) -> tuple[Complaint, ...]:
+        """Return what is wrong with the camera, and with roof tags that it sees."""
+        height = float(self.watch.anchor.model.position[2])
+        sizes = self._roof_sizes.complaints(now_ns, height)
+        return (*self.watch.complaints(now_ns), *self._causes.complaints(), *sizes)
 
     def _picture(
         self, frame: Frame, tags: Sequence[TagSeen], known: dict[int, tuple[str, CarBody]],
@@ -290,7 +325,7 @@ class EyePart:
         if self._is_wanted(EyePreview, {"camera": self.camera}):
             names = {tag_id: vehicle for tag_id, (vehicle, _) in known.items()}
             names |= {tag.tag_id: f"map {tag.tag_id}" for tag in self.watch.anchor.map_tags}
-            wrong = [one.said for one in self.watch.complaints(now_ns)]
+            wrong = [one.said for one in self._complaints(now_ns)]
             told.append(EyePreview(payload=preview(frame.image, tags, names, wrong), **size))
         return told
 

@@ -13,11 +13,14 @@ The covariance is carried through: doubt of the corners, doubt of the camera's p
 (shared by all cars of a frame, and by all frames), and the lean of the body, which moves the roof
 but cannot be seen. What the four points are off the square, over what corner noise explains, is the
 misfit. One corner that spoils an else good square is left out; a misfit that stays widens the
-doubt; beyond `REFUSED` it is no tag of this size on this roof.
+covariance. Where a square of another size fits clearly better, the print has another size or the
+roof another height: middle and yaw are the same for any size, so there is a pose, `size_ratio` says
+how large the square looks, and beyond `SIZE_TOLERANCE` the covariance holds half the way by which
+another height would move the car. Corners that fit no square of any size (`REFUSED`) are no tag.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +36,9 @@ LEAN_RAD = 0.003
 MISFIT = 2.0
 """Deviations, root mean square, that corner noise passes once in 1000 squares."""
 REFUSED = 20.0
+SIZE_TOLERANCE = 0.025
+"""A print that is larger or smaller by more is reported; printers keep 1 %, "fit to page" does not:
+A4 on Letter paper loses 3 to 7 %."""
 CLEARLY = 3.0
 """A corner is to blame if the square without it fits so many times better than without others."""
 
@@ -45,6 +51,8 @@ class PoseEstimate:
         shared: The part of it that all sightings by this camera have in common, (3, 3).
         lean: The part of it that all cameras have in common while the body leans so, (3, 3).
         misfit: How far the corners are from a square, over the noise of corners: about 1.
+        size_ratio: Edge of the square as it looks on this roof over that of the car file; 1 where
+            the car file's fits the corners as well.
     """
 
     pose: Pose2
@@ -52,11 +60,17 @@ class PoseEstimate:
     shared: Floats
     lean: Floats
     misfit: float
+    size_ratio: float = 1.0
 
     @property
     def is_refused(self) -> bool:
-        """Whether these corners are no square of this size."""
+        """Whether these corners are no square."""
         return not self.misfit < REFUSED
+
+    @property
+    def is_other_size(self) -> bool:
+        """Whether the square is larger or smaller than the car file's by more than prints are."""
+        return abs(self.size_ratio - 1.0) > SIZE_TOLERANCE
 
 
 def car_pose(anchor: Anchor, body: CarBody, corners: Floats) -> PoseEstimate:
@@ -76,9 +90,11 @@ def car_poses(
     points = _on_roofs(model, model.undistort(corners), offsets[:, 2])
     by_metre = by_place(model, points)
     by_pixel = np.linalg.inv(by_metre)
-    fit = _patched(_Square(points[..., :2], by_metre, square, offsets[:, :2], std))
+    on = _Square(points[..., :2], by_metre, square, offsets[:, :2], std)
+    fit = _patched(on)
+    widened = std * np.maximum(1.0, np.minimum(fit.misfit, REFUSED) / MISFIT)
+    ratios = _resized(on, fit)
     by_corner = np.einsum("nkij,nijp->nkip", fit.slopes, by_pixel).reshape(-1, 3, 8)
-    widened = std * np.maximum(1.0, fit.misfit / MISFIT)
     by_corner *= widened[:, None, None]
     moved = -by_pixel @ anchor.by_parameter(points)
     by_camera = np.einsum("nkij,nijp->nkp", fit.slopes, moved)
@@ -86,6 +102,7 @@ def car_poses(
     from_above = model.position - points.mean(axis=1)
     slant = np.hypot(from_above[:, 0], from_above[:, 1]) / from_above[:, 2]
     shared[:, 2, 2] += (LEAN_RAD * slant / 2.0) ** 2  # a leaning square, seen aslant, looks turned
+    shared[:, :2, :2] += _by_height(from_above, ratios)
     lean = np.zeros((len(bodies), 3, 3))
     lean[:, [0, 1], [0, 1]] = ((offsets[:, 2] * LEAN_RAD) ** 2)[:, None]
     covariance = by_corner @ by_corner.swapaxes(1, 2) + shared + lean
@@ -93,9 +110,21 @@ def car_poses(
     return tuple(
         PoseEstimate(Pose2(float(x), float(y), wrap_angle(float(yaw))), *rest)
         for (x, y, yaw), *rest in zip(
-            fit.poses, covariance, shared, lean, fit.misfit.tolist(), strict=True
+            fit.poses, covariance, shared, lean, fit.misfit.tolist(), ratios.tolist(), strict=True
         )
     )
+
+
+def _by_height(from_above: Floats, ratios: Floats) -> Floats:
+    """Return the covariance of places in case it is the height that differs, (n, 2, 2) [m^2].
+
+    Args:
+        from_above: From the roofs' tags to the camera, (n, 3) [m].
+        ratios: Of the squares' sizes, (n,).
+    """
+    is_other = np.abs(ratios - 1.0) > SIZE_TOLERANCE
+    moved = from_above[:, :2] * np.where(is_other, 1.0 - 1.0 / ratios, 0.0)[:, None] / 2.0
+    return np.asarray(moved[:, :, None] * moved[:, None, :])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,6 +174,25 @@ def _patched(on: _Square) -> _Fit:
         fit.poses[car], fit.slopes[car] = one.poses[index], one.slopes[index]
         fit.misfit[car] = one.misfit[index]
     return fit
+
+
+def _resized(on: _Square, fit: _Fit) -> Floats:
+    """Return the ratios of sizes, (n,), and take the misfits of squares that fit better so."""
+    ratios = np.ones(len(fit.misfit))
+    bad = np.flatnonzero(fit.misfit > MISFIT)
+    if not len(bad):
+        return ratios
+    some = on.of(bad)
+    spread = some.points - some.points.mean(axis=1, keepdims=True)
+    c, s = np.cos(fit.poses[bad, 2]), np.sin(fit.poses[bad, 2])
+    turn = np.stack((np.stack((c, s), axis=-1), np.stack((-s, c), axis=-1)), axis=1)
+    along = (turn @ spread.swapaxes(1, 2)).swapaxes(1, 2)
+    ratio = (along * some.square).sum((1, 2)) / (some.square**2).sum((1, 2))
+    other = _fitted(replace(some, square=some.square * ratio[:, None, None]), np.ones(4))
+    better = CLEARLY * other.misfit < fit.misfit[bad]
+    fit.misfit[bad[better]] = other.misfit[better]
+    ratios[bad[better]] = ratio[better]
+    return ratios
 
 
 def _fitted(on: _Square, weights: Floats) -> _Fit:

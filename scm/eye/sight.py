@@ -20,13 +20,17 @@ from scm.eye.anchor import KNOCKED_SIGMAS, Anchor
 from scm.eye.calibrate.judge import RMS_SHARE
 from scm.eye.calibration import Calibration, calibrated, covariance_faults
 from scm.eye.camera import CameraModel, camera_model
-from scm.eye.watch import Watch
+from scm.eye.watch import WORTH_M, Watch
 from scm.maps.model import Camera, MapTag
 from scm.v2x.messages.calibration_request import CalibrationRequest, MeasuredLens
 from scm.v2x.messages.eye_status import Calibrated, InForce
 
 MOST_KEPT = 10
 _OF_THE_SENSOR = ("name", "rate_hz", "noise_sigma", "rolling_s")
+
+
+class UnsureError(EyeError):
+    """A calibration whose poses would be flagged: it is put in force only if that is accepted."""
 
 
 class Sight(msgspec.Struct, kw_only=True, frozen=True):
@@ -110,6 +114,7 @@ class Sights:
             now_ns: The present time.
 
         Raises:
+            UnsureError: Its poses would be flagged `unsure`, and the request does not accept that.
             EyeError: It cannot be in force, in words; what is in force stays.
         """
         if request.verb == "back":
@@ -117,9 +122,12 @@ class Sights:
         new = self._asked(request, now_ns)
         model, seen = new.model(), watch.tags_seen(now_ns)
         _refuse_misfit(model, watch.anchor.map_tags, seen)
+        watch = _watch(model, watch, seen)
+        if not request.accept_unsure:
+            _refuse_unsure(watch.anchor)
         first, *later = *self._all, new
         self._all = (first, *later[1 - MOST_KEPT :])
-        return _watch(model, watch, seen)
+        return watch
 
     def _back(self, request: CalibrationRequest, watch: Watch, now_ns: int) -> Watch:
         if len(self._all) == 1:
@@ -219,6 +227,18 @@ def _refuse_misfit(
             f"camera {name!r}: map tags are {off_px:.1f} px from where this calibration puts them, "
             f"{sigmas:.0f} times what its doubt explains (at most {KNOCKED_SIGMAS:.0f})"
             + "".join(f"; {words}" for words in elsewhere.values())
+        )
+
+
+def _refuse_unsure(anchor: Anchor) -> None:
+    """Refuse a camera whose poses the self check would flag, as known as its tags make it now."""
+    worth = anchor.doubt_m()
+    if worth > WORTH_M:
+        raise UnsureError(
+            f"camera {anchor.model.camera.name!r}: poses by this calibration would be good to "
+            f"{2e3 * worth:.0f} mm only (at most {2e3 * WORTH_M:.0f} mm pass): the Eye would flag "
+            "them as unsure and guarded cars would stop; locate it with more tags, far apart, or "
+            "put it in force all the same with accept_unsure"
         )
 
 

@@ -13,6 +13,7 @@ from scm.maps.model import CityMap, Conflict, Group, Junction, Segment
 from scm.maps.radio_check import radio_problems
 from scm.maps.route import LanePath
 from scm.maps.rules_check import rule_problems
+from scm.maps.vehicle_tags import LAST_TAG_ID
 
 JOIN_M = 0.001
 JOIN_RAD = math.radians(0.1)
@@ -106,6 +107,8 @@ def _unique(city_map: CityMap) -> Iterator[str]:
         ("junctions", "number", junctions),
         ("lights", "light_id", city_map.lights),
         ("signs", "sign_id", city_map.signs),
+        ("vehicle_tags", "vehicle", city_map.vehicle_tags),
+        ("vehicle_tags", "tag_id", city_map.vehicle_tags),
     ]
     named += [
         (f"floor.{key}", "name", getattr(city_map.floor, key))
@@ -131,6 +134,12 @@ def _unique(city_map: CityMap) -> Iterator[str]:
             f"first_vehicle_tag_id: expected more than tag.tag_id = {city_map.tag.tag_id}, "
             f"got {city_map.first_vehicle_tag_id}"
         )
+    for index, one in enumerate(city_map.vehicle_tags):
+        if one.tag_id > LAST_TAG_ID or one.tag_id == city_map.tag.tag_id:
+            yield (
+                f"vehicle_tags[{index}] ({one.vehicle}).tag_id: expected 0 to {LAST_TAG_ID}, and "
+                f"not the map's own {city_map.tag.tag_id}, got {one.tag_id}"
+            )
 
 
 def _outlines(city_map: CityMap) -> Iterator[str]:

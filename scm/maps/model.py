@@ -161,6 +161,13 @@ class MapTag(Record, kw_only=True, frozen=True):
     size_m: float
 
 
+class VehicleTag(Record, kw_only=True, frozen=True):
+    """Which AprilTag is printed for a car: no other car is given it."""
+
+    vehicle: str
+    tag_id: int
+
+
 class Segment(Record, kw_only=True, frozen=True):
     """A piece of a lane's centre line: straight (`length_m`), or an arc.
 
@@ -441,6 +448,7 @@ class CityMap(Record, kw_only=True, frozen=True):
     wind: Wind = Wind()
     tag: MapTag
     first_vehicle_tag_id: int = 1
+    vehicle_tags: tuple[VehicleTag, ...] = ()
     lanes: tuple[Lane, ...] = ()
     areas: tuple[Area, ...] = ()
     junctions: tuple[Junction, ...] = ()

@@ -30,6 +30,7 @@ class CarBody:
         tag_size: Edge of its black square.
         x_span, y_span: The outline from above: rear to front, right to left.
         has_tag: Whether the car file has a section `ips`; without it the roof is bare.
+        tag_id: That this car wears, where its file says so.
     """
 
     tag_position: tuple[float, float, float] = (0.035125, 0.0, 0.129165)
@@ -41,6 +42,7 @@ class CarBody:
     wheel_radius: float = 0.0325
     wheel_width: float = 0.025
     has_tag: bool = True
+    tag_id: int | None = None
 
 
 NIGEL = CarBody()
@@ -53,6 +55,7 @@ KEYS = {
     "track": "body.track_m",
     "wheel_radius": "wheel.radius_m",
     "wheel_width": "wheel.width_m",
+    "tag_id": "ips.tag_id",
 }
 
 

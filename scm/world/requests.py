@@ -10,6 +10,7 @@ from scm.errors import LeaseError, RunError, ScmError, nearest
 from scm.geometry import Pose2
 from scm.maps.coordinates import are_coordinates
 from scm.maps.room import AHEAD_S, CLEARANCE_M
+from scm.maps.vehicle_tags import LAST_TAG_ID
 from scm.part import Serves
 from scm.store.records import StopRecord
 from scm.v2x.exchange import Keep
@@ -18,7 +19,7 @@ from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.echo_request import EchoReply, EchoRequest
-from scm.v2x.messages.join_request import LAST_TAG_ID, JoinReply, JoinRequest
+from scm.v2x.messages.join_request import JoinReply, JoinRequest
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest

@@ -4,7 +4,7 @@ A slot is a car's number in the whole world, hosted or remote, the lowest free o
 read from the fleets once a tick; what only a person asks for is read from them on demand.
 """
 
-import heapq
+from collections.abc import Collection
 
 import numpy as np
 
@@ -18,35 +18,33 @@ CODES = {mode: code for code, mode in enumerate(MODES)}
 
 
 class Numbers:
-    """Gives out whole numbers from `first` on, the lowest free one first."""
+    """Gives out whole numbers from `first` on, the lowest free one first; none of `never`."""
 
-    def __init__(self, first: int = 0, never: int | None = None) -> None:
-        self._first = self._next = first
-        self._never = never
-        self._returned: list[int] = []
-        self._claimed: set[int] = set()
+    def __init__(self, first: int = 0, never: Collection[int] = ()) -> None:
+        self._first = self._lowest = first
+        self._never = frozenset(never)
+        self._used: set[int] = set()
 
     def take(self) -> int:
         """Return a number and keep it from others."""
-        while self._returned:
-            number = heapq.heappop(self._returned)
-            if number not in self._claimed:
-                return number
-        while self._next == self._never or self._next in self._claimed:
-            self._next += 1
-        self._next += 1
-        return self._next - 1
+        while self._lowest in self._used or self._lowest in self._never:
+            self._lowest += 1
+        return self.claim(self._lowest)
+
+    def is_free(self, number: int) -> bool:
+        """Return whether nobody has a number."""
+        return number not in self._used
 
     def claim(self, number: int) -> int:
         """Keep a number that nobody has from others, and return it."""
-        self._claimed.add(number)
+        self._used.add(number)
         return number
 
     def give_back(self, number: int) -> None:
         """Let a number be taken again."""
-        self._claimed.discard(number)
-        if self._first <= number < self._next:
-            heapq.heappush(self._returned, number)
+        self._used.discard(number)
+        if number >= self._first:
+            self._lowest = min(self._lowest, number)
 
 
 class Slots:

@@ -17,6 +17,7 @@ from scm.geometry import Pose2
 from scm.maps.model import CityMap, Point
 from scm.maps.route import Roads
 from scm.maps.segments import wall_segments
+from scm.maps.vehicle_tags import bound_tag, reserved_tags
 from scm.store.records import CarRecord, EpochRecord
 from scm.v2x.exchange import Keep, Outgoing
 from scm.v2x.messages.city_event import CityEvent
@@ -165,7 +166,7 @@ class World:
         self.dangers = Dangers()
         self.batteries = Batteries()
         self.stuck = Stuck(capacity)
-        self._tags = Numbers(city_map.first_vehicle_tag_id, never=city_map.tag.tag_id)
+        self._tags = Numbers(city_map.first_vehicle_tag_id, never=reserved_tags(city_map))
         self._unnamed = 0
         self._came = 0
         self._receivers = Receivers(self.roadside)
@@ -258,7 +259,7 @@ class World:
             name=name,
             car=model,
             car_file=car_name,
-            tag_id=self._tag(tag_id),
+            tag_id=self._tag(name, tag_id, now_ns),
             slot=slot,
             slots=self.slots,
             fleet=fleet,
@@ -294,7 +295,7 @@ class World:
             session=session,
             car=model,
             car_file=car_name,
-            tag_id=self._tag(tag_id),
+            tag_id=self._tag(name, tag_id, now_ns),
             slot=slot,
             lease=rules.grant(name, self._first_epoch(now_ns)),
             pose=pose,
@@ -389,9 +390,19 @@ class World:
         _, self.front[slot] = self.garage.car(car_name).vector("body.footprint_x_m")
         return slot
 
-    def _tag(self, worn: int | None) -> int:
-        """Return the tag on a new car's roof: the one that it wears, or the lowest free one."""
-        return self._tags.take() if worn is None else self._tags.claim(worn)
+    def _tag(self, name: str, worn: int | None, now_ns: int) -> int:
+        """Return the tag on a new car's roof: the one that it wears, its name's, or a free one."""
+        if worn is not None:
+            return self._tags.claim(worn)
+        bound = bound_tag(self.city_map, name)
+        if bound is not None and self._tags.is_free(bound):
+            return self._tags.claim(bound)
+        given = self._tags.take()
+        if bound is not None:
+            wearer = next((car.name for car in self.cars() if car.tag_id == bound), "another car")
+            text = f"{name} has tag {given}: {wearer} wears tag {bound}, which is printed for it"
+            self.say("warning", "other_tag", text, now_ns, name)
+        return given
 
     def _first_epoch(self, now_ns: int) -> int:
         """Return an epoch above all that any car of this city has had so far."""

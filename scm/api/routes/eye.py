@@ -1,5 +1,6 @@
 """The Eye: its overhead cameras, their newest pictures, the tags in them, and cars' poses."""
 
+import asyncio
 from typing import Annotated
 
 import msgspec
@@ -8,6 +9,7 @@ from fastapi import APIRouter, Query, Request, Response
 from scm.api.city import City, Name, json_response, not_found
 from scm.api.eye_residuals import ResidualSample, ResidualStats, stats_of, thinned
 from scm.api.eye_rows import CameraRow, PoseRow, camera_rows, frame_of, pose_rows, tags_of
+from scm.api.eye_tracks import TrackRow
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer, answer_file, answer_page
@@ -16,6 +18,7 @@ from scm.v2x.messages.eye_tags import EyeTags
 
 LONGEST_WINDOW_S = 300.0
 MOST_SAMPLES = 3_000
+FIRST_LOOKS, LOOK_S = 5, 0.1
 
 WindowS = Annotated[
     float,
@@ -46,6 +49,12 @@ class CameraState(msgspec.Struct, kw_only=True, frozen=True):
 
     state: CameraRow
     mounted: Camera | None
+
+
+class TrackList(msgspec.Struct, kw_only=True, frozen=True):
+    """The Eye's tracks, by name."""
+
+    tracks: tuple[TrackRow, ...]
 
 
 class VehicleResiduals(msgspec.Struct, kw_only=True, frozen=True):
@@ -145,6 +154,20 @@ def _add_poses(routes: APIRouter, city: City) -> None:
         rows = pose_rows(city.view.picture())
         page = page_of(rows, lambda row: f"{row.camera}/{row.vehicle}", limit=limit, cursor=cursor)
         return page_response(request, page)
+
+    @routes.get(
+        "/tracks",
+        summary="Where each car is by all cameras together",
+        responses=answer(TrackList),
+    )
+    async def tracks() -> Response:
+        rows = city.view.tracks()
+        for _ in range(FIRST_LOOKS):
+            if rows:
+                break
+            await asyncio.sleep(LOOK_S)  # nobody asked before: they are heard from now on
+            rows = city.view.tracks()
+        return json_response(TrackList(tracks=rows))
 
     @routes.get(
         "/cameras/{name}/residuals",

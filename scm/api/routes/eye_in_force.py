@@ -38,6 +38,12 @@ class InForceBody(BackBody):
         description="a calibration on the shelf",
         examples=["overhead-place"],
     )
+    accept_unsure: bool = Field(
+        default=False,
+        description="whether it is meant although the Eye would flag its poses as unsure and "
+        "guarded cars would stop; without it such a calibration is a 409 of code `unsure`",
+        examples=[False],
+    )
 
 
 def router(city: City) -> APIRouter:
@@ -67,6 +73,7 @@ def router(city: City) -> APIRouter:
             lens=lens,
             by=signer(body.by),
             reason=body.reason,
+            accept_unsure=body.accept_unsure,
         )
         return json_response(city.ask(request, CalibrationReply))
 

@@ -11,12 +11,12 @@ from scm.client.records.eye import (
     CalibrationFile,
     CalibrationReply,
     PageCalibrationRow,
-    PagePoseRow,
     Residuals,
+    TrackList,
     View,
     Views,
 )
-from scm.client.records.eye_parts import CameraState, EyeTags, Overhead, PageCameraRow
+from scm.client.records.eye_parts import CameraState, EyeTags, Overhead, PageCameraRow, PagePoseRow
 from scm.client.records.shared import Operation
 
 
@@ -78,6 +78,10 @@ class EyeNoun:
         return self._connection.ask(
             "GET", "/api/v1/eye/poses", PagePoseRow, query={"limit": limit, "cursor": cursor}
         )
+
+    def tracks(self) -> TrackList:
+        """Where each car is by all cameras together."""
+        return self._connection.ask("GET", "/api/v1/eye/tracks", TrackList)
 
     def residuals(
         self, name: str, *, window_s: float = 120.0, vehicle: str = "", most: int = 1000
@@ -320,7 +324,14 @@ class EyeNoun:
         return self._connection.pieces(f"/api/v1/eye/calibrations/{part(name)}/file.toml")
 
     def use(
-        self, name: str, *, by: str = "", reason: str, calibration: str, idempotency_key: str = ""
+        self,
+        name: str,
+        *,
+        by: str = "",
+        reason: str,
+        calibration: str,
+        accept_unsure: bool = False,
+        idempotency_key: str = "",
     ) -> CalibrationReply:
         """See by a calibration from the next frame on.
 
@@ -329,13 +340,20 @@ class EyeNoun:
             by: who asks; empty: whoever calls
             reason: why
             calibration: a calibration on the shelf
+            accept_unsure: whether it is meant although the Eye would flag its poses as unsure and
+                guarded cars would stop; without it such a calibration is a 409 of code `unsure`
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.ask(
             "PUT",
             f"/api/v1/eye/cameras/{part(name)}/calibration",
             CalibrationReply,
-            body={"by": by, "reason": reason, "calibration": calibration},
+            body={
+                "by": by,
+                "reason": reason,
+                "calibration": calibration,
+                "accept_unsure": accept_unsure,
+            },
             key=idempotency_key,
         )
 
@@ -356,4 +374,58 @@ class EyeNoun:
             CalibrationReply,
             body={"by": by, "reason": reason},
             key=idempotency_key,
+        )
+
+    def print_tags(
+        self,
+        *,
+        vehicles: str = "",
+        paper: Literal["A4", "A3", "A2", "A1", "A0", "letter", "tabloid"] = "A4",
+        map_tag: bool = True,
+    ) -> Iterator[bytes]:
+        """Roof tags of cars and the map's tag, to print at 100 %.
+
+        Args:
+            vehicles: names, separated by commas; empty: all cars of the city now
+            paper: of the printer
+            map_tag: whether with the tag on the floor
+        """
+        return self._connection.pieces(
+            "/api/v1/eye/print/tags.pdf",
+            query={"vehicles": vehicles, "paper": paper, "map_tag": map_tag},
+        )
+
+    def print_board(
+        self,
+        *,
+        board: Literal["chessboard", "charuco", "tags"] = "chessboard",
+        columns: int = 9,
+        rows: int = 6,
+        square_mm: float = 30.0,
+        marker_mm: float = 22.0,
+        first_id: int = 0,
+        paper: Literal["A4", "A3", "A2", "A1", "A0", "letter", "tabloid"] = "A4",
+    ) -> Iterator[bytes]:
+        """A board to measure a lens with, to print at 100 %.
+
+        Args:
+            board: what kind
+            columns: squares, or tags
+            rows: squares, or tags
+            square_mm: [mm]
+            marker_mm: [mm]
+            first_id: of a grid of tags
+            paper: of the printer
+        """
+        return self._connection.pieces(
+            "/api/v1/eye/print/board.pdf",
+            query={
+                "board": board,
+                "columns": columns,
+                "rows": rows,
+                "square_mm": square_mm,
+                "marker_mm": marker_mm,
+                "first_id": first_id,
+                "paper": paper,
+            },
         )

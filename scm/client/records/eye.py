@@ -7,19 +7,57 @@ from typing import Any, Literal
 
 import msgspec
 
-from scm.client.records.eye_parts import InForce, PoseRow
+from scm.client.records.eye_parts import InForce
 
 
-class PagePoseRow(msgspec.Struct, kw_only=True, frozen=True):
-    """Some rows of a list.
+class TrackRow(msgspec.Struct, kw_only=True, frozen=True):
+    """Where a car is by all overhead cameras together.
 
     Attributes:
-        items: The rows of this page.
-        next_: Cursor of those after them; null at the end.
+        vehicle: Name of a car.
+        tag_id: Number of an AprilTag.
+        t_ns: The time that it holds for, on the Eye's clock.
+        x_m: To the right on the map [m].
+        y_m: Up on the map [m].
+        yaw_rad: Direction, counter-clockwise from map x [rad].
+        speed_mps: Along the car, + = forward; `lateral_speed_mps`: + = to its left.
+        std_x_m: Standard deviations.
+        std_y_m: Standard deviations.
+        std_yaw_rad: Standard deviations.
+        std_speed_mps: Standard deviations.
+        age_s: Since a camera last saw it.
+        stale: Not seen for so long that nobody should drive by it.
+        flags: What is wrong with it; empty: nothing.
+        cameras: Those that saw it last.
     """
 
-    items: tuple[PoseRow, ...]
-    next_: str | None = msgspec.field(name="next")
+    vehicle: str
+    tag_id: int
+    t_ns: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    speed_mps: float
+    lateral_speed_mps: float
+    yaw_rate_radps: float
+    std_x_m: float
+    std_y_m: float
+    std_yaw_rad: float
+    std_speed_mps: float
+    age_s: float
+    stale: bool
+    flags: tuple[str, ...]
+    cameras: tuple[str, ...]
+
+
+class TrackList(msgspec.Struct, kw_only=True, frozen=True):
+    """The Eye's tracks, by name.
+
+    Attributes:
+        tracks: Where a car is by all overhead cameras together.
+    """
+
+    tracks: tuple[TrackRow, ...]
 
 
 class ResidualStats(msgspec.Struct, kw_only=True, frozen=True):

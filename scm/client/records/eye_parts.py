@@ -230,3 +230,15 @@ class PoseRow(msgspec.Struct, kw_only=True, frozen=True):
     age_s: float
     flags: tuple[str, ...]
     residual: Residual | None
+
+
+class PagePoseRow(msgspec.Struct, kw_only=True, frozen=True):
+    """Some rows of a list.
+
+    Attributes:
+        items: The rows of this page.
+        next_: Cursor of those after them; null at the end.
+    """
+
+    items: tuple[PoseRow, ...]
+    next_: str | None = msgspec.field(name="next")

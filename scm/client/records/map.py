@@ -7,7 +7,7 @@ from typing import Literal
 
 import msgspec
 
-from scm.client.records.map_parts import Area, Floor, Lane, MapTag, Wind
+from scm.client.records.map_parts import Area, Floor, Lane, MapTag, VehicleTag, Wind
 from scm.client.records.shared import Box, Camera, Light
 
 
@@ -239,6 +239,7 @@ class CityMap(msgspec.Struct, kw_only=True, frozen=True):
         wind: The air over the whole map.
         tag: An AprilTag that lies on the floor and fixes the frame; `size_m` is the black edge.
         first_vehicle_tag_id: AprilTag of the first car; the others follow.
+        vehicle_tags: Which AprilTag is printed for a car: no other car is given it.
         lanes: Lanes.
         areas: Paved ground beside the lanes, a polygon: the open middle of a junction, a parking
             place.
@@ -268,6 +269,7 @@ class CityMap(msgspec.Struct, kw_only=True, frozen=True):
     wind: Wind | None = None
     tag: MapTag
     first_vehicle_tag_id: int = 1
+    vehicle_tags: tuple[VehicleTag, ...] = ()
     lanes: tuple[Lane, ...] = ()
     areas: tuple[Area, ...] = ()
     junctions: tuple[Junction, ...] = ()

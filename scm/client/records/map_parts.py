@@ -208,6 +208,18 @@ class MapTag(msgspec.Struct, kw_only=True, frozen=True):
     size_m: float
 
 
+class VehicleTag(msgspec.Struct, kw_only=True, frozen=True):
+    """Which AprilTag is printed for a car: no other car is given it.
+
+    Attributes:
+        vehicle: Name of a car.
+        tag_id: Number of an AprilTag.
+    """
+
+    vehicle: str
+    tag_id: int
+
+
 class Segment(msgspec.Struct, kw_only=True, frozen=True):
     """A piece of a lane's centre line: straight (`length_m`), or an arc.
 

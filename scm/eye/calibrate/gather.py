@@ -13,9 +13,10 @@ import numpy as np
 
 from scm.arrays import Image
 from scm.errors import EyeError
-from scm.eye.calibrate.board import Board, View, find_board
+from scm.eye.calibrate.board import View, find_board
 from scm.eye.picture import read_picture
 from scm.eye.source import grey_of
+from scm.scenery.board import Board
 
 FILMS = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mjpeg")
 NEW_SHARE = 0.05

@@ -14,7 +14,7 @@ import numpy as np
 
 from scm.arrays import Floats, Image
 from scm.errors import EyeError
-from scm.eye.calibrate.board import Board, View
+from scm.eye.calibrate.board import View
 from scm.eye.calibrate.gather import Gathered
 from scm.eye.calibrate.judge import CELLS, Verdict
 from scm.eye.calibrate.locate import NAMES, Located, off_px
@@ -24,6 +24,7 @@ from scm.eye.camera import CameraModel, camera_model
 from scm.eye.picture import read_picture
 from scm.eye.source import grey_of
 from scm.maps.model import Camera, MapTag
+from scm.scenery.board import Board
 from scm.v2x.messages.eye_tags import TagSeen
 
 Told = dict[str, Any]

@@ -7,9 +7,9 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.eye.track.motion import OFFSET, STATES, predict, slip_std
-from scm.eye.track.sighting import Sighting
+from scm.eye.track.sighting import ROOF_TAG_SIZE, Sighting
 
-KINDS = ("duplicate", "disagree", "wrong_id", "jumped")
+KINDS = ("duplicate", "disagree", "wrong_id", "jumped", ROOF_TAG_SIZE)
 """What may be said of a track for a while."""
 FIRST_SPEED_MPS = 2.0
 FIRST_TURN_RAD_S = 2.0
@@ -37,7 +37,7 @@ class Fleet:
         came_ns: When it appeared where it is, (n,).
         rival: Where sightings are that do not fit, (n, 3), when the last of them was, how many
             of them agree, and whether fitting ones came between, (n, 3).
-        said_ns: Until when each of `KINDS` holds, (n, 4).
+        said_ns: Until when each of `KINDS` holds, (n, 5).
         flags: What each camera last said is wrong with it.
     """
 

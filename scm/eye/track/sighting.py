@@ -9,6 +9,8 @@ from scm.arrays import Bools, Floats
 from scm.geometry import Pose2
 from scm.scenery.tags import TAG_COUNT
 
+ROOF_TAG_SIZE = "roof_tag_size"
+"""The flag of a sighting whose tag has another size than its car file says, and of its track."""
 FARTHEST_M = 1e4
 LARGEST_STD = 100.0
 LEAST_STD = 1e-6
@@ -27,7 +29,7 @@ class Sighting:
         shared: The part of it that all sightings by this camera have in common, (3, 3); None: all
             of it, which averages nothing away.
         lean: The part of it that all cameras have in common, (3, 3); None: nothing.
-        flags: What is wrong with the camera; its tracks carry them on.
+        flags: What is wrong with the camera, and `ROOF_TAG_SIZE`; its tracks carry them on.
     """
 
     camera: str
@@ -77,8 +79,9 @@ class Track:
         stale: Not seen for longer than a track is to be trusted.
         flags: `tentative` seen fewer than three times, `unknown` a tag of nobody, `duplicate` two
             places claim its id, `disagree` two cameras see it a little apart, `wrong_id` it stands
-            where another car is, or its tag has changed, `jumped` it was put elsewhere; and those
-            of its cameras.
+            where another car is, or its tag has changed, `jumped` it was put elsewhere,
+            `roof_tag_size` its tag has another size than its car file says; and those of its
+            cameras.
         cameras: Those that saw it last, within `scm.eye.track.tracks.STALE_NS`.
     """
 

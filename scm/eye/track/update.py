@@ -20,7 +20,7 @@ from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_S
 from scm.eye.track.fleet import ARRAYS, KINDS, Fleet, first_covariance
 from scm.eye.track.motion import STATES
-from scm.eye.track.sighting import Sighting
+from scm.eye.track.sighting import ROOF_TAG_SIZE, Sighting
 
 GATE = 30.0
 """Squared distance in deviations, of three numbers; noise alone passes it once in a million."""
@@ -36,7 +36,8 @@ STILL_M = 0.001
 
 def taken_in(fleet: Fleet, frame: Sequence[Sighting]) -> Fleet:
     """Return the tracks after one frame of one camera."""
-    fleet = fleet.with_camera(frame[0].camera, frame[0].flags)
+    of_camera = tuple(flag for flag in frame[0].flags if flag != ROOF_TAG_SIZE)
+    fleet = fleet.with_camera(frame[0].camera, of_camera)
     known = {name: row for row, name in enumerate(fleet.vehicles)}
     first = {one.vehicle: one for one in reversed(frame) if one.vehicle not in known}
     fleet = fleet.with_new(list(first.values()))
@@ -54,6 +55,8 @@ def taken_in(fleet: Fleet, frame: Sequence[Sighting]) -> Fleet:
     for one in frame:
         if one.tag_id != fleet.tag_ids[rows[one.vehicle]]:
             _say(fleet, rows[one.vehicle], "wrong_id", one.t_ns)
+        if ROOF_TAG_SIZE in one.flags:
+            _say(fleet, rows[one.vehicle], ROOF_TAG_SIZE, one.t_ns)
     return fleet
 
 

@@ -51,6 +51,8 @@ class CalibrationRequest(Request, kw_only=True, frozen=True):
         calibration: What it is called.
         place: Where the camera hangs, and the lens it was found with: the map file's block.
         lens: Alone: in place of the lens in force. With a place: the doubt of that place's lens.
+        accept_unsure: Whether it is meant although its poses would be flagged `unsure`; without,
+            such a calibration is refused with the code `unsure`.
     """
 
     KEY: ClassVar[str] = "eye/{camera}/req"
@@ -64,6 +66,7 @@ class CalibrationRequest(Request, kw_only=True, frozen=True):
     lens: MeasuredLens | None = None
     by: str
     reason: str = ""
+    accept_unsure: bool = False
 
 
 MESSAGE = CalibrationRequest

@@ -4,9 +4,6 @@ from typing import ClassVar
 
 from scm.v2x.message import Message, Request
 
-LAST_TAG_ID = 586
-"""Of the family tag36h11."""
-
 
 class JoinReply(Message, kw_only=True, frozen=True):
     """Welcome: where to start, and the lease under which the agent drives its own car.

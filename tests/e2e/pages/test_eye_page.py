@@ -66,6 +66,12 @@ def test_the_place_of_the_camera_is_found_put_in_force_and_put_back(visit, runni
     look_around(visited, "dialog", "eye_question")
     page.fill("dialog input[name=reason]", "tried by a test")
     page.click("dialog .primary")
+    page.wait_for_selector("dialog [role=alert]:has-text('would flag them as unsure')")
+    page.fill("dialog input[name=meant]", "another")
+    page.click("dialog .danger")
+    page.wait_for_selector("dialog input[name=meant]:invalid")
+    page.fill("dialog input[name=meant]", "overhead")
+    page.click("dialog .danger")
     page.wait_for_selector(f".bar .in-force b:text-is('place {row['name']}')")
     page.wait_for_selector(".eye-shelf td .good:text-is('in force')")
     told = running.get("/eye/cameras/overhead")["state"]["in_force"]

@@ -22,6 +22,7 @@ from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import Calibrated, EyeStatus, InForce
 from scm.v2x.messages.eye_tags import EyeTags, TagSeen
+from scm.v2x.messages.eye_track import EyeTrack
 
 API = "/api/v1"
 EYE = f"{API}/eye"
@@ -409,6 +410,16 @@ class TestInForce:
         (asked,) = eye.asked
         assert (asked.camera, asked.verb, asked.reason) == ("overhead", "back", "it was moved")
 
+    def test_a_calibration_that_the_eye_would_not_trust_needs_an_explicit_yes(
+        self, client, shelf, eye
+    ):
+        shelf(lab=PLACE)
+        eye.answers[CalibrationRequest] = Refused(code="unsure", detail="good to 30 mm only")
+        refused = client("PUT", self.path, json={"calibration": "lab", **WHY})
+        assert (refused.status_code, refused.json()["code"]) == (409, "unsure")
+        client("PUT", self.path, json={"calibration": "lab", **WHY, "accept_unsure": True})
+        assert [one.accept_unsure for one in eye.asked] == [False, True]
+
     def test_nothing_is_asked_that_cannot_be(self, client, shelf, eye):
         shelf(lab=PLACE.replace("overhead", "south"))
         other = f"{EYE}/cameras/south/calibration"
@@ -447,3 +458,46 @@ class TestInForce:
             reply = client_of(app)("POST", f"{self.path}/back", json=WHY, headers=headers)
             assert reply.status_code == status
         assert [asked.by for asked in eye.asked] == ["eva"]
+
+
+def test_tags_of_the_cars_in_the_city_and_a_board_are_printed(client, hear, snapshot):
+    hear(1.0, snapshot(blue=(0.0, 0.0, 0.0)))
+    reply = client("GET", f"{EYE}/print/tags.pdf")
+    assert reply.headers["content-type"] == "application/pdf"
+    assert reply.content.startswith(b"%PDF")
+    assert b"floor of driving_school - tag 0" in reply.content
+    assert b"blue - tag 1" in reply.content  # as the city has it, whatever its name
+    named = client("GET", f"{EYE}/print/tags.pdf?vehicles=n5&map_tag=false").content
+    assert (b"n5 - tag 5" in named, b"floor of " in named) == (True, False)
+    refused = client("GET", f"{EYE}/print/tags.pdf?vehicles=red")
+    assert (refused.status_code, "no tag is bound" in refused.json()["detail"]) == (422, True)
+    board = client("GET", f"{EYE}/print/board.pdf?board=charuco").content
+    assert b"--board charuco --squares 9x6 --square-m 0.03 --marker-m 0.022" in board
+    large = client("GET", f"{EYE}/print/board.pdf?square_mm=60")
+    assert (large.status_code, "expected paper A2" in large.json()["detail"]) == (422, True)
+
+
+def track(vehicle="n1", **more):
+    rows = tuple(tuple(4e-6 if i == j else 0.0 for j in range(6)) for i in range(6))
+    return EyeTrack(
+        vehicle=vehicle, tag_id=1, t_ns=7, x_m=1.23456, y_m=0.5, yaw_rad=0.1, speed_mps=0.2,
+        lateral_speed_mps=0.0, yaw_rate_radps=0.0, covariance=rows, age_s=0.05, stale=False, **more
+    )  # fmt: skip
+
+
+def test_tracks_of_all_cameras_are_heard_while_somebody_asks_for_them(client, view, hear):
+    def hears():
+        return EyeTrack in {one.kind for one in view.hears}
+
+    hear(1.0, track())
+    assert (hears(), client("GET", f"{EYE}/tracks").json()) == (False, {"tracks": []})
+    assert hears()
+    hear(1.5, track(flags=("roof_tag_size",), cameras=("overhead",)), track("n2"))
+    first, second = client("GET", f"{EYE}/tracks").json()["tracks"]
+    assert (first["vehicle"], second["vehicle"]) == ("n1", "n2")
+    assert (first["x_m"], first["std_x_m"], first["age_s"]) == (1.2346, 0.002, 0.05)
+    assert (first["flags"], first["cameras"]) == (["roof_tag_size"], ["overhead"])
+    hear(4.0)
+    assert client("GET", f"{EYE}/tracks").json() == {"tracks": []}  # the Eye fell silent
+    hear(9.5)
+    assert not hears()

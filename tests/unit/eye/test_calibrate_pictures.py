@@ -8,11 +8,12 @@ import pytest
 
 from scm.__main__ import main
 from scm.errors import EyeError
-from scm.eye.calibrate.board import Board, find_board
+from scm.eye.calibrate.board import find_board
 from scm.eye.calibrate.gather import from_files
 from scm.eye.calibration import load_calibration
 from scm.eye.camera import camera_model
 from scm.maps.model import Camera
+from scm.scenery.board import Board
 from scm.scenery.tags import tag_picture
 
 LENS = Camera(

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from scm.errors import EyeError
-from scm.eye.calibrate.board import Board, View, chessboard_corners
+from scm.eye.calibrate.board import View, chessboard_corners
 from scm.eye.calibrate.judge import judge
 from scm.eye.calibrate.say import report
 from scm.eye.calibrate.solve import Lens, solve
+from scm.scenery.board import Board
 
 SIZE = (1280, 720)
 EVERY = np.ones(9, dtype=bool)

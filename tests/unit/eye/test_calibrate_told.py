@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from scm.__main__ import main
-from scm.eye.calibrate.board import Board, find_board
+from scm.eye.calibrate.board import find_board
 from scm.eye.calibrate.gather import Gathered
 from scm.eye.calibrate.told import views_told
+from scm.scenery.board import Board
 
 WORDS = ["--squares", "9x6", "--square-m", "0.03"]
 

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from scm.errors import EyeError
-from scm.eye.calibration import Calibration, calibrated, load_calibration
+from scm.eye.calibration import Calibration, calibrated
+from scm.eye.calibration_files import load_calibration
 from scm.eye.camera import camera_model
 from scm.maps.load import load_map
 
@@ -44,7 +45,7 @@ def test_another_frame_size_is_refused_by_both():
         ("views = 14", "views = 14\nfoo = 1", "foo"),
         ("fx_px = 1151.25", "", "fx_px"),
         ("covariance = [", "covariance = [ [1.0, 2.0],", "nine rows of nine"),
-        ("covariance = [", "= [", "expected a calibration"),
+        ("covariance = [", "= [", "expected a lens"),
     ],
 )
 def test_a_damaged_file_is_refused_with_its_name(tmp_path, old, new, said):

@@ -130,17 +130,40 @@ def test_a_spoiled_corner_among_noisy_ones_is_left_out_too():
         assert found.misfit < 2.0
 
 
-def test_corners_that_are_no_square_are_doubted_or_refused():
+@pytest.mark.parametrize("scale", [0.6, 0.95, 0.98, 1.02, 1.05, 1.5])
+def test_a_print_of_another_size_gives_the_pose_and_the_size_that_would_fit(scale):
+    exact = TRUE.project(tag_on_roof(car(0.8, 0.5, 0.4)))
+    found = car_pose(
+        Anchor(TRUE, CITY.tag), NIGEL, TRUE.project(tag_on_roof(car(0.8, 0.5, 0.4), scale))
+    )
+    right = car_pose(Anchor(TRUE, CITY.tag), NIGEL, exact)
+    assert not found.is_refused
+    assert found.size_ratio == pytest.approx(scale, abs=1e-4)
+    assert found.is_other_size == (abs(scale - 1.0) > 0.025)
+    assert tuple(found.pose) == pytest.approx(tuple(right.pose), abs=1e-6)
+
+
+def test_a_roof_that_may_be_higher_instead_widens_the_covariance_away_from_the_camera():
+    tag = tag_on_roof(car(0.2, 0.2, 0.4), 1.05)
+    found = car_pose(Anchor(TRUE, CITY.tag), NIGEL, TRUE.project(tag))
+    at = tag.mean(axis=0)
+    by_height = np.hypot(*(TRUE.position - at)[:2]) * (1.0 - 1.0 / 1.05)
+    deviation = math.sqrt(np.linalg.eigvalsh(found.shared[:2, :2])[-1])
+    assert deviation == pytest.approx(by_height / 2.0, rel=0.05)
+
+
+def test_a_misfit_widens_the_covariance_and_corners_that_are_no_square_are_refused():
     exact = TRUE.project(tag_on_roof(car(1.0, 0.5, 0.4)))
     middle = exact.mean(axis=0)
     anchor = Anchor(TRUE, CITY.tag)
-    good, large, huge = (
-        car_pose(anchor, NIGEL, middle + scale * (exact - middle)) for scale in (1.0, 1.02, 1.2)
+    good, large = (
+        car_pose(anchor, NIGEL, middle + scale * (exact - middle)) for scale in (1.0, 1.02)
     )
     assert large.covariance[2, 2] - large.shared[2, 2] > 4.0 * (
         good.covariance[2, 2] - good.shared[2, 2]
     )
-    assert (good.is_refused, large.is_refused, huge.is_refused) == (False, False, True)
+    oblong = car_pose(anchor, NIGEL, middle + (1.2, 0.9) * (exact - middle))
+    assert (good.is_refused, large.is_refused, oblong.is_refused) == (False, False, True)
 
 
 def test_cars_solved_together_are_those_solved_one_by_one():

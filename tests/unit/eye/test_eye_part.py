@@ -1,5 +1,8 @@
 """The eye as a part: snapshots in; tags, poses and pictures out."""
 
+import math
+import re
+
 import cv2
 import msgspec
 import numpy as np
@@ -7,11 +10,13 @@ import pytest
 
 from scm.errors import EyeError
 from scm.eye.part import EyePart
+from scm.eye.render import car as render
 from scm.eye.source import Frame
 from scm.eye.sources.file import FileSource
 from scm.maps.load import load_map
 from scm.v2x.exchange import Incoming
 from scm.v2x.key import key_of
+from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.cpm_tx import CpmTx
 from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.eye_frame import EyeFrame
@@ -146,6 +151,84 @@ def test_a_pose_comes_from_the_picture_and_not_from_the_snapshot(eye):
     blind = EyePart(CITY, source=Elsewhere(EyePart(CITY)._source))
     (pose,) = of(EyePose, see(blind, light(1, CAR)))
     assert pose.x_m == pytest.approx(CAR.x_m + 0.5, abs=2e-3)
+
+
+SCALES = {7: 1.05, 8: 0.94, 9: 1.02, 10: 0.98, 11: 1.5, 12: 1.05}
+"""Of the roof tags' prints over what the car files say."""
+
+
+@pytest.fixture(scope="module")
+def misprints(eye):
+    """What the Eye tells of cars whose tags were printed larger or smaller; 11, 12 are nobody's."""
+    right = render.tag_on_roof
+    cars = [
+        msgspec.structs.replace(
+            CAR, vehicle=f"n{tag}" if tag < 11 else f"no/{tag}", tag_id=tag,
+            x_m=0.35 + 0.4 * index, y_m=0.5 + 0.3 * (index % 2),
+        )
+        for index, tag in enumerate(SCALES)
+    ]  # fmt: skip
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            render, "tag_on_roof", lambda car, scale=1.0: right(car, scale * SCALES[car.tag_id])
+        )
+        looking = EyePart(CITY, source=eye._source)
+        out = [item for tick in range(101, 109) for item in see(looking, light(tick, *cars))]
+    return cars, out
+
+
+def test_a_roof_tag_of_another_size_gives_flagged_poses(misprints):
+    cars, out = misprints
+    for car in cars[:4]:
+        poses = [one for one in of(EyePose, out) if one.vehicle == car.vehicle]
+        assert len(poses) == 8
+        assert all(math.dist((one.x_m, one.y_m), (car.x_m, car.y_m)) < 3e-3 for one in poses)
+        flags = ("roof_tag_size",) if car.tag_id in (7, 8) else ()
+        assert {one.flags for one in poses} == {flags}
+        (track,) = [one for one in of(EyeTrack, out)[-5:] if one.vehicle == car.vehicle]
+        assert track.flags == flags
+
+
+def test_a_roof_tag_of_another_size_is_named_once_with_the_size_that_would_fit(misprints):
+    _, out = misprints
+    status = of(EyeStatus, out)[-1]
+    assert status.good  # the camera is
+    assert [one.code for one in status.complaints] == 4 * ["roof_tag_size"]
+    begins = (
+        "tag 7 of n7: its black edge looks 80.0 mm (+5.0 %), its car file says 76.2 mm: print it",
+        "tag 8 of n8: its black edge looks 71.6 mm (-6.0 %), its car file says 76.2 mm: print it",
+        "tag 11, which no car wears: its black edge looks 114.3 mm (+50.0 %), a Nigel's is 76.2 mm",
+        "tag 12, which no car wears: its black edge looks 80.0 mm (+5.0 %), a Nigel's is 76.2 mm",
+    )
+    for complaint, begin in zip(status.complaints, begins, strict=True):
+        numbers = r"-?[0-9]+\.[0-9]"
+        assert re.sub(numbers, "_", complaint.said).startswith(re.sub(numbers, "_", begin))
+        told = [float(one) for one in re.findall(numbers, complaint.said)[:2]]
+        assert told == pytest.approx(
+            [float(one) for one in re.findall(numbers, begin)[:2]], abs=0.3
+        )
+    warned = [one.text for one in of(CityEvent, out) if one.name == "roof_tag_size"]
+    assert len(warned) == 4
+
+
+def test_a_tag_of_nobody_has_a_pose_if_it_is_about_a_nigel_s_size(misprints):
+    _, out = misprints
+    named = {one.vehicle for one in of(EyePose, out)}
+    assert named == {"n7", "n8", "n9", "n10", "tag-12"}
+
+
+def test_a_mirrored_camera_says_so_within_three_seconds(eye):
+    camera = Given()
+    looking = EyePart(CITY, source=camera)
+    image = eye._source.render(light(200, CAR)).copy()[:, ::-1]
+    out = []
+    for half in range(7):
+        now = PERIOD_NS + half * 500_000_000
+        camera.frame = Frame(now, np.ascontiguousarray(image))
+        out += looking.step(now, [])
+    assert of(EyeTags, out)[-1].tags == ()
+    assert "mirrored" in [one.code for one in of(EyeStatus, out)[-1].complaints]
+    assert [one.name for one in of(CityEvent, out)] == ["mirrored"]
 
 
 def test_a_tag_that_belongs_to_nobody_is_named_after_itself():

@@ -161,7 +161,11 @@ def test_the_doubt_of_place_and_lens_is_the_doubt_of_poses(still):
     city = City(still)
     city.ask(calibration="lab", place=TRUE)
     sure = city.pose().shared_covariance
-    city.ask(calibration="rough", place=moved(place_std=tuple(5.0 * std for std in WELL_KNOWN)))
+    rough = moved(place_std=tuple(5.0 * std for std in WELL_KNOWN))
+    refusal = city.ask(calibration="rough", place=rough)
+    assert (refusal.code, "mm only (at most 5 mm pass)" in refusal.detail) == ("unsure", True)
+    assert city.in_force().now.place == "lab"
+    city.ask(calibration="rough", place=rough, accept_unsure=True)
     unsure = city.pose().shared_covariance
     city.ask(calibration="both", place=TRUE, lens=LENS)
     lens = city.pose().shared_covariance

@@ -1,7 +1,10 @@
+import msgspec
 import pytest
 
 from scm.errors import MapError
 from scm.maps.load import MAPS_DIR, load_map, map_names
+from scm.maps.model import VehicleTag
+from scm.maps.vehicle_tags import bound_tag
 
 GOOD = (MAPS_DIR / "driving_school.toml").read_text(encoding="utf-8")
 
@@ -86,6 +89,17 @@ def test_a_wrong_key_or_type_is_refused_in_plain_words(tmp_path, old, new, key, 
         ("light_id = 2", "light_id = 1", "lights[1].light_id: 1 is already that of lights[0]"),
         ('name = "b"', 'name = "a"', "spawns[1].name: 'a' is already that of spawns[0]"),
         ("first_vehicle_tag_id = 1", "first_vehicle_tag_id = 0", "more than tag.tag_id = 0, got 0"),
+        (
+            "first_vehicle_tag_id = 1",
+            'first_vehicle_tag_id = 1\nvehicle_tags = [{vehicle = "red", tag_id = 0}]',
+            "vehicle_tags[0] (red).tag_id: expected 0 to 586, and not the map's own 0, got 0",
+        ),
+        (
+            "first_vehicle_tag_id = 1",
+            "first_vehicle_tag_id = 1\nvehicle_tags = ["
+            '{vehicle = "red", tag_id = 7}, {vehicle = "blue", tag_id = 7}]',
+            "vehicle_tags[1].tag_id: 7 is already that of vehicle_tags[0]",
+        ),
         ('kind = "left_curve"', 'kind = "left_curv"', "did you mean 'left_curve'?"),
         ("width_m = 0.257", "width_m = -0.257", "lanes[0].width_m: expected more than 0"),
         ("z_m = 2.8", "z_m = inf", "cameras[0].z_m: expected a finite number, got inf"),
@@ -109,3 +123,11 @@ def test_all_problems_are_told_at_once(tmp_path):
     )
     assert "3 problem(s)" in message
     assert message.count("\n") == 3
+
+
+def test_a_name_that_the_map_binds_or_the_city_gives_has_a_tag_of_its_own():
+    tags = (VehicleTag(vehicle="red", tag_id=12), VehicleTag(vehicle="blue", tag_id=3))
+    city_map = msgspec.structs.replace(load_map("driving_school"), vehicle_tags=tags)
+    names = ("red", "blue", "n1", "n3", "n12", "n586", "n587", "n0", "n01", "r1")
+    bound = [bound_tag(city_map, name) for name in names]
+    assert bound == [12, 3, 1, None, None, 586, None, None, None, None]

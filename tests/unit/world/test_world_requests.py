@@ -26,6 +26,7 @@ from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.vehicles.car import load_car
 from scm.world.requests import is_free, reply_to
+from scm.world.slots import Numbers
 from scm.world.world import World
 
 MAP = load_map("driving_school")
@@ -89,6 +90,29 @@ def test_a_car_keeps_the_tag_that_is_glued_onto_its_roof(city):
     assert city.world.remote["r1"].tag_id == 2
     city.ask(RemoveRequest(vehicle="r1"))
     assert city.ask(JoinRequest(vehicle="r2", session="s", tag_id=2)).tag_id == 2
+
+
+def test_a_car_gets_the_tag_that_is_printed_for_its_name_whenever_it_comes(city):
+    assert city.ask(SpawnRequest(vehicle="n3")).tag_id == 3
+    assert city.ask(SpawnRequest(vehicle="blue")).tag_id == 1
+    city.ask(RemoveRequest(vehicle="n3"))
+    assert city.ask(JoinRequest(vehicle="n3", session="s")).tag_id == 3
+
+
+def test_a_car_whose_tag_another_wears_gets_a_free_one_and_a_warning(city):
+    city.ask(JoinRequest(vehicle="r1", session="s", tag_id=2))
+    assert city.ask(SpawnRequest(vehicle="n2")).tag_id == 1
+    (event,) = [one for one in city.heard(CityEvent) if one.name == "other_tag"]
+    assert event.text == "n2 has tag 1: r1 wears tag 2, which is printed for it"
+
+
+def test_numbers_are_given_once_however_they_come_back():
+    numbers = Numbers(1, never={0, 3})
+    assert [numbers.take(), numbers.take()] == [1, 2]
+    numbers.give_back(1)
+    assert (numbers.claim(1), numbers.is_free(1)) == (1, False)
+    numbers.give_back(1)
+    assert [numbers.take(), numbers.take(), numbers.take()] == [1, 4, 5]
 
 
 def test_the_agent_that_asks_again_after_its_death_gets_its_tag_again(city):

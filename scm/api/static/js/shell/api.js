@@ -28,16 +28,18 @@ export function dismiss(id) {
  * Ask the city for a change and tell the person how it went.
  * @param headers more of them, such as `If-Match`.
  * @param patience_ms how long to wait for the answer; none: as long as it takes.
+ * @param refused what takes the sentence of a refusal instead of a notice, by the problem's code.
  * @returns the reply, or null when it was refused.
  */
-export async function change(method, path, body, done, headers = {}, patience_ms = null) {
+export async function change(method, path, body, done, headers = {}, patience_ms = null, refused = {}) {
   try {
     const id = crypto.randomUUID?.() ?? String(Math.random());
     const reply = await send(method, path, body, { ...headers, "Idempotency-Key": id }, patience_ms);
     if (done) notify("info", done(reply));
     return reply;
   } catch (error) {
-    notify("error", error.message);
+    if (refused[error.code]) refused[error.code](error.message);
+    else notify("error", error.message);
     return null;
   }
 }
@@ -57,7 +59,8 @@ async function send(method, path, body, own, patience_ms) {
   const reply = await response.json().catch(() => ({}));
   if (response.ok) return reply;
   if (response.status === 401 && (await askForKey())) return send(method, path, body, own, patience_ms);
-  throw new Error(reply.detail || reply.title || `${method} ${path}: ${response.status}`);
+  const sentence = reply.detail || reply.title || `${method} ${path}: ${response.status}`;
+  throw Object.assign(new Error(sentence), { code: reply.code });
 }
 
 /** What the browser says of it is for programmers. */

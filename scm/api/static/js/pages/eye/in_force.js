@@ -25,6 +25,7 @@ export function InForce({ camera }) {
 /** Ask for a reason, then put `wish` in force: the name of a calibration, or null for what was before. */
 export function PutInForce({ camera, wish, close }) {
   const report = useReport(wish);
+  const [unsure, setUnsure] = useState(""); // why the Eye would flag its poses
   const late = wish === null && !camera.in_force?.before;
   useEffect(() => {
     if (!late) return;
@@ -37,9 +38,13 @@ export function PutInForce({ camera, wish, close }) {
     event.preventDefault();
     const body = { by: "dashboard", reason: event.target.elements.reason.value };
     const path = `/eye/cameras/${camera.camera}/calibration`;
+    if (wish) {
+      const asked = { ...body, calibration: wish, accept_unsure: Boolean(unsure) };
+      let again = false;
+      await change("PUT", path, asked, said, {}, null, { unsure: (why) => setUnsure(((again = true), why)) });
+      if (again) return;
+    } else await change("POST", `${path}/back`, body, said);
     close();
-    if (wish) await change("PUT", path, { ...body, calibration: wish }, said);
-    else await change("POST", `${path}/back`, body, said);
   };
   const said = (reply) => `${camera.camera} sees by: ${named(reply.in_force.now)}.`;
   return html`
@@ -52,9 +57,17 @@ export function PutInForce({ camera, wish, close }) {
       ${report?.is_sure === false && html`<p class="warn">Two places would show its tags alike: it may be the wrong one.</p>`}
       <form onSubmit=${submit}>
         <input name="reason" required maxlength="200" placeholder="Reason (needed)" aria-label="Reason" data-first />
+        ${unsure &&
+        html`
+          <p class="warn" role="alert">${unsure}</p>
+          <label>
+            To use it all the same, type the camera's name
+            <input name="meant" required autocomplete="off" pattern=${camera.camera} placeholder=${camera.camera} />
+          </label>
+        `}
         <div class="actions">
           <button type="button" onClick=${close}>Cancel</button>
-          <button class="primary">${wish ? "Put in force" : "Put back"}</button>
+          <button class=${unsure ? "danger" : "primary"}>${unsure ? "Put in force although unsure" : wish ? "Put in force" : "Put back"}</button>
         </div>
       </form>
     <//>

@@ -105,6 +105,10 @@ function bodyOf({ board, columns, rows, square_mm, marker_mm, first_id, fisheye 
   };
 }
 
+/** The board as the server prints it. */
+const asQuery = ({ board, columns, rows, square_mm, marker_mm, first_id }) =>
+  new URLSearchParams({ board, columns, rows, square_mm, marker_mm, first_id });
+
 function BoardForm({ board, set }) {
   const number = (name, title, step = 1) => html`
     <label>${title}
@@ -135,6 +139,7 @@ function BoardForm({ board, set }) {
         <input type="checkbox" checked=${board.fisheye} onChange=${(event) => set({ ...board, fisheye: event.currentTarget.checked })} />
         wider than 100°
       </label>
+      <a href=${`/api/v1/eye/print/board.pdf?${asQuery(board)}`} target="_blank" title="PDF at true size, with a ruler">Print this board</a>
     </div>
   `;
 }

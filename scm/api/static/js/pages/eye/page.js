@@ -6,6 +6,7 @@ import { InForce } from "scm/pages/eye/in_force.js";
 import { Picture } from "scm/pages/eye/picture.js";
 import { Residuals } from "scm/pages/eye/residuals.js";
 import { TagTable } from "scm/pages/eye/tag_table.js";
+import { Tracks } from "scm/pages/eye/tracks.js";
 import { Wizard } from "scm/pages/eye/wizard.js";
 
 export function Page() {
@@ -28,6 +29,7 @@ export function Page() {
       : html`
           <${Picture} key=${camera.camera} camera=${camera} />
           <${TagTable} camera=${camera} />
+          <${Tracks} />
           <${Residuals} key=${`${camera.camera} residuals`} camera=${camera} />
         `}
   `;

@@ -11,7 +11,9 @@ export function TagTable({ camera }) {
     <section class="panel eye-tags" aria-label="Tags">
       <div class="panel-head">
         <h2>Tags</h2>
-        <span class="facts">of the last minute</span>
+        <span class="facts">
+          of the last minute · <a href="/api/v1/eye/print/tags.pdf" target="_blank" title="Roof tags of all cars in the city, and the map's tag: PDF at true size">Print tags</a>
+        </span>
       </div>
       ${tags.length ? html`<div class="scroll moves" tabindex="0" role="region" aria-label="Table of tags"><${Table} tags=${tags} /></div>` : html`<p class="empty">No tag has been seen for a minute.</p>`}
     </section>

@@ -8,6 +8,7 @@ import { gestures } from "scm/pages/map/gestures.js";
 import { followed, layers } from "scm/pages/map/layers.js";
 import { LayersMenu } from "scm/pages/map/layers_menu.js";
 import { hearCloseUp } from "scm/pages/map/close_up.js";
+import { hearTracks } from "scm/pages/map/tracks.js";
 import { HeatKey, Kinds, ScaleBar } from "scm/pages/map/legend.js";
 import { Scene } from "scm/pages/map/scene.js";
 import { offer, SendChip, withdraw } from "scm/pages/map/send_to.js";
@@ -48,7 +49,7 @@ export function MapPanel() {
     const seen = new Viewport(ground.box);
     const scene = new Scene(canvas.current, ground, seen);
     setView(seen);
-    const ends = [scene.run(), gestures(sheet.current, seen, (x, y) => choose(scene.pick(x, y), seen, x, y)), hearCloseUp()];
+    const ends = [scene.run(), gestures(sheet.current, seen, (x, y) => choose(scene.pick(x, y), seen, x, y)), hearCloseUp(), hearTracks()];
     return () => ends.forEach((end) => end());
   }, [ground]);
   if (ground instanceof Error) {

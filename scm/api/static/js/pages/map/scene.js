@@ -1,4 +1,4 @@
-/** One frame of the map, from below to above: roads, heat, path, scan, trails, boxes, cars, names, signals. */
+/** One frame of the map, from below to above: roads, heat, path, scan, trails, boxes, cars, tracks, names, signals. */
 import { drawBoxes } from "scm/shared/box_shape.js";
 import { drawCar, drawHalo, drawLabel, footprint } from "scm/shared/car_shape.js";
 import { coveredBy, drawLight } from "scm/shared/light_shape.js";
@@ -15,6 +15,7 @@ import { RoadNames } from "scm/pages/map/road_names.js";
 import { drawOffer } from "scm/pages/map/send_to.js";
 import { timeToChange } from "scm/pages/map/signal_times.js";
 import { drawSprites } from "scm/pages/map/sprites.js";
+import { drawTracks } from "scm/pages/map/tracks.js";
 import { Trails } from "scm/pages/map/trails.js";
 
 const FRAME_MS = 30; // smooth enough for a floor of cars
@@ -86,6 +87,7 @@ export class Scene {
     }
     drawBoxes(paper, view, boxes.peek(), city.peek()?.boxes ?? []);
     this.#drawCars(on);
+    if (on.tracks) drawTracks(paper, view);
     drawn.road_names = on.roads ? this.roadNames.draw(paper, view, now) : 0;
     // Signals last: no car's name may hide a colour.
     this.#drawSignals(on, now);

@@ -1,0 +1,114 @@
+"""The Eye's tracks, where cars are by all cameras together, heard while somebody looks at them."""
+
+import math
+from typing import Annotated
+
+import msgspec
+
+from scm.api.picture import Held
+from scm.clock import NS_PER_S
+from scm.part import Hears
+from scm.v2x.messages.eye_track import EyeTrack
+
+WATCHED_NS = 5 * NS_PER_S
+"""So long after somebody asked tracks are heard: 20 a second of each car are many."""
+SHOWN_S = 2.0
+
+
+class TrackRow(msgspec.Struct, kw_only=True, frozen=True):
+    """Where a car is by all overhead cameras together.
+
+    Attributes:
+        t_ns: The time that it holds for, on the Eye's clock.
+        speed_mps: Along the car, + = forward; `lateral_speed_mps`: + = to its left.
+        std_x_m, std_y_m, std_yaw_rad, std_speed_mps: Standard deviations.
+        age_s: Since a camera last saw it.
+        stale: Not seen for so long that nobody should drive by it.
+        flags: What is wrong with it; empty: nothing.
+        cameras: Those that saw it last.
+    """
+
+    vehicle: str
+    tag_id: int
+    t_ns: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    speed_mps: float
+    lateral_speed_mps: float
+    yaw_rate_radps: float
+    std_x_m: float
+    std_y_m: float
+    std_yaw_rad: float
+    std_speed_mps: float
+    age_s: float
+    stale: bool
+    flags: Annotated[tuple[str, ...], msgspec.Meta(examples=[["roof_tag_size"]])]
+    cameras: Annotated[tuple[str, ...], msgspec.Meta(examples=[["overhead"]])]
+
+
+class TrackWatch:
+    """Who asked for tracks lately, and the newest of each car; not safe between threads."""
+
+    def __init__(self) -> None:
+        self._until_ns: int | None = None
+        self._newest: dict[str, Held[EyeTrack]] = {}
+
+    def ask(self, now_ns: int) -> bool:
+        """Hear tracks from now on; return whether they were not heard before."""
+        is_new = self._until_ns is None
+        self._until_ns = now_ns + WATCHED_NS
+        return is_new
+
+    def forget(self, now_ns: int) -> bool:
+        """Forget old tracks; return whether nobody has asked for so long that none are heard."""
+        shown_ns = round(SHOWN_S * NS_PER_S)
+        self._newest = {
+            vehicle: held
+            for vehicle, held in self._newest.items()
+            if now_ns - held.arrived_ns <= shown_ns
+        }
+        if self._until_ns is None or now_ns < self._until_ns:
+            return False
+        self._until_ns, self._newest = None, {}
+        return True
+
+    def take(self, track: EyeTrack, t_ns: int) -> None:
+        """Keep a track."""
+        if self._until_ns is not None:
+            self._newest[track.vehicle] = Held(track, t_ns)
+
+    def hears(self) -> tuple[Hears, ...]:
+        """Return what has to be heard now."""
+        return () if self._until_ns is None else (Hears(EyeTrack),)
+
+    def rows(self, now_ns: int) -> tuple[TrackRow, ...]:
+        """Return the newest track of each car, by name."""
+        return tuple(
+            _row(held.message, held.age_s(now_ns))
+            for _, held in sorted(self._newest.items())
+            if held.age_s(now_ns) <= SHOWN_S
+        )
+
+
+def _row(track: EyeTrack, age_s: float) -> TrackRow:
+    x, y, yaw, speed = (math.sqrt(max(0.0, track.covariance[i][i])) for i in range(4))
+    return TrackRow(
+        vehicle=track.vehicle,
+        tag_id=track.tag_id,
+        t_ns=track.t_ns,
+        x_m=round(track.x_m, 4),
+        y_m=round(track.y_m, 4),
+        yaw_rad=round(track.yaw_rad, 4),
+        speed_mps=round(track.speed_mps, 4),
+        lateral_speed_mps=round(track.lateral_speed_mps, 4),
+        yaw_rate_radps=round(track.yaw_rate_radps, 4),
+        std_x_m=round(x, 5),
+        std_y_m=round(y, 5),
+        std_yaw_rad=round(yaw, 5),
+        std_speed_mps=round(speed, 5),
+        age_s=round(track.age_s + age_s, 2),
+        stale=track.stale,
+        flags=track.flags,
+        cameras=track.cameras,
+    )

@@ -1,0 +1,72 @@
+"""`scm eye convert`: a camera's lens from one file format into another."""
+
+import argparse
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scm.command import Command
+
+if TYPE_CHECKING:  # the command line starts without what reads lenses
+    from scm.eye.calibration_files import Format
+
+_FORMATS: "dict[str, Format]" = {".toml": "scm", ".yaml": "ros", ".yml": "opencv"}
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "calibration", type=Path, metavar="FILE",
+        help="lens.toml, ROS camera_info YAML, or YAML, XML or JSON of OpenCV",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE",
+        help="by its suffix: .toml ours, .yaml ROS camera_info, .yml OpenCV",
+    )  # fmt: skip
+    parser.add_argument(
+        "--format", choices=("scm", "ros", "opencv"), help="of --out, whatever its suffix"
+    )
+    parser.add_argument(
+        "--size", type=_size, metavar="1280x720", help="of the frames, where FILE does not hold it"
+    )
+    parser.add_argument(
+        "--camera-name", default="camera", metavar="NAME", help="for ROS (%(default)s)"
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.errors import EyeError
+    from scm.eye.calibrate.say import lens_lines
+    from scm.eye.calibration_files import read_calibration, write_calibration
+
+    form: Format | None = arguments.format or _FORMATS.get(arguments.out.suffix.lower())
+    if form is None:
+        raise EyeError(f"--out: expected .toml, .yaml or .yml, or --format, got {arguments.out}")
+    lens, remarks = read_calibration(arguments.calibration, arguments.size)
+    write_calibration(lens, arguments.out, form, arguments.camera_name)
+    print(f"{lens.lens} lens, {lens.width_px} x {lens.height_px} px")
+    print("\n".join(lens_lines(lens)))
+    for remark in remarks:
+        print(f"  {remark}")
+    if form != "scm":
+        print("  its covariance is not written: only our own format, .toml, holds it")
+    print(f"written to {arguments.out}, {_SAID[form]}")
+    return 0
+
+
+_SAID = {"scm": "for `scm eye --calibration`", "ros": "as ROS camera_info",
+         "opencv": "as OpenCV's FileStorage"}  # fmt: skip
+
+
+def _size(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,5})[xX](\d{1,5})", text)
+    if found is None:
+        raise argparse.ArgumentTypeError(f"expected two numbers as 1280x720, got {text!r}")
+    return int(found[1]), int(found[2])
+
+
+COMMAND = Command(
+    help="A camera's lens from ROS or OpenCV files into ours, or the other way.",
+    example="scm eye convert camera_info.yaml --out lens.toml",
+    arguments=_arguments,
+    run=_run,
+)
