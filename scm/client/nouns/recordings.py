@@ -11,9 +11,11 @@ from scm.client.records.recordings import (
     Notes,
     PageRecordedEvent,
     PageRecordingRow,
+    RecordedDisturbances,
     RecordingRow,
     Summary,
 )
+from scm.client.records.shared import Operation
 
 
 class RecordingsNoun:
@@ -95,6 +97,16 @@ class RecordingsNoun:
             query={"limit": limit, "cursor": cursor},
         )
 
+    def disturbances(self, name: str) -> RecordedDisturbances:
+        """What made measurements void while it was recorded.
+
+        Args:
+            name: a recording: its file without .mcap
+        """
+        return self._connection.ask(
+            "GET", f"/api/v1/recordings/{part(name)}/disturbances", RecordedDisturbances
+        )
+
     def picture(self, name: str, camera: str, *, t_s: float = 0.0) -> bytes:
         """What an overhead camera saw, at a time.
 
@@ -163,6 +175,30 @@ class RecordingsNoun:
             Notes,
             headers={"if-match": if_match, "if-none-match": if_none_match},
             body={"title": title, "notes": notes},
+            key=idempotency_key,
+        )
+
+    def cut(
+        self,
+        name: str,
+        *,
+        from_s: float = 0.0,
+        to_s: float | None = None,
+        idempotency_key: str = "",
+    ) -> Operation:
+        """Copy a part of it into a recording of its own.
+
+        Args:
+            name: a recording: its file without .mcap
+            from_s: seconds since the recording began
+            to_s: likewise; without: to the end
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.ask(
+            "POST",
+            f"/api/v1/recordings/{part(name)}/parts",
+            Operation,
+            body={"from_s": from_s, "to_s": to_s},
             key=idempotency_key,
         )
 

@@ -4,7 +4,7 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection
-from scm.client.records.traffic import TrafficCounts, Violations
+from scm.client.records.traffic import Counts, Violations
 
 
 class TrafficNoun:
@@ -13,9 +13,9 @@ class TrafficNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def counts(self) -> TrafficCounts:
+    def counts(self) -> Counts:
         """Counts, delays, queues and level of service."""
-        return self._connection.ask("GET", "/api/v1/traffic", TrafficCounts)
+        return self._connection.ask("GET", "/api/v1/traffic", Counts)
 
     def violations(self, *, vehicle: str = "", limit: int = 100) -> Violations:
         """Violations, newest first, with their evidence.

@@ -209,6 +209,36 @@ class PageRecordedEvent(msgspec.Struct, kw_only=True, frozen=True):
     next_: str | None = msgspec.field(name="next")
 
 
+class RecordedDisturbance(msgspec.Struct, kw_only=True, frozen=True):
+    """One of them, from when to when since the recording began; see `/disturbances`.
+
+    Attributes:
+        kind: Of which sort it is.
+        source: Who told it.
+        text: One sentence for a person.
+        start_s: When it begins [s].
+        end_s: When it ends [s].
+    """
+
+    kind: str
+    source: str
+    text: str
+    start_s: float
+    end_s: float
+
+
+class RecordedDisturbances(msgspec.Struct, kw_only=True, frozen=True):
+    """What of a recording is void.
+
+    Attributes:
+        disturbances: The oldest first.
+        void: What that means for the recording as a whole, in words; none: all of it counts.
+    """
+
+    disturbances: tuple[RecordedDisturbance, ...]
+    void: tuple[str, ...]
+
+
 class Notes(msgspec.Struct, kw_only=True, frozen=True):
     """What people wrote about a recording; the file keeps its name.
 

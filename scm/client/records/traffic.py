@@ -64,20 +64,23 @@ class ApproachCount(msgspec.Struct, kw_only=True, frozen=True):
     saturation: float | None = None
 
 
-class TrafficCounts(msgspec.Struct, kw_only=True, frozen=True):
-    """All lanes on which somebody was counted, and all approaches; over the last `window_s`.
+class Counts(msgspec.Struct, kw_only=True, frozen=True):
+    """Counts of the observer.
 
     Attributes:
         t_ns: When it was true, by the clock of who tells it [ns].
         window_s: Over how long it was counted [s].
         lanes: Lanes.
         approaches: One lane that leads to a line before a junction; means are over the window.
+        void: Why the window's counts, delays and queues say nothing of plans, in words; none: they
+            do.
     """
 
     t_ns: int
     window_s: float
     lanes: tuple[LaneCount, ...] = ()
     approaches: tuple[ApproachCount, ...] = ()
+    void: tuple[str, ...] = ()
 
 
 class SignalGroup(msgspec.Struct, kw_only=True, frozen=True):
