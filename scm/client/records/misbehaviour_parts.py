@@ -17,6 +17,8 @@ class StationScore(msgspec.Struct, kw_only=True, frozen=True):
         score: 0 is ordinary; from 5 up it is suspected, until it falls below 2.
         worst: The check that last gave it points; empty: none.
         suspected: Whether a report stands against it.
+        tag_unseen: Whether it is a car of the city whose tag the Eye cannot see though it
+            overlooks its place: nobody confirms where it is. No accusation.
     """
 
     station: str
@@ -24,6 +26,7 @@ class StationScore(msgspec.Struct, kw_only=True, frozen=True):
     score: float
     worst: str
     suspected: bool
+    tag_unseen: bool = False
 
 
 class Misbehaviour(msgspec.Struct, kw_only=True, frozen=True):
