@@ -38,6 +38,7 @@ _log = logging.getLogger(__name__)
 NAME = "misbehaviour"
 PERIOD_NS = 50 * NS_PER_MS
 CAR = "nigel"
+MOST_MPS = 7.0
 MOST_TOLD = 200
 """Stations in a list of scores: those that most is held against."""
 
@@ -149,14 +150,17 @@ class MisbehaviourPart:
 
 
 def limits_by_car(car: str) -> Limits:
-    """Return the limits of a car file by its name; of one that is not here, a Nigel's."""
+    """Return the limits of a car file by its name; of one that is not here, a Nigel's.
+
+    A file that tells no top speed is given `MOST_MPS`, that of a 1:10 racing car.
+    """
     try:
         facts = facts_of(car or CAR)
     except CarError:
         facts = facts_of(CAR)
     body = car_body(car or CAR)
     rear, front = body.x_span
-    return limits_of(facts.speed_mps, front / (front - rear), has_tag=body.has_tag)
+    return limits_of(min(facts.speed_mps, MOST_MPS), front / (front - rear), has_tag=body.has_tag)
 
 
 def report_of(found: Judged, detector: Detector, now_ns: int) -> MisbehaviourReport:

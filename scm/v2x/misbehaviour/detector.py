@@ -169,7 +169,7 @@ class Detector:
         doubts: list[tuple[Check, float]] = []
         confirmed = False
         for check in self._checks:
-            if (confirmed and check.witnessed) or (case.is_new and check.floor > LEAST):
+            if (confirmed and check.witnessed) or (case.is_new and _may_wait(check)):
                 continue
             plausibility = check.judge(case)
             if plausibility is None:
@@ -316,6 +316,11 @@ class Detector:
             if was != cell:
                 self._cells.get(was, {}).pop(claim.who, None)
         self._cells.setdefault(cell, {})[claim.who] = claim
+
+
+def _may_wait(check: Check) -> bool:
+    """Return whether a check says nothing of a newcomer: it goes by the map or the Eye alone."""
+    return check.floor > LEAST and check.kind != "longAcc"
 
 
 def _cell(x: float, y: float) -> tuple[int, int]:

@@ -6,7 +6,8 @@
 
 The least counts and not the sum: checks look at the same numbers, so they are wrong together.
 FREE is what an honest car's worst check of twenty says anyway. ON takes two blatant claims, or
-many doubtful ones within the memory.
+many doubtful ones within the memory. Where the Eye cannot see a car's tag, nobody can speak for it:
+what checks that a witness settles find raises its score to UNSEEN_MOST and no further.
 """
 
 import math
@@ -19,6 +20,7 @@ from scm.v2x.misbehaviour.kalman import Kalman
 MEMORY_S = 10.0
 FREE, MOST = 0.8, 4.0
 ON, OFF = 5.0, 2.0
+UNSEEN_MOST = 3.0
 EVIDENCE = 6
 REPEAT_NS = 10_000_000_000
 
@@ -88,7 +90,7 @@ class Memory:
             gap_s: Since the station's last one.
             doubts: Checks that found it less than ordinary, and its plausibility.
         """
-        points = 0.0
+        points = soft = 0.0
         for check, plausibility in doubts:
             found = min(MOST, -math.log10(plausibility)) - FREE
             if found <= 0.0:
@@ -98,10 +100,16 @@ class Memory:
                 noted = self.noted[check.name] = Noted(check)
             noted.claims += 1
             noted.least = min(noted.least, plausibility)
-            if found > points:
-                points, self.worst = found, check.name
+            if found > max(points, soft):
+                self.worst = check.name
+            if check.witnessed and self.is_tag_unseen:
+                soft = max(soft, found)
+            else:
+                points = max(points, found)
         self.score = self.score * math.exp(-max(0.0, gap_s) / MEMORY_S) + points
-        if points:
+        if soft > points:
+            self.score = max(self.score, min(self.score + soft - points, UNSEEN_MOST))
+        if points or soft:
             self._keep(claim)
         return self._judge(claim.sent_ns)
 

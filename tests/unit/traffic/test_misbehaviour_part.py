@@ -12,14 +12,17 @@ from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.part import Hears
 from scm.traffic.attacker import Attacker
-from scm.traffic.misbehaviour_part import MisbehaviourPart
+from scm.traffic.misbehaviour_part import MisbehaviourPart, limits_by_car
 from scm.traffic.part import TrafficPart
 from scm.v2x.etsi_convert import read_cam, station_id
+from scm.v2x.exchange import Incoming
+from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
 from scm.world.part import WorldPart
+from tests.unit.v2x.misbehaviour.claims import RSU, body, state, track
 from vehicle_agent.agent import AgentPart
 
 MAP = load_map("driving_school")
@@ -218,3 +221,38 @@ def test_a_liar_that_was_never_let_in_said_nothing():
     lines = []
     Attacker(AgentPart("n9"), {"n9": "zero_speed"}, MAP, say=lines.append).finish(START_NS)
     assert lines == ["n9 leaves: it was never in the city"]
+
+
+def hear_alone(names, car="nigel", seen=(), seconds_=8):
+    """Let a part hear cars that drive while the Eye sees some of them; return all that it says."""
+    part, said = MisbehaviourPart(MAP, lambda _x, _y: True), []
+    for k in range(seconds_):
+        now_ns = START_NS + k * NS_PER_S
+        for place, name in enumerate(names):
+            told = state(1.0 * k, 0.1 + 0.4 * place + 0.01 * k, v=0.01, name=name)
+            cam = CamRx(receiver=RSU, station=name, t_ns=told.t_ns, body=body(told), car=car)
+            inbox = [Incoming(message=cam, t_ns=now_ns)]
+            if name in seen:
+                inbox.insert(0, Incoming(message=track(told), t_ns=now_ns))
+            said += part.step(now_ns, inbox)
+    return said
+
+
+@pytest.mark.parametrize("car", ["nigel", "dart"])
+def test_that_the_eye_cannot_see_a_tag_is_told_once_and_accuses_nobody(car):
+    said = hear_alone(("n2", "n1"), car, seen=("n2",))
+    news = [one for one in said if isinstance(one, CityEvent)]
+    unseen = {"n1"} if car == "nigel" else {"n1", "n2"}  # a bare roof shows no tag of its own
+    assert {(one.name, one.severity, one.vehicle) for one in news} == {
+        ("tag_unseen", "info", name) for name in unseen
+    }
+    assert len(news) == len(unseen)
+    rows = next(one for one in reversed(said) if isinstance(one, MisbehaviourScores)).stations
+    assert {row.station for row in rows if row.tag_unseen} == unseen
+    assert max(row.score for row in rows) < 1.0
+
+
+def test_limits_are_those_of_the_car_and_of_a_nigel_where_its_file_is_not_here():
+    assert 20.0 < limits_by_car("f1tenth").faster < 30.0
+    assert (limits_by_car("f1tenth").has_tag, limits_by_car("dart").has_tag) == (True, False)
+    assert limits_by_car("no such car") == limits_by_car("nigel") == limits_by_car("")

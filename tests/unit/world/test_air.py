@@ -25,6 +25,7 @@ from scm.v2x.messages.mapem_tx import MapemTx
 from scm.v2x.messages.radio_status import RadioStatus
 from scm.v2x.messages.srem_tx import SremTx
 from scm.v2x.messages.ssem_tx import SsemTx
+from scm.v2x.messages.stop_request import StopRequest
 from scm.vehicles.drivers.channel import channel_of, has_arrived
 from scm.world.air import OF_ROADSIDE, RECEIVED, transmit
 from scm.world.busy import Busy
@@ -208,3 +209,23 @@ def test_drivers_lose_frames_by_distance_as_the_formula_says():
     wanted = 1.0 - 0.5 * math.erfc(margin_db / (6.0 * math.sqrt(2.0)))
     got = np.mean(known_at(0, 8000, 8.0, fading_db=6.0))
     assert got == pytest.approx(wanted, abs=0.02)
+
+
+def test_the_cams_tell_what_the_city_knows_of_their_sender(make_city):
+    """Car file, lease and stop come from the world: no sender can write them."""
+    city = make_city(hosted=(("n1", "nigel"),))
+    city.run_for(1.5)
+    city.lease("n1", ttl_ms=60_000)
+    held_ns = city.now
+    city.run_for(1.5)
+    city.ask(StopRequest(engaged=True, by="ann"))
+    stopped_ns = city.now
+    city.run_for(1.5)
+    cams = city.heard(CamRx)
+    assert {out.stopped for out in cams if out.t_ns >= stopped_ns} == {True}
+    assert {out.stopped for out in cams if out.t_ns < stopped_ns} == {False}
+    assert {out.by_hand for out in cams if out.t_ns < held_ns} == {False}
+    assert next(out for out in cams if out.t_ns >= held_ns).by_hand
+    assert {out.car for out in city.heard(CamRx)} == {"nigel"}
+    bid = CamTx(station="n1", t_ns=0, body=city.heard(CamRx)[0].body)
+    assert not {"car", "by_hand", "stopped"} & set(bid.__struct_fields__)

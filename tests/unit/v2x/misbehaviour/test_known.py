@@ -1,10 +1,13 @@
 """What the city itself knows excuses honest cars: newcomers, bare roofs, hands, stops; no liar."""
 
+import math
+
 import pytest
 
 from scm.clock import NS_PER_S
 from scm.v2x.misbehaviour.check import GRACE_S, HARD_S, Sender, load_checks
 from scm.v2x.misbehaviour.detector import Detector
+from scm.v2x.misbehaviour.fusion import UNSEEN_MOST
 from scm.v2x.misbehaviour.limits import Limits, limits_of
 from tests.unit.v2x.misbehaviour.claims import RSU, body, ground, state, track
 
@@ -81,6 +84,26 @@ def test_a_newcomer_beside_the_road_has_seconds_of_grace_and_no_more():
 
     assert until_s(Sender()) < 0.5
     assert GRACE_S < until_s(NIGEL) < GRACE_S + 1.0
+
+
+def against_its_lane(judge, sender, jumps=False):
+    """Let a car drive against its lane while the Eye sees another one; return what is known."""
+    for k in range(100):
+        judge.see(track(state(0.1 * k, 0.9, v=0.0, name="n2")))
+        told = state(0.1 * k, 0.6 - 0.003 * k, v=0.03, turn=math.pi)
+        if jumps and k == 99:
+            told = state(0.1 * k, 0.1, v=0.03, turn=math.pi)
+        memory = hear(judge, told, sender).memory
+    return memory
+
+
+def test_who_cannot_be_seen_is_not_suspected_for_driving_badly_alone():
+    """No Eye could speak for it, as it would for a car with a tag; a contradiction still counts."""
+    assert against_its_lane(detector(), Sender()).since_ns is not None
+    memory = against_its_lane(detector(), NIGEL)
+    assert (memory.since_ns, memory.is_tag_unseen) == (None, True)
+    assert 2.0 < memory.score <= UNSEEN_MOST
+    assert against_its_lane(detector(), NIGEL, jumps=True).since_ns is not None
 
 
 @pytest.mark.parametrize("name", ["n1", "n9"])

@@ -95,8 +95,9 @@ function eyeOf(eye) {
 
 function doubtText(vehicle) {
   if (!misbehaviour.value?.watched) return "nobody watches";
-  const { score, suspected, reported } = doubtOf(vehicle);
-  const now = score === null ? "not on the air" : `score ${fixed(score, 1)}`;
+  const { score, suspected, tagUnseen, reported } = doubtOf(vehicle);
+  const unseen = tagUnseen ? "; the Eye cannot see its tag" : "";
+  const now = score === null ? "not on the air" : `score ${fixed(score, 1)}${unseen}`;
   if (suspected) return `${now}, suspected`;
   return reported ? `${now}, was reported` : now;
 }

@@ -24,13 +24,17 @@ export function useMisbehaviour() {
   }, []);
 }
 
-/** `{score, suspected, reported}` of a car, now and ever; the score is null where it is not heard. */
+/**
+ * `{score, suspected, tagUnseen, reported}` of a car, now and ever; the score is null where it is not
+ * heard. `tagUnseen`: the Eye cannot see its tag, which is no accusation.
+ */
 export function doubtOf(vehicle) {
   const told = misbehaviour.value;
   const row = told?.stations.find((one) => one.station === vehicle);
   return {
     score: row?.score ?? null,
     suspected: row?.suspected ?? false,
+    tagUnseen: row?.tag_unseen ?? false,
     reported: told?.reported.includes(vehicle) ?? false,
   };
 }
