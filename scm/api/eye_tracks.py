@@ -20,7 +20,9 @@ class TrackRow(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         t_ns: The time that it holds for, on the Eye's clock.
-        speed_mps: Along the car, + = forward; `lateral_speed_mps`: + = to its left.
+        speed_mps: Along the car, + = forward.
+        lateral_speed_mps: + = to the car's left.
+        yaw_rate_radps: + = counter-clockwise.
         std_x_m, std_y_m, std_yaw_rad, std_speed_mps: Standard deviations.
         age_s: Since a camera last saw it.
         stale: Not seen for so long that nobody should drive by it.

@@ -20,7 +20,9 @@ class TrackRow(msgspec.Struct, kw_only=True, frozen=True):
         x_m: To the right on the map [m].
         y_m: Up on the map [m].
         yaw_rad: Direction, counter-clockwise from map x [rad].
-        speed_mps: Along the car, + = forward; `lateral_speed_mps`: + = to its left.
+        speed_mps: Along the car, + = forward.
+        lateral_speed_mps: + = to the car's left.
+        yaw_rate_radps: + = counter-clockwise.
         std_x_m: Standard deviations.
         std_y_m: Standard deviations.
         std_yaw_rad: Standard deviations.

@@ -67,6 +67,8 @@ def test_the_place_of_the_camera_is_found_put_in_force_and_put_back(visit, runni
     page.fill("dialog input[name=reason]", "tried by a test")
     page.click("dialog .primary")
     page.wait_for_selector("dialog [role=alert]:has-text('would flag them as unsure')")
+    assert len(visited.complaints) == 1  # the browser's own, of the answer 409
+    visited.complaints.clear()
     page.fill("dialog input[name=meant]", "another")
     page.click("dialog .danger")
     page.wait_for_selector("dialog input[name=meant]:invalid")
