@@ -33,7 +33,7 @@ export function footprint(car) {
 }
 
 /** Draw a car; a chosen or lost one always with its name, others when there is room: `named`. */
-export function drawCar(paper, view, car, chosen, named = true, lamps = []) {
+export function drawCar(paper, view, car, chosen, named = true, heads = []) {
   const shape = footprint(car.car);
   const paint = paintOf(car.kind, car.alive);
   paper.save();
@@ -48,7 +48,7 @@ export function drawCar(paper, view, car, chosen, named = true, lamps = []) {
   lamps(paper, shape, on);
   if (!car.alive) cross(paper, shape);
   paper.restore();
-  if (named || chosen || !car.alive) drawLabel(paper, view, car, chosen, lamps);
+  if (named || chosen || !car.alive) drawLabel(paper, view, car, chosen, heads);
 }
 
 /** The ring about a chosen car. */
@@ -172,10 +172,10 @@ function cross(paper, { rear, front, half }) {
 }
 
 /**
- * The name beside the car, outside its outline whatever its heading, where no lamp would hide it.
- * @param lamps what is drawn over names: `[left, top, right, bottom]` in pixels
+ * The name beside the car, outside its outline whatever its heading, where no signal head would hide it.
+ * @param heads signal heads, drawn over names: `[left, top, right, bottom]` in pixels
  */
-export function drawLabel(paper, view, car, chosen, lamps = []) {
+export function drawLabel(paper, view, car, chosen, heads = []) {
   const { middle, front, rear, half } = footprint(car.car);
   const [colour] = paintOf(car.kind, car.alive);
   const [c, s] = [Math.cos(car.yaw_rad), Math.sin(car.yaw_rad)];
@@ -193,7 +193,7 @@ export function drawLabel(paper, view, car, chosen, lamps = []) {
     [view.x(car.x_m + middle * c), view.y(car.y_m + middle * s)],
     [across * view.scale + width / 2 + 4, along * view.scale + 12],
     [width / 2, half_px],
-    lamps,
+    heads,
   );
   paper.beginPath();
   paper.roundRect(x - width / 2, y - half_px, width, 2 * half_px, half_px);
@@ -204,11 +204,11 @@ export function drawLabel(paper, view, car, chosen, lamps = []) {
   paper.fillText(text, x - width / 2 + lead, y + 0.5);
 }
 
-/** The middle of a name: above the car, below it, right or left of it, as the first of these is free of lamps. */
-export function placeOf([x, y], [aside, above], [halfWide, halfHigh], lamps) {
+/** The middle of a name: above the car, below it, right or left of it, as the first of these is free of heads. */
+export function placeOf([x, y], [aside, above], [halfWide, halfHigh], heads) {
   const places = [[x, y - above], [x, y + above], [x + aside, y], [x - aside, y]];
   const isFree = ([px, py]) =>
-    lamps.every(
+    heads.every(
       ([left, top, right, bottom]) =>
         px + halfWide < left || px - halfWide > right || py + halfHigh < top || py - halfHigh > bottom,
     );
