@@ -27,6 +27,29 @@ def facts_of(name_or_path: str) -> CarFacts:
     Raises:
         CarError: when there is no such file, or it has no footprint.
     """
+    data, footprint = _read(name_or_path)
+    speeds = _numbers(data, "drive", "throttle_speed_m_s")
+    late = _numbers(data, "drive", "delay_s")
+    return CarFacts(
+        speed_mps=max(speeds, default=math.inf),
+        slow_mps=speeds[round(CRUISE_THROTTLE * len(speeds)) - 1] if speeds else math.inf,
+        length_m=footprint[1] - footprint[0],
+        reaction_s=NIGEL.reaction_s + (late[0] if late else 0.0),
+    )
+
+
+def outline_of(name_or_path: str) -> tuple[float, bool]:
+    """Return what share of a car lies before its rear axle, and whether its roof has a tag.
+
+    Raises:
+        CarError: as `facts_of`.
+    """
+    data, (rear, front) = _read(name_or_path)
+    return front / (front - rear), "ips" in data
+
+
+def _read(name_or_path: str) -> tuple[dict[str, Any], tuple[float, ...]]:
+    """Return a car file's content and its footprint along the car [m]: rear, front."""
     path = Path(name_or_path)
     named = car_files()
     if path.suffix != ".toml":
@@ -40,14 +63,7 @@ def facts_of(name_or_path: str) -> CarFacts:
     footprint = _numbers(data, "body", "footprint_x_m")
     if len(footprint) != 2 or not footprint[0] < footprint[1]:
         raise CarError(f"{path}: body.footprint_x_m: got {footprint}, expected [rear, front]")
-    speeds = _numbers(data, "drive", "throttle_speed_m_s")
-    late = _numbers(data, "drive", "delay_s")
-    return CarFacts(
-        speed_mps=max(speeds, default=math.inf),
-        slow_mps=speeds[round(CRUISE_THROTTLE * len(speeds)) - 1] if speeds else math.inf,
-        length_m=footprint[1] - footprint[0],
-        reaction_s=NIGEL.reaction_s + (late[0] if late else 0.0),
-    )
+    return data, footprint
 
 
 def slowest_of(cars: Iterable[CarFacts]) -> CarFacts:

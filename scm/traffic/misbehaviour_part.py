@@ -12,8 +12,7 @@ from scm.errors import CarError
 from scm.log import event
 from scm.maps.model import CityMap
 from scm.part import Hears, Serves
-from scm.scenery.bodies import car_body
-from scm.traffic.cars import facts_of
+from scm.traffic.cars import facts_of, outline_of
 from scm.v2x.etsi_convert import roadside_station
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
@@ -155,12 +154,10 @@ def limits_by_car(car: str) -> Limits:
     A file that tells no top speed is given `MOST_MPS`, that of a 1:10 racing car.
     """
     try:
-        facts = facts_of(car or CAR)
+        facts, (front_share, has_tag) = facts_of(car), outline_of(car)
     except CarError:
-        facts = facts_of(CAR)
-    body = car_body(car or CAR)
-    rear, front = body.x_span
-    return limits_of(min(facts.speed_mps, MOST_MPS), front / (front - rear), has_tag=body.has_tag)
+        facts, (front_share, has_tag) = facts_of(CAR), outline_of(CAR)
+    return limits_of(min(facts.speed_mps, MOST_MPS), front_share, has_tag=has_tag)
 
 
 def report_of(found: Judged, detector: Detector, now_ns: int) -> MisbehaviourReport:

@@ -47,11 +47,6 @@ class Limits:
     front_share: float = 0.767
     has_tag: bool = True
 
-    @property
-    def faster(self) -> float:
-        """Return how many times faster than a Nigel it is, at least 1."""
-        return max(1.0, self.speed_mps / NIGEL_MPS)
-
     @cached_property
     def hard(self) -> "Limits":
         """Return the same for who brakes with full throttle in reverse, as hands do."""

@@ -8,13 +8,15 @@ cancels there and a small constant lie remains.
 
 Between two CAMs the speed strays from both by DRIFT_MPS: beyond it another CAM would have been due
 (EN 302 637-2, 6.1.3), and lost ones make the tolerance grow with the square of the time, and the
-mean as unsure as it is when the speed changed.
+mean as unsure as it is when the speed changed. Who drives faster than a Nigel can slips more: all
+tolerances of a speed grow in that ratio.
 """
 
 import math
 
 from scm.v2x.misbehaviour.check import Case, Check
 from scm.v2x.misbehaviour.likely import of_number
+from scm.v2x.misbehaviour.limits import NIGEL_MPS
 
 DRIFT_MPS = 0.03
 TOLERANCE_M = 0.006
@@ -27,7 +29,7 @@ def _judge(case: Case) -> float | None:
     if before is None or dt <= 0.0 or now.speed_mps is None or before.speed_mps is None:
         return None
     spread = abs(now.speed_mps - before.speed_mps)
-    faster = case.limits.faster
+    faster = max(1.0, abs(now.speed_mps) / NIGEL_MPS, abs(before.speed_mps) / NIGEL_MPS)
     tolerance = TOLERANCE_M + (DRIFT_MPS * faster + 0.25 * spread) * dt + 0.02 * faster * dt * dt
     sigma = math.hypot(now.own_m + before.own_m, now.own_mps * dt)
     strayed = case.strayed

@@ -148,4 +148,13 @@ def test_a_faster_car_is_judged_by_what_it_can_do():
         told = state(0.1 * k, 0.05 + 0.1 * k, v=1.0)
         found = hear(judge, told, Sender("fast"))
     assert found.memory.score < 1.0
-    assert (fast.accel_mps2, fast.faster) == (pytest.approx(9.0), pytest.approx(10.0))
+    assert fast.accel_mps2 == pytest.approx(9.0)
+
+
+def test_a_faster_car_file_buys_no_leniency_at_the_speed_of_others():
+    """What is excused goes by the speed that is driven, so a Nigel's lie is found in any car."""
+    judge = Detector(ground(), lambda _car: limits_of(7.0, 0.767, has_tag=False), CHECKS)
+    for k in range(60):
+        memory = hear(judge, state(0.1 * k, 0.05 + 0.01 * k, v=0.2), Sender("dart")).memory
+    assert memory.since_ns is not None
+    assert "position_speed_consistency" in memory.noted
