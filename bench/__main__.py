@@ -35,6 +35,7 @@ LONG = (
     "recording_faults",
     "serial",
     "stop",
+    "sumo",
 )  # takes minutes: only where it is asked for, alone, with its own arguments
 
 

@@ -7,6 +7,7 @@
     ├── MessageError  (ValueError)       a message, a key, or bytes that should have been one
     ├── RecordingError(ValueError)       a recording or its description
     ├── PlanError     (ValueError)       a signal plan or program card
+    ├── DemandError   (ValueError)       a table of who wants to drive where, and when
     ├── EyeError      (ValueError)       a camera or its calibration
     ├── LinkError     (ConnectionError)  the bus, a serial line, a peer that is not there
     ├── StoreError    (OSError)          state that must survive, and cannot be read or written
@@ -51,6 +52,10 @@ class RecordingError(ScmError, ValueError):
 
 class PlanError(ScmError, ValueError):
     """A signal plan or a program card that is not safe or not complete."""
+
+
+class DemandError(ScmError, ValueError):
+    """A demand table that cannot be."""
 
 
 class EyeError(ScmError, ValueError):

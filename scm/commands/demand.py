@@ -1,9 +1,11 @@
 """`scm demand`: cars come and go as a table says."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from scm.command import Command, credentials_argument, run_part
+from scm.errors import DemandError
 from scm.v2x.router import DEFAULT_ENDPOINT
 
 
@@ -25,10 +27,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
     from scm.traffic.demand import DemandPart
-    from scm.traffic.demand_table import DemandError, load_demand, seconds_of_day
+    from scm.traffic.demand_table import load_demand, seconds_of_day
 
     begin_s = None if arguments.time is None else seconds_of_day(arguments.time, "--time")
-    flows = load_demand(arguments.table)
+    flows = load_demand(arguments.table, lambda words: print(words, file=sys.stderr, flush=True))
     city_map = load_map(arguments.map)
     try:
         part = DemandPart(city_map, flows, begin_s)

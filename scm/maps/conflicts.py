@@ -52,8 +52,12 @@ def _shape(one: Conflict, other: Conflict, roads: Roads) -> tuple[object, ...]:
 def _measure(one: Conflict, other: Conflict, roads: Roads) -> Meeting | None:
     first, second = roads.lane(one.lane), roads.lane(other.lane)
     (a, at_a), (b, at_b) = _stretch(one, roads), _stretch(other, roads)
-    squared = ((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2)
-    near = squared < ((first.width_m + second.width_m) / 2.0) ** 2
+    least_m = (first.width_m + second.width_m) / 2.0
+    apart = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0))
+    if apart.max() >= least_m:
+        return None
+    dx, dy = np.subtract.outer(a[:, 0], b[:, 0]), np.subtract.outer(a[:, 1], b[:, 1])
+    near = dx * dx + dy * dy < least_m**2
     if not near.any():
         return None
     along_a, along_b = at_a[near.any(axis=1)], at_b[near.any(axis=0)]

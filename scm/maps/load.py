@@ -65,7 +65,18 @@ def load_map(name_or_path: str | Path) -> CityMap:
         raise MapError(
             f"{path}: expected a map file, got a picture: give the .yaml that describes its cells"
         )
-    city_map = _with_pictures(_read(path), path)
+    with reading(path, "a TOML file", MapError):
+        text = path.read_text(encoding="utf-8")
+    return map_of(text, path)
+
+
+def map_of(text: str, path: Path) -> CityMap:
+    """Return the map that the text of a map file describes; `path` is where it is, or will be.
+
+    Raises:
+        MapError: It is wrong, with every reason that could be found.
+    """
+    city_map = _with_pictures(_read(text, path), path)
     problems = problems_of(city_map)
     if problems:
         listed = "".join(f"\n  {problem}" for problem in problems)
@@ -95,10 +106,10 @@ def _find(name_or_path: str | Path) -> Path:
     )
 
 
-def _read(path: Path) -> CityMap:
+def _read(text: str, path: Path) -> CityMap:
     """Return the file as a map whose keys and types are right."""
     with reading(path, "a TOML file", MapError):
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(text)
     try:
         return msgspec.convert(data, CityMap)
     except msgspec.ValidationError as error:

@@ -436,6 +436,8 @@ class CityMap(Record, kw_only=True, frozen=True):
 
     Attributes:
         revision: Counts changes of the lanes that cars must know of.
+        drives_on: The side of the road. On the left, rules are mirrored: left comes before right,
+            and who turns right lets oncoming cars pass.
         speed_advice: Whether drivers come to red lights no sooner than SPATEM lets them pass.
     """
 
@@ -444,6 +446,7 @@ class CityMap(Record, kw_only=True, frozen=True):
     title: str
     source: str
     revision: int = 1
+    drives_on: Literal["right", "left"] = "right"
     floor: Floor
     wind: Wind = Wind()
     tag: MapTag

@@ -4,7 +4,6 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
 from typing import Any, Protocol
 
 import msgspec
@@ -33,6 +32,7 @@ from scm.maps.polyline import advance, extent
 from scm.maps.route import Roads
 from scm.maps.sumo_curves import Curve
 from scm.maps.sumo_read import Net, NetLane, NetLink
+from scm.maps.sumo_ruled import Ruled, bus_names, ruled
 
 FASTEST_MPS = 0.25
 SLOWEST_MPS = 0.08
@@ -63,7 +63,12 @@ class LaidTurn(Protocol):
 
 
 class CityBuilder:
-    """One city in the making; lengths are scaled already, speeds are not."""
+    """One city in the making; lengths are scaled already, speeds are not.
+
+    Attributes:
+        ruled: The junctions where ways meet, once the city is made.
+        idle_signals: The network's traffic lights that rule nothing, for no ways meet there.
+    """
 
     def __init__(
         self,
@@ -76,7 +81,8 @@ class CityBuilder:
         self._net, self._lanes, self._curves, self._turns = net, lanes, curves, turns
         self._scale = scale
         self._fastest = max(lane.speed_mps for lane in lanes.values())
-        self._names: dict[str, str] = {}
+        self.ruled: list[Ruled] = []
+        self.idle_signals: list[str] = []
         xs, ys = zip(*(point for lane in lanes.values() for point in lane.points), strict=True)
         self._low, self._high = (min(xs), min(ys)), (max(xs), max(ys))
         self._shift = (0.0, 0.0)
@@ -92,9 +98,10 @@ class CityBuilder:
         )
         bare = CityMap(
             map=1,
-            name=re.sub(r"[^a-z0-9_]", "_", self._net.name.lower())[:32],
+            name=_map_name(self._net.name),
             title=f"{self._net.name}, 1:{self._scale:g}",
             source="imported from a SUMO network",
+            drives_on=self._net.head.drives_on,
             floor=Floor(x_m=_span(width), y_m=_span(depth), colour="#8ea583"),
             tag=MapTag(tag_id=0, size_m=0.0762),
             lanes=(*self._street_lanes(), *self._turn_lanes()),
@@ -131,76 +138,52 @@ class CityBuilder:
     def _at(self, x: float, y: float) -> Point:
         return round(x + self._shift[0], DIGITS), round(y + self._shift[1], DIGITS)
 
+    def in_network(self, x_m: float, y_m: float) -> Point:
+        """Return where a place of the city is in the network [m at full size]."""
+        return (x_m - self._shift[0]) * self._scale, (y_m - self._shift[1]) * self._scale
+
     def _areas(self) -> Iterator[Area]:
-        for node, shape in self._net.shapes.items():
+        names = bus_names(self._net.shapes)
+        for name, shape in zip(names, self._net.shapes.values(), strict=True):
             points = tuple(self._at(x / self._scale, y / self._scale) for x, y in shape)
             if len(set(points)) > 2:
-                yield Area(name=self.name_of(node), points=points)
-
-    def name_of(self, node: str) -> str:
-        """Return a junction's name on the bus, always the same for the same SUMO id."""
-        if node not in self._names:
-            wished = re.sub(r"[^a-z0-9_-]", "_", node.lower())[:22] or "_"
-            taken = set(self._names.values())
-            count, name = 1, wished
-            while name in taken:
-                count += 1
-                name = f"{wished}_{count}"
-            self._names[node] = name
-        return self._names[node]
+                yield Area(name=name, points=points)
 
     def _ruled(self, bare: CityMap) -> CityMap:
         """Return the city with signals, signs and spawn places."""
         roads = Roads(bare)
-        lit, unlit = self._by_junction(roads)
-        junctions, lines = [], []
-        lights: list[Light] = []
-        for number, (name, approaches) in enumerate(lit.items(), start=1):
-            groups = []
-            for count, (lane, links) in enumerate(approaches.items(), start=1):
-                first, *more = _ways(links, roads)
-                groups.append(Group(name=lane, number=count, movement=first, more=tuple(more)))
-                at_m = line_at(roads, lane)
-                lines.append(
-                    StopLine(name=f"{name}_{lane}", lane=lane, at_m=at_m, junction=name, group=lane)
-                )
-                pole = _pole(roads, lane, at_m)
-                lights.append(Light(light_id=len(lights) + 1, junction=name, group=lane, **pole))
-            junctions.append(Junction(name=name, number=number, groups=tuple(groups), plan=PLAN))
-        crossings = [
-            Crossing(name=name, approaches=tuple(_approach(lane, links, roads)
-                     for lane, links in approaches.items()))
-            for name, approaches in unlit.items()
+        links = [turn.link for turn in self._turns]
+        self.ruled, self.idle_signals = ruled(
+            links, lambda a, b: meeting(_way(a, roads), _way(b, roads), roads) is not None
+        )
+        lit = [junction for junction in self.ruled if junction.signals]
+        unlit = [junction for junction in self.ruled if not junction.signals]
+        lines = [
+            StopLine(
+                name=lane, lane=lane, at_m=line_at(roads, lane), junction=junction.name, group=lane
+            )
+            for junction in lit for lane in junction.approaches
         ]  # fmt: skip
-        signed = [(lane, links) for approaches in unlit.values() for lane, links in
-                  approaches.items()]  # fmt: skip
         return msgspec.structs.replace(
             bare,
-            junctions=tuple(junctions),
-            crossings=tuple(crossings),
+            junctions=tuple(_junction(one, k, roads) for k, one in enumerate(lit, start=1)),
+            crossings=tuple(_crossing(one, roads) for one in unlit),
             stop_lines=tuple(lines),
-            lights=tuple(lights),
-            signs=tuple(_signs(signed, roads)),
+            lights=tuple(
+                Light(
+                    light_id=k, junction=line.junction, group=line.group,
+                    **_pole(roads, line.lane, line.at_m),
+                )
+                for k, line in enumerate(lines, start=1)
+            ),
+            signs=tuple(_signs(unlit, roads)),
             spawns=tuple(_spawns(roads, list(self._lanes))),
-        )
+        )  # fmt: skip
 
-    def _by_junction(
-        self, roads: Roads
-    ) -> tuple[dict[str, dict[str, list[NetLink]]], dict[str, dict[str, list[NetLink]]]]:
-        """Return the links by junction and lane: those with signals, and those without.
 
-        Where no ways of two lanes meet there is nothing to rule.
-        """
-        lit: dict[str, dict[str, list[NetLink]]] = defaultdict(lambda: defaultdict(list))
-        unlit: dict[str, dict[str, list[NetLink]]] = defaultdict(lambda: defaultdict(list))
-        for turn in self._turns:
-            link = turn.link
-            table, key = (lit, link.signal) if link.signal else (unlit, link.node)
-            table[self.name_of(key)][link.start].append(link)
-        return tuple(  # type: ignore[return-value]
-            {name: lanes for name, lanes in table.items() if _any_meet(lanes, roads)}
-            for table in (lit, unlit)
-        )
+def _map_name(given: str) -> str:
+    name = re.sub(r"[^a-z0-9_]", "_", given.lower())[:32]
+    return name if name.strip("_") else "city"
 
 
 def way_name(link: NetLink) -> str:
@@ -214,37 +197,39 @@ def line_at(roads: Roads, lane: str) -> float:
     return round(max(length - LINE_BEFORE_M, 0.5 * length), 4)
 
 
-def _ways(links: Sequence[NetLink], roads: Roads) -> list[Conflict]:
-    names = [way_name(link) for link in links]
-    return [
-        Conflict(lane=name, from_m=0.0, to_m=math.floor(roads.length_of(name) * 1e4) / 1e4)
-        for name in names
-    ]
+def _way(link: NetLink, roads: Roads) -> Conflict:
+    name = way_name(link)
+    return Conflict(lane=name, from_m=0.0, to_m=math.floor(roads.length_of(name) * 1e4) / 1e4)
 
 
-def _any_meet(lanes: Mapping[str, Sequence[NetLink]], roads: Roads) -> bool:
-    ways = {lane: _ways(links, roads) for lane, links in lanes.items()}
-    return any(
-        meeting(a, b, roads) is not None
-        for one, other in combinations(ways.values(), 2)
-        for a in one
-        for b in other
-    )
+def _junction(junction: Ruled, number: int, roads: Roads) -> Junction:
+    groups = []
+    for count, (lane, links) in enumerate(junction.approaches.items(), start=1):
+        first, *more = (_way(link, roads) for link in links)
+        groups.append(Group(name=lane, number=count, movement=first, more=tuple(more)))
+    return Junction(name=junction.name, number=number, groups=tuple(groups), plan=PLAN)
 
 
-def _approach(lane: str, links: Sequence[NetLink], roads: Roads) -> Approach:
-    return Approach(
-        name=lane, lane=lane, at_m=line_at(roads, lane), ways=tuple(_ways(links, roads))
-    )
+def _crossing(junction: Ruled, roads: Roads) -> Crossing:
+    return Crossing(
+        name=junction.name,
+        approaches=tuple(
+            Approach(
+                name=lane, lane=lane, at_m=line_at(roads, lane),
+                ways=tuple(_way(link, roads) for link in links),
+            )
+            for lane, links in junction.approaches.items()
+        ),
+    )  # fmt: skip
 
 
-def _signs(signed: Sequence[tuple[str, Sequence[NetLink]]], roads: Roads) -> Iterator[Sign]:
+def _signs(unlit: Sequence[Ruled], roads: Roads) -> Iterator[Sign]:
     """Yield the signs of lanes that do not go first; SUMO's state is that of the straightest."""
     number = 0
-    for lane, links in signed:
-        states = {link.state for link in links}
+    approaches = (pair for junction in unlit for pair in junction.approaches.items())
+    for lane, links in approaches:
         straightest = min(links, key=lambda link: _bend(roads, way_name(link)))
-        if states & {"s", "w"}:
+        if {link.state for link in links} & {"s", "w"}:
             kind = "stop"
         elif straightest.state == "m":
             kind = "give_way"
@@ -261,10 +246,11 @@ def _bend(roads: Roads, lane: str) -> float:
 
 
 def _pole(roads: Roads, lane: str, at_m: float) -> dict[str, Any]:
-    """Return the place of what stands to the right of a line and looks at who comes."""
+    """Return the place of what stands beside a line, on the road's own side, facing the cars."""
     x, y, yaw = _pose(roads.definition(lane), at_m)
-    right = roads.definition(lane).width_m / 2.0 + POLE_M
-    beside = Pose2(x, y, yaw).apply(0.0, -right)
+    out = roads.definition(lane).width_m / 2.0 + POLE_M
+    side = 1.0 if roads.city_map.drives_on == "left" else -1.0
+    beside = Pose2(x, y, yaw).apply(0.0, side * out)
     yaw = math.remainder(yaw + math.pi, math.tau)
     return {"x_m": round(beside[0], 4), "y_m": round(beside[1], 4), "yaw_rad": round(yaw, 6)}
 

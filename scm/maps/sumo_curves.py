@@ -16,10 +16,12 @@ import numpy as np
 from scm.arrays import Floats
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.model import Point, Segment
-from scm.maps.polyline import advance, extent, sample
+from scm.maps.polyline import advance, extent
 
 DUST_M = 1e-6
 DUST_RAD = 1e-7
+DOT_M = 0.04
+FINE_M = 0.01
 
 
 class Curve(NamedTuple):
@@ -211,9 +213,44 @@ def _arc(start: Pose2, end: Point) -> tuple[tuple[Segment, ...], float]:
     return (Segment(radius_m=radius, angle_rad=2.0 * half),), start.yaw + 2.0 * half
 
 
+class Dots(NamedTuple):
+    """Places along a curve, its ends included: (n, 2) points, (n,) headings, (n,) distances."""
+
+    points: Floats
+    yaw: Floats
+    at_m: Floats
+
+
+def dotted(curve: Curve, apart_m: float = DOT_M) -> Dots:
+    """Return places along a curve, so far apart or less."""
+    pose, begin_m = curve.start, 0.0
+    points, yaws, places = [], [], []
+    for segment in curve.segments:
+        length, bend = extent(segment)
+        s = np.linspace(0.0, length, max(1, math.ceil(length / apart_m)), endpoint=False)
+        arc = np.stack((np.sin(bend * s), 1.0 - np.cos(bend * s)))
+        ahead = arc / bend if bend else np.stack((s, 0.0 * s))
+        points.append(turned(ahead.T, pose.yaw) + np.array((pose.x, pose.y)))
+        yaws.append(pose.yaw + bend * s)
+        places.append(begin_m + s)
+        pose, begin_m = advance(pose, length, bend), begin_m + length
+    return Dots(
+        np.concatenate((*points, [[pose.x, pose.y]])),
+        np.concatenate((*yaws, [pose.yaw])),
+        np.concatenate((*places, [begin_m])),
+    )
+
+
+def turned(points: Floats, yaw: float | Floats) -> Floats:
+    """Return points (n, 2) turned about the origin by one angle, or each by its own (n,)."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    x, y = points.T
+    return np.stack((cos * x - sin * y, sin * x + cos * y), axis=1)
+
+
 def distance_m(points: Sequence[Point], curve: Curve) -> float:
     """Return how far the farthest place of a polyline lies from a curve."""
-    line = sample(curve.start, curve.segments).points
+    line = dotted(curve, FINE_M).points
     dense = _dense(points)
     squared = ((dense[:, None, :] - line[None, :, :]) ** 2).sum(axis=2).min(axis=1)
     return float(math.sqrt(squared.max()))

@@ -1,52 +1,78 @@
 """SUMO's signal programs as stages of our junctions: which groups are green together, how long.
 
     a phase         a stage of all lanes that show green on each of their ways
+    no light        lanes that SUMO lets go without one are green in every stage that is free of
+                    what they meet
     yellow, all red are left to the kernel, which takes what our cars need, and keeps those green
-                    meanwhile who are so before and after
+                    meanwhile who are so before and after; red and yellow (`u`) is red
+    turn on red     (`s`) is red: a car may always wait
     same greens     in phases that follow one another are one stage
 
-Whether a stage is safe is not asked here: `scm.traffic.own_plan` has the kernel's rules do that.
+Whether a stage is safe is checked by `scm.traffic.own_plan`, with the kernel's rules.
 """
 
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import msgspec
 
 from scm.errors import MapError
+from scm.maps.conflicts import conflicting_groups
 from scm.maps.model import CityMap, PlanStage
-from scm.maps.sumo_read import Net, NetLink, NetPhase
+from scm.maps.route import Roads
+from scm.maps.sumo_read import OFF, NetPhase
+from scm.maps.sumo_ruled import Ruled
 
 GREEN = frozenset("Gg")
 YELLOW = frozenset("yY")
-BLINKS = frozenset("oOsu")
 
 
 def with_programs(
-    city_map: CityMap, net: Net, links: Iterable[NetLink], name_of: Callable[[str], str]
+    city_map: CityMap, ruled: Iterable[Ruled], programs: Mapping[str, Sequence[NetPhase]]
 ) -> tuple[CityMap, dict[str, str]]:
     """Return the city with the network's stages at its junctions, and why some have none.
 
     Args:
-        city_map: Whose junctions are named by `name_of` the network's signals.
-        net: Where it comes from.
-        links: The ways that the city has of it.
-        name_of: From a signal's id to its junction.
+        city_map: The city.
+        ruled: What its junctions are in the network.
+        programs: By traffic light.
     """
-    numbers: dict[str, dict[str, list[int]]] = defaultdict(lambda: defaultdict(list))
-    for link in links:
-        if link.signal:
-            numbers[name_of(link.signal)][link.start].append(link.number)
-    programs = {name_of(signal): phases for signal, phases in net.programs.items()}
+    roads, by_name = Roads(city_map), {junction.name: junction for junction in ruled}
     junctions, why_not = [], {}
     for junction in city_map.junctions:
+        conflicts = conflicting_groups(junction, roads)
         try:
-            stages = stages_of(programs.get(junction.name, ()), numbers[junction.name])
+            stages = _stages(by_name[junction.name], programs, conflicts)
             junctions.append(msgspec.structs.replace(junction, stages=stages))
         except MapError as refusal:
             why_not[junction.name] = str(refusal)
             junctions.append(junction)
     return msgspec.structs.replace(city_map, junctions=tuple(junctions)), why_not
+
+
+def _stages(
+    junction: Ruled,
+    programs: Mapping[str, Sequence[NetPhase]],
+    conflicts: Collection[frozenset[str]],
+) -> tuple[PlanStage, ...]:
+    if len(junction.signals) > 1:
+        named = ", ".join(map(repr, junction.signals))
+        raise MapError(f"the network has several lights for it, {named}, expected one program")
+    numbers = {lane: junction.numbers(lane) for lane in junction.approaches}
+    free = [lane for lane, places in numbers.items() if not places]
+    held = {lane: places for lane, places in numbers.items() if places}
+    stages = stages_of(programs.get(junction.signals[0], ()), held)
+    return tuple(_joined(stage, free, conflicts) for stage in stages)
+
+
+def _joined(
+    stage: PlanStage, free: Iterable[str], conflicts: Collection[frozenset[str]]
+) -> PlanStage:
+    """Return a stage with those that have no light in the network, as far as they may go in it."""
+    groups = stage.groups
+    for lane in free:
+        if not any(frozenset((lane, other)) in conflicts for other in groups):
+            groups = (*groups, lane)
+    return PlanStage(groups=groups, green_s=stage.green_s)
 
 
 def stages_of(
@@ -62,7 +88,9 @@ def stages_of(
         MapError: some phase cannot be shown by one light a lane, or there is none.
     """
     stages: list[PlanStage] = []
-    for phase in phases:
+    for number, phase in enumerate(phases):
+        if phase.following not in {(), ((number + 1) % len(phases),)}:
+            raise MapError(f"phase {phase.state!r} is not followed by the one after it")
         groups = tuple(lane for lane in numbers if _is_green(phase, lane, numbers[lane]))
         if stages and YELLOW & set(phase.state) and set(groups) <= set(stages[-1].groups):
             continue
@@ -82,7 +110,7 @@ def stages_of(
 
 def _is_green(phase: NetPhase, lane: str, numbers: Sequence[int]) -> bool:
     shown = [phase.state[number] for number in numbers]
-    if any(light in BLINKS for light in shown):
+    if any(light in OFF for light in shown):
         raise MapError(f"phase {phase.state!r} blinks for lane {lane!r}, expected red or green")
     if any(light in YELLOW for light in shown):
         return False

@@ -11,11 +11,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
-from scm.errors import nearest
+from scm.errors import DemandError, nearest
 from scm.maps.model import CityMap
 from scm.maps.route import MOST_PASSES, Roads
 from scm.part import Hears, Serves
-from scm.traffic.demand_table import DemandError, Flow, departures
+from scm.traffic.demand_table import Flow, departures
 from scm.v2x.exchange import Call, Incoming, Outgoing
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.city_event import CityEvent
@@ -76,7 +76,9 @@ class DemandPart:
         self.hears = (Hears(Trip),)
         self.serves: tuple[Serves, ...] = ()
         ways = Ways(city_map)
-        self._flows = [(flow, *ways.of(flow, f"row {n}")) for n, flow in enumerate(flows, start=1)]
+        self._flows = [
+            (flow, *ways.of(flow, flow.name or f"row {n}")) for n, flow in enumerate(flows, start=1)
+        ]
         self._begin_s = (
             min(flow.begin_s for flow in flows) if time_of_day_s is None else time_of_day_s
         )
@@ -207,6 +209,11 @@ class Ways:
         self._roads = Roads(city_map)
         self._map = city_map.name
         self._lanes = {lane.name: lane for lane in city_map.lanes}
+        self._edges: dict[str, list[str]] = {}
+        for lane in self._lanes:
+            edge, _, number = lane.rpartition("_")
+            if edge and number.isdigit():
+                self._edges.setdefault(edge, []).append(lane)
         self._entries: dict[str, tuple[float, str]] = {}
         self._spawns: dict[str, str] = {}
         for spawn in city_map.spawns:
@@ -223,7 +230,8 @@ class Ways:
         Raises:
             DemandError: there is no such place or no way.
         """
-        goals = self._named(flow.end, f"{where}: to")
+        goals = [self._named(name, f"{where}: via") for name in flow.via]
+        goals.append(self._named(flow.end, f"{where}: to"))
         if flow.start in self._spawns:
             entries = {self._spawns[flow.start]: flow.start}
         else:
@@ -234,40 +242,44 @@ class Ways:
         route = self._quickest(entries, goals)
         if route is None or len(route) > MOST_PASSES:
             what = "no way" if route is None else f"a way of over {MOST_PASSES} lanes"
-            raise DemandError(f"{where}: {what} from {flow.start!r} to {flow.end!r}")
+            via = f" by {', '.join(map(repr, flow.via))}" if flow.via else ""
+            raise DemandError(f"{where}: {what} from {flow.start!r}{via} to {flow.end!r}")
         return entries[route[0]], route
 
     def _named(self, name: str, where: str) -> tuple[str, ...]:
         """Return the lane of a name, or the lanes of an edge."""
+        found = self._edges.get(name, ())
+        if name in self._lanes and found:
+            msg = f"{where}: {name!r} is a lane and an edge (lane {found[0]!r}): rename the edge"
+            raise DemandError(msg)
         if name in self._lanes:
             return (name,)
-        found = tuple(
-            lane for lane in self._lanes
-            if lane.startswith(f"{name}_") and lane[len(name) + 1 :].isdigit()
-        )  # fmt: skip
         if not found:
-            edges = {lane.rpartition("_")[0] or lane for lane in self._lanes}
-            hint = nearest(name, [*self._lanes, *self._spawns, *sorted(edges)])
+            hint = nearest(name, [*self._lanes, *self._spawns, *sorted(self._edges)])
             msg = f"{where}: map {self._map} has no lane or edge {name!r}{hint}"
             raise DemandError(msg)
-        return found
+        return tuple(found)
 
-    def _quickest(self, starts: Iterable[str], goals: Sequence[str]) -> tuple[str, ...] | None:
-        queue: list[tuple[float, tuple[str, ...]]] = [
-            (self._time_s(lane), (lane,)) for lane in sorted(starts)
+    def _quickest(
+        self, starts: Iterable[str], goals: Sequence[Sequence[str]]
+    ) -> tuple[str, ...] | None:
+        """Return the quickest way that passes a lane of each goal, one after the other."""
+        queue: list[tuple[float, int, tuple[str, ...]]] = [
+            (self._time_s(lane), 0, (lane,)) for lane in sorted(starts)
         ]
-        done: set[str] = set()
+        done: set[tuple[int, str]] = set()
         heapq.heapify(queue)
         while queue:
-            taken_s, lanes = heapq.heappop(queue)
-            if lanes[-1] in goals:
+            taken_s, reached, lanes = heapq.heappop(queue)
+            reached += lanes[-1] in goals[reached]
+            if reached == len(goals):
                 return lanes
-            if lanes[-1] in done:
+            if (reached, lanes[-1]) in done:
                 continue
-            done.add(lanes[-1])
+            done.add((reached, lanes[-1]))
             for following in self._roads.successors(lanes[-1]):
-                if following not in done:
-                    way = (taken_s + self._time_s(following), (*lanes, following))
+                if (reached, following) not in done:
+                    way = (taken_s + self._time_s(following), reached, (*lanes, following))
                     heapq.heappush(queue, way)
         return None
 

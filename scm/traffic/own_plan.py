@@ -1,7 +1,8 @@
 """A junction's own plan: the stages that its map gives it, for instance those of SUMO's network.
 
 It is the plan `own`, with the times and the order of the map and the yellow and all-red of our
-kernel. Who makes a map asks `adopted` first: what the rules of the kernel do not allow is left out.
+kernel, within the limits of plans that people make. An importer calls `adopted` first: it leaves
+out what the rules of the kernel do not allow.
 """
 
 from collections.abc import Sequence
@@ -12,10 +13,12 @@ from scm.errors import PlanError
 from scm.maps.model import CityMap, Junction, PlanStage
 from scm.maps.route import Roads
 from scm.traffic.kernel import Program
-from scm.traffic.plan import Stage, Timetable, timetable
-from scm.traffic.program import program_of, whole_steps_ns
+from scm.traffic.plan import Timetable
+from scm.traffic.plan_asked import limited_table
+from scm.traffic.program import program_of
 from scm.traffic.proof_load import check_junction
 from scm.traffic.timing import NIGEL, CarFacts
+from scm.v2x.messages.plan_request import SignalStage
 
 OWN = "own"
 
@@ -26,8 +29,8 @@ def own_table(stages: Sequence[PlanStage], program: Program) -> Timetable:
     Raises:
         PlanError: naming every problem of the stages at once.
     """
-    cycle = (Stage(stage.groups, whole_steps_ns(stage.green_s)) for stage in stages)
-    return timetable(OWN, tuple(cycle), program)
+    made = [SignalStage(groups=stage.groups, green_s=stage.green_s) for stage in stages]
+    return limited_table(OWN, made, program)
 
 
 def adopted(city_map: CityMap, car: CarFacts = NIGEL) -> tuple[CityMap, dict[str, str]]:

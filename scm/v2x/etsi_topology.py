@@ -179,7 +179,7 @@ def _lane(roads: Roads, topology: Topology, number: int, middle: tuple[float, fl
     turns = [connection.connecting_lane.maneuver or "" for connection in connections]
     return MapLane(
         lane_id=number,
-        name=stretch.lane[:63],
+        name=stretch.lane[:63] if stretch.lane.isascii() else None,  # an IA5String
         ingress_approach=approach if leads_in else None,
         egress_approach=None if leads_in else approach,
         lane_attributes=LaneAttributes(

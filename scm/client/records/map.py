@@ -235,6 +235,8 @@ class CityMap(msgspec.Struct, kw_only=True, frozen=True):
         title: What people call it.
         source: Who told it.
         revision: Counts changes of the lanes that cars must know of.
+        drives_on: The side of the road. On the left, rules are mirrored: left comes before right,
+            and who turns right lets oncoming cars pass.
         floor: The ground plate: a rectangle [m], and how it holds, rolls and rises.
         wind: The air over the whole map.
         tag: An AprilTag that lies on the floor and fixes the frame; `size_m` is the black edge.
@@ -265,6 +267,7 @@ class CityMap(msgspec.Struct, kw_only=True, frozen=True):
     title: str
     source: str
     revision: int = 1
+    drives_on: Literal["left", "right"] = "right"
     floor: Floor
     wind: Wind | None = None
     tag: MapTag

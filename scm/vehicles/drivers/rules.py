@@ -273,17 +273,22 @@ class RuleBook:
         return rows
 
     def _yields(self, way: _Way, other: _Way, order: dict[int, int]) -> bool:
-        """Return whether a way gives way: by signs, else right before left, left after oncoming."""
+        """Return whether a way gives way: by signs, else right before left, left after oncoming.
+
+        Where cars drive on the left it is the other way round.
+        """
         mine, theirs = self._lines[way.line], self._lines[other.line]
         is_major, other_is_major = mine.kind in (LIT, PLAIN), theirs.kind in (LIT, PLAIN)
         if is_major != other_is_major:
             return other_is_major
         angle = wrap_angle(self._pose(theirs).yaw - self._pose(mine).yaw)
+        on_left = self._roads.city_map.drives_on == "left"
         if ACROSS_RAD <= abs(angle) <= math.pi - ACROSS_RAD:
-            return angle > 0.0
-        turns_left, other_turns_left = way.turn == "left", other.turn == "left"
-        if abs(angle) > ACROSS_RAD and turns_left != other_turns_left:
-            return turns_left
+            return (angle > 0.0) != on_left
+        across = "right" if on_left else "left"
+        turns_across, other_turns_across = way.turn == across, other.turn == across
+        if abs(angle) > ACROSS_RAD and turns_across != other_turns_across:
+            return turns_across
         return order[way.line] > order[other.line]
 
     def _pose(self, line: Line) -> Pose2:

@@ -77,3 +77,62 @@ def grid(out: Path, kind: str, *more: str) -> Path:
         "netgenerate", "--grid", "--grid.number", "3", "--grid.length", "56",
         "--default-junction-type", kind, *more, out=out,
     )  # fmt: skip
+
+
+_NET = """<net version="1.20"{lefthand}>
+<location netOffset="0,0" convBoundary="0.00,0.00,120.00,120.00" origBoundary="0,0,1,1"
+ projParameter="!"/>
+<edge id="{w}" from="W" to="C"><lane id="{w}_0" index="0" speed="13.9" length="56" {west}/></edge>
+<edge id="{s}" from="S" to="C">
+ <lane id="{s}_0" index="0" speed="13.9" length="53" shape="64.8,0 64.8,52.8"/>
+ <lane id="{s}_1" index="1" speed="13.9" length="53" shape="61.6,0 61.6,52.8"/></edge>
+<edge id="{e}" from="C" to="E">
+ <lane id="{e}_0" index="0" speed="13.9" length="50" shape="70.4,58.4 120,58.4"/></edge>
+<edge id="{n}" from="C" to="N">
+ <lane id="{n}_0" index="0" speed="13.9" length="56" shape="61.6,64 61.6,120"/></edge>
+{programs}
+<junction id="C" type="priority" x="60" y="60" incLanes="{s}_0 {s}_1 {w}_0" intLanes="" shape=""/>
+<junction id="E" type="dead_end" x="120" y="60" incLanes="{e}_0" intLanes="" shape=""/>
+<junction id="N" type="dead_end" x="60" y="120" incLanes="{n}_0" intLanes="" shape=""/>
+<junction id="S" type="dead_end" x="60" y="0" incLanes="" intLanes="" shape=""/>
+<junction id="W" type="dead_end" x="0" y="60" incLanes="" intLanes="" shape=""/>
+<connection from="{s}" to="{n}" fromLane="1" toLane="0" dir="s" state="M"{s_n}/>
+<connection from="{w}" to="{e}" fromLane="0" toLane="0" dir="s" state="m"{w_e}/>
+<connection from="{s}" to="{e}" fromLane="0" toLane="0" dir="r" state="m"{s_e}/>
+</net>
+"""
+
+
+def tee(
+    phases=(), *, lit=("s_n", "w_e"), lights=None, edges="W2C S2C C2E C2N", lefthand=False,
+    west="0,58.4 56,58.4",
+):  # fmt: skip
+    """Return a network in words: west and south lead to east, south to north as well.
+
+    Args:
+        phases: Of its signal program: (seconds, letters), or with the following phases as a third.
+        lit: The ways with a signal, in the order of the letters.
+        lights: The traffic light of each of them; without, all are of `C`.
+        edges: Ids of the edges from west and south, to east and north.
+        lefthand: Whether cars drive on the left.
+        west: The lane from the west.
+    """
+    lights = lights or ["C"] * len(lit)
+    signals = dict.fromkeys(("s_n", "w_e", "s_e"), "")
+    if phases:
+        for number, (way, light) in enumerate(zip(lit, lights, strict=True)):
+            signals[way] = f' tl="{light}" linkIndex="{number}"'
+    rows = "".join(
+        f'<phase duration="{phase[0]}" state="{phase[1]}"'
+        + (f' next="{phase[2]}"/>' if len(phase) > 2 else "/>")
+        for phase in phases
+    )
+    programs = "".join(
+        f'<tlLogic id="{light}" type="static" programID="0" offset="0">{rows}</tlLogic>'
+        for light in dict.fromkeys(lights if phases else ())
+    )
+    names = dict(zip("wsen", edges.split(), strict=True))
+    return _NET.format(
+        lefthand=' lefthand="true"' if lefthand else "", programs=programs,
+        west=f'shape="{west}"', **names, **signals,
+    )  # fmt: skip

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 from collections import Counter
 
 import msgspec
@@ -12,8 +13,10 @@ from scm.__main__ import main
 from scm.errors import MapError
 from scm.lockstep import Lockstep
 from scm.maps.check import problems_of
+from scm.maps.conflicts import conflicting_groups
 from scm.maps.load import load_map
 from scm.maps.polyline import extent
+from scm.maps.route import Roads
 from scm.maps.sumo import ERROR_M, LEAST_RADIUS_M, import_sumo
 from scm.maps.sumo_program import stages_of
 from scm.maps.sumo_read import NetPhase
@@ -21,11 +24,12 @@ from scm.maps.sumo_toml import map_toml
 from scm.part import Hears
 from scm.traffic.own_plan import adopted
 from scm.traffic.part import TrafficPart
+from scm.v2x.etsi_topology import mapem_of
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spat import Spat
 from scm.world.driving import send
 from scm.world.part import WorldPart
-from tests.unit.maps.sumo_nets import OSM, grid, made, stadium
+from tests.unit.maps.sumo_nets import OSM, grid, made, stadium, tee
 
 CARS = 8
 SPAN_S = 40.0
@@ -150,6 +154,8 @@ def test_a_signal_program_that_lets_ways_cross_is_left_out_and_says_why(tmp_path
         ([(2, "Gr"), (3, "yr"), (5, "rG"), (3, "ry"), (4, "Gr")], [("a", 6), ("b", 5)]),
         ([(9, "GG"), (2, "rr")], [("ab", 9)]),
         ([(9, "GG"), (3, "yG"), (5, "rG"), (3, "ry")], [("ab", 9), ("b", 5)]),
+        ([(9, "Gr"), (3, "yr"), (1, "ru"), (5, "rG"), (3, "ry"), (1, "ur")], [("a", 9), ("b", 5)]),
+        ([(9, "Gs"), (3, "Yr"), (5, "sg"), (3, "rY")], [("a", 9), ("b", 5)]),
     ],
 )
 def test_phases_become_stages(phases, expected):
@@ -272,7 +278,7 @@ def test_a_network_too_tight_for_the_car_is_refused(tmp_path):
 def test_other_files_are_refused_with_what_to_do(tmp_path):
     for name, words in (("a.osm", "netconvert --osm-files"), ("b.net.xml", "lanes for cars")):
         path = tmp_path / name
-        path.write_text("<osm/>")
+        path.write_text('<net version="1.0"/>' if name.endswith(".net.xml") else "<osm/>")
         with pytest.raises(MapError, match=words):
             import_sumo(path)
     with pytest.raises(MapError, match="no such file"):
@@ -287,6 +293,132 @@ def test_a_missing_library_is_said(tmp_path, monkeypatch):
         import_sumo(path)
 
 
+def town(tmp_path, *phases, scale=10.0, **network):
+    """Import what `tee` describes; programs that the kernel accepts are adopted."""
+    path = tmp_path / "t.net.xml"
+    path.write_text(tee(phases, **network), encoding="utf-8")
+    imported = import_sumo(path, scale=scale)
+    city, why_not = adopted(imported.city_map)
+    return city, imported, imported.unread | why_not
+
+
+TWO_GREENS = (20, "Gr"), (3, "yr"), (20, "rG"), (3, "ry")
+
+
+def test_a_turn_free_of_the_light_beside_it_gets_a_light_where_it_meets_others(tmp_path):
+    city, _, why_not = town(tmp_path, *TWO_GREENS)
+    (junction,) = city.junctions
+    assert {group.name for group in junction.groups} == {"S2C_0", "S2C_1", "W2C_0"}
+    assert frozenset({"S2C_0", "W2C_0"}) in conflicting_groups(junction, Roads(city))
+    assert [set(stage.groups) for stage in junction.stages] == [{"S2C_0", "S2C_1"}, {"W2C_0"}]
+    assert (junction.plan, why_not) == ("own", {})
+
+
+def test_two_lights_at_one_junction_are_one_junction_without_a_program(tmp_path):
+    city, _, why_not = town(tmp_path, *TWO_GREENS, lights=["C", "D"])
+    assert [len(junction.groups) for junction in city.junctions] == [3]
+    assert "several lights" in why_not[city.junctions[0].name]
+
+
+def test_a_light_that_is_off_is_signs(tmp_path):
+    city, _, _ = town(tmp_path, (90, "Oo"))
+    assert city.junctions == ()
+    assert [len(crossing.approaches) for crossing in city.crossings] == [3]
+    assert [(sign.kind, sign.lane) for sign in city.signs] == [
+        ("give_way", "W2C_0"), ("give_way", "S2C_0"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("phases", "words"),
+    [
+        ([(20, "G"), (20, "r")], "light 'C': phase 1, state 'G': expected a letter for each link"),
+        ([(20, "Gr"), (20, "xG")], "light 'C': phase 2, state 'xG': expected letters of .*'x'"),
+        ([(-1, "Gr"), (20, "rG")], "light 'C': phase 1, .*duration: expected .* got -1"),
+    ],
+)
+def test_a_program_that_says_nothing_of_a_link_is_refused_by_the_lights_name(
+    tmp_path, phases, words
+):
+    with pytest.raises(MapError, match=words):
+        town(tmp_path, *phases)
+
+
+@pytest.mark.parametrize(
+    ("phases", "words"),
+    [
+        ([(1e6, "Gr"), (20, "rG")], "got 1e.06, expected 0 to 300 s"),
+        ([(200, "Gr"), (200, "rG")], "cycle: got .* expected 300 s at most"),
+        ([(20, "Gr", "0"), (20, "rG", "0")], "not followed by the one after it"),
+    ],
+)
+def test_a_program_beyond_the_limits_of_peoples_plans_is_left_out(tmp_path, phases, words):
+    city, _, why_not = town(tmp_path, *phases)
+    (junction,) = city.junctions
+    assert junction.plan == "calm"
+    assert re.search(words, why_not[junction.name])
+
+
+def test_ids_of_any_script_are_names_each_of_its_own(tmp_path):
+    city, imported, _ = town(tmp_path, *TWO_GREENS, edges="запад a/b a%2Fb दिल्ली")
+    streets = [lane.name for lane in city.lanes if ".." not in lane.name]
+    assert streets == ["запад_0", "a%2Fb_0", "a%2Fb_1", "a%252Fb_0", "दिल्ली_0"]
+    assert imported.renamed == {"a/b": "a%2Fb", "a%2Fb": "a%252Fb"}
+    path = tmp_path / "t.toml"
+    path.write_text(map_toml(city), encoding="utf-8")
+    assert load_map(path) == city
+    lanes = mapem_of(Roads(city), city.junctions[0]).intersections[0].lane_set
+    assert {lane.name for lane in lanes} == {None, "a%2Fb_0", "a%2Fb_1", "a%252Fb_0"}
+
+
+def test_a_left_hand_network_has_its_signs_and_lights_on_the_left(tmp_path):
+    kinds = {"lights": "traffic_light", "signs": "allway_stop"}
+    for name, kind in kinds.items():
+        out = tmp_path / f"{name}.net.xml"
+        city = import_sumo(grid(out, kind, "--lefthand", "true")).city_map
+        assert city.drives_on == "left"
+        assert problems_of(city) == []
+        assert not any(lane.name == "A1B1_0..B1A1_0" for lane in city.lanes)
+        roads = Roads(city)
+        lines = [(light, light.group) for light in city.lights]
+        for post, lane in [*lines, *((sign, sign.lane) for sign in city.signs)]:
+            assert roads.lane(lane).project(post.x_m, post.y_m)[1] > 0.1
+
+
+def test_streets_that_cross_without_a_junction_are_refused(tmp_path):
+    with pytest.raises(
+        MapError, match=r"cars would touch at 1:10.*'W2C_0' and 'S2C_[01]' .* 0.0 mm"
+    ):
+        town(tmp_path, west="0,20 90,20 56,58.4")
+
+
+def test_a_lane_without_a_speed_is_refused(tmp_path):
+    path = tmp_path / "t.net.xml"
+    path.write_text(tee().replace('speed="13.9"', 'speed="0"', 1))
+    with pytest.raises(MapError, match="lane 'W2C_0': expected a speed and a width, got 0 m/s"):
+        import_sumo(path)
+
+
+def test_sizes_are_known_before_anything_is_computed(tmp_path):
+    path, told = tmp_path / "t.net.xml", []
+    path.write_text(tee())
+    with pytest.raises(MapError, match="wide at 1:20"):
+        import_sumo(path, scale=20.0, say=told.append)
+    assert told[0] == "120 x 120 m at full size; at 1:20 a floor of some 7 x 7 m"
+    assert told[1] == "5 lanes, 3 ways over junctions"
+
+
+def test_what_cannot_be_imported_leaves_the_file_as_it_was(tmp_path, capsys):
+    net, out = tmp_path / "t.net.xml", tmp_path / "city.toml"
+    net.write_text(tee([(20, "G")]))
+    out.write_text("before")
+    assert main(["import", "sumo", str(net), "--out", str(out)]) == 2
+    assert out.read_text() == "before"
+    net.write_text(tee())
+    assert main(["import", "sumo", str(net), "--scale", "10", "--out", str(tmp_path)]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+
+
 def test_the_command_writes_a_map_that_can_be_shown(tmp_path, capsys):
     net = grid(tmp_path / "g.net.xml", "traffic_light")
     out, picture = tmp_path / "city.toml", tmp_path / "city.svg"
@@ -294,7 +426,11 @@ def test_the_command_writes_a_map_that_can_be_shown(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "5 junctions with signals" in said
     assert "signal programs kept at 0 of 5 junctions" in said
+    assert "a1, b0, b2, c1 (4) run plan 'calm' instead; at 'a1': phase " in said
     assert "b1 runs plan 'calm' instead: plan 'own': " in said
+    assert said.count("instead") == 2
+    assert "--tls.layout incoming" in said
+    assert "left out where no ways of cars meet: traffic lights A0, A2, C0, C2" in said
     assert "turns back left out" in said
     assert main(["show", "map", str(out), "--out", str(picture)]) == 0
     assert "<svg" in picture.read_text()

@@ -249,3 +249,22 @@ def test_a_car_that_stays_before_its_line_does_not_block_the_junction_for_ever()
     drive.driven[1] = False
     drive.run(12.0)
     assert drive.crossed_s[0] is not None
+
+
+def mirrored(lane):
+    x, y, yaw = lane.start
+    segments = tuple(
+        msgspec.structs.replace(s, angle_rad=-s.angle_rad) if s.angle_rad else s
+        for s in lane.segments
+    )
+    return msgspec.structs.replace(lane, start=(x, -y, -yaw), segments=segments)
+
+
+def test_where_cars_drive_on_the_left_they_yield_in_the_mirror_image():
+    city = msgspec.structs.replace(grid_city(3, 3, block_m=6.0, signs=True), signs=())
+    lanes = tuple(map(mirrored, city.lanes))
+    right = Streets(Roads(city)).ways.rules
+    left = Streets(Roads(msgspec.structs.replace(city, lanes=lanes, drives_on="left"))).ways.rules
+    assert right.pair_way.tolist() == left.pair_way.tolist()
+    assert right.pair_yields.tolist() == left.pair_yields.tolist()
+    assert any(right.pair_yields)
