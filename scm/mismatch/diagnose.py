@@ -288,14 +288,33 @@ def retuned_error(searched: Searched, retuned: Car | None, found: Car | None) ->
 
     None where no part has a whole window, or a car has no file.
     """
+    fit = _beside_retuned(searched, retuned, found)
+    return None if fit is None else fit.confirm.before.get(POSE[0])
+
+
+def strays_more(searched: Searched, fit: Fit, retuned: Car | None, found: Car | None) -> bool:
+    """Return whether a car strays farther than the given one, or than the re-tuned one.
+
+    Args:
+        searched: Whose recordings they are driven by.
+        fit: Of the found car and the one given.
+        retuned: With the given car's own numbers refitted, and nothing else.
+        found: With effects.
+    """
+    beside = _beside_retuned(searched, retuned, found)
+    fits = (fit,) if beside is None else (fit, beside)
+    return any(POSE[0] in nothing_got_worse(one) for one in fits)
+
+
+def _beside_retuned(searched: Searched, retuned: Car | None, found: Car | None) -> Fit | None:
+    """Return free runs of the re-tuned car and of the one found, as of `before` and `after`."""
     if retuned is None or found is None:
         return None
     base = searched.model.car
     try:
-        fit, _ = judge(searched.drives, on(base, retuned), on(base, found), searched.parts)
+        return judge(searched.drives, on(base, retuned), on(base, found), searched.parts)[0]
     except RecordingError:
         return None
-    return fit.confirm.before.get(POSE[0])
 
 
 def gained_nothing(fit: Fit) -> bool:
@@ -401,16 +420,19 @@ def told(searched: Searched, tell: Tell) -> Found:
     car, best, rough = searched.car, searched.best, searched.rough
     titles = _titles(searched.recordings)
     files = CarFiles(car, model, titles)
+    _, retuned_car = _written(searched, files, search.retuned)
     effects, found_car = _written(searched, files, best)
     fit, free_runs = _judged(searched, found_car)
-    while rough and best.effects and fit is not None and POSE[0] in nothing_got_worse(fit):
+    while (
+        rough and best.effects and fit is not None
+        and strays_more(searched, fit, retuned_car, found_car)
+    ):  # fmt: skip
         best = search.without_one(best)
         effects, found_car = _written(searched, files, best)
         fit, free_runs = _judged(searched, found_car)
     if not best.effects and fit is not None and gained_nothing(fit):
         best, found_car = as_given(search.fitter, best), car
         fit, free_runs = _judged(searched, car)
-    _, retuned_car = _written(searched, files, search.retuned)
     retuned_m = retuned_error(searched, retuned_car, found_car) if best.effects else None
     located, residuals = locate(model, search.retuned, best)
     suggestions = () if rough else undecided_of(model, search, best, tell)

@@ -426,8 +426,13 @@ class Search:
         return fitted
 
     def without_one(self, fitted: Fitted) -> Fitted:
-        """Return the best refitted model that lacks one of the effects."""
-        return min(self._without_each(fitted), key=self.criterion)
+        """Return the best model that lacks one of the effects, fitted to the end.
+
+        It begins from the re-tuned car's own numbers as well: with an effect more than that car it
+        explains no less.
+        """
+        best = min(self._without_each(fitted), key=self.criterion)
+        return self._to_the_end(best, [best.z, self.retuned.z]) if best.effects else best
 
     def _without_each(self, fitted: Fitted) -> list[Fitted]:
         """Return refitted models that lack one effect each, in the effects' order."""

@@ -10,6 +10,7 @@ from scm.mismatch.diagnose import (
     as_given,
     gained_nothing,
     retuned_error,
+    strays_more,
     verdict_of,
     write,
 )
@@ -21,7 +22,7 @@ from scm.mismatch.experiment.separation import Apart
 from scm.mismatch.experiment.suggest import Suggestion, Weighed
 from scm.mismatch.findings import Undecided, Verdict
 from scm.mismatch.fit import Fitter
-from scm.mismatch.judge import judge
+from scm.mismatch.judge import judge, nothing_got_worse
 from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.parts import split
 from scm.mismatch.patch import patched
@@ -50,6 +51,20 @@ def test_the_re_tuned_car_strays_by_what_refitting_alone_could_not_take_off():
     strays_m = retuned_error(searched, tuned, found)
     before, after = (side["position_m"] for side in (fit.confirm.before, fit.confirm.after))
     assert after < 0.9 * strays_m < 0.7 * before
+
+
+@pytest.mark.parametrize(("retuned", "found", "worse"), [(0.05, 0.025, True), (0.025, 0.05, False)])
+def test_a_car_that_strays_more_than_the_re_tuned_one_is_worse_though_better_than_the_given_one(
+    retuned, found, worse
+):
+    drive = driven((("steering.trim_rad", 0.05),))
+    model = Likelihood([drive], big_nigel())
+    parts = split(model, 5.0)
+    searched = SimpleNamespace(model=model, drives=[drive], parts=parts)
+    tuned, car = (car_with({"steering.trim_rad": trim}) for trim in (retuned, found))
+    fit, _ = judge([drive], big_nigel(), car, parts)
+    assert nothing_got_worse(fit) == ()
+    assert strays_more(searched, fit, tuned, car) == worse
 
 
 def test_numbers_that_gained_nothing_on_unseen_parts_stay_as_the_file_has_them(tmp_path):
