@@ -324,14 +324,16 @@ def test_a_part_is_cut_out_and_opened(visit, running, drive, last_s):
     page = visited.page
     page.wait_for_function(ALL_SHOWN)
     page.click("text=Download")
-    page.fill(f"{PART} input[name=start]", "1")
-    page.fill(f"{PART} input[name=stop]", "6")
+    begin_s, end_s = (round(last_s - before_s, 1) for before_s in (5.0, 0.0))
+    name = f"{NAME}-{begin_s:g}-{end_s:g}s"
+    page.fill(f"{PART} input[name=start]", f"{begin_s:g}")
+    page.fill(f"{PART} input[name=stop]", f"{end_s:g}")
     page.click(f"{PART} >> text=Cut")
-    visited.until(lambda: running.hasten() or page.url.endswith("-1-6s"), "the part is opened")
+    visited.until(lambda: running.hasten() or page.url.endswith(name), "the part is opened")
     page.wait_for_function(ALL_SHOWN)
-    part = running.get(f"/recordings/{NAME}-1-6s")
+    part = running.get(f"/recordings/{name}")
     assert part["length_s"] == pytest.approx(5.0, abs=0.5)
-    running.web.delete(f"/recordings/{NAME}-1-6s").raise_for_status()
+    running.web.delete(f"/recordings/{name}").raise_for_status()
 
 
 def test_a_mismatch_job_is_asked_for_the_car_and_the_span_that_are_shown(

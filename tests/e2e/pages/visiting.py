@@ -66,12 +66,13 @@ def judge(visited: Visit, within: str | None = None) -> None:
     Axe looks `within` what a selector names: it keeps the page from all else meanwhile.
     """
     page = visited.page
-    assert visited.complaints == []
+    assert not visited.complaints, "\n".join(visited.complaints)
     assert visited.hosts == {urlsplit(page.url).netloc}
     wide = "() => [document.documentElement.scrollWidth, window.innerWidth]"
     content, window = page.evaluate(wide)
     assert content <= window, f"the page is {content} px wide in a window of {window} px"
-    assert faults_of(page, within) == []
+    faults = faults_of(page, within)
+    assert not faults, "\n".join(faults)
 
 
 def faults_of(page: Any, within: str | None = None) -> list[str]:

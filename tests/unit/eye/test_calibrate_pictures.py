@@ -10,7 +10,7 @@ from scm.__main__ import main
 from scm.errors import EyeError
 from scm.eye.calibrate.board import find_board
 from scm.eye.calibrate.gather import from_files
-from scm.eye.calibration import load_calibration
+from scm.eye.calibration_files import load_calibration
 from scm.eye.camera import camera_model
 from scm.maps.model import Camera
 from scm.scenery.board import Board

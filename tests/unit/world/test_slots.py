@@ -10,7 +10,7 @@ SOMEWHERE = Pose2(1.0, 2.0, 0.5)
 
 
 def test_numbers_come_back_lowest_first_and_the_forbidden_one_never():
-    numbers = Numbers(3, never=5)
+    numbers = Numbers(3, never=(5,))
     taken = [numbers.take() for _ in range(4)]
     numbers.give_back(6)
     numbers.give_back(4)
@@ -19,7 +19,7 @@ def test_numbers_come_back_lowest_first_and_the_forbidden_one_never():
 
 
 def test_a_claimed_number_is_nobody_elses_until_it_is_given_back():
-    numbers = Numbers(1, never=2)
+    numbers = Numbers(1, never=(2,))
     assert numbers.claim(3) == 3
     assert [numbers.take() for _ in range(3)] == [1, 4, 5]
     numbers.give_back(3)

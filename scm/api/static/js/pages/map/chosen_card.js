@@ -5,6 +5,7 @@ import { Dialog } from "scm/shared/dialog.js";
 import { age, fixed, UNKNOWN } from "scm/shared/format.js";
 import { selected } from "scm/shared/selection.js";
 import { change } from "scm/shell/api.js";
+import { blind } from "scm/pages/map/close_up.js";
 import { carNamed, fleetBeat } from "scm/pages/map/fleet.js";
 import { followed, layers, show } from "scm/pages/map/layers.js";
 import { SendTo } from "scm/pages/map/send_to.js";

@@ -169,7 +169,7 @@ export function PlanEditor() {
         </label>
       </div>
       <${PlanStrip} stages=${draft.stages} tall=${true} />
-      <div class="scroll">
+      <div class="scroll" tabindex="0" role="region" aria-label="Table of stages">
         <table>
           <caption class="hidden">Stages in the order of the cycle</caption>
           <thead>

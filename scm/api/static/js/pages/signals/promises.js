@@ -44,7 +44,7 @@ export function Promises() {
 
 function Leads({ told }) {
   return html`
-    <div class="scroll"><table>
+    <div class="scroll" tabindex="0" role="region" aria-label="Table of promises"><table>
       <caption class="hidden">Likely ends as told before the end, against the end</caption>
       <thead>
         <tr>
