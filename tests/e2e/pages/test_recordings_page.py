@@ -366,7 +366,7 @@ def test_a_refusal_is_said_within_the_dialog_that_asked(visit, drive):
     page = visited.page
     page.click("text=Mismatch job")
     visited.wait("() => document.querySelectorAll('dialog select[name=car] option').length > 1")
-    gone = "(car) => { car.options[1].value = car.value = 'no_such_car' }"  # as a file removed
+    gone = "car => { car.options[1].value = 'no_such_car'; car.selectedIndex = 1 }"  # as removed
     page.locator("dialog select[name=car]").evaluate(gone)
     page.locator("dialog select[name=car]").dispatch_event("input")
     page.click("dialog .primary")
