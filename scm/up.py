@@ -25,6 +25,7 @@ from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.key import check_name
 from scm.v2x.messages.presence import Presence
 from scm.v2x.router import DEFAULT_ENDPOINT, Router, free_endpoint
+from scm.vehicles.car_files import name_own_folder
 
 HOST = "127.0.0.1"
 SCM = (sys.executable, "-m", "scm")
@@ -123,6 +124,7 @@ def run_city(wanted: Wanted, say: Say = _say_now) -> int:
         ScmError: when the map, the port or the endpoint is not to be had.
     """
     plan = _settled(wanted)
+    name_own_folder(wanted.record_dir / "cars")
     guard = plan.guard
     with (
         Router(guard.listen, guard.settings) as router,

@@ -30,6 +30,7 @@ from scm.api.routes import (
     audit,
     boxes,
     cameras,
+    cars,
     cities,
     close_up,
     disturbances,
@@ -174,6 +175,7 @@ class _Desk:
         return (
             cities.router(city),
             vehicles.router(city),
+            cars.router(city),
             leases.router(city),
             planned_path.router(city),
             signals.router(city, self.plans),

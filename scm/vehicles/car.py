@@ -198,6 +198,16 @@ def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
     return car_of(data, path, trusted=trusted)
 
 
+def car_of_text(text: str, path: Path) -> Car:
+    """Make a car of the text of a car file that is not written yet; `path` names it in errors.
+
+    Raises:
+        CarError: naming every problem at once.
+    """
+    with reading(path, "a TOML file", CarError):
+        return car_of(tomllib.loads(text), path, trusted=False)
+
+
 def car_of(data: Mapping[str, Any], path: Path, *, trusted: bool = True) -> Car:
     """Make a car of a parsed file; `path` names it in errors, effects of its own stand beside it.
 

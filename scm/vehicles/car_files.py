@@ -1,15 +1,41 @@
 """Where the cars lie that have a name: those shipped, and those of one's own folder.
 
-The environment's `SCM_CARS` names that folder, for each process of a city and each agent.
+The environment's `SCM_CARS` names that folder, for each process of a city and each agent; `scm up`
+names one beside its recordings where nobody did.
 """
 
 import os
 from pathlib import Path
 
-from scm.errors import CarError
+from scm.errors import CarError, reading
 
 TYPES_DIR = Path(__file__).parent / "types"
 OWN_CARS = "SCM_CARS"
+
+
+def name_own_folder(folder: Path) -> None:
+    """Make a folder that of one's own cars for this process and its children, if none is named.
+
+    Raises:
+        CarError: when it cannot be made.
+    """
+    if not os.environ.get(OWN_CARS):
+        with reading(folder, "a folder for car files", CarError):
+            folder.mkdir(parents=True, exist_ok=True)
+        os.environ[OWN_CARS] = str(folder.resolve())
+
+
+def own_folder() -> Path | None:
+    """Return the folder of one's own cars; None: nobody named one.
+
+    Raises:
+        CarError: when there is no such folder.
+    """
+    folder = os.environ.get(OWN_CARS, "")
+    if folder and not Path(folder).is_dir():
+        msg = f"{OWN_CARS}: got {folder!r}, expected a folder of car files"
+        raise CarError(msg)
+    return Path(folder) if folder else None
 
 
 def car_files() -> dict[str, Path]:
@@ -19,11 +45,8 @@ def car_files() -> dict[str, Path]:
         CarError: when there is no such folder, or a name in it is a shipped car's.
     """
     found = {path.stem: path for path in TYPES_DIR.glob("*.toml")}
-    folder = os.environ.get(OWN_CARS, "")
-    if folder and not Path(folder).is_dir():
-        msg = f"{OWN_CARS}: got {folder!r}, expected a folder of car files"
-        raise CarError(msg)
-    for path in Path(folder).glob("*.toml") if folder else ():
+    folder = own_folder()
+    for path in folder.glob("*.toml") if folder else ():
         if path.stem in found:
             msg = f"{path}: {path.stem!r} is a shipped car's name, expected another"
             raise CarError(msg)

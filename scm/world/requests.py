@@ -8,6 +8,7 @@ from typing import Any
 
 from scm.errors import LeaseError, RunError, ScmError, nearest
 from scm.geometry import Pose2
+from scm.maps.bends import misfit
 from scm.maps.coordinates import are_coordinates
 from scm.maps.room import AHEAD_S, CLEARANCE_M
 from scm.maps.vehicle_tags import LAST_TAG_ID
@@ -27,6 +28,7 @@ from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.vehicles.car import car_names
+from scm.vehicles.drivers.limits import limits_of, turning_radius_m
 from scm.world import lease as rules
 from scm.world.driving import send, take_over
 from scm.world.hosted import HostedCar
@@ -65,6 +67,7 @@ def _spawn(world: World, request: SpawnRequest, now_ns: int) -> SpawnReply:
     world.say(
         "info", "vehicle_spawned", f"{name}, a {request.car}, stands on the map", now_ns, name
     )
+    _warn_of_bends(world, name, request.car, now_ns)
     x, y, yaw = car.pose
     return SpawnReply(vehicle=name, x_m=x, y_m=y, yaw_rad=yaw, tag_id=car.tag_id)
 
@@ -88,7 +91,19 @@ def _join(world: World, request: JoinRequest, now_ns: int) -> JoinReply:
         name, request.kind, request.session, request.car, pose, now_ns, request.tag_id
     )
     world.say("info", "vehicle_joined", f"{name}, a {request.car}, joined the city", now_ns, name)
+    _warn_of_bends(world, name, request.car, now_ns)
     return _welcome(car, now_ns)
+
+
+def _warn_of_bends(world: World, name: str, car_file: str, now_ns: int) -> None:
+    """Say which lanes a car cannot follow, at the first car of its file."""
+    if car_file in world.warned_of_bends:
+        return
+    world.warned_of_bends.add(car_file)
+    car = world.garage.car(car_file)
+    problem = misfit(world.city_map, turning_radius_m(car), limits_of(car).width)
+    if problem:
+        world.say("warning", "lanes_misfit", f"{name}, a {car_file}: {problem}", now_ns, name)
 
 
 def _welcome(car: RemoteCar, now_ns: int) -> JoinReply:
@@ -200,7 +215,7 @@ def _check_new(world: World, name: str, car_file: str) -> None:
     if car_file not in car_names():  # no paths: whoever asks may be far away
         known = ", ".join(car_names())
         wanted = f"expected one of {known}{nearest(car_file, car_names())}"
-        own = "a car of your own: start the city with SCM_CARS=FOLDER of its file"
+        own = "a car of your own: make it on page /cars, or put its file in the folder SCM_CARS"
         raise _RefusedError("invalid", f"car: got {car_file!r}, {wanted}; {own}")
 
 

@@ -109,6 +109,7 @@ class World:
         batteries: Which of them were told to be low.
         stuck: Which cars push in vain.
         highest_epoch: Of any car that left: a newcomer's is higher, whatever its name.
+        warned_of_bends: Car files of which it was said whether they fit the lanes.
     """
 
     def __init__(
@@ -162,6 +163,7 @@ class World:
         self.outbox: list[Outgoing] = []
         self.tick = 0
         self.ignored = self.highest_epoch = 0
+        self.warned_of_bends: set[str] = set()
         self.last_hit_ns: dict[str, int] = {}
         self.dangers = Dangers()
         self.batteries = Batteries()

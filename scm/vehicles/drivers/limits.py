@@ -1,5 +1,7 @@
 """What a driver must know of its car, read from the car file."""
 
+import math
+
 from scm.vehicles.car import Car
 from scm.vehicles.driver import CarLimits
 
@@ -39,3 +41,15 @@ def _steer_rate(car: Car, limit: float) -> float:
     if any(term.name == "steer_lag" for term in car.terms):
         return 0.5 * limit / max(0.01, car.value("steering.lag_s"))
     return car.value("steering.rate_rad_s")
+
+
+def turning_radius_m(car: Car) -> float:
+    """Return the radius of the tightest circle that the middle of the rear axle drives [m]."""
+    lock = _steer_limit(car)
+    if any(term.name == "steer_map_tanh" for term in car.terms):
+        lock = min(
+            car.value(f"steering.map_{side}_rad")
+            * math.tanh(car.value(f"steering.map_{side}_slope"))
+            for side in ("left", "right")
+        )
+    return car.value("body.wheelbase_m") / math.tan(lock)
