@@ -18,7 +18,7 @@ _PLACES = re.compile(r"(?<=<)/|^/")
 _COOKIE_PATH = re.compile(r"(?i)(;\s*path=)/")
 
 
-PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
+PAGES = ("map", "signals", "vehicles", "cars", "eye", "recordings", "mismatch", "events")
 """First part of the address of each page of the dashboard; what follows is the page's own."""
 TAKEN = (*PAGES, "api", "static", "docs", "ngsi-ld", "metrics")
 

@@ -11,6 +11,7 @@ from scm.client.connection import Connection
 from scm.client.nouns.audit import AuditNoun
 from scm.client.nouns.boxes import BoxesNoun
 from scm.client.nouns.cameras import CamerasNoun
+from scm.client.nouns.cars import CarsNoun
 from scm.client.nouns.cities import CitiesNoun
 from scm.client.nouns.disturbances import DisturbancesNoun
 from scm.client.nouns.events import EventsNoun
@@ -51,6 +52,7 @@ class Client:
         self.audit = AuditNoun(self.connection)
         self.boxes = BoxesNoun(self.connection)
         self.cameras = CamerasNoun(self.connection)
+        self.cars = CarsNoun(self.connection)
         self.cities = CitiesNoun(self.connection)
         self.disturbances = DisturbancesNoun(self.connection)
         self.events = EventsNoun(self.connection)

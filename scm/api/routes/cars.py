@@ -7,7 +7,7 @@ from tempfile import NamedTemporaryFile
 from typing import Annotated, Literal
 
 import msgspec
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
 from fastapi import Path as InPath
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -25,6 +25,8 @@ from scm.vehicles.drivers.limits import turning_radius_m
 from scm.vehicles.new_car import Figures, new_car_text
 
 TOML = "application/toml"
+PREVIEW = "preview"
+"""No car file has this name: an address has it."""
 CarName = Annotated[
     str,
     InPath(pattern=r"^[a-z0-9_-]{1,32}$", description="name of a car file", examples=["nigel"]),
@@ -142,6 +144,14 @@ def router(city: City) -> APIRouter:
         return json_response(CarFiles(cars=cars, folder="" if folder is None else folder.name))
 
     @routes.get(
+        "/preview",
+        summary="See the car file that figures lead to; nothing is written",
+        responses=answer(CarFile),
+    )
+    def preview(figures: Annotated[NewCarBody, Query()]) -> Response:
+        return json_response(_made(city.city_map, figures))
+
+    @routes.get(
         "/{name}.toml",
         summary="Download a car file",
         response_class=Response,
@@ -164,15 +174,6 @@ def router(city: City) -> APIRouter:
 
 def _add_new(routes: APIRouter, city_map: CityMap) -> None:
     @routes.post(
-        "/preview",
-        summary="See the car file that figures lead to; nothing is written",
-        responses=answer(CarFile),
-    )
-    def preview(body: NewCarBody, key: IdempotencyKey = "") -> Response:
-        del key  # nothing changes
-        return json_response(_made(city_map, body))
-
-    @routes.post(
         "",
         summary="Write a new car file",
         status_code=201,
@@ -193,7 +194,7 @@ def _made(city_map: CityMap, body: NewCarBody) -> CarFile:
         RefusedError: the name is taken, or numbers contradict each other.
     """
     try:
-        if body.car in car_files():
+        if body.car == PREVIEW or body.car in car_files():
             raise _refused("conflict", f"car: there is a car file named {body.car!r} already")
         text = new_car_text(body.figures())
     except CarError as error:

@@ -28,7 +28,7 @@ def test_shipped_cars_are_listed_with_their_outline_and_what_lanes_they_miss(cli
 
 
 def test_a_preview_writes_nothing(client, folder):
-    made = client("POST", "/api/v1/cars/preview", json=BUGGY).json()
+    made = client("GET", "/api/v1/cars/preview", params=BUGGY).json()
     assert made["text"].startswith("# Made from a few figures")
     assert made["wheelbase_m"] == 0.324
     assert "lane" in made["misfit"]
@@ -50,7 +50,7 @@ def test_a_new_car_is_there_at_once_and_its_file_comes_back(client, folder):
 
 def test_a_car_file_is_never_written_over(client, folder):
     (folder / "lab_buggy.toml").write_text("# mine\n", encoding="utf-8")
-    for body in (BUGGY, {**BUGGY, "car": "nigel"}):
+    for body in (BUGGY, {**BUGGY, "car": "nigel"}, {**BUGGY, "car": "preview"}):
         reply = client("POST", "/api/v1/cars", json=body)
         assert reply.status_code == 409
         assert f"named '{body['car']}' already" in reply.json()["detail"]
@@ -82,14 +82,14 @@ def test_without_a_folder_it_is_said_how_to_name_one(client, monkeypatch):
     ],
 )
 def test_wrong_figures_are_refused_by_name(client, folder, change, where):
-    reply = client("POST", "/api/v1/cars/preview", json={**BUGGY, **change})
+    reply = client("GET", "/api/v1/cars/preview", params={**BUGGY, **change})
     assert reply.status_code == 422
     assert where in reply.text
     assert not list(folder.iterdir())
 
 
 def test_sizes_that_fit_no_car_name_the_number(client, folder):
-    reply = client("POST", "/api/v1/cars/preview", json={**BUGGY, "track_m": 0.01})
+    reply = client("GET", "/api/v1/cars/preview", params={**BUGGY, "track_m": 0.01})
     assert reply.status_code == 422
     assert "body.track_m: expected 0.03 to 3 m" in reply.json()["detail"]
 

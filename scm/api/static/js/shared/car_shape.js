@@ -3,13 +3,11 @@
  *
  * Its kind is told by colour and by the sign on its roof: circle hosted, diamond remote, triangle real.
  */
+import { placed } from "scm/shared/base.js";
 
-/** Outlines by car file [m]: rear and front end, half width, wheelbase; unknown ones look like a Nigel. */
-const OUTLINES = {
-  nigel: { rear: -0.07, front: 0.23, half: 0.0875, wheelbase: 0.14154 },
-  f1tenth: { rear: -0.09, front: 0.44, half: 0.15, wheelbase: 0.33 },
-  dart: { rear: -0.04, front: 0.24, half: 0.08, wheelbase: 0.175 },
-};
+/** Outlines by car file [m]: a Nigel's, until the city says otherwise. */
+const NIGEL = { rear: -0.07, front: 0.23, half: 0.0875, wheelbase: 0.14154, track: 0.153, radius: 0.0325, middle: 0.08 };
+const outlines = new Map([["nigel", NIGEL]]);
 const SMALL_PX_PER_M = 130; // below, names are written smaller
 const PAINT = {
   hosted: ["#4c8df0", "#2c65bd"],
@@ -27,9 +25,31 @@ const SIGNS = {
 /** The two colours of a car of this kind, light and dark; a lost one is grey. */
 export const paintOf = (kind, alive) => (alive ? (PAINT[kind] ?? PAINT.hosted) : PAINT.lost);
 
+/** Rear and front end, half width, wheelbase, track, radius of the wheels, and the middle [m]. */
 export function footprint(car) {
-  const { rear, front, half, wheelbase } = OUTLINES[car] ?? OUTLINES.nigel;
-  return { rear, front, half, wheelbase, middle: (rear + front) / 2 };
+  if (!outlines.has(car)) learn(car);
+  return outlines.get(car);
+}
+
+/** Ask the city what a car file says; one that it does not know stays a Nigel. */
+async function learn(car) {
+  outlines.set(car, NIGEL);
+  const reply = await fetch(placed(`/api/v1/cars/${encodeURIComponent(car)}`)).catch(() => null);
+  const known = reply?.ok ? await reply.json() : null;
+  if (known && !known.problem) outlines.set(car, outlineOf(known));
+}
+
+/** The outline of a row of `GET /cars`. */
+export function outlineOf(row) {
+  return {
+    rear: row.rear_m,
+    front: row.front_m,
+    half: (row.left_m - row.right_m) / 2,
+    wheelbase: row.wheelbase_m,
+    track: row.track_m,
+    radius: row.wheel_radius_m,
+    middle: (row.rear_m + row.front_m) / 2,
+  };
 }
 
 /** Draw a car; a chosen or lost one always with its name, others when there is room: `named`. */
@@ -43,7 +63,7 @@ export function drawCar(paper, view, car, chosen, named = true, heads = []) {
   const on = new Set(car.alive ? car.lights : []);
   beams(paper, shape, on);
   if (chosen) drawHalo(paper, shape);
-  wheels(paper, shape, car.steering_rad);
+  drawWheels(paper, shape, car.steering_rad);
   drawBody(paper, shape, paint, car.alive ? car.kind : "lost");
   lamps(paper, shape, on);
   if (!car.alive) cross(paper, shape);
@@ -60,15 +80,15 @@ export function drawHalo(paper, { rear, front, half }) {
   paper.stroke();
 }
 
-function wheels(paper, { half, wheelbase }, steering) {
+export function drawWheels(paper, { track, wheelbase, radius }, steering) {
   paper.fillStyle = "#0c0f13";
   for (const [x, angle] of [[0, 0], [wheelbase, steering]]) {
-    for (const y of [-half + 0.012, half - 0.012]) {
+    for (const y of [-track / 2, track / 2]) {
       paper.save();
       paper.translate(x, y);
       paper.rotate(angle);
       paper.beginPath();
-      paper.roundRect(-0.0325, -0.0145, 0.065, 0.029, 0.008);
+      paper.roundRect(-radius, -0.45 * radius, 2 * radius, 0.9 * radius, 0.25 * radius);
       paper.fill();
       paper.restore();
     }

@@ -63,7 +63,7 @@ export function Shell() {
   return html`
     <div class="page" data-link=${link.value}>
       <a class="skip" href="#main">Skip to the page</a>
-      <${TitleBar} pages=${PAGES} here=${next?.name} />
+      <${TitleBar} pages=${PAGES} here=${next?.under ?? next?.name} />
       <${Banners} />
       <main id="main" class="at-${page?.name ?? "nowhere"}" tabindex="-1" ref=${main}>
         <${Body} page=${page} />

@@ -39,7 +39,7 @@ export function TitleBar({ pages, here }) {
         <h1>${city.value ? city.value.title : "Smart City Manager"}</h1>
       </a>
       <nav aria-label="Pages" ref=${nav}>
-        ${pages.map(
+        ${pages.filter((page) => !page.under).map(
           (page) => html`
             <a key=${page.name} href="/${page.name}" aria-current=${page.name === here ? "page" : null}>
               ${page.title}

@@ -27,6 +27,7 @@ export function FleetTable() {
       <div class="panel-head">
         <h2>Vehicles <small>${shown.length === all.length ? all.length : `${shown.length} of ${all.length}`}</small></h2>
         <div class="filters">
+          <a href="/cars">Car files</a>
           <input
             type="search"
             placeholder="Name, owner, mode"
