@@ -30,6 +30,7 @@ from scm.api.etag import etag_of, has_tag
 
 STATIC_DIR = Path(__file__).parent / "static"
 INDEX = STATIC_DIR / "index.html"
+PAGE_LIST = STATIC_DIR / "js/pages/index.js"
 NEEDS, FRAME = "<!-- needs -->", "<main></main>"
 """What a page fills in, in `index.html`."""
 
@@ -38,6 +39,7 @@ NO_PAGES = ("/api/", "/ngsi-ld/", "/static/")
 
 _READS = frozenset({"GET", "HEAD"})
 _IMPORT = re.compile(r'(?:\bfrom|^import)\s*"([\w@./-]+)"', re.MULTILINE)
+_UNDER = re.compile(r'name: "([a-z]+)".* under: "([a-z]+)"')
 _LOADS = re.compile(r'name: "([a-z]+)".*import\("([^"]+)"\)')
 _MAPPING = re.compile(r'<script type="importmap">(.*?)</script>', re.DOTALL)
 _ADDRESS_IN = re.compile(r'((?:href|src)="|: ")/')
@@ -196,10 +198,11 @@ def page_text(name: str, base: str = "") -> str:
     inside = frame.read_text("utf-8") if frame.is_file() else ""
     needs = [f'<link rel="stylesheet" href="/static/css/pages/{name}.css">']
     needs += [f'<link rel="modulepreload" href="{address}">' for address in modules_of(name)]
+    shown = dict(_UNDER.findall(PAGE_LIST.read_text("utf-8"))).get(name, name)
     text = (
         index_text()
         .replace(NEEDS, "\n".join(needs))
-        .replace(f'<a href="/{name}">', f'<a href="/{name}" aria-current="page">')
+        .replace(f'<a href="/{shown}">', f'<a href="/{shown}" aria-current="page">')
         .replace(FRAME, f'<main class="at-{name}">\n{inside}</main>')
     )
     return _placed(text, base)
@@ -208,7 +211,7 @@ def page_text(name: str, base: str = "") -> str:
 @functools.cache
 def modules_of(name: str) -> tuple[str, ...]:
     """Return the addresses of all modules that a page imports, the nearest first."""
-    loads = dict(_LOADS.findall((STATIC_DIR / "js/pages/index.js").read_text("utf-8")))
+    loads = dict(_LOADS.findall(PAGE_LIST.read_text("utf-8")))
     found = dict.fromkeys(["/static/js/app.js", _address(loads[name])])
     left = list(found)
     for address in left:  # which grows

@@ -12,6 +12,7 @@ from scm.command import Command
 
 if TYPE_CHECKING:
     from scm.maps.model import CityMap
+    from scm.vehicles.car import Car
 
 Row = tuple[str, ...]
 
@@ -39,6 +40,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--docs", type=Path, metavar="DIR", help="terms: write a page and a picture of each"
     )
+    parser.add_argument("--map", help="car: say which of this map's lanes it cannot follow")
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -113,9 +115,19 @@ def _car(arguments: argparse.Namespace) -> str:
     from scm.vehicles.car import car_names, load_car
     from scm.vehicles.describe import describe_car
 
-    return (
-        "\n".join(car_names()) if arguments.name is None else describe_car(load_car(arguments.name))
-    )
+    if arguments.name is None:
+        return "\n".join(car_names())
+    car = load_car(arguments.name)
+    return describe_car(car) + ("" if arguments.map is None else _on_map(car, arguments.map))
+
+
+def _on_map(car: "Car", name: str) -> str:
+    from scm.maps.bends import misfit
+    from scm.maps.load import load_map
+    from scm.vehicles.drivers.limits import limits_of, turning_radius_m
+
+    problem = misfit(load_map(name), turning_radius_m(car), limits_of(car).width)
+    return f"ON MAP {name}: {problem or 'it can follow all lanes'}"
 
 
 def _terms(arguments: argparse.Namespace) -> str:

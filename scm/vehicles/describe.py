@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from scm.vehicles import body14
 from scm.vehicles.car import Car, Quantity, all_terms
+from scm.vehicles.drivers.limits import turning_radius_m
 from scm.vehicles.facts import FACTS
 from scm.vehicles.param import Param
 from scm.vehicles.term import Term, flat
@@ -19,6 +20,7 @@ def describe_car(car: Car) -> str:
         title,
         "=" * len(title),
         f"file     {car.path}",
+        f"turns    on a radius of {turning_radius_m(car):.3f} m at best, middle of the rear axle",
         "skeleton 14 degrees of freedom: body 6, wheel hops 4, wheel spins 4",
         f"effects  {len(effects)} of the {len(all_terms())} known; "
         "`scm show terms NAME` shows an equation",

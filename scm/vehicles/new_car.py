@@ -186,24 +186,24 @@ class _Size:
         return cls(base, length - rear, rear, width, radius, ROOF * radius, entries)
 
 
+_BOXES: Mapping[str, Callable[[float, float, float], float]] = {
+    "yaw_inertia_kgm2": lambda mass, length, width: mass * (length**2 + width**2) / 12.0,
+    "roll_inertia_kgm2": lambda mass, _, width: mass * width**2 / 12.0,
+    "pitch_inertia_kgm2": lambda mass, length, _: mass * length**2 / 12.0,
+}
+"""Inertia of a box as heavy and as large as the car."""
+
+
+def _over_box(car: Car, key: str, box: Callable[[float, float, float], float]) -> float:
+    return car.value(key) / box(car.value("body.mass_kg"), _length(car), _width(car))
+
+
 def _body(figures: Figures, size: _Size) -> Entries:
     mass, length = figures.mass_kg, size.front + size.rear
-    box = {
-        "yaw_inertia_kgm2": lambda m, long, wide: m * (long * long + wide * wide) / 12.0,
-        "roll_inertia_kgm2": lambda m, long, wide: m * wide * wide / 12.0,
-        "pitch_inertia_kgm2": lambda m, long, wide: m * long * long / 12.0,
-    }
-    inertia = {
-        key: _estimate(
-            law(mass, length, size.width),
-            _scaled(
-                lambda c, key=key, law=law: (  # type: ignore[misc]
-                    c.value(f"body.{key}") / law(c.value("body.mass_kg"), _length(c), _width(c))
-                )
-            ),
-        )[1]
-        for key, law in box.items()
-    }
+    inertia = {}
+    for key, box in _BOXES.items():
+        ratio = _scaled(partial(_over_box, key=f"body.{key}", box=box))
+        inertia[key] = _estimate(box(mass, length, size.width), ratio)[1]
     half = 0.5 * size.width
     sized = "given" if figures.length_m and figures.width_m else "scaled"
     return {

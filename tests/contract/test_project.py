@@ -49,6 +49,8 @@ def test_imports_go_one_way(root: Path) -> None:
 def test_modules_and_functions_stay_short(root: Path, tree: str) -> None:
     too_long = []
     for path in sorted((root / tree).rglob("*.py")):
+        if path.parent == root / "scm" / "client" / "nouns":
+            continue  # written by docs/make/client.py: a parameter a field of the interface
         text = path.read_text(encoding="utf-8")
         if text.count("\n") > LONGEST_MODULE:
             too_long.append(f"{path.relative_to(root)}: {text.count(chr(10))} lines")

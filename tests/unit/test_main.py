@@ -193,3 +193,16 @@ def test_a_command_that_is_none_is_told_all_that_are(
     said = capsys.readouterr().err
     assert f"invalid choice: '{words[0]}'" in said
     assert "'world'" in said
+
+
+def test_a_car_is_shown_with_the_lanes_that_it_cannot_follow(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Its turning circle is held against the map."""
+    assert main(["show", "car", "f1tenth", "--map", "driving_school"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith("ON MAP driving_school: it is 0.27 m wide, wider than 4 lanes")
+    assert main(["show", "car", "nigel", "--map", "driving_school"]) == 0
+    shown = capsys.readouterr().out
+    assert "turns    on a radius of 0.245 m" in shown
+    assert shown.endswith("ON MAP driving_school: it can follow all lanes\n")

@@ -3,8 +3,6 @@
  *
  * Its kind is told by colour and by the sign on its roof: circle hosted, diamond remote, triangle real.
  */
-import { placed } from "scm/shared/base.js";
-
 /** Outlines by car file [m]: a Nigel's, until the city says otherwise. */
 const NIGEL = { rear: -0.07, front: 0.23, half: 0.0875, wheelbase: 0.14154, track: 0.153, radius: 0.0325, middle: 0.08 };
 const outlines = new Map([["nigel", NIGEL]]);
@@ -31,12 +29,13 @@ export function footprint(car) {
   return outlines.get(car);
 }
 
-/** Ask the city what a car file says; one that it does not know stays a Nigel. */
+/** Ask the city what car files say; one that it does not know stays a Nigel. */
 async function learn(car) {
   outlines.set(car, NIGEL);
-  const reply = await fetch(placed(`/api/v1/cars/${encodeURIComponent(car)}`)).catch(() => null);
-  const known = reply?.ok ? await reply.json() : null;
-  if (known && !known.problem) outlines.set(car, outlineOf(known));
+  const { placed } = await import("scm/shared/base.js"); // it needs a document, and to draw needs none
+  const reply = await fetch(placed("/api/v1/cars")).catch(() => null);
+  const { cars } = reply?.ok ? await reply.json() : { cars: [] };
+  for (const row of cars) if (!row.problem) outlines.set(row.car, outlineOf(row));
 }
 
 /** The outline of a row of `GET /cars`. */
