@@ -160,6 +160,7 @@ def test_random_departures_have_the_rate_and_are_the_same_for_a_seed():
         ("from,to,vehicles_per_hour,begin,end\na,b,1,9:00,8:00\n", "end: expected after begin"),
         ("from,to,vehicles_per_hour,begin\na,b,1,9:x\n", "begin: expected 07:30"),
         ("from,to,vehicles_per_hour,begin\na,b,1,7 am\n", "begin: expected 07:30.*got '7 am'"),
+        ("from,to,vehicles_per_hour,end\na,b,1,1e12\n", "end: expected at most 604800 s, a week"),
         ("from,to,vehicles_per_hour,end\na,b,1,25:10\n", "end: expected 07:30.*got '25:10'"),
         ("from,to,vehicles_per_hour,end\na,b,1,7:60\n", "end: expected 07:30"),
         ("from,to,vph\na,b,1\n", "no key 'vph', only from, to, vehicles_per_hour"),
