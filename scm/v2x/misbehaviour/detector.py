@@ -30,6 +30,7 @@ from scm.v2x.misbehaviour.likely import LEAST, Box, overlap_m
 from scm.v2x.misbehaviour.limits import REAPPEARS_S, Limits
 
 FRESH_NS = NS_PER_S // 3
+EYE_PAUSE_NS = 2 * NS_PER_S  # an Eye that was silent for longer has begun anew
 EYE_WORKS_NS = NS_PER_S // 2
 FORGET_NS = 60 * NS_PER_S
 SILENT_NS = 2 * NS_PER_S
@@ -91,6 +92,7 @@ class Detector:
         self._tracks: dict[int, EyeTrack] = {}
         self._seen: set[int] = set()
         self.eye_ns: int | None = None
+        self._eye_began_ns = 0
         self._standings: dict[int, Standing] = {}
         self._began_ns: int | None = None
         self._heard_ns = 0
@@ -102,6 +104,8 @@ class Detector:
         if not track.stale and BAD_FLAGS.isdisjoint(track.flags):
             self._seen.add(who)
         seen, before = seen_ns(track), self.eye_ns
+        if before is None or seen - before > EYE_PAUSE_NS:
+            self._eye_began_ns = seen
         # Nobody saw anything after this was told: what came from the future is forgotten again.
         self.eye_ns = seen if before is None or before > track.t_ns else max(seen, before)
 
@@ -200,7 +204,8 @@ class Detector:
         eye_sees = self._eye_sees(claim)
         is_new = bool(sender.car) and claim.sent_ns - memory.first_ns <= GRACE_S * NS_PER_S
         unseen = bool(sender.car) and (claim.who not in self._seen or not limits.has_tag)
-        memory.is_tag_unseen = unseen and not is_new and (eye_sees or memory.is_tag_unseen)
+        has_looked = _since_s(claim.sent_ns, self._eye_began_ns) > GRACE_S and not is_new
+        memory.is_tag_unseen = unseen and has_looked and (eye_sees or memory.is_tag_unseen)
         neighbours = self._around(claim)
         return Case(
             now=claim,

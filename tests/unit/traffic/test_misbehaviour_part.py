@@ -223,7 +223,7 @@ def test_a_liar_that_was_never_let_in_said_nothing():
     assert lines == ["n9 leaves: it was never in the city"]
 
 
-def hear_alone(names, car="nigel", seen=(), seconds_=8):
+def hear_alone(names, car="nigel", seen=(), seconds_=8, eye_from_s=0):
     """Let a part hear cars that drive while the Eye sees some of them; return all that it says."""
     part, said = MisbehaviourPart(MAP, lambda _x, _y: True), []
     for k in range(seconds_):
@@ -232,10 +232,17 @@ def hear_alone(names, car="nigel", seen=(), seconds_=8):
             told = state(1.0 * k, 0.1 + 0.4 * place + 0.01 * k, v=0.01, name=name)
             cam = CamRx(receiver=RSU, station=name, t_ns=told.t_ns, body=body(told), car=car)
             inbox = [Incoming(message=cam, t_ns=now_ns)]
-            if name in seen:
+            if name in seen and k >= eye_from_s:
                 inbox.insert(0, Incoming(message=track(told), t_ns=now_ns))
             said += part.step(now_ns, inbox)
     return said
+
+
+def test_an_eye_that_has_just_begun_may_not_have_seen_every_tag_yet():
+    said = hear_alone(("n1", "n2"), seen=("n2",), seconds_=8, eye_from_s=5)
+    assert not [one for one in said if isinstance(one, CityEvent)]
+    said = hear_alone(("n1", "n2"), seen=("n2",), seconds_=12, eye_from_s=5)
+    assert [one.vehicle for one in said if isinstance(one, CityEvent)] == ["n1"]
 
 
 @pytest.mark.parametrize("car", ["nigel", "dart"])
