@@ -153,7 +153,9 @@ def _checked(flow: Flow, where: str) -> Flow:
     if flow.begin_s >= flow.end_s:
         raise DemandError(f"{where}: end: expected after begin = {flow.begin_s:g} s")
     if flow.end_s > MOST_S:
-        raise DemandError(f"{where}: end: expected at most {MOST_S:g} s, a week, got {flow.end_s:g}")
+        raise DemandError(
+            f"{where}: end: expected at most {MOST_S:g} s, a week, got {flow.end_s:g}"
+        )
     if flow.per_hour > HOUR_S:
         raise DemandError(f"{where}: expected at most {HOUR_S:g} an hour, got {flow.per_hour:g}")
     return flow

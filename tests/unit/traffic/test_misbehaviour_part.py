@@ -239,9 +239,9 @@ def hear_alone(names, car="nigel", seen=(), seconds_=8, eye_from_s=0):
 
 
 def test_an_eye_that_has_just_begun_may_not_have_seen_every_tag_yet():
-    said = hear_alone(("n1", "n2"), seen=("n2",), seconds_=8, eye_from_s=5)
+    said = hear_alone(("n2", "n1"), seen=("n2",), seconds_=8, eye_from_s=5)
     assert not [one for one in said if isinstance(one, CityEvent)]
-    said = hear_alone(("n1", "n2"), seen=("n2",), seconds_=12, eye_from_s=5)
+    said = hear_alone(("n2", "n1"), seen=("n2",), seconds_=12, eye_from_s=5)
     assert [one.vehicle for one in said if isinstance(one, CityEvent)] == ["n1"]
 
 
