@@ -144,6 +144,16 @@ def test_a_car_of_ones_own_folder_comes_by_its_name(make_city, monkeypatch):
     assert car_body("buggy") != car_body("nigel")
 
 
+def test_a_car_that_cannot_follow_the_lanes_is_announced_once_a_file(make_city):
+    city = make_city()
+    for name in ("f1", "f2"):
+        city.ask(SpawnRequest(vehicle=name, car="f1tenth"))
+    city.ask(SpawnRequest(vehicle="n1"))
+    (said,) = [event for event in city.heard(CityEvent) if event.name == "lanes_misfit"]
+    assert (said.vehicle, said.severity) == ("f1", "warning")
+    assert said.text.startswith("f1, a f1tenth: it is 0.27 m wide, wider than 4 lanes")
+
+
 def test_cars_without_a_name_get_one_each(city):
     assert [city.ask(SpawnRequest()).vehicle for _ in range(3)] == ["n1", "n2", "n3"]
 
