@@ -39,6 +39,16 @@ def test_no_script_writes_markup_from_data(path):
         assert danger not in text
 
 
+@pytest.mark.parametrize("path", OURS, ids=str)
+def test_what_a_person_types_is_not_reset_when_the_page_is_drawn_again(path):
+    """Preact sets `value` at each drawing; a field that reports no input takes `defaultValue`."""
+    fields = re.findall(r"<(?:input|textarea)\b(?:=>|[^>])*>", path.read_text("utf-8"))
+    for field in fields:
+        is_set = re.search(r"\s(value|checked)=(\$|\")", field)
+        is_choice = re.search(r'type="(radio|checkbox|submit|hidden)"', field)
+        assert not is_set or is_choice or "onInput" in field, field
+
+
 @pytest.mark.parametrize("path", [*OURS, *DOCUMENTS, *FRAMES, *STYLES], ids=str)
 def test_nothing_of_ours_points_to_another_host(path):
     assert not re.search(r"(?:https?:)?//[a-z0-9-]+\.[a-z]", path.read_text("utf-8"))

@@ -75,7 +75,7 @@ function Question({ name }) {
       <form class="add-car" onSubmit=${submit}>
         <label>
           Lane
-          <input name="lane" list="lanes" value=${standing(offered.value)?.lane ?? ""} required data-first />
+          <input name="lane" list="lanes" defaultValue=${standing(offered.value)?.lane ?? ""} required data-first />
           <datalist id="lanes">${city.value.lanes.map(({ name }) => html`<option key=${name} value=${name}></option>`)}</datalist>
         </label>
         <label>

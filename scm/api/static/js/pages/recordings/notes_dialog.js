@@ -25,7 +25,7 @@ export function NotesDialog({ recording, onClose, onChanged }) {
   return html`
     <${Dialog} title="Name and notes" onClose=${onClose}>
       <form class="fields" onSubmit=${submit}>
-        <label>Name <input name="title" maxlength="120" value=${known.body.title} placeholder=${recording.name} data-first /></label>
+        <label>Name <input name="title" maxlength="120" defaultValue=${known.body.title} placeholder=${recording.name} data-first /></label>
         <label>Notes <textarea name="notes" rows="5" maxlength="4000">${known.body.notes}</textarea></label>
         <p class="hint">The file keeps its name, ${recording.name}.mcap.</p>
         <div class="actions">

@@ -173,7 +173,7 @@ function RunForm({ name, edited, text, seen }) {
   };
   return html`
     <form class="run" onSubmit=${submit}>
-      <label>Arguments <input name="given" maxlength="400" value=${offered(text)} placeholder="none" /></label>
+      <label>Arguments <input name="given" maxlength="400" defaultValue=${offered(text)} placeholder="none" /></label>
       <button class="primary" disabled=${edited}>Run</button>
       <small>${edited ? "Save it first: what is saved is run." : "{connect} becomes the address of this city's router."}</small>
     </form>

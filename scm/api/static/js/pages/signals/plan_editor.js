@@ -153,7 +153,7 @@ export function PlanEditor() {
         </label>
         <label>
           <span>Cycle, s (stretches greens)</span>
-          <input type="number" id="plan-cycle" step="0.1" min="1" max=${LONGEST_CYCLE_S} value=${cycleOf(draft.stages).toFixed(1)} onChange=${scale} />
+          <input key=${cycleOf(draft.stages)} type="number" id="plan-cycle" step="0.1" min="1" max=${LONGEST_CYCLE_S} defaultValue=${cycleOf(draft.stages).toFixed(1)} onChange=${scale} />
         </label>
         <label>
           <span>Offset, s (empty: in step with nobody)</span>
