@@ -31,7 +31,7 @@ export function Page() {
           <thead>
             <tr>
               <th>Name</th><th class="wide">Scale</th><th class="number wide">Mass</th><th class="number wide">Wheelbase</th>
-              <th class="number" title="Of the tightest circle of the middle of its rear axle">Turns on</th>
+              <th class="number wide" title="Of the tightest circle of the middle of its rear axle">Turns on</th>
               <th>Lanes of this city</th><th>File</th>
             </tr>
           </thead>
@@ -58,7 +58,7 @@ function Row({ car }) {
       <td class="wide">${car.scale}</td>
       <td class="number wide">${fixed(car.mass_kg, 2)} <small>kg</small></td>
       <td class="number wide">${fixed(100 * car.wheelbase_m, 1)} <small>cm</small></td>
-      <td class="number">${fixed(car.turning_radius_m, 2)} <small>m</small></td>
+      <td class="number wide">${fixed(car.turning_radius_m, 2)} <small>m</small></td>
       <td class="wraps ${car.misfit ? "warn" : ""}">${car.misfit || "follows all"}</td>
       <td><a href="/api/v1/cars/${car.car}.toml" download>TOML</a></td>
     </tr>

@@ -50,7 +50,7 @@ export function FleetTable() {
             <tr>
               <th>Name</th><th>State</th><th>Kind</th><th class="wide">Car</th><th>Driven by</th>
               <th class="number">Speed</th><th class="wide">Trip</th><th class="number wide">Battery</th>
-              <th class="number wide" title="Score of what is doubted of its messages">Misbehaviour</th><th class="number" title="Age of its newest report">Link</th>
+              <th class="number wide" title="Score of what is doubted of its messages">Misbehaviour</th><th class="number wide" title="Age of its newest report">Link</th>
             </tr>
           </thead>
           <tbody>${shown.map((car) => html`<${Row} key=${car.vehicle} car=${car} />`)}</tbody>
@@ -85,7 +85,7 @@ function Row({ car }) {
         ${batteryWord(car)} <${BatterySign} car=${car} /> ${percent(car) || fixed(car.battery_v, 1, " V")}
       </td>
       <td class="number wide ${doubt.suspected ? "bad" : ""}">${doubt.suspected ? "suspected" : doubt.score === null ? UNKNOWN : fixed(doubt.score, 1)}</td>
-      <td class="number ${age_ms > STALE_MS ? "warn" : ""}">${age(age_ms)}</td>
+      <td class="number wide ${age_ms > STALE_MS ? "warn" : ""}">${age(age_ms)}</td>
     </tr>
   `;
 }
