@@ -19,6 +19,8 @@ ROOT = Path(__file__).parent.parent
 TESTS = ROOT / "tests"
 SHARED = ROOT.parent / "shared"
 
+os.environ["SCM_CARS"] = ""  # no car files of whoever runs the tests
+
 # How long an example takes says nothing on a machine that others use as well.
 settings.register_profile(
     "busy_machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]

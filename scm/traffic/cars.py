@@ -16,7 +16,7 @@ from typing import Any
 
 from scm.errors import CarError, nearest, reading
 from scm.traffic.timing import NIGEL, CarFacts
-from scm.vehicles.car_files import car_files
+from scm.vehicles.car_files import OWN_CARS, car_files
 
 CRUISE_THROTTLE = 0.8
 
@@ -57,7 +57,10 @@ def _read(name_or_path: str) -> tuple[dict[str, Any], tuple[float, ...]]:
     if not path.is_file():
         known = sorted(named)
         hint = nearest(path.stem, known)
-        raise CarError(f"{name_or_path}: no such car{hint}; cars by name: {', '.join(known)}")
+        raise CarError(
+            f"{name_or_path}: no such car{hint}; cars by name: {', '.join(known)}; cars of your "
+            f"own: {OWN_CARS}=FOLDER of their files"
+        )
     with reading(path, "a TOML file", CarError):
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     footprint = _numbers(data, "body", "footprint_x_m")

@@ -16,7 +16,7 @@ from scm import registry
 from scm.errors import CarError, TermError, nearest, reading
 from scm.vehicles import body14
 from scm.vehicles.assemble import setters_of
-from scm.vehicles.car_files import TYPES_DIR, car_files
+from scm.vehicles.car_files import OWN_CARS, TYPES_DIR, car_files
 from scm.vehicles.correlated import Correlated, read_correlated
 from scm.vehicles.facts import FACTS, Fact
 from scm.vehicles.measure import Fault, all_measures, read_faults
@@ -191,7 +191,8 @@ def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
     if not path.is_file():
         hint = nearest(Path(name_or_path).stem, car_names())
         what = "file" if Path(name_or_path).suffix == ".toml" else "car"
-        msg = f"{name_or_path}: no such {what}; cars by name: {', '.join(car_names())}{hint}"
+        own = f"; cars of your own: {OWN_CARS}=FOLDER of their files" if what == "car" else ""
+        msg = f"{name_or_path}: no such {what}; cars by name: {', '.join(car_names())}{hint}{own}"
         raise CarError(msg)
     with reading(path, "a TOML file", CarError):
         data = tomllib.loads(path.read_text(encoding="utf-8"))

@@ -1,7 +1,7 @@
 """Where the cars lie that have a name: those shipped, and those of one's own folder.
 
-The environment's `SCM_CARS` names that folder, for each process of a city and each agent; `scm up`
-names one beside its recordings where nobody did.
+The environment's `SCM_CARS` names that folder, for each process of a city and each agent. Where it
+does not, that is `cars` beside the recordings of `scm up`, which are in `runs` unless it says so.
 """
 
 import os
@@ -11,6 +11,8 @@ from scm.errors import CarError, reading
 
 TYPES_DIR = Path(__file__).parent / "types"
 OWN_CARS = "SCM_CARS"
+USUAL_FOLDER = Path("runs/cars")
+"""Of one's own cars, from the working directory, where the environment has no `SCM_CARS`."""
 
 
 def name_own_folder(folder: Path) -> None:
@@ -26,12 +28,14 @@ def name_own_folder(folder: Path) -> None:
 
 
 def own_folder() -> Path | None:
-    """Return the folder of one's own cars; None: nobody named one.
+    """Return the folder of one's own cars; None: there is none, or `SCM_CARS` is empty.
 
     Raises:
         CarError: when there is no such folder.
     """
-    folder = os.environ.get(OWN_CARS, "")
+    folder = os.environ.get(OWN_CARS)
+    if folder is None:
+        return USUAL_FOLDER if USUAL_FOLDER.is_dir() else None
     if folder and not Path(folder).is_dir():
         msg = f"{OWN_CARS}: got {folder!r}, expected a folder of car files"
         raise CarError(msg)

@@ -65,7 +65,7 @@ def test_a_broken_file_of_ones_own_is_listed_with_what_is_wrong(client, folder):
 
 
 def test_without_a_folder_it_is_said_how_to_name_one(client, monkeypatch):
-    monkeypatch.delenv("SCM_CARS", raising=False)
+    monkeypatch.setenv("SCM_CARS", "")
     reply = client("POST", "/api/v1/cars", json=BUGGY)
     assert reply.status_code == 409
     assert "SCM_CARS=FOLDER" in reply.json()["detail"]

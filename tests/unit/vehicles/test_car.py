@@ -197,6 +197,22 @@ def test_a_car_of_ones_own_folder_has_a_name(garage):
     assert load_car("nigel").path == TYPES_DIR / "nigel.toml"
 
 
+def test_cars_beside_the_usual_recordings_have_names_where_no_folder_is_named(
+    tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("SCM_CARS")
+    shipped = car_names()
+    folder = tmp_path / "runs" / "cars"
+    folder.mkdir(parents=True)
+    (folder / "buggy.toml").write_text((TYPES_DIR / "nigel.toml").read_text())
+    assert car_names() == sorted([*shipped, "buggy"])
+    monkeypatch.setenv("SCM_CARS", "")
+    assert car_names() == shipped
+    with pytest.raises(CarError, match="cars of your own: SCM_CARS=FOLDER of their files"):
+        load_car("buggy")
+
+
 def test_a_shipped_cars_name_is_not_given_twice(garage):
     (garage / "nigel.toml").write_text("")
     with pytest.raises(CarError, match="'nigel' is a shipped car's name"):

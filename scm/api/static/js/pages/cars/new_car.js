@@ -77,7 +77,7 @@ export function NewCar({ folder, names, onWritten }) {
           ? html`<button class="primary" disabled=${!preview.row || Boolean(preview.problem)}>Make the car file</button>`
           : html`<p class="hint">This city has no folder for car files: start it with <code>SCM_CARS=FOLDER</code>, or copy the text below.</p>`}
       </form>
-      ${written && html`<${Next} car=${written} folder=${folder} />`}
+      ${written && html`<${Next} car=${written} />`}
       ${preview.row && html`<${Made} row=${preview.row} />`}
     </section>
   `;
@@ -87,12 +87,12 @@ function Number_({ name, words, ...more }) {
   return html`<label>${words} <input name=${name} type="number" step="any" ...${more} /></label>`;
 }
 
-function Next({ car, folder }) {
+function Next({ car }) {
   return html`
     <p class="next" role="status">
-      <strong>${car}</strong> can join now: by “Add a car” on the <a href="/map">map</a>, or by an agent of its own, which needs${" "}
-      <a href="/api/v1/cars/${car}.toml" download>the file</a> too (this city has it in folder ${folder}):${" "}
-      <code>SCM_CARS=FOLDER vehicle-agent join --car ${car} --name NAME --connect ADDRESS</code>
+      <strong>${car}</strong> can join now: by “Add a car” on the <a href="/map">map</a>, or by an agent of its own:${" "}
+      <code>vehicle-agent join --car ${car} --name NAME --connect ADDRESS</code>, on another computer with${" "}
+      <a href="/api/v1/cars/${car}.toml" download>the file</a> in a folder that <code>SCM_CARS</code> names.
     </p>
   `;
 }
