@@ -20,9 +20,9 @@ import numpy as np
 
 from bench.city import fill
 from scm.arrays import Bools, Floats, Ints
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears, Serves
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears, Serves
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.observer_part import ObserverPart
 from scm.traffic.part import TrafficPart

@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 import msgspec
 
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.part import TrafficPart
 from scm.v2x.etsi import SCALE
 from scm.v2x.etsi_convert import read_cam

@@ -8,9 +8,9 @@ import threading
 from collections.abc import Sequence
 
 from scm.clock import WallClock
-from scm.live import run
 from scm.maps.model import CityMap
-from scm.part import Hears
+from scm.runtime.live import run
+from scm.runtime.part import Hears
 from scm.selftest.signal_fault import Bend
 from scm.traffic.part import TrafficPart
 from scm.v2x.bus_zenoh import ZenohBus
@@ -22,7 +22,7 @@ from scm.v2x.messages.spatem_tx import SpatemTx
 
 
 class BentTraffic:
-    """A traffic part whose output is bent at one junction; see `scm.part.Part`.
+    """A traffic part whose output is bent at one junction; see `scm.runtime.part.Part`.
 
     Attributes:
         bend: What turns the meant into the shown; None: nothing is bent.

@@ -16,7 +16,7 @@ from scm.errors import PlanError, nearest
 from scm.log import event
 from scm.maps.model import CityMap
 from scm.maps.route import Roads
-from scm.part import Hears, Serves
+from scm.runtime.part import Hears, Serves
 from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller
 from scm.traffic.detectors import Seen, Watcher, reach_of
@@ -48,7 +48,7 @@ _log = logging.getLogger(__name__)
 
 
 class TrafficPart:
-    """Controls the signals of all junctions of a map; see `scm.part.Part`."""
+    """Controls the signals of all junctions of a map; see `scm.runtime.part.Part`."""
 
     def __init__(
         self,

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 import scm.traffic
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map, map_names
 from scm.maps.route import Roads
-from scm.part import Hears
 from scm.registry import load
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic import kernel
 from scm.traffic.card import card_of
 from scm.traffic.controller import Controller

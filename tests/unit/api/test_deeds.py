@@ -9,9 +9,9 @@ from scm.api.app import create_app
 from scm.api.deeds import Words
 from scm.api.keys import KeyRing
 from scm.clock import StepClock
-from scm.part import Serves
 from scm.registry import names
-from scm.station import Station
+from scm.runtime.part import Serves
+from scm.runtime.station import Station
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.v2x.bus_memory import MemoryNetwork

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import pytest
 
 from scm.clock import NS_PER_S, nanoseconds, seconds
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.attacker import Attacker
 from scm.traffic.misbehaviour_part import MisbehaviourPart, limits_by_car
 from scm.traffic.part import TrafficPart

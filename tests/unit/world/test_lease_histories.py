@@ -7,8 +7,8 @@ from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from scm.clock import NS_PER_MS
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
+from scm.runtime.lockstep import Lockstep
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.v2x.ask import Asking

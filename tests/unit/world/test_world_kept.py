@@ -5,8 +5,8 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
+from scm.runtime.lockstep import Lockstep
 from scm.store.memory import MemoryStore
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.join_request import JoinRequest

@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from scm.clock import NS_PER_S, StepClock, WallClock
-from scm.crew import Crew, Job
+from scm.runtime.crew import Crew, Job
 from scm.v2x.messages.presence import Presence
 
 CLOCK = WallClock()

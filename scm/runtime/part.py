@@ -1,8 +1,9 @@
 """The contract of a part of the city: a steppable object without thread, clock or bus.
 
-A part says what it hears and what it serves; a runner (`scm.live` or `scm.lockstep`) ties it to a
-bus and a clock. Because a part only ever sees `now_ns` and its inbox, the same object runs live in
-a process of its own, and deterministically beside all the others on a stepped clock.
+A part says what it hears and what it serves; a runner (`scm.runtime.live` or
+`scm.runtime.lockstep`) ties it to a bus and a clock. Because a part only ever sees `now_ns` and its
+inbox, the same object runs live in a process of its own, and deterministically beside all the
+others on a stepped clock.
 """
 
 from collections.abc import Mapping, Sequence

@@ -9,7 +9,7 @@ from scm.__main__ import parse
 from scm.commands.up import wanted_of
 from scm.disturbances import COSTLY, Disturbance
 from scm.errors import MapError, RunError, ScmError
-from scm.up import OPTIONAL, Wanted, _parts, _say_disturbance, _settled, run_city
+from scm.runtime.up import OPTIONAL, Wanted, _parts, _say_disturbance, _settled, run_city
 from scm.v2x.router import Router, free_endpoint
 
 

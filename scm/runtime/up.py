@@ -9,13 +9,13 @@ from functools import partial
 from pathlib import Path
 
 from scm.clock import NS_PER_MS, WallClock, seconds
-from scm.crew import Crew, Job, Say
 from scm.disturbances import HEARS, Disturbance, Disturbances
 from scm.errors import RunError, nearest
 from scm.eye.station import eye_station
-from scm.live import stop_on_signal
 from scm.maps.load import is_scan, load_map
 from scm.maps.radio import with_radio
+from scm.runtime.crew import Crew, Job, Say
+from scm.runtime.live import stop_on_signal
 from scm.store.open import open_store
 from scm.traffic.demand import DemandPart
 from scm.traffic.demand_table import load_demand

@@ -15,8 +15,8 @@ import msgspec
 from scm.clock import NS_PER_MS, NS_PER_S, Clock, next_beat_ns
 from scm.errors import LinkError, ScmError
 from scm.log import event
-from scm.part import Part
-from scm.station import Station
+from scm.runtime.part import Part
+from scm.runtime.station import Station
 from scm.store.repository import Repository
 from scm.v2x.bus import Bus
 from scm.v2x.exchange import Outgoing

@@ -14,7 +14,7 @@ from typing import cast
 import msgspec
 
 from scm.log import event
-from scm.part import Hears, Part
+from scm.runtime.part import Hears, Part
 from scm.store.audit import Deed
 from scm.store.repository import Table
 from scm.v2x.answers import AnswerBook

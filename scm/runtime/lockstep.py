@@ -11,8 +11,8 @@ from typing import Self
 
 from scm.clock import StepClock, nanoseconds, seconds
 from scm.errors import RunError
-from scm.part import Hears, Part
-from scm.station import Station
+from scm.runtime.part import Hears, Part
+from scm.runtime.station import Station
 from scm.store.repository import Repository
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_memory import MemoryBus, MemoryNetwork

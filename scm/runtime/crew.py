@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from scm.clock import NS_PER_MS, NS_PER_S, Clock, seconds
-from scm.parent_watch import with_parent
+from scm.runtime.parent_watch import with_parent
 from scm.v2x.messages.presence import Presence
 
 FIRST_PAUSE_NS = 250 * NS_PER_MS

@@ -5,8 +5,8 @@ import threading
 import pytest
 
 from scm.clock import NS_PER_MS, NS_PER_S, StepClock
-from scm.live import run
-from scm.part import Hears
+from scm.runtime.live import run
+from scm.runtime.part import Hears
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.messages.city_event import CityEvent

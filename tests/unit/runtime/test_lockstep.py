@@ -6,8 +6,8 @@ import pytest
 
 from scm.clock import NS_PER_MS
 from scm.errors import RunError
-from scm.lockstep import Lockstep
-from scm.part import Hears, Serves
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears, Serves
 from scm.v2x.exchange import Answer, Call
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
