@@ -31,7 +31,7 @@ from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.eye_track import EyeTrack, Row6
 from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.violation import Violation
-from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.driver_batch import Crowd
 from scm.vehicles.drivers.memory import SIGNAL
 from scm.world.contacts import Contacts, Touches
 from scm.world.part import WorldPart

@@ -13,7 +13,7 @@ from scm.errors import TermError
 from scm.vehicles import effect_text
 from scm.vehicles.jit import plain
 from scm.vehicles.param import Param
-from scm.vehicles.signals import Per
+from scm.vehicles.physics_variables import Per
 
 __all__ = ["Law", "Per", "Term", "flat", "reads"]
 

@@ -24,13 +24,13 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
 from scm.vehicles.drivers.channel import RANGE
-from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.driver_batch import Crowd
 from scm.vehicles.drivers.early import compile_together
 from scm.vehicles.drivers.errands import Errands
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.drivers.streets import streets_of
+from scm.vehicles.external_vehicles import Placed
 from scm.vehicles.ground import Ground
-from scm.vehicles.placed import Placed
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sensor

@@ -17,7 +17,7 @@ from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers.channel import channel_of, has_arrived
-from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.driver_batch import Crowd
 from scm.vehicles.drivers.memory import WAITING_FOR
 from scm.vehicles.drivers.stations import known_to
 from scm.vehicles.drivers.streets import Streets
@@ -155,7 +155,7 @@ def test_every_car_of_a_crowd_decides_as_it_would_alone(eight):
 
 
 def test_how_many_threads_work_changes_nothing(grid, monkeypatch):
-    monkeypatch.setattr("scm.vehicles.drivers.crowd.WORTH_THREADS", 2)
+    monkeypatch.setattr("scm.vehicles.drivers.driver_batch.WORTH_THREADS", 2)
     one, two = (City(grid, on_streets(grid, 40)) for _ in range(2))
     two.crowd.threads = 2
     for _ in range(200):

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from scm.recording.read import Channel, Recording
 from scm.vehicles.measure import Fault, Series, all_measures, measure
-from scm.vehicles.undone import without_faults
+from scm.vehicles.sensor_correction import without_faults
 
 T = np.linspace(3.0, 63.0, 1500)
 TRUE = {

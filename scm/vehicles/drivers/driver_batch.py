@@ -22,13 +22,13 @@ from scm.vehicles.drivers import memory as m
 from scm.vehicles.drivers.ahead import Scratch, scratch
 from scm.vehicles.drivers.channel import channel_of, frames_kept
 from scm.vehicles.drivers.green_light import HORIZON
+from scm.vehicles.drivers.lane_tracking import look_from
 from scm.vehicles.drivers.law import decide
 from scm.vehicles.drivers.order import note_standing
 from scm.vehicles.drivers.signal_table import SignalTable
 from scm.vehicles.drivers.stations import find_cells, hear_cams, nobody
 from scm.vehicles.drivers.streets import Streets
 from scm.vehicles.drivers.warned import Warnings
-from scm.vehicles.drivers.way import look_from
 from scm.vehicles.drivers.way_back import FARTHEST_M, FREE, free_way, walls_near
 
 PACKED_FROM = 4096

@@ -8,7 +8,7 @@ from scm.maps.model import CityMap, Floor, MapTag, Patch, Ramp
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
-from scm.vehicles.standing import LENGTH_M, MEMORY, standing
+from scm.vehicles.slope_hold import LENGTH_M, MEMORY, standing
 from scm.world.step import move
 from scm.world.world import PERIOD_NS, World
 from vehicle_agent.bodies.simulated import SimulatedBody

@@ -9,9 +9,9 @@ from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.route import Path, Roads
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.driver_batch import Crowd
+from scm.vehicles.drivers.lane_tracking import segment_at, survey, turned
 from scm.vehicles.drivers.streets import CURVATURE, LENGTH, YAW, Streets
-from scm.vehicles.drivers.way import segment_at, survey, turned
 
 NIGEL = CarLimits(0.14154, 0.5236, 0.42, 0.23, 0.07, 0.175, speeds=(0.13, 0.27))
 LAP = ("east_loop", "crossing_south_west", "west_loop", "crossing_south_east")
