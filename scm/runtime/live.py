@@ -20,9 +20,9 @@ from scm.runtime.station import Station
 from scm.store.repository import Repository
 from scm.v2x.bus import Bus
 from scm.v2x.exchange import Outgoing
-from scm.v2x.keeping import KeeperBehind
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.write_ahead import KeeperBehind
 
 _log = logging.getLogger(__name__)
 

@@ -18,8 +18,8 @@ from scm.v2x.bus import Mailbox
 from scm.v2x.bus_memory import MemoryBus, MemoryNetwork
 from scm.v2x.exchange import Call, Incoming
 from scm.v2x.faults import Faults
-from scm.v2x.keeping import Keeper
 from scm.v2x.message import Message, Request
+from scm.v2x.write_ahead import Keeper
 
 HEARD_DEPTH = 1_000_000
 

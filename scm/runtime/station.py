@@ -20,9 +20,9 @@ from scm.store.repository import Table
 from scm.v2x.answers import AnswerBook
 from scm.v2x.bus import Bus, Mailbox, RawMailbox, check_reply
 from scm.v2x.exchange import Answer, Call, Incoming, Keep, Outgoing, RawSample
-from scm.v2x.keeping import Batch, Keeps
 from scm.v2x.mailbox import drain_all
 from scm.v2x.message import Delivery, Refused, Request, encode
+from scm.v2x.write_ahead import Batch, Keeps
 
 DEPTH = {
     Delivery.STREAM: 1024,

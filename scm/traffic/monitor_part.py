@@ -14,7 +14,7 @@ from scm.log import event
 from scm.maps.model import CityMap
 from scm.runtime.part import Hears, Serves
 from scm.store.records import FaultRecord
-from scm.traffic.card import card_hash, card_of
+from scm.traffic.conflict_table import card_hash, card_of
 from scm.traffic.monitor import OVERLOAD, Monitor
 from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
 from scm.v2x.message import Message, Refused

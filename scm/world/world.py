@@ -37,15 +37,15 @@ from scm.vehicles.sensor import Sensor
 from scm.world import lease as rules
 from scm.world.batteries import Batteries
 from scm.world.blows import Blows
-from scm.world.busy import Busy
 from scm.world.cams import CamTriggers
+from scm.world.channel_load import Busy
 from scm.world.contacts import Contacts
 from scm.world.dangers import Dangers
+from scm.world.delay_queue import Late
 from scm.world.garage import Garage
 from scm.world.hosted import HostedCar
 from scm.world.hull import outline
 from scm.world.impacts import Impacts
-from scm.world.late import Late
 from scm.world.pace import Every, Pace
 from scm.world.radio import Radio, RadioCounts, Receivers, roadside_places
 from scm.world.remote import RemoteCar

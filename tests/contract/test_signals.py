@@ -14,7 +14,7 @@ from scm.registry import load
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Hears
 from scm.traffic import kernel
-from scm.traffic.card import card_of
+from scm.traffic.conflict_table import card_of
 from scm.traffic.controller import Controller
 from scm.traffic.monitor import Monitor
 from scm.traffic.monitor_part import MonitorPart

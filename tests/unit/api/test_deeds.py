@@ -16,11 +16,11 @@ from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.exchange import Answer, Call
-from scm.v2x.keeping import Keeper
 from scm.v2x.message import Request
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
 from scm.v2x.messages.stop_request import StopRequest
+from scm.v2x.write_ahead import Keeper
 
 API = "/api/v1"
 REMOVAL = RemoveRequest(vehicle="n9", reason="battery empty")

@@ -15,9 +15,9 @@ from scm.runtime.station import Station
 from scm.store.memory import MemoryStore
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.exchange import Answer, Call
-from scm.v2x.keeping import Keeper
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.stop_request import StopRequest
+from scm.v2x.write_ahead import Keeper
 
 GIVEN = "4bf92f3577b34da6a3ce929d0e0e4736"
 PARENT = f"00-{GIVEN}-00f067aa0ba902b7-01"

@@ -28,7 +28,7 @@ from scm.v2x.messages.ssem_tx import SsemTx
 from scm.v2x.messages.stop_request import StopRequest
 from scm.vehicles.drivers.channel import channel_of, has_arrived
 from scm.world.air import OF_ROADSIDE, RECEIVED, transmit
-from scm.world.busy import Busy
+from scm.world.channel_load import Busy
 from scm.world.remote import missed_between
 from scm.world.world import World
 

@@ -31,9 +31,9 @@ from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.guard import Guard, Guarded
 from scm.vehicles.lights import OFF, TURNS, Headlights, Indicators, Switches, lamps
 from scm.vehicles.signal_view import SignalView
+from vehicle_agent.actuation import LastWord
 from vehicle_agent.body import Body
 from vehicle_agent.guard import RealGuard
-from vehicle_agent.last_word import LastWord
 
 _log = logging.getLogger(__name__)
 

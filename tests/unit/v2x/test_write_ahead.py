@@ -8,7 +8,7 @@ from scm.errors import StoreError
 from scm.store.audit import AuditLog, Deed
 from scm.store.memory import MemoryStore
 from scm.v2x import keeping
-from scm.v2x.keeping import Batch, Keeper, KeeperBehind
+from scm.v2x.write_ahead import Batch, Keeper, KeeperBehind
 
 PATIENCE_S = 20.0
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from scm.maps.model import Box, CityMap, Floor, MapTag, Wall
-from scm.world.near import TOUCH_M, Near, obstacles_of
+from scm.world.broad_phase import TOUCH_M, Near, obstacles_of
 from scm.world.solids import obstacle_boxes
 
 RNG = np.random.default_rng(4)

@@ -6,7 +6,7 @@ import pytest
 from scm.maps.load import load_map
 from scm.maps.model import Lane, Segment
 from scm.maps.route import Roads
-from scm.traffic.card import card_hash, card_of
+from scm.traffic.conflict_table import card_hash, card_of
 from scm.traffic.program import program_of
 
 MAP = load_map("driving_school")
