@@ -12,9 +12,9 @@ from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.v2x.cam_trigger import CamTrigger
 from scm.v2x.congestion import OwnControl
-from scm.v2x.etsi_convert import cam_of
-from scm.v2x.etsi_events import CarWarnings
-from scm.v2x.etsi_path import SlowNews
+from scm.v2x.etsi.convert import cam_of
+from scm.v2x.etsi.events import CarWarnings
+from scm.v2x.etsi.path import SlowNews
 from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.contact import Contact

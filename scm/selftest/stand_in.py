@@ -15,7 +15,7 @@ from scm.selftest.signal_fault import Bend
 from scm.traffic.part import TrafficPart
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.credentials import Credentials
-from scm.v2x.etsi_convert import roadside_station, spatem_of
+from scm.v2x.etsi.convert import roadside_station, spatem_of
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx

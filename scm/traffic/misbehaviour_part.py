@@ -13,7 +13,7 @@ from scm.log import event
 from scm.maps.model import CityMap
 from scm.runtime.part import Hears, Serves
 from scm.traffic.cars import facts_of, outline_of
-from scm.v2x.etsi_convert import roadside_station
+from scm.v2x.etsi.convert import roadside_station
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
 from scm.v2x.messages.cam_rx import CamRx

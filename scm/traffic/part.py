@@ -33,8 +33,8 @@ from scm.traffic.sightings import Sightings
 from scm.traffic.timetables import Tables
 from scm.traffic.timing import NIGEL, CarFacts
 from scm.traffic.wave import links_of, waves_of
-from scm.v2x.etsi_convert import roadside_station
-from scm.v2x.etsi_topology import mapem_of
+from scm.v2x.etsi.convert import roadside_station
+from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
 from scm.v2x.message import Refused
 from scm.v2x.messages.cam_rx import CamRx

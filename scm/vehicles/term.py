@@ -1,7 +1,8 @@
 """The contract of a physical effect: a pure scalar law, and its facts as data.
 
-The law's argument names are its wiring: each is a signal of `signals.py`, a parameter of the term,
-or a parameter of the 14-degree-of-freedom skeleton. A law knows no arrays and no configuration.
+The law's argument names are its wiring: each is a variable of `physics_variables.py`, a parameter
+of the term, or a parameter of the 14-degree-of-freedom skeleton. A law knows no arrays and no
+configuration.
 """
 
 import inspect

@@ -3,7 +3,8 @@
 The cars' own dynamics have already moved them; a contact step only solves impulses at the places
 where footprints overlap, so its own duration is next to nothing (`INSTANT`) and it moves nobody.
 What it returns per car is the change of velocity, and a shift out of the overlap that is shared by
-inverse mass. A car that touches nothing gets exact zeros and never meets pymunk: `near.py` sieves.
+inverse mass. A car that touches nothing gets exact zeros and never meets pymunk: `broad_phase.py`
+sieves.
 Boxes that can be pushed live here too: between two steps they slide, braked by the floor.
 
 Two shapes a car: one meets other cars, one meets walls and boxes. pymunk multiplies the two

@@ -6,7 +6,9 @@ process is not. It holds the port, talks rosserial, and passes wishes on; when n
 150 ms is there it sends zeros, and when the agent is gone it sends them again and again, waits
 until they are out, and ends. It never reads the bus and decides nothing else.
 
-    python -m vehicle_agent.nigel.serial_watchdog PATH BAUD FD     FD: a SOCK_SEQPACKET socket to the agent
+    python -m vehicle_agent.nigel.serial_watchdog PATH BAUD FD
+
+FD is a SOCK_SEQPACKET socket to the agent.
 """
 
 import logging

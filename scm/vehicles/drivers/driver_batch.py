@@ -14,8 +14,8 @@ from scm.errors import MapError
 from scm.geometry import Pose2
 from scm.maps.model import RadioChannel
 from scm.maps.segments import wall_segments
-from scm.v2x.etsi import SpatemBody
-from scm.v2x.etsi_denm import DenmBody
+from scm.v2x.etsi.cam_spatem import SpatemBody
+from scm.v2x.etsi.denm import DenmBody
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers import memory as m

@@ -24,7 +24,7 @@ from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Hears
 from scm.traffic.own_plan import adopted
 from scm.traffic.part import TrafficPart
-from scm.v2x.etsi_topology import mapem_of
+from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spat import Spat
 from scm.world.driving import send

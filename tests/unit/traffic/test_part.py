@@ -10,7 +10,7 @@ from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Hears
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
-from scm.v2x.etsi_convert import colours_of
+from scm.v2x.etsi.convert import colours_of
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.monitor_status import MonitorStatus

@@ -7,7 +7,7 @@ import pytest
 from scm.errors import StoreError
 from scm.store.audit import AuditLog, Deed
 from scm.store.memory import MemoryStore
-from scm.v2x import keeping
+from scm.v2x import write_ahead
 from scm.v2x.write_ahead import Batch, Keeper, KeeperBehind
 
 PATIENCE_S = 20.0
@@ -116,7 +116,7 @@ def test_a_commit_of_which_nobody_knows_whether_it_happened_is_not_done_twice(ki
 
 
 def test_what_waits_is_stored_before_the_end(kind, store, monkeypatch):
-    monkeypatch.setattr(keeping, "CLOSE_S", PATIENCE_S)
+    monkeypatch.setattr(write_ahead, "CLOSE_S", PATIENCE_S)
     keeper = kind(store, "world", "s1")
     keeper.write(batch(1))
     keeper.close()

@@ -12,8 +12,8 @@ from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.model import RadioChannel
 from scm.maps.route import Roads
-from scm.v2x.etsi_convert import spatem_of
-from scm.v2x.etsi_topology import mapem_of, topology_of
+from scm.v2x.etsi.convert import spatem_of
+from scm.v2x.etsi.topology import mapem_of, topology_of
 from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers.driver_batch import Crowd

@@ -6,7 +6,7 @@
 
 Promises are rounded to the honest side: a minimum end down, a maximum end up. What does not fit a
 field is written as the field's code for that, its largest value in most; what is not known as its
-own unknown value. What is read is a number or None: `scm.v2x.etsi_codes` has the codes.
+own unknown value. What is read is a number or None: `scm.v2x.etsi.codes` has the codes.
 Field sets and values: EN 302 637-2 v1.4.1 with TS 102 894-2, TS 103 301 with SAE J2735.
 """
 
@@ -19,7 +19,7 @@ from typing import NamedTuple
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import wrap_angle
 from scm.maps.model import Junction
-from scm.v2x.etsi import (
+from scm.v2x.etsi.cam_spatem import (
     PHASE_STATES,
     REFERENCE_LATITUDE_DEG,
     REFERENCE_LONGITUDE_DEG,
@@ -43,8 +43,8 @@ from scm.v2x.etsi import (
     VehicleLength,
     YawRate,
 )
-from scm.v2x.etsi_codes import number_in, number_of, scaled
-from scm.v2x.etsi_parts import (
+from scm.v2x.etsi.codes import number_in, number_of, scaled
+from scm.v2x.etsi.parts import (
     PROTOCOL_VERSION,
     UNKNOWN_POSITION,
     Heading,

@@ -10,8 +10,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from scm.v2x.etsi_codes import coded
-from scm.v2x.etsi_parts import (
+from scm.v2x.etsi.codes import coded
+from scm.v2x.etsi.parts import (
     NO_ALTITUDE,
     NO_ALTITUDE_CONFIDENCE,
     NO_ANGLE,

@@ -9,9 +9,9 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from scm.v2x.etsi_codes import coded
-from scm.v2x.etsi_mapem import Position3d, Velocity
-from scm.v2x.etsi_parts import (
+from scm.v2x.etsi.codes import coded
+from scm.v2x.etsi.mapem import Position3d, Velocity
+from scm.v2x.etsi.parts import (
     ApproachId,
     Byte,
     DSecond,

@@ -6,7 +6,7 @@ enlarged city: lengths, speeds and accelerations times `SCALE`, time unchanged, 
 degrees from a reference point. Every field then means what the standard says.
 
 A body is, name by name, the `message` of the open JSON schemas of Orange's its-client (cam 2.4.0,
-spatem 2.0.0); `scm.v2x.etsi_json` puts their envelope around it.
+spatem 2.0.0); `scm.v2x.etsi.json_form` puts their envelope around it.
 
 Field sets and units: EN 302 637-2 v1.4.1 (CAM), TS 103 301 with SAE J2735 phase states (SPATEM).
 """
@@ -16,8 +16,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from scm.v2x.etsi_codes import coded
-from scm.v2x.etsi_parts import (
+from scm.v2x.etsi.codes import coded
+from scm.v2x.etsi.parts import (
     Byte,
     DSecond,
     Heading,

@@ -9,14 +9,14 @@ from collections import deque
 from typing import NamedTuple
 
 from scm.clock import NS_PER_MS
-from scm.v2x.etsi import (
+from scm.v2x.etsi.cam_spatem import (
     SCALE,
     ExteriorLights,
     LowFrequencyContainer,
     VehicleLowFrequency,
 )
-from scm.v2x.etsi_convert import latitude_of, longitude_of
-from scm.v2x.etsi_parts import NO_DELTA, DeltaPosition, PathPoint
+from scm.v2x.etsi.convert import latitude_of, longitude_of
+from scm.v2x.etsi.parts import NO_DELTA, DeltaPosition, PathPoint
 from scm.v2x.messages.vehicle_state import VehicleState
 
 EVERY_NS = 500 * NS_PER_MS

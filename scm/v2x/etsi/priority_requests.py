@@ -1,6 +1,6 @@
 """Between a wish for priority at a junction and the records on the air: SREM there, SSEM back.
 
-Lanes are numbered as in the junction's MAPEM (`scm.v2x.etsi_topology`). Times are minute of the
+Lanes are numbered as in the junction's MAPEM (`scm.v2x.etsi.topology`). Times are minute of the
 year and millisecond of the minute, UTC; they are read as those nearest to the receiver's clock.
 """
 
@@ -11,12 +11,12 @@ from typing import Literal, NamedTuple
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.model import Junction
-from scm.v2x.etsi import SCALE
-from scm.v2x.etsi_codes import number_of, scaled
-from scm.v2x.etsi_convert import moment_of, position_of, roadside_station, station_id
-from scm.v2x.etsi_mapem import MOST_VELOCITY, Position3d
-from scm.v2x.etsi_parts import PROTOCOL_VERSION, IntersectionId
-from scm.v2x.etsi_priority import (
+from scm.v2x.etsi.cam_spatem import SCALE
+from scm.v2x.etsi.codes import number_of, scaled
+from scm.v2x.etsi.convert import moment_of, position_of, roadside_station, station_id
+from scm.v2x.etsi.mapem import MOST_VELOCITY, Position3d
+from scm.v2x.etsi.parts import PROTOCOL_VERSION, IntersectionId
+from scm.v2x.etsi.priority import (
     CANCEL,
     REQUEST,
     ROLES,

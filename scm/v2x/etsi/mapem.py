@@ -1,7 +1,7 @@
 """The ETSI map of a junction (MAPEM) as JSON records, enlarged city.
 
 A body is the `message` of its-client's JSON schema mapem 2.0.0; of its kinds of lanes we have the
-one for vehicles. `scm.v2x.etsi_topology` makes it from a map file.
+one for vehicles. `scm.v2x.etsi.topology` makes it from a map file.
 Field sets and units: TS 103 301 with SAE J2735.
 """
 
@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from scm.v2x.etsi_codes import coded
-from scm.v2x.etsi_parts import (
+from scm.v2x.etsi.codes import coded
+from scm.v2x.etsi.parts import (
     ApproachId,
     Byte,
     IntersectionId,

@@ -1,7 +1,7 @@
 """The ETSI collective perception message (CPM) as JSON records, in the units of the standard.
 
-As in `scm.v2x.etsi` it speaks of the enlarged city: lengths and speeds times `SCALE`, time as it
-is. Names and ranges are those of the open JSON schema of Orange's its-client, cpm 2.1.1, after
+As in `scm.v2x.etsi.cam_spatem` it speaks of the enlarged city: lengths and speeds times `SCALE`,
+time as it is. Names and ranges are those of the open JSON schema of Orange's its-client, cpm 2.1.1, after
 TS 103 324 v2.1.1 with TS 102 894-2. Objects stand east (x) and north (y) of the reference
 position; map x is east and map y is north.
 """
@@ -10,8 +10,8 @@ from typing import Annotated
 
 import msgspec
 
-from scm.v2x.etsi_codes import coded
-from scm.v2x.etsi_parts import (
+from scm.v2x.etsi.codes import coded
+from scm.v2x.etsi.parts import (
     NO_CONFIDENCE,
     Byte,
     Confidence,

@@ -19,9 +19,9 @@ from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import MessageError
-from scm.v2x.etsi import PASSENGER_CAR
-from scm.v2x.etsi_convert import heading_of, its_time, position_of, speed_of, station_id
-from scm.v2x.etsi_denm import (
+from scm.v2x.etsi.cam_spatem import PASSENGER_CAR
+from scm.v2x.etsi.convert import heading_of, its_time, position_of, speed_of, station_id
+from scm.v2x.etsi.denm import (
     CANCELLATION,
     NEGATION,
     ActionId,
@@ -33,7 +33,7 @@ from scm.v2x.etsi_denm import (
     EventPosition,
     Trace,
 )
-from scm.v2x.etsi_parts import PROTOCOL_VERSION, Heading
+from scm.v2x.etsi.parts import PROTOCOL_VERSION, Heading
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.vehicle_state import VehicleState
 

@@ -13,11 +13,11 @@ import msgspec
 
 from scm.clock import NS_PER_MS
 from scm.errors import MessageError
-from scm.v2x.etsi import CamBody, SpatemBody
-from scm.v2x.etsi_cpm import CpmBody
-from scm.v2x.etsi_denm import DenmBody
-from scm.v2x.etsi_mapem import MapemBody
-from scm.v2x.etsi_priority import SremBody, SsemBody
+from scm.v2x.etsi.cam_spatem import CamBody, SpatemBody
+from scm.v2x.etsi.cpm import CpmBody
+from scm.v2x.etsi.denm import DenmBody
+from scm.v2x.etsi.mapem import MapemBody
+from scm.v2x.etsi.priority import SremBody, SsemBody
 
 Body = CamBody | CpmBody | DenmBody | MapemBody | SpatemBody | SremBody | SsemBody
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from scm.v2x.etsi_codes import coded
+from scm.v2x.etsi.codes import coded
 
 PROTOCOL_VERSION = 2
 UNKNOWN_POSITION = (900_000_001, 1_800_000_001)

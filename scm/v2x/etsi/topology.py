@@ -15,9 +15,9 @@ from scm.errors import MapError
 from scm.geometry import wrap_angle
 from scm.maps.model import Junction
 from scm.maps.route import Roads
-from scm.v2x.etsi import SCALE
-from scm.v2x.etsi_convert import REVISIONS, moment_of, position_of, roadside_station, station_id
-from scm.v2x.etsi_mapem import (
+from scm.v2x.etsi.cam_spatem import SCALE
+from scm.v2x.etsi.convert import REVISIONS, moment_of, position_of, roadside_station, station_id
+from scm.v2x.etsi.mapem import (
     FARTHEST_CM,
     LEFT,
     MOST_APPROACHES,
@@ -42,7 +42,7 @@ from scm.v2x.etsi_mapem import (
     Position3d,
     SpeedLimit,
 )
-from scm.v2x.etsi_parts import PROTOCOL_VERSION, IntersectionId
+from scm.v2x.etsi.parts import PROTOCOL_VERSION, IntersectionId
 
 NODE_M = 0.1
 _REST_M = 0.05
