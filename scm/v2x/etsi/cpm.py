@@ -1,8 +1,8 @@
 """The ETSI collective perception message (CPM) as JSON records, in the units of the standard.
 
 As in `scm.v2x.etsi.cam_spatem` it speaks of the enlarged city: lengths and speeds times `SCALE`,
-time as it is. Names and ranges are those of the open JSON schema of Orange's its-client, cpm 2.1.1, after
-TS 103 324 v2.1.1 with TS 102 894-2. Objects stand east (x) and north (y) of the reference
+time as it is. Names and ranges are those of the open JSON schema of Orange's its-client, cpm 2.1.1,
+after TS 103 324 v2.1.1 with TS 102 894-2. Objects stand east (x) and north (y) of the reference
 position; map x is east and map y is north.
 """
 
