@@ -18,7 +18,7 @@ from pathlib import Path
 
 from scm.clock import WallClock
 from scm.maps.load import load_map
-from scm.parent_watch import with_parent
+from scm.runtime.parent_watch import with_parent
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.mailbox import Mailbox
 from scm.v2x.messages.eye_track import EyeTrack

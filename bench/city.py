@@ -15,10 +15,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.maps.model import CityMap
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.messages.lidar_scan import LidarScan

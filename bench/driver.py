@@ -15,7 +15,7 @@ from scm.arrays import Floats
 from scm.maps.grid_city import grid_city
 from scm.maps.route import Roads
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.driver_batch import Crowd
 from scm.vehicles.drivers.streets import streets_of
 
 NIGEL = CarLimits(

@@ -17,7 +17,7 @@ from scm.clock import WallClock
 from scm.eye.part import EyePart
 from scm.eye.sources.capture import Grabbed
 from scm.eye.sources.live import LiveSource
-from scm.live import run
+from scm.runtime.live import run
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.mailbox import Mailbox
 from scm.v2x.messages.eye_pose import EyePose

@@ -20,9 +20,9 @@ import numpy as np
 
 from bench.city import fill
 from scm.arrays import Bools, Floats, Ints
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears, Serves
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears, Serves
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.observer_part import ObserverPart
 from scm.traffic.part import TrafficPart
@@ -31,7 +31,7 @@ from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.eye_track import EyeTrack, Row6
 from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.violation import Violation
-from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.driver_batch import Crowd
 from scm.vehicles.drivers.memory import SIGNAL
 from scm.world.contacts import Contacts, Touches
 from scm.world.part import WorldPart

@@ -9,9 +9,9 @@ import argparse
 
 from bench.city import fill
 from bench.flow import Cameras
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.demand import DemandPart
 from scm.traffic.demand_table import Flow
 from scm.traffic.monitor_part import MonitorPart

@@ -20,12 +20,12 @@ from typing import NamedTuple
 
 import msgspec
 
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.part import TrafficPart
-from scm.v2x.etsi import SCALE
-from scm.v2x.etsi_convert import read_cam
+from scm.v2x.etsi.cam_spatem import SCALE
+from scm.v2x.etsi.convert import read_cam
 from scm.v2x.message import Refused
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.eye_track import EyeTrack

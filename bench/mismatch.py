@@ -23,7 +23,7 @@ from scm.mismatch.trial.reality import Wish, make_cases
 from scm.mismatch.trial.score import score
 from scm.recording.read import read_recordings
 from scm.vehicles.car import load_car
-from scm.vehicles.undone import without_faults
+from scm.vehicles.sensor_correction import without_faults
 
 CASES, SEED = 12, 77
 HEALTHY, HEALTHY_SEED = 12, 901

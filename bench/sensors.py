@@ -11,7 +11,7 @@ import numpy as np
 from scm import registry
 from scm.vehicles.bank import Bank
 from scm.vehicles.car import load_car
-from scm.vehicles.placed import Placed
+from scm.vehicles.external_vehicles import Placed
 from scm.vehicles.sensor import Sensor
 
 CARS, TICKS, TICK_NS = 10_000, 50, 20_000_000

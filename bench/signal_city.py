@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bench.city import fill
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
+from scm.runtime.lockstep import Lockstep
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.world.part import WorldPart

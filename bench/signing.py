@@ -16,8 +16,8 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec
 
 from scm.clock import NS_PER_S
-from scm.v2x.etsi import CamBody
-from scm.v2x.etsi_convert import cam_of
+from scm.v2x.etsi.cam_spatem import CamBody
+from scm.v2x.etsi.convert import cam_of
 from scm.v2x.fleet_file import Fleet, add
 from scm.v2x.message import decode, encode
 from scm.v2x.messages.cam_tx import CamTx

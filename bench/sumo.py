@@ -27,10 +27,10 @@ import numpy as np
 
 from bench.flow import STANDS_MPS, counted
 from scm.errors import DemandError, ScmError
-from scm.lockstep import Lockstep
 from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.maps.sumo import import_sumo
+from scm.runtime.lockstep import Lockstep
 from scm.traffic.demand import DemandPart, Ways
 from scm.traffic.demand_table import Flow
 from scm.traffic.own_plan import OWN, adopted, own_table

@@ -12,9 +12,9 @@ import sys
 import time
 
 from bench.watched_keeper import say
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.parent_watch import PR_SET_PDEATHSIG
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.parent_watch import PR_SET_PDEATHSIG
 from scm.world.part import WorldPart
 from vehicle_agent.__main__ import main
 from vehicle_agent.agent import AgentPart

@@ -5,7 +5,7 @@ import time
 from collections.abc import Sequence
 
 from scm.clock import Clock
-from vehicle_agent.nigel import keeper
+from vehicle_agent.nigel import serial_watchdog
 from vehicle_agent.nigel.cable import Cable
 from vehicle_agent.nigel.host import Host, Wish
 
@@ -32,7 +32,7 @@ class WatchedHost(Host):
         self._watched_moves = throttle != 0.0
 
 
-class WatchedKeeper(keeper.Keeper):
+class WatchedKeeper(serial_watchdog.Keeper):
     """A keeper that tells when it is to end."""
 
     def finish(self, clock: Clock) -> None:
@@ -51,7 +51,7 @@ class WatchedCable(Cable):
 
 
 if __name__ == "__main__":
-    setattr(keeper, "Cable", WatchedCable)  # noqa: B010
-    setattr(keeper, "Keeper", WatchedKeeper)  # noqa: B010
-    setattr(keeper, "Host", WatchedHost)  # noqa: B010 what the keeper makes its host of
-    keeper.main(sys.argv[1:])
+    setattr(serial_watchdog, "Cable", WatchedCable)  # noqa: B010
+    setattr(serial_watchdog, "Keeper", WatchedKeeper)  # noqa: B010
+    setattr(serial_watchdog, "Host", WatchedHost)  # noqa: B010 what the keeper makes its host of
+    serial_watchdog.main(sys.argv[1:])

@@ -11,9 +11,9 @@ import math
 import numpy as np
 from msgspec.structs import replace
 
-from scm.lockstep import Lockstep
 from scm.maps.grid_city import grid_city
 from scm.maps.model import RadioChannel, Sign
+from scm.runtime.lockstep import Lockstep
 from scm.v2x.messages.route_request import RouteRequest
 from scm.world.driving import send
 from scm.world.part import WorldPart

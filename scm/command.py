@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scm.errors import MapError
-from scm.part import Part
+from scm.runtime.part import Part
 from scm.store.repository import Repository
 from scm.v2x.router import DEFAULT_ENDPOINT
 
@@ -125,7 +125,7 @@ def state_of(arguments: argparse.Namespace) -> Iterator[Repository | None]:
 def run_part(part: Part, arguments: argparse.Namespace, state: Repository | None = None) -> int:
     """Run one part on the real bus and clock until Ctrl-C or SIGTERM."""
     from scm.clock import WallClock
-    from scm.live import run, stop_on_signal
+    from scm.runtime.live import run, stop_on_signal
     from scm.v2x.bus_zenoh import ZenohBus
 
     stop = stop_on_signal()

@@ -27,10 +27,10 @@ from scm.caller import program_name
 from scm.clock import WallClock, seconds
 from scm.disturbances import HEARS, Disturbance, Disturbances
 from scm.errors import RunError, ScmError, VoidError, nearest
-from scm.lockstep import Lockstep
 from scm.log import event
 from scm.maps.load import load_map
-from scm.part import Hears, Part
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears, Part
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.ask import ask

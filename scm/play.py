@@ -22,11 +22,11 @@ from scm.clock import NS_PER_S
 from scm.errors import RecordingError, RunError, ScmError, reading
 from scm.fleet import Link
 from scm.geometry import Pose2
-from scm.part import Hears
 from scm.play_watch import Watch
 from scm.recorder.driven import RUN_IN_NS, Heard, recording_of
 from scm.recording.read import Recording
 from scm.recording.table import read_table
+from scm.runtime.part import Hears
 from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.drive_command import DriveCommand

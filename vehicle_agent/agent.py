@@ -13,7 +13,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import MapError, RunError
 from scm.log import event
 from scm.maps.model import CityMap
-from scm.part import Hears, IsWanted, Serves
+from scm.runtime.part import Hears, IsWanted, Serves
 from scm.v2x.exchange import Answer, Incoming, Outgoing
 from scm.v2x.key import check_name
 from scm.v2x.message import Message, Refused
@@ -37,7 +37,7 @@ from vehicle_agent.body import BodyKind, Wiring
 from vehicle_agent.link import Link
 
 if TYPE_CHECKING:
-    from vehicle_agent.stay import Stay
+    from vehicle_agent.session import Stay
 
 BODIES = "vehicle_agent.bodies"
 HARDEST = 100.0
@@ -203,11 +203,11 @@ class AgentPart:
             self._stay.guard.set_epoch(self._link.epoch + 1, now_ns)  # whoever has it may speak now
 
     def _begin_stay(self, city_map: CityMap, now_ns: int) -> None:
-        from vehicle_agent.stay import Stay  # noqa: PLC0415 drivers bring the compiler with them
+        from vehicle_agent.session import Stay  # noqa: PLC0415 drivers bring the compiler with them
 
         body, real = self._body, None
         if self._is_real:
-            from vehicle_agent.last_word import real_guard  # noqa: PLC0415
+            from vehicle_agent.actuation import real_guard  # noqa: PLC0415
 
             real = real_guard(body.limits, city_map, self._wiring)
         try:

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Sequence
 
 from scm.clock import NS_PER_MS
-from scm.part import Hears, Part
+from scm.runtime.part import Hears, Part
 from scm.v2x.exchange import Incoming, Outgoing
 
 PATIENCE_NS = 900 * NS_PER_MS

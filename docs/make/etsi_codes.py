@@ -7,8 +7,8 @@ from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 
-from scm.v2x.etsi_codes import Codes, codes_in
-from scm.v2x.etsi_json import KINDS
+from scm.v2x.etsi.codes import Codes, codes_in
+from scm.v2x.etsi.json_form import KINDS
 
 PAGE = Path(__file__).parents[1] / "v2x.md"
 BEGIN, END = "<!-- codes -->\n", "<!-- end of codes -->\n"

@@ -20,7 +20,7 @@ from scm.api.city import not_found
 from scm.api.operations import Cancelled, Teller
 from scm.api.problem import RefusedError
 from scm.errors import RunError
-from scm.parent_watch import with_parent
+from scm.runtime.parent_watch import with_parent
 from scm.v2x.message import Refused
 
 LARGEST_PICTURE = 8 * 1024 * 1024

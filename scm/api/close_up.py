@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import msgspec
 
 from scm.clock import NS_PER_S
-from scm.part import Hears
+from scm.runtime.part import Hears
 from scm.v2x.messages.vehicle_state import VehicleState
 
 DEPTH = 200  # reports: 4 s at 50 Hz, longer than any page takes to fetch them

@@ -7,7 +7,7 @@ import msgspec
 
 from scm.api.picture import Held
 from scm.clock import NS_PER_S
-from scm.part import Hears
+from scm.runtime.part import Hears
 from scm.v2x.messages.eye_track import EyeTrack
 
 WATCHED_NS = 5 * NS_PER_S

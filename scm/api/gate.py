@@ -25,7 +25,7 @@ from urllib.parse import urlsplit
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from scm.api.brake import REFILL_PER_S, Brake
+from scm.api.auth_throttle import REFILL_PER_S, Brake
 from scm.api.keys import KeyRing
 from scm.api.known_keys import Known, KnownKeys
 from scm.api.problem import problem

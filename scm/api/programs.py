@@ -14,7 +14,7 @@ from queue import Empty, SimpleQueue
 from scm.api.operations import Teller
 from scm.api.priority import stand_back
 from scm.errors import RunError
-from scm.parent_watch import with_parent
+from scm.runtime.parent_watch import with_parent
 
 LOOK_S = 0.2
 GRACE_S = 8.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from scm.api.picture import Held
 from scm.geometry import Pose2
-from scm.part import Hears
+from scm.runtime.part import Hears
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.vehicles.car import car_names, load_car
 

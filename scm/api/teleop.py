@@ -17,8 +17,8 @@ import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from scm.api.city import City
-from scm.api.going_on import RESUME_NS, RESUME_PAUSE_S, onward, trip_of
 from scm.api.problem import RefusedError
+from scm.api.trip_resume import RESUME_NS, RESUME_PAUSE_S, onward, trip_of
 from scm.api.wheel import (
     LEASE_MS,
     DrivePacket,

@@ -20,9 +20,9 @@ import yaml
 
 from scm.api.problem import DISK_TROUBLE, RefusedError
 from scm.errors import RecordingError
-from scm.parent_watch import with_parent
 from scm.recording.description import FILE_NAME, Description, read_description
 from scm.recording.table import KINDS
+from scm.runtime.parent_watch import with_parent
 from scm.v2x.message import Refused
 
 FOLDER = "uploads"

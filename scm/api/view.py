@@ -23,7 +23,7 @@ from scm.api.stations import StationTable
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.disturbances import Disturbances
 from scm.geometry import Pose2
-from scm.part import Hears, Serves
+from scm.runtime.part import Hears, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame

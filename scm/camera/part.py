@@ -19,7 +19,7 @@ from scm.camera.tween import between, near
 from scm.clock import NS_PER_MS, NS_PER_S, Clock, nanoseconds
 from scm.errors import EyeError
 from scm.maps.model import CityMap
-from scm.part import Hears, IsWanted, Serves
+from scm.runtime.part import Hears, IsWanted, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame

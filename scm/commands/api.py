@@ -111,9 +111,9 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.api.view import CityView
     from scm.api.wire import BusWire
     from scm.clock import WallClock
-    from scm.live import run, stop_on_signal
     from scm.maps.load import load_map
     from scm.registry import names
+    from scm.runtime.live import run, stop_on_signal
     from scm.store.open import open_store
     from scm.v2x.bus_zenoh import ZenohBus
 

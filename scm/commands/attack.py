@@ -27,8 +27,8 @@ def _run(arguments: argparse.Namespace) -> int:
 
     from scm.clock import WallClock
     from scm.command import credentials_of
-    from scm.live import run, stop_on_signal
     from scm.maps.load import load_map
+    from scm.runtime.live import run, stop_on_signal
     from scm.traffic.attacker import Attacker
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name

@@ -42,9 +42,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.fleet import LiveLink, LockstepLink
-    from scm.lockstep import Lockstep
     from scm.maps.load import load_map
     from scm.play import left_out, play, read_drive, write_recording
+    from scm.runtime.lockstep import Lockstep
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.world.part import WorldPart
 
@@ -81,9 +81,9 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _watch(arguments: argparse.Namespace, car: str) -> "Watch":
     """Return what to look for on a city's floor, for a car of that size."""
-    from scm.live import stop_on_signal
     from scm.play import read_way
     from scm.play_watch import Watch
+    from scm.runtime.live import stop_on_signal
     from scm.vehicles.car import load_car
 
     x0, x1, y0, y1 = arguments.floor

@@ -111,7 +111,7 @@ def _replayed(
     from scm.recorder.drives import SUFFIX
     from scm.replay.free_run import joined
     from scm.vehicles.car import load_car
-    from scm.vehicles.undone import POSES
+    from scm.vehicles.sensor_correction import POSES
 
     car = car or load_car(recording.vehicle, trusted=False)
     who = f"{recording.name}, " if path.suffix == SUFFIX else ""

@@ -10,7 +10,7 @@ from scm.commands.api import proxy_arguments
 from scm.commands.record import camera_arguments
 
 if TYPE_CHECKING:
-    from scm.up import Wanted
+    from scm.runtime.up import Wanted
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,7 +73,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def wanted_of(arguments: argparse.Namespace) -> "Wanted":
     """Return the city that is asked for."""
-    from scm.up import Wanted
+    from scm.runtime.up import Wanted
 
     settings = {**vars(arguments), "map_name": arguments.map}
     settings |= {
@@ -84,7 +84,7 @@ def wanted_of(arguments: argparse.Namespace) -> "Wanted":
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.api.based import check_base
-    from scm.up import run_city
+    from scm.runtime.up import run_city
 
     check_base(arguments.base)
     return run_city(wanted_of(arguments))

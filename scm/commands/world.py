@@ -31,8 +31,8 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.radio import with_radio
     from scm.vehicles.car import car_names
     from scm.vehicles.drivers.early import compile_later, is_first_start
-    from scm.world.kept import read_kept
     from scm.world.part import WorldPart
+    from scm.world.restore import read_kept
 
     hosted = tuple((f"n{i + 1}", arguments.car) for i in range(arguments.hosted))
     is_first = is_first_start()

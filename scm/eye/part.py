@@ -39,7 +39,7 @@ from scm.eye.track.tracks import Tracks
 from scm.eye.watch import Watch
 from scm.log import event
 from scm.maps.model import CityMap, MapTag
-from scm.part import Hears, IsWanted, Serves
+from scm.runtime.part import Hears, IsWanted, Serves
 from scm.scenery.bodies import NIGEL, CarBody, car_body
 from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
 from scm.v2x.key import is_name

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from scm.arrays import Image
-from scm.part import Hears
+from scm.runtime.part import Hears
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 

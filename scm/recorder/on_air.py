@@ -9,7 +9,7 @@ from typing import BinaryIO, NamedTuple
 from scm.errors import MessageError, RecordingError
 from scm.recorder.mcap_file import MESSAGES, read_keys, read_run
 from scm.registry import load
-from scm.v2x.etsi_json import KINDS, Body, wrap
+from scm.v2x.etsi.json_form import KINDS, Body, wrap
 from scm.v2x.message import Message, decode
 from scm.v2x.pcap import Positions, frame_of, write_capture
 from scm.v2x.uper.codec import CODINGS, encode

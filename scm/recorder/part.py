@@ -5,9 +5,9 @@ from pathlib import Path
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RecordingError
-from scm.part import Hears, Serves
 from scm.recorder.mcap_file import MESSAGES, RunFile
 from scm.registry import load, names
+from scm.runtime.part import Hears, Serves
 from scm.v2x.exchange import Incoming, Outgoing, RawSample
 from scm.v2x.key import check_name
 from scm.v2x.message import Delivery, Message

@@ -23,7 +23,7 @@ from scm.replay.drive import STEP_S, Drive
 from scm.replay.windows import Runs, Side, Windows, at_times
 from scm.vehicles.car import Car
 from scm.vehicles.drive_channel import COMMANDED_SPEEDS, drive_name
-from scm.vehicles.undone import without_faults
+from scm.vehicles.sensor_correction import without_faults
 
 HORIZONS_S = (0.5, 1.0, 3.0)
 SHORTEST_HORIZON_S = 0.05

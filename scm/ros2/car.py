@@ -16,10 +16,10 @@ from typing import Any
 
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
-from scm.part import Hears
 from scm.ros2 import convert, frames
 from scm.ros2.pilot import Pilot
 from scm.ros2.wire import Endpoint, Graph, Topic
+from scm.runtime.part import Hears
 from scm.v2x.exchange import Outgoing
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame

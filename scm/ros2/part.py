@@ -18,12 +18,12 @@ from scm.clock import NS_PER_MS
 from scm.errors import CarError
 from scm.log import event
 from scm.maps.model import CityMap
-from scm.part import Hears, Serves
 from scm.ros2 import convert, frames, markers
 from scm.ros2.car import RosCar
 from scm.ros2.names import ros_name
 from scm.ros2.types import ros
 from scm.ros2.wire import Graph
+from scm.runtime.part import Hears, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.spat import Spat

@@ -10,11 +10,11 @@ from functools import partial
 from pathlib import Path
 
 from scm.clock import NS_PER_MS, WallClock, nanoseconds
-from scm.crew import Crew, Job
 from scm.errors import LinkError, RunError
 from scm.eye.station import eye_station
 from scm.maps.load import load_map
-from scm.parent_watch import with_parent
+from scm.runtime.crew import Crew, Job
+from scm.runtime.parent_watch import with_parent
 from scm.selftest.proxy import FaultyProxy
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from scm.clock import NS_PER_S
 from scm.errors import RunError
-from scm.parent_watch import with_parent
+from scm.runtime.parent_watch import with_parent
 from scm.selftest.city import CITY, City
 from scm.selftest.harm import Harm, Watch
 from scm.v2x.bus import Mailbox

@@ -3,7 +3,7 @@
 import sys
 
 from scm.clock import NS_PER_S, WallClock
-from scm.live import stop_on_signal
+from scm.runtime.live import stop_on_signal
 from scm.v2x.router import Router
 
 

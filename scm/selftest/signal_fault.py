@@ -12,7 +12,7 @@ from signal import Signals
 import msgspec
 
 from scm.clock import NS_PER_MS
-from scm.traffic.card import Card
+from scm.traffic.conflict_table import Card
 from scm.v2x.messages.spat import Colour, SignalGroup, Spat
 
 Bend = Callable[[Spat], Spat | None]

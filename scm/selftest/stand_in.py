@@ -8,21 +8,21 @@ import threading
 from collections.abc import Sequence
 
 from scm.clock import WallClock
-from scm.live import run
 from scm.maps.model import CityMap
-from scm.part import Hears
+from scm.runtime.live import run
+from scm.runtime.part import Hears
 from scm.selftest.signal_fault import Bend
 from scm.traffic.part import TrafficPart
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.credentials import Credentials
-from scm.v2x.etsi_convert import roadside_station, spatem_of
+from scm.v2x.etsi.convert import roadside_station, spatem_of
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx
 
 
 class BentTraffic:
-    """A traffic part whose output is bent at one junction; see `scm.part.Part`.
+    """A traffic part whose output is bent at one junction; see `scm.runtime.part.Part`.
 
     Attributes:
         bend: What turns the meant into the shown; None: nothing is bent.

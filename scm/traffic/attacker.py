@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from scm.clock import seconds
 from scm.maps.model import CityMap
-from scm.part import Hears, IsWanted, Part, Serves
+from scm.runtime.part import Hears, IsWanted, Part, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
@@ -41,7 +41,7 @@ class _Record:
 
 
 class Attacker:
-    """A part, and what some of its stations say instead of the truth; see `scm.part.Part`.
+    """A part, and what some of its stations say instead of the truth; see `scm.runtime.part.Part`.
 
     Args:
         part: Whose outbox is changed; everything else is its own.

@@ -24,7 +24,7 @@ from scm.traffic.counters_level import level_of, share_below
 from scm.traffic.observer_belief import Belief
 from scm.traffic.observer_follow import Followed, Lines
 from scm.traffic.sightings import NIGEL_FRONT_M
-from scm.v2x.etsi_convert import ASSUMED_LENGTH_M
+from scm.v2x.etsi.convert import ASSUMED_LENGTH_M
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.traffic_counts import ApproachCount, LaneCount, TrafficCounts
 

@@ -14,7 +14,7 @@ from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.errors import DemandError, nearest
 from scm.maps.model import CityMap
 from scm.maps.route import MOST_PASSES, Roads
-from scm.part import Hears, Serves
+from scm.runtime.part import Hears, Serves
 from scm.traffic.demand_table import Flow, departures
 from scm.v2x.exchange import Call, Incoming, Outgoing
 from scm.v2x.message import Message, Refused
@@ -53,7 +53,7 @@ class _Entry:
 
 
 class DemandPart:
-    """Serves a demand table; see `scm.part.Part`.
+    """Serves a demand table; see `scm.runtime.part.Part`.
 
     Args:
         city_map: Where they drive.

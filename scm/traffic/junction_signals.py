@@ -17,9 +17,9 @@ from scm.traffic.plan_asked import check_name, recalled, records_of, table_of, w
 from scm.traffic.policy import FIXED, policy_names
 from scm.traffic.priority_air import PriorityDesk
 from scm.traffic.program import STEP_NS
-from scm.v2x.etsi_convert import roadside_station, spatem_of
-from scm.v2x.etsi_mapem import MapemBody
-from scm.v2x.etsi_topology import mapem_at
+from scm.v2x.etsi.convert import roadside_station, spatem_of
+from scm.v2x.etsi.mapem import MapemBody
+from scm.v2x.etsi.topology import mapem_at
 from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.mapem_tx import MapemTx

@@ -11,9 +11,9 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import CarError
 from scm.log import event
 from scm.maps.model import CityMap
-from scm.part import Hears, Serves
+from scm.runtime.part import Hears, Serves
 from scm.traffic.cars import facts_of, outline_of
-from scm.v2x.etsi_convert import roadside_station
+from scm.v2x.etsi.convert import roadside_station
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
 from scm.v2x.messages.cam_rx import CamRx
@@ -43,7 +43,7 @@ MOST_TOLD = 200
 
 
 class MisbehaviourPart:
-    """Judges what is said on the air of one city; see `scm.part.Part`."""
+    """Judges what is said on the air of one city; see `scm.runtime.part.Part`."""
 
     role = "part"
     period_ns = PERIOD_NS

@@ -22,7 +22,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from scm.clock import NS_PER_MS
-from scm.traffic.card import Card
+from scm.traffic.conflict_table import Card
 from scm.v2x.messages.spat import Colour, Spat
 
 STALE_NS = 500 * NS_PER_MS

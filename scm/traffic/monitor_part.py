@@ -12,9 +12,9 @@ from scm.clock import NS_PER_MS
 from scm.errors import nearest
 from scm.log import event
 from scm.maps.model import CityMap
-from scm.part import Hears, Serves
+from scm.runtime.part import Hears, Serves
 from scm.store.records import FaultRecord
-from scm.traffic.card import card_hash, card_of
+from scm.traffic.conflict_table import card_hash, card_of
 from scm.traffic.monitor import OVERLOAD, Monitor
 from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
 from scm.v2x.message import Message, Refused
@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 
 
 class MonitorPart:
-    """Watches all junctions of a map; see `scm.part.Part`.
+    """Watches all junctions of a map; see `scm.runtime.part.Part`.
 
     Args:
         faults: By junction, what a monitor before this one had latched.

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.model import CityMap
 from scm.maps.route import Roads
-from scm.part import Hears, Serves
+from scm.runtime.part import Hears, Serves
 from scm.traffic.counters import Counters
 from scm.traffic.observer_belief import Beliefs
 from scm.traffic.observer_follow import Follower, rules_of
@@ -27,7 +27,7 @@ TELL_NS = 5 * NS_PER_S
 
 
 class ObserverPart:
-    """Observes the traffic of a map; see `scm.part.Part`."""
+    """Observes the traffic of a map; see `scm.runtime.part.Part`."""
 
     def __init__(self, city_map: CityMap) -> None:
         self.name = "observer"

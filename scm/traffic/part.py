@@ -16,7 +16,7 @@ from scm.errors import PlanError, nearest
 from scm.log import event
 from scm.maps.model import CityMap
 from scm.maps.route import Roads
-from scm.part import Hears, Serves
+from scm.runtime.part import Hears, Serves
 from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller
 from scm.traffic.detectors import Seen, Watcher, reach_of
@@ -33,8 +33,8 @@ from scm.traffic.sightings import Sightings
 from scm.traffic.timetables import Tables
 from scm.traffic.timing import NIGEL, CarFacts
 from scm.traffic.wave import links_of, waves_of
-from scm.v2x.etsi_convert import roadside_station
-from scm.v2x.etsi_topology import mapem_of
+from scm.v2x.etsi.convert import roadside_station
+from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
 from scm.v2x.message import Refused
 from scm.v2x.messages.cam_rx import CamRx
@@ -48,7 +48,7 @@ _log = logging.getLogger(__name__)
 
 
 class TrafficPart:
-    """Controls the signals of all junctions of a map; see `scm.part.Part`."""
+    """Controls the signals of all junctions of a map; see `scm.runtime.part.Part`."""
 
     def __init__(
         self,

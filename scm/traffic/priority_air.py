@@ -14,9 +14,9 @@ from scm.clock import NS_PER_S
 from scm.maps.model import Junction
 from scm.maps.route import Roads
 from scm.traffic.policy import PriorityCall, Status
-from scm.v2x.etsi_ask import Answered, Wish, ssem_of, wishes_of
-from scm.v2x.etsi_convert import roadside_station, station_id
-from scm.v2x.etsi_topology import topology_of
+from scm.v2x.etsi.convert import roadside_station, station_id
+from scm.v2x.etsi.priority_requests import Answered, Wish, ssem_of, wishes_of
+from scm.v2x.etsi.topology import topology_of
 from scm.v2x.messages.srem_rx import SremRx
 from scm.v2x.messages.ssem_tx import SsemTx
 

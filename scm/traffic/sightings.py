@@ -8,7 +8,7 @@ import math
 
 from scm.clock import NS_PER_S
 from scm.traffic.detectors import Seen
-from scm.v2x.etsi_convert import ASSUMED_LENGTH_M, generated_ns, read_cam, station_id
+from scm.v2x.etsi.convert import ASSUMED_LENGTH_M, generated_ns, read_cam, station_id
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.eye_track import EyeTrack
 

@@ -13,7 +13,7 @@ import math
 
 from scm.clock import NS_PER_MS
 from scm.geometry import wrap_angle
-from scm.v2x.etsi import SCALE
+from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.messages.vehicle_state import VehicleState
 
 T_MIN_NS = 100 * NS_PER_MS

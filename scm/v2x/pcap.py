@@ -12,13 +12,13 @@ from collections.abc import Iterable
 from typing import BinaryIO, NamedTuple
 
 from scm.clock import NS_PER_S
-from scm.v2x.etsi import PASSENGER_CAR, ROADSIDE_UNIT, CamBody
-from scm.v2x.etsi_codes import number_of
-from scm.v2x.etsi_convert import its_ms, place_of
-from scm.v2x.etsi_denm import DenmBody
-from scm.v2x.etsi_json import Body
-from scm.v2x.etsi_mapem import MapemBody
-from scm.v2x.etsi_priority import SremBody
+from scm.v2x.etsi.cam_spatem import PASSENGER_CAR, ROADSIDE_UNIT, CamBody
+from scm.v2x.etsi.codes import number_of
+from scm.v2x.etsi.convert import its_ms, place_of
+from scm.v2x.etsi.denm import DenmBody
+from scm.v2x.etsi.json_form import Body
+from scm.v2x.etsi.mapem import MapemBody
+from scm.v2x.etsi.priority import SremBody
 
 ETHERTYPE = 0x8947
 PORTS = {

@@ -22,7 +22,7 @@ from scm.vehicles.jit import array_kernel
 from scm.vehicles.noise import Keys, bases_of, key_of, normals, uniforms
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
-from scm.vehicles.spoil import spoil, wander
+from scm.vehicles.sensor_noise import spoil, wander
 
 NEVER = np.iinfo(np.int64).max
 LOSS = np.uint64(0x10553B6E0D1C4F27)

@@ -17,7 +17,7 @@ import math
 
 from scm.vehicles.jit import law
 from scm.vehicles.param import Normal, Param
-from scm.vehicles.signals import Per
+from scm.vehicles.physics_variables import Per
 
 GRAVITY = 9.80665
 STATUS_OK, STATUS_DIVERGED, STATUS_ROLLED = 0, 1, 2

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from scm.vehicles import body14
 from scm.vehicles.car import Car, Quantity, all_terms
+from scm.vehicles.car_file_schema import FACTS
 from scm.vehicles.drivers.limits import turning_radius_m
-from scm.vehicles.facts import FACTS
 from scm.vehicles.param import Param
 from scm.vehicles.term import Term, flat
 

@@ -7,7 +7,7 @@ from scm.vehicles.car import all_terms
 from scm.vehicles.chapters import CHAPTERS, OTHERS, chapter_of
 from scm.vehicles.measure import Measure, all_measures
 from scm.vehicles.param import Param
-from scm.vehicles.signals import SIGNALS
+from scm.vehicles.physics_variables import SIGNALS
 from scm.vehicles.term import Term, flat, reads
 
 Effect = Term | Measure

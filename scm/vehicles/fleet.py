@@ -16,6 +16,7 @@ from scm.errors import RunError, TermError, nearest
 from scm.geometry import Pose2
 from scm.vehicles.body14 import GRAVITY, STATUS_DIVERGED, STATUS_OK, STATUS_ROLLED, sprung_part
 from scm.vehicles.car import Car
+from scm.vehicles.command_delay import COMMANDS, DELAYS, CommandPast
 from scm.vehicles.fleet_rows import (
     COG,
     COG_CHANGED,
@@ -33,9 +34,8 @@ from scm.vehicles.jit import plain
 from scm.vehicles.kernel_file import compile_kernel
 from scm.vehicles.lanes import LANES
 from scm.vehicles.layout import columns_of, find_column, slots_of
-from scm.vehicles.past import COMMANDS, DELAYS, CommandPast
+from scm.vehicles.physics_variables import SIGNALS
 from scm.vehicles.shape import Shape, shape_of
-from scm.vehicles.signals import SIGNALS
 from scm.vehicles.term import reads
 
 SUBSTEP_S = 1e-3

@@ -15,7 +15,7 @@ from scm.maps.model import CityMap, Floor, Point
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground_kernel import ANYTHING, CLIMBS, Sheet, feel
-from scm.vehicles.standing import standing
+from scm.vehicles.slope_hold import standing
 from scm.vehicles.wind import Gusts
 
 CELL_M = 0.25

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from scm.errors import TermError, nearest
 from scm.vehicles import body14
 from scm.vehicles.param import Param
-from scm.vehicles.signals import SIGNALS, Per
+from scm.vehicles.physics_variables import SIGNALS, Per
 from scm.vehicles.term import Term
 
 

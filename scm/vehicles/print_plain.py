@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from textwrap import indent
 
 from scm.vehicles import body14
+from scm.vehicles.physics_variables import Per
 from scm.vehicles.print_tiles import Slots, loads_of, motion_slots, print_line, range_text
 from scm.vehicles.program import Program, Stage
-from scm.vehicles.signals import Per
 
 _PAGE = '''"""{title}
 

@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 from textwrap import indent
 
 from scm.vehicles import body14
+from scm.vehicles.command_delay import COMMANDS
 from scm.vehicles.inline import Line, copied
 from scm.vehicles.lanes import LANES, WIDTH
-from scm.vehicles.past import COMMANDS
+from scm.vehicles.physics_variables import Per
 from scm.vehicles.program import Program, Stage, names_in
-from scm.vehicles.signals import Per
 
 Slots = Mapping[str, tuple[int, int]]
 

@@ -13,7 +13,7 @@ from typing import cast
 
 from scm.vehicles.axles import AXLES, Known, fold_body
 from scm.vehicles.inline import Line
-from scm.vehicles.signals import Per
+from scm.vehicles.physics_variables import Per
 
 
 @dataclass(slots=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from scm.vehicles.car import Car
 from scm.vehicles.jit import plain
-from scm.vehicles.signals import SIGNALS, Role
+from scm.vehicles.physics_variables import SIGNALS, Role
 from scm.vehicles.term import reads
 
 _ADDED = {

@@ -1,7 +1,8 @@
 """The contract of a physical effect: a pure scalar law, and its facts as data.
 
-The law's argument names are its wiring: each is a signal of `signals.py`, a parameter of the term,
-or a parameter of the 14-degree-of-freedom skeleton. A law knows no arrays and no configuration.
+The law's argument names are its wiring: each is a variable of `physics_variables.py`, a parameter
+of the term, or a parameter of the 14-degree-of-freedom skeleton. A law knows no arrays and no
+configuration.
 """
 
 import inspect
@@ -13,7 +14,7 @@ from scm.errors import TermError
 from scm.vehicles import effect_text
 from scm.vehicles.jit import plain
 from scm.vehicles.param import Param
-from scm.vehicles.signals import Per
+from scm.vehicles.physics_variables import Per
 
 __all__ = ["Law", "Per", "Term", "flat", "reads"]
 

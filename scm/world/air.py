@@ -11,8 +11,8 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_MS
-from scm.v2x.etsi import CamBody
-from scm.v2x.etsi_convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, cam_of, read_cam
+from scm.v2x.etsi.cam_spatem import CamBody
+from scm.v2x.etsi.convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, cam_of, read_cam
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.cpm_rx import CpmRx

@@ -3,7 +3,8 @@
 The cars' own dynamics have already moved them; a contact step only solves impulses at the places
 where footprints overlap, so its own duration is next to nothing (`INSTANT`) and it moves nobody.
 What it returns per car is the change of velocity, and a shift out of the overlap that is shared by
-inverse mass. A car that touches nothing gets exact zeros and never meets pymunk: `near.py` sieves.
+inverse mass. A car that touches nothing gets exact zeros and never meets pymunk: `broad_phase.py`
+sieves.
 Boxes that can be pushed live here too: between two steps they slide, braked by the floor.
 
 Two shapes a car: one meets other cars, one meets walls and boxes. pymunk multiplies the two
@@ -23,7 +24,7 @@ from scm.arrays import Bools, Floats, Ints
 from scm.geometry import Pose2
 from scm.maps.model import CityMap
 from scm.world.boxes import Boxes, is_still
-from scm.world.near import Near, obstacles_of
+from scm.world.broad_phase import Near, obstacles_of
 from scm.world.solids import Hull, box_body, car_body, obstacle_boxes, outline_of, solids
 
 INSTANT = 1e-9

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from scm.v2x.etsi_events import CarWarnings, DenmWatch
+from scm.v2x.etsi.events import CarWarnings, DenmWatch
 
 
 @dataclass(slots=True)

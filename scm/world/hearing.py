@@ -6,7 +6,7 @@ What comes from outside never stops the city: what fits nothing is counted in `W
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from scm.part import Hears
+from scm.runtime.part import Hears
 from scm.v2x.exchange import Answer, Incoming
 from scm.v2x.message import Message, Request
 from scm.v2x.messages.cam_tx import CamTx

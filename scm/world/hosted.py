@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
-from scm.v2x.etsi_path import SlowNews
+from scm.v2x.etsi.path import SlowNews
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.guard import Guard

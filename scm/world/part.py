@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from scm.clock import NS_PER_S
 from scm.errors import RunError, ScmError
 from scm.maps.model import CityMap, Spawn
-from scm.part import Hears, IsWanted, Serves
+from scm.runtime.part import Hears, IsWanted, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.route_request import RouteRequest
@@ -15,8 +15,8 @@ from scm.v2x.messages.world_definition import WorldDefinition
 from scm.world.driving import send
 from scm.world.hearing import hears_of
 from scm.world.hosted import HostedCar
-from scm.world.kept import Kept, bring_back
 from scm.world.requests import SERVES, reply_to
+from scm.world.restore import Kept, bring_back
 from scm.world.step import tick
 from scm.world.world import DEFAULT_CAR, NAME, PERIOD_NS, World
 

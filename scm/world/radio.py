@@ -2,7 +2,7 @@
 
 A frame sent by one station reaches other stations as `vehicles/drivers/channel.py` says. Stations
 are cars, and the roadside units at their junctions. What hosted cars hear their drivers keep, all
-for themselves (`vehicles/drivers/crowd.py`); here are all other receivers.
+for themselves (`vehicles/drivers/driver_batch.py`); here are all other receivers.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.maps.model import CityMap, Point
 from scm.maps.roadside import roadside_place
-from scm.v2x.etsi_convert import roadside_station
+from scm.v2x.etsi.convert import roadside_station
 from scm.vehicles.drivers.channel import (
     DELAY_NS,
     FADING,

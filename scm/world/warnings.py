@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from scm.arrays import Bools
-from scm.v2x.etsi_events import (
+from scm.v2x.etsi.events import (
     ACCIDENT,
     DANGEROUS_SITUATION,
     EMERGENCY_BRAKE,

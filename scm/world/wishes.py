@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from scm.part import IsWanted
+from scm.runtime.part import IsWanted
 from scm.v2x.message import Message
 
 ASK_EVERY_TICKS = 50

@@ -24,28 +24,28 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
 from scm.vehicles.drivers.channel import RANGE
-from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.driver_batch import Crowd
 from scm.vehicles.drivers.early import compile_together
 from scm.vehicles.drivers.errands import Errands
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.drivers.streets import streets_of
+from scm.vehicles.external_vehicles import Placed
 from scm.vehicles.ground import Ground
-from scm.vehicles.placed import Placed
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sensor
 from scm.world import lease as rules
 from scm.world.batteries import Batteries
 from scm.world.blows import Blows
-from scm.world.busy import Busy
 from scm.world.cams import CamTriggers
+from scm.world.channel_load import Busy
 from scm.world.contacts import Contacts
 from scm.world.dangers import Dangers
+from scm.world.delay_queue import Late
 from scm.world.garage import Garage
 from scm.world.hosted import HostedCar
 from scm.world.hull import outline
 from scm.world.impacts import Impacts
-from scm.world.late import Late
 from scm.world.pace import Every, Pace
 from scm.world.radio import Radio, RadioCounts, Receivers, roadside_places
 from scm.world.remote import RemoteCar

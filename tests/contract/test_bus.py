@@ -11,7 +11,7 @@ from scm.errors import LinkError, MessageError
 from scm.v2x.bus import Mailbox, RawMailbox
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.bus_zenoh import ZenohBus
-from scm.v2x.etsi_convert import cam_of
+from scm.v2x.etsi.convert import cam_of
 from scm.v2x.exchange import Answer, Call
 from scm.v2x.message import Refused, decode
 from scm.v2x.messages.cam_rx import CamRx

@@ -7,9 +7,9 @@ both take a step of 20 ms at most.
 import pytest
 
 from scm.clock import NS_PER_MS
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest

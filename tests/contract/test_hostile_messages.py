@@ -15,9 +15,9 @@ from scm.api.signal_rows import junction_rows
 from scm.api.vehicle_rows import vehicles_topic
 from scm.api.view import CityView
 from scm.errors import MessageError
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.registry import load, names
+from scm.runtime.lockstep import Lockstep
 from scm.traffic.demand import DemandPart
 from scm.traffic.demand_table import Flow
 from scm.traffic.misbehaviour_part import MisbehaviourPart

@@ -8,10 +8,10 @@ from scm.api.view import CityView
 from scm.camera.part import CameraPart
 from scm.clock import StepClock
 from scm.eye.part import EyePart
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.recorder.part import RecorderPart
 from scm.registry import names
+from scm.runtime.lockstep import Lockstep
 from scm.traffic.demand import DemandPart
 from scm.traffic.demand_table import load_demand
 from scm.traffic.misbehaviour_part import MisbehaviourPart

@@ -12,7 +12,7 @@ from scm.clock import NS_PER_S
 from scm.geometry import Pose2
 from scm.vehicles.bank import Bank
 from scm.vehicles.car import car_names, load_car
-from scm.vehicles.facts import FACTS
+from scm.vehicles.car_file_schema import FACTS
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 import scm.traffic
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map, map_names
 from scm.maps.route import Roads
-from scm.part import Hears
 from scm.registry import load
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic import kernel
-from scm.traffic.card import card_of
+from scm.traffic.conflict_table import card_of
 from scm.traffic.controller import Controller
 from scm.traffic.monitor import Monitor
 from scm.traffic.monitor_part import MonitorPart

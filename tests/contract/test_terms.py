@@ -11,7 +11,7 @@ from scm.vehicles import body14
 from scm.vehicles.car import all_terms
 from scm.vehicles.jit import plain
 from scm.vehicles.layout import columns_of
-from scm.vehicles.signals import SIGNALS
+from scm.vehicles.physics_variables import SIGNALS
 from scm.vehicles.term import flat, reads
 
 FILES = all_terms()

@@ -15,7 +15,7 @@ from typing import Any
 import httpx
 
 from scm.api.priority import NICER
-from scm.parent_watch import with_parent
+from scm.runtime.parent_watch import with_parent
 
 START_S = 180.0  # a cold start compiles the physics
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
-from scm.parent_watch import with_parent
+from scm.runtime.parent_watch import with_parent
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.emulated_pose import EmulatedPose

@@ -12,7 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from scm.parent_watch import with_parent
+from scm.runtime.parent_watch import with_parent
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.emulated_pose import EmulatedPose

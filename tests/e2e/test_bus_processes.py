@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from scm.clock import NS_PER_S, WallClock, seconds
-from scm.crew import Crew, Job
+from scm.runtime.crew import Crew, Job
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.city_event import CityEvent
@@ -240,7 +240,7 @@ def test_a_crew_is_stopped_within_two_seconds_even_if_one_does_not_listen(superv
 SUPERVISOR = """
 import sys, threading
 from scm.clock import WallClock
-from scm.crew import Crew, Job
+from scm.runtime.crew import Crew, Job
 toy, endpoint = sys.argv[1:]
 command = [sys.executable, toy, "orphan", endpoint]
 Crew([Job("orphan", "part", "", lambda: command)], WallClock(), print).look()

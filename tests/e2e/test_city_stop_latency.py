@@ -9,8 +9,8 @@ import threading
 import time
 
 from scm.clock import NS_PER_MS, WallClock
-from scm.live import run, stop_on_signal
-from scm.parent_watch import with_parent
+from scm.runtime.live import run, stop_on_signal
+from scm.runtime.parent_watch import with_parent
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.router import Router, free_endpoint

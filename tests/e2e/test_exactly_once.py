@@ -9,7 +9,7 @@ from collections import Counter
 
 import pytest
 
-from scm.parent_watch import with_parent
+from scm.runtime.parent_watch import with_parent
 from scm.store.audit import AuditLog
 from scm.store.open import open_store
 from scm.v2x.ask import ask, with_id

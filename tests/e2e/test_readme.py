@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.recorder.part import RecorderPart
+from scm.runtime.lockstep import Lockstep
 from scm.traffic.part import TrafficPart
 from scm.world.part import WorldPart
 from tests.e2e.city_process import CityProcess, city, wait_for

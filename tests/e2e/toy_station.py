@@ -3,8 +3,8 @@
 import sys
 
 from scm.clock import NS_PER_MS, WallClock
-from scm.live import run, stop_on_signal
-from scm.part import Hears
+from scm.runtime.live import run, stop_on_signal
+from scm.runtime.part import Hears
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.city_event import CityEvent

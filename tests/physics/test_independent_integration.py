@@ -12,7 +12,7 @@ from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.jit import plain
 from scm.vehicles.layout import columns_of
-from scm.vehicles.signals import Per
+from scm.vehicles.physics_variables import Per
 from scm.vehicles.term import reads
 
 THROTTLE, STEER, SPEED, SECONDS = 0.35, 0.12, 1.5, 0.4

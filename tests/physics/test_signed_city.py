@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from scm.lockstep import Lockstep
 from scm.maps.grid_city import grid_city
+from scm.runtime.lockstep import Lockstep
 from scm.v2x.messages.route_request import RouteRequest
 from scm.world.driving import send
 from scm.world.part import WorldPart

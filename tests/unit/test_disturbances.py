@@ -6,8 +6,8 @@ from scm.clock import NS_PER_S
 from scm.disturbances import Disturbances
 from scm.errors import VoidError
 from scm.fleet import City, LockstepLink
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
+from scm.runtime.lockstep import Lockstep
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.exchange import Incoming

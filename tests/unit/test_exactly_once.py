@@ -10,8 +10,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from scm.clock import NS_PER_MS, seconds
 from scm.errors import StoreError
-from scm.lockstep import Lockstep
-from scm.part import Serves
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Serves
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.store.records import PlanRecord, records

@@ -8,9 +8,9 @@ import pytest
 from scm.clock import WallClock
 from scm.errors import LinkError, RunError, ScmError
 from scm.fleet import City, LiveLink, LockstepLink, open_city
-from scm.live import run
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
+from scm.runtime.live import run
+from scm.runtime.lockstep import Lockstep
 from scm.traffic.part import TrafficPart
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.mailbox import Mailbox

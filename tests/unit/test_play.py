@@ -8,11 +8,11 @@ import pytest
 from scm.__main__ import main
 from scm.errors import RunError, ScmError
 from scm.fleet import LockstepLink
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.play import left_out, play, read_drive, write_recording
 from scm.recording.read import read_recordings
 from scm.replay.free_run import free_run
+from scm.runtime.lockstep import Lockstep
 from scm.v2x.mailbox import Mailbox
 from scm.vehicles.car import load_car
 from scm.world.part import WorldPart

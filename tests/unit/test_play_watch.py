@@ -8,11 +8,11 @@ import pytest
 from scm.errors import RunError
 from scm.fleet import LockstepLink
 from scm.geometry import Pose2
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.maps.ways import laid_from, leaves
 from scm.play import play, read_way
 from scm.play_watch import Watch
+from scm.runtime.lockstep import Lockstep
 from scm.v2x.messages.stop_request import StopRequest
 from scm.world.part import WorldPart
 

@@ -17,12 +17,12 @@ from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.bank import Bank
+from scm.vehicles.battery_telemetry import Packs
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
 from scm.vehicles.lights import Switches
-from scm.vehicles.packs import Packs
 from scm.vehicles.sensed import ENCODERS, KINDS, sensors_message
 from scm.vehicles.sensor import Sensor
 from vehicle_agent.body import Body, BodyKind, Motion, Wiring

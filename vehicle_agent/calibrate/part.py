@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.geometry import Pose2
-from scm.part import Hears, Serves
+from scm.runtime.part import Hears, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.drive_command import DriveCommand

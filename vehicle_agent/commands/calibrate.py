@@ -72,7 +72,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
-    from scm.live import run, stop_on_signal
+    from scm.runtime.live import run, stop_on_signal
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name
     from scm.vehicles.car import load_car

@@ -88,7 +88,7 @@ def _check_is_the_car(cars: list[str], credentials: "Credentials") -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import NS_PER_S, WallClock
     from scm.errors import RunError
-    from scm.live import run, stop_on_signal
+    from scm.runtime.live import run, stop_on_signal
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name
     from vehicle_agent.devkit.bridge import DevkitPart, Wanted

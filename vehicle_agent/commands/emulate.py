@@ -53,7 +53,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
     from scm.errors import RunError
-    from scm.live import stop_on_signal
+    from scm.runtime.live import stop_on_signal
 
     if (arguments.connect is None) != (arguments.name is None):
         raise RunError("--connect and --name: expected both or none of them")
@@ -102,7 +102,7 @@ def _serve(device: "Device", clock: "Clock", stop: "Event") -> None:
 def _join(
     arguments: argparse.Namespace, device: "Device", sketch: Sketch, clock: "Clock", stop: "Event"
 ) -> None:
-    from scm.live import run
+    from scm.runtime.live import run
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name
     from vehicle_agent.emulate.part import EmulatorPart, station_of

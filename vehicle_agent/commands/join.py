@@ -69,7 +69,7 @@ def _tag_of(arguments: argparse.Namespace) -> int | None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
-    from scm.live import run, stop_on_signal
+    from scm.runtime.live import run, stop_on_signal
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name
     from vehicle_agent.agent import AgentPart

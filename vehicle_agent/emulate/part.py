@@ -14,7 +14,7 @@ from scm.log import event
 from scm.maps.model import CityMap
 from scm.maps.room import CLEARANCE_M, distances_m
 from scm.maps.route import Roads
-from scm.part import Hears
+from scm.runtime.part import Hears
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.world_definition import WorldDefinition

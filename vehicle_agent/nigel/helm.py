@@ -19,7 +19,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.log import event
 from vehicle_agent.nigel.hand import Hand
 from vehicle_agent.nigel.host import REST, Wish
-from vehicle_agent.nigel.keeper import LONGEST, Asked, Told, Written
+from vehicle_agent.nigel.serial_watchdog import LONGEST, Asked, Told, Written
 
 RESTART_NS = NS_PER_S
 DOUBT_NS, DOUBT_TURNS = 55 * NS_PER_MS, 3
@@ -42,7 +42,13 @@ class Helm:
     """
 
     def __init__(self, path: str, baud: int) -> None:
-        self._command = [sys.executable, "-m", "vehicle_agent.nigel.keeper", path, str(baud)]
+        self._command = [
+            sys.executable,
+            "-m",
+            "vehicle_agent.nigel.serial_watchdog",
+            path,
+            str(baud),
+        ]
         self._path, self._hand = path, Hand(path, baud)
         self._line: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None

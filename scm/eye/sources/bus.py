@@ -6,7 +6,7 @@ from scm.eye.picture import decode_picture
 from scm.eye.source import Frame
 from scm.eye.sources.capture import Grabbed
 from scm.eye.sources.watch import Tally, Watch
-from scm.part import Hears
+from scm.runtime.part import Hears
 from scm.v2x.exchange import Incoming
 from scm.v2x.key import check_name
 from scm.v2x.messages.eye_picture_in import EyePictureIn

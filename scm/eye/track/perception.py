@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from scm.clock import NS_PER_MS
 from scm.eye.track.sighting import Track
 from scm.scenery.bodies import NIGEL, CarBody
-from scm.v2x.etsi import REFERENCE_LATITUDE_DEG, REFERENCE_LONGITUDE_DEG, SCALE
-from scm.v2x.etsi_convert import its_ms, station_id
-from scm.v2x.etsi_cpm import (
+from scm.v2x.etsi.cam_spatem import REFERENCE_LATITUDE_DEG, REFERENCE_LONGITUDE_DEG, SCALE
+from scm.v2x.etsi.convert import its_ms, station_id
+from scm.v2x.etsi.cpm import (
     MOST_OBJECTS,
     PASSENGER_CAR,
     Angle,
@@ -27,7 +27,7 @@ from scm.v2x.etsi_cpm import (
     Velocity,
     VelocityComponent,
 )
-from scm.v2x.etsi_parts import PROTOCOL_VERSION, ReferencePosition
+from scm.v2x.etsi.parts import PROTOCOL_VERSION, ReferencePosition
 from scm.v2x.messages.cpm_tx import CpmTx
 
 SURELY = 1.96

@@ -5,7 +5,7 @@ import math
 from scm.mismatch.findings import Equation
 from scm.mismatch.laws.law import Channel, ToNumbers, Values, Written
 from scm.mismatch.listed import Knob
-from scm.vehicles.signals import Per
+from scm.vehicles.physics_variables import Per
 
 _FORCE = (-200.0, 200.0)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from scm.mismatch.findings import Equation
 from scm.mismatch.laws.learned import PREFIX
 from scm.mismatch.listed import Candidate, Knob
-from scm.vehicles.signals import Per
+from scm.vehicles.physics_variables import Per
 
 Values = tuple[float, ...]
 ToNumbers = Callable[[Values], Mapping[str, float]]

@@ -11,7 +11,7 @@ from scm.mismatch.trial.known import is_measure, parameters_of
 from scm.mismatch.trial.labels import Case, Label
 from scm.recording.read import Recording, read_recordings
 from scm.vehicles.car import Car, load_car
-from scm.vehicles.undone import without_faults
+from scm.vehicles.sensor_correction import without_faults
 
 SHIFT, POINT = "com_shift.shift_m", "measure.pose_point_x_m"
 SHOWS = 1.2  # where the nominal car's error is below this times the true car's, nothing is to gain

@@ -12,7 +12,7 @@ import msgspec
 from scm.mismatch.diagnose import diagnose, write
 from scm.mismatch.findings import Diagnosis
 from scm.mismatch.trial.labels import Case
-from scm.parent_watch import end_with
+from scm.runtime.parent_watch import end_with
 
 SAID, BROKEN = "diagnosis.json", "failed.txt"
 Diagnose = Callable[[Path, Path], Diagnosis]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import scm
 from scm.errors import RunError
-from scm.parent_watch import with_parent
+from scm.runtime.parent_watch import with_parent
 
 PLACE = "tests/reality"
 KINDS = ("mixed", "single", "none", "pair", "unlisted", "shuffled", "other_car")

@@ -1,7 +1,7 @@
 """Two that would collide both have green, and keep it."""
 
 from scm.selftest.signal_fault import Bend, SignalFault, long_green, recolour, rivals
-from scm.traffic.card import Card
+from scm.traffic.conflict_table import Card
 from scm.v2x.messages.spat import Colour, Spat
 
 

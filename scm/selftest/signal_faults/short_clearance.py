@@ -2,7 +2,7 @@
 
 from scm.clock import NS_PER_MS
 from scm.selftest.signal_fault import Bend, SignalFault, recolour, rivals
-from scm.traffic.card import Card
+from scm.traffic.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 

@@ -1,7 +1,7 @@
 """The controller runs, but nothing it shows arrives."""
 
 from scm.selftest.signal_fault import Bend, SignalFault
-from scm.traffic.card import Card
+from scm.traffic.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 

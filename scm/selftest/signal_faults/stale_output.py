@@ -1,7 +1,7 @@
 """The same old sample is shown again and again."""
 
 from scm.selftest.signal_fault import Bend, SignalFault
-from scm.traffic.card import Card
+from scm.traffic.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 

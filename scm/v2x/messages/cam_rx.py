@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from scm.v2x.etsi import CamBody
+from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.message import Message
 
 

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from scm.v2x.etsi_cpm import CpmBody
+from scm.v2x.etsi.cpm import CpmBody
 from scm.v2x.message import Message
 
 

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from scm.v2x.etsi_denm import DenmBody
+from scm.v2x.etsi.denm import DenmBody
 from scm.v2x.message import Message
 
 

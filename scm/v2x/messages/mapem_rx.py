@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from scm.v2x.etsi_mapem import MapemBody
+from scm.v2x.etsi.mapem import MapemBody
 from scm.v2x.message import Message
 
 

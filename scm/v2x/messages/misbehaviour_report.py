@@ -4,7 +4,7 @@ from typing import ClassVar, Literal
 
 import msgspec
 
-from scm.v2x.etsi import CamBody
+from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.message import Delivery, Message
 
 

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from scm.v2x.etsi import SpatemBody
+from scm.v2x.etsi.cam_spatem import SpatemBody
 from scm.v2x.message import Message
 
 

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from scm.v2x.etsi_priority import SremBody
+from scm.v2x.etsi.priority import SremBody
 from scm.v2x.message import Message
 
 

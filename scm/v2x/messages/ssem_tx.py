@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from scm.v2x.etsi_priority import SsemBody
+from scm.v2x.etsi.priority import SsemBody
 from scm.v2x.message import Message
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from scm import registry
 from scm.errors import RunError
-from scm.v2x.etsi import SCALE, CamBody
+from scm.v2x.etsi.cam_spatem import SCALE, CamBody
 from scm.v2x.misbehaviour.ground import Ground
 
 ATTACKS = "scm.v2x.misbehaviour.attacks"

@@ -4,9 +4,9 @@ import math
 
 import msgspec
 
-from scm.v2x.etsi import SCALE, CamBody
-from scm.v2x.etsi_codes import is_out_of_range, scaled
-from scm.v2x.etsi_convert import (
+from scm.v2x.etsi.cam_spatem import SCALE, CamBody
+from scm.v2x.etsi.codes import is_out_of_range, scaled
+from scm.v2x.etsi.convert import (
     ASSUMED_LENGTH_M,
     ASSUMED_WIDTH_M,
     generated_ns,

@@ -9,8 +9,8 @@ from functools import cache, partial
 from typing import NamedTuple
 
 from scm.clock import NS_PER_S, nanoseconds
-from scm.v2x.etsi import CamBody
-from scm.v2x.etsi_convert import station_id
+from scm.v2x.etsi.cam_spatem import CamBody
+from scm.v2x.etsi.convert import station_id
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.misbehaviour.check import (
     CONFIRMED,

@@ -4,8 +4,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from scm.v2x.etsi import SCALE, CamBody, HighFrequencyContainer
-from scm.v2x.etsi_convert import (
+from scm.v2x.etsi.cam_spatem import SCALE, CamBody, HighFrequencyContainer
+from scm.v2x.etsi.convert import (
     ACCEL_MAX,
     SPEED_MAX,
     delta_time,

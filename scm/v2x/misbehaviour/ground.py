@@ -13,7 +13,7 @@ from scm.geometry import wrap_angle
 from scm.maps.model import Camera, CityMap, Point
 from scm.maps.roadside import roadside_place
 from scm.maps.route import Roads
-from scm.v2x.etsi_convert import roadside_station
+from scm.v2x.etsi.convert import roadside_station
 
 CELL_M = 0.04
 STEP = 4

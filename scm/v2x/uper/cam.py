@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from scm.v2x.etsi import CAM_ID, CamBody, ExteriorLights
+from scm.v2x.etsi.cam_spatem import CAM_ID, CamBody, ExteriorLights
 from scm.v2x.uper.parts import (
     ALTITUDE,
     HEADING,

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import msgspec
 
 from scm.errors import MessageError
-from scm.v2x.etsi import CAM_ID, SPATEM_ID, CamBody, SpatemBody
-from scm.v2x.etsi_denm import DENM_ID, DenmBody
-from scm.v2x.etsi_json import Body, type_of
-from scm.v2x.etsi_mapem import MAPEM_ID, MapemBody
-from scm.v2x.etsi_priority import SREM_ID, SSEM_ID, SremBody, SsemBody
+from scm.v2x.etsi.cam_spatem import CAM_ID, SPATEM_ID, CamBody, SpatemBody
+from scm.v2x.etsi.denm import DENM_ID, DenmBody
+from scm.v2x.etsi.json_form import Body, type_of
+from scm.v2x.etsi.mapem import MAPEM_ID, MapemBody
+from scm.v2x.etsi.priority import SREM_ID, SSEM_ID, SremBody, SsemBody
 from scm.v2x.uper import cam, denm, mapem, spatem, srem, ssem
 
 EXTRA = "scm[v2x]"

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from scm.v2x.etsi_denm import DENM_ID, DenmBody
+from scm.v2x.etsi.denm import DENM_ID, DenmBody
 from scm.v2x.uper.parts import (
     ALTITUDE,
     HEADING,

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from scm.errors import MessageError
-from scm.v2x.etsi_mapem import DIRECTIONS, MAPEM_ID, SHARED, VEHICLE_LANE, MapemBody
+from scm.v2x.etsi.mapem import DIRECTIONS, MAPEM_ID, SHARED, VEHICLE_LANE, MapemBody
 from scm.v2x.uper.parts import (
     INTERSECTION_ID,
     POSITION_3D,

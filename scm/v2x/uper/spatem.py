@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from scm.v2x.etsi import PHASE_STATES, SPATEM_ID, SpatemBody
+from scm.v2x.etsi.cam_spatem import PHASE_STATES, SPATEM_ID, SpatemBody
 from scm.v2x.uper.parts import (
     INTERSECTION_ID,
     Bits,

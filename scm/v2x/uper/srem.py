@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from scm.v2x.etsi_priority import ROLES, SREM_ID, SremBody
+from scm.v2x.etsi.priority import ROLES, SREM_ID, SremBody
 from scm.v2x.uper.parts import (
     ACCESS_POINT,
     INTERSECTION_ID,

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scm.arrays import Floats, Ints
+from scm.vehicles.drivers.lane_tracking import foot
 from scm.vehicles.drivers.memory import FRONT, WIDTH
 from scm.vehicles.drivers.stations import (
     AT_X,
@@ -36,7 +37,6 @@ from scm.vehicles.drivers.streets import (
     X,
     Y,
 )
-from scm.vehicles.drivers.way import foot
 from scm.vehicles.jit import law
 
 REACH = 2.0

@@ -10,7 +10,7 @@ import numpy as np
 from scm.maps.route import Roads
 from scm.vehicles.driver import CarLimits, Other, RouteView
 from scm.vehicles.drivers.channel import DEAF
-from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.driver_batch import Crowd
 from scm.vehicles.drivers.memory import WAITING_FOR
 from scm.vehicles.drivers.streets import streets_of
 

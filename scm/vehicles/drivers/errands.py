@@ -17,7 +17,7 @@ from scm.geometry import Pose2
 from scm.maps.route import OnLane
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.trip import Trip
-from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.driver_batch import Crowd
 from scm.vehicles.drivers.memory import WAITING_FOR
 
 REPORT_NS = NS_PER_S // 2

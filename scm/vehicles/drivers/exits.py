@@ -18,11 +18,11 @@ from scm.vehicles.drivers.ahead import (
     Scratch,
     cars_ahead,
 )
+from scm.vehicles.drivers.lane_tracking import survey
 from scm.vehicles.drivers.memory import FRONT, HERE, IN_SIGHT, SPEEDS, STEPS
 from scm.vehicles.drivers.stations import Heard
 from scm.vehicles.drivers.stop_lines import SHORT_OF_LINE, next_line
 from scm.vehicles.drivers.streets import JUNCTION, LIMIT, Ways
-from scm.vehicles.drivers.way import survey
 from scm.vehicles.jit import law
 
 FLOW = 0.7

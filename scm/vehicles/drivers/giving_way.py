@@ -14,6 +14,7 @@ import math
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.drivers.ahead import is_outside
+from scm.vehicles.drivers.lane_tracking import foot
 from scm.vehicles.drivers.memory import (
     ACCEL,
     BUSY_NS,
@@ -54,7 +55,6 @@ from scm.vehicles.drivers.stations import (
 )
 from scm.vehicles.drivers.stop_lines import REACTION, SHORT_OF_LINE
 from scm.vehicles.drivers.streets import COS, LENGTH, SIN, Ways
-from scm.vehicles.drivers.way import foot
 from scm.vehicles.jit import law
 
 AT_LINE = 0.12

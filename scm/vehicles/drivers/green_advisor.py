@@ -7,10 +7,10 @@ import math
 from typing import NamedTuple
 
 from scm.geometry import Pose2, wrap_angle
-from scm.v2x.etsi import SCALE, SpatemBody
-from scm.v2x.etsi_codes import number_of, scaled
-from scm.v2x.etsi_convert import Told, colours_of, place_of
-from scm.v2x.etsi_mapem import IntersectionGeometry, MapemBody, MapLane
+from scm.v2x.etsi.cam_spatem import SCALE, SpatemBody
+from scm.v2x.etsi.codes import number_of, scaled
+from scm.v2x.etsi.convert import Told, colours_of, place_of
+from scm.v2x.etsi.mapem import IntersectionGeometry, MapemBody, MapLane
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers.green_light import FLOOR, HORIZON, advised_speed
 from scm.vehicles.drivers.stop_lines import SHORT_OF_LINE

@@ -5,8 +5,8 @@ from collections import deque
 
 from scm.clock import NS_PER_S, seconds
 from scm.geometry import Pose2
-from scm.v2x.etsi import CamBody
-from scm.v2x.etsi_convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, CamView, read_cam
+from scm.v2x.etsi.cam_spatem import CamBody
+from scm.v2x.etsi.convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, CamView, read_cam
 from scm.vehicles.driver import Other
 from scm.vehicles.drivers.ahead import REACH
 from scm.vehicles.drivers.silence import ENOUGH, FRESH_NS

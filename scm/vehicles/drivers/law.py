@@ -17,6 +17,7 @@ from scm.vehicles.drivers.ahead import (
 from scm.vehicles.drivers.exits import has_room
 from scm.vehicles.drivers.giving_way import gives_way
 from scm.vehicles.drivers.green_light import advice
+from scm.vehicles.drivers.lane_tracking import choose_again, locate, survey, turned
 from scm.vehicles.drivers.memory import (
     ARRIVED,
     DECEL,
@@ -54,7 +55,6 @@ from scm.vehicles.drivers.stop_lines import (
 )
 from scm.vehicles.drivers.streets import LIMIT, Ways
 from scm.vehicles.drivers.warned import Warned, cautious
-from scm.vehicles.drivers.way import choose_again, locate, survey, turned
 from scm.vehicles.jit import array_kernel, law
 
 TIME_GAP = 0.8

@@ -16,6 +16,7 @@ Holds: small slip angles, |e| below a car's width.   Source: Frenet kinematics o
 import math
 
 from scm.arrays import Floats, Ints
+from scm.vehicles.drivers.lane_tracking import turned
 from scm.vehicles.drivers.memory import (
     ANGLE,
     BESIDE,
@@ -26,7 +27,6 @@ from scm.vehicles.drivers.memory import (
     WHEELBASE,
 )
 from scm.vehicles.drivers.streets import CURVATURE, YAW
-from scm.vehicles.drivers.way import turned
 from scm.vehicles.jit import law
 
 STIFFNESS = 8.0

@@ -11,9 +11,9 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.clock import NS_PER_S
-from scm.v2x.etsi_convert import place_of
-from scm.v2x.etsi_denm import ActionId, DenmBody
-from scm.v2x.etsi_events import DenmWatch
+from scm.v2x.etsi.convert import place_of
+from scm.v2x.etsi.denm import ActionId, DenmBody
+from scm.v2x.etsi.events import DenmWatch
 from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived
 from scm.vehicles.jit import law
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.vehicles.drivers.ahead import Scratch
+from scm.vehicles.drivers.lane_tracking import locate, survey
 from scm.vehicles.drivers.memory import (
     ANGLE,
     BESIDE,
@@ -31,7 +32,6 @@ from scm.vehicles.drivers.memory import (
 from scm.vehicles.drivers.pace import START_SPEED, free_speed
 from scm.vehicles.drivers.steering import LEAST_HALF, steer
 from scm.vehicles.drivers.streets import CURVATURE, YAW, Ways
-from scm.vehicles.drivers.way import locate, survey
 from scm.vehicles.jit import array_kernel, law
 
 FARTHEST_M = 4.0  # at the law's flattest approach a car comes 1 m nearer to its lane in that

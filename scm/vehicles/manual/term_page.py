@@ -8,7 +8,7 @@ from scm.vehicles.manual.manoeuvres import MANOEUVRES
 from scm.vehicles.manual.page_parts import equations, headings, parameter_table, story
 from scm.vehicles.manual.picture import SIGHTS
 from scm.vehicles.manual.shown import DROPPED, Shown, shown_of
-from scm.vehicles.signals import SIGNALS
+from scm.vehicles.physics_variables import SIGNALS
 from scm.vehicles.term import Term, flat, reads
 
 

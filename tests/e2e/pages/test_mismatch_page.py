@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from scm.fleet import LockstepLink
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.mismatch.report.several_page import write_several
 from scm.mismatch.report.write import write_report
 from scm.play import play, write_recording
+from scm.runtime.lockstep import Lockstep
 from scm.world.part import WorldPart
 from tests.e2e.city_process import wait_for
 from tests.e2e.pages.visiting import LOOKS, judge

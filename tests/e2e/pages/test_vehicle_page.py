@@ -6,8 +6,8 @@ from contextlib import contextmanager
 import pytest
 
 from scm.clock import NS_PER_MS, WallClock
-from scm.live import run
-from scm.part import Serves
+from scm.runtime.live import run
+from scm.runtime.part import Serves
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.exchange import Answer, Call
 from scm.v2x.messages.echo_request import EchoReply, EchoRequest

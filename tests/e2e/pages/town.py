@@ -18,9 +18,9 @@ from scm.api.based import Site
 from scm.api.server import serve
 from scm.api.shelves import shelves_in
 from scm.api.view import CityView
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.registry import names
+from scm.runtime.lockstep import Lockstep
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.message import Message, Request

@@ -11,7 +11,7 @@ from scm.api.close_up import DEPTH, sample_of
 from scm.api.routes.close_up import _reports
 from scm.api.routes.scan import Turns
 from scm.api.stream import Stream
-from scm.part import Hears
+from scm.runtime.part import Hears
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_state import VehicleState
 

@@ -9,18 +9,18 @@ from scm.api.app import create_app
 from scm.api.deeds import Words
 from scm.api.keys import KeyRing
 from scm.clock import StepClock
-from scm.part import Serves
 from scm.registry import names
-from scm.station import Station
+from scm.runtime.part import Serves
+from scm.runtime.station import Station
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.exchange import Answer, Call
-from scm.v2x.keeping import Keeper
 from scm.v2x.message import Request
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
 from scm.v2x.messages.stop_request import StopRequest
+from scm.v2x.write_ahead import Keeper
 
 API = "/api/v1"
 REMOVAL = RemoveRequest(vehicle="n9", reason="battery empty")

@@ -6,7 +6,7 @@ import pytest
 from fastapi.responses import StreamingResponse
 
 from scm.api.app import create_app
-from scm.api.brake import Brake
+from scm.api.auth_throttle import Brake
 from scm.api.gate import Gate, check_bind, content_policy, is_loopback
 from scm.api.known_keys import KnownKeys
 from scm.api.roles import ROLES

@@ -5,8 +5,8 @@ import math
 import msgspec
 import pytest
 
-from scm.v2x.etsi import SCALE
-from scm.v2x.etsi_convert import place_of
+from scm.v2x.etsi.cam_spatem import SCALE
+from scm.v2x.etsi.convert import place_of
 from scm.v2x.messages.traffic_counts import LaneCount, TrafficCounts
 
 WHERE = "/ngsi-ld/v1/entities"

@@ -10,14 +10,14 @@ from scm.api.audit_trail import newest_first
 from scm.api.deeds import Words
 from scm.api.trace import HEADER, Traced, trace_id, trace_id_of, traced
 from scm.clock import StepClock
-from scm.part import Serves
-from scm.station import Station
+from scm.runtime.part import Serves
+from scm.runtime.station import Station
 from scm.store.memory import MemoryStore
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.exchange import Answer, Call
-from scm.v2x.keeping import Keeper
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.stop_request import StopRequest
+from scm.v2x.write_ahead import Keeper
 
 GIVEN = "4bf92f3577b34da6a3ce929d0e0e4736"
 PARENT = f"00-{GIVEN}-00f067aa0ba902b7-01"
@@ -80,7 +80,7 @@ def test_a_station_says_in_log_and_audit_under_which_trace_it_did_something(capl
     station = Station(Button(), network.bus("city", "world"), Keeper(store, "world", "s"))
     request = StopRequest(engaged=True, by="ada", trace_id=GIVEN)
     network.bus("city", "api").call(Call(request), print)
-    with caplog.at_level(logging.INFO, "scm.station"):
+    with caplog.at_level(logging.INFO, "scm.runtime.station"):
         station.send(Answer(item, CityStop(t_ns=1, engaged=True)) for item in station.inbox())
     assert f"answered request=StopRequest reply=CityStop trace_id={GIVEN}" in caplog.text
     assert [row.trace_id for row in newest_first(store, Words({}))] == [GIVEN]

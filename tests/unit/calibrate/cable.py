@@ -19,7 +19,7 @@ from vehicle_agent.emulate.firmware import Firmware
 from vehicle_agent.emulate.sketches import SKETCHES
 from vehicle_agent.emulate.wheels import Wheels, throttle_of, wheel_angle
 from vehicle_agent.nigel.host import REST, Host
-from vehicle_agent.nigel.keeper import Written
+from vehicle_agent.nigel.serial_watchdog import Written
 
 LINE_NS = 10 * NS_PER_MS
 DEADBAND = 0.2

@@ -16,13 +16,13 @@ from scm.maps.route import Roads
 from scm.vehicles.car import load_car
 from tests.unit.calibrate.cable import SHARP, Emulated, Line, Street
 from tests.unit.calibrate.rig import STEP_NS, T0, Eye
+from vehicle_agent.actuation import real_guard
 from vehicle_agent.bodies.nigel import NigelBody
 from vehicle_agent.body import Wiring
 from vehicle_agent.calibrate.car_file import write_car
 from vehicle_agent.calibrate.fit import fit
 from vehicle_agent.emulate.part import place_of
-from vehicle_agent.last_word import real_guard
-from vehicle_agent.stay import Stay
+from vehicle_agent.session import Stay
 
 LASTS_S = 70
 MOVES_MPS = 0.02

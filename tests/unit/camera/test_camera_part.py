@@ -7,10 +7,10 @@ import pytest
 from scm.camera.part import CameraPart
 from scm.camera.tween import between, near
 from scm.clock import NS_PER_MS, NS_PER_S
-from scm.lockstep import Lockstep
-from scm.part import Hears
 from scm.recorder.mcap_file import read_run
 from scm.recorder.part import RecorderPart
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.world_snapshot import WorldSnapshot

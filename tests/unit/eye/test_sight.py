@@ -10,9 +10,9 @@ from scm.eye.part import EyePart
 from scm.eye.sight import MOST_KEPT, SightRecord
 from scm.eye.source import Frame
 from scm.eye.sources.synthetic import SyntheticSource
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.store.records import record

@@ -15,7 +15,7 @@ from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.model import CityMap
 from scm.maps.route import Roads
-from scm.traffic.card import card_of
+from scm.traffic.conflict_table import card_of
 from scm.traffic.part import TrafficPart
 from scm.traffic.program import program_of
 

@@ -11,7 +11,6 @@ import pytest
 
 from scm.__main__ import main
 from scm.errors import MapError
-from scm.lockstep import Lockstep
 from scm.maps.check import problems_of
 from scm.maps.conflicts import conflicting_groups
 from scm.maps.load import load_map
@@ -21,10 +20,11 @@ from scm.maps.sumo import ERROR_M, LEAST_RADIUS_M, import_sumo
 from scm.maps.sumo_program import stages_of
 from scm.maps.sumo_read import NetPhase
 from scm.maps.sumo_toml import map_toml
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.own_plan import adopted
 from scm.traffic.part import TrafficPart
-from scm.v2x.etsi_topology import mapem_of
+from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spat import Spat
 from scm.world.driving import send

@@ -24,7 +24,7 @@ from vehicle_agent.bodies import nigel
 from vehicle_agent.bodies.nigel import BODY, LIFTED_M, STALE_NS, NigelBody
 from vehicle_agent.body import Obeyed, Wiring
 from vehicle_agent.nigel.host import REST, Wish
-from vehicle_agent.nigel.keeper import Told, Written
+from vehicle_agent.nigel.serial_watchdog import Told, Written
 from vehicle_agent.nigel.telemetry import Telemetry
 
 BEGIN_NS = 10**9

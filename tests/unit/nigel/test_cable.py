@@ -22,8 +22,8 @@ from vehicle_agent.nigel import helm as helm_module
 from vehicle_agent.nigel.cable import FULL_BYTES, REOPEN_NS, Cable
 from vehicle_agent.nigel.helm import DOUBT_NS, Helm
 from vehicle_agent.nigel.host import Host, Wish
-from vehicle_agent.nigel.keeper import PATIENCE_NS, Asked, Keeper, Told
 from vehicle_agent.nigel.rosserial import pack_float
+from vehicle_agent.nigel.serial_watchdog import PATIENCE_NS, Asked, Keeper, Told
 
 ZERO, HALF = pack_float(0.0), pack_float(0.5)
 PATIENCE_S = 40.0

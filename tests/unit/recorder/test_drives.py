@@ -12,7 +12,6 @@ from numpy.testing import assert_allclose
 from scm.__main__ import main
 from scm.errors import RecordingError
 from scm.fleet import LockstepLink
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.mismatch.diagnose import diagnose
 from scm.play import play, write_recording
@@ -20,6 +19,7 @@ from scm.recorder.drives import read_drives, recordings_of
 from scm.recorder.mcap_file import RunFile, read_run
 from scm.recorder.part import RecorderPart
 from scm.replay.free_run import free_run
+from scm.runtime.lockstep import Lockstep
 from scm.traffic.part import TrafficPart
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of

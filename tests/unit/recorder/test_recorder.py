@@ -9,10 +9,10 @@ import pytest
 from mcap.reader import make_reader
 
 from scm.errors import MessageError, RecordingError
-from scm.lockstep import Lockstep
 from scm.recorder.mcap_file import RunFile, read_run
 from scm.recorder.part import RecorderPart
 from scm.recorder.recover import recover
+from scm.runtime.lockstep import Lockstep
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of
 from scm.v2x.message import encode

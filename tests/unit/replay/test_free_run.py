@@ -16,7 +16,7 @@ from scm.replay.free_run import HORIZONS_S, error_table, free_run
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.measure import Series, measure
-from scm.vehicles.undone import POSES
+from scm.vehicles.sensor_correction import POSES
 
 
 @pytest.fixture(scope="module")

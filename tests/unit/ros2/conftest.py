@@ -2,10 +2,10 @@
 
 import pytest
 
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.ros2.part import RosPart
 from scm.ros2.wire import Heard
+from scm.runtime.lockstep import Lockstep
 from scm.world.part import WorldPart
 
 

@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from scm.maps.load import load_map
-from scm.part import Hears
 from scm.ros2 import markers
 from scm.ros2.frames import vector
 from scm.ros2.part import RosPart
 from scm.ros2.types import ros, to_cdr
+from scm.runtime.part import Hears
 from scm.traffic.part import TrafficPart
 from scm.v2x.exchange import Incoming
 from scm.v2x.message import Refused

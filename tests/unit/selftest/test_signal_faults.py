@@ -9,7 +9,7 @@ from scm.selftest.signal_fault import SignalFault
 from scm.selftest.signals import FAULTS, Outcome
 from scm.selftest.stand_in import BentTraffic
 from scm.selftest.table import markdown_table, text_table
-from scm.traffic.card import card_of
+from scm.traffic.conflict_table import card_of
 from scm.traffic.monitor import Monitor
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.monitor_status import MonitorStatus

@@ -6,9 +6,9 @@ import pytest
 
 from scm.clock import NS_PER_MS, NS_PER_S, nanoseconds
 from scm.errors import RunError
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.selftest.signals import SignalTrials
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart

@@ -7,9 +7,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from scm.lockstep import Lockstep
 from scm.maps.grid_city import grid_city
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.demand import DemandPart, Ways
 from scm.traffic.demand_table import DemandError, Flow, departures, load_demand, seconds_of_day
 from scm.v2x.messages.world_snapshot import WorldSnapshot

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import pytest
 
 from scm.clock import NS_PER_S, nanoseconds, seconds
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.attacker import Attacker
 from scm.traffic.misbehaviour_part import MisbehaviourPart, limits_by_car
 from scm.traffic.part import TrafficPart
-from scm.v2x.etsi_convert import read_cam, station_id
+from scm.v2x.etsi.convert import read_cam, station_id
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx

@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from scm.clock import NS_PER_MS
-from scm.traffic.card import Card, CardGroup
+from scm.traffic.conflict_table import Card, CardGroup
 from scm.traffic.monitor import Monitor
 from scm.v2x.messages.spat import SignalGroup, Spat
 

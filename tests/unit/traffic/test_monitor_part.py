@@ -3,9 +3,9 @@
 import msgspec
 import pytest
 
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.message import Refused

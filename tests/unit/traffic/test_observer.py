@@ -6,11 +6,11 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from scm.lockstep import Lockstep
 from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.observer_part import ObserverPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.messages.city_event import CityEvent

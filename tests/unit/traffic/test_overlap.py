@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from scm.traffic.card import Card, CardGroup
+from scm.traffic.conflict_table import Card, CardGroup
 from scm.traffic.controller import Controller
 from scm.traffic.kernel import GroupTimes, Program
 from scm.traffic.monitor import Monitor

@@ -5,12 +5,12 @@ from itertools import pairwise
 import msgspec
 import pytest
 
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
-from scm.v2x.etsi_convert import colours_of
+from scm.v2x.etsi.convert import colours_of
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.monitor_status import MonitorStatus

@@ -6,9 +6,9 @@ import msgspec
 import pytest
 
 from scm.errors import PlanError
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller
 from scm.traffic.kernel import GroupTimes, Program

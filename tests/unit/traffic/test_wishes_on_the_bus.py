@@ -4,13 +4,13 @@ import msgspec
 import pytest
 
 from scm.clock import NS_PER_S
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.part import TrafficPart
-from scm.v2x.etsi_ask import Wish, answers_of, srem_of
-from scm.v2x.etsi_convert import cam_of, station_id
+from scm.v2x.etsi.convert import cam_of, station_id
+from scm.v2x.etsi.priority_requests import Wish, answers_of, srem_of
 from scm.v2x.message import Refused
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.city_event import CityEvent

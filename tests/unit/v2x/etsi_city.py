@@ -13,18 +13,18 @@ import numpy as np
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.eye.track.perception import collective_perception
 from scm.eye.track.sighting import Track
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.part import Hears
 from scm.recorder.mcap_file import RunFile
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.part import TrafficPart
-from scm.v2x.etsi_ask import Answered, Wish, srem_of, ssem_of
-from scm.v2x.etsi_convert import roadside_station, station_id
-from scm.v2x.etsi_events import DenmSender, accident, city_stop
-from scm.v2x.etsi_json import Body
-from scm.v2x.etsi_priority import STATUSES
-from scm.v2x.etsi_topology import mapem_at, mapem_of, topology_of
+from scm.v2x.etsi.convert import roadside_station, station_id
+from scm.v2x.etsi.events import DenmSender, accident, city_stop
+from scm.v2x.etsi.json_form import Body
+from scm.v2x.etsi.priority import STATUSES
+from scm.v2x.etsi.priority_requests import Answered, Wish, srem_of, ssem_of
+from scm.v2x.etsi.topology import mapem_at, mapem_of, topology_of
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of
 from scm.v2x.message import encode

@@ -19,7 +19,7 @@ from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.certificates import Pair, issue_station, make_authority
 from scm.v2x.credentials import Credentials, read_credentials
-from scm.v2x.etsi_convert import cam_of
+from scm.v2x.etsi.convert import cam_of
 from scm.v2x.exchange import Answer
 from scm.v2x.fleet_file import Fleet, add, name_hosts, remove
 from scm.v2x.message import Refused, encode

@@ -8,7 +8,7 @@ from scm.errors import MessageError
 from scm.v2x.bus import Mailbox, RawMailbox
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.copies import KEPT
-from scm.v2x.etsi_convert import cam_of
+from scm.v2x.etsi.convert import cam_of
 from scm.v2x.exchange import Incoming, RawSample
 from scm.v2x.mailbox import drain_all
 from scm.v2x.message import Refused, decode, encode

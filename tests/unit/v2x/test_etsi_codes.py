@@ -20,17 +20,17 @@ from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.traffic.sightings import Sightings
-from scm.v2x.etsi import CamBody
-from scm.v2x.etsi_ask import Answered, Wish, answers_of, srem_of, ssem_of, wishes_of
-from scm.v2x.etsi_codes import codes_in
-from scm.v2x.etsi_convert import cam_of, colours_of, place_of, read_cam, spatem_of, station_id
-from scm.v2x.etsi_denm import DenmBody
-from scm.v2x.etsi_events import DenmSender, stationary
-from scm.v2x.etsi_json import KINDS
-from scm.v2x.etsi_mapem import MapemBody
-from scm.v2x.etsi_parts import Altitude
-from scm.v2x.etsi_path import SlowNews
-from scm.v2x.etsi_topology import mapem_of
+from scm.v2x.etsi.cam_spatem import CamBody
+from scm.v2x.etsi.codes import codes_in
+from scm.v2x.etsi.convert import cam_of, colours_of, place_of, read_cam, spatem_of, station_id
+from scm.v2x.etsi.denm import DenmBody
+from scm.v2x.etsi.events import DenmSender, stationary
+from scm.v2x.etsi.json_form import KINDS
+from scm.v2x.etsi.mapem import MapemBody
+from scm.v2x.etsi.parts import Altitude
+from scm.v2x.etsi.path import SlowNews
+from scm.v2x.etsi.priority_requests import Answered, Wish, answers_of, srem_of, ssem_of, wishes_of
+from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.v2x.misbehaviour.claim import claim_of

@@ -11,8 +11,8 @@ from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.model import Conflict, Group, Junction
-from scm.v2x import etsi_convert as ec
-from scm.v2x.etsi import (
+from scm.v2x.etsi import convert as ec
+from scm.v2x.etsi.cam_spatem import (
     PHASE_STATES,
     SCALE,
     HighFrequencyContainer,
@@ -21,7 +21,7 @@ from scm.v2x.etsi import (
     VehicleHighFrequency,
     VehicleLength,
 )
-from scm.v2x.etsi_parts import Heading, Speed
+from scm.v2x.etsi.parts import Heading, Speed
 from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.v2x.messages.vehicle_state import VehicleState
 

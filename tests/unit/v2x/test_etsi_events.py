@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import MessageError
-from scm.v2x.etsi_convert import place_of
-from scm.v2x.etsi_denm import CANCELLATION, NEGATION
-from scm.v2x.etsi_events import (
+from scm.v2x.etsi.convert import place_of
+from scm.v2x.etsi.denm import CANCELLATION, NEGATION
+from scm.v2x.etsi.events import (
     ACCIDENT,
     DANGEROUS_SITUATION,
     STATIONARY_VEHICLE,

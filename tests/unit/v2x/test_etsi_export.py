@@ -12,7 +12,7 @@ from scm.clock import NS_PER_MS
 from scm.errors import RecordingError
 from scm.recorder.mcap_file import RunFile, read_run
 from scm.recorder.on_air import OnAir, write_pcap
-from scm.v2x.etsi_json import unwrap
+from scm.v2x.etsi.json_form import unwrap
 from scm.v2x.exchange import RawSample
 from scm.v2x.pcap import PORTS
 from scm.v2x.uper import codec

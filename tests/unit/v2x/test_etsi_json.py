@@ -8,7 +8,7 @@ import jsonschema_rs
 import pytest
 
 from scm.errors import MessageError
-from scm.v2x.etsi_json import KINDS, unwrap, wrap
+from scm.v2x.etsi.json_form import KINDS, unwrap, wrap
 from tests.unit.v2x.etsi_city import city_says
 from tests.unit.v2x.etsi_facts import FACTS, schema_of
 

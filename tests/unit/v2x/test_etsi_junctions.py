@@ -8,10 +8,10 @@ import pytest
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.v2x.etsi_ask import Answered, Wish, answers_of, srem_of, ssem_of, wishes_of
-from scm.v2x.etsi_convert import place_of, spatem_of, station_id
-from scm.v2x.etsi_path import MOST_POINTS, SlowNews
-from scm.v2x.etsi_topology import mapem_of, topology_of
+from scm.v2x.etsi.convert import place_of, spatem_of, station_id
+from scm.v2x.etsi.path import MOST_POINTS, SlowNews
+from scm.v2x.etsi.priority_requests import Answered, Wish, answers_of, srem_of, ssem_of, wishes_of
+from scm.v2x.etsi.topology import mapem_of, topology_of
 from scm.v2x.messages.spat import SignalGroup, Spat
 from tests.unit.v2x.test_etsi_convert import NOW, a_state
 

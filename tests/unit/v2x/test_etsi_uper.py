@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from scm.errors import MessageError
-from scm.v2x.etsi_mapem import MapemBody
+from scm.v2x.etsi.mapem import MapemBody
 from scm.v2x.uper import codec
 from tests.unit.v2x.asn1_text import for_asn1tools, module_of
 from tests.unit.v2x.etsi_city import city_says, everything

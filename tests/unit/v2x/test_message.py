@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from scm.errors import MessageError
-from scm.v2x.etsi_convert import cam_of
+from scm.v2x.etsi.convert import cam_of
 from scm.v2x.message import Message, Refused, decode, encode
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.city_stop import CityStop

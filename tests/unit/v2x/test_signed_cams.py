@@ -8,7 +8,7 @@ import pytest
 from scm.clock import NS_PER_MS, NS_PER_S, StepClock
 from scm.errors import AccessError, ScmError
 from scm.v2x.credentials import read_credentials
-from scm.v2x.etsi_convert import cam_of
+from scm.v2x.etsi.convert import cam_of
 from scm.v2x.fleet_file import Fleet, add, complete
 from scm.v2x.message import decode, encode
 from scm.v2x.messages.cam_rx import CamRx

@@ -6,10 +6,10 @@ import math
 import pytest
 
 from scm.clock import NS_PER_MS
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.message import Refused

@@ -48,7 +48,7 @@ def small_kernel(folder, calm_after=None):
     """
     from scm.vehicles.car import all_terms
     from scm.vehicles.kernel_file import compile_kernel
-    from scm.vehicles.signals import Per
+    from scm.vehicles.physics_variables import Per
     from scm.vehicles.term import Term
 
     sys.path.insert(0, str(folder))

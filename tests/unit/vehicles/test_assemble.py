@@ -10,7 +10,7 @@ from scm.vehicles.car import STANDARD_TERMS, all_terms, load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.kernel_file import compile_kernel
 from scm.vehicles.param import Param
-from scm.vehicles.signals import SIGNALS, Per, Role
+from scm.vehicles.physics_variables import SIGNALS, Per, Role
 from scm.vehicles.term import Term
 from tests.unit.vehicles.fresh import Compiling, nigel_after_a_second
 

@@ -6,7 +6,7 @@ import pytest
 
 from scm.clock import NS_PER_S
 from scm.geometry import Pose2
-from scm.v2x.etsi_convert import cam_of
+from scm.v2x.etsi.convert import cam_of
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.drivers.ahead import REACH
 from scm.vehicles.drivers.heard import HeardCars

@@ -10,7 +10,7 @@ from scm.clock import NS_PER_MS
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.load import load_map
 from scm.maps.route import Path, Roads
-from scm.v2x.etsi_convert import spatem_of
+from scm.v2x.etsi.convert import spatem_of
 from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.vehicles.driver import CarLimits, Other, RouteView
 from scm.vehicles.drivers.route import RouteDriver

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 
 from scm.vehicles.noise import bases_of, key_of, normals, uniforms
-from scm.vehicles.spoil import LONGEST_S, wander
+from scm.vehicles.sensor_noise import LONGEST_S, wander
 
 COUNT = 400_000
 

@@ -7,7 +7,7 @@ from numpy.testing import assert_array_equal
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.vehicles.bank import Bank
 from scm.vehicles.car import load_car
-from scm.vehicles.placed import Placed
+from scm.vehicles.external_vehicles import Placed
 from scm.vehicles.sensor import Facts, Sensor
 
 TICK = 20 * NS_PER_MS

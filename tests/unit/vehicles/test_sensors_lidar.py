@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scm.clock import NS_PER_S
 from scm.vehicles.bank import Bank
 from scm.vehicles.car import load_car
-from scm.vehicles.placed import Placed
+from scm.vehicles.external_vehicles import Placed
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sight

@@ -5,7 +5,7 @@ from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.load import load_map
-from scm.v2x.etsi_convert import spatem_of
+from scm.v2x.etsi.convert import spatem_of
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.vehicles.signal_view import SignalView

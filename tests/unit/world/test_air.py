@@ -14,8 +14,8 @@ from scm.maps.load import load_map
 from scm.maps.model import RadioChannel
 from scm.maps.radio import with_radio
 from scm.maps.radio_check import radio_problems
-from scm.v2x.etsi_convert import cam_of
-from scm.v2x.etsi_events import ACCIDENT, DenmSender, Event
+from scm.v2x.etsi.convert import cam_of
+from scm.v2x.etsi.events import ACCIDENT, DenmSender, Event
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.city_event import CityEvent
@@ -28,7 +28,7 @@ from scm.v2x.messages.ssem_tx import SsemTx
 from scm.v2x.messages.stop_request import StopRequest
 from scm.vehicles.drivers.channel import channel_of, has_arrived
 from scm.world.air import OF_ROADSIDE, RECEIVED, transmit
-from scm.world.busy import Busy
+from scm.world.channel_load import Busy
 from scm.world.remote import missed_between
 from scm.world.world import World
 

@@ -7,8 +7,8 @@ from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from scm.clock import NS_PER_MS
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
+from scm.runtime.lockstep import Lockstep
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.v2x.ask import Asking
@@ -17,8 +17,8 @@ from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.vehicles.guard import Guard
 from scm.world import driving
-from scm.world.kept import read_kept
 from scm.world.part import WorldPart
+from scm.world.restore import read_kept
 
 MAP = load_map("driving_school")
 OWNERS = {"ann": 0.1, "bob": 0.2, "eve": 0.3}

@@ -5,10 +5,10 @@ import hashlib
 import pytest
 from msgspec.structs import replace
 
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
 from scm.maps.model import RadioChannel
 from scm.maps.radio import with_radio
+from scm.runtime.lockstep import Lockstep
 from scm.traffic.part import TrafficPart
 from scm.world.part import WorldPart
 

@@ -9,7 +9,7 @@ from scm.maps.model import CityMap, Floor, Group, Junction, Light, MapTag, Radio
 from scm.maps.model import Conflict as Stretch
 from scm.v2x.messages.part_status import PartStatus
 from scm.vehicles.drivers.channel import channel_of
-from scm.world.late import Late
+from scm.world.delay_queue import Late
 from scm.world.radio import Radio, Receivers, roadside_places
 
 PLACES = {"n1": (0.0, 0.0), "n2": (3.0, 4.0), "n3": (0.0, 5.1), "rsu-x": (1.0, 0.0)}

@@ -1,8 +1,8 @@
 """Hosted cars warn on the air where real stations would, and only there."""
 
 from scm.geometry import Pose2
-from scm.v2x.etsi_convert import station_id
-from scm.v2x.etsi_events import (
+from scm.v2x.etsi.convert import station_id
+from scm.v2x.etsi.events import (
     ACCIDENT,
     DANGEROUS_SITUATION,
     EMERGENCY_BRAKE,

@@ -5,8 +5,8 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from scm.lockstep import Lockstep
 from scm.maps.load import load_map
+from scm.runtime.lockstep import Lockstep
 from scm.store.memory import MemoryStore
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.join_request import JoinRequest
@@ -14,8 +14,8 @@ from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
-from scm.world.kept import read_kept
 from scm.world.part import WorldPart
+from scm.world.restore import read_kept
 
 MAP = load_map("driving_school")
 

@@ -6,7 +6,7 @@ import pytest
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import Pose2
 from scm.maps.load import load_map
-from scm.v2x.etsi_convert import roadside_station, spatem_of
+from scm.v2x.etsi.convert import roadside_station, spatem_of
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.contact import Contact

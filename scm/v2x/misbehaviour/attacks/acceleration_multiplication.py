@@ -5,7 +5,7 @@ a' = k a, k of 2..4        a lie where |a| > 0.5 m/s^2 of the full city
 
 import random
 
-from scm.v2x.etsi import SCALE
+from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.misbehaviour.attack import Attack, Frame, Scene, Sent, Transform
 from scm.v2x.misbehaviour.claim import accel_of as told_of
 from scm.v2x.misbehaviour.forge import driven

@@ -5,8 +5,8 @@ p' = p + d, |dx| and |dy| each 20..70 m of the full city, 1.4..5 m here
 
 import random
 
-from scm.v2x.etsi import SCALE
-from scm.v2x.etsi_convert import read_cam
+from scm.v2x.etsi.cam_spatem import SCALE
+from scm.v2x.etsi.convert import read_cam
 from scm.v2x.misbehaviour.attack import Attack, Frame, Scene, Sent, Transform
 from scm.v2x.misbehaviour.forge import moved
 

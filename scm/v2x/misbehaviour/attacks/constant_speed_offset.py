@@ -5,8 +5,8 @@ v' = v + d, |d| 1..7 m/s of the full city, 0.07..0.5 m/s here; v' >= 0
 
 import random
 
-from scm.v2x.etsi import SCALE
-from scm.v2x.etsi_convert import read_cam
+from scm.v2x.etsi.cam_spatem import SCALE
+from scm.v2x.etsi.convert import read_cam
 from scm.v2x.misbehaviour.attack import Attack, Frame, Scene, Sent, Transform
 from scm.v2x.misbehaviour.forge import driven
 

@@ -8,8 +8,8 @@ import math
 import random
 
 from scm.clock import NS_PER_S
-from scm.v2x.etsi import SCALE
-from scm.v2x.etsi_convert import read_cam
+from scm.v2x.etsi.cam_spatem import SCALE
+from scm.v2x.etsi.convert import read_cam
 from scm.v2x.misbehaviour.attack import Attack, Frame, Scene, Sent, Transform
 from scm.v2x.misbehaviour.forge import stamped
 

@@ -5,7 +5,7 @@ v' = v(t*), t* with 5 % for each CAM        a lie where |v' - v| > 1 m/s of the 
 
 import random
 
-from scm.v2x.etsi_convert import read_cam
+from scm.v2x.etsi.convert import read_cam
 from scm.v2x.misbehaviour.attack import SLOW_MPS, Attack, Frame, Scene, Sent, Transform
 from scm.v2x.misbehaviour.forge import driven
 

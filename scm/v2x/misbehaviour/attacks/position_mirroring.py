@@ -6,7 +6,7 @@ p' = p mirrored at the left edge of the lane; heading and speed stay
 import math
 import random
 
-from scm.v2x.etsi_convert import read_cam
+from scm.v2x.etsi.convert import read_cam
 from scm.v2x.misbehaviour.attack import Attack, Frame, Scene, Sent, Transform
 from scm.v2x.misbehaviour.forge import moved
 

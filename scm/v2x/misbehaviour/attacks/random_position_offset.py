@@ -5,7 +5,7 @@ p' = p + d, drawn anew for each CAM, sizes as in constant_position_offset
 
 import random
 
-from scm.v2x.etsi_convert import read_cam
+from scm.v2x.etsi.convert import read_cam
 from scm.v2x.misbehaviour.attack import Attack, Frame, Scene, Sent, Transform
 from scm.v2x.misbehaviour.attacks.constant_position_offset import offset_m
 from scm.v2x.misbehaviour.forge import moved

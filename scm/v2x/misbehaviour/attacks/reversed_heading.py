@@ -7,7 +7,7 @@ import math
 import random
 
 from scm.geometry import wrap_angle
-from scm.v2x.etsi_convert import CamView, read_cam
+from scm.v2x.etsi.convert import CamView, read_cam
 from scm.v2x.misbehaviour.attack import Attack, Frame, Scene, Sent, Transform
 from scm.v2x.misbehaviour.attacks.zero_speed import drives
 from scm.v2x.misbehaviour.forge import driven

@@ -7,8 +7,8 @@ a lie while it drives, or once it is 20 m of the full city away
 import math
 import random
 
-from scm.v2x.etsi import SCALE
-from scm.v2x.etsi_convert import CamView, read_cam
+from scm.v2x.etsi.cam_spatem import SCALE
+from scm.v2x.etsi.convert import CamView, read_cam
 from scm.v2x.misbehaviour.attack import SLOW_MPS, Attack, Frame, Scene, Sent, Transform
 from scm.v2x.misbehaviour.forge import driven, moved
 

@@ -6,7 +6,7 @@ v' = 0        a lie while it drives: above 1 m/s of the full city, and moved
 import math
 import random
 
-from scm.v2x.etsi_convert import CamView, read_cam
+from scm.v2x.etsi.convert import CamView, read_cam
 from scm.v2x.misbehaviour.attack import (
     SLOW_MPS,
     STEP_M,

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from scm.parent_watch import with_parent
+from scm.runtime.parent_watch import with_parent
 
 SCRIPT = Path(__file__).with_name("sleeping_trial.py")
 START_S, END_S = 120.0, 30.0

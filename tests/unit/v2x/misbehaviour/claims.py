@@ -5,7 +5,7 @@ import math
 from scm.clock import NS_PER_S, nanoseconds
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.v2x.etsi_convert import cam_of
+from scm.v2x.etsi.convert import cam_of
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.misbehaviour.detector import Detector

@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 
 from scm.clock import NS_PER_S
 from scm.errors import RunError
-from scm.lockstep import Lockstep
-from scm.part import Hears
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Hears
 from scm.traffic.part import TrafficPart
-from scm.v2x.etsi_convert import read_cam
+from scm.v2x.etsi.convert import read_cam
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest

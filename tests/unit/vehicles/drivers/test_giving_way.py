@@ -12,7 +12,7 @@ from scm.maps.model import RadioChannel, Sign
 from scm.maps.route import Roads
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers.channel import DEAF
-from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.driver_batch import Crowd
 from scm.vehicles.drivers.memory import WAITING_FOR
 from scm.vehicles.drivers.streets import Streets
 

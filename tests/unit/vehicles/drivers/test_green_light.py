@@ -12,11 +12,11 @@ from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.model import RadioChannel
 from scm.maps.route import Roads
-from scm.v2x.etsi_convert import spatem_of
-from scm.v2x.etsi_topology import mapem_of, topology_of
+from scm.v2x.etsi.convert import spatem_of
+from scm.v2x.etsi.topology import mapem_of, topology_of
 from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers.crowd import Crowd
+from scm.vehicles.drivers.driver_batch import Crowd
 from scm.vehicles.drivers.green_advisor import GreenAdvisor
 from scm.vehicles.drivers.green_light import advised_speed, arriving_speed, red_for
 from scm.vehicles.drivers.pace import stopping_speed

@@ -7,7 +7,7 @@ import pytest
 
 from scm.clock import NS_PER_S
 from scm.maps.model import RadioChannel
-from scm.v2x.etsi_events import ACCIDENT, DenmSender, Event
+from scm.v2x.etsi.events import ACCIDENT, DenmSender, Event
 from scm.vehicles.drivers.channel import channel_of
 from scm.vehicles.drivers.warned import CAUTION, PLACES, Warnings, cautious
 

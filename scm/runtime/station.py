@@ -1,0 +1,234 @@
+"""A part at its bus: what it hears is collected, what it sends goes out, retries get one answer.
+
+Both runners use it. Whoever asks again with the `request_id` of an answered request gets the
+stored answer: the effect happens once, however often the network makes people ask. With a keeper
+this holds across restarts too: an answer leaves only when it, the state behind it and its entry in
+the audit log are stored.
+"""
+
+import logging
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import cast
+
+import msgspec
+
+from scm.log import event
+from scm.runtime.part import Hears, Part
+from scm.store.audit import Deed
+from scm.store.repository import Table
+from scm.v2x.answers import AnswerBook
+from scm.v2x.bus import Bus, Mailbox, RawMailbox, check_reply
+from scm.v2x.exchange import Answer, Call, Incoming, Keep, Outgoing, RawSample
+from scm.v2x.mailbox import drain_all
+from scm.v2x.message import Delivery, Refused, Request, encode
+from scm.v2x.write_ahead import Batch, Keeps
+
+DEPTH = {
+    Delivery.STREAM: 1024,
+    Delivery.COMMAND: 256,
+    Delivery.EVENT: 4096,
+    Delivery.RPC: 256,
+    Delivery.PRESENCE: 1024,
+}
+RAW_DEPTH = 16384
+MAX_ACTOR = 128  # characters of a sender's name that the audit log keeps
+
+_log = logging.getLogger(__name__)
+
+
+class Station:
+    """One part, tied to one bus: subscribed, serving and announced from the start.
+
+    Args:
+        part: The part.
+        bus: Its connection.
+        keeper: Of what must outlive this process; None: nothing must.
+    """
+
+    def __init__(self, part: Part, bus: Bus, keeper: Keeps | None = None) -> None:
+        self._part = part
+        self._bus = bus
+        self._boxes: list[Mailbox | RawMailbox] = []
+        self._replies = self._mailbox(Delivery.RPC)
+        self._keeper = keeper
+        self._answers = AnswerBook(None if keeper is None else keeper.stored_answers())
+        self._heard: Sequence[Hears] = ()
+        self._ears: list[tuple[Hears, Mailbox]] = []
+        self._follow()
+        for serves in part.serves:
+            bus.serve(serves.kind, serves.where, self._mailbox(Delivery.RPC))
+        self._hear_raw()
+        learn = getattr(part, "learn_wishes", None)
+        if learn is not None:
+            learn(bus.is_wanted)
+        bus.announce(part.role)
+
+    def _hear_raw(self) -> None:
+        raw = RawMailbox(RAW_DEPTH)
+        if getattr(self._part, "hears_raw", False):
+            self._bus.subscribe_raw(raw)
+        for hears in getattr(self._part, "hears_raw_too", ()):
+            self._bus.subscribe_raw(raw, hears.kind, hears.where)
+        self._boxes.append(raw)
+
+    def _follow(self) -> None:
+        """Subscribe to what the part wishes to hear now, and to nothing else any more."""
+        if self._part.hears is self._heard:
+            return
+        self._heard = self._part.hears
+        wished = list(self._heard)
+        for ear in list(self._ears):
+            hears, box = ear
+            if hears in wished:
+                wished.remove(hears)
+            else:
+                self._bus.unsubscribe(box)
+                self._ears.remove(ear)
+                self._boxes.remove(box)
+        for hears in wished:
+            box = self._mailbox(hears.kind.DELIVERY, once=hears.once)
+            self._bus.subscribe(hears.kind, hears.where, box)
+            self._ears.append((hears, box))
+
+    def _mailbox(self, delivery: Delivery, *, once: bool = False) -> Mailbox:
+        box = Mailbox(DEPTH[delivery], once=once)
+        self._boxes.append(box)
+        return box
+
+    @property
+    def dropped(self) -> int:
+        """How many arrivals had to make room for newer ones since the start."""
+        return sum(box.dropped for box in self._boxes)
+
+    def inbox(self) -> list[Incoming]:
+        """Return what arrived since the last time, without requests that are answered already."""
+        self._follow()
+        self._release()
+        fresh: list[Incoming | RawSample] = []
+        for item in drain_all(self._boxes):
+            if isinstance(item, Incoming) and _is_request(item):
+                met = self._answers.meet(item, self._closed_for(item))
+                if isinstance(met, Answer):
+                    self._bus.answer(met)
+                if met != "do":
+                    continue
+            fresh.append(item)
+        # A part that asks for raw samples declares that its inbox holds them too.
+        return cast("list[Incoming]", fresh)
+
+    def send(self, outgoing: Iterable[Outgoing]) -> None:
+        """Deliver what a step returned, in its order; answers wait until they are stored."""
+        kept: list[Keep] = []
+        answers: list[Answer] = []
+        for item in outgoing:
+            if isinstance(item, Call):
+                self._bus.call(self._signed(item), self._replies.put)
+            elif isinstance(item, Answer):
+                self._log_traced(item)
+                if self._keeper is None:
+                    self._settle(item)
+                else:
+                    check_reply(item)
+                    answers.append(item)
+            elif isinstance(item, Keep):
+                kept.append(item)
+            else:
+                self._bus.publish(item)
+        if self._keeper is not None and (kept or answers):
+            self._store(self._keeper, kept, answers)
+
+    def close(self) -> None:
+        """Let what must be stored be stored, and its answers go; the bus stays open."""
+        if self._keeper is not None:
+            self._keeper.close()
+            self._release()
+
+    def _closed_for(self, item: Incoming) -> str:
+        """Return why a request cannot be done now: what it does could not be stored."""
+        if self._keeper is None or not _has_effect(item):
+            return ""
+        return self._keeper.stuck
+
+    def _store(self, keeper: Keeps, kept: Sequence[Keep], answers: Sequence[Answer]) -> None:
+        values: list[tuple[Table, str, bytes | None]] = [
+            (item.table, item.key, None if item.value is None else msgspec.json.encode(item.value))
+            for item in kept
+        ]
+        for answer in answers:
+            record = self._answers.record(answer)
+            if record is not None:
+                values.append(("answers", record[0], msgspec.json.encode(record[1])))
+        forgotten, self._answers.forgotten = self._answers.forgotten, []
+        values += [("answers", key, None) for key in forgotten]
+        deeds = [
+            self._deed(answer)
+            for answer in answers
+            if not isinstance(answer.reply, Refused) and _has_effect(answer.to)
+        ]
+        if values or deeds:
+            keeper.write(Batch(values, deeds, answers))
+            self._release()
+        else:
+            for answer in answers:
+                self._settle(answer)
+
+    def _signed(self, call: Call) -> Call:
+        """Return a call whose request says who asks, this part where it names nobody itself."""
+        request = call.request
+        if not request.HAS_EFFECT or request.actor or _named(request):
+            return call
+        return replace(call, request=msgspec.structs.replace(request, actor=self._part.name))
+
+    def _log_traced(self, answer: Answer) -> None:
+        """Say in the log what became of a request that somebody traces."""
+        request = cast("Request", answer.to.message)
+        if request.trace_id and _has_effect(answer.to):
+            kind, reply = type(request).__name__, type(answer.reply).__name__
+            event(_log, "answered", request=kind, reply=reply, trace_id=request.trace_id[:32])
+
+    def _deed(self, answer: Answer) -> Deed:
+        request = cast("Request", answer.to.message)
+        return Deed(
+            t_ns=answer.to.t_ns,
+            station=self._part.name,
+            kind=type(request).__name__,
+            by=_asked_by(request),
+            request_id=request.request_id,
+            request=msgspec.Raw(encode(request)[0]),
+            reply=msgspec.Raw(encode(answer.reply)[0]),
+        )
+
+    def _release(self) -> None:
+        """Let the answers go whose state is safe by now."""
+        if self._keeper is not None:
+            for batch in self._keeper.written():
+                for answer in batch.answers:
+                    self._settle(answer)
+
+    def _settle(self, answer: Answer) -> None:
+        for ready in self._answers.settle(answer):
+            self._bus.answer(ready)
+
+
+def _is_request(item: Incoming) -> bool:
+    return isinstance(item.message, Request) and item.call is None
+
+
+def _named(request: Request) -> str:
+    """Return who asks in the request's own words; empty: it does not say."""
+    return str(getattr(request, "by", "") or getattr(request, "owner", ""))
+
+
+def _asked_by(request: Request) -> str:
+    """Return who asks, for the audit: whom the request names, and who sent it if that differs."""
+    named, actor = _named(request), request.actor[:MAX_ACTOR]
+    if not (named and actor):
+        return named or actor
+    return actor if named in actor else f"{named} ({actor})"
+
+
+def _has_effect(item: Incoming) -> bool:
+    """Return whether a request does more than to say, or to ask, that somebody is still there."""
+    request = cast("Request", item.message)
+    return request.HAS_EFFECT and getattr(request, "verb", "") != "renew"

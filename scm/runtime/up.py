@@ -1,0 +1,384 @@
+"""`scm up`: a whole city on this machine, one process a part, around a router in this one."""
+
+import socket
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+
+from scm.clock import NS_PER_MS, WallClock, seconds
+from scm.disturbances import HEARS, Disturbance, Disturbances
+from scm.errors import RunError, nearest
+from scm.eye.station import eye_station
+from scm.maps.load import is_scan, load_map
+from scm.maps.radio import with_radio
+from scm.runtime.crew import Crew, Job, Say
+from scm.runtime.live import stop_on_signal
+from scm.store.open import open_store
+from scm.traffic.demand import DemandPart
+from scm.traffic.demand_table import load_demand
+from scm.v2x.access import SCRIPT, Guard, guard_of, is_loopback, own_stations
+from scm.v2x.bus import Mailbox
+from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.key import check_name
+from scm.v2x.messages.presence import Presence
+from scm.v2x.router import DEFAULT_ENDPOINT, Router, free_endpoint
+from scm.vehicles.car_files import name_own_folder
+
+HOST = "127.0.0.1"
+SCM = (sys.executable, "-m", "scm")
+MOST_RECORDED = 50  # hosted cars whose own messages are recorded: more would be nearly all of it
+OPTIONAL = {
+    "eye": "no poses from overhead cameras: real cars stand, and it checks no claims",
+    "camera": "no pictures from cars' own cameras",
+    "record": "no recording: nothing to replay or to search for a mismatch",
+    "observer": "no traffic counts, no delays, no list of who breaks the rules",
+    "misbehaviour": "nobody checks what cars claim on the air",
+}
+"""Parts that a city can do without, and what is missing then."""
+LOOK_EVERY_NS = 50 * NS_PER_MS
+
+_say_now: Say = partial(print, flush=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """What city is to run.
+
+    Attributes:
+        map_name: Of a shipped map, or the path of a map file.
+        city: Chunk of all its keys on the bus.
+        hosted: How many cars the world simulates itself: n1, n2 ...
+        agents: How many cars come as processes of their own, named on from there.
+        host: Address that the dashboard is bound to.
+        port: Of the dashboard; 0 takes a free one.
+        listen: Endpoint of the router; one that ends in `:0` takes a free one.
+        record_dir: Where the recording goes; made when missing.
+        cameras_hz: How many pictures of the cars' own cameras are recorded a second, of each; 0:
+            none, and the cameras run only while somebody looks.
+        cameras_of: The cars whose cameras these are; empty: all.
+        seed: Of all randomness.
+        fleet: Fleet file of those who may enter; None: everybody on this machine.
+        state: Store of what must outlive a part's process, and this city when it is named; None: a
+            new file beside the recording.
+        keys: Store of API keys; None: everybody on this machine.
+        base: Path below which a proxy shows the dashboard.
+        origin: Where people find it, if a proxy calls it by another name.
+        trust_proxy: Proxies whose X-Forwarded-For the server believes.
+        ros2: Whether ROS 2 nodes shall see the city.
+        demand: Table of who wants to drive from where to where; None: nobody else comes.
+        without: Parts to leave out, of `OPTIONAL`.
+        radio: What the air does in the place of what the map says, `key=value` each.
+    """
+
+    map_name: str
+    city: str = "city"
+    hosted: int = 4
+    agents: int = 2
+    host: str = HOST
+    port: int = 8000
+    listen: str = DEFAULT_ENDPOINT
+    record_dir: Path = Path("runs")
+    cameras_hz: float = 0.0
+    cameras_of: tuple[str, ...] = ()
+    seed: int = 0
+    fleet: Path | None = None
+    state: str | None = None
+    keys: str | None = None
+    base: str = ""
+    origin: tuple[str, ...] = ()
+    trust_proxy: tuple[str, ...] = ()
+    ros2: bool = False
+    demand: Path | None = None
+    without: tuple[str, ...] = ()
+    radio: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Plan:
+    """What is wanted, and what was settled before anything starts.
+
+    Attributes:
+        port: One that is free.
+        agents: The names of their cars.
+        eyes: Cameras by the station that looks through each.
+        scan: How a scanned map was read; empty: it is none.
+    """
+
+    wanted: Wanted
+    guard: Guard
+    agents: tuple[str, ...]
+    port: int
+    recording: Path
+    state: str
+    eyes: Mapping[str, str]
+    scan: str
+
+
+def run_city(wanted: Wanted, say: Say = _say_now) -> int:
+    """Run a city until SIGINT or SIGTERM, `say` telling a person lines; return the exit code.
+
+    Raises:
+        ScmError: when the map, the port or the endpoint is not to be had.
+    """
+    plan = _settled(wanted)
+    name_own_folder(wanted.record_dir / "cars")
+    guard = plan.guard
+    with (
+        Router(guard.listen, guard.settings) as router,
+        ZenohBus(wanted.city, "up", guard.connect, credentials=guard.credentials("up")) as bus,
+    ):
+        say(f"scm: city {wanted.city!r} on map {wanted.map_name!r}, bus {router.listen}")
+        if plan.scan:
+            say(f"  {plan.scan}")
+        for name in wanted.without:
+            say(f"  {name:<12} left out: {OPTIONAL[name]}")
+        _watch(plan, bus, say)
+    if plan.recording.exists():
+        say(f"recorded in {plan.recording}")
+    return 0
+
+
+def _settled(wanted: Wanted) -> _Plan:
+    if wanted.keys is None and not is_loopback(wanted.host):
+        got = f"host: got {wanted.host!r} without API keys"
+        msg = f"{got}, expected 127.0.0.1, or a store of `scm key add`"
+        raise RunError(msg)
+    city_map = with_radio(load_map(wanted.map_name), wanted.radio)
+    _check_counts(wanted, len(city_map.spawns))
+    if wanted.demand is not None:
+        DemandPart(city_map, load_demand(wanted.demand))
+    for url in (wanted.state, wanted.keys):
+        if url is not None:
+            open_store(url).close()
+    port = _free_port(wanted.port)
+    _make_folder(wanted.record_dir)
+    recording = wanted.record_dir / f"{wanted.city}-{_stamp()}.mcap"
+    eyes = {
+        eye_station(camera.name, first=i == 0): camera.name
+        for i, camera in enumerate(city_map.cameras)
+    }
+    agents = tuple(f"n{wanted.hosted + i + 1}" for i in range(wanted.agents))
+    stations = own_stations(eyes, agents)
+    return _Plan(
+        wanted=wanted,
+        guard=guard_of(wanted.fleet, wanted.city, _free(wanted.listen), stations, _now()),
+        agents=agents,
+        port=port,
+        recording=recording,
+        state=wanted.state or f"sqlite:{recording.with_suffix('.db')}",
+        eyes=eyes,
+        scan=city_map.source if is_scan(wanted.map_name) else "",
+    )
+
+
+def _check_counts(wanted: Wanted, places: int) -> None:
+    """Check how many of each are wanted; `places` are the map's, to put hosted cars."""
+    if not 0 <= wanted.hosted <= places:
+        got = f"hosted: got {wanted.hosted} cars"
+        msg = f"{got}, expected 0 to {places}: so many places has map {wanted.map_name!r}"
+        raise RunError(msg)
+    if wanted.agents < 0:
+        msg = f"agents: got {wanted.agents} cars, expected 0 or more"
+        raise RunError(msg)
+    hz, cars = wanted.cameras_hz, wanted.cameras_of
+    if not 0.0 <= hz < float("inf") or (cars and not hz):
+        msg = f"cameras_hz: got {hz}, expected 0 or more, and more than 0 with --cameras-of"
+        raise RunError(msg)
+    for name in cars:
+        check_name(name, "cameras_of")
+    for name in wanted.without:
+        if name not in OPTIONAL:
+            expected = f"expected any of {', '.join(OPTIONAL)}{nearest(name, tuple(OPTIONAL))}"
+            msg = f"without: got {name!r}, {expected}; every other part is needed"
+            raise RunError(msg)
+    if hz and "record" in wanted.without:
+        msg = "without: got record with --cameras-hz, which records pictures; expected one of both"
+        raise RunError(msg)
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as cause:
+        msg = f"{folder}: {cause.strerror}; expected a folder for recordings"
+        raise RunError(msg) from cause
+
+
+def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
+    """Keep all processes of the city alive until told to stop."""
+    clock, heard = WallClock(), Mailbox(1000)
+    crew, disturbances = Crew([*_parts(plan), *_agents(plan)], clock, say), Disturbances()
+    stop = stop_on_signal()
+    for kind in HEARS:
+        bus.subscribe(kind, {}, heard)
+    is_ready, advised = False, set[str]()
+    try:
+        while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, stop):
+            crew.look()
+            for item in heard.drain():
+                disturbances.hear(item)
+                if isinstance(item.message, Presence):
+                    crew.heard(item.message)
+            disturbances.look(clock.now_ns())
+            for one in disturbances.news():
+                if is_ready:  # parts that start are late, and are not all there
+                    _say_disturbance(one, say, advised)
+            if crew.settled and not is_ready:
+                is_ready = True
+                _tell_next(plan, say)
+    finally:
+        say("stopping")
+        crew.stop()
+
+
+def _say_disturbance(one: Disturbance, say: Say, advised: set[str]) -> None:
+    """Say what began or is over; what to do is said once for each kind of it."""
+    if one.end_ns is None:
+        say(f"  {'warning':<12} {one.text}: trips meanwhile are void")
+        if one.advice and one.kind not in advised:
+            advised.add(one.kind)
+            say(f"  {'do this':<12} {one.advice}")
+    else:
+        lasted_s = seconds(one.end_ns - one.start_ns)
+        say(f"  {'over':<12} after {lasted_s:.1f} s: {one.text}")
+
+
+def _parts(plan: _Plan) -> list[Job]:
+    def scm(name: str, *more: str, station: str = "") -> Sequence[str]:
+        shared = (*_at_bus(plan, station or name), "--seed", str(plan.wanted.seed))
+        return [*SCM, name, plan.wanted.map_name, *shared, *more]
+
+    def record() -> Sequence[str]:
+        """Name another file when a recorder died: a recording is never written over."""
+        first = plan.recording
+        out = first.with_stem(f"{plan.wanted.city}-{_stamp()}") if first.exists() else first
+        sparse = ["--sparse"] if plan.wanted.hosted > MOST_RECORDED else []
+        of = (word for name in plan.wanted.cameras_of for word in ("--cameras-of", name))
+        cameras = ("--cameras-hz", str(plan.wanted.cameras_hz), *of)
+        return scm("record", "--out", str(out), *sparse, *cameras)
+
+    def part(name: str, what: str, *more: str) -> Job:
+        return Job(name, "part", what, lambda: scm(name, *more))
+
+    def eye(station: str, camera: str) -> Job:
+        command = partial(scm, "eye", "--camera", camera, *kept, station=station)
+        return Job(station, "part", f"overhead camera {camera}: tags, poses, tracks", command)
+
+    cars = f"cars, walls, sensors, radio; {plan.wanted.hosted} hosted"
+    kept = ("--state", plan.state)
+    air = [word for setting in plan.wanted.radio for word in ("--radio", setting)]
+
+    def demand(table: Path) -> Job:
+        command = [*SCM, "demand", str(table), plan.wanted.map_name, *_at_bus(plan, "demand")]
+        return Job("demand", "part", f"cars that come and go as in {table}", lambda: command)
+
+    jobs = [
+        Job(
+            "record",
+            "part",
+            f"everything on the bus into {plan.recording.parent}/",
+            record,
+            last=True,
+        ),
+        part("traffic", "signals: safe kernel, policies, plans", *kept),
+        part("monitor", "second channel: doubts the signals, latches flash", *kept),
+        part("world", cars, "--hosted", str(plan.wanted.hosted), *air, *kept),
+        *(eye(station, camera) for station, camera in plan.eyes.items()),
+        part("camera", "cars' own cameras, rendered while somebody looks"),
+        part("observer", "counts, delays, and who breaks the rules"),
+        part("misbehaviour", "doubts what cars claim on the air"),
+    ]
+    if plan.wanted.demand is not None:
+        jobs.append(demand(plan.wanted.demand))
+    if plan.wanted.ros2:
+        jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))
+    left = plan.wanted.without
+    jobs = [job for job in jobs if ("eye" if job.name in plan.eyes else job.name) not in left]
+    web = _web(plan, [job.name for job in jobs])
+    return [*jobs, part("api", "REST, event stream, dashboard", *web, *kept)]
+
+
+def _web(plan: _Plan, parts: Sequence[str]) -> Sequence[str]:
+    """Return where the server is found, who may call it, what it shows, and who should be there."""
+    wanted, own = plan.wanted, plan.guard.files.get(SCRIPT)
+    words = ["--host", wanted.host, "--port", str(plan.port), "--data", str(wanted.record_dir)]
+    words += ["--base", wanted.base] if wanted.base else []
+    words += [word for one in wanted.trust_proxy for word in ("--trust-proxy", one)]
+    words += [word for one in wanted.origin for word in ("--origin", one)]
+    words += [word for name in parts for word in ("--expects", name)]
+    words += ["--keys", wanted.keys] if wanted.keys is not None else []
+    return [*words, *(("--script-credentials", str(own)) if own is not None else ())]
+
+
+def _at_bus(plan: _Plan, station: str) -> Sequence[str]:
+    """Return how a station's program finds the bus, and what it is let in by."""
+    shared = ("--connect", plan.guard.connect, "--city", plan.wanted.city)
+    return (*shared, *plan.guard.arguments(station))
+
+
+def _agents(plan: _Plan) -> list[Job]:
+    def join(name: str) -> Sequence[str]:
+        program = (sys.executable, "-m", "vehicle_agent", "--log", "warning", "join")
+        return [*program, "--name", name, *_at_bus(plan, name)]
+
+    # After the world: it compiles the physics, and they find it compiled.
+    return [
+        Job(name, "v", "vehicle agent: a car of its own", partial(join, name), after="world")
+        for name in plan.agents
+    ]
+
+
+def _tell_next(plan: _Plan, say: Say) -> None:
+    script = f"--connect {plan.guard.connect}"
+    at = script + ("" if plan.wanted.city == "city" else f" --city {plan.wanted.city}")
+    programs = Path(sys.executable).parent
+    if programs.is_relative_to(Path.cwd()):
+        programs = programs.relative_to(Path.cwd())
+    car = f"n{plan.wanted.hosted + len(plan.agents) + 1}"
+    say(f"dashboard: http://{plan.wanted.host}:{plan.port}{plan.wanted.base.rstrip('/')}")
+    if plan.wanted.fleet is None:
+        say("try next, in another shell:")
+        say(f"  {programs}/vehicle-agent join --name {car} {at}      another car")
+        say(f"  {programs}/python examples/travel_times.py --live {script}      a fleet script")
+    else:
+        say(f"who is in {plan.wanted.fleet} may enter: --connect and --credentials say how")
+        say(f"  {programs}/vehicle-agent join --name NAME {at} --credentials FILE      a car of it")
+    say("Ctrl-C stops the city and names its recording")
+
+
+def _now() -> datetime:
+    return datetime.fromtimestamp(seconds(WallClock().now_ns()), UTC)
+
+
+def _stamp() -> str:
+    """Return the time of day for a file's name, UTC."""
+    return f"{_now():%Y%m%d-%H%M%S-%f}"
+
+
+def _free(listen: str) -> str:
+    """Return an endpoint, with a free port instead of 0."""
+    if not listen.endswith(":0"):
+        return listen
+    link = listen.partition("/")[0]
+    return free_endpoint().replace("tcp/", f"{link}/")
+
+
+def _free_port(port: int) -> int:
+    """Return a port that can be bound now.
+
+    Raises:
+        RunError: when the given one is taken.
+    """
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except (OSError, OverflowError) as cause:
+            why = getattr(cause, "strerror", "there is no such port")
+            msg = f"dashboard port {port}: {why}; expected a free one, or 0 for any"
+            raise RunError(msg) from cause
+        bound: int = probe.getsockname()[1]
+        return bound

@@ -1,0 +1,386 @@
+"""Warnings on the air: who sends a DENM how often, what ends it, and what a receiver believes.
+
+    trigger   new action id, detected now; sent at once and again every interval
+    update    same action id, later reference time, by the station that triggered it
+    cancel    the same with termination 0; then nothing of it for ever
+    negate    somebody else's event is over: its action id with termination 1
+    valid     for validity_duration from the detection; whoever sent it then falls silent
+
+A receiver takes of one action id only what has a later reference time than it knows; what has the
+same is a repetition. Nobody can undo a termination. A negation counts only of an event that the
+receiver knows. Terminations are sent until the event would have ended by itself.
+Source: EN 302 637-3 v1.3.1, 6 and 8.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from msgspec.structs import replace
+
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import MessageError
+from scm.v2x.etsi.cam_spatem import PASSENGER_CAR
+from scm.v2x.etsi.convert import heading_of, its_time, position_of, speed_of, station_id
+from scm.v2x.etsi.denm import (
+    CANCELLATION,
+    NEGATION,
+    ActionId,
+    CauseCode,
+    DenmBody,
+    DenmLocation,
+    DenmManagement,
+    DenmSituation,
+    EventPosition,
+    Trace,
+)
+from scm.v2x.etsi.parts import PROTOCOL_VERSION, Heading
+from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.vehicle_state import VehicleState
+
+ACCIDENT, STATIONARY_VEHICLE, DANGEROUS_SITUATION = 2, 94, 99
+MULTI_VEHICLE_ACCIDENT, EMERGENCY_BRAKE = 1, 1
+HARD_BRAKING_MPS2 = 2.0  # four times what drivers find comfortable; where they stop for a light 1.2
+LEAST_BRAKING_MPS = 0.05
+BRAKES_NS = 5 * NS_PER_S
+COUNTS = 65_536
+MOST_KNOWN = 4096
+STANDSTILL_MPS = 0.02
+STANDS_NS = 2 * NS_PER_S
+RENEW_NS = 15 * NS_PER_S  # half of what a stationary vehicle's warning is valid for
+HITS_NS = 10 * NS_PER_S
+WALL = "wall"
+
+Heard = Literal["new", "update", "repetition", "ended", "ignored"]
+
+
+class Event(NamedTuple):
+    """What a warning says.
+
+    Attributes:
+        cause, subcause: Of TS 102 894-2.
+        x_m, y_m: Where, map frame.
+        quality: 1 a guess to 7 certain.
+        valid_s: For how long it is true unless it is told again.
+        interval_ms: Between repetitions.
+        awareness: How far it matters, a class: 0 within 50 m of the enlarged city, 1 100 m ...
+        yaw_rad, speed_mps: Of what it is about, where it moves.
+    """
+
+    cause: int
+    x_m: float
+    y_m: float
+    subcause: int = 0
+    quality: int = 5
+    valid_s: int = 60
+    interval_ms: int = 1000
+    awareness: int = 1
+    yaw_rad: float | None = None
+    speed_mps: float | None = None
+
+
+@dataclass(slots=True)
+class _Told:
+    body: DenmBody
+    interval_ns: int
+    ends_ns: int
+    next_ns: int
+
+
+class DenmSender:
+    """The warnings of one station; ask `due` as often as the shortest interval wants."""
+
+    def __init__(self, station: str, station_type: int = PASSENGER_CAR, first: int = 0) -> None:
+        """Take the station's name and the number of its first event."""
+        self._station = station_id(station)
+        self._station_type = station_type
+        self._count = first
+        self._told: dict[ActionId, _Told] = {}
+
+    def trigger(self, event: Event, now_ns: int) -> ActionId:
+        """Begin to warn of something; return the name of the warning."""
+        action = ActionId(
+            originating_station_id=self._station, sequence_number=self._count % COUNTS
+        )
+        self._count += 1
+        self._tell(self._body(action, event, now_ns), event, now_ns)
+        return action
+
+    def update(self, action: ActionId, event: Event, now_ns: int) -> None:
+        """Say something newer of an event of one's own, which is detected anew.
+
+        Raises:
+            MessageError: when it is not known any more, or somebody else's.
+        """
+        self._own(action)
+        self._tell(self._body(action, event, now_ns), event, now_ns)
+
+    def cancel(self, action: ActionId, now_ns: int) -> None:
+        """Say that an event of one's own is over.
+
+        Raises:
+            MessageError: when it is not known any more, or somebody else's.
+        """
+        told = self._own(action)
+        self._end(told.body, CANCELLATION, told.interval_ns, told.ends_ns, now_ns)
+
+    def negate(self, heard: DenmBody, now_ns: int) -> None:
+        """Say that somebody else's event, heard as `heard`, is over."""
+        management = heard.management_container
+        interval_ns = (management.transmission_interval or 1000) * NS_PER_MS
+        self._end(heard, NEGATION, interval_ns, now_ns + _left_ns(heard, now_ns), now_ns)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether there is something to send now or later."""
+        return bool(self._told)
+
+    def due(self, now_ns: int) -> list[DenmBody]:
+        """Return what has to be sent now; it counts as sent."""
+        self._told = {name: told for name, told in self._told.items() if told.ends_ns > now_ns}
+        bodies = []
+        for told in self._told.values():
+            if told.next_ns <= now_ns:
+                told.next_ns = now_ns + told.interval_ns
+                bodies.append(told.body)
+        return bodies
+
+    def _own(self, action: ActionId) -> _Told:
+        told = self._told.get(action)
+        if told is None or told.body.management_container.termination is not None:
+            msg = f"DENM: expected an event of this station that still lasts, got {action}"
+            raise MessageError(msg)
+        return told
+
+    def _tell(self, body: DenmBody, event: Event, now_ns: int) -> None:
+        self._told[body.management_container.action_id] = _Told(
+            body, event.interval_ms * NS_PER_MS, now_ns + event.valid_s * NS_PER_S, now_ns
+        )
+
+    def _end(
+        self, body: DenmBody, termination: int, interval_ns: int, ends_ns: int, now_ns: int
+    ) -> None:
+        before = body.management_container
+        management = replace(
+            before,
+            reference_time=max(its_time(now_ns), before.reference_time + 1),
+            termination=termination,
+            station_type=self._station_type,
+        )
+        ended = DenmBody(
+            protocol_version=PROTOCOL_VERSION,
+            station_id=self._station,
+            management_container=management,
+        )
+        self._told[before.action_id] = _Told(ended, interval_ns, ends_ns, now_ns)
+
+    def _body(self, action: ActionId, event: Event, now_ns: int) -> DenmBody:
+        place = position_of(event.x_m, event.y_m)
+        known = self._told.get(action)
+        now = its_time(now_ns)
+        if known is not None:  # two updates within a millisecond
+            now = max(now, known.body.management_container.reference_time + 1)
+        return DenmBody(
+            protocol_version=PROTOCOL_VERSION,
+            station_id=self._station,
+            management_container=DenmManagement(
+                action_id=action,
+                detection_time=now,
+                reference_time=now,
+                event_position=EventPosition(latitude=place.latitude, longitude=place.longitude),
+                awareness_distance=event.awareness,
+                relevance_traffic_direction=0,
+                validity_duration=event.valid_s,
+                transmission_interval=event.interval_ms,
+                station_type=self._station_type,
+            ),
+            situation_container=DenmSituation(
+                information_quality=event.quality,
+                event_type=CauseCode(cause=event.cause, subcause=event.subcause),
+            ),
+            location_container=DenmLocation(
+                event_speed=None if event.speed_mps is None else speed_of(event.speed_mps),
+                event_position_heading=None
+                if event.yaw_rad is None
+                else Heading(value=heading_of(event.yaw_rad)),
+                detection_zones_to_event_position=(Trace(),),
+            ),
+        )
+
+
+class DenmWatch:
+    """What a receiver knows of events around it; beyond 4096 the one that ends first is lost."""
+
+    def __init__(self) -> None:
+        self._known: dict[ActionId, tuple[DenmBody, int]] = {}
+
+    def hear(self, body: DenmBody, now_ns: int) -> Heard:
+        """Take a DENM that arrived now; return what it was to this receiver."""
+        management = body.management_container
+        action, known = management.action_id, self._known.get(management.action_id)
+        left_ns = _left_ns(body, now_ns)
+        if left_ns <= 0:
+            return "ignored"
+        if known is not None:
+            before = known[0].management_container
+            if management.reference_time < before.reference_time or before.termination is not None:
+                return "ignored"
+            if management.reference_time == before.reference_time:
+                return "repetition"
+        if not _may_say(body, is_known=known is not None):
+            return "ignored"
+        self._known[action] = body, now_ns + left_ns
+        self._forget(now_ns)
+        if management.termination is not None:
+            return "ended"
+        return "new" if known is None else "update"
+
+    def events(self, now_ns: int) -> tuple[DenmBody, ...]:
+        """Return the events that last, in the order in which they were first heard."""
+        self._forget(now_ns)
+        return tuple(
+            body
+            for body, _ in self._known.values()
+            if body.management_container.termination is None
+        )
+
+    def _forget(self, now_ns: int) -> None:
+        self._known = {name: one for name, one in self._known.items() if one[1] > now_ns}
+        if len(self._known) > MOST_KNOWN:
+            del self._known[min(self._known, key=lambda name: self._known[name][1])]
+
+
+def _may_say(body: DenmBody, *, is_known: bool) -> bool:
+    """Return whether a station may say this: its own events, or that another's is over."""
+    management = body.management_container
+    if management.termination == NEGATION:
+        return is_known and body.station_id != management.action_id.originating_station_id
+    return body.station_id == management.action_id.originating_station_id
+
+
+def _left_ns(body: DenmBody, now_ns: int) -> int:
+    """Return for how long a DENM that is heard now is still valid [ns]."""
+    management = body.management_container
+    age_ns = (its_time(now_ns) - management.detection_time) * NS_PER_MS
+    return management.validity_duration * NS_PER_S - age_ns
+
+
+def accident(contact: Contact, state: VehicleState) -> Event:
+    """Return what a car warns of that was hit: an accident where it stands."""
+    others = [name for name in contact.against if name != WALL]
+    return Event(
+        cause=ACCIDENT,
+        subcause=MULTI_VEHICLE_ACCIDENT if others else 0,
+        x_m=state.x_m,
+        y_m=state.y_m,
+        yaw_rad=state.yaw_rad,
+        speed_mps=state.speed_mps,
+        quality=7,
+    )
+
+
+def stationary(state: VehicleState) -> Event:
+    """Return what a car warns of that stands though it should drive."""
+    return Event(
+        cause=STATIONARY_VEHICLE,
+        x_m=state.x_m,
+        y_m=state.y_m,
+        yaw_rad=state.yaw_rad,
+        speed_mps=0.0,
+        valid_s=30,
+    )
+
+
+def hard_braking(state: VehicleState) -> Event:
+    """Return what a car warns of that brakes as hard as nobody does without need."""
+    return Event(
+        cause=DANGEROUS_SITUATION,
+        subcause=EMERGENCY_BRAKE,
+        x_m=state.x_m,
+        y_m=state.y_m,
+        yaw_rad=state.yaw_rad,
+        speed_mps=state.speed_mps,
+        valid_s=2,
+        interval_ms=100,
+        awareness=1,
+    )
+
+
+def city_stop(x_m: float, y_m: float) -> Event:
+    """Return what a roadside station at a place warns of while the whole city is stopped."""
+    return Event(cause=DANGEROUS_SITUATION, x_m=x_m, y_m=y_m, awareness=4, quality=7)
+
+
+class CarWarnings:
+    """When a car warns: of a hit or of hard braking at once, and while it stands and should not.
+
+    It should not stand when its guard holds or stops it (`mode`), unless whoever asks knows better;
+    waiting at a red light is no event.
+    """
+
+    def __init__(self, vehicle: str) -> None:
+        self._sender = DenmSender(vehicle)
+        self._hit_ns: int | None = None
+        self._braked_ns: int | None = None
+        self._since_ns: int | None = None
+        self._stands: tuple[ActionId, int] | None = None
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether it warns of something, or is about to: it must be asked again."""
+        return self._sender.is_busy or self._since_ns is not None
+
+    def step(
+        self,
+        state: VehicleState,
+        contacts: tuple[Contact, ...] = (),
+        *,
+        is_stranded: bool | None = None,
+        has_braked: bool | None = None,
+    ) -> list[DenmBody]:
+        """Return the DENMs that go out now; ask at every report of the car.
+
+        Args:
+            state: Of the car now.
+            contacts: What hit it since the last time.
+            is_stranded: Whether it stands where it should not; None: as its guard's mode says.
+            has_braked: Whether it has braked hard since the last time; None: as `state` says, which
+                a small car outruns: it stands within a tenth of a second.
+        """
+        now_ns = state.t_ns
+        for contact in contacts:
+            if contact.against and (self._hit_ns is None or now_ns - self._hit_ns >= HITS_NS):
+                self._sender.trigger(accident(contact, state), now_ns)
+                self._hit_ns = now_ns
+        if has_braked is None:
+            is_moving = state.speed_mps > LEAST_BRAKING_MPS
+            has_braked = is_moving and state.accel_mps2 <= -HARD_BRAKING_MPS2
+        if has_braked and not contacts:
+            self._brake(state)
+        if is_stranded is None:
+            is_stranded = state.mode in ("hold", "stop") and abs(state.speed_mps) < STANDSTILL_MPS
+        self._stand(state, is_stranded=is_stranded)
+        return self._sender.due(now_ns)
+
+    def _brake(self, state: VehicleState) -> None:
+        hit_ns, braked_ns = self._hit_ns, self._braked_ns
+        was_hit = hit_ns is not None and state.t_ns - hit_ns < BRAKES_NS
+        has_told = braked_ns is not None and state.t_ns - braked_ns < BRAKES_NS
+        if not was_hit and not has_told:
+            self._sender.trigger(hard_braking(state), state.t_ns)
+            self._braked_ns = state.t_ns
+
+    def _stand(self, state: VehicleState, *, is_stranded: bool) -> None:
+        now_ns = state.t_ns
+        if not is_stranded:
+            self._since_ns = None
+            if self._stands is not None:
+                self._sender.cancel(self._stands[0], now_ns)
+                self._stands = None
+            return
+        if self._since_ns is None:
+            self._since_ns = now_ns
+        if self._stands is None and now_ns - self._since_ns >= STANDS_NS:
+            self._stands = self._sender.trigger(stationary(state), now_ns), now_ns
+        elif self._stands is not None and now_ns - self._stands[1] >= RENEW_NS:
+            self._sender.update(self._stands[0], stationary(state), now_ns)
+            self._stands = self._stands[0], now_ns

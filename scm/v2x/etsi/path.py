@@ -1,0 +1,107 @@
+"""What changes slowly in a car's CAMs: role, lights and path, in one CAM every 500 ms at most.
+
+The path is where earlier such CAMs were sent, at least 4 m of the enlarged city apart and not more
+than 200 m back. Source: EN 302 637-2 v1.4.1, 6.1.3 and annex B.
+"""
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+from scm.clock import NS_PER_MS
+from scm.v2x.etsi.cam_spatem import (
+    SCALE,
+    ExteriorLights,
+    LowFrequencyContainer,
+    VehicleLowFrequency,
+)
+from scm.v2x.etsi.convert import latitude_of, longitude_of
+from scm.v2x.etsi.parts import NO_DELTA, DeltaPosition, PathPoint
+from scm.v2x.messages.vehicle_state import VehicleState
+
+EVERY_NS = 500 * NS_PER_MS
+MOST_POINTS = 23
+APART_M, FARTHEST_M = 4.0 / SCALE, 200.0 / SCALE
+_TIME_STEP_NS = 10 * NS_PER_MS
+_MOST_TIME = 65_535
+
+ROLE_NUMBERS = {"default": 0, "publicTransport": 1, "emergency": 6, "safetyCar": 7, "taxi": 12}
+"""VehicleRole by name, those that cars of a city may have."""
+
+
+class _At(NamedTuple):
+    x_m: float
+    y_m: float
+    t_ns: int
+
+
+class SlowNews:
+    """The low-frequency container of one car."""
+
+    def __init__(self, role: str = "default") -> None:
+        """Take the car's role, one of `ROLE_NUMBERS`."""
+        self._role = ROLE_NUMBERS[role]
+        self._path: deque[_At] = deque(maxlen=MOST_POINTS)
+        self._sent_ns: int | None = None
+
+    def due(self, state: VehicleState, front_m: float) -> LowFrequencyContainer | None:
+        """Return what a CAM that goes out now should hold; None: not yet again.
+
+        Args:
+            state: The car's, at the CAM's time.
+            front_m: From its rear axle to its front bumper.
+        """
+        if self._sent_ns is not None and state.t_ns - self._sent_ns < EVERY_NS:
+            return None
+        self._sent_ns = state.t_ns
+        here = _At(
+            state.x_m + front_m * math.cos(state.yaw_rad),
+            state.y_m + front_m * math.sin(state.yaw_rad),
+            state.t_ns,
+        )
+        content = VehicleLowFrequency(
+            vehicle_role=self._role,
+            exterior_lights=lights_of(state),
+            path_history=self._history(here),
+        )
+        if not self._path or math.dist(self._path[0][:2], here[:2]) >= APART_M:
+            self._path.appendleft(here)
+        return LowFrequencyContainer(basic_vehicle_container_low_frequency=content)
+
+    def _history(self, here: _At) -> tuple[PathPoint, ...]:
+        points, length_m = [], 0.0
+        for before in self._path:
+            length_m += math.dist(before[:2], here[:2])
+            if length_m > FARTHEST_M:
+                break
+            points.append(_point(before, here))
+            here = before
+        return tuple(points)
+
+
+def _point(before: _At, here: _At) -> PathPoint:
+    steps = (here.t_ns - before.t_ns) // _TIME_STEP_NS
+    return PathPoint(
+        path_position=DeltaPosition(
+            delta_latitude=_delta(latitude_of(before.y_m) - latitude_of(here.y_m)),
+            delta_longitude=_delta(longitude_of(before.x_m) - longitude_of(here.x_m)),
+        ),
+        path_delta_time=max(1, min(_MOST_TIME, steps)),
+    )
+
+
+def _delta(value: int) -> int:
+    return value if abs(value) < NO_DELTA else NO_DELTA
+
+
+def lights_of(state: VehicleState) -> ExteriorLights:
+    """Return which of a car's lights are on; both indicators are the hazard lights."""
+    on = state.lights
+    return ExteriorLights(
+        low_beam_headlights_on="head_low" in on,
+        high_beam_headlights_on="head_high" in on,
+        left_turn_signal_on="left" in on,
+        right_turn_signal_on="right" in on,
+        reverse_light_on="reverse" in on,
+        parking_lights_on="tail" in on and "head_low" not in on,
+    )

@@ -1,0 +1,223 @@
+"""Between a wish for priority at a junction and the records on the air: SREM there, SSEM back.
+
+Lanes are numbered as in the junction's MAPEM (`scm.v2x.etsi.topology`). Times are minute of the
+year and millisecond of the minute, UTC; they are read as those nearest to the receiver's clock.
+"""
+
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Literal, NamedTuple
+
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.maps.model import Junction
+from scm.v2x.etsi.cam_spatem import SCALE
+from scm.v2x.etsi.codes import number_of, scaled
+from scm.v2x.etsi.convert import moment_of, position_of, roadside_station, station_id
+from scm.v2x.etsi.mapem import MOST_VELOCITY, Position3d
+from scm.v2x.etsi.parts import PROTOCOL_VERSION, IntersectionId
+from scm.v2x.etsi.priority import (
+    CANCEL,
+    REQUEST,
+    ROLES,
+    STATUSES,
+    UPDATE,
+    AccessPoint,
+    Requester,
+    Requestor,
+    RequestorPosition,
+    RequestorType,
+    RequestPackage,
+    SignalRequestRecord,
+    SignalStatusPackage,
+    SignalStatusRecord,
+    SremBody,
+    SsemBody,
+    TransmissionAndSpeed,
+)
+from scm.v2x.messages.vehicle_state import VehicleState
+
+COUNTS = 128
+Verb = Literal["request", "update", "cancel"]
+
+_TYPES: dict[Verb, int] = {"request": REQUEST, "update": UPDATE, "cancel": CANCEL}
+_VERBS: dict[int, Verb] = {number: verb for verb, number in _TYPES.items()}
+_MOST_LASTS_MS = 60_999
+_FORWARD, _REVERSE = 2, 3
+NO_LANE = 0
+_STANDSTILL_MPS = 0.02
+
+
+class Wish(NamedTuple):
+    """A wish for priority.
+
+    Attributes:
+        station_id: Of the car, as in its CAMs.
+        number: The car's own number of this wish, 0 to 255; an update or a cancellation keeps it.
+        junction: The junction's number.
+        lane_in, lane_out: Numbers of MAPEM; None: not told.
+        role: One of `ROLES`.
+        arrives_ns: When the car expects to be at the stop line; None: not told.
+        lasts_s: For how long after that; None: not told.
+        sequence: Counts the car's SREMs.
+    """
+
+    station_id: int
+    number: int
+    junction: int
+    lane_in: int | None
+    verb: Verb = "request"
+    role: str = "basicVehicle"
+    lane_out: int | None = None
+    arrives_ns: int | None = None
+    lasts_s: float | None = None
+    sequence: int = 0
+
+
+class Answered(NamedTuple):
+    """What becomes of a wish: one of `STATUSES`."""
+
+    wish: Wish
+    status: str
+
+
+def srem_of(wish: Wish, state: VehicleState) -> SremBody:
+    """Return the SREM by which a car asks; the car of the state is the wish's.
+
+    Raises:
+        KeyError: for a verb that there is not.
+        ValueError: for a role that there is not.
+    """
+    minute, millisecond = moment_of(state.t_ns)
+    arrives = None if wish.arrives_ns is None else moment_of(wish.arrives_ns)
+    package = RequestPackage(
+        request=SignalRequestRecord(
+            id=IntersectionId(id=wish.junction),
+            request_id=wish.number,
+            request_type=_TYPES[wish.verb],
+            inbound_lane=AccessPoint(lane=wish.lane_in or NO_LANE),
+            outbound_lane=AccessPoint(lane=wish.lane_out) if wish.lane_out else None,
+        ),
+        minute=None if arrives is None else arrives[0],
+        second=None if arrives is None else arrives[1],
+        duration=None
+        if wish.lasts_s is None
+        else max(0, min(_MOST_LASTS_MS, round(wish.lasts_s * 1e3))),
+    )
+    return SremBody(
+        protocol_version=PROTOCOL_VERSION,
+        station_id=station_id(state.vehicle),
+        timestamp=minute,
+        second=millisecond,
+        sequence_number=wish.sequence % COUNTS,
+        requests=(package,),
+        requestor=_requestor(wish, state),
+    )
+
+
+def _requestor(wish: Wish, state: VehicleState) -> Requestor:
+    place = position_of(state.x_m, state.y_m)
+    speed = min(MOST_VELOCITY, round(abs(state.speed_mps) * SCALE / 0.02))
+    return Requestor(
+        id=wish.station_id,
+        type=RequestorType(role=ROLES.index(wish.role)),
+        position=RequestorPosition(
+            position=Position3d(latitude=place.latitude, longitude=place.longitude),
+            heading=round((90.0 - math.degrees(state.yaw_rad)) * 80.0) % 28_800,
+            speed=TransmissionAndSpeed(
+                transmission=_REVERSE if state.speed_mps < -_STANDSTILL_MPS else _FORWARD,
+                speed=speed,
+            ),
+        ),
+        name=state.vehicle,
+    )
+
+
+def wishes_of(body: SremBody, near_ns: int) -> tuple[Wish, ...]:
+    """Return the wishes of an SREM that arrived about `near_ns`; reserved types are left out."""
+    kind = body.requestor.type
+    return tuple(
+        Wish(
+            station_id=body.requestor.id,
+            number=package.request.request_id,
+            junction=package.request.id.id,
+            lane_in=number_of(package.request.inbound_lane, "lane"),
+            verb=_VERBS[package.request.request_type],
+            role=ROLES[0 if kind is None else kind.role],
+            lane_out=None
+            if package.request.outbound_lane is None
+            else number_of(package.request.outbound_lane, "lane"),
+            arrives_ns=_moment_ns(
+                number_of(package, "minute"), number_of(package, "second"), near_ns
+            ),
+            lasts_s=scaled(package, "duration", 1e-3),
+            sequence=body.sequence_number or 0,
+        )
+        for package in body.requests or ()
+        if package.request.request_type in _VERBS
+    )
+
+
+def _moment_ns(minute: int | None, second: int | None, near_ns: int) -> int | None:
+    """Return the time nearest to `near_ns` that has this minute of the year."""
+    if minute is None or second is None:
+        return None
+    year = datetime.fromtimestamp(near_ns // NS_PER_S, UTC).year
+    starts = (datetime(y, 1, 1, tzinfo=UTC).timestamp() for y in (year - 1, year, year + 1))
+    times = [
+        round(start) * NS_PER_S + minute * 60 * NS_PER_S + second * NS_PER_MS for start in starts
+    ]
+    return min(times, key=lambda t_ns: abs(t_ns - near_ns))
+
+
+def ssem_of(junction: Junction, answers: Sequence[Answered], sequence: int, t_ns: int) -> SsemBody:
+    """Return the SSEM by which a junction's roadside station tells what becomes of wishes.
+
+    Args:
+        junction: Whose lights they are.
+        answers: One or more, the first 32 are told.
+        sequence: Counts changes of the answers.
+        t_ns: When it is sent.
+    """
+    minute, millisecond = moment_of(t_ns)
+    status = SignalStatusRecord(
+        sequence_number=sequence % COUNTS,
+        id=IntersectionId(id=junction.number),
+        sig_status=tuple(_package(answer) for answer in answers[:32]),
+    )
+    return SsemBody(
+        protocol_version=PROTOCOL_VERSION,
+        station_id=station_id(roadside_station(junction.name)),
+        timestamp=minute,
+        second=millisecond,
+        sequence_number=sequence % COUNTS,
+        status=(status,),
+    )
+
+
+def _package(answer: Answered) -> SignalStatusPackage:
+    wish = answer.wish
+    arrives = None if wish.arrives_ns is None else moment_of(wish.arrives_ns)
+    return SignalStatusPackage(
+        requester=Requester(
+            id=wish.station_id,
+            request=wish.number,
+            sequence_number=wish.sequence % COUNTS,
+            role=ROLES.index(wish.role),
+        ),
+        inbound_on=AccessPoint(lane=wish.lane_in or NO_LANE),
+        outbound_on=AccessPoint(lane=wish.lane_out) if wish.lane_out else None,
+        minute=None if arrives is None else arrives[0],
+        second=None if arrives is None else arrives[1],
+        status=STATUSES.index(answer.status),
+    )
+
+
+def answers_of(body: SsemBody, station: int) -> dict[tuple[int, int], str]:
+    """Return what an SSEM says to one station: (junction's number, wish's number) to its status."""
+    return {
+        (record.id.id, package.requester.request): STATUSES[package.status]
+        for record in body.status
+        for package in record.sig_status
+        if package.requester is not None and package.requester.id == station
+    }

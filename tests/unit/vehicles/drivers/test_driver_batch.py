@@ -1,0 +1,321 @@
+"""Many drivers at once: the same decisions as alone, and streets that stay safe and moving."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.geometry import Pose2
+from scm.maps.grid_city import grid_city
+from scm.maps.load import load_map
+from scm.maps.model import RadioChannel
+from scm.maps.route import Roads
+from scm.traffic.part import TrafficPart
+from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.spatem_tx import SpatemTx
+from scm.vehicles.driver import CarLimits
+from scm.vehicles.drivers.channel import channel_of, has_arrived
+from scm.vehicles.drivers.driver_batch import Crowd
+from scm.vehicles.drivers.memory import WAITING_FOR
+from scm.vehicles.drivers.stations import known_to
+from scm.vehicles.drivers.streets import Streets
+from scm.vehicles.jit import plain
+
+NIGEL = CarLimits(
+    wheelbase=0.14154, steer_limit=0.5235988, steer_rate=0.42, front=0.23, rear=0.07, width=0.175,
+    speeds=(0.02867, 0.05685, 0.08457, 0.11185, 0.13871, 0.16516, 0.19122, 0.21688, 0.24215,
+            0.26703),
+)  # fmt: skip
+TICK_NS = 20 * NS_PER_MS
+
+
+@pytest.fixture(scope="module")
+def grid():
+    return Roads(grid_city(3, 3))
+
+
+@pytest.fixture(scope="module")
+def eight():
+    return Roads(load_map("driving_school"))
+
+
+class City:
+    """Bicycles with slow servos on a map, driven by a crowd; everybody tells all at each tick."""
+
+    def __init__(self, roads, places, seeds=None, **options):
+        n = len(places)
+        self.roads = roads
+        self.crowd = Crowd(Streets(roads), n, **options)
+        self.traffic = TrafficPart(roads.city_map)
+        self.x, self.y, self.yaw, self.speed, self.angle = np.zeros((5, n))
+        self.driven = np.ones(n, np.bool_)
+        self.now_ns = 0
+        self.colours = {}
+        for slot, (lane, s) in enumerate(places):
+            self.x[slot], self.y[slot], self.yaw[slot] = roads.lane(lane).at(s)
+            self.crowd.enter(slot, NIGEL, seeds[slot] if seeds else slot)
+            self.crowd.circulate(slot, lane, s)
+
+    def tell(self):
+        if self.now_ns % (100 * NS_PER_MS) == 0:
+            for message in self.traffic.step(self.now_ns, []):
+                if isinstance(message, SpatemTx):
+                    self.crowd.hear_spatem(message.body, self.now_ns)
+                elif isinstance(message, Spat):
+                    for group in message.groups:
+                        self.colours[message.junction, group.group] = group.colour
+        ahead = NIGEL.front * np.cos(self.yaw), NIGEL.front * np.sin(self.yaw)
+        rate = self.speed * np.tan(self.angle) / NIGEL.wheelbase
+        slots = np.arange(len(self.x))
+        told = self.x + ahead[0], self.y + ahead[1], self.yaw, self.speed, rate
+        self.crowd.hear(slots, self.now_ns, *told)
+
+    def decide(self):
+        self.crowd.decide(self.now_ns, self.x, self.y, self.yaw, self.speed, self.driven)
+
+    def tick(self):
+        self.tell()
+        self.decide()
+        most = NIGEL.steer_rate * 0.01
+        wanted = np.interp(self.crowd.throttle, np.linspace(0, 1, 11), (0.0, *NIGEL.speeds))
+        for _ in range(2):
+            turn = self.crowd.steering * NIGEL.steer_limit - self.angle
+            self.angle += np.clip(turn, -most, most)
+            self.speed += (wanted - self.speed) * 0.15
+            self.x += self.speed * np.cos(self.yaw) * 0.01
+            self.y += self.speed * np.sin(self.yaw) * 0.01
+            self.yaw += self.speed * np.tan(self.angle) / NIGEL.wheelbase * 0.95 * 0.01
+        self.now_ns += TICK_NS
+
+
+def on_streets(roads, count, seed=0):
+    """Return places for cars, by lot, on the streets of a grid city."""
+    spawns = roads.city_map.spawns
+    lot = np.random.default_rng(seed).choice(len(spawns), count, replace=False)
+    return [(spawns[k].lane, spawns[k].at_m) for k in lot]
+
+
+def touching(city):
+    """Return the pairs of cars whose outlines overlap."""
+    middles = np.column_stack([city.x + 0.08 * np.cos(city.yaw), city.y + 0.08 * np.sin(city.yaw)])
+    pairs = []
+    for a, b in itertools.combinations(range(len(city.x)), 2):
+        if math.dist(middles[a], middles[b]) < 0.36 and not (
+            apart(city.yaw, middles, a, b) or apart(city.yaw, middles, b, a)
+        ):
+            pairs.append((a, b))
+    return pairs
+
+
+def apart(yaw, middles, a, b):
+    seen = Pose2(*middles[a], yaw[a]).inverse().apply(*middles[b])
+    cos, sin = abs(math.cos(yaw[b] - yaw[a])), abs(math.sin(yaw[b] - yaw[a]))
+    along, across = 0.15 + 0.15 * cos + 0.0875 * sin, 0.0875 + 0.15 * sin + 0.0875 * cos
+    return abs(seen[0]) > along or abs(seen[1]) > across
+
+
+def test_dense_traffic_flows_without_touching_running_red_or_blocking_a_junction(grid):
+    city = City(grid, on_streets(grid, 60))
+    lines = {line.lane: line for line in grid.city_map.stop_lines}
+    inside = {m.lane for j in grid.city_map.junctions for g in j.groups for m in g.movements}
+    names, crowd = city.crowd.streets.names, city.crowd
+    passed, began, driven = 0, {}, np.zeros(60)
+    for tick in range(6000):
+        before = [(names[crowd.lane[k]], crowd.s[k] + NIGEL.front) for k in range(60)]
+        city.tick()
+        driven += city.speed * 0.02
+        for slot, (lane, front) in enumerate(before):
+            line = lines.get(lane)
+            now = names[crowd.lane[slot]]
+            if line and now == lane and front <= line.at_m < crowd.s[slot] + NIGEL.front:
+                passed += 1
+                assert city.colours[line.junction, line.group] in ("green", "yellow")
+            began[slot] = tick if now not in inside else began.get(slot, tick)
+            assert tick - began[slot] < 1000, f"car {slot} has been in a junction for 20 s"
+        if tick % 25 == 0:
+            assert touching(city) == []
+        if tick > 250:
+            assert np.abs(crowd.cross_track).max() < 0.007
+    assert passed > 60
+    assert driven.min() > 0.8  # all junctions share the longest cycle of them, for a green wave
+
+
+def test_every_car_of_a_crowd_decides_as_it_would_alone(eight):
+    places = [("east_loop", 0.3), ("west_loop", 1.1), ("crossing_south_east", 0.1)]
+    together = City(eight, places)
+    alone = [City(eight, [place], [slot]) for slot, place in enumerate(places)]
+    for _ in range(100):
+        together.tick()
+        for slot, one in enumerate(alone):
+            one.tick()
+            assert one.crowd.throttle[0] == together.crowd.throttle[slot]
+            assert one.crowd.steering[0] == together.crowd.steering[slot]
+
+
+def test_how_many_threads_work_changes_nothing(grid, monkeypatch):
+    monkeypatch.setattr("scm.vehicles.drivers.driver_batch.WORTH_THREADS", 2)
+    one, two = (City(grid, on_streets(grid, 40)) for _ in range(2))
+    two.crowd.threads = 2
+    for _ in range(200):
+        one.tick()
+        two.tick()
+    assert np.array_equal(one.crowd.throttle, two.crowd.throttle)
+    assert np.array_equal(one.x, two.x)
+
+
+def test_where_a_car_turns_depends_on_its_own_seed_alone(grid):
+    lane = grid.city_map.spawns[0].lane
+    crowd = Crowd(Streets(grid), 3)
+    for slot, seed in enumerate((7, 8, 7)):
+        crowd.enter(slot, NIGEL, seed)
+        crowd.circulate(slot, lane, 0.2)
+    assert crowd.in_sight(0) == crowd.in_sight(2)
+    assert crowd.in_sight(0) != crowd.in_sight(1)
+
+
+def test_all_ways_behind_a_junction_are_taken(grid):
+    spawn = next(
+        s for s in grid.city_map.spawns if len(grid.successors(grid.successors(s.lane)[0]))
+    )
+    crowd = Crowd(Streets(grid), 1)
+    taken = set()
+    for seed in range(40):
+        crowd.enter(0, NIGEL, seed)
+        crowd.circulate(0, spawn.lane, 0.2)
+        taken.add(crowd.in_sight(0)[1])
+    assert taken == set(grid.successors(spawn.lane))
+
+
+def test_a_car_that_nobody_drives_keeps_its_commands(eight):
+    city = City(eight, [("east_loop", 0.3)])
+    city.tick()
+    before = float(city.crowd.throttle[0])
+    city.driven[:] = False
+    city.decide()
+    assert city.crowd.throttle[0] == before > 0.0
+
+
+def test_a_halted_car_is_not_driven_before_it_is_sent_again(eight):
+    city = City(eight, [("east_loop", 0.3)])
+    city.crowd.halt(0)
+    city.tick()
+    assert city.crowd.throttle[0] == 0.0
+    city.crowd.circulate(0, "east_loop", 0.3)
+    city.tick()
+    assert city.crowd.throttle[0] > 0.0
+
+
+def test_a_car_behind_another_stops_and_says_why(eight):
+    city = City(eight, [("east_loop", 0.3), ("east_loop", 1.2)])
+    city.driven[1] = False
+    for _ in range(400):
+        city.tick()
+    gap = 1.2 - NIGEL.rear - (city.crowd.s[0] + NIGEL.front)
+    assert 0.05 < gap < 0.15
+    assert WAITING_FOR[city.crowd.waiting[0]] == "vehicle"
+
+
+def test_a_car_that_left_is_seen_by_nobody(eight):
+    city = City(eight, [("east_loop", 0.3), ("east_loop", 1.0)])
+    city.driven[1] = False
+    city.crowd.leave(1)
+    for _ in range(300):
+        city.tick()
+    assert city.crowd.done_m[0] > 1.0
+
+
+@pytest.mark.parametrize(("queue", "enters"), [(7, False), (3, True)])
+def test_nobody_enters_a_junction_whose_exit_is_full_even_if_all_roll_there(grid, queue, enters):
+    """A street full of cars that say they roll leaves no place once they have to stop."""
+    line = next(line for line in grid.city_map.stop_lines if line.lane == "j0_1_e")
+    way, street = "j1_1_ee", "j1_1_e"
+    assert grid.stop_lines_on(street)
+    places = [(line.lane, line.at_m - 0.8), *((street, 0.5 + 0.37 * k) for k in range(queue))]
+    city = City(grid, places)
+    city.crowd.send(0, (line.lane, way, street), line.at_m - 0.8)
+    city.driven[1:] = False
+    x, y, was_green = city.x[1:].copy(), city.y[1:].copy(), 0
+    for _ in range(3500):
+        city.x[1:], city.y[1:], city.speed[1:] = x, y, 0.2
+        city.tick()
+        was_green += city.colours[line.junction, line.group] == "green"
+    assert was_green > 100
+    assert bool(city.crowd.passed[0] > 0) is enters
+
+
+def test_with_all_frames_lost_nobody_is_seen(eight):
+    city = City(eight, [("east_loop", 0.3), ("east_loop", 1.2)], radio=RadioChannel(loss=1.0))
+    city.driven[1] = False
+    for _ in range(300):
+        city.tick()
+    assert city.crowd.s[0] + NIGEL.front > 1.2
+
+
+def test_with_some_frames_lost_cars_still_keep_apart(eight):
+    city = City(eight, [("east_loop", 0.3), ("east_loop", 1.2)], radio=RadioChannel(loss=0.3))
+    city.driven[1] = False
+    for _ in range(400):
+        city.tick()
+    assert touching(city) == []
+
+
+def reached(loss, seed, sender, receiver, frame):
+    air = channel_of(RadioChannel(loss=loss), 20.0, 1 + receiver, np.zeros((0, 4)))
+    return has_arrived(air, seed, sender, receiver, frame, 0.0, 0.0, 0)
+
+
+def test_luck_takes_its_share_of_frames_evenly():
+    frames = itertools.product(range(20), range(20), range(50))
+    got = [reached(0.3, 5, sender, receiver, n) for sender, receiver, n in frames]
+    assert np.mean(got) == pytest.approx(0.7, abs=0.01)
+
+
+def test_luck_depends_on_sender_receiver_and_frame():
+    def luck(seed=1, sender=2, receiver=3):
+        return [reached(0.5, seed, sender, receiver, n) for n in range(64)]
+
+    assert luck() == luck()
+    assert luck() != luck(seed=9)
+    assert luck() != luck(sender=9)
+    assert luck() != luck(receiver=9)
+
+
+def test_routes_sent_again_and_again_take_no_more_room(eight):
+    crowd = Crowd(Streets(eight), 2)
+    for slot in range(2):
+        crowd.enter(slot, NIGEL)
+    crowd.send(1, ("east_loop", "crossing_south_west"), 0.5)
+    for _ in range(2000):
+        crowd.send(0, ("west_loop", "crossing_south_east", "east_loop"), 0.1)
+    assert crowd.in_sight(1) == ("east_loop", "crossing_south_west")
+    assert crowd.in_sight(0) == ("west_loop", "crossing_south_east", "east_loop")
+    assert len(crowd._memory.routes) < 200
+
+
+def test_a_silent_car_is_forgotten(eight):
+    city = City(eight, [("east_loop", 0.3), ("east_loop", 1.0)])
+    city.driven[1] = False
+    city.tell()
+    city.now_ns += 4 * NS_PER_S
+    city.decide()
+    assert city.crowd.throttle[0] > 0.0
+
+
+def test_where_frames_get_lost_a_silent_car_is_believed_to_stand_where_it_stood(grid):
+    now_ns = 10 * NS_PER_S
+    for air, after_s, is_known in (
+        (RadioChannel(loss=0.3), 3.5, True),
+        (RadioChannel(loss=0.3), 17.0, False),
+    ):
+        crowd = Crowd(Streets(grid), 2, radio=air)
+        crowd.enter(0, NIGEL, 0)
+        crowd.show(1, 0.3, 0.175)
+        for frame in range(16):
+            told = np.array([[1.0], [1.0], [0.0], [0.0], [0.0]])
+            crowd.hear(np.array([1]), now_ns + frame * NS_PER_MS, *told)
+        told_ns = now_ns + round(after_s * NS_PER_S)
+        known, x, *_ = plain(known_to)(crowd._heard, 1, 0, told_ns, 0)
+        assert known == is_known
+        assert x == (pytest.approx(0.85) if is_known else 0.0)
