@@ -74,7 +74,7 @@ class MisbehaviourPart:
                     message.t_ns,
                     message.body,
                     message.lost_ns,
-                    Sender(message.car, message.by_hand, message.stopped),
+                    Sender(message.car, message.by_hand, message.stopped, message.touches),
                 )
                 if found is not None and found.is_reported:
                     outbox += self._tell(found, now_ns)

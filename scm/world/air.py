@@ -10,7 +10,7 @@ from dataclasses import fields
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.clock import NS_PER_MS
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.etsi.convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, cam_of, read_cam
 from scm.v2x.messages.cam_rx import CamRx
@@ -47,6 +47,8 @@ RECEIVED: dict[type[Frame], type[Heard]] = {
     SsemTx: SsemRx,
 }
 """All that the air carries: as sent, and as heard."""
+TOUCHES_NS = NS_PER_S // 2
+"""For how long a car that was pushed counts as touching: some CAMs long."""
 OF_ROADSIDE = (MapemTx, SpatemTx, SsemTx)
 """What nobody else may say."""
 
@@ -200,7 +202,7 @@ def _deliver(
         if also_sent:
             world.outbox.append(frame)
         for i in np.flatnonzero(reached[row]).tolist():
-            heard = _received(world, receivers.names[i], frame)
+            heard = _received(world, receivers.names[i], frame, now_ns)
             delay_ns = next(delays)
             if delay_ns:
                 world.late.put(now_ns + delay_ns, heard)
@@ -222,7 +224,7 @@ def _cam(world: World, state: VehicleState, now_ns: int) -> CamTx:
     return CamTx(station=state.vehicle, t_ns=now_ns, body=body)
 
 
-def _received(world: World, receiver: str, frame: Frame) -> Heard:
+def _received(world: World, receiver: str, frame: Frame, now_ns: int) -> Heard:
     if isinstance(frame, CamTx):
         car = world.car(frame.station)
         return CamRx(
@@ -230,6 +232,7 @@ def _received(world: World, receiver: str, frame: Frame) -> Heard:
             signed=frame.signed, lost_ns=world.lost_ns(frame.station),
             car="" if car is None else car.car_file,
             by_hand=car is not None and not car.lease.is_at_home, stopped=world.stop.engaged,
+            touches=now_ns - world.touched_ns.get(frame.station, -TOUCHES_NS) < TOUCHES_NS,
         )  # fmt: skip
     kind = RECEIVED[type(frame)]
     return kind(receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body)  # type: ignore[arg-type]

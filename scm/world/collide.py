@@ -67,6 +67,8 @@ def _tell(world: World, slots: Ints, touches: Touches, t_ns: int) -> None:
             _push(world, fleet, rows[struck], touches, begin + struck)
         begin += len(rows)
     against = _Against(world, slots, touches.pairs)
+    for row in np.flatnonzero(changed).tolist():
+        world.touched_ns[against.name(row)] = t_ns
     for row in np.flatnonzero(changed[:begin]).tolist() if world.wishes.any(Contact) else ():
         world.blows.add(against.name(row), touches.dv[row], against.of(row))
     for row, car in enumerate(world.remote.values(), start=begin):

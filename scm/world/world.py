@@ -105,6 +105,7 @@ class World:
         outbox: What the tick under way sends.
         ignored: Messages that fitted nothing: unknown cars, commands without the lease.
         last_hit_ns: When a car's contact was last told.
+        touched_ns: When anything last pushed a car.
         dangers: What is known of warnings on the air.
         batteries: Which of them were told to be low.
         stuck: Which cars push in vain.
@@ -165,6 +166,7 @@ class World:
         self.ignored = self.highest_epoch = 0
         self.warned_of_bends: set[str] = set()
         self.last_hit_ns: dict[str, int] = {}
+        self.touched_ns: dict[str, int] = {}
         self.dangers = Dangers()
         self.batteries = Batteries()
         self.stuck = Stuck(capacity)
@@ -427,6 +429,7 @@ class World:
         for values in self.readings.values():
             values[slot] = np.nan
         self.last_hit_ns.pop(car.name, None)
+        self.touched_ns.pop(car.name, None)
         self._tags.give_back(car.tag_id)
         self._unnamed = 0
         self.slots.free(slot)

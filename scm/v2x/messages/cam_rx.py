@@ -20,6 +20,7 @@ class CamRx(Message, kw_only=True, frozen=True, omit_defaults=True):
         car: The sender's car file, with which it came; empty: it is no car of this city.
         by_hand: Whether somebody else than its own driver or agent holds its lease.
         stopped: Whether the city-wide stop is engaged.
+        touches: Whether a wall, a box or another car pushed it within the last half second.
     """
 
     KEY: ClassVar[str] = "v2x/rx/{receiver}/{station}/cam"
@@ -34,6 +35,7 @@ class CamRx(Message, kw_only=True, frozen=True, omit_defaults=True):
     car: str = ""
     by_hand: bool = False
     stopped: bool = False
+    touches: bool = False
 
 
 MESSAGE = CamRx

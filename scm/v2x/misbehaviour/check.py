@@ -71,6 +71,7 @@ class Sender(NamedTuple):
     car: str = ""
     by_hand: bool = False
     stopped: bool = False
+    touches: bool = False
 
 
 class Standing(NamedTuple):

@@ -5,7 +5,7 @@ A CAM that several roadside units hear counts once. What comes from outside neve
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache, partial
+from functools import cache
 from typing import NamedTuple
 
 from scm.clock import NS_PER_S, nanoseconds
@@ -195,11 +195,13 @@ class Detector:
             driven_s = _driven_s(claim, before, limits.front_share)
             memory.late_ns = claim.t_ns
         memory.idle = _idle(claim, before, gap_s, memory.idle)
-        if sender.by_hand or sender.stopped:
+        if sender.by_hand or sender.stopped or sender.touches:
             memory.hard_ns = claim.sent_ns
         is_hard = _since_s(claim.sent_ns, memory.hard_ns) <= HARD_S
         limits = limits.hard if is_hard else limits
         self._filter(claim, memory, before, driven_s, limits, HARD_PSD if is_hard else ACCEL_PSD)
+        if sender.touches:  # what holds or pushes it does so between two claims
+            memory.strayed.begin()
         track = self._fresh(claim)
         eye_sees = self._eye_sees(claim)
         is_new = bool(sender.car) and claim.sent_ns - memory.first_ns <= GRACE_S * NS_PER_S
@@ -232,7 +234,7 @@ class Detector:
             since_start_s=(claim.sent_ns - (self._began_ns or claim.sent_ns)) * 1e-9,
             idle=memory.idle,
             is_own_number=self._number(claim.station) == claim.who,
-            touches=partial(self._touches, claim, neighbours, limits),
+            touches=lambda: sender.touches or self._touches(claim, neighbours, limits),
         )
 
     def _filter(

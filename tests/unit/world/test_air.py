@@ -228,4 +228,16 @@ def test_the_cams_tell_what_the_city_knows_of_their_sender(make_city):
     assert next(out for out in cams if out.t_ns >= held_ns).by_hand
     assert {out.car for out in city.heard(CamRx)} == {"nigel"}
     bid = CamTx(station="n1", t_ns=0, body=city.heard(CamRx)[0].body)
-    assert not {"car", "by_hand", "stopped"} & set(bid.__struct_fields__)
+    assert not {"car", "by_hand", "stopped", "touches"} & set(bid.__struct_fields__)
+
+
+def test_a_cam_tells_that_its_sender_touches_something(make_city):
+    city = make_city(hosted=(("n1", "nigel"),))
+    city.run_for(1.0)
+    assert not any(out.touches for out in city.heard(CamRx))
+    city.world.touched_ns["n1"] = city.now
+    touched_ns = city.now
+    city.run_for(2.0)
+    lately = [out.touches for out in city.heard(CamRx) if touched_ns <= out.t_ns]
+    assert lately[0]
+    assert not lately[-1], "half a second later it touches nothing any more"

@@ -141,6 +141,16 @@ def test_who_lies_by_hand_or_in_a_stop_is_found_all_the_same(sender, lie):
     assert memory.since_ns - told.t_ns > -3 * NS_PER_S
 
 
+@pytest.mark.parametrize("touches", [True, False])
+def test_who_scrapes_along_a_wall_tells_a_speed_that_is_no_way(touches):
+    """Its wheels turn and a wall holds it, so place and speed contradict each other in truth."""
+    judge = detector()
+    for k in range(80):
+        told = state(0.1 * k, 0.1 + 0.003 * k, v=0.02 + 0.06 * (k % 2))
+        memory = hear(judge, told, Sender("nigel", touches=touches)).memory
+    assert (memory.since_ns is None) == touches
+
+
 def test_a_faster_car_is_judged_by_what_it_can_do():
     fast = limits_of(2.67, 0.767, has_tag=True)
     judge = Detector(ground(), lambda _car: fast, CHECKS)
