@@ -84,7 +84,7 @@ UNITS = tuple(
         *("id", "number"),
     )
 )
-ETSI = "scm.v2x.etsi.cam_spatem"  # modules whose numbers are in the units of the standards
+ETSI = "scm.v2x.etsi."  # modules whose numbers are in the units of the standards
 
 
 def message_classes():

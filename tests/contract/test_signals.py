@@ -129,7 +129,7 @@ def test_a_controller_with_a_wrong_program_is_caught_in_its_first_cycle(city_map
 
 def test_the_second_channel_imports_nothing_of_the_first():
     folder = Path(scm.traffic.__file__).parent
-    second = {"card", "monitor", "monitor_part"}
+    second = {"conflict_table", "monitor", "monitor_part"}
     for name in second:
         tree = ast.parse((folder / f"{name}.py").read_text(encoding="utf-8"))
         imported = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}

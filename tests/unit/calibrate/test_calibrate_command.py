@@ -5,7 +5,8 @@ from contextlib import nullcontext
 
 import pytest
 
-from scm import live, registry
+from scm import registry
+from scm.runtime import live
 from scm.v2x import bus_zenoh
 from scm.v2x.exchange import Incoming
 from scm.vehicles.car import load_car
