@@ -165,8 +165,7 @@ class World:
         self.tick = 0
         self.ignored = self.highest_epoch = 0
         self.warned_of_bends: set[str] = set()
-        self.last_hit_ns: dict[str, int] = {}
-        self.touched_ns: dict[str, int] = {}
+        self.last_hit_ns, self.touched_ns = dict[str, int](), dict[str, int]()
         self.dangers = Dangers()
         self.batteries = Batteries()
         self.stuck = Stuck(capacity)
