@@ -124,7 +124,15 @@ PARTS = {"rest": rest, "messages": messages, "commands": commands}
 
 def text_of(part: str) -> str:
     """Return a part as it stands in its file."""
-    return json.dumps(PARTS[part](), indent=1, sort_keys=True, ensure_ascii=False) + "\n"
+    return _written(PARTS[part](), 2 if part == "commands" else 3) + "\n"
+
+
+def _written(node: Any, depth: int) -> str:
+    """Return JSON with a line for each entry down to a depth: a change is a few lines of a diff."""
+    if depth == 0 or not isinstance(node, dict) or not node:
+        return json.dumps(node, sort_keys=True, ensure_ascii=False)
+    lines = (f"{json.dumps(key)}: {_written(node[key], depth - 1)}" for key in sorted(node))
+    return "{\n" + ",\n".join(lines) + "\n}"
 
 
 if __name__ == "__main__":

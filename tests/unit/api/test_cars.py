@@ -2,6 +2,7 @@
 
 import pytest
 
+from scm.api.routes import cars
 from scm.errors import CarError
 from scm.vehicles.car import car_names, load_car
 
@@ -17,10 +18,10 @@ def folder(tmp_path, monkeypatch):
 
 def test_shipped_cars_are_listed_with_their_outline_and_what_lanes_they_miss(client):
     listed = client("GET", "/api/v1/cars").json()
-    cars = {car["car"]: car for car in listed["cars"]}
-    assert list(cars) == sorted(car_names())
+    by_name = {car["car"]: car for car in listed["cars"]}
+    assert list(by_name) == sorted(car_names())
     assert listed["folder"] == ""
-    nigel, f1tenth = cars["nigel"], cars["f1tenth"]
+    nigel, f1tenth = by_name["nigel"], by_name["f1tenth"]
     assert (nigel["rear_m"], nigel["front_m"], nigel["shipped"]) == (-0.07, 0.23, True)
     assert nigel["misfit"] == ""
     assert nigel["turning_radius_m"] == pytest.approx(0.2452, abs=1e-4)
@@ -55,6 +56,14 @@ def test_a_car_file_is_never_written_over(client, folder):
         assert reply.status_code == 409
         assert f"named '{body['car']}' already" in reply.json()["detail"]
     assert (folder / "lab_buggy.toml").read_text(encoding="utf-8") == "# mine\n"
+
+
+def test_of_two_who_make_a_car_at_once_the_first_stays(client, folder, monkeypatch):
+    monkeypatch.setattr(cars, "car_files", dict)  # the other file came after this was looked at
+    (folder / "lab_buggy.toml").write_text("# mine\n", encoding="utf-8")
+    assert client("POST", "/api/v1/cars", json=BUGGY).status_code == 409
+    assert (folder / "lab_buggy.toml").read_text(encoding="utf-8") == "# mine\n"
+    assert [path.name for path in folder.iterdir()] == ["lab_buggy.toml"]
 
 
 def test_a_broken_file_of_ones_own_is_listed_with_what_is_wrong(client, folder):

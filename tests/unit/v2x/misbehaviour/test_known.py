@@ -146,7 +146,7 @@ def test_who_scrapes_along_a_wall_tells_a_speed_that_is_no_way(touches):
     """Its wheels turn and a wall holds it, so place and speed contradict each other in truth."""
     judge = detector()
     for k in range(80):
-        told = state(0.1 * k, 0.1 + 0.003 * k, v=0.02 + 0.06 * (k % 2))
+        told = state(0.1 * k, 0.1 + 0.003 * k, v=0.08)
         memory = hear(judge, told, Sender("nigel", touches=touches)).memory
     assert (memory.since_ns is None) == touches
 
