@@ -16,7 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from scm.maps.load import load_map
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Hears
 from scm.traffic.monitor_part import MonitorPart

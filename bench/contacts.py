@@ -16,7 +16,7 @@ import pymunk
 from pymunk import batch
 
 from scm.arrays import Floats
-from scm.maps.model import CityMap, Floor, MapTag, Wall
+from scm.records.city_map import CityMap, Floor, MapTag, Wall
 from scm.world.contacts import INSTANT, ITERATIONS, Contacts
 from scm.world.solids import Hull, car_body, solids
 

@@ -16,7 +16,7 @@ from bench.city import fill
 from bench.flow import counted
 from scm.arrays import Bools, Floats
 from scm.maps.load import load_map
-from scm.maps.model import CityMap, RadioChannel
+from scm.records.city_map import CityMap, RadioChannel
 from scm.runtime.lockstep import Lockstep
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart

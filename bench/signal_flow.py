@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 from scm.clock import NS_PER_S
 from scm.geometry import Pose2
 from scm.maps.load import load_map
-from scm.maps.model import CityMap
 from scm.maps.route import Roads
+from scm.records.city_map import CityMap
 from scm.traffic.controller import Controller, Heard
 from scm.traffic.detectors import Seen, Watcher, reach_of
 from scm.traffic.part import tables_of

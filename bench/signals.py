@@ -7,8 +7,8 @@ import sys
 import time
 
 from scm.maps.load import load_map
-from scm.maps.model import CityMap
 from scm.maps.route import Roads
+from scm.records.city_map import CityMap
 from scm.traffic import kernel, rings
 from scm.traffic.controller import Controller
 from scm.traffic.flood import flood

@@ -27,9 +27,9 @@ import numpy as np
 
 from bench.flow import STANDS_MPS, counted
 from scm.errors import DemandError, ScmError
-from scm.maps.model import CityMap
 from scm.maps.route import Roads
 from scm.maps.sumo import import_sumo
+from scm.records.city_map import CityMap
 from scm.runtime.lockstep import Lockstep
 from scm.traffic.demand import DemandPart, Ways
 from scm.traffic.demand_table import Flow

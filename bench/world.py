@@ -14,8 +14,8 @@ from collections.abc import Callable, Sequence
 
 import pymunk
 
-from scm.maps.model import CityMap, Floor, Lane, MapTag, Segment, Wall
 from scm.maps.segments import wall_segments
+from scm.records.city_map import CityMap, Floor, Lane, MapTag, Segment, Wall
 from scm.v2x.message import Message, encode
 from scm.v2x.messages.route_request import RouteRequest
 from scm.world import step

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from scm.maps.grid_city import grid_city
-from scm.maps.model import RadioChannel, Sign
+from scm.records.city_map import RadioChannel, Sign
 from scm.runtime.lockstep import Lockstep
 from scm.v2x.messages.route_request import RouteRequest
 from scm.world.driving import send

@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.guard import Guarded, Mode

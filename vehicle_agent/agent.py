@@ -12,7 +12,7 @@ from scm import registry
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import MapError, RunError
 from scm.log import event
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.runtime.part import Hears, IsWanted, Serves
 from scm.v2x.exchange import Answer, Incoming, Outgoing
 from scm.v2x.key import check_name

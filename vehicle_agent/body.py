@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from scm.geometry import Pose2
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.lidar_scan import LidarScan

@@ -8,8 +8,8 @@ import logging
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import MapError
 from scm.log import event
-from scm.maps.model import CityMap
 from scm.maps.route import Roads
+from scm.records.city_map import CityMap
 from scm.v2x.cam_trigger import CamTrigger
 from scm.v2x.congestion import OwnControl
 from scm.v2x.etsi.convert import cam_of

@@ -70,7 +70,7 @@ from scm.api.trace import Traced
 from scm.api.vehicle_frames import VehicleFrames
 from scm.api.view import CityView
 from scm.clock import WallClock
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.store.memory import MemoryStore
 from scm.store.repository import Repository
 

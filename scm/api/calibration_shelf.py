@@ -15,7 +15,7 @@ import msgspec
 
 from scm.api.city import not_found
 from scm.api.problem import RefusedError
-from scm.maps.model import Camera
+from scm.records.city_map import Camera
 from scm.v2x.message import Refused
 from scm.v2x.messages.calibration_request import MeasuredLens
 

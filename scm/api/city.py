@@ -13,7 +13,7 @@ from scm.api.shelves import Shelves
 from scm.api.view import CityView
 from scm.api.wire import Wire
 from scm.clock import Clock
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.v2x.message import Message, Refused, Request
 
 ASK_TIMEOUT_S = 2.0

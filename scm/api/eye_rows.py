@@ -10,7 +10,7 @@ import msgspec
 from scm.api.picture import Held, Picture, TagSighting
 from scm.api.residual import Residual
 from scm.clock import seconds
-from scm.maps.model import MapTag
+from scm.records.city_map import MapTag
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import EyeStatus, InForce

@@ -15,8 +15,8 @@ from typing import Any
 from scm.api.city import City
 from scm.api.picture import Picture
 from scm.clock import NS_PER_S, nanoseconds
-from scm.maps.model import Lane
 from scm.maps.route import LanePath
+from scm.records.city_map import Lane
 from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.etsi.convert import latitude_of, longitude_of
 from scm.v2x.messages.traffic_counts import LaneCount, TrafficCounts

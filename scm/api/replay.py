@@ -14,9 +14,9 @@ from typing import Annotated, TypeVar
 import msgspec
 
 from scm.clock import NS_PER_MS, NS_PER_S
-from scm.maps.model import CityMap
 from scm.recorder.mcap_file import Recorded
 from scm.recorder.run_index import RunIndex
+from scm.records.city_map import CityMap
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent

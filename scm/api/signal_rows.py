@@ -9,7 +9,7 @@ import msgspec
 
 from scm.api.picture import Held, Picture
 from scm.clock import seconds
-from scm.maps.model import Junction
+from scm.records.city_map import Junction
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import SignalStage
 from scm.v2x.messages.signal_request import SignalWish

@@ -17,9 +17,9 @@ from scm.arrays import Floats, Image
 from scm.camera.daylight import Daylight
 from scm.camera.lens import Lens, View
 from scm.maps.draw import bounds
-from scm.maps.model import CityMap, Crosswalk
 from scm.maps.polyline import extent
 from scm.maps.route import LanePath
+from scm.records.city_map import CityMap, Crosswalk
 from scm.scenery.canvas import Colour, colour_of
 from scm.scenery.sheet import TABLE, FloorSheet, paint_floor, printed_tag, wall_pieces
 from scm.scenery.solids import rectangle

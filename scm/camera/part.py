@@ -18,7 +18,7 @@ from scm.camera.studio import Studio
 from scm.camera.tween import between, near
 from scm.clock import NS_PER_MS, NS_PER_S, Clock, nanoseconds
 from scm.errors import EyeError
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.runtime.part import Hears, IsWanted, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message

@@ -10,8 +10,8 @@ import numpy as np
 from scm.arrays import Floats
 from scm.camera.mesh import Behind, Face, Mesh, mesh_of, part_of
 from scm.camera.painter import Thing
-from scm.maps.model import Box, CityMap, Light, Sign, Wall
 from scm.maps.signs import SPEED_LIMIT, TURNS
+from scm.records.city_map import Box, CityMap, Light, Sign, Wall
 from scm.scenery.canvas import Colour, colour_of, dimmed
 from scm.scenery.sheet import BRICK, CARD, wall_pieces
 from scm.scenery.solids import prism, rectangle

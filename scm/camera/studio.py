@@ -25,7 +25,7 @@ from scm.camera.standing import (
     wall_balls,
     wall_thing,
 )
-from scm.maps.model import Box, CityMap
+from scm.records.city_map import Box, CityMap
 from scm.scenery.bodies import car_rotation
 from scm.scenery.canvas import Colour
 from scm.v2x.messages.world_snapshot import SnapshotBox, SnapshotVehicle

@@ -10,7 +10,7 @@ from scm.command import Command
 
 if TYPE_CHECKING:  # the command line starts without what finds boards
     from scm.eye.calibrate.gather import Gathered
-    from scm.maps.model import Camera
+    from scm.records.city_map import Camera
     from scm.scenery.board import Board
 
 

@@ -9,7 +9,7 @@ from scm.command import Command
 from scm.commands.eye_calibrate import squares
 
 if TYPE_CHECKING:  # the command line starts without what draws tags
-    from scm.maps.model import CityMap
+    from scm.records.city_map import CityMap
     from scm.scenery.paper import Page
     from scm.scenery.prints import TagPrint
 

@@ -11,8 +11,8 @@ from scm.command import Command
 from scm.errors import MapError
 
 if TYPE_CHECKING:
-    from scm.maps.model import CityMap
     from scm.maps.sumo import Imported
+    from scm.records.city_map import CityMap
 
 MOST_NAMES = 4
 NEXT_STEP = (

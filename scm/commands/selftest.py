@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from scm.command import Command, credentials_argument, credentials_of
 
 if TYPE_CHECKING:
-    from scm.maps.model import CityMap
+    from scm.records.city_map import CityMap
     from scm.selftest.signals import SignalTrials
     from scm.v2x.credentials import Credentials
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from scm.command import Command
 
 if TYPE_CHECKING:
-    from scm.maps.model import CityMap
+    from scm.records.city_map import CityMap
     from scm.vehicles.car import Car
 
 Row = tuple[str, ...]

@@ -27,7 +27,7 @@ from scm.clock import NS_PER_MS
 from scm.eye.camera import CameraModel
 from scm.eye.detect import CORNER_STD_PX
 from scm.log import event
-from scm.maps.model import MapTag
+from scm.records.city_map import MapTag
 from scm.scenery.tags import floor_corners
 
 LOGGER = logging.getLogger(__name__)

@@ -19,7 +19,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.errors import EyeError, MessageError, nearest
-from scm.maps.model import Camera, CityMap
+from scm.records.city_map import Camera, CityMap
 from scm.v2x.key import check_name
 
 LARGEST_TILT_RAD = math.radians(45.0)

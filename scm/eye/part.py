@@ -38,7 +38,7 @@ from scm.eye.track.sighting import ROOF_TAG_SIZE, Sighting
 from scm.eye.track.tracks import Tracks
 from scm.eye.watch import Watch
 from scm.log import event
-from scm.maps.model import CityMap, MapTag
+from scm.records.city_map import CityMap, MapTag
 from scm.runtime.part import Hears, IsWanted, Serves
 from scm.scenery.bodies import NIGEL, CarBody, car_body
 from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing

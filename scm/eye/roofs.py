@@ -12,7 +12,7 @@ import numpy as np
 from scm.arrays import Floats
 from scm.eye.camera import CameraModel
 from scm.eye.track.sighting import Track
-from scm.maps.model import Camera
+from scm.records.city_map import Camera
 from scm.scenery.bodies import NIGEL, CarBody
 from scm.scenery.tags import CORNERS
 

@@ -21,7 +21,7 @@ from scm.eye.calibrate.judge import RMS_SHARE
 from scm.eye.calibration import Calibration, calibrated, covariance_faults
 from scm.eye.camera import CameraModel, camera_model
 from scm.eye.watch import WORTH_M, Watch
-from scm.maps.model import Camera, MapTag
+from scm.records.city_map import Camera, MapTag
 from scm.v2x.messages.calibration_request import CalibrationRequest, MeasuredLens
 from scm.v2x.messages.eye_status import Calibrated, InForce
 

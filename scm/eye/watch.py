@@ -21,7 +21,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.eye.anchor import Anchor
 from scm.eye.camera import CameraModel
 from scm.eye.sharpness import EdgeWidth, edge_width
-from scm.maps.model import MapTag
+from scm.records.city_map import MapTag
 from scm.v2x.messages.eye_status import Complaint
 
 SETTLED_FRAMES = 10

@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from scm.maps.model import CityMap, Lane
 from scm.maps.polyline import extent
+from scm.records.city_map import CityMap, Lane
 
 WIDEST_CUT_RAD = math.radians(170.0)
 

@@ -9,11 +9,11 @@ import msgspec
 from scm.errors import nearest
 from scm.geometry import wrap_angle
 from scm.maps.floor_check import floor_problems
-from scm.maps.model import CityMap, Conflict, Group, Junction, Segment
 from scm.maps.radio_check import radio_problems
 from scm.maps.route import LanePath
 from scm.maps.rules_check import rule_problems
 from scm.maps.vehicle_tags import LAST_TAG_ID
+from scm.records.city_map import CityMap, Conflict, Group, Junction, Segment
 
 JOIN_M = 0.001
 JOIN_RAD = math.radians(0.1)

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from scm.arrays import Floats
-from scm.maps.model import Conflict, Junction
 from scm.maps.route import Roads
+from scm.records.city_map import Conflict, Junction
 
 
 class Meeting(NamedTuple):

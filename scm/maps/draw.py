@@ -14,12 +14,12 @@ from scm.arrays import Floats
 from scm.geometry import Pose2
 from scm.maps import furniture
 from scm.maps.floor_draw import floor_layers, wind_arrow
-from scm.maps.model import Approach, CityMap, Crosswalk, Wall
 from scm.maps.names_draw import SPAWN_NAME_AT_M, SPAWN_NAME_M, name_layers
 from scm.maps.route import LanePath, Roads
 from scm.maps.segments import box_outline, wall_outlines
 from scm.maps.signs import precedence_at
 from scm.maps.svg import element, label, lane_data, layer, number, outline, placed
+from scm.records.city_map import Approach, CityMap, Crosswalk, Wall
 
 MARGIN_M = 0.06
 STRIP_M = 0.17

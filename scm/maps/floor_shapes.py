@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from scm.geometry import Pose2
-from scm.maps.model import Floor, Patch, Plate, Point, Ramp
+from scm.records.city_map import Floor, Patch, Plate, Point, Ramp
 
 CIRCLE_CORNERS = 32
 

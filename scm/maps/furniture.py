@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable
 
 from scm.geometry import Pose2
-from scm.maps.model import Light, Sign
 from scm.maps.signs import SPEED_LIMIT, TURNS
 from scm.maps.svg import element, label, placed
+from scm.records.city_map import Light, Sign
 
 LAMPS = (("red", 0.046, "#5c2a2a"), ("yellow", 0.0, "#5a4a22"), ("green", -0.046, "#234a33"))
 RED, BLUE, INK, PAPER = "#c62f35", "#2b5ea8", "#23272e", "#fbfbf8"

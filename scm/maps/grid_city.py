@@ -22,7 +22,7 @@ from collections.abc import Iterator
 import msgspec
 
 from scm.errors import MapError
-from scm.maps.model import (
+from scm.records.city_map import (
     Approach,
     Area,
     CityMap,

@@ -8,9 +8,9 @@ import math
 from collections.abc import Iterable, Iterator
 
 from scm.geometry import Pose2
-from scm.maps.model import CityMap, Conflict
 from scm.maps.route import LanePath, Roads
 from scm.maps.svg import label, layer
+from scm.records.city_map import CityMap, Conflict
 
 SHARES = sorted((k / 20.0 for k in range(3, 18)), key=lambda share: abs(share - 0.5))
 """Of a lane's length: where its name may stand, the best first."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.geometry import Pose2, wrap_angle
-from scm.maps.model import Segment
+from scm.records.city_map import Segment
 
 STEP_M = 0.01
 

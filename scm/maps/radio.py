@@ -7,7 +7,7 @@ import msgspec
 
 from scm.errors import MapError, nearest
 from scm.maps.check import problems_of
-from scm.maps.model import CityMap, RadioChannel
+from scm.records.city_map import CityMap, RadioChannel
 
 _SWITCHES = {"true": True, "false": False}
 

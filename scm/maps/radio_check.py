@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 
 SHARES = ("loss", "hidden_share")
 LONGEST_MS = 1000.0

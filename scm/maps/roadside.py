@@ -1,6 +1,6 @@
 """Where the roadside units stand."""
 
-from scm.maps.model import CityMap, Point
+from scm.records.city_map import CityMap, Point
 
 
 def roadside_place(city_map: CityMap, junction: str) -> Point:

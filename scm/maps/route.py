@@ -11,9 +11,9 @@ from scm.arrays import Floats
 from scm.errors import MapError, nearest
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.coordinates import EXAMPLE, are_coordinates, pose_at
-from scm.maps.model import Approach, CityMap, Conflict, Lane, Spawn, StopLine
 from scm.maps.polyline import Polyline, advance, extent, join, sample
 from scm.maps.signs import SPEED_LIMIT, Held, allowed_next, is_obeyed, looks_along
+from scm.records.city_map import Approach, CityMap, Conflict, Lane, Spawn, StopLine
 
 SAME_WAY_RAD = math.radians(60.0)
 MOST_PASSES = 400

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from scm.errors import nearest
-from scm.maps.model import Approach, CityMap, Conflict, Lane, Sign
 from scm.maps.polyline import extent
 from scm.maps.signs import (
     BEFORE_LINE_M,
@@ -14,6 +13,7 @@ from scm.maps.signs import (
     allowed_next,
     lines_of,
 )
+from scm.records.city_map import Approach, CityMap, Conflict, Lane, Sign
 
 DEEPEST = 3
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.geometry import Pose2
-from scm.maps.model import Box, CityMap, Point, Wall
+from scm.records.city_map import Box, CityMap, Point, Wall
 
 MITRE_LIMIT = 4.0
 

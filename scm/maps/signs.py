@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 from scm.geometry import Pose2
-from scm.maps.model import CityMap, Lane, Sign
 from scm.maps.polyline import extent
+from scm.records.city_map import CityMap, Lane, Sign
 
 Turn = Literal["left", "straight", "right"]
 Precedence = Literal["stop", "give_way"]

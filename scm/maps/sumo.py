@@ -20,12 +20,12 @@ from itertools import combinations
 from pathlib import Path
 
 from scm.errors import MapError
-from scm.maps.model import CityMap, Point
 from scm.maps.sumo_build import BESIDE_M, LINE_BEFORE_M, PAINT_M, CityBuilder
 from scm.maps.sumo_clear import STRAY_M, Strip, apart_m, is_clear, strip_of, unruled
 from scm.maps.sumo_curves import Curve, Dots, cut, distance_m, dotted, fit, length_of, turn
 from scm.maps.sumo_program import with_programs
 from scm.maps.sumo_read import Net, NetLane, NetLink, read_head, read_net
+from scm.records.city_map import CityMap, Point
 
 LEAST_RADIUS_M = 0.38  # a Nigel turns on 0.245 m; at 0.35 m drivers swing 40 mm wide, here 8 mm
 WIDE_RADIUS_M = 0.6  # of a street's bend beside another lane: cars swing 37 mm, not 54

@@ -10,7 +10,12 @@ import msgspec
 
 from scm.geometry import Pose2
 from scm.maps.conflicts import meeting
-from scm.maps.model import (
+from scm.maps.polyline import advance, extent
+from scm.maps.route import Roads
+from scm.maps.sumo_curves import Curve
+from scm.maps.sumo_read import Net, NetLane, NetLink
+from scm.maps.sumo_ruled import Ruled, bus_names, ruled
+from scm.records.city_map import (
     Approach,
     Area,
     CityMap,
@@ -28,11 +33,6 @@ from scm.maps.model import (
     Spawn,
     StopLine,
 )
-from scm.maps.polyline import advance, extent
-from scm.maps.route import Roads
-from scm.maps.sumo_curves import Curve
-from scm.maps.sumo_read import Net, NetLane, NetLink
-from scm.maps.sumo_ruled import Ruled, bus_names, ruled
 
 FASTEST_MPS = 0.25
 SLOWEST_MPS = 0.08

@@ -18,9 +18,9 @@ import numpy as np
 from scm.arrays import Bools, Floats
 from scm.geometry import Pose2
 from scm.maps.conflicts import meeting
-from scm.maps.model import CityMap, Conflict
 from scm.maps.route import Roads
 from scm.maps.sumo_curves import Curve, Dots, dotted, turned
+from scm.records.city_map import CityMap, Conflict
 
 HALF_WIDTH_M = 0.0875  # of a Nigel
 FRONT_M = 0.23  # before its rear axle

@@ -15,8 +15,8 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.geometry import Pose2, wrap_angle
-from scm.maps.model import Point, Segment
 from scm.maps.polyline import advance, extent
+from scm.records.city_map import Point, Segment
 
 DUST_M = 1e-6
 DUST_RAD = 1e-7

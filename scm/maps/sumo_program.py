@@ -17,10 +17,10 @@ import msgspec
 
 from scm.errors import MapError
 from scm.maps.conflicts import conflicting_groups
-from scm.maps.model import CityMap, PlanStage
 from scm.maps.route import Roads
 from scm.maps.sumo_read import OFF, NetPhase
 from scm.maps.sumo_ruled import Ruled
+from scm.records.city_map import CityMap, PlanStage
 
 GREEN = frozenset("Gg")
 YELLOW = frozenset("yY")

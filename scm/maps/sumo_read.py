@@ -14,7 +14,7 @@ from urllib.parse import quote
 from xml.etree import ElementTree
 
 from scm.errors import MapError, reading
-from scm.maps.model import Point
+from scm.records.city_map import Point
 
 CAR = "passenger"
 LETTERS = frozenset("rugGsyYoO")

@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 
 
 def map_toml(city_map: CityMap) -> str:

@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from xml.sax.saxutils import escape, quoteattr
 
 from scm.geometry import Pose2
-from scm.maps.model import Lane, Point
 from scm.maps.polyline import advance, extent
+from scm.records.city_map import Lane, Point
 
 ARC_PIECE_RAD = math.radians(120.0)
 

@@ -7,7 +7,7 @@ joins, or gets the lowest free one.
 
 import re
 
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 
 LAST_TAG_ID = 586
 """The family tag36h11 has no other."""

@@ -18,10 +18,10 @@ import numpy as np
 from scm.arrays import Floats
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import CarError, RecordingError
-from scm.maps.model import Light
 from scm.recorder.mcap_file import Recorded, read_keys, read_run
 from scm.recording.autodrive import ACCELERATION, GREEN, OFF, RATES, RED, YELLOW
 from scm.recording.autodrive_write import CarTrack, LightTrack, Series
+from scm.records.city_map import Light
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.eye_track import EyeTrack

@@ -14,11 +14,11 @@ from mcap.writer import Writer
 
 from scm.clock import NS_PER_S
 from scm.errors import CarError
-from scm.maps.model import CityMap, Light
 from scm.maps.route import Roads
 from scm.recorder import foxglove_messages as fox
 from scm.recorder.mcap_file import Recorded, SchemaTable
 from scm.recorder.run_index import RunIndex
+from scm.records.city_map import CityMap, Light
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent

@@ -8,9 +8,9 @@ import numpy as np
 
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
-from scm.maps.model import Box, CityMap
 from scm.maps.route import Roads
 from scm.maps.segments import wall_segments
+from scm.records.city_map import Box, CityMap
 from scm.ros2.frames import MAP, header, point, pose, vector
 from scm.ros2.types import constant, ros
 from scm.v2x.messages.spat import Spat

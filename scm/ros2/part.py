@@ -17,7 +17,7 @@ from typing import Any
 from scm.clock import NS_PER_MS
 from scm.errors import CarError
 from scm.log import event
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.ros2 import convert, frames, markers
 from scm.ros2.car import RosCar
 from scm.ros2.names import ros_name

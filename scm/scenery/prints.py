@@ -12,8 +12,8 @@ import numpy as np
 
 from scm.arrays import Bools
 from scm.errors import EyeError, nearest
-from scm.maps.model import CityMap
 from scm.maps.vehicle_tags import bound_tag
+from scm.records.city_map import CityMap
 from scm.scenery.board import Board, charuco_board
 from scm.scenery.bodies import car_body
 from scm.scenery.paper import PAPERS_MM, Page, Rectangle

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from scm.arrays import Floats, Image
 from scm.geometry import Pose2
-from scm.maps.model import CityMap, Crosswalk, Wall
 from scm.maps.route import LanePath
+from scm.records.city_map import CityMap, Crosswalk, Wall
 from scm.scenery.canvas import Colour, colour_of, dimmed
 from scm.scenery.solids import rectangle
 from scm.scenery.tags import tag_picture

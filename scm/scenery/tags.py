@@ -13,7 +13,7 @@ import numpy as np
 from scm.arrays import Floats, Image
 from scm.errors import EyeError
 from scm.geometry import Pose2
-from scm.maps.model import MapTag
+from scm.records.city_map import MapTag
 
 CELLS = 8
 MARGIN_CELLS = 1

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import TypeVar, cast
 
 from scm.clock import NS_PER_MS, WallClock, nanoseconds
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.credentials import Credentials

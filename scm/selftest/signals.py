@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.errors import RunError
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.registry import load, names
 from scm.selftest.observer import Observer
 from scm.selftest.signal_fault import Bend, SignalFault

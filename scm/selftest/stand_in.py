@@ -8,7 +8,7 @@ import threading
 from collections.abc import Sequence
 
 from scm.clock import WallClock
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.runtime.live import run
 from scm.runtime.part import Hears
 from scm.selftest.signal_fault import Bend

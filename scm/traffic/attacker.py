@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from scm.clock import seconds
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.runtime.part import Hears, IsWanted, Part, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.cam_rx import CamRx

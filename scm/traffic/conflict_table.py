@@ -19,7 +19,7 @@ from itertools import combinations
 
 import msgspec
 
-from scm.maps.model import CityMap, Conflict, Group, Junction, Lane, Segment, StopLine
+from scm.records.city_map import CityMap, Conflict, Group, Junction, Lane, Segment, StopLine
 
 NIGEL_TOP_MPS = 0.267
 NIGEL_SLOW_MPS = 0.217

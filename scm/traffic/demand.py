@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.errors import DemandError, nearest
-from scm.maps.model import CityMap
 from scm.maps.route import MOST_PASSES, Roads
+from scm.records.city_map import CityMap
 from scm.runtime.part import Hears, Serves
 from scm.traffic.demand_table import Flow, departures
 from scm.v2x.exchange import Call, Incoming, Outgoing

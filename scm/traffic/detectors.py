@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 from scm.clock import NS_PER_S
 from scm.geometry import Pose2
-from scm.maps.model import Group, Junction, StopLine
 from scm.maps.route import Roads
+from scm.records.city_map import Group, Junction, StopLine
 from scm.traffic.kernel import Program
 
 REACH_M = 2.4

@@ -6,7 +6,7 @@ from typing import Literal
 from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS
-from scm.maps.model import Junction
+from scm.records.city_map import Junction
 from scm.store.records import PlanRecord
 from scm.traffic.asked import NEED_RINGS, Asked
 from scm.traffic.controller import Controller, Heard

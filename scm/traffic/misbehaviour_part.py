@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import CarError
 from scm.log import event
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.runtime.part import Hears, Serves
 from scm.traffic.cars import facts_of, outline_of
 from scm.v2x.etsi.convert import roadside_station

@@ -11,7 +11,7 @@ from typing import Literal
 from scm.clock import NS_PER_MS
 from scm.errors import nearest
 from scm.log import event
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.runtime.part import Hears, Serves
 from scm.store.records import FaultRecord
 from scm.traffic.conflict_table import card_hash, card_of

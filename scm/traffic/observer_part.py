@@ -7,8 +7,8 @@ tells counts every five seconds and each violation once, also as a line of the c
 from collections.abc import Sequence
 
 from scm.clock import NS_PER_MS, NS_PER_S
-from scm.maps.model import CityMap
 from scm.maps.route import Roads
+from scm.records.city_map import CityMap
 from scm.runtime.part import Hears, Serves
 from scm.traffic.counters import Counters
 from scm.traffic.observer_belief import Beliefs

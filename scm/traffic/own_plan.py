@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import msgspec
 
 from scm.errors import PlanError
-from scm.maps.model import CityMap, Junction, PlanStage
 from scm.maps.route import Roads
+from scm.records.city_map import CityMap, Junction, PlanStage
 from scm.traffic.kernel import Program
 from scm.traffic.plan import Timetable
 from scm.traffic.plan_asked import limited_table

@@ -14,8 +14,8 @@ from typing import Any
 
 from scm.errors import PlanError, nearest
 from scm.log import event
-from scm.maps.model import CityMap
 from scm.maps.route import Roads
+from scm.records.city_map import CityMap
 from scm.runtime.part import Hears, Serves
 from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller

@@ -11,8 +11,8 @@ an ambulance at all is for signatures to settle, not for signals.
 from collections.abc import Mapping
 
 from scm.clock import NS_PER_S
-from scm.maps.model import Junction
 from scm.maps.route import Roads
+from scm.records.city_map import Junction
 from scm.traffic.policy import PriorityCall, Status
 from scm.v2x.etsi.convert import roadside_station, station_id
 from scm.v2x.etsi.priority_requests import Answered, Wish, ssem_of, wishes_of

@@ -5,8 +5,8 @@ import math
 from scm.clock import NS_PER_MS
 from scm.errors import PlanError
 from scm.maps.conflicts import conflicting_groups
-from scm.maps.model import Conflict, Group, Junction, StopLine
 from scm.maps.route import Roads
+from scm.records.city_map import Conflict, Group, Junction, StopLine
 from scm.traffic.kernel import GroupTimes, Program
 from scm.traffic.timing import NIGEL, CarFacts, clearance_s, min_green_s, yellow_s
 

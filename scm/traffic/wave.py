@@ -12,8 +12,8 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from scm.maps.model import CityMap, StopLine
 from scm.maps.route import Roads
+from scm.records.city_map import CityMap, StopLine
 from scm.traffic.plan import Slot, Timetable
 from scm.traffic.program import STEP_NS
 from scm.traffic.timing import CarFacts

@@ -2,7 +2,7 @@
 
 import math
 
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.v2x.etsi.cam_spatem import SpatemBody
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Colour

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from scm.arrays import Bools, Floats
-from scm.maps.model import Box
+from scm.records.city_map import Box
 from scm.v2x.messages.world_snapshot import SnapshotBox
 
 GRAVITY = 9.80665

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from scm.arrays import Bools, Floats
-from scm.maps.model import Point, RadioChannel
+from scm.records.city_map import Point, RadioChannel
 from scm.v2x.congestion import WINDOW_NS, ReactiveControl, air_time, load_loss
 from scm.vehicles.drivers.channel import busy_for
 

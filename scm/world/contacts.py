@@ -22,7 +22,7 @@ from pymunk import batch
 
 from scm.arrays import Bools, Floats, Ints
 from scm.geometry import Pose2
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.world.boxes import Boxes, is_still
 from scm.world.broad_phase import Near, obstacles_of
 from scm.world.solids import Hull, box_body, car_body, obstacle_boxes, outline_of, solids

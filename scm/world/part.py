@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from scm.clock import NS_PER_S
 from scm.errors import RunError, ScmError
-from scm.maps.model import CityMap, Spawn
+from scm.records.city_map import CityMap, Spawn
 from scm.runtime.part import Hears, IsWanted, Serves
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message, Refused

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.maps.model import CityMap, Point
 from scm.maps.roadside import roadside_place
+from scm.records.city_map import CityMap, Point
 from scm.v2x.etsi.convert import roadside_station
 from scm.vehicles.drivers.channel import (
     DELAY_NS,

@@ -9,7 +9,7 @@ import numpy as np
 import pymunk
 
 from scm.arrays import Floats
-from scm.maps.model import Box, CityMap, Wall
+from scm.records.city_map import Box, CityMap, Wall
 from scm.world.boxes import GRAVITY, arm_of, inertia_of, mass_of
 
 MEETS_CARS, MEETS_WALLS, WALL, BOX = 0b0001, 0b0010, 0b0100, 0b1000

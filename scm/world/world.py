@@ -14,10 +14,10 @@ from msgspec.structs import replace
 from scm import registry
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
-from scm.maps.model import CityMap, Point
 from scm.maps.route import Roads
 from scm.maps.segments import wall_segments
 from scm.maps.vehicle_tags import bound_tag, reserved_tags
+from scm.records.city_map import CityMap, Point
 from scm.store.records import CarRecord, EpochRecord
 from scm.v2x.exchange import Keep, Outgoing
 from scm.v2x.messages.city_event import CityEvent

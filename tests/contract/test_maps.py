@@ -12,9 +12,9 @@ from scm.geometry import Pose2, wrap_angle
 from scm.maps.conflicts import conflicting_groups
 from scm.maps.draw import draw_svg
 from scm.maps.load import load_map, map_names
-from scm.maps.model import CityMap
 from scm.maps.route import Path, Roads
 from scm.maps.segments import wall_segments
+from scm.records.city_map import CityMap
 
 CAR = ((-0.07, -0.0875), (0.23, -0.0875), (0.23, 0.0875), (-0.07, 0.0875))
 SEEN_BEYOND_FLOOR_M = 0.03

@@ -231,7 +231,7 @@ def numeric_fields(kind):
 
 def _numeric(path, name, of):
     if isinstance(of, type) and issubclass(of, msgspec.Struct):
-        if not of.__module__.startswith(ETSI) and of.__module__ != "scm.maps.model":
+        if not of.__module__.startswith(ETSI) and of.__module__ != "scm.records.city_map":
             yield from numeric_fields(of)
     elif of in (int, float):
         yield path, name

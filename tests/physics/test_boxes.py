@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scm.maps.model import Box, CityMap, Floor, MapTag, Wall
+from scm.records.city_map import Box, CityMap, Floor, MapTag, Wall
 from scm.world.boxes import Boxes, arm_of, inertia_of
 from scm.world.contacts import KEPT_STEPS, STEP_S, Contacts
 from scm.world.solids import Hull

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from scm.geometry import Pose2
-from scm.maps.model import CityMap, Floor, MapTag, Wall
+from scm.records.city_map import CityMap, Floor, MapTag, Wall
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.drive_command import DriveCommand

@@ -13,7 +13,7 @@ from scm.clock import NS_PER_MS, seconds
 from scm.errors import RunError
 from scm.geometry import Pose2
 from scm.log import event
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.lidar_scan import LidarScan

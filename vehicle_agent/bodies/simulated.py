@@ -12,7 +12,7 @@ from scm import registry
 from scm.arrays import Floats
 from scm.clock import NS_PER_MS, seconds
 from scm.geometry import Pose2
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.vehicle_sensors import VehicleSensors

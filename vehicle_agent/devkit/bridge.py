@@ -16,7 +16,7 @@ from typing import Any, Protocol
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.errors import CarError, RunError
 from scm.log import event
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.runtime.part import Hears, Serves
 from scm.v2x.exchange import Call, Incoming, Outgoing
 from scm.v2x.message import Message, Refused

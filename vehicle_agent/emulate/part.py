@@ -11,9 +11,9 @@ import numpy as np
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
 from scm.log import event
-from scm.maps.model import CityMap
 from scm.maps.room import CLEARANCE_M, distances_m
 from scm.maps.route import Roads
+from scm.records.city_map import CityMap
 from scm.runtime.part import Hears
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.emulated_pose import EmulatedPose

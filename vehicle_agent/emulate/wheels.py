@@ -12,7 +12,7 @@ import math
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import Pose2
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from vehicle_agent.bodies.simulated import SimulatedBody
 from vehicle_agent.body import Motion
 from vehicle_agent.emulate.firmware import Firmware

@@ -17,7 +17,7 @@ from scm.api.roles import ADMIN, VIEWER
 from scm.api.schemas import answer, answer_file
 from scm.errors import CarError
 from scm.maps.bends import misfit
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.v2x.message import Refused
 from scm.vehicles.car import Car, car_of_text, load_car
 from scm.vehicles.car_files import OWN_CARS, TYPES_DIR, car_files, own_folder

@@ -13,7 +13,7 @@ from scm.api.eye_tracks import TrackRow
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer, answer_file, answer_page
-from scm.maps.model import Camera
+from scm.records.city_map import Camera
 from scm.v2x.messages.eye_tags import EyeTags
 
 LONGEST_WINDOW_S = 300.0

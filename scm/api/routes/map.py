@@ -8,7 +8,7 @@ from scm.api.etag import etag_of, has_tag
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer, answer_file
 from scm.maps.draw import draw_svg
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 
 
 class SvgResponse(Response):

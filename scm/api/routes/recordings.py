@@ -36,8 +36,8 @@ from scm.api.schemas import answer, answer_file, answer_nothing, answer_page
 from scm.clock import NS_PER_S
 from scm.errors import RecordingError
 from scm.maps.draw import draw_svg
-from scm.maps.model import Box, Light
 from scm.recorder.run_index import RunIndex
+from scm.records.city_map import Box, Light
 from scm.v2x.message import Refused
 
 MCAP = "application/octet-stream"

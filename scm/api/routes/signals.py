@@ -19,7 +19,7 @@ from scm.api.schemas import answer, answer_page
 from scm.api.signal_history import History, PromiseScore, Verdict
 from scm.api.signal_plans import PlanShelf
 from scm.api.signal_rows import JunctionRow, StatusRow, junction_rows, status_row
-from scm.maps.model import Junction
+from scm.records.city_map import Junction
 from scm.v2x.message import Refused
 from scm.v2x.messages.monitor_reset import MonitorReset
 from scm.v2x.messages.monitor_status import MonitorStatus

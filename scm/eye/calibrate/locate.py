@@ -25,7 +25,7 @@ from scm.errors import EyeError
 from scm.eye.camera import LARGEST_TILT_RAD, LENS_PARAMETERS, CameraModel, camera_model
 from scm.eye.detect import CORNER_STD_PX
 from scm.geometry import wrap_angle
-from scm.maps.model import Camera, CityMap, MapTag, Record
+from scm.records.city_map import Camera, CityMap, MapTag, Record
 from scm.scenery.tags import TAG_COUNT, floor_corners
 from scm.v2x.messages.eye_tags import TagSeen
 

@@ -23,7 +23,7 @@ from scm.eye.calibration import LENS_NAMES, Calibration
 from scm.eye.camera import CameraModel, camera_model
 from scm.eye.picture import read_picture
 from scm.eye.source import grey_of
-from scm.maps.model import Camera, MapTag
+from scm.records.city_map import Camera, MapTag
 from scm.scenery.board import Board
 from scm.v2x.messages.eye_tags import TagSeen
 

@@ -8,7 +8,7 @@ import numpy as np
 from scm.arrays import Bools, Floats, Image
 from scm.eye.camera import CameraModel
 from scm.geometry import Pose2
-from scm.maps.model import Box, CityMap, MapTag
+from scm.records.city_map import Box, CityMap, MapTag
 from scm.scenery.canvas import Canvas
 from scm.scenery.sheet import BRICK, CARD, FloorSheet, paint_floor, printed_tag, wall_pieces
 from scm.scenery.solids import Solid, draw_shape, prism, rectangle, shape_of

@@ -7,7 +7,7 @@ import numpy as np
 
 from scm.errors import EyeError
 from scm.eye.camera import CameraModel, camera_model
-from scm.maps.model import Camera, CityMap, Floor, MapTag
+from scm.records.city_map import Camera, CityMap, Floor, MapTag
 
 PINHOLE = (-0.12, 0.03, 0.0004, -0.0003, 0.0)
 """What a cheap lens of 60 degrees bends."""

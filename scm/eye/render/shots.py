@@ -25,7 +25,7 @@ from scm.eye.render.motion import Driven, Easel, Rect, Shutter, paint_moving, se
 from scm.eye.render.visible import Hiding, visible_share
 from scm.eye.source import grey_of
 from scm.geometry import Pose2
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.scenery.bodies import car_body
 from scm.scenery.tags import PRINT_SCALE, tag_corners
 

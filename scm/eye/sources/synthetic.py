@@ -20,7 +20,7 @@ from scm.eye.render.car import draw_car
 from scm.eye.render.floor import draw_box, draw_scenery
 from scm.eye.source import Frame
 from scm.geometry import Pose2
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.runtime.part import Hears
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.emulated_pose import EmulatedPose

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import wrap_angle
-from scm.maps.model import Junction
+from scm.records.city_map import Junction
 from scm.v2x.etsi.cam_spatem import (
     PHASE_STATES,
     REFERENCE_LATITUDE_DEG,

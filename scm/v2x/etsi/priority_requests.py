@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from typing import Literal, NamedTuple
 
 from scm.clock import NS_PER_MS, NS_PER_S
-from scm.maps.model import Junction
+from scm.records.city_map import Junction
 from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.etsi.codes import number_of, scaled
 from scm.v2x.etsi.convert import moment_of, position_of, roadside_station, station_id

@@ -13,8 +13,8 @@ from msgspec.structs import replace
 
 from scm.errors import MapError
 from scm.geometry import wrap_angle
-from scm.maps.model import Junction
 from scm.maps.route import Roads
+from scm.records.city_map import Junction
 from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.etsi.convert import REVISIONS, moment_of, position_of, roadside_station, station_id
 from scm.v2x.etsi.mapem import (

@@ -4,7 +4,7 @@ from typing import ClassVar, Literal
 
 import msgspec
 
-from scm.maps.model import Camera
+from scm.records.city_map import Camera
 from scm.v2x.message import Message, Request
 from scm.v2x.messages.eye_status import InForce
 

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.v2x.message import Delivery, Message
 
 

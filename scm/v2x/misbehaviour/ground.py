@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 
 from scm.geometry import wrap_angle
-from scm.maps.model import Camera, CityMap, Point
 from scm.maps.roadside import roadside_place
 from scm.maps.route import Roads
+from scm.records.city_map import Camera, CityMap, Point
 from scm.v2x.etsi.convert import roadside_station
 
 CELL_M = 0.04

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scm.arrays import Bools, Floats
-from scm.maps.model import RadioChannel
+from scm.records.city_map import RadioChannel
 from scm.vehicles.drivers.chance import mixed
 from scm.vehicles.jit import array_kernel, law
 

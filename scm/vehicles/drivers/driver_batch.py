@@ -12,8 +12,8 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import MapError
 from scm.geometry import Pose2
-from scm.maps.model import RadioChannel
 from scm.maps.segments import wall_segments
+from scm.records.city_map import RadioChannel
 from scm.v2x.etsi.cam_spatem import SpatemBody
 from scm.v2x.etsi.denm import DenmBody
 from scm.v2x.messages.monitor_status import MonitorStatus

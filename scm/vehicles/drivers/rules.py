@@ -13,10 +13,10 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.conflicts import meeting
-from scm.maps.model import Conflict
 from scm.maps.polyline import advance, extent
 from scm.maps.route import Roads
 from scm.maps.signs import Turn, precedence_at, turn_of
+from scm.records.city_map import Conflict
 
 # What a line asks for: to obey its signal, to stop, to give way, or right before left.
 LIT, STOP_SIGN, GIVE_WAY, PLAIN = range(4)

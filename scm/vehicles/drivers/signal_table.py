@@ -10,8 +10,8 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_S
-from scm.maps.model import CityMap
 from scm.maps.roadside import roadside_place
+from scm.records.city_map import CityMap
 from scm.v2x.etsi.cam_spatem import SpatemBody
 from scm.v2x.etsi.convert import REVISIONS, colours_of
 from scm.v2x.messages.monitor_status import MonitorStatus

@@ -12,7 +12,7 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.clock import NS_PER_S
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived
 from scm.vehicles.jit import array_kernel, law
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.geometry import Pose2
-from scm.maps.model import Lane
 from scm.maps.polyline import advance
 from scm.maps.route import Roads
+from scm.records.city_map import Lane
 from scm.vehicles.drivers.rules import RuleBook, Rules, cut_segments, lines_of
 
 # Columns of a segment: where on its lane, its length, its start pose, 1/radius (+ = left), the

@@ -4,7 +4,7 @@ import pytest
 from scm.api.app import create_app
 from scm.api.wire import BusWire
 from scm.clock import StepClock
-from scm.maps.model import CityMap
+from scm.records.city_map import CityMap
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.message import Refused

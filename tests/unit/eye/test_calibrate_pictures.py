@@ -12,7 +12,7 @@ from scm.eye.calibrate.board import find_board
 from scm.eye.calibrate.gather import from_files
 from scm.eye.calibration_files import load_calibration
 from scm.eye.camera import camera_model
-from scm.maps.model import Camera
+from scm.records.city_map import Camera
 from scm.scenery.board import Board
 from scm.scenery.tags import tag_picture
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scm.errors import EyeError
 from scm.eye.camera import camera_model
 from scm.maps.load import load_map
-from scm.maps.model import Camera
+from scm.records.city_map import Camera
 
 PLAIN = Camera(
     name="top", x_m=1.4, y_m=0.65, z_m=2.8, width_px=1280, height_px=720,

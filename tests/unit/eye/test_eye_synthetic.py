@@ -10,7 +10,7 @@ from scm.eye.render.car import tag_on_roof
 from scm.eye.source import Frame
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.maps.load import load_map
-from scm.maps.model import Box
+from scm.records.city_map import Box
 from scm.scenery.bodies import NIGEL, car_body, car_rotation
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from scm.errors import EyeError
 from scm.eye.camera import camera_model
-from scm.maps.model import Camera
+from scm.records.city_map import Camera
 
 WIDE = Camera(
     name="wide", x_m=1.4, y_m=0.65, z_m=2.0, yaw_rad=0.3, tilt_x_rad=0.2, tilt_y_rad=-0.1,

@@ -15,7 +15,7 @@ from scm.eye.detect import detect_tags
 from scm.eye.render.floor import draw_map_tag
 from scm.geometry import Pose2
 from scm.maps.load import load_map
-from scm.maps.model import Camera, MapTag
+from scm.records.city_map import Camera, MapTag
 from scm.scenery.tags import tag_corners
 from scm.v2x.messages.eye_tags import TagSeen
 

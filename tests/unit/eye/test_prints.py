@@ -17,7 +17,7 @@ from scm.eye.camera import camera_model
 from scm.eye.detect import detect_tags
 from scm.eye.pose import car_pose
 from scm.maps.load import load_map
-from scm.maps.model import VehicleTag
+from scm.records.city_map import VehicleTag
 from scm.scenery.board import Board
 from scm.scenery.bodies import NIGEL
 from scm.scenery.paper import PAPERS_MM, pdf, svg

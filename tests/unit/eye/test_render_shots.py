@@ -319,7 +319,7 @@ def test_the_written_camera_is_the_true_one(tmp_path):
     import msgspec
 
     from scm.eye.render.scene import camera_toml
-    from scm.maps.model import Camera
+    from scm.records.city_map import Camera
 
     model = camera_over(FLOOR, SIZE, 1.5, 0.2, fisheye=True)
     read = msgspec.toml.decode(camera_toml(model.camera))

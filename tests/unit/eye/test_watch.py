@@ -15,7 +15,7 @@ from scm.eye.source import Frame
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.eye.watch import Watch
 from scm.maps.load import load_map
-from scm.maps.model import MapTag
+from scm.records.city_map import MapTag
 from scm.scenery.bodies import NIGEL
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 

@@ -6,7 +6,7 @@ import pytest
 
 from scm.maps.bends import bends_too_tight, misfit
 from scm.maps.load import load_map
-from scm.maps.model import Lane, Segment
+from scm.records.city_map import Lane, Segment
 
 
 class Road:

@@ -2,8 +2,8 @@ import msgspec
 
 from scm.maps.conflicts import conflicting_groups
 from scm.maps.load import load_map
-from scm.maps.model import Conflict
 from scm.maps.route import Roads
+from scm.records.city_map import Conflict
 
 
 def test_the_two_ways_over_the_crossing_conflict():

@@ -7,8 +7,8 @@ import pytest
 
 from scm.maps.draw import bounds, draw_svg
 from scm.maps.load import load_map
-from scm.maps.model import Lane, Segment
 from scm.maps.svg import lane_data, number
+from scm.records.city_map import Lane, Segment
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -13,8 +13,8 @@ from scm.maps.conflicts import conflicting_groups
 from scm.maps.draw import draw_svg
 from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
-from scm.maps.model import CityMap
 from scm.maps.route import Roads
+from scm.records.city_map import CityMap
 from scm.traffic.conflict_table import card_of
 from scm.traffic.part import TrafficPart
 from scm.traffic.program import program_of

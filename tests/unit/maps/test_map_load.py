@@ -3,8 +3,8 @@ import pytest
 
 from scm.errors import MapError
 from scm.maps.load import MAPS_DIR, load_map, map_names
-from scm.maps.model import VehicleTag
 from scm.maps.vehicle_tags import bound_tag
+from scm.records.city_map import VehicleTag
 
 GOOD = (MAPS_DIR / "driving_school.toml").read_text(encoding="utf-8")
 

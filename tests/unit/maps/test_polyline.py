@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scm.geometry import Pose2
-from scm.maps.model import Segment
 from scm.maps.polyline import join, sample
+from scm.records.city_map import Segment
 
 STRAIGHT = Segment(length_m=1.0)
 LEFT = Segment(radius_m=0.5, angle_rad=math.pi / 2)

@@ -8,8 +8,8 @@ from scm.maps.check import problems_of
 from scm.maps.draw import draw_svg
 from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
-from scm.maps.model import Sign
 from scm.maps.route import Path, Roads
+from scm.records.city_map import Sign
 from scm.vehicles.drivers.rules import PLAIN, STOP_SIGN
 from scm.vehicles.drivers.streets import LIMIT, Streets
 

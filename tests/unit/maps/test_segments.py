@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scm.maps.load import load_map
-from scm.maps.model import Box, Wall
 from scm.maps.segments import box_outline, wall_outlines, wall_segments
+from scm.records.city_map import Box, Wall
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 

@@ -4,8 +4,8 @@ import msgspec
 import pytest
 
 from scm.maps.load import load_map
-from scm.maps.model import Lane, Segment
 from scm.maps.route import Roads
+from scm.records.city_map import Lane, Segment
 from scm.traffic.conflict_table import card_hash, card_of
 from scm.traffic.program import program_of
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
-from scm.maps.model import Conflict, Group, Junction
+from scm.records.city_map import Conflict, Group, Junction
 from scm.v2x.etsi import convert as ec
 from scm.v2x.etsi.cam_spatem import (
     PHASE_STATES,

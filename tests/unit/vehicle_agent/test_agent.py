@@ -11,8 +11,8 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import CarError, MessageError, RunError
 from scm.geometry import Pose2
 from scm.maps.load import load_map
-from scm.maps.model import RadioChannel
 from scm.maps.route import Roads
+from scm.records.city_map import RadioChannel
 from scm.v2x.exchange import Answer, Call, Incoming
 from scm.v2x.message import Refused
 from scm.v2x.messages.cam_tx import CamTx

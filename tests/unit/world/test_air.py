@@ -11,9 +11,9 @@ import pytest
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import MapError
 from scm.maps.load import load_map
-from scm.maps.model import RadioChannel
 from scm.maps.radio import with_radio
 from scm.maps.radio_check import radio_problems
+from scm.records.city_map import RadioChannel
 from scm.v2x.etsi.convert import cam_of
 from scm.v2x.etsi.events import ACCIDENT, DenmSender, Event
 from scm.v2x.messages.cam_rx import CamRx

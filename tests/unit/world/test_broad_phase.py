@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from scm.maps.model import Box, CityMap, Floor, MapTag, Wall
+from scm.records.city_map import Box, CityMap, Floor, MapTag, Wall
 from scm.world.broad_phase import TOUCH_M, Near, obstacles_of
 from scm.world.solids import obstacle_boxes
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scm.maps.model import RadioChannel
+from scm.records.city_map import RadioChannel
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "crossing_without_lights.py"
 

@@ -6,8 +6,8 @@ import pytest
 from msgspec.structs import replace
 
 from scm.maps.load import load_map
-from scm.maps.model import RadioChannel
 from scm.maps.radio import with_radio
+from scm.records.city_map import RadioChannel
 from scm.runtime.lockstep import Lockstep
 from scm.traffic.part import TrafficPart
 from scm.world.part import WorldPart

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from scm.maps.model import CityMap, Floor, Group, Junction, Light, MapTag, RadioChannel
-from scm.maps.model import Conflict as Stretch
+from scm.records.city_map import CityMap, Floor, Group, Junction, Light, MapTag, RadioChannel
+from scm.records.city_map import Conflict as Stretch
 from scm.v2x.messages.part_status import PartStatus
 from scm.vehicles.drivers.channel import channel_of
 from scm.world.delay_queue import Late

@@ -10,8 +10,8 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import Pose2
 from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
-from scm.maps.model import RadioChannel
 from scm.maps.route import Roads
+from scm.records.city_map import RadioChannel
 from scm.traffic.part import TrafficPart
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx

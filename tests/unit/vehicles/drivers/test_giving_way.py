@@ -8,8 +8,8 @@ import pytest
 
 from scm.clock import NS_PER_MS
 from scm.maps.grid_city import grid_city
-from scm.maps.model import RadioChannel, Sign
 from scm.maps.route import Roads
+from scm.records.city_map import RadioChannel, Sign
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers.channel import DEAF
 from scm.vehicles.drivers.driver_batch import Crowd

@@ -10,8 +10,8 @@ from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
 from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
-from scm.maps.model import RadioChannel
 from scm.maps.route import Roads
+from scm.records.city_map import RadioChannel
 from scm.v2x.etsi.convert import spatem_of
 from scm.v2x.etsi.topology import mapem_of, topology_of
 from scm.v2x.messages.spat import SignalGroup, Spat

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scm.clock import NS_PER_S
-from scm.maps.model import RadioChannel
+from scm.records.city_map import RadioChannel
 from scm.v2x.etsi.events import ACCIDENT, DenmSender, Event
 from scm.vehicles.drivers.channel import channel_of
 from scm.vehicles.drivers.warned import CAUTION, PLACES, Warnings, cautious
