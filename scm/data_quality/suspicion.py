@@ -44,7 +44,7 @@ class Suspicion:
     """A fault of measurement that would explain how two sensors differ.
 
     Attributes:
-        name: Of the library (`scm.vehicles.measures`).
+        name: Of the library (`scm.vehicles.sensor_faults`).
         channels: Where it would act.
         values, std: By the measure's own parameter names.
         sigma: How far from its neutral value, in standard deviations; what the car file allows

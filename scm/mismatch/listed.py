@@ -16,8 +16,8 @@ from scm.mismatch.findings import Equation
 from scm.replay.drive import Drive, has_odometer
 from scm.replay.numbers import Numbers
 from scm.vehicles.car import Car, all_terms
-from scm.vehicles.measure import all_measures
 from scm.vehicles.param import Param
+from scm.vehicles.sensor_fault import all_sensor_faults
 from scm.vehicles.term import flat
 
 PATCH, SPOTS_ACROSS = "surface_patch", 7
@@ -284,8 +284,8 @@ def terms_needed(car: Car) -> list[str]:
 
 @cache
 def _params(name: str) -> tuple[dict[str, Param], Mapping[str, float]]:
-    if name in all_measures():
-        measure = all_measures()[name]
+    if name in all_sensor_faults():
+        measure = all_sensor_faults()[name]
         return {p.reported: p for p in measure.params}, measure.neutral
     term = all_terms()[name]
     parts = flat([term])

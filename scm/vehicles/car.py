@@ -19,9 +19,9 @@ from scm.vehicles.assemble import setters_of
 from scm.vehicles.car_file_schema import FACTS, Fact
 from scm.vehicles.car_files import OWN_CARS, TYPES_DIR, car_files
 from scm.vehicles.correlated import Correlated, read_correlated
-from scm.vehicles.measure import Fault, all_measures, read_faults
 from scm.vehicles.own_term import SUFFIX, load_own_term
 from scm.vehicles.param import Param
+from scm.vehicles.sensor_fault import AppliedFault, all_sensor_faults, read_faults
 from scm.vehicles.term import Term, flat
 
 TERMS = "scm.vehicles.terms"
@@ -59,14 +59,14 @@ class Car:
     path: Path
     terms: tuple[Term, ...]
     values: Mapping[str, Quantity]
-    measures: tuple[Fault, ...] = ()
+    measures: tuple[AppliedFault, ...] = ()
     correlated: tuple[Correlated, ...] = ()
 
     @property
-    def faults(self) -> tuple[Fault, ...]:
+    def faults(self) -> tuple[AppliedFault, ...]:
         """The faults of its measurements with the car's numbers, in the file's order."""
         return tuple(
-            replace(fault, values={p.name: self.value(p.key) for p in fault.measure.params})
+            replace(fault, values={p.name: self.value(p.key) for p in fault.kind.params})
             for fault in self.measures
         )
 
@@ -116,7 +116,7 @@ class Car:
         """
         problems: list[str] = []
         new = read_faults(list(entries), problems)
-        kept = [old for old in self.measures if old.measure not in [f.measure for f in new]]
+        kept = [old for old in self.measures if old.kind not in [f.kind for f in new]]
         numbers = {**_fault_defaults(new), **self.values}
         numbers = _filled(self, numbers, values or {}, problems)
         return replace(self, measures=(*kept, *new), values=numbers)
@@ -274,11 +274,11 @@ def _defaults(terms: tuple[Term, ...]) -> dict[str, Quantity]:
     return {p.key: Quantity(p.default, None, p.unit, f"default of {owner}") for owner, p in own}
 
 
-def _fault_defaults(faults: Sequence[Fault]) -> dict[str, Quantity]:
+def _fault_defaults(faults: Sequence[AppliedFault]) -> dict[str, Quantity]:
     return {
-        p.key: Quantity(p.default, None, p.unit, f"default of {fault.measure.name}")
+        p.key: Quantity(p.default, None, p.unit, f"default of {fault.kind.name}")
         for fault in faults
-        for p in fault.measure.params
+        for p in fault.kind.params
     }
 
 
@@ -298,7 +298,7 @@ def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
 def _known_keys(terms: Sequence[Term]) -> dict[str, Param | Fact]:
     known = flat([*all_terms().values(), *terms])
     params = [*body14.PARAMS, *(param for term in known for param in term.params)]
-    params += [param for fault in all_measures().values() for param in fault.params]
+    params += [param for fault in all_sensor_faults().values() for param in fault.params]
     return {**FACTS, **{param.key: param for param in params}}
 
 

@@ -5,17 +5,17 @@ from collections.abc import Iterator, Sequence
 from scm.errors import TermError, nearest
 from scm.vehicles.car import all_terms
 from scm.vehicles.chapters import CHAPTERS, OTHERS, chapter_of
-from scm.vehicles.measure import Measure, all_measures
 from scm.vehicles.param import Param
 from scm.vehicles.physics_variables import SIGNALS
+from scm.vehicles.sensor_fault import SensorFault, all_sensor_faults
 from scm.vehicles.term import Term, flat, reads
 
-Effect = Term | Measure
+Effect = Term | SensorFault
 
 
 def all_effects() -> dict[str, Effect]:
     """Return every effect on a car, then every fault of measuring it, by name."""
-    return {**all_terms(), **all_measures()}
+    return {**all_terms(), **all_sensor_faults()}
 
 
 def effect_named(name: str) -> Effect:
@@ -33,7 +33,7 @@ def effect_named(name: str) -> Effect:
 
 def list_effects() -> str:
     """Return a line for each effect, by what it acts on."""
-    terms, faults = list(all_terms().values()), list(all_measures().values())
+    terms, faults = list(all_terms().values()), list(all_sensor_faults().values())
     width = max(len(name) for name in all_effects())
     lines = [f"{len(terms)} effects on a car, {len(faults)} faults of measuring it; "
              "`scm show terms NAME` tells one whole"]  # fmt: skip
@@ -64,7 +64,7 @@ def describe_term(name: str) -> str:
 
 def params_of(effect: Effect) -> list[Param]:
     """Return the numbers of an effect, each once."""
-    found = effect.params if isinstance(effect, Measure) else _of_term(effect)
+    found = effect.params if isinstance(effect, SensorFault) else _of_term(effect)
     return list({param.key: param for param in found}.values())
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from scm.vehicles.car import all_terms
-from scm.vehicles.measure import all_measures
+from scm.vehicles.sensor_fault import all_sensor_faults
 from scm.vehicles.term import flat
 
 PUBLIC = {
@@ -54,12 +54,12 @@ PUBLIC = {
     "clock_drift": {"rate"},
     "unit_error": {"factor"},
 }
-MEASURED = [name for name in PUBLIC if name in all_measures()]
+MEASURED = [name for name in PUBLIC if name in all_sensor_faults()]
 
 
 def params_of(name):
-    if name in all_measures():
-        return all_measures()[name].params
+    if name in all_sensor_faults():
+        return all_sensor_faults()[name].params
     return [param for term in flat([all_terms()[name]]) for param in term.params]
 
 
@@ -74,13 +74,13 @@ def test_an_effect_has_exactly_the_parameters_that_reports_name(name):
 
 @pytest.mark.parametrize("name", PUBLIC)
 def test_every_public_effect_can_be_switched_off(name):
-    effect = all_measures()[name] if name in all_measures() else all_terms()[name]
+    effect = all_sensor_faults()[name] if name in all_sensor_faults() else all_terms()[name]
     assert effect.neutral
 
 
 def test_every_fault_of_measurement_is_public():
-    assert set(MEASURED) == set(all_measures())
+    assert set(MEASURED) == set(all_sensor_faults())
 
 
 def test_no_name_means_both_a_physical_effect_and_a_fault_of_measurement():
-    assert not set(all_terms()) & set(all_measures())
+    assert not set(all_terms()) & set(all_sensor_faults())

@@ -17,7 +17,7 @@ from scm.mismatch.report.estimates import estimates_by_key
 from scm.mismatch.report.own_files import listed_terms, write_own_terms
 from scm.mismatch.report.toml_text import number, quoted, set_entry, set_list
 from scm.vehicles.car import Car, Quantity, Value, load_car
-from scm.vehicles.measure import Fault
+from scm.vehicles.sensor_fault import AppliedFault
 
 FILE = "car.toml"
 FOUND_DIGITS = 6  # of a number found: far more than any interval allows
@@ -71,10 +71,10 @@ def _equal(a: Value, b: Value, rel_tol: float = 1e-8) -> bool:
     return a == b
 
 
-def measure_entry(fault: Fault) -> str:
+def measure_entry(fault: AppliedFault) -> str:
     """Return a fault as a car file's `measures` list names it."""
     where = f" on {', '.join(fault.channels)}" if fault.channels else ""
-    return fault.measure.name + where
+    return fault.kind.name + where
 
 
 def _entries(

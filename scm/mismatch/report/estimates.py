@@ -8,7 +8,7 @@ from scm.mismatch.findings import Diagnosis, Effect, Estimate
 from scm.mismatch.report.own_files import own_terms
 from scm.vehicles.car import Car
 from scm.vehicles.describe_effects import all_effects, params_of
-from scm.vehicles.measure import all_measures
+from scm.vehicles.sensor_fault import all_sensor_faults
 
 _SAME = 0.01  # of a number: nearer than that, two are one
 
@@ -25,8 +25,8 @@ def estimates_by_key(
 
 
 def _of_effect(effect: Effect, car: Car, patched: Car) -> Iterator[tuple[str, Estimate]]:
-    measure = all_measures().get(effect.name)
-    if measure and measure.stands_for and measure not in [f.measure for f in patched.measures]:
+    measure = all_sensor_faults().get(effect.name)
+    if measure and measure.stands_for and measure not in [f.kind for f in patched.measures]:
         share = effect.parameters.get(measure.params[0].reported)
         if share is not None and car.has(measure.stands_for):
             yield measure.stands_for, _times(share, car.value(measure.stands_for))

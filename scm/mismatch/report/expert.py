@@ -238,8 +238,8 @@ def _reading() -> str:
 def _inputs(diagnosis: Diagnosis, evidence: Evidence, cars: tuple[Car, Car]) -> str:
     given, patched = cars
     new = [term.name for term in patched.terms if term not in given.terms]
-    old = [fault.measure for fault in given.measures]
-    new += [f.measure.name for f in patched.measures if f.measure not in old]
+    old = [fault.kind for fault in given.measures]
+    new += [f.kind.name for f in patched.measures if f.kind not in old]
     rows = [
         ("recordings", ", ".join(evidence.recordings)),
         ("car file", str(given.path)),

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import cache
 
 from scm.vehicles.car import all_terms
-from scm.vehicles.measure import all_measures
 from scm.vehicles.param import Param
+from scm.vehicles.sensor_fault import all_sensor_faults
 from scm.vehicles.term import flat
 
 
@@ -20,8 +20,8 @@ class Known:
 @cache
 def parameters_of(name: str) -> dict[str, Known]:
     """Return the parameters of an effect by public name; empty for one that is not listed."""
-    if name in all_measures():
-        measure = all_measures()[name]
+    if name in all_sensor_faults():
+        measure = all_sensor_faults()[name]
         return _known(measure.params, dict(measure.neutral))
     if name not in all_terms():
         return {}
@@ -40,4 +40,4 @@ def _known(params: tuple[Param, ...], neutral: dict[str, float]) -> dict[str, Kn
 
 def is_measure(name: str) -> bool:
     """Say whether an effect is a fault of measurement."""
-    return name in all_measures()
+    return name in all_sensor_faults()

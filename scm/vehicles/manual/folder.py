@@ -5,8 +5,8 @@ from pathlib import Path
 
 from scm.vehicles.chapters import CHAPTERS, OTHERS, chapter_of
 from scm.vehicles.describe_effects import Effect, all_effects, effect_named
-from scm.vehicles.manual.measure_page import draw_measure, measure_page
 from scm.vehicles.manual.picture import draw_term
+from scm.vehicles.manual.sensor_fault_page import draw_sensor_fault, sensor_fault_page
 from scm.vehicles.manual.term_page import term_page
 from scm.vehicles.term import Term
 
@@ -66,8 +66,8 @@ def write_manual(
 
 
 def _page(effect: Effect) -> str:
-    return term_page(effect) if isinstance(effect, Term) else measure_page(effect)
+    return term_page(effect) if isinstance(effect, Term) else sensor_fault_page(effect)
 
 
 def _picture(effect: Effect) -> str:
-    return draw_term(effect) if isinstance(effect, Term) else draw_measure(effect)
+    return draw_term(effect) if isinstance(effect, Term) else draw_sensor_fault(effect)

@@ -10,17 +10,19 @@ from scm.vehicles.effect_text import HEADINGS
 from scm.vehicles.jit import plain
 from scm.vehicles.param import LogNormal, Normal, Param
 
-Law = Callable[..., Any]
+EffectFunction = Callable[..., Any]
 
 
-def equations(law: Law) -> Iterator[str]:
+def equations(function: EffectFunction) -> Iterator[str]:
     """Yield the lines of the equation."""
-    yield from (line.strip() for line in _document(law).splitlines() if line.startswith("    "))
+    yield from (
+        line.strip() for line in _document(function).splitlines() if line.startswith("    ")
+    )
 
 
-def story(law: Law) -> str:
+def story(function: EffectFunction) -> str:
     """Return what the file says beside first line, equation and headings."""
-    body = _document(law).partition("\n")[2].partition(f"{HEADINGS[0]}:")[0]
+    body = _document(function).partition("\n")[2].partition(f"{HEADINGS[0]}:")[0]
     return " ".join(line for line in body.splitlines() if line and not line.startswith("    "))
 
 
@@ -56,5 +58,5 @@ def _prior(param: Param) -> str:
     return "anything inside the bounds" if param.fit else "a number of the method, never fitted"
 
 
-def _document(law: Law) -> str:
-    return inspect.getdoc(inspect.getmodule(plain(law))) or ""
+def _document(function: EffectFunction) -> str:
+    return inspect.getdoc(inspect.getmodule(plain(function))) or ""

@@ -9,7 +9,7 @@ from scm.data_quality.check import check
 from scm.data_quality.suspicion import Suspicion
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
-from scm.vehicles.measure import Fault, Series, all_measures, measure
+from scm.vehicles.sensor_fault import AppliedFault, Series, all_sensor_faults, apply_faults
 
 Drive = Callable[[int], Recording]
 Suspicions = Callable[[str, dict[str, float], int], tuple[Suspicion, ...]]
@@ -38,7 +38,7 @@ INJECTED = [
 def with_fault(recording: Recording, name: str, values: dict[str, float], *where: str) -> Recording:
     """Return what the recording would hold with a fault of the library."""
     true = {key: Series(c.t, c.values) for key, c in recording.channels.items()}
-    seen = measure(true, [Fault(all_measures()[name], values, where)])
+    seen = apply_faults(true, [AppliedFault(all_sensor_faults()[name], values, where)])
     channels = {
         key: replace(c, t=seen[key].t_s, values=seen[key].values)
         for key, c in recording.channels.items()

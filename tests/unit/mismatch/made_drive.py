@@ -12,7 +12,7 @@ from scm.recording.read import Channel, Recording
 from scm.replay.drive import Drive
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
-from scm.vehicles.measure import all_measures
+from scm.vehicles.sensor_fault import all_sensor_faults
 
 STEP_S = 0.01
 POSE_STD, YAW_STD, GYRO_STD, ACCEL_STD = 0.002, 0.0087, 0.002, 0.03
@@ -36,7 +36,7 @@ def car_with(numbers=()):
     numbers = dict(numbers)
     sensed = {key: value for key, value in numbers.items() if key.startswith("measure.")}
     driven_by = {key: value for key, value in numbers.items() if key not in sensed}
-    names = [n for n, m in all_measures().items() if sensed.keys() & {p.key for p in m.params}]
+    names = [n for n, m in all_sensor_faults().items() if sensed.keys() & {p.key for p in m.params}]
     car = big_nigel().with_terms([], driven_by)
     return car.with_measures(names, sensed) if names else car
 

@@ -15,7 +15,7 @@ from scm.mismatch.report.toml_text import set_entry, set_list
 from scm.vehicles.car import all_terms, load_car
 from scm.vehicles.describe_effects import all_effects, params_of
 from scm.vehicles.fleet import Fleet
-from scm.vehicles.measure import all_measures
+from scm.vehicles.sensor_fault import all_sensor_faults
 from tests.unit.mismatch import made_up_findings as made_up
 
 SHOWN = Evidence(vehicle="nigel", recordings=("tuesday.yaml",))
@@ -52,7 +52,7 @@ def patched_with(car, name, params):
     numbers = {param.key: number_of(param) for param in params}
     if name in all_terms():
         return car.with_terms([name], numbers)
-    needs_channel = all_measures()[name].acts_on == ()
+    needs_channel = all_sensor_faults()[name].acts_on == ()
     return car.with_measures([f"{name} on imu.gyro_z" if needs_channel else name], numbers)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scm.vehicles.car import all_terms
-from scm.vehicles.measure import all_measures
+from scm.vehicles.sensor_fault import all_sensor_faults
 from tests.reality import cases
 from tests.reality.cases import draw_kinds, make_case, names_for, seal, write_cases
 from tests.reality.concealed import ALIKE, EFFECTS, LISTED
@@ -15,7 +15,7 @@ from tests.reality.numbers import nominal
 
 def test_every_listed_name_and_parameter_is_one_of_the_librarys():
     for effect in LISTED:
-        library = all_measures().get(effect.name) or all_terms()[effect.name]
+        library = all_sensor_faults().get(effect.name) or all_terms()[effect.name]
         parts = [library, *getattr(library, "also", ())]
         names = {param.reported for part in parts for param in part.params}
         for car, smallest in effect.smallest.items():

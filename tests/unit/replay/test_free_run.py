@@ -15,8 +15,8 @@ from scm.recording.read import Channel, Recording, read_recordings
 from scm.replay.free_run import HORIZONS_S, error_table, free_run
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.fleet import Fleet
-from scm.vehicles.measure import Series, measure
 from scm.vehicles.sensor_correction import POSES
+from scm.vehicles.sensor_fault import Series, apply_faults
 
 
 @pytest.fixture(scope="module")
@@ -321,7 +321,7 @@ def test_faults_of_measurement_in_the_car_file_are_undone(
     nigel: Car, name: str, values: dict[str, float]
 ) -> None:
     faulty, recording = nigel.with_measures([name], values), drive(nigel)
-    seen = measure({n: Series(recording.channels[n].t, recording.channels[n].values)
+    seen = apply_faults({n: Series(recording.channels[n].t, recording.channels[n].values)
                     for n in POSES}, faulty.faults)  # fmt: skip
     channels = {n: replace(recording.channels[n], t=s.t_s, values=s.values)
                 for n, s in seen.items()}  # fmt: skip

@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from scm.recording.read import Channel, Recording
-from scm.vehicles.measure import Fault, Series, all_measures, measure
 from scm.vehicles.sensor_correction import without_faults
+from scm.vehicles.sensor_fault import AppliedFault, Series, all_sensor_faults, apply_faults
 
 T = np.linspace(3.0, 63.0, 1500)
 TRUE = {
@@ -30,12 +30,12 @@ STRONG = [
 
 
 def faults_of(rows):
-    return [Fault(all_measures()[name], values) for name, values in rows]
+    return [AppliedFault(all_sensor_faults()[name], values) for name, values in rows]
 
 
 def measured(faults):
     """What a recording with these faults holds."""
-    seen = measure({name: Series(T, values) for name, values in TRUE.items()}, faults)
+    seen = apply_faults({name: Series(T, values) for name, values in TRUE.items()}, faults)
     channels = {
         name: Channel(s.t_s, s.values, None, (0.0, 0.0), "ratio") for name, s in seen.items()
     }
@@ -64,7 +64,9 @@ def test_a_recording_without_such_faults_stays_as_it_is():
 
 
 def test_a_unit_is_put_right_where_it_is_wrong():
-    fault = Fault(all_measures()["unit_error"], {"factor": 180.0 / np.pi}, ("pose.yaw",))
+    fault = AppliedFault(
+        all_sensor_faults()["unit_error"], {"factor": 180.0 / np.pi}, ("pose.yaw",)
+    )
     right = without_faults(measured([fault]), [fault])
     assert_allclose(right.channels["pose.yaw"].values, TRUE["pose.yaw"], atol=1e-9)
     assert_allclose(right.channels["pose.x"].values, TRUE["pose.x"], atol=0.0)

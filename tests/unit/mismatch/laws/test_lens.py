@@ -12,7 +12,7 @@ from scm.mismatch.likelihood import Likelihood
 from scm.mismatch.parts import split
 from scm.mismatch.patch import patched
 from scm.replay.drive import POSES, Drive
-from scm.vehicles.measure import Series, measure
+from scm.vehicles.sensor_fault import Series, apply_faults
 from tests.unit.mismatch.made_drive import big_nigel, car_with, driven, nigel
 
 PER_M = 0.12
@@ -34,7 +34,7 @@ def test_a_car_file_with_the_lens_takes_it_out_of_what_free_runs_are_held_agains
     poses = {name: Series(true.channel(name).t, true.channel(name).values) for name in POSES}
     seen = {
         name: replace(true.channel(name), values=series.values)
-        for name, series in measure(poses, lens.faults).items()
+        for name, series in apply_faults(poses, lens.faults).items()
     }
     drive = Drive(replace(true, channels={**true.channels, **seen}), big_nigel())
     fit, _ = judge([drive], big_nigel(), lens, split(Likelihood([drive], big_nigel())))
@@ -47,5 +47,5 @@ def test_the_car_file_has_the_lens(seen, tmp_path):
     fitted = Fitted((LAW,), np.zeros(own), np.array([PER_M]), np.zeros(1), 0.0,
                     np.zeros((1, own + 1)), covariance=np.eye(own + 1))  # fmt: skip
     car = patched(nigel(), model, fitted, tmp_path)
-    assert [fault.measure.name for fault in car.faults] == [LENS]
+    assert [fault.kind.name for fault in car.faults] == [LENS]
     assert car.value("measure.camera_lens_x_per_m") == PER_M

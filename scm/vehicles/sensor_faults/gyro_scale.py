@@ -7,8 +7,8 @@ Source: IEEE Std 952, scale factor error.
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def gyro_scale(value: Floats, scale: float) -> Floats:
@@ -16,8 +16,8 @@ def gyro_scale(value: Floats, scale: float) -> Floats:
     return scale * value
 
 
-MEASURE = Measure(
-    laws={"imu.gyro_z": gyro_scale},
+SENSOR_FAULT = SensorFault(
+    functions={"imu.gyro_z": gyro_scale},
     neutral={"scale": 1.0},
     shows_in=("circle",),
     params=(

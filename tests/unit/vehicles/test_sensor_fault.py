@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scm.errors import TermError
-from scm.vehicles.measure import Fault, Series, all_measures, measure
+from scm.vehicles.sensor_fault import AppliedFault, Series, all_sensor_faults, apply_faults
 
 T = np.linspace(2.0, 12.0, 101)
 
@@ -30,7 +30,7 @@ def drive():
 
 
 def seen(name, channels=(), **values):
-    return measure(drive(), [Fault(all_measures()[name], values, channels)])
+    return apply_faults(drive(), [AppliedFault(all_sensor_faults()[name], values, channels)])
 
 
 def test_a_late_pose_shows_at_its_stamp_where_the_car_was_before():
@@ -75,10 +75,10 @@ def test_a_tilted_camera_sees_what_a_pinhole_at_that_angle_sees():
     taken_x, taken_y = height * aside / depth, height * up / depth
     at_origin = -height * s / c
     at = np.arange(3.0)
-    channels = measure(
+    channels = apply_faults(
         {"pose.x": Series(at, x), "pose.y": Series(at, y)},
         [
-            Fault(all_measures()["camera_tilt"], {"tilt_x": math.tan(angle) / height}),
+            AppliedFault(all_sensor_faults()["camera_tilt"], {"tilt_x": math.tan(angle) / height}),
         ],
     )
     np.testing.assert_allclose(channels["pose.x"].values / c**2, taken_x - at_origin, rtol=1e-12)
@@ -141,31 +141,33 @@ def test_a_unit_error_multiplies_the_channel_that_is_named_and_no_other():
 
 def test_a_unit_error_without_a_channel_is_refused():
     with pytest.raises(TermError, match="unit_error: expected the channels"):
-        Fault(all_measures()["unit_error"], {"factor": 2.0})
+        AppliedFault(all_sensor_faults()["unit_error"], {"factor": 2.0})
 
 
 def test_an_unknown_parameter_is_refused_with_the_nearest():
     with pytest.raises(TermError, match=r"gyro_bias: no parameter 'bas'.*bias"):
-        Fault(all_measures()["gyro_bias"], {"bas": 0.1})
+        AppliedFault(all_sensor_faults()["gyro_bias"], {"bas": 0.1})
 
 
 def test_a_fault_whose_channel_is_missing_says_which():
     with pytest.raises(TermError, match=r"pose_point: needs the channel pose\.yaw"):
-        measure({"pose.x": drive()["pose.x"]}, [Fault(all_measures()["pose_point"], {})])
+        apply_faults(
+            {"pose.x": drive()["pose.x"]}, [AppliedFault(all_sensor_faults()["pose_point"], {})]
+        )
 
 
 def test_channels_of_other_stamps_are_read_in_between_and_angles_the_short_way():
     yaw = Series(np.array([0.0, 1.0]), np.array([3.0, -3.0]))  # turns left over the seam
     x = Series(np.array([0.5]), np.array([0.0]))
-    fault = Fault(all_measures()["pose_point"], {"ahead": 1.0})
-    assert measure({"pose.x": x, "pose.yaw": yaw}, [fault])["pose.x"].values[0] < -0.99
+    fault = AppliedFault(all_sensor_faults()["pose_point"], {"ahead": 1.0})
+    assert apply_faults({"pose.x": x, "pose.yaw": yaw}, [fault])["pose.x"].values[0] < -0.99
 
 
 def test_later_faults_see_what_earlier_ones_left():
-    scaled = Fault(all_measures()["gyro_scale"], {"scale": 2.0})
-    biased = Fault(all_measures()["gyro_bias"], {"bias": 0.1})
-    assert measure(drive(), [scaled, biased])["imu.gyro_z"].values[0] == pytest.approx(0.5)
-    assert measure(drive(), [biased, scaled])["imu.gyro_z"].values[0] == pytest.approx(0.6)
+    scaled = AppliedFault(all_sensor_faults()["gyro_scale"], {"scale": 2.0})
+    biased = AppliedFault(all_sensor_faults()["gyro_bias"], {"bias": 0.1})
+    assert apply_faults(drive(), [scaled, biased])["imu.gyro_z"].values[0] == pytest.approx(0.5)
+    assert apply_faults(drive(), [biased, scaled])["imu.gyro_z"].values[0] == pytest.approx(0.6)
 
 
 def test_two_faults_of_one_file_act_on_the_same_true_position():

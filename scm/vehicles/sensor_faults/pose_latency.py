@@ -9,8 +9,8 @@ Source: textbook dead time; camera exposure, detection and radio together.
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def pose_latency(t: Floats, delay: float) -> Floats:
@@ -18,8 +18,8 @@ def pose_latency(t: Floats, delay: float) -> Floats:
     return t + delay
 
 
-MEASURE = Measure(
-    laws={"pose.*": pose_latency},
+SENSOR_FAULT = SensorFault(
+    functions={"pose.*": pose_latency},
     stamps=True,
     neutral={"delay": 0.0},
     shows_in=("steering_step", "throttle_step"),

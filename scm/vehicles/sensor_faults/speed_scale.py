@@ -7,8 +7,8 @@ Source: rolling without slip; an odometer knows its wheels' radius and gearing o
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def speed_scale(value: Floats, scale: float) -> Floats:
@@ -16,8 +16,8 @@ def speed_scale(value: Floats, scale: float) -> Floats:
     return scale * value
 
 
-MEASURE = Measure(
-    laws={"speed": speed_scale},
+SENSOR_FAULT = SensorFault(
+    functions={"speed": speed_scale},
     neutral={"scale": 1.0},
     shows_in=("straight",),
     params=(

@@ -8,8 +8,8 @@ Source: dirty disc, missed interrupts; the definition is ours. On encoders alone
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def encoder_loss(value: Floats, fraction: float) -> Floats:
@@ -17,8 +17,8 @@ def encoder_loss(value: Floats, fraction: float) -> Floats:
     return (1.0 - fraction) * value
 
 
-MEASURE = Measure(
-    laws={"encoder.*": encoder_loss},
+SENSOR_FAULT = SensorFault(
+    functions={"encoder.*": encoder_loss},
     neutral={"fraction": 0.0},
     shows_in=("straight",),
     params=(

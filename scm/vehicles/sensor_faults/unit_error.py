@@ -8,8 +8,8 @@ Source: definition; the factor of a mere scale fault lies near 1, that of a unit
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import LogNormal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def unit_error(value: Floats, factor: float) -> Floats:
@@ -17,8 +17,8 @@ def unit_error(value: Floats, factor: float) -> Floats:
     return factor * value
 
 
-MEASURE = Measure(
-    laws={"*": unit_error},
+SENSOR_FAULT = SensorFault(
+    functions={"*": unit_error},
     neutral={"factor": 1.0},
     shows_in=("any",),
     acts_on=(),

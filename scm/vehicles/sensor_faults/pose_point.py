@@ -11,8 +11,8 @@ believed one: + ahead of it, + to its left.
 import numpy as np
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def pose_point(pose_x: Floats, pose_yaw: Floats, ahead: float, aside: float) -> Floats:
@@ -25,8 +25,8 @@ def pose_point_y(pose_y: Floats, pose_yaw: Floats, ahead: float, aside: float) -
     return pose_y + (np.sin(pose_yaw) * ahead + np.cos(pose_yaw) * aside)
 
 
-MEASURE = Measure(
-    laws={"pose.x": pose_point, "pose.y": pose_point_y},
+SENSOR_FAULT = SensorFault(
+    functions={"pose.x": pose_point, "pose.y": pose_point_y},
     neutral={"ahead": 0.0, "aside": 0.0},
     shows_in=("tight_circle", "figure_eight"),
     params=(

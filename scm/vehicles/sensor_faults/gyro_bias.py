@@ -7,8 +7,8 @@ Source: IEEE Std 952, gyro error model; + shows a turn to the left.
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def gyro_bias(value: Floats, bias: float) -> Floats:
@@ -16,8 +16,8 @@ def gyro_bias(value: Floats, bias: float) -> Floats:
     return value + bias
 
 
-MEASURE = Measure(
-    laws={"imu.gyro_z": gyro_bias},
+SENSOR_FAULT = SensorFault(
+    functions={"imu.gyro_z": gyro_bias},
     neutral={"bias": 0.0},
     shows_in=("standing", "straight"),
     params=(

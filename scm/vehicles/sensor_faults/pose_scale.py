@@ -7,8 +7,8 @@ Source: ground-plane calibration; a camera believed at the wrong height does thi
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def pose_scale(value: Floats, scale: float) -> Floats:
@@ -16,8 +16,8 @@ def pose_scale(value: Floats, scale: float) -> Floats:
     return scale * value
 
 
-MEASURE = Measure(
-    laws={"pose.x": pose_scale, "pose.y": pose_scale},
+SENSOR_FAULT = SensorFault(
+    functions={"pose.x": pose_scale, "pose.y": pose_scale},
     neutral={"scale": 1.0},
     shows_in=("straight", "circle"),
     params=(

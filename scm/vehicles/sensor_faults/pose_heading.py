@@ -8,8 +8,8 @@ Source: rigid-body geometry; + where the marker is turned counter-clockwise on t
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def pose_heading(value: Floats, offset: float) -> Floats:
@@ -17,8 +17,8 @@ def pose_heading(value: Floats, offset: float) -> Floats:
     return value + offset
 
 
-MEASURE = Measure(
-    laws={"pose.yaw": pose_heading},
+SENSOR_FAULT = SensorFault(
+    functions={"pose.yaw": pose_heading},
     neutral={"offset": 0.0},
     shows_in=("straight",),
     params=(

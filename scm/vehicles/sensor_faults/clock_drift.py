@@ -7,8 +7,8 @@ Source: crystal tolerance is 1e-4; interpolating drivers and virtual machines re
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def clock_drift(t: Floats, start: float, rate: float) -> Floats:
@@ -16,8 +16,8 @@ def clock_drift(t: Floats, start: float, rate: float) -> Floats:
     return t + rate * (t - start)
 
 
-MEASURE = Measure(
-    laws={"*": clock_drift},
+SENSOR_FAULT = SensorFault(
+    functions={"*": clock_drift},
     stamps=True,
     neutral={"rate": 0.0},
     shows_in=("long_drive",),

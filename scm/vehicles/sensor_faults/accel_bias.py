@@ -7,8 +7,8 @@ Shows in: standing still.   Source: IEEE Std 1293, accelerometer model; + forwar
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def accel_bias(value: Floats, along: float) -> Floats:
@@ -21,8 +21,8 @@ def accel_bias_y(value: Floats, across: float) -> Floats:
     return value + across
 
 
-MEASURE = Measure(
-    laws={"imu.accel_x": accel_bias, "imu.accel_y": accel_bias_y},
+SENSOR_FAULT = SensorFault(
+    functions={"imu.accel_x": accel_bias, "imu.accel_y": accel_bias_y},
     neutral={"along": 0.0, "across": 0.0},
     shows_in=("standing",),
     params=(

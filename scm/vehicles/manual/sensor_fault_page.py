@@ -11,7 +11,7 @@ from scm.vehicles.fleet import Fleet
 from scm.vehicles.manual.line_svg import Line, draw_lines
 from scm.vehicles.manual.page_parts import equations, headings, parameter_table, story
 from scm.vehicles.manual.shown import strong
-from scm.vehicles.measure import Fault, Measure, Series, measure
+from scm.vehicles.sensor_fault import AppliedFault, SensorFault, Series, apply_faults
 
 _EVERY_S = 1.0 / 30.0
 _SECONDS = 9.0
@@ -29,13 +29,13 @@ _TITLES = {
 }  # fmt: skip
 
 
-def measure_page(fault: Measure) -> str:
+def sensor_fault_page(fault: SensorFault) -> str:
     """Return one fault's page."""
-    text = story(fault.law)
-    channels = ", ".join(f"`{name}`" for name in fault.acts_on or fault.laws)
+    text = story(fault.function)
+    channels = ", ".join(f"`{name}`" for name in fault.acts_on or fault.functions)
     shown = _numbers(fault)
     numbers = ", ".join(f"`{p.key} = {shown[p.name]:g}`" for p in fault.params)
-    lines = [f"# {fault.name}", "", fault.about, "", "```", *equations(fault.law), "```", ""]
+    lines = [f"# {fault.name}", "", fault.about, "", "```", *equations(fault.function), "```", ""]
     lines += [text, ""] if text else []
     lines += [f"![{fault.name}: true and measured]({fault.name}.svg)", ""]
     lines += [f"*nigel swinging slowly; grey: true, blue: as measured with {numbers}.*", ""]
@@ -43,12 +43,12 @@ def measure_page(fault: Measure) -> str:
     lines += [f"**Acts on:** the stamps of {channels}" if fault.stamps else
               f"**Acts on:** {channels}", ""]  # fmt: skip
     lines += list(_example(fault))
-    code = fault.law.__module__.replace(".", "/")
+    code = fault.function.__module__.replace(".", "/")
     lines += [f"Code: `{code}.py` · [all effects](README.md)"]
     return "\n".join(lines) + "\n"
 
 
-def _example(fault: Measure) -> Iterator[str]:
+def _example(fault: SensorFault) -> Iterator[str]:
     """What a car file says."""
     where = " on speed" if fault.acts_on == () else ""
     shown = _numbers(fault)
@@ -59,13 +59,15 @@ def _example(fault: Measure) -> Iterator[str]:
     yield from ("```", "")
 
 
-def draw_measure(fault: Measure) -> str:
+def draw_sensor_fault(fault: SensorFault) -> str:
     """Return the picture of one fault."""
     true = _drive()
     numbers = _numbers(fault)
     seen = _channel(fault)
     known = {name: series for name, series in true.items() if name != "speed" or seen == "speed"}
-    measured = measure(known, [Fault(fault, numbers, (seen,) if fault.acts_on == () else ())])
+    measured = apply_faults(
+        known, [AppliedFault(fault, numbers, (seen,) if fault.acts_on == () else ())]
+    )
     lines = []
     for label, channels in (("true", true), ("measured", measured)):
         shown = channels[seen]
@@ -76,17 +78,17 @@ def draw_measure(fault: Measure) -> str:
     return draw_lines(lines, "time [s]", _TITLES[seen])
 
 
-def _numbers(fault: Measure) -> dict[str, float]:
+def _numbers(fault: SensorFault) -> dict[str, float]:
     chosen = {param.name: strong(param) for param in fault.params}
     return chosen | _NUMBERS.get(fault.name, {})
 
 
-def _channel(fault: Measure) -> str:
+def _channel(fault: SensorFault) -> str:
     if fault.acts_on == ():
         return "speed"
     if fault.name in _SEEN:
         return _SEEN[fault.name]
-    names = list(fault.laws)
+    names = list(fault.functions)
     if fault.stamps:
         return "pose.yaw"
     if "pose.y" in names:

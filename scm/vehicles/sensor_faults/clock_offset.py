@@ -8,8 +8,8 @@ Source: unsynchronised computers; + where the poses' clock is ahead. A positive 
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def clock_offset(t: Floats, offset: float) -> Floats:
@@ -17,8 +17,8 @@ def clock_offset(t: Floats, offset: float) -> Floats:
     return t + offset
 
 
-MEASURE = Measure(
-    laws={"*": clock_offset},
+SENSOR_FAULT = SensorFault(
+    functions={"*": clock_offset},
     stamps=True,
     neutral={"offset": 0.0},
     shows_in=("steering_step", "throttle_step"),

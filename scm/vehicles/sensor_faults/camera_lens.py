@@ -16,8 +16,8 @@ Source: radial distortion (Brown, Decentering Distortion of Lenses, 1966), first
 import numpy as np
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def _scale(x: Floats, y: Floats, per_x: float, per_y: float, per_square: float) -> Floats:
@@ -38,8 +38,8 @@ def camera_lens_y(
     return pose_y * _scale(pose_x, pose_y, per_x, per_y, per_square)
 
 
-MEASURE = Measure(
-    laws={"pose.x": camera_lens, "pose.y": camera_lens_y},
+SENSOR_FAULT = SensorFault(
+    functions={"pose.x": camera_lens, "pose.y": camera_lens_y},
     neutral={"per_x": 0.0, "per_y": 0.0, "per_square": 0.0},
     shows_in=("circles_at_the_ends",),
     params=(

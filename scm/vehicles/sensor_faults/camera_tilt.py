@@ -16,8 +16,8 @@ Source: pinhole projection (Hartley and Zisserman, Multiple View Geometry, chapt
 import numpy as np
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def _depth(x: Floats, y: Floats, tilt_x: float, tilt_y: float) -> Floats:
@@ -34,8 +34,8 @@ def camera_tilt_y(pose_x: Floats, pose_y: Floats, tilt_x: float, tilt_y: float) 
     return pose_y / _depth(pose_x, pose_y, tilt_x, tilt_y)
 
 
-MEASURE = Measure(
-    laws={"pose.x": camera_tilt, "pose.y": camera_tilt_y},
+SENSOR_FAULT = SensorFault(
+    functions={"pose.x": camera_tilt, "pose.y": camera_tilt_y},
     neutral={"tilt_x": 0.0, "tilt_y": 0.0},
     shows_in=("circles_at_the_ends",),
     params=(

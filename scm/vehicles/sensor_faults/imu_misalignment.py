@@ -10,8 +10,8 @@ Source: rotation of axes; + where the sensor is turned counter-clockwise (left) 
 import math
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def imu_misalignment(imu_accel_x: Floats, imu_accel_y: Floats, angle: float) -> Floats:
@@ -24,8 +24,8 @@ def imu_misalignment_y(imu_accel_x: Floats, imu_accel_y: Floats, angle: float) -
     return math.cos(angle) * imu_accel_y - math.sin(angle) * imu_accel_x
 
 
-MEASURE = Measure(
-    laws={"imu.accel_x": imu_misalignment, "imu.accel_y": imu_misalignment_y},
+SENSOR_FAULT = SensorFault(
+    functions={"imu.accel_x": imu_misalignment, "imu.accel_y": imu_misalignment_y},
     neutral={"angle": 0.0},
     shows_in=("hard_braking", "circle"),
     params=(

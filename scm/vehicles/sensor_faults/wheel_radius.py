@@ -9,8 +9,8 @@ Source: rolling without slip; worn, soft or wrong tyres.
 """
 
 from scm.arrays import Floats
-from scm.vehicles.measure import Measure
 from scm.vehicles.param import Normal, Param
+from scm.vehicles.sensor_fault import SensorFault
 
 
 def wheel_radius(value: Floats, scale: float) -> Floats:
@@ -18,8 +18,8 @@ def wheel_radius(value: Floats, scale: float) -> Floats:
     return value / scale
 
 
-MEASURE = Measure(
-    laws={"encoder.*": wheel_radius, "wheel_speed.*": wheel_radius},
+SENSOR_FAULT = SensorFault(
+    functions={"encoder.*": wheel_radius, "wheel_speed.*": wheel_radius},
     neutral={"scale": 1.0},
     shows_in=("straight",),
     stands_for="wheel.radius_m",
