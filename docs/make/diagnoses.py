@@ -115,9 +115,9 @@ def _figures(found: Found) -> None:
             f"{name} {e.value:.4g} ({e.low:.4g} to {e.high:.4g})"
             for name, e in effect.parameters.items()
         )
-        rivals = ", ".join(f"{r.name} {r.probability:.2f}" for r in effect.rivals[:3])
-        _say(f"effect: {effect.name}: {numbers}; {effect.said} rivals: {rivals}")
-    for own in found.evidence.ordinary:
+        rivals = ", ".join(f"{r.name} {r.probability:.2f}" for r in effect.alternatives[:3])
+        _say(f"effect: {effect.name}: {numbers}; {effect.text} rivals: {rivals}")
+    for own in found.evidence.refitted:
         if abs(own.found.value - own.given) > 0.5 * (own.given_std or 1.0):
             _say(f"own: {own.key}: {own.given:.4g} -> {own.found.value:.4g}")
     model, retuned, runs = found.model, found.retuned_car, found.evidence.free_runs

@@ -116,7 +116,7 @@ def _replayed(
     car = car or load_car(recording.vehicle, trusted=False)
     who = f"{recording.name}, " if path.suffix == SUFFIX else ""
     prepared = prepare(recording, car, strict=arguments.strict)
-    doubtful = [f"{p.channel}: {p.said}" for p in prepared.problems if p.name in DOUBTFUL]
+    doubtful = [f"{p.channel}: {p.text}" for p in prepared.problems if p.name in DOUBTFUL]
     for line in (*prepared.account, *doubtful):
         print(f"{path}  {who}{line}")
     run = joined(_runs(path, prepared.recordings, car, arguments.horizon_s))

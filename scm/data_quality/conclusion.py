@@ -28,7 +28,7 @@ def no_verdict(
     return DataProblem(
         channel="*",
         name="no_verdict",
-        said=f"The car cannot be judged: {'; '.join(lacks)}. {_still(relations, suspicions)}",
+        text=f"The car cannot be judged: {'; '.join(lacks)}. {_still(relations, suspicions)}",
         record_instead=ANOTHER if list(lacks) == [OTHER_CAR] else RECORD,
     )
 
@@ -38,7 +38,7 @@ def _still(relations: Sequence[Relation], suspicions: Sequence[Suspicion]) -> st
     if not others:
         return "No other sensor shows the poses' motion for long enough to be held against them."
     named = ", ".join(dict.fromkeys(WORDS.get(name, name) for name in others))
-    said = list(dict.fromkeys(s.said for s in suspicions if s.said and not s.repaired))
-    if not said:
+    sentences = list(dict.fromkeys(s.text for s in suspicions if s.text and not s.repaired))
+    if not sentences:
         return f"What can still be said: the poses agree with {named}."
-    return f"What can still be said: {' '.join(said[:MOST])}"
+    return f"What can still be said: {' '.join(sentences[:MOST])}"

@@ -60,7 +60,7 @@ def _missing(recording: Recording) -> Iterator[DataProblem]:
         yield DataProblem(
             channel="command.throttle",
             name="missing",
-            said="Nothing says what drove the car, so no simulator can drive it again: neither its "
+            text="Nothing says what drove the car, so no simulator can drive it again: neither its "
             "drive nor its tyres can be judged.",
             record_instead=RECORD,
         )
@@ -68,7 +68,7 @@ def _missing(recording: Recording) -> Iterator[DataProblem]:
         yield DataProblem(
             channel="command.throttle",
             name="missing",
-            said="There is no throttle command; only a car whose file has a speed control can be "
+            text="There is no throttle command; only a car whose file has a speed control can be "
             "driven again without one.",
             record_instead=RECORD,
         )
@@ -76,7 +76,7 @@ def _missing(recording: Recording) -> Iterator[DataProblem]:
         yield DataProblem(
             channel="command.acceleration",
             name="assumed",
-            said="The car is driven by its commanded acceleration: over more than 3 s its speed is "
+            text="The car is driven by its commanded acceleration: over more than 3 s its speed is "
             "the measured one, so one that drifts slowly from its command does not show.",
             corrected="Added up to a speed from the measured one.",
             record_instead="Record the speed that the car was asked for as well.",
@@ -85,7 +85,7 @@ def _missing(recording: Recording) -> Iterator[DataProblem]:
         yield DataProblem(
             channel="command.steering",
             name="missing",
-            said="There is no steering command, so no simulator can drive the same way again.",
+            text="There is no steering command, so no simulator can drive the same way again.",
             record_instead=RECORD,
         )
     missing = [name for name in ("pose.x", "pose.y", "pose.yaw") if name not in have]
@@ -93,7 +93,7 @@ def _missing(recording: Recording) -> Iterator[DataProblem]:
         yield DataProblem(
             channel=", ".join(missing) if len(missing) < 3 else "pose.*",
             name="missing",
-            said="Without a whole pose there is no measure of where the car went, and nothing that "
+            text="Without a whole pose there is no measure of where the car went, and nothing that "
             "another sensor could be held against.",
             record_instead="Record x, y and yaw of the car by camera, motion capture or satellite.",
         )
@@ -109,7 +109,7 @@ def _range(recording: Recording, name: str, channel: Series) -> Iterator[DataPro
     yield DataProblem(
         channel=name,
         name="range",
-        said=f"Reaches {largest:.3g}; {100.0 * beyond:.1f} % of the rows are beyond {limit:g}.",
+        text=f"Reaches {largest:.3g}; {100.0 * beyond:.1f} % of the rows are beyond {limit:g}.",
         record_instead="Record the command that the car obeys, after its limits.",
     )
 
@@ -120,7 +120,7 @@ def _constant(name: str, channel: Series) -> Iterator[DataProblem]:
         yield DataProblem(
             channel=name,
             name="constant",
-            said=f"Stays at {float(np.median(channel.values)):.3g}: delays, lags and play of the "
+            text=f"Stays at {float(np.median(channel.values)):.3g}: delays, lags and play of the "
             f"{other} cannot show, only its steady state.",
             record_instead="Drive with steps and sines of this command.",
         )
@@ -134,7 +134,7 @@ def _apart(recording: Recording, poses: Track) -> Iterator[DataProblem]:
             yield DataProblem(
                 channel=name,
                 name="clock",
-                said=f"Is stamped from {t[0]:.1f} s to {t[-1]:.1f} s, the poses from "
+                text=f"Is stamped from {t[0]:.1f} s to {t[-1]:.1f} s, the poses from "
                 f"{poses.t[0]:.1f} s to {poses.t[-1]:.1f} s: they share no time, as of two clocks.",
                 record_instead="Stamp every table by one clock, or give the `offset` of the time "
                 "column in the recording's description.",
@@ -177,13 +177,13 @@ def _unmoved(
     length = car.value("body.wheelbase_m") if car else WHEELBASE_M
     right, left = np.percentile(np.arctan(length * rate[going] / speed[going]), (5, 95))
     if _stays(recording, "command.steering") and left - right > TURNED_RAD:
-        said = f"The steering stays as it is, and the wheels turned by {left - right:.2f} rad"
-        yield _unrelated("command.steering", said)
+        text = f"The steering stays as it is, and the wheels turned by {left - right:.2f} rad"
+        yield _unrelated("command.steering", text)
     slow_or_fast = np.where(speed > 0.8 * fast, 1, np.where(speed < 0.2 * fast, -1, 0))
     starts = int((np.diff(slow_or_fast[slow_or_fast != 0]) > 0).sum())
     if _stays(recording, "command.throttle") and starts >= STARTS:
-        said = f"The throttle stays as it is, and the car started {starts} times"
-        yield _unrelated("command.throttle", said)
+        text = f"The throttle stays as it is, and the car started {starts} times"
+        yield _unrelated("command.throttle", text)
 
 
 def _stays(recording: Recording, name: str) -> bool:
@@ -253,11 +253,11 @@ def best_alike(motion: Floats, asked: Floats, on: Grid, latest_s: float) -> floa
     return max(abs(float(np.corrcoef(motion[d:], asked[: len(asked) - d])[0, 1])) for d in delays)
 
 
-def _unrelated(name: str, said: str) -> DataProblem:
+def _unrelated(name: str, text: str) -> DataProblem:
     return DataProblem(
         channel=name,
         name="without_effect",
-        said=f"{said}: these commands belong to another drive, another car or another clock. No "
+        text=f"{text}: these commands belong to another drive, another car or another clock. No "
         "effect of this command can be concluded.",
         record_instead=RECORD,
     )

@@ -56,13 +56,13 @@ def mend_heading(now: Mending) -> Iterator[DataProblem]:
     mirrored = factor == -1.0 and _turns_with_gyro(now.recording, poses)
     channel = "pose.y" if mirrored else "pose.yaw"
     now.repair(Repair(channels=(channel,), factor=1.0 / factor))
-    said = "The heading turns the other way than the pose moves: one axis is mirrored."
+    text = "The heading turns the other way than the pose moves: one axis is mirrored."
     if abs(factor) != 1.0:
-        said = f"The heading is {abs(factor):.3g} times too large for the way the pose moves."
+        text = f"The heading is {abs(factor):.3g} times too large for the way the pose moves."
     yield DataProblem(
         channel=channel,
         name="sign" if abs(factor) == 1.0 else "unit",
-        said=said,
+        text=text,
         corrected=f"Multiplied by {1.0 / factor:.4g}.",
         record_instead="Record yaw counter-clockwise, x and y on a right-handed floor.",
     )
@@ -84,7 +84,7 @@ def mend_unsigned(now: Mending) -> Iterator[DataProblem]:
         yield DataProblem(
             channel="speed",
             name="sign",
-            said=f"Stays positive while the pose drives backwards ({100.0 * back.mean():.0f} % of "
+            text=f"Stays positive while the pose drives backwards ({100.0 * back.mean():.0f} % of "
             "the time).",
             corrected="Takes the sign of the pose's motion.",
             record_instead="Record speed with its sign.",

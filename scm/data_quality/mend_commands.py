@@ -70,8 +70,8 @@ def _unit(now: Mending, car: Car | None, found: Steered | None) -> Iterator[Data
         if largest > LARGEST_ANGLE:
             yield _mended(now, "command.steering", DEGREE, f"Reaches {largest:.3g} rad: degrees.")
         elif too_small and found is not None and abs(found.alike) > FOLLOWS:
-            said = f"Reaches only {largest:.2g} rad, but the car turns: radians taken for degrees."
-            yield _mended(now, "command.steering", 1.0 / DEGREE, said)
+            text = f"Reaches only {largest:.2g} rad, but the car turns: radians taken for degrees."
+            yield _mended(now, "command.steering", 1.0 / DEGREE, text)
         return
     if largest <= LARGEST_RATIO or not _often(now, "command.steering"):
         return
@@ -85,8 +85,8 @@ def _unit(now: Mending, car: Car | None, found: Steered | None) -> Iterator[Data
         if not _near(gain, known[unit], 0.5):
             return
     if largest * known[unit] < LARGEST_RATIO:
-        said = f"Reaches {largest:.3g}, not 1: it is in {unit}."
-        yield _mended(now, "command.steering", known[unit], said)
+        text = f"Reaches {largest:.3g}, not 1: it is in {unit}."
+        yield _mended(now, "command.steering", known[unit], text)
 
 
 def _near(value: float, expected: float, within: float = NEAR) -> bool:
@@ -103,12 +103,12 @@ def _often(now: Mending, name: str) -> bool:
     return float((np.abs(clean(now.recording.channels[name]).values) > LARGEST_RATIO).mean()) > 0.05
 
 
-def _mended(now: Mending, name: str, factor: float, said: str) -> DataProblem:
+def _mended(now: Mending, name: str, factor: float, text: str) -> DataProblem:
     now.repair(Repair(channels=(name,), factor=factor))
     return DataProblem(
         channel=name,
         name="sign" if factor == -1.0 else "unit",
-        said=said,
+        text=text,
         corrected=f"Multiplied by {factor:.4g}.",
         record_instead=DESCRIBE,
     )

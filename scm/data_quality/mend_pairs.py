@@ -111,7 +111,7 @@ def _length(now: Mending, length: float, than: str) -> DataProblem:
     return DataProblem(
         channel="pose.x, pose.y",
         name="unit",
-        said=f"The pose moves {1.0 / length:g} times as far as {than}.",
+        text=f"The pose moves {1.0 / length:g} times as far as {than}.",
         corrected=f"Multiplied by {length:g}.",
         record_instead=DESCRIBE,
     )
@@ -146,7 +146,7 @@ def _backwards(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator
     yield DataProblem(
         channel="pose.yaw",
         name="sign",
-        said="The heading points to the back of the car: it drives backwards all the time.",
+        text="The heading points to the back of the car: it drives backwards all the time.",
         corrected="Half a turn added.",
         record_instead="Fix the marker with its x axis ahead.",
     )
@@ -166,7 +166,7 @@ def _size(now: Mending, pair: Pair) -> Iterator[DataProblem]:
             yield DataProblem(
                 channel=at,
                 name="unrelated",
-                said=f"Does not follow the pose's {pair.what}: correlation {pair.lag.alike:.2f}.",
+                text=f"Does not follow the pose's {pair.what}: correlation {pair.lag.alike:.2f}.",
                 record_instead="Check that all channels are of one drive.",
             )
         return
@@ -180,11 +180,11 @@ def _divided(now: Mending, channels: tuple[str, ...], factor: float, what: str) 
     unit = gross.unit_of(factor, what)
     if channels[0].startswith("encoder.") != ("counts" in unit):
         unit = ""
-    said = "Its sign is turned" if factor == -1.0 else f"Shows {factor:.4g} times the pose's {what}"
+    text = "Its sign is turned" if factor == -1.0 else f"Shows {factor:.4g} times the pose's {what}"
     return DataProblem(
         channel=called(channels),
         name="sign" if factor == -1.0 else "unit",
-        said=said + (f": it looks like {unit}." if unit else "."),
+        text=text + (f": it looks like {unit}." if unit else "."),
         corrected=f"Divided by {factor:.4g}.",
         record_instead=DESCRIBE,
     )
@@ -215,7 +215,7 @@ def _offsets(now: Mending, car: Car | None, pairs: list[Pair]) -> Iterator[DataP
         yield DataProblem(
             channel=called(fresh),
             name="clock",
-            said=f"Stamped {abs(shift):.3f} s {'later' if shift < 0.0 else 'earlier'} than the "
+            text=f"Stamped {abs(shift):.3f} s {'later' if shift < 0.0 else 'earlier'} than the "
             "other sensors stamp the same moment.",
             corrected=f"Stamps moved by {shift:+.3f} s.",
             record_instead="Stamp all sensors with one clock, or with clocks kept together.",

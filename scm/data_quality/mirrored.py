@@ -18,7 +18,7 @@ def mirrored(problems: Iterable[DataProblem]) -> DataProblem | None:
     return DataProblem(
         channel="*",
         name="time_backwards",
-        said="Gyro and throttle both have the wrong sign against the motion, as in a recording "
+        text="Gyro and throttle both have the wrong sign against the motion, as in a recording "
         "that runs backwards in time: causes would come after what they cause.",
         record_instead="Write stamps that count up, and rows as they come.",
     )

@@ -75,7 +75,7 @@ def other_car(
         yield DataProblem(
             channel="*",
             name="other_car",
-            said=f"The car file {car.name!r} does not fit this recording: {'; '.join(reasons)}. "
+            text=f"The car file {car.name!r} does not fit this recording: {'; '.join(reasons)}. "
             "Effects found with it would make up for the wrong car.",
             record_instead=ANOTHER,
         )

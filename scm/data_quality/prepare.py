@@ -79,7 +79,7 @@ def _account(
     return (
         read,
         *lines_left_out(left_out),
-        *(f"{files.get(p.channel, p.channel)}: {p.said} {p.corrected}".rstrip() for p in changes),
+        *(f"{files.get(p.channel, p.channel)}: {p.text} {p.corrected}".rstrip() for p in changes),
     )
 
 
@@ -96,10 +96,10 @@ def lines_left_out(left_out: Iterable[LeftOut]) -> tuple[str, ...]:
     alike: dict[tuple[str, str], list[LeftOut]] = {}
     for one in left_out:
         alike.setdefault((one.file, one.why), []).append(one)
-    said = []
+    lines = []
     for (file, why), some in list(alike.items())[:MOST_LISTED]:
         first = ", ".join(str(one.line) for one in some[:3])
         more = f" and {len(some) - 3} more" if len(some) > 3 else ""
-        said.append(f"{file}: lines {first}{more}: {why}" if len(some) > 1 else str(some[0]))
+        lines.append(f"{file}: lines {first}{more}: {why}" if len(some) > 1 else str(some[0]))
     rest = sum(map(len, list(alike.values())[MOST_LISTED:]))
-    return (*said, f"and {rest} more lines that are no rows") if rest else tuple(said)
+    return (*lines, f"and {rest} more lines that are no rows") if rest else tuple(lines)

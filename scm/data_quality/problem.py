@@ -1,21 +1,21 @@
 """A problem of a recording itself, as a report names it."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+
+from msgspec import Struct, field, structs
 
 Span = tuple[float, float]
 MOST_NAMED = 3  # channels that one line names; of more it gives their number
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DataProblem:
+class DataProblem(Struct, kw_only=True, frozen=True):
     """Something wrong with the recording itself, found by its sensors against each other.
 
     Attributes:
         channel: Where, `pose.x` or `imu.*`.
         name: Short and fixed: `gap`, `frozen`, `copied`, `jump`, `unit`, `time_backwards`,
             `missing`, `too_short`, `constant`, `not_finite` ...
-        said: One sentence: what, where, how much.
+        text: One sentence: what, where, how much.
         when_s: None: all the time.
         corrected: What was done about it before physics was blamed; empty: nothing.
         record_instead: What to record next time; empty where nothing helps.
@@ -23,7 +23,7 @@ class DataProblem:
 
     channel: str
     name: str
-    said: str
+    text: str = field(name="said")
     when_s: tuple[Span, ...] | None = None
     corrected: str = ""
     record_instead: str = ""
@@ -33,10 +33,10 @@ def folded(problems: Iterable[DataProblem]) -> tuple[DataProblem, ...]:
     """Return problems, those that say the same of several channels as one."""
     alike = dict[DataProblem, list[str]]()
     for problem in problems:
-        channels = alike.setdefault(replace(problem, channel=""), [])
+        channels = alike.setdefault(structs.replace(problem, channel=""), [])
         if problem.channel not in channels:
             channels.append(problem.channel)
-    return tuple(replace(one, channel=_together(names)) for one, names in alike.items())
+    return tuple(structs.replace(one, channel=_together(names)) for one, names in alike.items())
 
 
 def _together(channels: list[str]) -> str:

@@ -58,7 +58,7 @@ def _spacing(t: Floats, at: str, names: Sequence[str]) -> Iterator[DataProblem]:
         yield DataProblem(
             channel=at,
             name="too_short",
-            said=f"Holds {span:.1f} s, less than {SHORTEST_S:.0f} s.",
+            text=f"Holds {span:.1f} s, less than {SHORTEST_S:.0f} s.",
             record_instead="Drive for 60 s or more: straights, both turns, starts and stops.",
         )
     gaps = gaps_of(t, command)
@@ -67,7 +67,7 @@ def _spacing(t: Floats, at: str, names: Sequence[str]) -> Iterator[DataProblem]:
         yield DataProblem(
             channel=at,
             name="gap",
-            said=_gaps_said(gaps, lost, span),
+            text=_gaps_text(gaps, lost, span),
             when_s=gaps,
             corrected="Nothing is compared across a gap.",
         )
@@ -75,13 +75,13 @@ def _spacing(t: Floats, at: str, names: Sequence[str]) -> Iterator[DataProblem]:
         yield DataProblem(
             channel=at,
             name="slow",
-            said=f"A pose every {period:.2f} s shows steady driving, not how it starts or steers.",
+            text=f"A pose every {period:.2f} s shows steady driving, not how it starts or steers.",
             record_instead="Record poses at 20 Hz or more.",
         )
     yield from _jitter(step, period, at, command=command)
 
 
-def _gaps_said(gaps: Sequence[Span], lost_s: float, span_s: float) -> str:
+def _gaps_text(gaps: Sequence[Span], lost_s: float, span_s: float) -> str:
     if len(gaps) == 1:
         return f"One gap of {lost_s:.2f} s in {span_s:.1f} s."
     longest_s = max(end - start for start, end in gaps)
@@ -93,14 +93,14 @@ def _jitter(step: Floats, period: float, at: str, *, command: bool) -> Iterator[
     high = float(np.percentile(step, 95))
     bursts = float((step < 0.1 * period).mean())
     if not command and (high > UNEVEN * period or bursts > BURST_SHARE):
-        said = f"Rows come every {1e3 * period:.1f} ms as a rule, but one in twenty "
-        said += f"only after {1e3 * high:.0f} ms or more"
+        text = f"Rows come every {1e3 * period:.1f} ms as a rule, but one in twenty "
+        text += f"only after {1e3 * high:.0f} ms or more"
         if bursts > FEW_BURSTS:
-            said += f", and {100.0 * bursts:.0f} % right after another"
+            text += f", and {100.0 * bursts:.0f} % right after another"
         yield DataProblem(
             channel=at,
             name="jitter",
-            said=f"{said}.",
+            text=f"{text}.",
             record_instead="Stamp a value where it is measured, not where it arrives.",
         )
 

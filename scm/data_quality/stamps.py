@@ -451,9 +451,9 @@ def without_repeats(recording: Recording) -> tuple[Recording, list[DataProblem]]
 
 def problem(names: Sequence[str], name: str, words: tuple[str, str, str]) -> DataProblem:
     """Return a problem of some channels: what is wrong, what was done, what to record instead."""
-    said, corrected, instead = words
+    text, corrected, instead = words
     return DataProblem(
-        channel=called(names), name=name, said=said, corrected=corrected, record_instead=instead
+        channel=called(names), name=name, text=text, corrected=corrected, record_instead=instead
     )
 
 

@@ -31,7 +31,7 @@ def standing_problem() -> DataProblem:
     return DataProblem(
         channel="pose.*",
         name="standing",
-        said="The car does not move in this recording.",
+        text="The car does not move in this recording.",
         record_instead="Drive: straights, both turns, starts and stops.",
     )
 

@@ -135,13 +135,13 @@ def _problem(
         for names in tables(recording)
         if (count := _lost(recording, names[0], whole))
     ]
-    said = f"{', and '.join(causes)}: {rest}."
+    text = f"{', and '.join(causes)}: {rest}."
     if lost:
-        said += f" Not in a stretch of {SHORTEST_S:g} s that has both: {', '.join(lost)}."
+        text += f" Not in a stretch of {SHORTEST_S:g} s that has both: {', '.join(lost)}."
     return DataProblem(
         channel=called(silent) if gaps and not jumps else "*",
         name="gap",
-        said=said,
+        text=text,
         when_s=tuple(sorted([*gaps, *jumps])),
         corrected="Cut there.",
         record_instead="Record poses and commands without pauses, or one file a drive.",

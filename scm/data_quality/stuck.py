@@ -64,7 +64,7 @@ def _held(recording: Recording) -> Iterator[DataProblem]:
         yield DataProblem(
             channel=called(names),
             name="held",
-            said=f"Values change only every {1e3 * period:.0f} ms, though rows come every "
+            text=f"Values change only every {1e3 * period:.0f} ms, though rows come every "
             f"{1e3 * rows:.0f} ms: each is up to that old.",
             corrected="Only rows with a new value are compared.",
             record_instead="Write a row when the sensor has a new value, with its own stamp.",
@@ -88,7 +88,7 @@ def _frozen(
         yield DataProblem(
             channel=name,
             name="frozen",
-            said=f"Stands still for {sum(b - a for a, b in when):.1f} s while the car moves.",
+            text=f"Stands still for {sum(b - a for a, b in when):.1f} s while the car moves.",
             when_s=when,
             record_instead="Check the sensor's link: it repeated its last value.",
         )
@@ -127,7 +127,7 @@ def _copied(recording: Recording) -> Iterator[DataProblem]:
             yield DataProblem(
                 channel=other,
                 name="copied",
-                said=f"Holds the same numbers as {one}, to the last digit.",
+                text=f"Holds the same numbers as {one}, to the last digit.",
                 corrected="Counts as one sensor, not two.",
                 record_instead="Record each sensor's own channel.",
             )
@@ -160,7 +160,7 @@ def _derived(recording: Recording, movement: Series) -> Iterator[DataProblem]:
             yield DataProblem(
                 channel=name,
                 name="derived",
-                said="Follows the differences of the poses row by row, noise and all: it was "
+                text="Follows the differences of the poses row by row, noise and all: it was "
                 "computed from them.",
                 corrected="Not counted as a sensor.",
                 record_instead="Record a speed that the car itself measures.",
@@ -189,6 +189,6 @@ def _coarse(recording: Recording) -> Iterator[DataProblem]:
             yield DataProblem(
                 channel=name,
                 name="coarse",
-                said=f"Comes in steps of {step:.3g}, {100.0 * step / reach:.0f} % of its reach.",
+                text=f"Comes in steps of {step:.3g}, {100.0 * step / reach:.0f} % of its reach.",
                 record_instead="Record all digits that the sensor has.",
             )

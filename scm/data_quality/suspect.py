@@ -36,10 +36,10 @@ def from_gyro(found: Relation) -> Iterator[Suspicion]:
     gyro = found.pair[1]
     bias = _wide(found.numbers["bias"], FLOORS["gyro_bias"])
     scale = _wide(found.numbers["scale"], FLOORS["gyro_scale"])
-    said = f"{gyro} shows {bias.value:+.4f} rad/s while the pose does not turn."
-    yield from _one("gyro_bias", (gyro,), "bias", bias, 0.0, found, said)
-    said = f"{gyro} shows {scale.value:.3f} times the turn that the pose shows."
-    yield from _one("gyro_scale", (gyro,), "scale", scale, 1.0, found, said)
+    text = f"{gyro} shows {bias.value:+.4f} rad/s while the pose does not turn."
+    yield from _one("gyro_bias", (gyro,), "bias", bias, 0.0, found, text)
+    text = f"{gyro} shows {scale.value:.3f} times the turn that the pose shows."
+    yield from _one("gyro_scale", (gyro,), "scale", scale, 1.0, found, text)
 
 
 def from_repairs(repairs: Sequence[Repair]) -> Iterator[Suspicion]:
@@ -59,7 +59,7 @@ def from_repairs(repairs: Sequence[Repair]) -> Iterator[Suspicion]:
                     std={parameter: std},
                     sigma=abs(value - neutral) / std,
                     shown_by=(repair.channels[0], repair.channels[-1]),
-                    said="Undone before anything else was looked at.",
+                    text="Undone before anything else was looked at.",
                     repaired=True,
                 )
 
@@ -97,7 +97,7 @@ def from_travel(
             std={f"tilt_{axis}": m.std for axis, m in tilt.items()},
             sigma=sigma,
             shown_by=found.pair,
-            said="The pose's metre changes over the floor, as under a camera that leans.",
+            text="The pose's metre changes over the floor, as under a camera that leans.",
         )
 
 
@@ -132,14 +132,14 @@ def from_push(found: Relation, heading_rad: float = 0.0) -> Iterator[Suspicion]:
             std={"along": x.std, "across": y.std},
             sigma=sigma,
             shown_by=found.pair,
-            said=f"The accelerometer shows {x.value:+.2f} m/s^2 ahead and {y.value:+.2f} m/s^2 "
+            text=f"The accelerometer shows {x.value:+.2f} m/s^2 ahead and {y.value:+.2f} m/s^2 "
             "left beyond what the pose does: a bias, or a mount that is not level.",
         )
     seen = _wide(found.numbers["angle"], FLOORS["imu_angle"] + ANGLE_A_SECOND * found.step_s)
     angle = Measured(seen.value + heading_rad, seen.std, seen.leak)
-    said = f"The accelerometer is turned by {math.degrees(angle.value):+.1f} deg on the car."
+    text = f"The accelerometer is turned by {math.degrees(angle.value):+.1f} deg on the car."
     channels = ("imu.accel_x", "imu.accel_y")
-    yield from _one("imu_misalignment", channels, "angle", angle, 0.0, found, said)
+    yield from _one("imu_misalignment", channels, "angle", angle, 0.0, found, text)
 
 
 def _agreed(found: Sequence[Relation], name: str) -> Iterator[Suspicion]:
@@ -155,8 +155,8 @@ def _agreed(found: Sequence[Relation], name: str) -> Iterator[Suspicion]:
     for relation, measured in known:
         own = Measured(-measured.value, measured.std)
         kind, parameter = ("clock_drift", "rate") if name == "rate" else ("clock_offset", "offset")
-        said = f"The clock of {relation.pair[1]} disagrees with those of the other sensors."
-        yield from _one(kind, (relation.pair[1],), parameter, own, 0.0, relation, said)
+        text = f"The clock of {relation.pair[1]} disagrees with those of the other sensors."
+        yield from _one(kind, (relation.pair[1],), parameter, own, 0.0, relation, text)
 
 
 def _timed(found: Relation, name: str) -> Measured:
@@ -169,14 +169,14 @@ def _timed(found: Relation, name: str) -> Measured:
 def _late(name: str, late: Measured, found: Relation) -> Iterator[Suspicion]:
     ms, pose = 1e3 * late.value, ("pose.*",)
     if name == "rate":
-        said = f"The clock of the poses gains {ms:+.2f} ms a second."
-        yield from _one("clock_drift", pose, "rate", late, 0.0, found, said)
+        text = f"The clock of the poses gains {ms:+.2f} ms a second."
+        yield from _one("clock_drift", pose, "rate", late, 0.0, found, text)
     elif ms > 0.0:
-        said = f"Poses are stamped {ms:.0f} ms after the moment they show."
-        yield from _one("pose_latency", pose, "delay", late, 0.0, found, said, ("clock_offset",))
+        text = f"Poses are stamped {ms:.0f} ms after the moment they show."
+        yield from _one("pose_latency", pose, "delay", late, 0.0, found, text, ("clock_offset",))
     else:
-        said = f"Poses are stamped {-ms:.0f} ms before the moment they show."
-        yield from _one("clock_offset", pose, "offset", late, 0.0, found, said)
+        text = f"Poses are stamped {-ms:.0f} ms before the moment they show."
+        yield from _one("clock_offset", pose, "offset", late, 0.0, found, text)
 
 
 def _slides(found: Relation) -> bool:
@@ -214,7 +214,7 @@ def _scale(found: Relation, way: Way, push: Relation | None) -> Iterator[Suspici
             sigma=abs(sigma),
             shown_by=found.pair,
             twins=tuple(other for other in faults if other != name),
-            said=f"The pose goes {scale.value:.3f} m for every metre of {way.name}.",
+            text=f"The pose goes {scale.value:.3f} m for every metre of {way.name}.",
         )
 
 
@@ -236,8 +236,8 @@ def _ruled_out(push: Relation | None, share: float) -> tuple[str, ...]:
 
 def _heading(found: Relation) -> Iterator[Suspicion]:
     turn = _wide(found.numbers["heading"], FLOORS["heading"])
-    said = f"Driving straight, the car moves {-math.degrees(turn.value):+.1f} deg off its heading."
-    yield from _one("pose_heading", ("pose.yaw",), "offset", turn, 0.0, found, said)
+    text = f"Driving straight, the car moves {-math.degrees(turn.value):+.1f} deg off its heading."
+    yield from _one("pose_heading", ("pose.yaw",), "offset", turn, 0.0, found, text)
 
 
 def _point(found: Relation, names: tuple[str, ...], wheelbase_m: float) -> Iterator[Suspicion]:
@@ -256,13 +256,13 @@ def _point(found: Relation, names: tuple[str, ...], wheelbase_m: float) -> Itera
         sigma=sigma,
         shown_by=found.pair,
         twins=("com_shift",),
-        said=f"The car turns as if the tracked point were off ({where}).",
+        text=f"The car turns as if the tracked point were off ({where}).",
     )
 
 
 def _one(
     name: str, channels: tuple[str, ...], parameter: str, measured: Measured, neutral: float,
-    found: Relation, said: str, twins: tuple[str, ...] = (),
+    found: Relation, text: str, twins: tuple[str, ...] = (),
 ) -> Iterator[Suspicion]:  # fmt: skip
     sigma = abs(measured.value - neutral) / measured.std
     if sigma > LIMIT:
@@ -274,7 +274,7 @@ def _one(
             sigma=sigma,
             shown_by=found.pair,
             twins=twins,
-            said=said,
+            text=text,
         )
 
 

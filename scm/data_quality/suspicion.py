@@ -51,7 +51,7 @@ class Suspicion:
             counts as one of them.
         shown_by: The pair of sensors that shows it.
         twins: Faults that explain the same pair just as well.
-        said: One sentence.
+        text: One sentence.
         repaired: So gross that it is undone before anything else is looked at: the other values
             are those of the repaired recording.
     """
@@ -63,7 +63,7 @@ class Suspicion:
     sigma: float
     shown_by: tuple[str, str]
     twins: tuple[str, ...] = ()
-    said: str = ""
+    text: str = ""
     repaired: bool = False
 
 

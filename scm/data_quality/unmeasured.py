@@ -65,7 +65,7 @@ def clipped_rows(now: Mending) -> Iterator[DataProblem]:
         yield DataProblem(
             channel=name,
             name="clipped",
-            said=f"Stops at {_values_said(name, limits)}: {int(rows.sum())} of {len(rows)} rows "
+            text=f"Stops at {_values_text(name, limits)}: {int(rows.sum())} of {len(rows)} rows "
             "hold just that, the end of the sensor's range.",
             when_s=spans,
             corrected="These rows are left out.",
@@ -92,7 +92,7 @@ def wrapped_rows(now: Mending) -> Iterator[DataProblem]:
         yield DataProblem(
             channel=name,
             name="wrapped",
-            said=f"{int(rows.sum())} of {len(rows)} rows in {len(spikes)} spikes of up to "
+            text=f"{int(rows.sum())} of {len(rows)} rows in {len(spikes)} spikes of up to "
             f"{largest:.3g} rad/s: it is the slope of an angle that wraps there by a whole turn.",
             when_s=spans[:SHOWN],
             corrected="These rows are left out.",
@@ -240,7 +240,7 @@ def _spans(t: Floats, rows: Bools) -> tuple[Span, ...]:
     return tuple((float(t[i]), float(t[j - 1])) for i, j in zip(starts[at], ends[at], strict=True))
 
 
-def _values_said(name: str, limits: Sequence[_Limit]) -> str:
+def _values_text(name: str, limits: Sequence[_Limit]) -> str:
     """Return the limits in words, `±` where they are the same on both sides."""
     dimension = DIMENSIONS[name][0]
     unit = next(
@@ -249,9 +249,9 @@ def _values_said(name: str, limits: Sequence[_Limit]) -> str:
     ends = [f"{limit.value:+.4g}" for limit in limits]
     if len(limits) == 2 and abs(limits[0].value + limits[1].value) < 1e-3 * limits[0].value:
         ends = [f"±{limits[0].value:.4g}"]
-    said = f"{' and '.join(ends)} {unit}"
+    text = f"{' and '.join(ends)} {unit}"
     if dimension == "acceleration":
-        said += f" ({max(abs(limit.value) for limit in limits) / G:.3g} g)"
+        text += f" ({max(abs(limit.value) for limit in limits) / G:.3g} g)"
     if dimension == "angular speed":
-        said += f" ({math.degrees(max(abs(limit.value) for limit in limits)):.4g} deg/s)"
-    return said
+        text += f" ({math.degrees(max(abs(limit.value) for limit in limits)):.4g} deg/s)"
+    return text

@@ -51,7 +51,7 @@ def uncounted(recording: Recording, car: Car) -> Iterator[DataProblem]:
         yield DataProblem(
             channel="encoder.*",
             name="unknown_counts",
-            said=f"The car file {car.name!r} does not say how many counts a turn makes: encoders "
+            text=f"The car file {car.name!r} does not say how many counts a turn makes: encoders "
             "are not used.",
             record_instead="Nothing: state encoder.counts_per_revolution in the car file.",
         )

@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import TypeVar
 
 from scm.clock import Clock, processor_s, seconds
-from scm.mismatch.findings import Unasked
+from scm.mismatch.findings import Unanswered
 
 DEFAULT_S = 1800.0  # enough for all that is looked for, on a slow and busy computer too
 MOST_KEPT = 0.5  # of what was allowed
@@ -68,10 +68,10 @@ class Budget:
         self._processor, self._processor_s = processor, processor()
         self._began_ns = clock.now_ns() if clock else 0
         self._kept_s, self._attempts = 0.0, False
-        self._left: dict[Question, Unasked] = {}
+        self._left: dict[Question, Unanswered] = {}
 
     @property
-    def unasked(self) -> tuple[Unasked, ...]:
+    def unasked(self) -> tuple[Unanswered, ...]:
         """Questions that were left, in the order in which they came up, each once."""
         return tuple(self._left.values())
 
@@ -124,4 +124,4 @@ class Budget:
     def _leave(self, question: Question, *, begun: bool) -> None:
         how = " to the end" if begun else ""
         said = f"{WORDS[question]}{how}: the budget of {self._asked_s:g} s ended."
-        self._left.setdefault(question, Unasked(name=question.value, said=said))
+        self._left.setdefault(question, Unanswered(name=question.value, text=said))

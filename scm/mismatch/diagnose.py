@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from msgspec import structs
 from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock
@@ -23,7 +24,7 @@ from scm.mismatch.experiment.folders import folders_of
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.suggest import Suggestion
 from scm.mismatch.explain import effect_of, ordinary_of, tried_of, undecided_of, widened_of
-from scm.mismatch.findings import Diagnosis, Effect, Fit, Unasked, Undecided, Verdict
+from scm.mismatch.findings import Diagnosis, Effect, Fit, Unanswered, Undecided, Verdict
 from scm.mismatch.fit import Fitted, Fitter
 from scm.mismatch.judge import judge, nothing_got_worse
 from scm.mismatch.law_rivals import Standing, standing
@@ -79,7 +80,7 @@ class Searched:
     tried: tuple[Tried, ...]
     held: Standing | None
     sought: Sought | None
-    unasked: tuple[Unasked, ...] = ()
+    unasked: tuple[Unanswered, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +189,7 @@ def diagnose_car(
     usable, partly = sampled(usable, budget.allowed_s())
     with threadpool_limits(1):  # two threads drive already: more for small matrices only wait
         found = _searched(usable, car, tell, budget)
-    diagnosis = replace(
+    diagnosis = structs.replace(
         found.diagnosis, data=(*problems, *partly), runtime_s=budget.spent_s(),
         processor_share=budget.processor_share(), compared_s=budget.allowed_s(),
     )  # fmt: skip
@@ -220,7 +221,7 @@ def _usable(
         together = length_s > SHORTEST_S and _is_only_short(quality)
         where = f"{_titles([recording])[0]}: " if len(recordings) > 1 else ""
         problems += [
-            replace(p, said=where + p.said)
+            structs.replace(p, text=where + p.text)
             for p in one.problems
             if not together or p.name not in OF_SHORT
         ]
@@ -441,10 +442,10 @@ def told(searched: Searched, tell: Tell) -> Found:
     if verdict is Verdict.MISMATCH and not effects and fit and free_runs:
         located = strayed(free_runs, fit)
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
-                          fit=fit, runtime_s=0.0, unasked=searched.unasked)  # fmt: skip
+                          fit=fit, runtime_s=0.0, unanswered=searched.unasked)  # fmt: skip
     evidence = Evidence(
         vehicle=car.name, recordings=titles, residuals=residuals, free_runs=free_runs,
-        ordinary=as_written(ordinary_of(model, best, car), found_car or car), tried=searched.tried,
+        refitted=as_written(ordinary_of(model, best, car), found_car or car), tried=searched.tried,
         curves=_curves(model, best, searched.sought), retuned_m=retuned_m,
         pauses=_pauses(searched),
         widened=widened_of(model, car),

@@ -74,7 +74,7 @@ class FreeRuns:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ordinary:
+class RefittedParameter:
     """A nominal parameter of the car file, before and after, with what the file allows it.
 
     Attributes:
@@ -128,7 +128,7 @@ class Evidence:
     residuals: tuple[Residual, ...] = ()
     curves: tuple[Curve, ...] = ()
     free_runs: FreeRuns | None = None
-    ordinary: tuple[Ordinary, ...] = ()
+    refitted: tuple[RefittedParameter, ...] = ()
     tried: tuple[Tried, ...] = ()
     retuned_m: float | None = None
     pauses: tuple[tuple[float, float], ...] = ()

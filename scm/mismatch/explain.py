@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.evidence import Ordinary, Tried
+from scm.mismatch.evidence import RefittedParameter, Tried
 from scm.mismatch.experiment.plan import Rival as Contender
 from scm.mismatch.experiment.suggest import Suggestion, suggest
-from scm.mismatch.findings import Effect, Equation, Estimate, Rival
+from scm.mismatch.findings import Alternative, Effect, Equation, Estimate
 from scm.mismatch.fit import OF_OWN, Fitted
 from scm.mismatch.law_rivals import TIE, Standing, against, rivals_of_law
 from scm.mismatch.laws.decide import is_law
@@ -45,7 +45,7 @@ OPPOSITE: Mapping[str, str] = {
 Tell = Callable[[str], None]
 
 
-def ordinary_of(model: Likelihood, best: Fitted, car: Car) -> tuple[Ordinary, ...]:
+def ordinary_of(model: Likelihood, best: Fitted, car: Car) -> tuple[RefittedParameter, ...]:
     """Return the car's own numbers, as the file gives them and as the recordings do.
 
     No recording makes a number less sure than its file, or unphysical.
@@ -64,7 +64,7 @@ def ordinary_of(model: Likelihood, best: Fitted, car: Car) -> tuple[Ordinary, ..
         )  # fmt: skip
         given = car.value(own.key) if car.has(own.key) else own.mean
         found.append(
-            Ordinary(
+            RefittedParameter(
                 key=own.key,
                 given=given,
                 given_std=own.std,
@@ -175,14 +175,14 @@ def effect_of(
         probability, rivals = rivals_of_law(search, best, candidate, held, sought)
     return Effect(
         name=candidate.name,
-        listed=not is_law(candidate),
+        is_known=not is_law(candidate),
         equation=candidate.equation,
         depends_on=candidate.depends_on,
         parameters=estimates,
         probability=probability,
-        said=said(candidate, estimates),
-        law=candidate.formula(mine) if isinstance(candidate, Law | Sensed) else None,
-        rivals=rivals,
+        text=said(candidate, estimates),
+        formula=candidate.formula(mine) if isinstance(candidate, Law | Sensed) else None,
+        alternatives=rivals,
     )
 
 
@@ -255,7 +255,7 @@ def _number(name: str, value: float, unit: str) -> str:
     return quantity(value, "1" if unit == "1/min" else unit)
 
 
-def _rivals(search: Search, candidate: Candidate) -> tuple[float, tuple[Rival, ...]]:
+def _rivals(search: Search, candidate: Candidate) -> tuple[float, tuple[Alternative, ...]]:
     """Return an effect's probability among all that were tried in its place, and the next ones."""
     step = search.step_of(candidate)
     if step is not None:
@@ -266,7 +266,7 @@ def _rivals(search: Search, candidate: Candidate) -> tuple[float, tuple[Rival, .
         mine = sum(weights[id(f)] for f, _ in tried if f.names[-1] == candidate.name)
         others = [(f, c) for f, c in tried if f.names[-1] != candidate.name][:5]
         return mine / total, tuple(
-            Rival(name=f.names[-1], probability=weights[id(f)] / total,
+            Alternative(name=f.names[-1], probability=weights[id(f)] / total,
                   ruled_out_by=against(c - lowest))
             for f, c in others
         )  # fmt: skip

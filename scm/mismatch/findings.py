@@ -1,17 +1,19 @@
-"""What a diagnosis finds: the contract between the search and the report.
+"""What a diagnosis finds: the contract between the search and the report, and `report.json`.
 
-Field names are those of `report.json`; a `low`..`high` is a 90 % interval.
+Where an attribute has another name in `report.json`, `field(name=...)` gives it. A `low`..`high` is
+a 90 % interval.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from enum import StrEnum
+
+from msgspec import Struct, field
 
 from scm.data_quality.problem import DataProblem, Span
 
 
 class Verdict(StrEnum):
-    """What a recording shows beyond noise and the car file's own scatter."""
+    """What a recording shows beyond noise and the standard deviations of the car file."""
 
     NONE = "none"
     MISMATCH = "mismatch"
@@ -29,8 +31,7 @@ class Equation(StrEnum):
     SENSOR = "sensor"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
+class Estimate(Struct, kw_only=True, frozen=True):
     """A parameter's value with its 90 % interval, in `unit`."""
 
     value: float
@@ -39,8 +40,7 @@ class Estimate:
     unit: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rival:
+class Alternative(Struct, kw_only=True, frozen=True):
     """An effect that was tried in place of one that was found, and what rules it out."""
 
     name: str
@@ -48,41 +48,38 @@ class Rival:
     ruled_out_by: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Effect:
+class Effect(Struct, kw_only=True, frozen=True):
     """One effect that the simulator left out.
 
     Attributes:
-        name: Of the library, or what it depends on, such as `drive force against heading`.
-        listed: Whether the library has it.
+        name: In the catalogue, or what it depends on, such as `drive force against heading`.
+        is_known: Whether the catalogue of effects has it.
         depends_on: Physical variables, such as `("time",)`.
         parameters: By their public names.
-        probability: Over all rival models that were tried.
-        said: One or two sentences that a mechanic understands.
-        law: The formula of an effect outside the library.
+        probability: Among all alternatives that were tried.
+        text: One or two sentences that a mechanic understands.
+        formula: Of an effect outside the catalogue.
     """
 
     name: str
-    listed: bool
+    is_known: bool = field(name="listed")
     equation: Equation
     depends_on: tuple[str, ...]
     parameters: Mapping[str, Estimate]
     probability: float
-    said: str
-    law: str | None = None
-    rivals: tuple[Rival, ...] = ()
+    text: str = field(name="said")
+    formula: str | None = field(default=None, name="law")
+    alternatives: tuple[Alternative, ...] = field(default=(), name="rivals")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class Place(Struct, kw_only=True, frozen=True):
     """A box of the floor [m]."""
 
     x_m: Span
     y_m: Span
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Located:
+class Located(Struct, kw_only=True, frozen=True):
     """Where the error of the simulator as it was lies.
 
     Attributes:
@@ -101,8 +98,7 @@ class Located:
     share_of_error: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Undecided:
+class Undecided(Struct, kw_only=True, frozen=True):
     """Effects that this recording cannot tell apart, and the drive that would.
 
     Attributes:
@@ -114,8 +110,7 @@ class Undecided:
     expected_separation: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PartErrors:
+class PartErrors(Struct, kw_only=True, frozen=True):
     """Free-run errors of one part of the recording: root mean squares by name with unit.
 
     Names are `position_m`, `yaw_rad`, `wheel_m`, `speed_mps` ... as the recording allows.
@@ -127,8 +122,7 @@ class PartErrors:
     noise_floor: Mapping[str, float]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Fit:
+class Fit(Struct, kw_only=True, frozen=True):
     """How well free runs of `horizon_s` fit before and after, on three disjoint parts."""
 
     horizon_s: float
@@ -137,28 +131,26 @@ class Fit:
     confirm: PartErrors
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Unasked:
-    """A question that there was no time for.
+class Unanswered(Struct, kw_only=True, frozen=True):
+    """A question that the search had no time to answer.
 
     Attributes:
         name: Short and fixed: `effects`, `further_effects`, `calm`, `laws`, `beside_law`,
             `strides`.
-        said: One sentence: what was not sought, and why.
+        text: One sentence: what was not searched for, and why.
     """
 
     name: str
-    said: str
+    text: str = field(name="said")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Diagnosis:
-    """All that was found, and what was not asked; `report.json` holds these fields.
+class Diagnosis(Struct, kw_only=True, frozen=True):
+    """Everything that was found, and the questions left open; the fields of `report.json`.
 
     Attributes:
-        processor_share: How much of one processor the search got; None where nobody measured.
-        compared_s: How long the recordings could be that the budget let be compared whole; of
-            longer ones pieces are. None where there was no budget.
+        processor_share: Share of one processor that the search got; None if it was not measured.
+        compared_s: The longest recordings that the budget allows to compare as a whole; longer
+            ones are sampled. None without a budget.
     """
 
     verdict: Verdict
@@ -167,7 +159,7 @@ class Diagnosis:
     undecided: tuple[Undecided, ...]
     fit: Fit | None
     runtime_s: float
-    data: tuple[DataProblem, ...] = field(default=())
-    unasked: tuple[Unasked, ...] = field(default=())
+    data: tuple[DataProblem, ...] = ()
+    unanswered: tuple[Unanswered, ...] = field(default=(), name="unasked")
     processor_share: float | None = None
     compared_s: float | None = None

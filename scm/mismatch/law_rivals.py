@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from scm.mismatch.findings import Rival
+from scm.mismatch.findings import Alternative
 from scm.mismatch.fit import Fitted
 from scm.mismatch.laws.seek import Sought, criterion
 from scm.mismatch.listed import Candidate
@@ -51,7 +51,7 @@ def standing(search: Search, listed: Fitted, *, unseen: bool) -> Standing:
 
 def rivals_of_law(
     search: Search, best: Fitted, law: Candidate, held: Standing, sought: Sought
-) -> tuple[float, tuple[Rival, ...]]:
+) -> tuple[float, tuple[Alternative, ...]]:
     """Return a law's probability among all that it was held against, and the next ones."""
     worse = held.cost - _cost(search, best)
     others = sorted(held.behind.items(), key=lambda one: one[1])[:MOST_LISTED]
@@ -62,7 +62,7 @@ def rivals_of_law(
     weights = [math.exp(-0.5 * min(max(w, 0.0), 1400.0)) for _, w in tried]
     total = 1.0 + sum(weights)
     return 1.0 / total, tuple(
-        Rival(name=name, probability=weight / total,
+        Alternative(name=name, probability=weight / total,
               ruled_out_by=against(w, unseen=held.unseen and name == held.name))
         for (name, w), weight in zip(tried, weights, strict=True)
     )  # fmt: skip

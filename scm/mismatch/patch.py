@@ -12,10 +12,11 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 import numpy as np
+from msgspec import structs
 
 from scm.arrays import Bools
 from scm.errors import ScmError
-from scm.mismatch.evidence import Evidence, Ordinary
+from scm.mismatch.evidence import Evidence, RefittedParameter
 from scm.mismatch.explain import NINETY, ordinary_of
 from scm.mismatch.findings import Diagnosis, Effect, Verdict
 from scm.mismatch.fit import Fitted
@@ -74,19 +75,19 @@ class CarFiles:
             verdict=Verdict.NONE, located=(), effects=tuple(effects), undecided=(), fit=None,
             runtime_s=0.0,
         )  # fmt: skip
-        evidence = Evidence(vehicle=self._car.name, recordings=self._recordings, ordinary=ordinary)
+        evidence = Evidence(vehicle=self._car.name, recordings=self._recordings, refitted=ordinary)
         write_car(diagnosis, evidence, self._car, found, folder)
         return load_car(folder / FILE)
 
 
-def as_written(ordinary: Sequence[Ordinary], car: Car) -> tuple[Ordinary, ...]:
+def as_written(ordinary: Sequence[RefittedParameter], car: Car) -> tuple[RefittedParameter, ...]:
     """Return the car's own numbers as its file says them, where it says other than was found."""
-    found = list[Ordinary]()
+    found = list[RefittedParameter]()
     for one in ordinary:
         value = car.value(one.key) if car.has(one.key) else one.found.value
         if not math.isclose(value, one.found.value, rel_tol=1e-4, abs_tol=1e-12):
             spread = NINETY * one.given_std
-            stays = replace(one.found, value=value, low=value - spread, high=value + spread)
+            stays = structs.replace(one.found, value=value, low=value - spread, high=value + spread)
             found.append(replace(one, found=stays, found_std=one.given_std))
         else:
             found.append(one)

@@ -48,7 +48,7 @@ def sampled(
     problem = DataProblem(
         channel="*",
         name="partly_compared",
-        said=f"{taken_s:.0f} s of {whole_s:.0f} s are compared, in {len(parts)} pieces all over "
+        text=f"{taken_s:.0f} s of {whole_s:.0f} s are compared, in {len(parts)} pieces all over "
         f"the recording in which the car moves: the budget allows no more. All of it takes "
         f"`--budget-s {needed_s(whole_s):.0f}`.",
     )

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from msgspec import structs
 from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock, seconds
@@ -204,7 +205,7 @@ def _sharing(
     verdict = Verdict.UNDECIDED if undecided else anew.diagnosis.verdict
     if anew.diagnosis.undecided and not undecided:
         verdict = Verdict.MISMATCH
-    diagnosis = replace(
+    diagnosis = structs.replace(
         anew.diagnosis, verdict=verdict, effects=effects, undecided=undecided,
         data=found.diagnosis.data, runtime_s=found.diagnosis.runtime_s,
     )  # fmt: skip
@@ -252,9 +253,9 @@ def _with_shared(
     estimates = {key: common.parameters[key] for key in effect.parameters}
     candidate = next(e for e in best.effects if e.name == effect.name)
     every = [e for one in all_anew.values() for e in one.diagnosis.effects]
-    return replace(
+    return structs.replace(
         effect,
         parameters=estimates,
         probability=max(e.probability for e in every if e.name == effect.name),
-        said=f"{said(candidate, estimates)} {all_alike(common, name)}",
+        text=f"{said(candidate, estimates)} {all_alike(common, name)}",
     )

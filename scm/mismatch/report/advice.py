@@ -20,7 +20,7 @@ _LISTED = (
 
 def advice_of(effect: Effect) -> str:
     """Return what to check or mend; for an effect outside the library, where to look."""
-    if effect.listed:
+    if effect.is_known:
         return _table().get(effect.name, _LISTED)
     return _UNLISTED.format(drivers=" and ".join(effect.depends_on) or "the drive")
 

@@ -68,7 +68,7 @@ def drawn(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> dic
         "residuals": [_residual(residual) for residual in residuals],
         "free_runs": None if runs is None or not len(runs.start_s) else _runs(runs),
         "curves": [_rounded(plain(curve)) for curve in evidence.curves],
-        "numbers": [_rounded(plain(ordinary)) for ordinary in evidence.ordinary],
+        "numbers": [_rounded(plain(ordinary)) for ordinary in evidence.refitted],
         "tried": [
             {"name": one.name, "title": capital(title_of(one.name)), **_rounded(
                 {"gain": one.gain, "needed": one.needed})}
@@ -95,7 +95,7 @@ def _effect(effect: Effect) -> dict[str, Any]:
             }
             for name, estimate in effect.parameters.items()
         ],
-        "rivals": [capital(title_of(rival.name)) for rival in effect.rivals],
+        "rivals": [capital(title_of(rival.name)) for rival in effect.alternatives],
     }
 
 

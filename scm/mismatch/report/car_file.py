@@ -83,7 +83,7 @@ def _entries(
     """Yield key and new text of each number that the given car's file does not say."""
     stands = _file_entries(car.path)
     estimates = estimates_by_key(diagnosis, evidence, car, patched)
-    stds = {one.key: one.found_std for one in evidence.ordinary}
+    stds = {one.key: one.found_std for one in evidence.refitted}
     for key, quantity in patched.values.items():
         old = stands.get(key)
         told = old is not None and _equal(_value_of(old), quantity.value)

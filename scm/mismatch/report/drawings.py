@@ -60,7 +60,7 @@ def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Draw
         curves=curve_pictures(evidence.curves),
         windows=window_pictures(evidence.free_runs),
         errors=error_pictures(evidence.free_runs),
-        numbers=forest_picture(evidence.ordinary),
+        numbers=forest_picture(evidence.refitted),
         tried=tried_picture(evidence.tried, [effect.name for effect in diagnosis.effects]),
     )
 

@@ -1,7 +1,8 @@
 """Which number of a car file each estimate of a diagnosis is about, in that number's measure."""
 
 from collections.abc import Iterator
-from dataclasses import replace
+
+from msgspec import structs
 
 from scm.mismatch.evidence import Evidence
 from scm.mismatch.findings import Diagnosis, Effect, Estimate
@@ -17,7 +18,7 @@ def estimates_by_key(
     diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car
 ) -> dict[str, Estimate]:
     """Return every estimate by the `section.key` at which a car file holds its number."""
-    found = {ordinary.key: ordinary.found for ordinary in evidence.ordinary}
+    found = {ordinary.key: ordinary.found for ordinary in evidence.refitted}
     for effect in diagnosis.effects:
         for key, estimate in _of_effect(effect, car, patched):
             found[key] = _in_place(estimate, key, car, patched)
@@ -46,7 +47,7 @@ def _in_place(estimate: Estimate, key: str, car: Car, patched: Car) -> Estimate:
     near = _SAME * abs(now)
     if abs(now - estimate.value) <= near or abs(now - given - estimate.value) > near:
         return estimate
-    return replace(
+    return structs.replace(
         estimate,
         value=estimate.value + given,
         low=estimate.low + given,
@@ -55,6 +56,6 @@ def _in_place(estimate: Estimate, key: str, car: Car, patched: Car) -> Estimate:
 
 
 def _times(share: Estimate, number: float) -> Estimate:
-    return replace(
+    return structs.replace(
         share, value=share.value * number, low=share.low * number, high=share.high * number
     )

@@ -3,12 +3,13 @@
 import math
 import platform
 from collections.abc import Iterable
-from dataclasses import replace
 from importlib.metadata import version
+
+from msgspec import structs
 
 import scm
 from scm.data_quality.problem import MOST_NAMED, DataProblem
-from scm.mismatch.evidence import Evidence, Ordinary
+from scm.mismatch.evidence import Evidence, RefittedParameter
 from scm.mismatch.findings import Diagnosis, Effect, Fit
 from scm.mismatch.report.drawings import Drawings
 from scm.mismatch.report.first_screen import name_of
@@ -176,11 +177,11 @@ def _believed(param: Param | None) -> str:
 
 def _ordinary_table(evidence: Evidence, car: Car) -> str:
     bounds = {param.key: param.bounds for term in car.terms for param in params_of(term)}
-    rows = [_ordinary_row(o, bounds.get(o.key, (-math.inf, math.inf))) for o in evidence.ordinary]
+    rows = [_ordinary_row(o, bounds.get(o.key, (-math.inf, math.inf))) for o in evidence.refitted]
     return table(("ordinary number", "car file", "found (90 %)"), rows, (1, 2))
 
 
-def _ordinary_row(o: Ordinary, bounds: tuple[float, float]) -> tuple[str, str, str]:
+def _ordinary_row(o: RefittedParameter, bounds: tuple[float, float]) -> tuple[str, str, str]:
     """Return a number's row; what is far below its own scatter is nothing."""
     least, most = bounds
     ends = (o.found.value, max(o.found.low, least), min(o.found.high, most))
@@ -198,7 +199,7 @@ def _rival_table(diagnosis: Diagnosis) -> str:
             rival.ruled_out_by,
         )
         for effect in diagnosis.effects
-        for rival in effect.rivals
+        for rival in effect.alternatives
     ]
     return table(("found", "rival", "probability", "ruled out by"), rows, (2,))
 
@@ -214,13 +215,15 @@ def _of_recordings(problems: Iterable[DataProblem], evidence: Evidence) -> list[
     """Return problems, one for all recordings of which it says the same."""
     alike = dict[DataProblem, list[str]]()
     for problem in problems:
-        recording, said = of_recording(problem.said, evidence)
-        alike.setdefault(replace(problem, said=said), []).append(recording)
+        recording, said = of_recording(problem.text, evidence)
+        alike.setdefault(structs.replace(problem, text=said), []).append(recording)
     found = list[DataProblem]()
     for problem, names in alike.items():
         named = [name for name in dict.fromkeys(names) if name]
         every = joined(named) if len(named) <= MOST_NAMED else f"{len(named)} recordings"
-        found.append(replace(problem, said=f"{every}: {problem.said}") if named else problem)
+        found.append(
+            structs.replace(problem, text=f"{every}: {problem.text}") if named else problem
+        )
     return found
 
 
@@ -228,7 +231,7 @@ def _data_row(problem: DataProblem) -> tuple[str, ...]:
     when = spans(problem.when_s) if problem.when_s else "all the time"
     corrected = problem.corrected or "left as it is"
     name = problem.name.replace("_", " ")
-    return (sensors([problem.channel]), name, problem.said, when, corrected, problem.record_instead)
+    return (sensors([problem.channel]), name, problem.text, when, corrected, problem.record_instead)
 
 
 def _reading() -> str:

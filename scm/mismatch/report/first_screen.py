@@ -60,7 +60,7 @@ def cards_of(diagnosis: Diagnosis, evidence: Evidence) -> list[Card]:
     """Return what is to be known at first sight: effects, questions, problems of the recording."""
     cards = [*_effect_cards(diagnosis), *_undecided_cards(diagnosis), *_located_card(diagnosis)]
     cards += _limit_card(evidence)
-    if diagnosis.unasked:
+    if diagnosis.unanswered:
         cards.append(_unasked_card(diagnosis))
     elif diagnosis.verdict is Verdict.NONE and can_judge(diagnosis):
         cards.append(_checked_card(evidence))
@@ -129,16 +129,16 @@ def _effect_cards(diagnosis: Diagnosis) -> Iterator[Card]:
         number = f", {i} of {len(diagnosis.effects)}" if len(diagnosis.effects) > 1 else ""
         where = _located_of(effect, diagnosis.located)
         rows = [
-            ("What", pretty(effect.said)),
+            ("What", pretty(effect.text)),
             ("How much", _amounts(effect)),
-            ("Law", pretty(effect.law or "").replace(" * ", " · ")),
+            ("Law", pretty(effect.formula or "").replace(" * ", " · ")),
             ("Where", where_and_when(where)),
             ("How sure", sureness(effect)),
             ("What to do", advice_of(effect)),
         ]
         kind = "Measuring off" if effect.equation is Equation.SENSOR else "Left out"
         kind = "Likeliest, but undecided" if effect.name in open_names else kind
-        label = f"{kind}{number}" + ("" if effect.listed else ", outside the library")
+        label = f"{kind}{number}" + ("" if effect.is_known else ", outside the library")
         yield Card("effect", label, capital(title_of(effect.name)), rows)
 
 
@@ -208,7 +208,7 @@ def _then(question: Undecided, folder: str) -> str:
 
 def _limit_card(evidence: Evidence) -> Iterator[Card]:
     """Yield which of the car's own numbers were moved to a physical bound."""
-    at_limit = [(own, own.limit) for own in evidence.ordinary if own.limit is not None]
+    at_limit = [(own, own.limit) for own in evidence.refitted if own.limit is not None]
     if not at_limit:
         return
     moved = [
@@ -229,7 +229,7 @@ def _limit_card(evidence: Evidence) -> Iterator[Card]:
 def _unasked_card(diagnosis: Diagnosis) -> Card:
     """Say what there was no time for, and that more time would help."""
     rows = [
-        ("What", "\n".join(question.said for question in diagnosis.unasked)),
+        ("What", "\n".join(question.text for question in diagnosis.unanswered)),
         ("Why", processor_said(diagnosis)),
         ("What to do", "Search again with more time, `--budget-s`. What is reported above was "
                        "looked for, and fitted, to the end."),

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from scm.maps.svg import element
-from scm.mismatch.evidence import Ordinary
+from scm.mismatch.evidence import RefittedParameter
 from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text, ticks_across
 
 _WIDTH, _ROW = 440.0, 25.0
@@ -12,7 +12,7 @@ _MOST_LABEL = 270.0
 _FEWEST_STDS, _MOST_STDS = 2.5, 6.0
 
 
-def forest_picture(ordinary: Sequence[Ordinary]) -> Picture | None:
+def forest_picture(ordinary: Sequence[RefittedParameter]) -> Picture | None:
     """Return how far each number had to move; None where no number may."""
     shown = [o for o in ordinary if o.given_std > 0.0 and math.isfinite(o.found.value)]
     if not shown:
@@ -50,7 +50,7 @@ def forest_picture(ordinary: Sequence[Ordinary]) -> Picture | None:
     )
 
 
-def _moved(ordinary: Ordinary, value: float) -> float:
+def _moved(ordinary: RefittedParameter, value: float) -> float:
     if math.isnan(value):
         return 0.0
     return (value - ordinary.given) / ordinary.given_std

@@ -49,7 +49,7 @@ def alike(problems: Sequence[DataProblem], evidence: Evidence) -> list[Alike]:
     """Return problems, those that say the same of several channels or recordings together."""
     found: dict[tuple[object, ...], Alike] = {}
     for problem in problems:
-        recording, said = of_recording(problem.said, evidence)
+        recording, said = of_recording(problem.text, evidence)
         key = (problem.name, said, problem.record_instead, problem.when_s)
         one = found.setdefault(
             key, Alike(problem.name, said, problem.record_instead, [], [], problem.when_s)

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 
 from scm.arrays import Floats
 from scm.data_quality.problem import Span
@@ -19,10 +20,10 @@ def on_clock(diagnosis: Diagnosis, evidence: Evidence) -> Diagnosis:
     if not evidence.pauses:
         return diagnosis
     located = tuple(
-        replace(e, when_s=e.when_s and _with_pauses(e.when_s, evidence.pauses))
+        structs.replace(e, when_s=e.when_s and _with_pauses(e.when_s, evidence.pauses))
         for e in diagnosis.located
     )
-    return replace(diagnosis, located=located)
+    return structs.replace(diagnosis, located=located)
 
 
 def _with_pauses(
@@ -43,14 +44,14 @@ def since_start(diagnosis: Diagnosis, evidence: Evidence) -> tuple[Diagnosis, Ev
     start_s = _start_s(evidence)
     if not start_s:
         return diagnosis, evidence, 0.0
-    located = tuple(replace(e, when_s=_spans(e.when_s, start_s)) for e in diagnosis.located)
-    data = tuple(replace(p, when_s=_spans(p.when_s, start_s)) for p in diagnosis.data)
+    located = tuple(structs.replace(e, when_s=_spans(e.when_s, start_s)) for e in diagnosis.located)
+    data = tuple(structs.replace(p, when_s=_spans(p.when_s, start_s)) for p in diagnosis.data)
     residuals = tuple(replace(r, t_s=r.t_s - start_s) for r in evidence.residuals)
     runs = evidence.free_runs
     if runs is not None:
         runs = replace(runs, start_s=runs.start_s - start_s)
     shown = replace(evidence, residuals=residuals, free_runs=runs)
-    return replace(diagnosis, located=located, data=data), shown, start_s
+    return structs.replace(diagnosis, located=located, data=data), shown, start_s
 
 
 def _start_s(evidence: Evidence) -> float:

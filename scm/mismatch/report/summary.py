@@ -36,12 +36,12 @@ def _lines(diagnosis: Diagnosis, out: Path, retuned_m: float | None) -> Iterator
     yield f"{verdict}: {verdict_sentence(diagnosis)}"
     for effect in diagnosis.effects:
         yield f"  {effect.name}  {percent(effect.probability)}  {_numbers(effect)}".rstrip()
-        yield f"    {pretty(effect.said)}"
+        yield f"    {pretty(effect.text)}"
     for question in diagnosis.undecided:
         yield f"  undecided: {' or '.join(map(title_of, question.between))}"
         yield f"    drive this: {question.drive_this}"
-    for left in diagnosis.unasked:
-        yield f"  left unasked: {left.said}"
+    for left in diagnosis.unanswered:
+        yield f"  left unasked: {left.text}"
     if busy := processor_said(diagnosis):
         yield f"  {busy}"
     yield from _problems(diagnosis.data)
@@ -53,7 +53,7 @@ def _problems(problems: Sequence[DataProblem]) -> Iterator[str]:
     """Yield what is wrong with the recording, what is alike in several sensors once."""
     alike: dict[tuple[str, str, str], list[str]] = {}
     for problem in problems:
-        key = (problem.said, problem.corrected, problem.record_instead)
+        key = (problem.text, problem.corrected, problem.record_instead)
         alike.setdefault(key, []).append(problem.channel)
     for (said, corrected, instead), channels in alike.items():
         where = ", ".join(filter(None, ("recording", _sensors(channels))))
@@ -69,7 +69,7 @@ def _sensors(channels: Sequence[str]) -> str:
 
 def _numbers(effect: Effect) -> str:
     listed = [f"{name_of(n, e.unit)} {interval(e)}" for n, e in effect.parameters.items()]
-    return effect.law or "; ".join(listed)
+    return effect.formula or "; ".join(listed)
 
 
 def _better(diagnosis: Diagnosis, retuned_m: float | None) -> Iterator[str]:

@@ -26,11 +26,11 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
 
 def _nothing_named(diagnosis: Diagnosis) -> str:
     """Say that no effect was found, and whether there was time to look for all."""
-    if diagnosis.verdict is Verdict.NONE and diagnosis.unasked:
+    if diagnosis.verdict is Verdict.NONE and diagnosis.unanswered:
         return "Nothing beyond noise was found, but time ran out before all was asked."
     if diagnosis.verdict is Verdict.NONE:
         return "Nothing beyond noise: the simulator drives as the car does."
-    if diagnosis.unasked:
+    if diagnosis.unanswered:
         return "Simulator and recording differ, and time ran out before a cause was found."
     return "Simulator and recording differ, and no cause could be named."
 
@@ -38,7 +38,7 @@ def _nothing_named(diagnosis: Diagnosis) -> str:
 def processor_said(diagnosis: Diagnosis) -> str:
     """Say that other processes took the time that a search lacked; nothing where they did not."""
     share = diagnosis.processor_share
-    if not diagnosis.unasked or share is None or share >= _WHOLE_PROCESSOR:
+    if not diagnosis.unanswered or share is None or share >= _WHOLE_PROCESSOR:
         return ""
     return f"This process got {percent(share)} of a processor: the computer was busy."
 
@@ -84,7 +84,7 @@ def all_named(effects: Sequence[Effect]) -> str:
 def effect_title(effect: Effect) -> str:
     """Return an effect as the verdict names it; one outside the library says so."""
     name = title_of(effect.name)
-    return name if effect.listed else f"{name}, an effect outside its library"
+    return name if effect.is_known else f"{name}, an effect outside its library"
 
 
 def _undecided_sentence(diagnosis: Diagnosis) -> str:

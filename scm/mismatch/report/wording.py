@@ -136,8 +136,8 @@ def sureness(effect: Effect) -> str:
     """Return how sure an effect is, and what else it might be."""
     words = next((said for least, said in _SURE if effect.probability >= least), "Possible")
     said = f"{words}: {percent(effect.probability)}"
-    if effect.rivals:
-        best = max(effect.rivals, key=lambda rival: rival.probability)
+    if effect.alternatives:
+        best = max(effect.alternatives, key=lambda rival: rival.probability)
         said += f". Next best is {title_of(best.name)}, {percent(best.probability)}"
     return said + "."
 

@@ -98,7 +98,7 @@ def failed(label: Label, words: str) -> Outcome:
 def is_law(effect: Effect, label: Label) -> bool:
     """Say whether a law outside the library has the right equation and variables."""
     return (
-        not effect.listed
+        not effect.is_known
         and effect.equation.value in label.equations
         and same_variables(effect.depends_on, label.needs, label.allows)
     )
@@ -109,13 +109,13 @@ def _was_said(name: str, label: Label, diagnosis: Diagnosis) -> bool:
         return any(is_law(effect, label) for effect in diagnosis.effects)
     if name == "unit_error" and any(problem.name == "unit" for problem in diagnosis.data):
         return True
-    return any(effect.listed and effect.name == name for effect in diagnosis.effects)
+    return any(effect.is_known and effect.name == name for effect in diagnosis.effects)
 
 
 def _belongs(effect: Effect, label: Label) -> bool:
     if label.kind == "unlisted":
         return is_law(effect, label)
-    return effect.listed and effect.name in label.names
+    return effect.is_known and effect.name in label.names
 
 
 def _is_twin(name: str, label: Label, undecided: set[str]) -> bool:
@@ -135,7 +135,7 @@ def _twins_undecided(label: Label, said: tuple[str, ...], undecided: set[str]) -
 
 def _compared(effect: Effect, label: Label) -> list[tuple[float | None, bool]]:
     """Return (relative error, inside the interval) of each parameter whose truth is known."""
-    if not effect.listed or effect.name not in label.names:
+    if not effect.is_known or effect.name not in label.names:
         return []
     truth = label.parameters[label.names.index(effect.name)]
     found: list[tuple[float | None, bool]] = []

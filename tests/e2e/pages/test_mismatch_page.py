@@ -2,10 +2,10 @@
 
 import shutil
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from scm.fleet import LockstepLink
 from scm.maps.load import load_map

@@ -121,7 +121,7 @@ def test_a_broken_channel_makes_no_sensor_suspicious(
 def test_a_gap_and_uneven_rows_are_said_in_words(drive: Drive, nigel: Car) -> None:
     def words(change: Change, name: str) -> str:
         found = check(changed(drive(0), POSE, change), nigel).problems
-        return next(one.said for one in found if one.name == name)
+        return next(one.text for one in found if one.name == name)
 
     assert re.fullmatch(r"One gap of \d\.\d\d s in \d+\.\d s\.", words(gap, "gap"))
     assert re.fullmatch(

@@ -100,9 +100,9 @@ def test_without_a_verdict_it_is_said_what_can_still_be_concluded(drive: Drive, 
     undriven = replace(drive(0), channels=kept)
     healthy = check(undriven, nigel).problems[0]
     assert healthy.name == "no_verdict"
-    assert "agree" in healthy.said
+    assert "agree" in healthy.text
     assert healthy.record_instead
-    assert "+0.10" in check(changed(undriven, biased), nigel).problems[0].said
+    assert "+0.10" in check(changed(undriven, biased), nigel).problems[0].text
 
 
 def test_a_recording_that_runs_backwards_in_time_allows_no_verdict(

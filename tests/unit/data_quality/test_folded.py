@@ -5,14 +5,14 @@ from scm.data_quality.problem import DataProblem, folded
 
 def lost(channel: str, rows: int = 3) -> DataProblem:
     return DataProblem(
-        channel=channel, name="not_finite", said=f"{rows} of 1500 rows hold no number."
+        channel=channel, name="not_finite", text=f"{rows} of 1500 rows hold no number."
     )
 
 
 def test_problems_that_say_the_same_of_two_channels_are_one() -> None:
     (one,) = folded([lost("pose.x"), lost("pose.y")])
     assert one.channel == "pose.x, pose.y"
-    assert one.said == "3 of 1500 rows hold no number."
+    assert one.text == "3 of 1500 rows hold no number."
 
 
 def test_of_many_channels_their_number_is_given() -> None:

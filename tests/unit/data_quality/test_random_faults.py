@@ -8,7 +8,7 @@ from bench.recording_faults import FAULTS, tried
 @pytest.mark.parametrize("seed", [*range(20), 5565, 21821])  # the last two: shuffled rows
 def test_a_spoilt_recording_replays_as_the_clean_one_or_a_sentence_names_the_change(seed):
     outcome = tried(seed)
-    assert outcome.is_right, f"{outcome.kind}: {', '.join(outcome.faults)}: {outcome.said}"
+    assert outcome.is_right, f"{outcome.kind}: {', '.join(outcome.faults)}: {outcome.text}"
 
 
 def test_there_are_faults_of_every_kind():

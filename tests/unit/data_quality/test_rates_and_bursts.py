@@ -84,7 +84,7 @@ def test_rows_handed_over_together_are_late_and_no_jumps(
     found = prepare(recording, nigel)
     (problem,) = found.problems
     assert (problem.channel, problem.name) == ("pose.*", "bursts")
-    assert f"up to {together} at one moment" in problem.said
+    assert f"up to {together} at one moment" in problem.text
     (ready,) = found.recordings
     for name in POSE:
         channel, true = ready.channels[name], drive(0).channels[name]

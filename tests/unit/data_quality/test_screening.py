@@ -89,7 +89,7 @@ def names(screened: Screened) -> list[str]:
 
 
 def said(screened: Screened) -> str:
-    return " ".join(f"{p.channel}: {p.said} {p.corrected}" for p in screened.problems)
+    return " ".join(f"{p.channel}: {p.text} {p.corrected}" for p in screened.problems)
 
 
 def test_a_clean_recording_keeps_every_row(clean: dict[str, Floats], nigel: Car) -> None:

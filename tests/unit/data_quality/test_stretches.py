@@ -66,8 +66,8 @@ def test_a_pause_of_all_tables_cuts_them_together(drive: Drive, nigel: Car, paus
         assert np.array_equal(after, channel.values[channel.t >= 40.0]), name
     (problem,) = found.problems
     assert problem.name == "gap"
-    assert "2 stretches" in problem.said
-    assert "Left out" not in problem.said
+    assert "2 stretches" in problem.text
+    assert "Left out" not in problem.text
 
 
 def test_scans_are_cut_with_the_rest(drive: Drive, nigel: Car) -> None:
@@ -157,7 +157,7 @@ def test_short_rest_is_left_out_and_its_rows_are_counted(drive: Drive, nigel: Ca
     (problem,) = found.problems
     t = cut.channel("pose.x").t
     left, of = int(((t > 99.0) & (t < 102.0)).sum()), len(t)
-    assert f"{left} of {of} rows of pose.*" in problem.said
+    assert f"{left} of {of} rows of pose.*" in problem.text
     assert len(problem.when_s or ()) == 2
 
 
@@ -167,8 +167,8 @@ def test_a_table_whose_second_half_is_a_day_late_is_left_out_there(
     found = stretches(paused(drive(0), 40.0, DAY_S, only="command."), nigel)
     assert spans(found.recordings, "pose.x")[0][1] == pytest.approx(41.0, abs=0.1)
     assert len(found.recordings) == 1
-    assert "rows of pose.*" in found.problems[0].said
-    assert "rows of command.*" in found.problems[0].said
+    assert "rows of pose.*" in found.problems[0].text
+    assert "rows of command.*" in found.problems[0].text
 
 
 def test_a_recording_that_cannot_be_driven_stays_whole(drive: Drive, nigel: Car) -> None:
@@ -230,7 +230,7 @@ def test_commands_of_another_clock_are_named_as_such(drive: Drive, nigel: Car) -
     recording = paused(drive(0), 0.0, SINCE_1970_S, only="pose.")
     own = {n: c for n, c in recording.channels.items() if n.startswith(("pose.", "command."))}
     found = check(replace(recording, channels=own), nigel)
-    said = {p.name: p.said for p in found.problems if p.channel.startswith("command.")}
+    said = {p.name: p.text for p in found.problems if p.channel.startswith("command.")}
     assert "share no time" in said["clock"]
     assert "without_effect" not in said
 

@@ -37,7 +37,7 @@ def with_speed(recording: Recording, noise: float = 0.0) -> Recording:
 
 
 def found_in(recording: Recording, car: Car) -> dict[str, str]:
-    return {p.channel: p.said for p in check(recording, car).problems if p.name == "clipped"}
+    return {p.channel: p.text for p in check(recording, car).problems if p.name == "clipped"}
 
 
 def size(recording: Recording, name: str, percent: float) -> float:
@@ -55,8 +55,8 @@ def test_a_sensor_that_stops_at_a_value_is_clipped_there(
     (problem,) = [p for p in found.problems if p.name == "clipped"]
     at_limit = int((np.abs(recording.channels[name].values) == limit).sum())
     assert problem.channel == name
-    assert f"±{limit:.4g}" in problem.said
-    assert f"{at_limit} of {len(recording.channels[name].t)} rows" in problem.said
+    assert f"±{limit:.4g}" in problem.text
+    assert f"{at_limit} of {len(recording.channels[name].t)} rows" in problem.text
     kept = corrected(recording, found).channels[name]
     assert len(kept.t) == len(recording.channels[name].t) - at_limit
     assert np.abs(kept.values).max() < limit
@@ -121,8 +121,8 @@ def test_the_unit_of_a_clipped_sensor_is_told_by_what_it_measures(
         lambda c: replace(c, values=np.degrees(c.values)),
     )
     (unit,) = [p for p in check(recording, nigel).problems if p.name == "unit"]
-    assert "57.3" in unit.said
-    assert "deg/s" in unit.said
+    assert "57.3" in unit.text
+    assert "deg/s" in unit.text
 
 
 def test_an_accelerometer_that_is_shaken_to_its_range_is_clipped(drive: Make, nigel: Car) -> None:

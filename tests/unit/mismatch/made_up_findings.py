@@ -1,14 +1,16 @@
 """Made-up diagnoses with evidence that looks as a real one does, for the tests of the report."""
 
+import dataclasses
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from scm.data_quality.problem import DataProblem
-from scm.mismatch.evidence import Curve, Evidence, FreeRuns, Ordinary, Residual, Tried
+from scm.mismatch.evidence import Curve, Evidence, FreeRuns, RefittedParameter, Residual, Tried
 from scm.mismatch.findings import (
+    Alternative,
     Diagnosis,
     Effect,
     Equation,
@@ -17,8 +19,7 @@ from scm.mismatch.findings import (
     Located,
     PartErrors,
     Place,
-    Rival,
-    Unasked,
+    Unanswered,
     Undecided,
     Verdict,
 )
@@ -58,6 +59,12 @@ TERM = Term(
 '''
 
 
+def replace(record, **changes):
+    """Return a record with changes, a struct or a dataclass."""
+    change = dataclasses.replace if dataclasses.is_dataclass(record) else msgspec.structs.replace
+    return change(record, **changes)
+
+
 def estimate(value, unit="1", spread=0.1):
     half = spread * abs(value) or spread
     return Estimate(value=value, low=value - half, high=value + half, unit=unit)
@@ -66,20 +73,20 @@ def estimate(value, unit="1", spread=0.1):
 def lag():
     return Effect(
         name="drive_lag",
-        listed=True,
+        is_known=True,
         equation=Equation.DRIVE,
         depends_on=("throttle", "time"),
         parameters={"time_constant_s": estimate(0.142, "s")},
         probability=0.973,
-        said="The motor's force follows the throttle with a lag of 0.14 s. The simulator lets it "
+        text="The motor's force follows the throttle with a lag of 0.14 s. The simulator lets it "
         "follow at once.",
-        rivals=(
-            Rival(
+        alternatives=(
+            Alternative(
                 name="drive_delay",
                 probability=0.021,
                 ruled_out_by="The force starts to rise at once and not after a pause.",
             ),
-            Rival(
+            Alternative(
                 name="battery_sag",
                 probability=0.0004,
                 ruled_out_by="The error does not grow with time.",
@@ -91,7 +98,7 @@ def lag():
 def patch():
     return Effect(
         name="surface_patch",
-        listed=True,
+        is_known=True,
         equation=Equation.SURFACE,
         depends_on=("x", "y"),
         parameters={
@@ -102,9 +109,11 @@ def patch():
             "rolling": estimate(0.06),
         },
         probability=0.91,
-        said="On a round spot of 0.35 m the floor is slippery and slows the wheels.",
-        rivals=(
-            Rival(name="grade", probability=0.05, ruled_out_by="Elsewhere the floor is level."),
+        text="On a round spot of 0.35 m the floor is slippery and slows the wheels.",
+        alternatives=(
+            Alternative(
+                name="grade", probability=0.05, ruled_out_by="Elsewhere the floor is level."
+            ),
         ),
     )
 
@@ -112,14 +121,16 @@ def patch():
 def unlisted():
     return Effect(
         name="drive force against heading",
-        listed=False,
+        is_known=False,
         equation=Equation.DRIVE,
         depends_on=("heading",),
         parameters={"strength": estimate(0.42, "N")},
         probability=0.94,
-        said="Something pulls on the car with up to 0.42 N, depending on where it heads.",
-        law="F = -0.42 N · sin(2 · heading)",
-        rivals=(Rival(name="wind", probability=0.03, ruled_out_by="It turns twice in a circle."),),
+        text="Something pulls on the car with up to 0.42 N, depending on where it heads.",
+        formula="F = -0.42 N · sin(2 · heading)",
+        alternatives=(
+            Alternative(name="wind", probability=0.03, ruled_out_by="It turns twice in a circle."),
+        ),
     )
 
 
@@ -217,7 +228,7 @@ def free_runs(before=0.36, after=0.042, windows=30, seed=3):
     )
 
 
-def ordinary():
+def refitted():
     rows = (
         ("body.mass_kg", 2.4, 0.15, 2.43, 0.11, "kg"),
         ("drive.stall_torque_nm", 0.3, 0.03, 0.325, 0.02, "N*m"),
@@ -227,7 +238,7 @@ def ordinary():
         ("body.cog_to_rear_axle_m", 0.0708, 0.004, 0.0712, 0.006, "m"),
     )
     return tuple(
-        Ordinary(
+        RefittedParameter(
             key=key,
             given=given,
             given_std=std,
@@ -276,7 +287,7 @@ def evidence(**more):
             residual("yaw moment", "N*m", lambda t, x, y: 0.004 * np.sin(t / 9), 2),
         ),
         "free_runs": free_runs(),
-        "ordinary": ordinary(),
+        "refitted": refitted(),
         "tried": tried(),
     }
     return Evidence(**{**shown, **more})
@@ -308,7 +319,7 @@ def one_effect():
     problem = DataProblem(
         channel="pose.*",
         name="clock_offset",
-        said="Poses are stamped 41 ms late against the gyro.",
+        text="Poses are stamped 41 ms late against the gyro.",
         corrected="all poses were moved by 41 ms",
     )
     found = diagnosis(
@@ -385,11 +396,11 @@ def cut_short():
     """Nothing was found in too short a time."""
     found, *others = none()
     late = "was not sought to the end: the budget of 60 s ended."
-    unasked = (
-        Unasked(name="effects", said=f"What the library holds {late}"),
-        Unasked(name="laws", said=f"What it does not hold {late}"),
+    unanswered = (
+        Unanswered(name="effects", text=f"What the library holds {late}"),
+        Unanswered(name="laws", text=f"What it does not hold {late}"),
     )
-    return replace(found, unasked=unasked), *others
+    return replace(found, unanswered=unanswered), *others
 
 
 def undecided():
@@ -403,7 +414,7 @@ def undecided():
     problem = DataProblem(
         channel="imu.*",
         name="missing",
-        said="The recording has no IMU.",
+        text="The recording has no IMU.",
         record_instead="The gyro, at 50 Hz or more.",
     )
     found = diagnosis(
@@ -450,20 +461,20 @@ def bad_data():
         DataProblem(
             channel="command.throttle",
             name="missing",
-            said="The recording holds no throttle command.",
+            text="The recording holds no throttle command.",
             record_instead="The command as it is sent to the motor, with its time.",
         ),
         DataProblem(
             channel="pose.x",
             name="gap",
-            said="Poses are missing for 2.1 s.",
+            text="Poses are missing for 2.1 s.",
             when_s=((12.0, 14.1),),
             record_instead="Keep the tag in the camera's sight.",
         ),
         DataProblem(
             channel="imu.gyro_z",
             name="unit",
-            said="The gyro is in degrees a second.",
+            text="The gyro is in degrees a second.",
             corrected="divided by 57.3",
         ),
     )

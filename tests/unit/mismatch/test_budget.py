@@ -91,7 +91,7 @@ def test_a_question_is_told_once_and_whether_it_was_begun():
     budget.attempt(Question.LAWS, lambda: [clock.set_ns(nanoseconds(61.0)), budget.check()])
     budget.attempt(Question.LAWS, budget.check)
     budget.attempt(Question.CALM, budget.check)
-    assert [question.said for question in budget.unasked] == [
+    assert [question.text for question in budget.unasked] == [
         "Laws outside the library were not sought to the end: the budget of 60 s ended.",
         "Effects that the noise believed in may hide were not sought: the budget of 60 s ended.",
     ]
@@ -260,7 +260,7 @@ def test_a_car_that_differs_in_many_ways_keeps_its_first_fit_where_strides_come_
     monkeypatch.setattr(diagnose, "is_far", lambda search: bool(search.retuned))
     monkeypatch.setattr(diagnose, "strays", lambda _: True)
     found = diagnose_car([made_drive(seconds=12.0)], nigel(), budget_s=0.0, clock=StepClock())
-    assert names(found.diagnosis.unasked) == ["effects", "strides"]
+    assert names(found.diagnosis.unanswered) == ["effects", "strides"]
     assert not found.searched.rough
     assert found.best.z.tolist() == no_time.best.z.tolist()
 
@@ -282,7 +282,7 @@ def test_where_strides_come_too_late_only_they_are_told_as_left(monkeypatch):
     monkeypatch.setattr(diagnose, "is_far", lambda search: bool(search.retuned))
     monkeypatch.setattr(diagnose, "strays", lambda _: True)
     found = diagnose_car([made_drive(seconds=12.0)], nigel(), budget_s=60.0, clock=clock)
-    assert names(found.diagnosis.unasked) == ["strides"]
+    assert names(found.diagnosis.unanswered) == ["strides"]
 
 
 def test_as_long_as_the_first_fit_took_is_kept_for_what_follows_a_search(monkeypatch):

@@ -1,9 +1,8 @@
 """The judge: free runs before and after, against the recording and against noise alone."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from scm.errors import RecordingError
 from scm.mismatch.judge import judge, nothing_got_worse

@@ -1,7 +1,6 @@
 """`car.toml`: every effect that can be found loads again with its number, and comments stay."""
 
 import tomllib
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ from scm.vehicles.describe_effects import all_effects, params_of
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.sensor_fault import all_sensor_faults
 from tests.unit.mismatch import made_up_findings as made_up
+from tests.unit.mismatch.made_up_findings import replace
 
 SHOWN = Evidence(vehicle="nigel", recordings=("tuesday.yaml",))
 MOVED = ("body.mass_kg", 2.512345678)
@@ -44,8 +44,8 @@ def found_effect(name, params):
         )
         for p in params
     }
-    return Effect(name=name, listed=True, equation=Equation.BODY, depends_on=(),
-                  parameters=parameters, probability=0.9, said="")  # fmt: skip
+    return Effect(name=name, is_known=True, equation=Equation.BODY, depends_on=(),
+                  parameters=parameters, probability=0.9, text="")  # fmt: skip
 
 
 def patched_with(car, name, params):
@@ -101,7 +101,7 @@ def test_a_moved_number_says_its_interval_and_what_stood_there(tmp_path):
     car = load_car("nigel")
     patched = car.with_terms([], {MOVED[0]: MOVED[1]})
     estimate = Estimate(value=MOVED[1], low=2.4, high=2.6, unit="kg")
-    shown = replace(SHOWN, ordinary=(replace(made_up.ordinary()[0], found=estimate),))
+    shown = replace(SHOWN, refitted=(replace(made_up.refitted()[0], found=estimate),))
     write_car(made_up.diagnosis(), shown, car, patched, tmp_path)
     quantity = load_car(tmp_path / "car.toml").quantity(MOVED[0])
     assert quantity.source == ("mismatch: tuesday.yaml, 90 % 2.4..2.6; before: 2.4 +- 0.15 (ours)")

@@ -1,14 +1,14 @@
 """`report.json`: exactly the fixed fields, and numbers that every reader takes."""
 
 import json
-from dataclasses import replace
 
 import pytest
 
 from scm.mismatch.findings import Estimate
-from scm.mismatch.report.as_json import json_text, report_fields
+from scm.mismatch.report.as_json import json_text, plain
 from scm.mismatch.report.shown_time import on_clock
 from tests.unit.mismatch import made_up_findings as made_up
+from tests.unit.mismatch.made_up_findings import replace
 
 TOP = {"verdict", "located", "effects", "undecided", "fit", "runtime_s", "data", "unasked",
        "processor_share", "compared_s"}  # fmt: skip
@@ -54,7 +54,7 @@ def test_a_question_left_has_exactly_its_fields():
 
 
 def test_words_of_the_verdict_are_text():
-    report = report_fields(made_up.pair()[0])
+    report = plain(made_up.pair()[0])
     assert report["verdict"] == "mismatch"
     assert type(report["verdict"]) is str
     assert report["effects"][1]["equation"] == "surface"

@@ -1,20 +1,20 @@
 """The page: complete, self-contained, and safe whatever names the files hold."""
 
 import re
-from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
 from scm.data_quality.problem import DataProblem
-from scm.mismatch.evidence import Evidence, Ordinary, Residual
+from scm.mismatch.evidence import Evidence, RefittedParameter, Residual
 from scm.mismatch.findings import Effect, Equation, Estimate, Located, Verdict
 from scm.mismatch.report.summary import summary
 from scm.mismatch.report.verdict_text import verdict_sentence
 from scm.mismatch.report.write import write_report
 from scm.vehicles.car import load_car
 from tests.unit.mismatch import made_up_findings as made_up
+from tests.unit.mismatch.made_up_findings import replace
 
 ADDRESS = re.compile(r"""(?:https?:)?//[\w.-]+|url\(|@import|<link|<script|\bsrc\s*=""")
 NAMESPACE = "http://www.w3.org/2000/svg"
@@ -96,15 +96,15 @@ def test_a_second_report_leaves_no_picture_of_the_first(tmp_path):
 
 
 def test_names_from_files_cannot_write_html(tmp_path):
-    effect = replace(made_up.unlisted(), name=NASTY, said=NASTY, law=NASTY, depends_on=(NASTY,))
-    problem = DataProblem(channel=NASTY, name=NASTY, said=NASTY, record_instead=NASTY)
+    effect = replace(made_up.unlisted(), name=NASTY, text=NASTY, formula=NASTY, depends_on=(NASTY,))
+    problem = DataProblem(channel=NASTY, name=NASTY, text=NASTY, record_instead=NASTY)
     found = made_up.diagnosis(verdict=Verdict.MISMATCH, effects=(effect,), data=(problem,))
     shown = made_up.evidence(
         vehicle=NASTY,
         recordings=(NASTY,),
         residuals=(replace(made_up.evidence().residuals[0], channel=NASTY, unit=NASTY),),
         curves=(replace(made_up.curve(NASTY), x_name=NASTY, y_name=NASTY, x_unit=NASTY),),
-        ordinary=(replace(made_up.ordinary()[0], key=NASTY),),
+        refitted=(replace(made_up.refitted()[0], key=NASTY),),
         tried=(replace(made_up.tried()[0], name=NASTY),),
     )
     nigel = load_car("nigel")
@@ -192,9 +192,9 @@ def test_the_command_line_says_the_same_verdict(tmp_path, name, sentence):
 def test_page_and_command_line_say_what_there_was_no_time_for(page_of, tmp_path):
     case = made_up.cut_short()
     page, lines = page_of("cut_short"), summary(case[0], tmp_path).splitlines()
-    for question in case[0].unasked:
-        assert question.said.partition(":")[0] in page
-        assert f"  left unasked: {question.said}" in lines
+    for question in case[0].unanswered:
+        assert question.text.partition(":")[0] in page
+        assert f"  left unasked: {question.text}" in lines
     assert "What was checked" not in page
     assert "Time ran out" in page
     assert "Time ran out" not in page_of("none")
@@ -217,9 +217,9 @@ def test_a_difference_that_was_not_explained_in_time_may_have_a_cause():
 
 
 def test_a_fault_of_measuring_is_not_blamed_on_the_simulator(tmp_path):
-    effect = Effect(name="gyro_bias", listed=True, equation=Equation.SENSOR, depends_on=(),
+    effect = Effect(name="gyro_bias", is_known=True, equation=Equation.SENSOR, depends_on=(),
                     parameters={"bias_rad_s": made_up.estimate(0.02, "rad/s")}, probability=0.99,
-                    said="The gyro turns at rest.")  # fmt: skip
+                    text="The gyro turns at rest.")  # fmt: skip
     found = made_up.diagnosis(verdict=Verdict.MISMATCH, effects=(effect,))
     nigel = load_car("nigel")
     page = written(tmp_path, (found, made_up.evidence(), nigel, nigel))
@@ -239,11 +239,11 @@ def test_problems_that_stop_the_verdict_stand_on_the_first_screen(page_of):
 )
 def test_a_number_at_its_bound_stands_on_the_first_screen(tmp_path, given, found, is_shown):
     diagnosis, evidence, *cars = made_up.none()
-    lock = Ordinary(
+    lock = RefittedParameter(
         key="drive.axle_lock", given=given, given_std=0.5, bounds=(0.0, 1.0),
         found=Estimate(value=found, low=0.8, high=1.0, unit="1"),
     )  # fmt: skip
-    page = written(tmp_path, (diagnosis, replace(evidence, ordinary=(lock,)), *cars))
+    page = written(tmp_path, (diagnosis, replace(evidence, refitted=(lock,)), *cars))
     said = "moved from 0.5 to 1, the most that is physically possible"
     assert (said in page[: page.index("<section")]) == is_shown
 
@@ -280,7 +280,7 @@ def test_windows_shown_are_those_that_the_fit_did_not_see(tmp_path):
 
 
 def test_a_recording_of_another_car_is_said_to_be_one(tmp_path):
-    problem = DataProblem(channel="*", name="other_car", said="Wheels roll 1.6 times as far.",
+    problem = DataProblem(channel="*", name="other_car", text="Wheels roll 1.6 times as far.",
                           record_instead="Nothing: give the file of the car.")  # fmt: skip
     nigel = load_car("nigel")
     page = written(tmp_path, (made_up.diagnosis(data=(problem,)), made_up.evidence(), nigel, nigel))
@@ -289,7 +289,7 @@ def test_a_recording_of_another_car_is_said_to_be_one(tmp_path):
 
 def test_what_is_wrong_with_several_channels_alike_is_one_card(tmp_path):
     problems = tuple(
-        DataProblem(channel=channel, name="too_short", said="Holds 3 s.", record_instead="More.")
+        DataProblem(channel=channel, name="too_short", text="Holds 3 s.", record_instead="More.")
         for channel in ("pose.*", "imu.*")
     )
     nigel = load_car("nigel")
@@ -301,7 +301,7 @@ def test_what_is_wrong_with_several_channels_alike_is_one_card(tmp_path):
 def test_sensors_of_one_table_are_named_as_a_person_names_them(tmp_path):
     said = "Rows come every 20 ms as a rule."
     problems = tuple(
-        DataProblem(channel=channel, name="jitter", said=said, record_instead="Stamp it there.")
+        DataProblem(channel=channel, name="jitter", text=said, record_instead="Stamp it there.")
         for channel in ("pose.*", "encoder.*, imu.*")
     )
     nigel = load_car("nigel")
@@ -335,7 +335,7 @@ def test_a_bars_number_stands_clear_of_the_mark_of_noise(tmp_path):
 
 def test_what_is_wrong_with_several_recordings_alike_is_one_card(tmp_path):
     problems = tuple(
-        DataProblem(channel="speed", name="missing", said=f"{name}: Not there.", record_instead="x")
+        DataProblem(channel="speed", name="missing", text=f"{name}: Not there.", record_instead="x")
         for name in ("one", "two")
     )
     nigel = load_car("nigel")
@@ -361,7 +361,7 @@ def test_ten_effects_are_counted_where_no_sentence_holds_their_names(tmp_path):
 
 def test_a_clock_that_counts_from_1970_is_shown_from_the_start(tmp_path):
     shown, start_s = made_up.evidence(), 1_700_000_000.0
-    problem = DataProblem(channel="pose.*", name="gap", said="Nothing comes.",
+    problem = DataProblem(channel="pose.*", name="gap", text="Nothing comes.",
                           when_s=((start_s + 31.0, start_s + 34.0),))  # fmt: skip
     far = replace(
         shown,
@@ -422,7 +422,7 @@ def test_a_difference_without_a_name_says_what_to_do(tmp_path):
 
 def test_small_things_noticed_in_the_recording_take_one_line_and_no_card(tmp_path):
     small = [
-        DataProblem(channel=f"imu.{i}", name="coarse", said=f"Steps of {i}.") for i in range(9)
+        DataProblem(channel=f"imu.{i}", name="coarse", text=f"Steps of {i}.") for i in range(9)
     ]
     nigel = load_car("nigel")
     case = (made_up.diagnosis(data=tuple(small)), made_up.evidence(), nigel, nigel)

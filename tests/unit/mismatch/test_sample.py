@@ -45,8 +45,8 @@ def test_of_an_hour_a_short_budget_compares_pieces_all_over_it(budget_s):
     assert span(parts[0])[0] < 60.0
     assert span(parts[-1])[1] > 3540.0
     assert problem.name == "partly_compared"
-    assert f"{allowed_s // PIECE_S * PIECE_S:.0f} s of 3600 s" in problem.said
-    assert f"--budget-s {3600.0 / COMPARED:.0f}" in problem.said
+    assert f"{allowed_s // PIECE_S * PIECE_S:.0f} s of 3600 s" in problem.text
+    assert f"--budget-s {3600.0 / COMPARED:.0f}" in problem.text
 
 
 def test_pieces_in_which_the_car_stands_are_not_taken():

@@ -53,9 +53,9 @@ def test_a_law_takes_the_place_of_known_effects_only_by_a_margin():
 
 def test_the_listed_effects_that_a_law_was_held_against_are_its_rivals():
     effect = gust_told()
-    assert not effect.listed
-    assert {"wind", "steer_trim"} <= {rival.name for rival in effect.rivals}
-    assert effect.name not in {rival.name for rival in effect.rivals}
+    assert not effect.is_known
+    assert {"wind", "steer_trim"} <= {rival.name for rival in effect.alternatives}
+    assert effect.name not in {rival.name for rival in effect.alternatives}
 
 
 def test_what_rules_a_law_s_rivals_out_is_how_much_worse_they_explain_the_recording():
@@ -66,6 +66,6 @@ def test_what_rules_a_law_s_rivals_out_is_how_much_worse_they_explain_the_record
 
 def test_probabilities_of_a_law_and_its_rivals_are_of_one_whole():
     effect = gust_told()
-    total = effect.probability + sum(rival.probability for rival in effect.rivals)
+    total = effect.probability + sum(rival.probability for rival in effect.alternatives)
     np.testing.assert_allclose(total, 1.0)
     assert effect.probability > 0.99

@@ -1,9 +1,9 @@
 """A diagnosis is judged by names, laws and parameters, and by nothing kinder."""
 
 import math
-from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace
 
 from scm.data_quality.problem import DataProblem
 from scm.mismatch.findings import Diagnosis, Effect, Equation, Estimate, Undecided, Verdict
@@ -27,8 +27,8 @@ def effect(name, *, listed=True, equation=Equation.BODY, depends_on=("time",), *
         for key, (value, low, high) in values.items()
     }
     return Effect(
-        name=name, listed=listed, equation=equation, depends_on=depends_on, parameters=estimates,
-        probability=0.9, said="",
+        name=name, is_known=listed, equation=equation, depends_on=depends_on, parameters=estimates,
+        probability=0.9, text="",
     )  # fmt: skip
 
 
@@ -83,7 +83,7 @@ def test_one_of_two_is_neither_exact_nor_enough():
 
 
 def test_a_wrong_unit_may_be_reported_as_a_problem_of_the_data():
-    problem = DataProblem(channel="imu.gyro_z", name="unit", said="")
+    problem = DataProblem(channel="imu.gyro_z", name="unit", text="")
     got = score(label("unit_error"), replace(diagnosis(), data=(problem,)))
     assert (got.exact, got.missed) == (True, False)
 
@@ -159,7 +159,7 @@ def test_shared_parameters_of_a_shipped_pair_go_where_the_library_says():
 
 @pytest.mark.parametrize("kind", ["shuffled", "other_car"])
 def test_data_that_fits_no_car_must_be_called_that_and_no_effects_invented(kind):
-    problem = DataProblem(channel="command.throttle", name="other_car", said="")
+    problem = DataProblem(channel="command.throttle", name="other_car", text="")
     truth = label(kind=kind, listed=False)
     assert score(truth, replace(diagnosis(), data=(problem,))).exact
     assert score(truth, diagnosis()).missed
